@@ -1,0 +1,104 @@
+#include <chainmail/deformation.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::chainmail {
+
+namespace {
+
+// Calls visit(node, position at rest) for the nodes that are not fixed within `reach` of `middle`.
+template <typename Visit>
+void visitNodes(const Lattice& lattice, Vec3 middle, double reach, Visit&& visit) noexcept
+{
+    const auto& grid = lattice.grid;
+    const Vec3 last(grid.size - Index3(1));
+    const Index3 low(glm::clamp(glm::ceil((middle - reach - grid.origin) / grid.spacing), Vec3(0.0), last));
+    const Index3 high(glm::clamp(glm::floor((middle + reach - grid.origin) / grid.spacing), Vec3(0.0), last));
+    for (int k = low.z; k <= high.z; ++k) {
+        for (int j = low.y; j <= high.y; ++j) {
+            for (int i = low.x; i <= high.x; ++i) {
+                const auto n = static_cast<Node>(grid.offset({i, j, k}));
+                if (lattice.isNode(n) && !lattice.isFixed(n)) {
+                    visit(n, grid.position({i, j, k}));
+                }
+            }
+        }
+    }
+}
+
+}  // namespace
+
+Deformation::Deformation(const Lattice& lattice, std::uint32_t maxMoves)
+    : lattice_(lattice),
+      u_(lattice.tissue.size(), Vec3f(0.0F)),
+      scratch_(lattice, maxMoves, static_cast<std::uint32_t>(maxSeeds)),
+      map_(lattice.grid, lattice.tissue)
+{
+    before_.reserve(scratch_.moved.capacity());
+}
+
+PropagateResult Deformation::deform(std::span<const Seed> seeds, Yield yield) noexcept
+{
+    before_.assign(scratch_.moved.begin(), scratch_.moved.end());
+    for (const Node n : before_) {
+        u_[n] = Vec3f(0.0F);
+    }
+    const PropagateResult result = propagate(lattice_, u_, scratch_, seeds, yield);
+
+    const auto place = [&](Node n) {
+        map_.place(n, lattice_.grid.position(lattice_.grid.node(n)) + Vec3(u_[n]));
+    };
+    for (const Node n : before_) {
+        if (scratch_.seen[n] != scratch_.pass) {
+            place(n);
+        }
+    }
+    for (const Node n : scratch_.moved) {
+        place(n);
+    }
+    return result;
+}
+
+occupancy::Body Deformation::body(const volume::DistanceField& surface) const noexcept
+{
+    return {lattice_.grid, lattice_.tissue, u_, map_, surface};
+}
+
+std::size_t pressSeeds(const Lattice& lattice, Vec3 centre, double radius, Vec3 normal, std::span<Seed> out) noexcept
+{
+    const double seen = std::max(radius, lattice.grid.spacing);
+    const Vec3 middle = centre + (seen - radius) * normal;
+    std::size_t count = 0;
+    visitNodes(lattice, middle, seen, [&](Node n, Vec3 rest) {
+        const Vec3 r = rest - middle;
+        const double along = glm::dot(r, normal);
+        const double across = glm::dot(r, r) - along * along;
+        const double inside = seen * seen - across;
+        if (inside <= 0.0 || count == out.size()) {
+            return;
+        }
+        const double push = along + std::sqrt(inside);
+        if (push > 0.0) {
+            out[count++] = {n, Vec3f(-push * normal)};
+        }
+    });
+    return count;
+}
+
+std::size_t dragSeeds(const Lattice& lattice, Vec3 rest, Vec3 u, std::span<Seed> out) noexcept
+{
+    const double reach = lattice.grid.spacing;
+    std::size_t count = 0;
+    visitNodes(lattice, rest, reach, [&](Node n, Vec3 at) {
+        if (glm::distance(at, rest) <= reach && count < out.size()) {
+            out[count++] = {n, Vec3f(u)};
+        }
+    });
+    return count;
+}
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chainmail/lattice.h>
+#include <chainmail/propagate.h>
+#include <occupancy/body.h>
+
+#include <span>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// The deformed body of level 1: ChainMail from rest in every tick, so that the shape depends on where the tool is and not
+/// on how it came there, and is exactly at rest when nothing touches it. Keeps the occupancy map in step: only nodes that
+/// moved are rewritten.
+class Deformation {
+public:
+    /// @param maxMoves  node moves per tick; what is left over is reported as residual
+    Deformation(const Lattice& lattice, std::uint32_t maxMoves);
+
+    /// The shape with these nodes held, at most maxSeeds, free to yield along `yield` (see propagate()). Cost O(nodes moved now and last time); allocates nothing.
+    PropagateResult deform(std::span<const Seed> seeds, Yield yield = Yield(0.0F)) noexcept;
+
+    /// Nodes that are not at rest, in the order in which they moved.
+    std::span<const Node> moved() const noexcept { return scratch_.moved; }
+    std::span<const Vec3f> u() const noexcept { return u_; }
+    const Lattice& lattice() const noexcept { return lattice_; }
+    /// What the queries of occupancy/ see. `surface` must outlive it.
+    occupancy::Body body(const volume::DistanceField& surface) const noexcept;
+
+    static constexpr std::size_t maxSeeds = 4096;
+
+private:
+    const Lattice& lattice_;
+    std::vector<Vec3f> u_;            // displacement [m] (count x 3)
+    PropagateScratch scratch_;
+    std::vector<Node> before_;        // moved last time
+    occupancy::OccupancyMap map_;
+};
+
+/// The nodes that a ball pressed against the body pushes ahead of itself, and where to: straight against `normal` onto
+/// the far side of the ball. A ball smaller than the lattice can see is widened to one spacing with the same deepest point.
+/// @param centre  of the ball [m]    @param normal  unit vector out of the body    @returns seeds written to `out`
+std::size_t pressSeeds(const Lattice& lattice, Vec3 centre, double radius, Vec3 normal, std::span<Seed> out) noexcept;
+
+/// The nodes within one spacing of `rest` [m], all displaced by `u` [m]: material that sticks to a needle's tip.
+std::size_t dragSeeds(const Lattice& lattice, Vec3 rest, Vec3 u, std::span<Seed> out) noexcept;
+
+}  // namespace palpate::chainmail

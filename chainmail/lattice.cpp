@@ -1,0 +1,66 @@
+#include <chainmail/lattice.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+#include <algorithm>
+#include <cassert>
+
+namespace palpate::chainmail {
+
+Lattice::Lattice(const volume::NodeGrid& nodes, std::vector<std::uint8_t> tissueOfNodes, const volume::TissueTable& table)
+    : grid(nodes), tissue(std::move(tissueOfNodes)), rows(table.rows.size())
+{
+    assert(tissue.size() == grid.count() && grid.count() < 0xFFFFFFFF);
+    for (Node n = 0; n < tissue.size(); ++n) {
+        const Index3 at = grid.node(n);
+        if (glm::any(glm::equal(at, Index3(0))) || glm::any(glm::equal(at, grid.size - Index3(1)))) {
+            tissue[n] = 0;
+        }
+    }
+    const auto x = static_cast<Node>(1);
+    const auto y = static_cast<Node>(grid.size.x);
+    const auto z = static_cast<Node>(grid.size.x) * static_cast<Node>(grid.size.y);
+    step = {0 - x, x, 0 - y, y, 0 - z, z};
+    for (const auto& row : table.rows) {
+        fixed.push_back(row.fixed ? 1 : 0);
+    }
+    const auto mean = [&](double a, double b) { return static_cast<float>(0.5 * (a + b) * grid.spacing); };
+    for (const auto& a : table.rows) {
+        for (const auto& b : table.rows) {
+            limits.push_back({mean(1.0 - a.compress, 1.0 - b.compress), mean(a.stretch - 1.0, b.stretch - 1.0),
+                              mean(a.shear, b.shear)});
+        }
+    }
+}
+
+Vec3f correction(Vec3f du, int side, const LinkLimits& limits) noexcept
+{
+    const int axis = side / 2;
+    const bool ahead = side % 2 != 0;
+    Vec3f low(-limits.shear);
+    Vec3f high(limits.shear);
+    low[axis] = ahead ? -limits.shorter : -limits.longer;
+    high[axis] = ahead ? limits.longer : limits.shorter;
+    return glm::clamp(du, low, high) - du;
+}
+
+double worstViolation(const Lattice& lattice, std::span<const Vec3f> u) noexcept
+{
+    float worst = 0.0F;
+    for (Node a = 0; a < lattice.tissue.size(); ++a) {
+        if (lattice.tissue[a] == 0) {
+            continue;
+        }
+        for (int side = 1; side < 6; side += 2) {
+            const Node b = lattice.beside(a, side);
+            if (lattice.isNode(b)) {
+                worst = std::max(worst, glm::length(correction(u[b] - u[a], side, lattice.between(a, b))));
+            }
+        }
+    }
+    return static_cast<double>(worst);
+}
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,33 @@
+# All from Debian's packages; docs/dependencies.md says what each one replaces.
+find_package(Threads REQUIRED)
+# TBB first: OpenVDB's find module defines TBB::tbb and the config would then fail.
+find_package(TBB CONFIG REQUIRED)
+
+file(GLOB openvdb_module_dir /usr/lib/*/cmake/OpenVDB)
+list(APPEND CMAKE_MODULE_PATH ${openvdb_module_dir})
+find_package(OpenVDB 10 REQUIRED COMPONENTS openvdb)
+list(REMOVE_ITEM CMAKE_MODULE_PATH ${openvdb_module_dir})
+
+find_package(glm CONFIG REQUIRED)
+find_package(fmt CONFIG REQUIRED)
+find_package(CLI11 CONFIG REQUIRED)
+find_package(nlohmann_json CONFIG REQUIRED)
+find_package(tomlplusplus CONFIG REQUIRED)
+find_package(SQLite3 REQUIRED)
+find_package(Boost 1.74 REQUIRED)
+
+find_package(ITK 5.2 REQUIRED COMPONENTS
+  ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta)
+
+if(PALPATE_VIEWER)
+  find_package(glfw3 3.3 CONFIG REQUIRED)
+  find_package(GLEW REQUIRED)
+  find_package(VTK 9.1 REQUIRED COMPONENTS
+    CommonCore CommonDataModel CommonExecutionModel CommonTransforms FiltersCore FiltersGeneral FiltersSources ImagingCore
+    InteractionStyle IOImage RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
+    RenderingVolume RenderingVolumeOpenGL2)
+endif()
+
+if(BUILD_TESTING)
+  find_package(GTest CONFIG REQUIRED)
+endif()

@@ -1,0 +1,27 @@
+# Flags that every target of ours shares. Third-party headers come in as SYSTEM and stay silent.
+include(CTest)
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM)
+  set(CMAKE_C_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+add_library(palpate_flags INTERFACE)
+# No fused multiply-add and no fast-math: a replay must give the same bits.
+target_compile_options(palpate_flags INTERFACE
+  -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast)
+if(PALPATE_WERROR)
+  target_compile_options(palpate_flags INTERFACE -Werror)
+endif()
+if(PALPATE_SANITIZE)
+  add_compile_options(-fsanitize=${PALPATE_SANITIZE} -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=${PALPATE_SANITIZE})
+else()
+  # GCC's -Wconversion fires under -fsanitize on code that is clean without it.
+  target_compile_options(palpate_flags INTERFACE -Wconversion)
+endif()

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <occupancy/occupancy_map.h>
+#include <volume/scalar_field.h>
+
+#include <cstdint>
+#include <span>
+
+namespace palpate::occupancy {
+
+/// A deformed body, as the queries see it. Views only: whoever deforms owns the memory.
+struct Body {
+    const volume::NodeGrid& grid;            // of the elements at rest
+    std::span<const std::uint8_t> solid;     // not 0 where there is an element      (count x 1)
+    std::span<const Vec3f> u;                // displacement of each element [m]     (count x 3)
+    const OccupancyMap& map;                 // where the displaced elements are
+    const volume::DistanceField& surface;    // signed distance to the surface at rest [m]
+
+    Vec3 restPosition(Element e) const noexcept { return grid.position(grid.node(e)); }
+    Vec3 position(Element e) const noexcept { return restPosition(e) + Vec3(u[e]); }
+};
+
+/// Displacement of the material that is at `rest` when undeformed [m]: trilinear over the elements around it, those that
+/// are not there left out; zero where there is none.
+Vec3 displacementAt(const Body& body, Vec3 rest) noexcept;
+
+/// The undeformed place of what is at `p` now [m]: solves X + u(X) = p by fixed-point steps, started at the nearest element
+/// that the occupancy map finds, so that displacements of many elements are followed. Outside tissue the displacement
+/// fades out with the elements, and X tends to p.
+Vec3 restPoint(const Body& body, Vec3 p) noexcept;
+
+/// Signed distance from `p` to the deformed surface, to first order: the distance at rest of restPoint(p) [m].
+double distance(const Body& body, Vec3 p) noexcept;
+
+}  // namespace palpate::occupancy

@@ -1,0 +1,89 @@
+#include "blocks.h"
+
+#include <chainmail/deformation.h>
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+namespace palpate::chainmail {
+namespace {
+
+// Load, move aside, unload: the body is back at rest, to the bit.
+TEST(Deformation, UnloadedBodyIsExactlyAtRest)
+{
+    const auto lattice = tests::block(15, {}, [](Index3) { return 1; });
+    Deformation body(lattice, 20000);
+    std::vector<Seed> seeds(Deformation::maxSeeds);
+    for (int step = 0; step < 20; ++step) {
+        const Vec3 centre(5.0 + 0.2 * step, 7.0, -1.5 + 0.15 * step);
+        const auto count = pressSeeds(lattice, centre, 2.0, Vec3(0, 0, -1), seeds);
+        EXPECT_GT(count, 0U);
+        body.deform(std::span(seeds).first(count));
+        EXPECT_GT(body.moved().size(), count / 2);
+    }
+    body.deform({});
+    for (const Vec3f u : body.u()) {
+        ASSERT_EQ(u, Vec3f(0));
+    }
+    EXPECT_TRUE(body.moved().empty());
+}
+
+// Same pose, same shape, whichever way it was reached: a detour leaves no trace.
+TEST(Deformation, ShapeDoesNotDependOnThePath)
+{
+    const auto lattice = tests::block(15, {}, [](Index3 at) { return at.x > 9 ? 2 : 1; });
+    Deformation direct(lattice, 20000), detour(lattice, 20000);
+    std::vector<Seed> seeds(Deformation::maxSeeds);
+    const auto press = [&](Deformation& d, Vec3 centre) {
+        d.deform(std::span(seeds).first(pressSeeds(lattice, centre, 2.0, Vec3(0, 0, -1), seeds)));
+    };
+    press(direct, {8, 7, 1});
+    press(detour, {3, 3, 2});
+    press(detour, {12, 9, 1.5});
+    press(detour, {8, 7, 1});
+    for (std::size_t n = 0; n < direct.u().size(); ++n) {
+        ASSERT_EQ(direct.u()[n], detour.u()[n]);
+    }
+}
+
+// After a press no node is inside the ball, and those under it lie on its far side.
+TEST(Deformation, NoPressedNodeIsInsideTheBall)
+{
+    const auto lattice = tests::block(21, {}, [](Index3) { return 1; });
+    Deformation body(lattice, 100000);
+    std::vector<Seed> seeds(Deformation::maxSeeds);
+    const Vec3 centre(10.2, 9.7, 0.5);
+    const double radius = 3.3;
+    const auto count = pressSeeds(lattice, centre, radius, Vec3(0, 0, -1), seeds);
+    const auto result = body.deform(std::span(seeds).first(count), Yield(0, 0, 1));
+    EXPECT_EQ(result.residual, 0.0);
+    for (Node n = 0; n < lattice.tissue.size(); ++n) {
+        if (lattice.isNode(n)) {
+            const Vec3 at = lattice.grid.position(lattice.grid.node(n)) + Vec3(body.u()[n]);
+            ASSERT_GE(glm::distance(at, centre), radius - 1e-4);
+        }
+    }
+}
+
+// Only nodes that change their cell are rewritten: a press that stays where it is rewrites nothing.
+TEST(Deformation, OccupancyFollowsOnlyWhatMoved)
+{
+    const auto lattice = tests::block(15, {}, [](Index3) { return 1; });
+    Deformation body(lattice, 20000);
+    volume::DistanceField surface;
+    std::vector<Seed> seeds(Deformation::maxSeeds);
+    const auto count = pressSeeds(lattice, {7, 7, 0.6}, 2.0, Vec3(0, 0, -1), seeds);
+    body.deform(std::span(seeds).first(count));
+    const auto map = body.body(surface);
+    const auto once = map.map.rewrites();
+    EXPECT_GT(once, 0U);
+    EXPECT_LE(once, body.moved().size());
+    body.deform(std::span(seeds).first(count));
+    EXPECT_EQ(map.map.rewrites(), once);
+    body.deform({});
+    EXPECT_EQ(map.map.rewrites(), 2 * once);
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

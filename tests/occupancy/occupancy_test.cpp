@@ -1,0 +1,214 @@
+#include "../allocations.h"
+
+#include <occupancy/query.h>
+
+#include <gtest/gtest.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <set>
+
+namespace palpate::occupancy {
+namespace {
+
+/// A body on an n^3 grid, 1 m apart, whose surface is given by a signed distance.
+struct Solid {
+    Solid(int n, const std::function<double(Vec3)>& sd)
+        : grid{Index3(n), Vec3(0.0), 1.0}, solid(grid.count()), u(grid.count(), Vec3f(0)), surface{{grid, std::vector<float>(grid.count())}}
+    {
+        for (std::size_t i = 0; i < grid.count(); ++i) {
+            const double d = sd(grid.position(grid.node(i)));
+            solid[i] = d < 0.0 ? 1 : 0;
+            surface.values[i] = static_cast<float>(d);
+        }
+        map = std::make_unique<OccupancyMap>(grid, solid);
+    }
+    void displace(const std::function<Vec3(Vec3)>& field)
+    {
+        for (Element e = 0; e < grid.count(); ++e) {
+            if (solid[e] != 0) {
+                u[e] = Vec3f(field(grid.position(grid.node(e))));
+                map->place(e, body().position(e));
+            }
+        }
+    }
+    Body body() const { return {grid, solid, u, *map, surface}; }
+
+    volume::NodeGrid grid;
+    std::vector<std::uint8_t> solid;
+    std::vector<Vec3f> u;
+    volume::DistanceField surface;
+    std::unique_ptr<OccupancyMap> map;
+};
+
+double slab(Vec3 p)
+{
+    return 8.3 - p.z;  // tissue above z = 8.3
+}
+
+std::set<Element> elementsWithin(const Solid& s, const Capsule& tool, double reach)
+{
+    std::set<Element> found;
+    for (Element e = 0; e < s.grid.count(); ++e) {
+        if (s.solid[e] == 0) {
+            continue;
+        }
+        const Vec3 p = s.body().position(e);
+        const Vec3 along = tool.b - tool.a;
+        const double t = glm::clamp(glm::dot(p - tool.a, along) / std::max(1e-300, glm::dot(along, along)), 0.0, 1.0);
+        if (glm::distance(p, tool.a + t * along) < reach) {
+            found.insert(e);
+        }
+    }
+    return found;
+}
+
+// However the elements are displaced, a query finds those that a look at all of them finds.
+TEST(OccupancyMap, FindsWhatExhaustiveSearchFindsAfterRandomDisplacements)
+{
+    Solid s(20, slab);
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> shift(-3.5, 3.5), place(2.0, 18.0), radius(0.3, 3.0);
+    auto contacts = std::make_unique<ContactSet>();
+    for (int round = 0; round < 50; ++round) {
+        s.displace([&](Vec3) { return Vec3(shift(random), shift(random), shift(random)); });
+        const Vec3 a(place(random), place(random), place(random));
+        const Capsule tool{a, round % 2 == 0 ? a : a + Vec3(shift(random), shift(random), 1.0), radius(random)};
+        touch(s.body(), tool, *contacts);
+        std::set<Element> found;
+        for (std::size_t i = 0; i < contacts->count; ++i) {
+            found.insert(contacts->contacts[i].element);
+        }
+        ASSERT_EQ(found, elementsWithin(s, tool, tool.radius + 0.5)) << round;
+    }
+}
+
+TEST(OccupancyMap, RewritesOnlyElementsThatChangeTheirCell)
+{
+    Solid s(12, slab);
+    s.displace([](Vec3) { return Vec3(0.2, -0.3, 0.4); });
+    EXPECT_EQ(s.map->rewrites(), 0U);
+    s.displace([](Vec3 p) { return p.x == 5.0 ? Vec3(0.7, 0, 0) : Vec3(0.0); });
+    const auto column = static_cast<std::uint64_t>(std::count_if(s.solid.begin(), s.solid.end(), [](auto v) { return v != 0; }) / 12);
+    EXPECT_EQ(s.map->rewrites(), column);
+}
+
+// The elements visited by a query are those near the tool: their number does not grow with the grid.
+TEST(OccupancyMap, QueryVisitsTheSameElementsInAnyGrid)
+{
+    const auto visited = [](int n) {
+        const Solid s(n, slab);
+        std::size_t count = 0;
+        s.map->visit({6.5, 6.5, 7.0}, {12.5, 12.5, 12.0}, [&](Element) { ++count; });
+        return count;
+    };
+    const auto small = visited(20);
+    EXPECT_GT(small, 0U);
+    EXPECT_EQ(visited(64), small);
+}
+
+// X + u(X) = p has the closed-form solution X = (I + G)^-1 (p - c) for u = G X + c.
+TEST(RestPoint, InvertsAnAffineDisplacement)
+{
+    Solid s(24, [](Vec3 p) { return glm::distance(p, Vec3(11.5)) - 9.0; });
+    const Mat3 g(0.2, 0.1, 0.0, -0.15, 0.1, 0.05, 0.1, 0.0, -0.3);
+    const Vec3 c(2.5, -1.0, 3.0);
+    s.displace([&](Vec3 x) { return g * x + c - g * Vec3(11.5); });
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> place(-4.0, 4.0);
+    for (int i = 0; i < 200; ++i) {
+        const Vec3 x = Vec3(11.5) + Vec3(place(random), place(random), place(random));
+        const Vec3 p = x + g * (x - Vec3(11.5)) + c;
+        ASSERT_LT(glm::distance(restPoint(s.body(), p), x), 0.03);
+    }
+}
+
+TEST(Touch, SphereOnAFlatSurfaceHasTheDepthAndNormalOfThePlane)
+{
+    const Solid s(20, slab);
+    auto contacts = std::make_unique<ContactSet>();
+    for (const double depth : {-0.5, 0.1, 0.7, 1.9}) {
+        const Vec3 centre(9.3, 10.6, 8.3 - 2.0 + depth);
+        touch(s.body(), {centre, centre, 2.0}, *contacts);
+        EXPECT_EQ(contacts->touching, depth > 0.0);
+        EXPECT_NEAR(contacts->depth, depth, 1e-5);
+        if (depth > 0.0) {
+            EXPECT_NEAR(contacts->normal.z, -1.0, 1e-5);
+        }
+    }
+}
+
+// The surface that was pushed away by 3 elements is found where it is now, not where it was.
+TEST(Touch, FollowsTheDeformedSurface)
+{
+    Solid s(24, slab);
+    s.displace([](Vec3) { return Vec3(0, 0, 3.0); });
+    auto contacts = std::make_unique<ContactSet>();
+    const Vec3 before(11.2, 11.9, 9.0), after(11.2, 11.9, 12.0);
+    touch(s.body(), {before, before, 1.0}, *contacts);
+    EXPECT_EQ(contacts->count, 0U);
+    touch(s.body(), {after, after, 1.0}, *contacts);
+    EXPECT_TRUE(contacts->touching);
+    EXPECT_NEAR(contacts->depth, 1.7, 0.1);
+}
+
+TEST(Touch, CapsuleTouchesWithItsLowestPoint)
+{
+    const Solid s(20, slab);
+    auto contacts = std::make_unique<ContactSet>();
+    const Capsule tool{{5, 5, 3.0}, {12, 9, 8.0}, 0.9};
+    touch(s.body(), tool, *contacts);
+    EXPECT_NEAR(contacts->depth, 0.6, 1e-5);
+    EXPECT_LT(glm::distance(contacts->point, tool.b), 1e-9);
+}
+
+// A stab through a plate of one element stops at it at any speed, up to a thousand times the plate's thickness per tick.
+TEST(Sweep, CannotTunnelThroughAPlateOfOneElement)
+{
+    const auto plate = [](Vec3 p) { return std::abs(p.z - 12.0) - 0.5; };
+    const Solid s(25, plate);
+    for (const double speed : {0.3, 1.0, 7.7, 23.0, 100.0}) {
+        for (double start = 0.0; start < 1.0; start += 0.13) {
+            const Vec3 from(12.2, 11.8, 10.0 + start - 0.05), to = from + Vec3(0, 0, speed);
+            const auto result = sweep(s.body(), {from, from, 0.1}, {to, to, 0.1});
+            const double reach = from.z + speed + 0.1;
+            EXPECT_EQ(result.hit, reach >= 11.5) << speed << ' ' << start;
+            if (result.hit) {
+                EXPECT_LT(from.z + result.fraction * speed, 12.2);
+            }
+        }
+    }
+}
+
+// A jump too long for the work allowed ends short of its goal instead of passing through what lies behind.
+TEST(Sweep, EndsWhereItsWorkEnds)
+{
+    // Everywhere so near to tissue that only the shortest step is safe, a quarter of an element.
+    const Solid s(140, [](Vec3) { return 0.01; });
+    const Vec3 from(8, 8, 1), to(8, 8, 138);
+    const auto result = sweep(s.body(), {from, from, 0.0}, {to, to, 0.0});
+    EXPECT_TRUE(result.hit);
+    EXPECT_NEAR(result.fraction * 137.0, 0.25 * (sweepSteps - 1), 1e-9);
+}
+
+TEST(Queries, AllocateNothing)
+{
+    Solid s(20, slab);
+    s.displace([](Vec3 p) { return Vec3(0.1 * p.x, 0, 1.0); });
+    auto contacts = std::make_unique<ContactSet>();
+    const Capsule from{{9, 9, 5}, {9, 9, 6}, 1.0}, to{{9, 9, 9}, {9, 9, 10}, 1.0};
+    const auto count = tests::allocationsIn([&] {
+        touch(s.body(), to, *contacts);
+        sweep(s.body(), from, to);
+    });
+    EXPECT_EQ(count, 0U);
+    EXPECT_GT(contacts->count, 0U);
+}
+
+}  // namespace
+}  // namespace palpate::occupancy
