@@ -35,17 +35,6 @@ Lattice::Lattice(const volume::NodeGrid& nodes, std::vector<std::uint8_t> tissue
     }
 }
 
-Vec3f correction(Vec3f du, int side, const LinkLimits& limits) noexcept
-{
-    const int axis = side / 2;
-    const bool ahead = side % 2 != 0;
-    Vec3f low(-limits.shear);
-    Vec3f high(limits.shear);
-    low[axis] = ahead ? -limits.shorter : -limits.longer;
-    high[axis] = ahead ? limits.longer : limits.shorter;
-    return glm::clamp(du, low, high) - du;
-}
-
 double worstViolation(const Lattice& lattice, std::span<const Vec3f> u) noexcept
 {
     float worst = 0.0F;

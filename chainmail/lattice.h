@@ -3,6 +3,8 @@
 #include <volume/geometry.h>
 #include <volume/tissue_table.h>
 
+#include <glm/common.hpp>
+
 #include <array>
 #include <cstdint>
 #include <span>
@@ -55,6 +57,15 @@ double worstViolation(const Lattice& lattice, std::span<const Vec3f> u) noexcept
 /// With du = u_b - u_a and the link on side 2 k (+ 1 when b lies ahead of a):
 ///
 ///     -shorter <= +-du_k <= longer   and   |du_t| <= shear for both other axes t
-Vec3f correction(Vec3f du, int side, const LinkLimits& limits) noexcept;
+inline Vec3f correction(Vec3f du, int side, const LinkLimits& limits) noexcept
+{
+    const int axis = side / 2;
+    const bool ahead = side % 2 != 0;
+    Vec3f low(-limits.shear);
+    Vec3f high(limits.shear);
+    low[axis] = ahead ? -limits.shorter : -limits.longer;
+    high[axis] = ahead ? limits.longer : limits.shorter;
+    return glm::clamp(du, low, high) - du;
+}
 
 }  // namespace palpate::chainmail

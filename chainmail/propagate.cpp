@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace palpate::chainmail {
 
@@ -11,10 +12,13 @@ namespace {
 
 using Pull = PropagateScratch::Pull;
 
-bool later(const Pull& a, const Pull& b) noexcept
-{
-    return a.violation != b.violation ? a.violation < b.violation : a.order > b.order;
-}
+// A function object, so that the heap's loops take it in.
+struct Later {
+    bool operator()(const Pull& a, const Pull& b) const noexcept
+    {
+        return a.violation != b.violation ? a.violation < b.violation : a.order > b.order;
+    }
+};
 
 // One run of propagate(): the lattice, the state and the queue together.
 struct Run {
@@ -47,12 +51,12 @@ struct Run {
     {
         pull.order = scratch.order++;
         scratch.queue.push_back(pull);
-        std::push_heap(scratch.queue.begin(), scratch.queue.end(), later);
+        std::push_heap(scratch.queue.begin(), scratch.queue.end(), Later{});
     }
 
     Pull pop() noexcept
     {
-        std::pop_heap(scratch.queue.begin(), scratch.queue.end(), later);
+        std::pop_heap(scratch.queue.begin(), scratch.queue.end(), Later{});
         const Pull pull = scratch.queue.back();
         scratch.queue.pop_back();
         return pull;
@@ -65,9 +69,10 @@ struct Run {
             if (!lattice.isNode(b)) {
                 continue;
             }
-            const float violation = glm::length(correction(u[b] - u[a], side, lattice.between(a, b)));
-            if (violation > tolerance) {
-                push({violation, 0, a, side});
+            const Vec3f step = correction(u[b] - u[a], side, lattice.between(a, b));
+            const float square = glm::dot(step, step);
+            if (square > tolerance * tolerance) {
+                push({std::sqrt(square), 0, a, side});
             }
         }
     }

@@ -1,0 +1,123 @@
+"use strict";
+// Draws the charts of a report from the data in the page. uPlot comes before this script.
+const data = JSON.parse(document.getElementById("data").textContent);
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+const charts = [];
+
+const eventColours = { "warning": "c6", "vital touch": "c4", "fire": "c0", "puncture": "c7", "fault": "c4" };
+
+// Text with a rim in the colour of the card, so that lines below it do not disturb.
+function write(ctx, text, x, y) {
+  ctx.lineJoin = "round";
+  ctx.lineWidth = 4 * devicePixelRatio;
+  ctx.setLineDash([]);
+  ctx.strokeStyle = colour("card");
+  ctx.strokeText(text, x, y);
+  ctx.fillStyle = colour("soft");
+  ctx.fillText(text, x, y);
+}
+
+function horizontal(u, lines) {
+  const { ctx, bbox } = u;
+  const taken = [];
+  for (const line of lines) {
+    const y = u.valToPos(line.at, "y", true);
+    if (y < bbox.top || y > bbox.top + bbox.height) continue;
+    ctx.save();
+    ctx.strokeStyle = colour(line.colour);
+    ctx.setLineDash([6 * devicePixelRatio, 5 * devicePixelRatio]);
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    ctx.moveTo(bbox.left, y);
+    ctx.lineTo(bbox.left + bbox.width, y);
+    ctx.stroke();
+    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    ctx.textAlign = "right";
+    ctx.textBaseline = "bottom";
+    const right = Math.min(bbox.left + bbox.width, ...taken.filter((t) => Math.abs(t.y - y) < 14 * devicePixelRatio).map((t) => t.left));
+    write(ctx, line.label, right - 4 * devicePixelRatio, y - 2 * devicePixelRatio);
+    taken.push({ y, left: right - ctx.measureText(line.label).width - 12 * devicePixelRatio });
+    ctx.restore();
+  }
+}
+
+function vertical(u, events) {
+  const { ctx, bbox } = u;
+  let free = [-Infinity, -Infinity, -Infinity];
+  for (const event of events) {
+    const x = u.valToPos(event.seconds, "x", true);
+    if (!(event.kind in eventColours) || x < bbox.left || x > bbox.left + bbox.width) continue;
+    ctx.save();
+    ctx.strokeStyle = colour(eventColours[event.kind]);
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
+    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+    ctx.textAlign = "left";
+    ctx.textBaseline = "top";
+    const text = event.label;
+    const width = ctx.measureText(text).width;
+    const left = x + width + 4 * devicePixelRatio > bbox.left + bbox.width ? x - width - 4 * devicePixelRatio : x + 4 * devicePixelRatio;
+    const row = free.findIndex((end) => end < left);
+    if (row >= 0) {
+      write(ctx, text, left, bbox.top + (2 + 14 * row) * devicePixelRatio);
+      free[row] = left + width + 6 * devicePixelRatio;
+    }
+    ctx.restore();
+  }
+}
+
+function draw(id, chart) {
+  const place = document.getElementById(id);
+  if (!place) return;
+  if (chart.columns[0].length < 2) {
+    place.className = "note";
+    place.textContent = "The record is too short to draw.";
+    return;
+  }
+  const axis = (label, size) => ({
+    label, labelSize: 18, size, gap: 4, stroke: colour("soft"), labelFont: "12px system-ui, sans-serif",
+    font: "12px system-ui, sans-serif", grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("line"), width: 1, size: 5 },
+  });
+  const value = (unit) => (u, v) => (v == null ? "–" : v.toFixed(2) + " " + unit);
+  const limits = (chart.lines || []).map((line) => line.at);
+  const options = {
+    width: Math.max(place.clientWidth, 240),
+    height: innerWidth < 640 ? 230 : 300,
+    scales: {
+      x: { time: false },
+      y: { range: (u, low, high) => {
+        const bottom = Math.min(low ?? 0, 0), top = Math.max(high ?? 1, ...limits);
+        const room = 0.08 * (top - bottom || 1);
+        return [bottom < 0 ? bottom - room : 0, top + (chart.events ? 3 : 1) * room];
+      } },
+    },
+    axes: [axis(chart.x.label, 40), axis(chart.y.label, 46)],
+    cursor: { points: { size: 7 }, sync: chart.sync ? { key: chart.sync } : undefined },
+    legend: { markers: { fill: (u, i) => u.series[i].stroke(u, i), width: 0 } },
+    series: [{ label: chart.x.name, value: value(chart.x.unit) }].concat(chart.series.map((s) => ({
+      label: s.label, stroke: () => colour(s.colour), width: s.width || 1.6, dash: s.dash, show: s.show !== false,
+      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: { show: false }, spanGaps: false,
+    }))),
+    hooks: { draw: [(u) => { horizontal(u, chart.lines || []); vertical(u, chart.events ? data.events : []); }] },
+  };
+  const plot = new uPlot(options, chart.columns, place);
+  charts.push({ plot, place });
+}
+
+function drawAll() {
+  for (const { plot } of charts.splice(0)) plot.destroy();
+  for (const id of Object.keys(data.charts)) draw(id, data.charts[id]);
+}
+
+drawAll();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+let resized = 0;
+addEventListener("resize", () => {
+  cancelAnimationFrame(resized);
+  resized = requestAnimationFrame(() => {
+    for (const { plot, place } of charts) plot.setSize({ width: Math.max(place.clientWidth, 240), height: plot.height });
+  });
+});

@@ -1,0 +1,103 @@
+#include <apps/command.h>
+
+#include <apps/figures.h>
+#include <apps/session.h>
+#include <experiments/bench_tick.h>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+namespace palpate::apps {
+
+namespace {
+
+struct Options {
+    std::string scene = "breast";
+    std::vector<int> sides{64, 128, 256};
+    SceneChanges changes;
+    bool paced = false;
+    std::string json;
+};
+
+nlohmann::json caseFigures(int side, const haptics::SessionModel& model, const experiments::TickCase& c)
+{
+    const auto tick = c.contact.percentiles();
+    nlohmann::json tasks;
+    for (std::size_t i = 0; i < haptics::taskCount; ++i) {
+        tasks[std::string(name(static_cast<haptics::Task>(i)))] = microseconds(c.contactTasks[i].percentiles());
+    }
+    const auto size = model.tissue->size();
+    return {{"voxels_per_side", side},
+            {"size", {size.x, size.y, size.z}},
+            {"lattice_nodes", model.lattice.grid.count()},
+            {"ticks", c.contact.count()},
+            {"tick_us_p50", 1e6 * tick.p50},
+            {"tick_us_p99", 1e6 * tick.p99},
+            {"tasks_us", tasks},
+            {"moved_nodes", c.meanMoved},
+            {"all", timingFigures(c.all)}};
+}
+
+void printCase(int side, const experiments::TickCase& c)
+{
+    const auto tick = c.contact.percentiles();
+    fmt::print("{:>6}^3 {:>8} {:>8.1f} {:>8.1f}", side, c.contact.count(), 1e6 * tick.p50, 1e6 * tick.p99);
+    for (const auto& task : c.contactTasks) {
+        fmt::print(" {:>7.1f}", 1e6 * task.percentiles().p50);
+    }
+    fmt::print(" {:>8.0f}\n", c.meanMoved);
+    std::fflush(stdout);
+}
+
+void benchTick(const Options& o)
+{
+    fmt::print("ticks in contact; times in us, tasks p50\n{:>8} {:>8} {:>8} {:>8}", "voxels", "ticks", "p50", "p99");
+    for (std::size_t i = 0; i < haptics::taskCount; ++i) {
+        fmt::print(" {:>7}", name(static_cast<haptics::Task>(i)));
+    }
+    fmt::print(" {:>8}\n", "moved");
+
+    auto cases = nlohmann::json::array();
+    double least = 0.0;
+    double most = 0.0;
+    for (const int side : o.sides) {
+        auto changes = o.changes;
+        changes.voxelsPerSide = side;
+        const auto model = openSession(o.scene, changes);
+        const auto result = experiments::benchTick(model, {o.paced, 0.0});
+        printCase(side, result);
+        cases.push_back(caseFigures(side, model, result));
+        const double p50 = result.contact.percentiles().p50;
+        least = least == 0.0 ? p50 : std::min(least, p50);
+        most = std::max(most, p50);
+    }
+    const double growth = most / least;
+    fmt::print("the median grows by {:.2f} x over that range\n", growth);
+    if (!o.json.empty()) {
+        writeJson(o.json, {{"cases", cases}, {"growth", growth}, {"scene", o.scene}});
+    }
+}
+
+}  // namespace
+
+void addBench(CLI::App& app)
+{
+    auto* bench = app.add_subcommand("bench", "Measure");
+    bench->require_subcommand(1);
+
+    auto o = std::make_shared<Options>();
+    auto* tick = bench->add_subcommand("tick", "Time per tick and task, for phantoms of growing resolution");
+    tick->add_option("SCENE", o->scene, "Scene with a phantom")->capture_default_str();
+    tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")->delimiter(',')->capture_default_str();
+    tick->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember({"spring", "chainmail"}));
+    tick->add_flag("--paced", o->paced, "One tick per millisecond instead of one after the other");
+    tick->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    tick->final_callback([o] { benchTick(*o); });
+}
+
+}  // namespace palpate::apps

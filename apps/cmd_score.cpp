@@ -1,0 +1,300 @@
+#include <apps/command.h>
+#include <apps/report.h>
+
+#include <haptics/score.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::apps {
+
+namespace {
+
+using haptics::Score;
+using nlohmann::json;
+
+struct Options {
+    std::vector<std::filesystem::path> files;
+    std::vector<std::string> groups;
+    std::filesystem::path json, report, pictures;
+};
+
+struct Session {
+    std::filesystem::path file;
+    std::string scene, model, device;
+    bool complete = true;
+    Score score;
+};
+
+struct Group {
+    std::string name;
+    std::vector<std::size_t> sessions;  // rows of all sessions
+};
+
+struct Measure {
+    const char* key;    // in --json
+    const char* title;  // in a table
+    int decimals;
+    double (*value)(const Score&);
+};
+
+constexpr std::array<Measure, 17> measures{{
+    {"total", "total", 0, [](const Score& s) { return s.total; }},
+    {"passes", "passes", 0, [](const Score& s) { return static_cast<double>(s.passes); }},
+    {"targeting_error_mm", "target mm", 1, [](const Score& s) { return s.targetingError * 1e3; }},
+    {"best_target_pct", "core %", 0, [](const Score& s) { return s.bestTargetFraction * 100; }},
+    {"best_target_length_mm", "core mm", 1, [](const Score& s) { return s.bestTargetLength * 1e3; }},
+    {"vital_contacts", "vital", 0, [](const Score& s) { return static_cast<double>(s.vitalContacts); }},
+    {"vital_s", "vital s", 2, [](const Score& s) { return s.vitalSeconds; }},
+    {"vital_depth_mm", "vital mm", 1, [](const Score& s) { return s.vitalDepth * 1e3; }},
+    {"warnings", "warnings", 0, [](const Score& s) { return static_cast<double>(s.warnings); }},
+    {"skin_contacts", "skin", 0, [](const Score& s) { return static_cast<double>(s.skinContacts); }},
+    {"redirects", "redirects", 0, [](const Score& s) { return static_cast<double>(s.redirects); }},
+    {"seconds", "time s", 1, [](const Score& s) { return s.seconds; }},
+    {"path_mm", "path mm", 0, [](const Score& s) { return s.pathLength * 1e3; }},
+    {"inserted_path_mm", "inside mm", 0, [](const Score& s) { return s.insertedPath * 1e3; }},
+    {"deepest_mm", "deepest mm", 1, [](const Score& s) { return s.deepest * 1e3; }},
+    {"peak_force_n", "peak N", 2, [](const Score& s) { return s.peakForce; }},
+    {"mean_force_n", "mean N", 2, [](const Score& s) { return s.meanForce; }},
+}};
+
+// Infinity, the targeting error of a session that never fired, sorts last and is worse than any other.
+double median(std::vector<double> values)
+{
+    std::ranges::sort(values);
+    const std::size_t half = values.size() / 2;
+    return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+// Cliff's delta: how much more often a value of `a` is above one of `b` than below it, -1 to 1. It needs no distribution.
+// Source: N. Cliff, "Dominance statistics: ordinal analyses to answer ordinal questions", Psychological Bulletin 114, 1993.
+double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b)
+{
+    double above = 0;
+    for (const double x : a) {
+        for (const double y : b) {
+            above += x > y ? 1 : x < y ? -1 : 0;
+        }
+    }
+    return above / static_cast<double>(a.size() * b.size());
+}
+
+std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessions)
+{
+    const auto known = std::ranges::find(sessions, file, &Session::file);
+    if (known != sessions.end()) {
+        return static_cast<std::size_t>(known - sessions.begin());
+    }
+    const haptics::Record record(file);
+    const haptics::SessionInfo& info = record.info();
+    sessions.push_back({file, info.scene, info.model, info.device, record.complete(), haptics::scoreOf(record)});
+    return sessions.size() - 1;
+}
+
+Group parseGroup(const std::string& text, std::vector<Session>& sessions)
+{
+    const std::size_t equals = text.find('=');
+    if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
+        throw std::runtime_error("--group " + text + ": give a name and files, as in --group experts=a.palpate,b.palpate");
+    }
+    Group group{text.substr(0, equals), {}};
+    for (const std::string& file : CLI::detail::split(text.substr(equals + 1), ',')) {
+        if (file.empty()) {
+            throw std::runtime_error("--group " + text + ": a file between two commas is missing");
+        }
+        group.sessions.push_back(open(file, sessions));
+    }
+    return group;
+}
+
+std::vector<double> valuesOf(const Group& group, const std::vector<Session>& sessions, const Measure& measure)
+{
+    std::vector<double> values;
+    for (const std::size_t i : group.sessions) {
+        values.push_back(measure.value(sessions[i].score));
+    }
+    return values;
+}
+
+json measuresOf(const Score& score)
+{
+    json out;
+    for (const Measure& m : measures) {
+        out[m.key] = m.value(score);
+    }
+    return out;
+}
+
+json effectSize(const Group& a, const Group& b, const std::vector<Session>& sessions)
+{
+    json out = {{"kind", "cliffs_delta"}, {"of", a.name}, {"over", b.name}};
+    for (const Measure& m : measures) {
+        out[m.key] = cliffsDelta(valuesOf(a, sessions, m), valuesOf(b, sessions, m));
+    }
+    return out;
+}
+
+json figures(const std::vector<Session>& sessions, const std::vector<Group>& groups)
+{
+    json out = {{"sessions", json::array()}};
+    for (const Session& s : sessions) {
+        json one = measuresOf(s.score);
+        const haptics::ScoreParts p = haptics::parts(s.score);
+        one.update({{"file", s.file.string()},
+                    {"scene", s.scene},
+                    {"model", s.model},
+                    {"device", s.device},
+                    {"complete", s.complete},
+                    {"points", {{"core", p.core}, {"vital", p.vital}, {"technique", p.technique}}}});
+        out["sessions"].push_back(std::move(one));
+    }
+    out["groups"] = json::array();
+    for (const Group& g : groups) {
+        json medians;
+        for (const Measure& m : measures) {
+            medians[m.key] = median(valuesOf(g, sessions, m));
+        }
+        out["groups"].push_back({{"name", g.name}, {"n", g.sessions.size()}, {"median", medians}});
+    }
+    if (groups.size() >= 2) {
+        out["effect_size"] = effectSize(groups[0], groups[1], sessions);
+    }
+    if (groups.size() > 2) {
+        out["effect_sizes"] = json::array();
+        for (std::size_t a = 0; a < groups.size(); ++a) {
+            for (std::size_t b = a + 1; b < groups.size(); ++b) {
+                out["effect_sizes"].push_back(effectSize(groups[a], groups[b], sessions));
+            }
+        }
+    }
+    return out;
+}
+
+std::string cell(double value, int decimals)
+{
+    return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
+}
+
+// Measures down, columns across: one per session or group.
+void printTable(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& columns)
+{
+    std::string text = fmt::format("{:<12}", "");
+    for (std::size_t c = 0; c < heads.size(); ++c) {
+        text += fmt::format("  {:>{}}", heads[c], std::max<std::size_t>(heads[c].size(), 8));
+    }
+    for (std::size_t m = 0; m < measures.size(); ++m) {
+        text += fmt::format("\n{:<12}", measures[m].title);
+        for (std::size_t c = 0; c < heads.size(); ++c) {
+            text += fmt::format("  {:>{}}", columns[c][m], std::max<std::size_t>(heads[c].size(), 8));
+        }
+    }
+    std::printf("%s\n", text.c_str());
+}
+
+void printSessions(const std::vector<Session>& sessions)
+{
+    if (sessions.size() == 1) {
+        for (const auto& [label, value] : haptics::describe(sessions[0].score)) {
+            std::printf("%-26s %s\n", label.c_str(), value.c_str());
+        }
+    } else {
+        std::vector<std::string> heads;
+        std::vector<std::vector<std::string>> columns;
+        for (const Session& s : sessions) {
+            heads.push_back(s.file.filename().string());
+            columns.emplace_back();
+            for (const Measure& m : measures) {
+                columns.back().push_back(cell(m.value(s.score), m.decimals));
+            }
+        }
+        printTable(heads, columns);
+    }
+    for (const Session& s : sessions) {
+        if (!s.complete) {
+            std::printf("note: %s ends early: the program that wrote it was stopped; scored up to there\n", s.file.c_str());
+        }
+    }
+}
+
+void printGroups(const std::vector<Group>& groups, const std::vector<Session>& sessions)
+{
+    std::vector<std::string> heads;
+    std::vector<std::vector<std::string>> columns;
+    for (const Group& g : groups) {
+        heads.push_back(fmt::format("{} (n={})", g.name, g.sessions.size()));
+        columns.emplace_back();
+        for (const Measure& m : measures) {
+            columns.back().push_back(cell(median(valuesOf(g, sessions, m)), m.decimals + (m.decimals == 0 ? 1 : 0)));
+        }
+    }
+    std::printf("\nMedians%s\n", groups.size() > 1 ? ", and Cliff's delta of one group over another (-1 to 1)" : "");
+    for (std::size_t a = 0; a < groups.size(); ++a) {
+        for (std::size_t b = a + 1; b < groups.size(); ++b) {
+            heads.push_back(groups[a].name + " over " + groups[b].name);
+            columns.emplace_back();
+            for (const Measure& m : measures) {
+                const double delta = cliffsDelta(valuesOf(groups[a], sessions, m), valuesOf(groups[b], sessions, m));
+                columns.back().push_back(fmt::format("{:+.2f}", delta));
+            }
+        }
+    }
+    printTable(heads, columns);
+}
+
+void run(const Options& options)
+{
+    std::vector<Session> sessions;
+    std::vector<Group> groups;
+    for (const std::filesystem::path& file : options.files) {
+        open(file, sessions);
+    }
+    for (const std::string& text : options.groups) {
+        groups.push_back(parseGroup(text, sessions));
+    }
+    if (sessions.empty()) {
+        throw std::runtime_error("score: give at least one record, or --group NAME=FILE,FILE");
+    }
+    if (!options.report.empty()) {
+        if (sessions.size() != 1) {
+            throw std::runtime_error(options.report.string() + ": a report is of one record; give one file with --report");
+        }
+        writeReport(options.report, haptics::Record(sessions[0].file), options.pictures);
+    }
+    if (!options.json.empty()) {
+        writeJson(options.json, figures(sessions, groups));
+    }
+    if (options.json != "-") {
+        printSessions(sessions);
+        if (!groups.empty()) {
+            printGroups(groups, sessions);
+        }
+    }
+}
+
+}  // namespace
+
+void addScore(CLI::App& app)
+{
+    auto options = std::make_shared<Options>();
+    CLI::App* score = app.add_subcommand("score", "Score one record or several, and compare groups");
+    score->add_option("FILE", options->files, "records of sessions");
+    score->add_option("--group", options->groups, "a group to compare: NAME=FILE,FILE; give the option once per group")
+        ->allow_extra_args(false);
+    score->add_option("--json", options->json, "write the figures here (- for standard output)");
+    score->add_option("--report", options->report, "write an HTML report of the one record here");
+    score->add_option("--pictures", options->pictures, "put the PNG files of this folder into the report");
+    score->callback([options] { run(*options); });
+}
+
+}  // namespace palpate::apps

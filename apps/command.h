@@ -1,0 +1,25 @@
+#pragma once
+
+#include <CLI/App.hpp>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <filesystem>
+
+namespace palpate::apps {
+
+// Each command lives in its own file, adds itself to the program here, and does its work in CLI11's final callback.
+// A command that cannot do what was asked throws std::runtime_error ("FILE: what is wrong and what to do"); main() prints
+// it on one line and exits with 1.
+void addTrain(CLI::App& app);
+void addImport(CLI::App& app);
+void addInfo(CLI::App& app);
+void addPhantom(CLI::App& app);
+void addReplay(CLI::App& app);
+void addScore(CLI::App& app);
+void addBench(CLI::App& app);
+
+/// Writes figures where `--json FILE` asked for them ("-" = standard output). Throws std::runtime_error.
+void writeJson(const std::filesystem::path& file, const nlohmann::json& figures);
+
+}  // namespace palpate::apps

@@ -1,0 +1,42 @@
+#include <apps/figures.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <sys/resource.h>
+
+#include <string>
+
+namespace palpate::apps {
+
+nlohmann::json microseconds(const haptics::Percentiles& p)
+{
+    return {{"p50", 1e6 * p.p50}, {"p99", 1e6 * p.p99}, {"p999", 1e6 * p.p999}, {"max", 1e6 * p.max}};
+}
+
+nlohmann::json timingFigures(const haptics::ServoTiming& timing)
+{
+    nlohmann::json tasks;
+    for (std::size_t i = 0; i < haptics::taskCount; ++i) {
+        tasks[std::string(name(static_cast<haptics::Task>(i)))] = microseconds(timing.tasks[i].percentiles());
+    }
+    return {{"ticks", timing.ticks},
+            {"missed_ticks", timing.missed},
+            {"lateness_us", microseconds(timing.lateness.percentiles())},
+            {"tick_us", microseconds(timing.work.percentiles())},
+            {"tasks_us", tasks}};
+}
+
+std::string hexadecimal(std::uint64_t hash)
+{
+    return fmt::format("{:016x}", hash);
+}
+
+double peakMemoryMb()
+{
+    rusage use{};
+    getrusage(RUSAGE_SELF, &use);
+    return static_cast<double>(use.ru_maxrss) / 1024.0;
+}
+
+}  // namespace palpate::apps

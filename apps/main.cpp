@@ -1,0 +1,36 @@
+#include <apps/command.h>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <exception>
+
+int main(int argc, char** argv)
+{
+    CLI::App app("Palpate: feel inside a segmented volume", "palpate");
+    app.set_version_flag("--version", PALPATE_BUILD);
+    app.require_subcommand(1);
+    app.failure_message([](const CLI::App*, const CLI::Error& e) {
+        return std::string("palpate: ") + e.what() + " (palpate --help lists what there is)\n";
+    });
+
+    using namespace palpate::apps;
+    addTrain(app);
+    addImport(app);
+    addInfo(app);
+    addPhantom(app);
+    addReplay(app);
+    addScore(app);
+    addBench(app);
+
+    try {
+        app.parse(argc, argv);
+        return 0;
+    } catch (const CLI::ParseError& e) {
+        const int status = app.exit(e);
+        return status == 0 ? 0 : 2;
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "palpate: %s\n", e.what());
+        return 1;
+    }
+}

@@ -1,0 +1,30 @@
+#pragma once
+
+// The parts of a report's page that are text and tables.
+
+#include <apps/report_data.h>
+
+#include <haptics/recorder.h>
+
+#include <string>
+#include <string_view>
+
+namespace palpate::apps {
+
+/// Text as it may stand in HTML, also in an attribute.
+std::string escape(std::string_view text);
+
+std::string_view kindName(haptics::EventKind kind);
+/// A few words for a mark in a chart; not escaped.
+std::string eventLabel(const haptics::Event& event, const haptics::SessionInfo& info);
+
+std::string header(const ReportData& data, const haptics::Record& record);
+std::string scoreCard(const haptics::Score& score);
+std::string coresCard(const ReportData& data, const haptics::SessionInfo& info);
+/// An empty place for a chart; the page's script fills it.
+std::string chartCard(std::string_view id, std::string_view title, std::string_view note);
+std::string timingCard(const ReportData& data, const haptics::Record& record);
+std::string eventsCard(const ReportData& data, const haptics::SessionInfo& info);
+std::string sessionCard(const haptics::Record& record);
+
+}  // namespace palpate::apps

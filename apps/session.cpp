@@ -1,0 +1,114 @@
+#include <apps/session.h>
+
+#include <datasets/scene_text.h>
+#include <haptics/replay.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+using datasets::Scene;
+
+void change(Scene& scene, const SceneChanges& changes)
+{
+    if (changes.model) {
+        scene.model.level = *changes.model == "spring" ? datasets::ModelLevel::spring : datasets::ModelLevel::chainmail;
+    }
+    if (changes.dffb) {
+        scene.dffb.mode = *changes.dffb == "off"      ? datasets::DffbMode::off
+                          : *changes.dffb == "thesis" ? datasets::DffbMode::thesis
+                                                      : datasets::DffbMode::field;
+    }
+    if (changes.target) {
+        scene.target = *changes.target;
+    }
+    if (changes.seed) {
+        scene.source.phantom.seed = *changes.seed;
+    }
+    if (changes.voxelsPerSide) {
+        scene.source.phantom.numbers["voxels_per_side"] = *changes.voxelsPerSide;
+    }
+}
+
+bool anyOf(const SceneChanges& c)
+{
+    return c.model || c.dffb || c.target || c.seed || c.voxelsPerSide;
+}
+
+// The text must stay the scene: a replay is built from it.
+Scene changed(Scene scene, const SceneChanges& changes, const std::string& origin)
+{
+    if (!anyOf(changes)) {
+        return scene;
+    }
+    change(scene, changes);
+    return datasets::parseScene(datasets::sceneText(scene), origin);
+}
+
+Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissue, const SceneChanges& changes)
+{
+    return datasets::sceneForVolume(std::filesystem::absolute(file), tissue, changes.target.value_or(""));
+}
+
+}  // namespace
+
+haptics::SessionModel openSession(const std::string& what, const SceneChanges& changes)
+{
+    const std::filesystem::path path(what);
+    if (path.extension() == ".vdb") {
+        auto tissue = std::make_shared<const volume::Tissue>(volume::Tissue::load(path));
+        auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
+        return haptics::buildModel(std::move(scene), std::move(tissue));
+    }
+    auto builtIn = datasets::builtInScene(what);
+    if (!builtIn && !std::filesystem::exists(path)) {
+        throw std::runtime_error(fmt::format("{}: no such scene or volume; built-in scenes are: {}", what,
+                                             fmt::join(datasets::builtInScenes(), ", ")));
+    }
+    auto scene = changed(builtIn ? *builtIn : datasets::loadScene(path), changes, what);
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    return haptics::buildModel(std::move(scene), std::move(tissue));
+}
+
+haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)
+{
+    auto scene = datasets::parseScene(info.sceneText, info.sceneOrigin);
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    auto model = haptics::buildModel(std::move(scene), std::move(tissue));
+    if (haptics::modelHash(model) != info.volumeHash) {
+        throw std::runtime_error(file + ": the volume or the tissue table of this session has changed since it was "
+                                        "recorded; replay it with those it was recorded with");
+    }
+    return model;
+}
+
+haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
+                                     const std::string& device)
+{
+    haptics::SessionInfo info;
+    info.scene = model.scene.name;
+    info.sceneText = model.scene.text;
+    info.sceneOrigin = origin;
+    info.volumeHash = haptics::modelHash(model);
+    info.model = model.scene.model.level == datasets::ModelLevel::spring ? "spring" : "chainmail";
+    info.device = device;
+    info.build = PALPATE_BUILD;
+    info.seed = model.scene.source.phantom.seed;
+    for (const auto& s : model.structures) {
+        info.structures.push_back(s.name);
+        info.warnDistances.push_back(s.warnDistance);
+    }
+    for (const auto& row : model.tissue->table().rows) {
+        info.tissues.push_back(row.name);
+    }
+    return info;
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,165 @@
+#include <apps/trainer.h>
+
+#include <datasets/scene.h>
+#include <haptics/broadcast.h>
+#include <haptics/hand.h>
+#include <haptics/simulation.h>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <signal.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <thread>
+
+namespace palpate::apps {
+
+namespace {
+
+using namespace haptics;
+
+constexpr std::size_t mostCores = 64;
+constexpr double startDistance = 30e-3;  // the hand begins this far outside the body [m]
+
+std::atomic<bool> interrupted{false};
+
+void onSignal(int)
+{
+    interrupted = true;
+}
+
+std::unique_ptr<Device> openDevice(const std::string& name, const SessionModel& model)
+{
+    if (name != "hand") {
+        return std::make_unique<ReplayDevice>(Record(name));
+    }
+    const auto& way = model.approach;
+    const Vec3 axis = glm::normalize(way.aim - way.entry);
+    return std::make_unique<HandDevice>(HandParameters{}, datasets::traineeScript(model.scene, way),
+                                        way.entry - startDistance * axis, axis);
+}
+
+// Takes in what the session's figures need, tick by tick, in the servo thread.
+struct Tally {
+    explicit Tally(const SessionInfo& info) : scorer(info)
+    {
+        result.cores.reserve(mostCores);
+        result.nearest.fill(std::numeric_limits<double>::infinity());
+    }
+
+    void add(const TickRecord& r) noexcept
+    {
+        scorer.add(r);
+        hash.add(r);
+        result.peakBasic = std::max(result.peakBasic, glm::length(r.basic));
+        result.peakAdditional = std::max(result.peakAdditional, glm::length(r.additional));
+        result.peakTotal = std::max(result.peakTotal, glm::length(r.total));
+        for (std::size_t i = 0; i < maxStructures; ++i) {
+            result.nearest[i] = std::min(result.nearest[i], r.distance[i]);
+        }
+        for (std::uint32_t i = 0; i < r.eventCount; ++i) {
+            result.contacts += r.events[i].kind == EventKind::contact ? 1 : 0;
+            result.punctures += r.events[i].kind == EventKind::puncture ? 1 : 0;
+        }
+        if (r.fired && result.cores.size() < mostCores) {
+            result.cores.push_back(r.core);
+        }
+        faulted = faulted || r.faulted;
+    }
+
+    Scorer scorer;
+    ForceHash hash;
+    TrainResult result;
+    bool faulted = false;
+};
+
+}  // namespace
+
+struct Trainer::Impl {
+    Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
+        : options(o), device(openDevice(o.device, model)), simulation(model), broadcast(o.session, model), tally(info)
+    {
+        if (!o.record.empty()) {
+            recorder.emplace(o.record, info);
+        }
+    }
+
+    // The servo thread: nothing in the sink allocates, locks or does I/O.
+    void servo(std::vector<std::string>& warnings)
+    {
+        if (options.servo.paced) {
+            warnings = claimRealTime();
+        }
+        const auto sink = [this](const TickRecord& record, const ServoTiming& timing) {
+            tally.add(record);
+            if (recorder) {
+                recorder->push(record);
+            }
+            broadcast.publish(record, timing, simulation);
+        };
+        tally.result.timing = runServo(*device, simulation, options.servo, sink, interrupted);
+        broadcast.finish();
+    }
+
+    void conclude(TrainResult& result)
+    {
+        result.score = tally.scorer.score();
+        result.forceHash = tally.hash.value();
+        if (recorder) {
+            const auto late = result.timing.lateness.percentiles();
+            const auto work = result.timing.work.percentiles();
+            recorder->finish({{"missed_ticks", fmt::format("{}", result.timing.missed)},
+                              {"tick_us_p50", fmt::format("{:.2f}", 1e6 * work.p50)},
+                              {"tick_us_p99", fmt::format("{:.2f}", 1e6 * work.p99)},
+                              {"lateness_us_p50", fmt::format("{:.2f}", 1e6 * late.p50)},
+                              {"lateness_us_p99", fmt::format("{:.2f}", 1e6 * late.p99)},
+                              {"force_hash", fmt::format("{:016x}", result.forceHash)},
+                              {"score_total", fmt::format("{:.1f}", result.score.total)}});
+            result.lostRecords = recorder->lost();
+            result.problem = recorder->error();
+        }
+        if (tally.faulted && result.problem.empty()) {
+            result.problem = "a force or a pose was not finite: the force was switched off (event 'fault' in the record)";
+        }
+    }
+
+    TrainOptions options;
+    std::unique_ptr<Device> device;
+    Simulation simulation;
+    Broadcast broadcast;
+    std::optional<Recorder> recorder;
+    Tally tally;
+};
+
+Trainer::Trainer(const SessionModel& model, const SessionInfo& info, const TrainOptions& options)
+    : impl_(std::make_unique<Impl>(model, info, options))
+{
+}
+
+Trainer::~Trainer() = default;
+
+TrainResult Trainer::run()
+{
+    struct sigaction action{};
+    action.sa_handler = onSignal;
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+
+    std::vector<std::string> warnings;
+    std::thread servo([&] { impl_->servo(warnings); });
+    servo.join();
+    for (const auto& warning : warnings) {
+        fmt::print(stderr, "palpate: {}\n", warning);
+    }
+    TrainResult result = std::move(impl_->tally.result);
+    result.warnings = warnings;
+    impl_->conclude(result);
+    return result;
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,368 @@
+#include <datasets/scene.h>
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+namespace palpate::datasets {
+
+namespace {
+
+using volume::Box;
+using volume::NodeGrid;
+using volume::Role;
+using volume::Structure;
+using volume::Tissue;
+using Labels = std::vector<std::uint16_t>;
+
+constexpr std::size_t mostSamples = 2'000'000;   // of the search for the target
+constexpr std::size_t mostFieldNodes = 300'000;  // of a distance field
+constexpr int directionCount = 600;
+constexpr int borderVoxels = 3;         // the body's surface so near to the image's border is a cut, not skin
+constexpr double freeOutside = 0.06;    // length of needle that must be in air before it enters [m]
+constexpr double comfort = 7e-3;        // clearance beyond which more is no better [m]
+constexpr double discSpacing = 0.7e-3;  // of the samples around a line [m]
+constexpr double beyondTip = 3e-3;      // a line must also be clear so far beyond the fired tip [m]
+constexpr double startDistance = 0.03;  // of the tip from the skin, before and after [m]
+constexpr double leastInside = 3e-3;    // the tip is so deep before the gun fires [m]
+constexpr double clearances[] = {4e-3, 2.5e-3, 1.5e-3};  // tried in this order, beside the needle's radius [m]
+
+struct Blob {
+    std::size_t nodes = 0;
+    Box box;
+};
+
+Labels namedLabels(const Scene& scene, const Tissue& tissue)
+{
+    Labels labels = tissue.labelsNamed(scene.target);
+    if (labels.empty()) {
+        std::string names;
+        for (const Structure& s : tissue.structures()) {
+            names += (names.empty() ? "" : ", ") + s.name;
+        }
+        throw std::runtime_error(
+            fmt::format("{}: no structure '{}' in the volume; there are {}", scene.name, scene.target, names));
+    }
+    return labels;
+}
+
+std::vector<char> samplesInside(const Tissue& tissue, const NodeGrid& grid, const Labels& labels)
+{
+    std::vector<char> inside(grid.count(), 0);
+    std::vector<char> wanted(65536, 0);
+    for (const std::uint16_t label : labels) {
+        wanted[label] = 1;
+    }
+    tbb::parallel_for(tbb::blocked_range<int>(0, grid.size.z, 4), [&](const tbb::blocked_range<int>& slab) {
+        const Tissue::Reader reader(tissue);
+        for (int k = slab.begin(); k < slab.end(); ++k) {
+            for (int j = 0; j < grid.size.y; ++j) {
+                for (int i = 0; i < grid.size.x; ++i) {
+                    inside[grid.offset({i, j, k})] = wanted[reader.label(grid.position({i, j, k}))];
+                }
+            }
+        }
+    });
+    return inside;
+}
+
+// Connected pieces (faces) of the marked nodes, largest first; unmarks them.
+std::vector<Blob> blobs(const NodeGrid& grid, std::vector<char>& marked)
+{
+    std::vector<Blob> out;
+    std::vector<std::size_t> open;
+    for (std::size_t start = 0; start < marked.size(); ++start) {
+        if (marked[start] == 0) {
+            continue;
+        }
+        Blob blob{0, {grid.position(grid.node(start)), grid.position(grid.node(start))}};
+        open.assign(1, start);
+        marked[start] = 0;
+        while (!open.empty()) {
+            const Index3 n = grid.node(open.back());
+            open.pop_back();
+            ++blob.nodes;
+            blob.box = {glm::min(blob.box.low, grid.position(n)), glm::max(blob.box.high, grid.position(n))};
+            for (int side = 0; side < 6; ++side) {
+                Index3 next = n;
+                next[side / 2] += side % 2 == 0 ? 1 : -1;
+                if (grid.contains(next) && marked[grid.offset(next)] != 0) {
+                    marked[grid.offset(next)] = 0;
+                    open.push_back(grid.offset(next));
+                }
+            }
+        }
+        out.push_back(blob);
+    }
+    std::stable_sort(out.begin(), out.end(), [](const Blob& a, const Blob& b) { return a.nodes > b.nodes; });
+    return out;
+}
+
+Vec3 deepestPoint(const Tissue& tissue, const Labels& labels, const Box& box, double step)
+{
+    const Vec3 extent = box.high - box.low;
+    const double wanted = std::max(step / 2, std::max({extent.x, extent.y, extent.z}) / 32);
+    const NodeGrid grid = volume::coveringGrid(box, volume::affordableSpacing(box, wanted, step, mostFieldNodes), step);
+    const volume::DistanceField field = tissue.distanceTo(labels, grid);
+    const auto deepest = std::min_element(field.values.begin(), field.values.end());
+    return grid.position(grid.node(static_cast<std::size_t>(deepest - field.values.begin())));
+}
+
+// Points to aim at: inside the target's largest piece, or inside a few of the largest when it is scattered.
+std::vector<Vec3> aims(const Scene& scene, const Tissue& tissue)
+{
+    if (scene.aim) {
+        return {*scene.aim};
+    }
+    constexpr std::size_t mostBlobs = 6;
+    const Labels labels = namedLabels(scene, tissue);
+    const Vec3 voxel = tissue.affine().spacing();
+    const Box body = tissue.box();
+    const double step = volume::affordableSpacing(body, std::max({voxel.x, voxel.y, voxel.z}), 0, mostSamples);
+    const NodeGrid grid = volume::coveringGrid(body, step, 0);
+    std::vector<char> inside = samplesInside(tissue, grid, labels);
+    const std::vector<Blob> pieces = blobs(grid, inside);
+    if (pieces.empty()) {  // smaller than the sampling
+        return {deepestPoint(tissue, labels, body, step)};
+    }
+    std::vector<Vec3> points;
+    for (const Blob& piece : pieces) {
+        if (points.size() < mostBlobs && 2 * piece.nodes >= pieces.front().nodes) {
+            points.push_back(deepestPoint(tissue, labels, piece.box, step));
+        }
+    }
+    return points;
+}
+
+/// What the search for a line asks of the volume.
+struct Surroundings {
+    const Tissue& tissue;
+    std::vector<char> forbidden;  // by label: vital, bone and fixed tissue
+    std::vector<Vec3> disc;       // around a line: two offsets and their length [m], shortest first
+    bool hasSkin = false;
+    double step = 0;   // along a line [m]
+    double reach = 0;  // no line inside the body is longer [m]
+};
+
+// Samples over a disc of radius `radius`, ring by ring.
+std::vector<Vec3> discSamples(double radius)
+{
+    std::vector<Vec3> samples{Vec3(0.0)};
+    for (double r = discSpacing; r < radius; r += discSpacing) {
+        const int count = static_cast<int>(std::ceil(2 * std::numbers::pi * r / discSpacing));
+        for (int n = 0; n < count; ++n) {
+            const double angle = 2 * std::numbers::pi * n / count;
+            samples.emplace_back(r * std::cos(angle), r * std::sin(angle), r);
+        }
+    }
+    return samples;
+}
+
+Surroundings surroundings(const Scene& scene, const Tissue& tissue)
+{
+    const volume::TissueTable& table = tissue.table();
+    Surroundings s{tissue, std::vector<char>(65536, 0), discSamples(comfort + scene.tool.radius)};
+    for (const Structure& structure : tissue.structures()) {
+        const volume::TissueRow& row = table.rows[structure.tissue];
+        s.hasSkin = s.hasSkin || row.role == Role::skin;
+        s.forbidden[structure.value] = row.role == Role::vital || row.role == Role::bone || row.fixed ? 1 : 0;
+    }
+    for (const VitalStructure& vital : scene.vital) {
+        for (const std::uint16_t label : tissue.labelsNamed(vital.name)) {
+            s.forbidden[label] = 1;
+        }
+    }
+    for (const std::uint16_t label : scene.target.empty() ? Labels{} : tissue.labelsNamed(scene.target)) {
+        s.forbidden[label] = 0;
+    }
+    const Box body = tissue.box();
+    const Vec3 voxel = tissue.affine().spacing();
+    s.step = std::clamp(std::min({voxel.x, voxel.y, voxel.z}) / 2, 0.2e-3, 1e-3);
+    s.reach = glm::length(body.high - body.low);
+    return s;
+}
+
+bool outside(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
+{
+    return s.tissue.table().rows[reader.tissue(p)].role == Role::air;
+}
+
+bool nearBorder(const Tissue& tissue, Vec3 p)
+{
+    const Vec3 index = tissue.affine().toIndex(p);
+    for (int axis = 0; axis < 3; ++axis) {
+        if (index[axis] < borderVoxels || index[axis] > tissue.size()[axis] - 1 - borderVoxels) {
+            return true;
+        }
+    }
+    return false;
+}
+
+// Where the way from `aim` along `direction` leaves the body for good, or nothing when that is no place to enter.
+std::optional<Vec3> exitPoint(const Surroundings& s, const Tissue::Reader& reader, Vec3 aim, Vec3 direction)
+{
+    double inside = 0;
+    for (double t = 0; t < s.reach && t < inside + freeOutside; t += s.step) {
+        inside = outside(s, reader, aim + t * direction) ? inside : t;
+    }
+    double beyond = inside + s.step;
+    const Vec3 last = aim + inside * direction;
+    if (nearBorder(s.tissue, last) || outside(s, reader, last)) {
+        return std::nullopt;
+    }
+    if (s.hasSkin && s.tissue.table().rows[reader.tissue(last)].role != Role::skin) {
+        return std::nullopt;
+    }
+    for (int halving = 0; halving < 8; ++halving) {
+        const double middle = (inside + beyond) / 2;
+        (outside(s, reader, aim + middle * direction) ? beyond : inside) = middle;
+    }
+    return aim + beyond * direction;
+}
+
+// Distance from the line to what is forbidden, up to the radius of the disc.
+double clearance(const Surroundings& s, const Tissue::Reader& reader, Vec3 from, Vec3 to)
+{
+    const double length = glm::length(to - from);
+    const Vec3 along = (to - from) / length;
+    const Vec3 side = glm::normalize(glm::cross(along, std::abs(along.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
+    const Vec3 up = glm::cross(along, side);
+    double least = s.disc.back().z;
+    for (double t = 0; t <= length; t += discSpacing) {
+        const Vec3 middle = from + t * along;
+        for (const Vec3& sample : s.disc) {
+            if (sample.z >= least) {
+                break;
+            }
+            if (s.forbidden[reader.label(middle + sample.x * side + sample.y * up)] != 0) {
+                least = sample.z;
+            }
+        }
+    }
+    return least;
+}
+
+struct Line {
+    Approach approach;
+    double clearance = 0;
+    double cost = 0;
+};
+
+double throwOf(const ToolSpec& tool)
+{
+    return tool.kind == ToolKind::needle ? tool.throwLength : 0.0;
+}
+double halfNotch(const ToolSpec& tool)
+{
+    return tool.kind == ToolKind::needle ? tool.notchLength / 2 : 0.0;
+}
+
+// How deep the tip goes by hand, so that the fired notch's middle is at the aim, `length` deep: the tip then stands half a
+// notch beyond it. A shallow aim is missed rather than fired at from outside.
+double tipDepth(const ToolSpec& tool, double length)
+{
+    const double depth = length + halfNotch(tool) - throwOf(tool);
+    return tool.kind == ToolKind::needle ? std::max(leastInside, depth) : depth;
+}
+
+// The way into `aim` along -`direction`, if there is one.
+std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const Tissue::Reader& reader, Vec3 aim,
+                              Vec3 direction)
+{
+    const std::optional<Vec3> entry = exitPoint(s, reader, aim, direction);
+    if (!entry || glm::length(*entry - aim) > scene.tool.length) {
+        return std::nullopt;
+    }
+    const double length = glm::length(*entry - aim);
+    const double fired = tipDepth(scene.tool, length) + throwOf(scene.tool);
+    const double room = clearance(s, reader, *entry, *entry - (fired + beyondTip) * direction) - scene.tool.radius;
+    const double offCentre = std::max(0.0, fired - (length + halfNotch(scene.tool)));
+    return Line{{*entry, aim}, room, length + 3.0 * (std::max(0.0, comfort - room) + offCentre)};
+}
+
+// Ways into `aim` from all around, on Fibonacci's spiral.
+void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vector<Line>& lines)
+{
+    std::vector<std::optional<Line>> found(directionCount);
+    tbb::parallel_for(tbb::blocked_range<int>(0, directionCount, 20), [&](const tbb::blocked_range<int>& range) {
+        const Tissue::Reader reader(s.tissue);
+        for (int n = range.begin(); n < range.end(); ++n) {
+            const double z = 1.0 - (2.0 * n + 1.0) / directionCount;
+            const double angle = n * std::numbers::pi * (3.0 - std::sqrt(5.0));
+            const double side = std::sqrt(1.0 - z * z);
+            const Vec3 direction(side * std::cos(angle), side * std::sin(angle), z);
+            found[static_cast<std::size_t>(n)] = lineAlong(scene, s, reader, aim, direction);
+        }
+    });
+    for (const std::optional<Line>& line : found) {
+        if (line) {
+            lines.push_back(*line);
+        }
+    }
+}
+
+}  // namespace
+
+Approach planApproach(const Scene& scene, const Tissue& tissue)
+{
+    const std::vector<Vec3> points = aims(scene, tissue);
+    if (scene.entry) {
+        return {*scene.entry, points.front()};
+    }
+    const Surroundings s = surroundings(scene, tissue);
+    std::vector<Line> lines;
+    for (const Vec3 aim : points) {
+        collectLines(scene, s, aim, lines);
+    }
+    for (const double least : clearances) {
+        const Line* best = nullptr;
+        for (const Line& line : lines) {
+            if (line.clearance >= least && (best == nullptr || line.cost < best->cost)) {
+                best = &line;
+            }
+        }
+        if (best != nullptr) {
+            return best->approach;
+        }
+    }
+    throw std::runtime_error(fmt::format(
+        "{}: no straight way to '{}' from the skin that keeps {} mm from vital structures and bone ({} ways reach it): set "
+        "entry_mm and aim_mm in [target]",
+        scene.name, scene.target, clearances[std::size(clearances) - 1] * 1e3, lines.size()));
+}
+
+std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach)
+{
+    if (!scene.script.empty()) {
+        return scene.script;
+    }
+    using Kind = TraineeStep::Kind;
+    const double length = glm::length(approach.aim - approach.entry);
+    const Vec3 inward = length > 0 ? (approach.aim - approach.entry) / length : Vec3(0, 1, 0);
+    const double depth = tipDepth(scene.tool, length);
+    const Vec3 away = approach.entry - startDistance * inward;
+    std::vector<TraineeStep> script{
+        {.kind = Kind::move, .to = away, .speed = 0.06, .seconds = 3, .tolerance = 1e-3},
+        {.kind = Kind::move, .to = approach.entry - 3e-3 * inward, .speed = 0.06, .seconds = 3, .tolerance = 1e-3}};
+    if (scene.tool.kind == ToolKind::needle) {
+        script.push_back({.kind = Kind::pierce, .to = approach.aim, .speed = 0.018, .seconds = 15});
+    }
+    script.push_back(
+        {.kind = Kind::press, .to = approach.entry + depth * inward, .speed = 0.018, .seconds = 15, .tolerance = 1e-3});
+    if (scene.tool.kind == ToolKind::needle) {
+        script.push_back({.kind = Kind::fire});
+    }
+    script.push_back({.kind = Kind::wait, .seconds = 0.5});
+    script.push_back({.kind = Kind::move, .to = away, .speed = 0.06, .seconds = 10, .tolerance = 2e-3});
+    return script;
+}
+
+}  // namespace palpate::datasets

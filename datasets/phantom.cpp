@@ -1,0 +1,137 @@
+#include <datasets/phantom.h>
+
+#include <datasets/phantom_parts.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace palpate::datasets {
+
+namespace {
+
+struct Maker {
+    const char* name;
+    std::vector<PhantomParameter> (*parameters)();
+    PhantomLabels (*make)(const PhantomValues&);
+};
+
+constexpr Maker makers[] = {
+    {"breast", breastParameters, breastPhantom},
+    {"layered", layeredParameters, layeredPhantom},
+    {"block", blockParameters, blockPhantom},
+};
+
+constexpr double smallestVoxel = 0.1, largestVoxel = 5;  // [mm]
+
+const Maker& makerOf(const std::string& name)
+{
+    for (const Maker& maker : makers) {
+        if (name == maker.name) {
+            return maker;
+        }
+    }
+    throw std::runtime_error(
+        fmt::format("phantom '{}': there is none; there are {}", name, fmt::join(phantomNames(), ", ")));
+}
+
+double checked(const std::string& phantom, const PhantomParameter& p, double value)
+{
+    // The negation also catches what is not a number.
+    if (!(value >= p.low && value <= p.high)) {
+        throw std::runtime_error(fmt::format("phantom '{}': {} = {} {}: must be {:g} to {:g} {}", phantom, p.name, value,
+                                             p.unit, p.low, p.high, p.unit));
+    }
+    if (p.whole && value != std::floor(value)) {
+        throw std::runtime_error(fmt::format("phantom '{}': {} = {}: must be a whole number", phantom, p.name, value));
+    }
+    return value;
+}
+
+PhantomValues checkedValues(const PhantomSpec& spec, const std::vector<PhantomParameter>& parameters)
+{
+    PhantomValues values;
+    values.seed = spec.seed;
+    values.voxel = checked(spec.name, {"voxel", "mm", "", smallestVoxel, largestVoxel, 1, ""}, spec.voxel * 1e3);
+    for (const PhantomParameter& p : parameters) {
+        if (p.word.empty()) {
+            const auto given = spec.numbers.find(p.name);
+            values.numbers[p.name] = given == spec.numbers.end() ? p.standard : checked(spec.name, p, given->second);
+        } else {
+            const auto given = spec.words.find(p.name);
+            values.words[p.name] = given == spec.words.end() ? p.word : given->second;
+        }
+    }
+    const auto refuse = [&](const std::string& name) {
+        std::vector<std::string> known;
+        for (const PhantomParameter& p : parameters) {
+            known.push_back(p.name);
+        }
+        throw std::runtime_error(
+            fmt::format("phantom '{}': no such parameter '{}'; it takes {}", spec.name, name, fmt::join(known, ", ")));
+    };
+    for (const auto& [name, value] : spec.numbers) {
+        if (!values.numbers.contains(name)) {
+            refuse(name);
+        }
+    }
+    for (const auto& [name, value] : spec.words) {
+        if (!values.words.contains(name)) {
+            refuse(name);
+        }
+    }
+    return values;
+}
+
+volume::Provenance provenance(const PhantomSpec& spec, const PhantomValues& values)
+{
+    volume::Provenance out{{"made by", "palpate phantom"},
+                           {"phantom", spec.name},
+                           {"seed", fmt::format("{}", spec.seed)},
+                           {"voxel_mm", fmt::format("{:.12g}", values.voxel)}};
+    for (const auto& [name, value] : values.numbers) {
+        out.emplace_back(name, fmt::format("{:.12g}", value));
+    }
+    for (const auto& [name, value] : values.words) {
+        out.emplace_back(name, value);
+    }
+    return out;
+}
+
+}  // namespace
+
+std::vector<std::string> phantomNames()
+{
+    std::vector<std::string> names;
+    for (const Maker& maker : makers) {
+        names.emplace_back(maker.name);
+    }
+    return names;
+}
+
+std::vector<PhantomParameter> phantomParameters(const std::string& name)
+{
+    std::vector<PhantomParameter> parameters = makerOf(name).parameters();
+    parameters.push_back(
+        {"voxels_per_side", "", "cubic grid of so many voxels along each side; 0: as voxel says", 0, 1024, 0, "", true});
+    return parameters;
+}
+
+volume::Tissue makePhantom(const PhantomSpec& spec, const volume::TissueTable& table)
+{
+    const Maker& maker = makerOf(spec.name);
+    const PhantomValues values = checkedValues(spec, phantomParameters(spec.name));
+    for (const auto& [name, word] : values.words) {
+        if (!table.find(word)) {
+            throw std::runtime_error(fmt::format("phantom '{}': {} = \"{}\": the tissue table '{}' has no such tissue",
+                                                 spec.name, name, word, table.name));
+        }
+    }
+    const PhantomLabels labels = maker.make(values);
+    return volume::Tissue::fromLabels(labels.image, table, labels.names, provenance(spec, values));
+}
+
+}  // namespace palpate::datasets

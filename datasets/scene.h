@@ -1,0 +1,123 @@
+#pragma once
+
+#include <datasets/phantom.h>
+#include <volume/geometry.h>
+#include <volume/tissue.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::datasets {
+
+enum class ToolKind : std::uint8_t { sphere, needle };
+
+struct ToolSpec {
+    ToolKind kind = ToolKind::needle;
+    double radius = 1.05e-3;      // sphere, or needle shaft [m]; 14 G: 2.1 mm across
+    double length = 0.12;         // of the needle [m]
+    double throwLength = 0.022;   // of the biopsy gun [m]
+    double notchLength = 0.020;   // [m]
+    double notchRadius = 0.8e-3;  // inner radius of the notch [m]
+};
+
+/// A mass, damper and spring with a magnitude: one term of equation 3 of the thesis and its share of equations 6-8.
+struct ForceTerm {
+    double force = 0;      // magnitude [N]
+    double mass = 0;       // [kg]
+    double damping = 0;    // [N s/m]
+    double stiffness = 0;  // [N/m]
+};
+
+enum class DffbMode : std::uint8_t { off, thesis, field };
+
+/// Differential force feedback, equations 1-8 of the thesis.
+struct DffbParameters {
+    DffbMode mode = DffbMode::field;
+    ForceTerm surgery, structure, tissue, task;  // set by the user
+    double floorDistance = 2e-3;                 // distance in equation 4 never falls below this [m]
+    double range = 15e-3;                        // `field`: no proximity force beyond this distance [m]
+    double budget = 3.0;                         // `field`: most additional force in all [N]
+};
+
+/// One row of the lookup table of vital structures, in the order of the procedure.
+struct VitalStructure {
+    std::string name;            // structure or tissue of the volume
+    double gain = 1.0;           // of its proximity force
+    double warnDistance = 5e-3;  // [m]
+};
+
+enum class ModelLevel : std::uint8_t { spring, chainmail };
+
+struct ModelSettings {
+    ModelLevel level = ModelLevel::chainmail;
+    double spacing = 2e-3;          // of the ChainMail lattice [m]; widened when the body would need over maxNodes
+    std::uint32_t maxMoves = 2500;  // node moves per tick; what is left over is reported as residual
+    double stiffness = 0;           // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact
+};
+
+/// What the scripted trainee does next.
+struct TraineeStep {
+    // pierce: push on towards `to` until the tissue is felt to give way
+    enum class Kind : std::uint8_t { move, press, fire, wait, pierce } kind = Kind::move;
+    Vec3 to{0.0};             // where the tip shall be, patient frame [m] (move, press)
+    double speed = 0.02;      // of the hand [m/s]
+    double seconds = 0;       // wait: how long; move, press: give up after
+    double tolerance = 1e-3;  // the step is done when the tip is this near [m]
+};
+
+/// Where the volume of a scene comes from: a file, or a phantom when `file` is empty.
+struct VolumeSource {
+    std::filesystem::path file;
+    PhantomSpec phantom;
+};
+
+/// Everything that a session needs, checked. Lengths in the patient frame, SI.
+struct Scene {
+    std::string name;
+    std::string text;  // the TOML it was read from; parsing it again gives this scene (replay relies on it)
+    VolumeSource source;
+    std::string tissues;  // tissue table file; empty = built-in
+    ToolSpec tool;
+    ModelSettings model;
+    DffbParameters dffb;
+    std::string target;  // structure to sample
+    std::vector<VitalStructure> vital;
+    std::optional<Vec3> entry;        // where the needle shall enter [m]; nothing = chosen by planApproach()
+    std::optional<Vec3> aim;          // the point to reach [m]; nothing = inside the target structure
+    double forceCap = 8.5;            // [N]
+    std::vector<TraineeStep> script;  // empty = the standard biopsy along entry and aim
+};
+
+/// Reads a scene. Errors: "FILE:LINE: [dffb] range_mm = -4 mm: must be 0 to 100 mm". Unknown keys are errors, with the
+/// nearest known key.
+Scene loadScene(const std::filesystem::path& file);
+/// As loadScene() from text; `origin` stands for the file in errors, and relative paths start at its folder.
+Scene parseScene(const std::string& text, const std::filesystem::path& origin);
+
+std::vector<std::string> builtInScenes();  // "breast", "layered", "block"
+std::optional<Scene> builtInScene(const std::string& name);
+/// The scene for a volume file alone: target = the first tumour (else the structure nearest the middle), vital = all of
+/// role vital.
+Scene sceneForVolume(const std::filesystem::path& file, const volume::Tissue& tissue, const std::string& target = {});
+
+/// The scene's volume: loads the file or makes the phantom.
+volume::Tissue sceneVolume(const Scene& scene);
+
+/// The straight line of a procedure.
+struct Approach {
+    Vec3 entry;  // on the surface of the body [m]
+    Vec3 aim;    // inside the target [m]
+};
+
+/// Takes entry and aim of the scene where given, else searches the surface: shortest line to the middle of the target that
+/// keeps away from vital structures, bone and fixed tissue, and is long enough for the notch to be centred on the aim.
+/// The surface near the image's border is a cut and no place to enter. Throws std::runtime_error when there is none.
+Approach planApproach(const Scene& scene, const volume::Tissue& tissue);
+
+/// The scene's script, or the standard biopsy: approach, press, puncture, advance short of the target, fire, withdraw.
+std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach);
+
+}  // namespace palpate::datasets

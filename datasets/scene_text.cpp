@@ -1,0 +1,348 @@
+#include <datasets/scene_text.h>
+
+#include <datasets/embedded.h>
+#include <datasets/toml_fields.h>
+
+#include <array>
+#include <limits>
+#include <stdexcept>
+
+namespace palpate::datasets {
+
+namespace {
+
+constexpr double farthest = 5000;        // of a coordinate from the origin [mm]
+constexpr std::size_t mostSteps = 1000;  // of a script
+
+constexpr std::array<std::string_view, 2> toolKinds{"sphere", "needle"};
+constexpr std::array<std::string_view, 3> dffbModes{"off", "thesis", "field"};
+constexpr std::array<std::string_view, 2> modelLevels{"spring", "chainmail"};
+constexpr std::array<std::string_view, 5> stepKinds{"move", "press", "fire", "wait", "pierce"};
+
+constexpr std::array<Field<ToolSpec>, 5> toolFields{{
+    {"radius_mm", "mm", 0.1, 30, 1e-3, &ToolSpec::radius},
+    {"length_mm", "mm", 10, 500, 1e-3, &ToolSpec::length},
+    {"throw_mm", "mm", 0, 50, 1e-3, &ToolSpec::throwLength},
+    {"notch_mm", "mm", 1, 50, 1e-3, &ToolSpec::notchLength},
+    {"notch_radius_mm", "mm", 0.05, 10, 1e-3, &ToolSpec::notchRadius},
+}};
+
+constexpr std::array<Field<ModelSettings>, 3> modelFields{{
+    {"spacing_mm", "mm", 0.2, 20, 1e-3, &ModelSettings::spacing},
+    {"max_moves", "", 1, 1e6, 1, &ModelSettings::maxMoves},
+    {"stiffness_n_m", "N/m", 0, 10000, 1, &ModelSettings::stiffness},
+}};
+
+constexpr std::array<Field<DffbParameters>, 3> dffbFields{{
+    {"floor_mm", "mm", 0.1, 50, 1e-3, &DffbParameters::floorDistance},
+    {"range_mm", "mm", 0, 100, 1e-3, &DffbParameters::range},
+    {"budget_n", "N", 0, 50, 1, &DffbParameters::budget},
+}};
+
+constexpr std::array<Field<ForceTerm>, 4> termFields{{
+    {"force_n", "N", 0, 50, 1, &ForceTerm::force},
+    {"mass_kg", "kg", 0, 5, 1, &ForceTerm::mass},
+    {"damping_ns_m", "N s/m", 0, 100, 1, &ForceTerm::damping},
+    {"stiffness_n_m", "N/m", 0, 5000, 1, &ForceTerm::stiffness},
+}};
+
+struct Term {
+    std::string_view key;
+    ForceTerm DffbParameters::*member;
+};
+constexpr std::array<Term, 4> terms{{{"surgery", &DffbParameters::surgery},
+                                     {"structure", &DffbParameters::structure},
+                                     {"tissue", &DffbParameters::tissue},
+                                     {"task", &DffbParameters::task}}};
+
+constexpr std::array<Field<VitalStructure>, 3> vitalFields{{
+    {"name", "", 0, 0, 1, &VitalStructure::name},
+    {"gain", "", 0, 100, 1, &VitalStructure::gain},
+    {"warn_mm", "mm", 0, 100, 1e-3, &VitalStructure::warnDistance},
+}};
+
+constexpr std::array<Field<TraineeStep>, 3> stepFields{{
+    {"speed_mm_s", "mm/s", 0.1, 2000, 1e-3, &TraineeStep::speed},
+    {"seconds", "s", 0, 3600, 1, &TraineeStep::seconds},
+    {"tolerance_mm", "mm", 0.01, 50, 1e-3, &TraineeStep::tolerance},
+}};
+
+template <class Enum, std::size_t N>
+void readChoice(Section& section, std::string_view key, const std::array<std::string_view, N>& names, Enum& value)
+{
+    if (const auto index = section.choice(key, names)) {
+        value = static_cast<Enum>(*index);
+    }
+}
+
+void readPhantom(Section& volume, PhantomSpec& spec)
+{
+    const std::vector<std::string> names = phantomNames();
+    const std::vector<std::string_view> choices(names.begin(), names.end());
+    spec.name = choices[*volume.choice("phantom", choices)];
+    if (const auto seed = volume.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max())) {
+        spec.seed = static_cast<std::uint64_t>(*seed);
+    }
+    spec.voxel = volume.number("voxel_mm", "mm", 0.1, 5).value_or(spec.voxel * 1e3) * 1e-3;
+    std::optional<Section> parameters = volume.section("parameters");
+    if (!parameters) {
+        return;
+    }
+    for (const PhantomParameter& p : phantomParameters(spec.name)) {
+        if (!p.word.empty()) {
+            if (const auto word = parameters->word(p.name)) {
+                spec.words[p.name] = *word;
+            }
+        } else if (const auto number = parameters->number(p.name, p.unit, p.low, p.high)) {
+            spec.numbers[p.name] = *number;
+        }
+    }
+    parameters->finish();
+}
+
+std::filesystem::path resolved(const std::string& file, const std::filesystem::path& origin)
+{
+    const std::filesystem::path path(file);
+    return path.is_absolute() ? path : std::filesystem::absolute(origin.parent_path() / path).lexically_normal();
+}
+
+void readVolume(Section& top, const std::filesystem::path& origin, VolumeSource& source)
+{
+    std::optional<Section> volume = top.section("volume");
+    if (!volume) {
+        top.missing("[volume]", "a scene needs file = \"..\" or phantom = \"..\" in it");
+    }
+    if (volume->has("file") == volume->has("phantom")) {
+        top.refuse("volume", "needs one of file = \"..\" and phantom = \"..\"");
+    }
+    if (const auto file = volume->word("file")) {
+        source.file = resolved(*file, origin);
+    } else {
+        readPhantom(*volume, source.phantom);
+    }
+    volume->finish();
+}
+
+void readDffb(Section& top, DffbParameters& dffb)
+{
+    std::optional<Section> section = top.section("dffb");
+    if (!section) {
+        return;
+    }
+    readChoice(*section, "mode", dffbModes, dffb.mode);
+    readFields<DffbParameters>(*section, dffbFields, dffb, Need::some);
+    for (const Term& term : terms) {
+        if (std::optional<Section> inner = section->section(term.key)) {
+            readFields<ForceTerm>(*inner, termFields, dffb.*term.member, Need::some);
+            inner->finish();
+        }
+    }
+    section->finish();
+}
+
+void readTool(Section& top, ToolSpec& tool)
+{
+    if (std::optional<Section> section = top.section("tool")) {
+        readChoice(*section, "kind", toolKinds, tool.kind);
+        readFields<ToolSpec>(*section, toolFields, tool, Need::some);
+        section->finish();
+        if (tool.kind == ToolKind::needle && tool.notchRadius >= tool.radius) {
+            section->refuse(section->has("notch_radius_mm") ? "notch_radius_mm" : "radius_mm",
+                            "the notch must be narrower than the needle", "mm");
+        }
+    }
+}
+
+void readModel(Section& top, ModelSettings& model)
+{
+    if (std::optional<Section> section = top.section("model")) {
+        readChoice(*section, "level", modelLevels, model.level);
+        readFields<ModelSettings>(*section, modelFields, model, Need::some);
+        section->finish();
+    }
+}
+
+void readTarget(Section& top, Scene& scene)
+{
+    if (std::optional<Section> section = top.section("target")) {
+        scene.target = section->word("structure").value_or(scene.target);
+        scene.entry = section->point("entry_mm", farthest);
+        scene.aim = section->point("aim_mm", farthest);
+        section->finish();
+    }
+}
+
+void readVital(Section& top, std::vector<VitalStructure>& vital)
+{
+    for (Section& section : top.sections("vital")) {
+        VitalStructure structure;
+        readFields<VitalStructure>(section, vitalFields, structure, Need::some);
+        if (structure.name.empty()) {
+            section.missing("name", "a structure or tissue of the volume");
+        }
+        section.finish();
+        vital.push_back(std::move(structure));
+        if (vital.size() > mostVital) {
+            section.refuse("name", fmt::format("over {} vital structures", mostVital));
+        }
+    }
+}
+
+void readScript(Section& top, std::vector<TraineeStep>& script)
+{
+    for (Section& section : top.sections("script")) {
+        TraineeStep step;
+        if (!section.has("kind")) {
+            section.missing("kind", "move, press, pierce, fire or wait");
+        }
+        readChoice(section, "kind", stepKinds, step.kind);
+        readFields<TraineeStep>(section, stepFields, step, Need::some);
+        if (const auto to = section.point("to_mm", farthest)) {
+            step.to = *to;
+        } else if (step.kind != TraineeStep::Kind::fire && step.kind != TraineeStep::Kind::wait) {
+            section.missing("to_mm", "where the tip shall go: [x, y, z] in mm");
+        }
+        if (step.kind == TraineeStep::Kind::wait && step.seconds <= 0) {
+            section.missing("seconds", "how long to wait, above 0 s");
+        }
+        section.finish();
+        script.push_back(step);
+        if (script.size() > mostSteps) {
+            section.refuse("kind", fmt::format("over {} steps", mostSteps));
+        }
+    }
+}
+
+// Replaces the TOML string `node` of `text` by `value`: a relative path by an absolute one, so that the text gives the same
+// scene from every folder.
+void replaceString(std::string& text, const toml::node* node, const std::string& value)
+{
+    const toml::source_region& at = node->source();
+    const auto offset = [&](toml::source_position position) {
+        std::size_t begin = 0;
+        for (toml::source_index line = 1; line < position.line; ++line) {
+            begin = text.find('\n', begin) + 1;
+        }
+        // Columns count code points; the second and later bytes of one begin with the bits 10.
+        for (toml::source_index column = 1; column < position.column && begin < text.size();) {
+            ++begin;
+            column += begin == text.size() || (static_cast<unsigned char>(text[begin]) & 0xC0U) != 0x80U ? 1U : 0U;
+        }
+        return begin;
+    };
+    const std::size_t begin = offset(at.begin);
+    text.replace(begin, offset(at.end) - begin, tomlString(value));
+}
+
+std::string millimetres(Vec3 p)
+{
+    return fmt::format("[{:.12g}, {:.12g}, {:.12g}]", p.x * 1e3, p.y * 1e3, p.z * 1e3);
+}
+
+std::string phantomText(const PhantomSpec& spec)
+{
+    std::string out = fmt::format("phantom = {}\nseed = {}\nvoxel_mm = {:.12g}\n\n[volume.parameters]\n",
+                                  tomlString(spec.name), spec.seed, spec.voxel * 1e3);
+    for (const auto& [name, value] : spec.numbers) {
+        out += fmt::format("{} = {:.12g}\n", name, value);
+    }
+    for (const auto& [name, value] : spec.words) {
+        out += fmt::format("{} = {}\n", name, tomlString(value));
+    }
+    return out;
+}
+
+std::string stepText(const TraineeStep& step)
+{
+    const bool moves = step.kind != TraineeStep::Kind::fire && step.kind != TraineeStep::Kind::wait;
+    return fmt::format("\n[[script]]\nkind = \"{}\"\n{}{}", stepKinds[static_cast<std::size_t>(step.kind)],
+                       moves ? "to_mm = " + millimetres(step.to) + "\n" : "", writeFields<TraineeStep>(stepFields, step));
+}
+
+}  // namespace
+
+Scene parseScene(const std::string& text, const std::filesystem::path& origin)
+{
+    const toml::table root = parseToml(text, origin.string());
+    Section top(root, origin.string(), "");
+    Scene scene;
+    scene.text = text;
+    scene.name = top.word("name").value_or(origin.stem().string());
+    readVolume(top, origin, scene.source);
+    const auto tissues = top.word("tissues");
+    if (tissues && !scene.source.file.empty()) {
+        top.refuse("tissues", "a volume file holds its tissues; give the table to `palpate import --tissues`");
+    }
+    readTool(top, scene.tool);
+    readModel(top, scene.model);
+    readDffb(top, scene.dffb);
+    readVital(top, scene.vital);
+    readTarget(top, scene);
+    if (std::optional<Section> safety = top.section("safety")) {
+        scene.forceCap = safety->number("cap_n", "N", 0.1, 50).value_or(scene.forceCap);
+        safety->finish();
+    }
+    readScript(top, scene.script);
+    top.finish();
+    if (scene.target.empty() && !scene.aim) {
+        top.missing("[target]", "structure = \"..\", what to sample, or aim_mm = [x, y, z]");
+    }
+    if (tissues) {
+        scene.tissues = resolved(*tissues, origin).string();
+        replaceString(scene.text, root.get("tissues"), scene.tissues);
+    }
+    if (!scene.source.file.empty()) {
+        replaceString(scene.text, root["volume"]["file"].node(), scene.source.file.string());
+    }
+    return scene;
+}
+
+Scene loadScene(const std::filesystem::path& file)
+{
+    return parseScene(readText(file), file);
+}
+
+std::vector<std::string> builtInScenes()
+{
+    return {"breast", "layered", "block"};
+}
+
+std::optional<Scene> builtInScene(const std::string& name)
+{
+    const std::string_view text = embeddedFile("scenes/" + name + ".toml");
+    return text.empty() ? std::nullopt : std::optional(parseScene(std::string(text), name));
+}
+
+std::string sceneText(const Scene& scene)
+{
+    std::string out = fmt::format("name = {}\n", tomlString(scene.name));
+    if (!scene.tissues.empty()) {
+        out += fmt::format("tissues = {}\n", tomlString(scene.tissues));
+    }
+    out += "\n[volume]\n";
+    out += scene.source.file.empty() ? phantomText(scene.source.phantom)
+                                     : fmt::format("file = {}\n", tomlString(scene.source.file.string()));
+    out += fmt::format("\n[tool]\nkind = \"{}\"\n{}", toolKinds[static_cast<std::size_t>(scene.tool.kind)],
+                       writeFields<ToolSpec>(toolFields, scene.tool));
+    out += fmt::format("\n[model]\nlevel = \"{}\"\n{}", modelLevels[static_cast<std::size_t>(scene.model.level)],
+                       writeFields<ModelSettings>(modelFields, scene.model));
+    out += fmt::format("\n[dffb]\nmode = \"{}\"\n{}", dffbModes[static_cast<std::size_t>(scene.dffb.mode)],
+                       writeFields<DffbParameters>(dffbFields, scene.dffb));
+    for (const Term& term : terms) {
+        out += fmt::format("\n[dffb.{}]\n{}", term.key, writeFields<ForceTerm>(termFields, scene.dffb.*term.member));
+    }
+    for (const VitalStructure& vital : scene.vital) {
+        out += "\n[[vital]]\n" + writeFields<VitalStructure>(vitalFields, vital);
+    }
+    out += "\n[target]\n";
+    out += scene.target.empty() ? "" : fmt::format("structure = {}\n", tomlString(scene.target));
+    out += scene.entry ? fmt::format("entry_mm = {}\n", millimetres(*scene.entry)) : "";
+    out += scene.aim ? fmt::format("aim_mm = {}\n", millimetres(*scene.aim)) : "";
+    out += fmt::format("\n[safety]\ncap_n = {:.12g}\n", scene.forceCap);
+    for (const TraineeStep& step : scene.script) {
+        out += stepText(step);
+    }
+    return out;
+}
+
+}  // namespace palpate::datasets

@@ -1,0 +1,121 @@
+#include <datasets/scene.h>
+#include <datasets/scene_text.h>
+#include <datasets/tables.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <stdexcept>
+
+namespace palpate::datasets {
+
+namespace {
+
+using volume::Role;
+using volume::Structure;
+using volume::Tissue;
+
+std::string lower(std::string text)
+{
+    std::transform(text.begin(), text.end(), text.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return text;
+}
+
+Role roleOf(const Tissue& tissue, const Structure& structure)
+{
+    return tissue.table().rows[structure.tissue].role;
+}
+
+std::string chooseTarget(const std::filesystem::path& file, const Tissue& tissue)
+{
+    const std::span<const Structure> all = tissue.structures();
+    const auto tumour =
+        std::find_if(all.begin(), all.end(), [&](const Structure& s) { return roleOf(tissue, s) == Role::tumour; });
+    if (tumour != all.end()) {
+        return tumour->name;
+    }
+    static constexpr std::array<std::string_view, 6> hints{"lesion", "tumor", "mass", "nodule", "target", "tdlu"};
+    for (const std::string_view hint : hints) {
+        for (const Structure& s : all) {
+            if (roleOf(tissue, s) != Role::air && lower(s.name).find(hint) != std::string::npos) {
+                return s.name;
+            }
+        }
+    }
+    std::vector<std::string> names;
+    for (const Structure& s : all) {
+        if (roleOf(tissue, s) != Role::air) {
+            names.push_back(s.name);
+        }
+    }
+    throw std::runtime_error(fmt::format("{}: no tumour or lesion to aim at: choose with --target NAME, one of {}",
+                                         file.string(), fmt::join(names, ", ")));
+}
+
+struct Candidate {
+    std::string name;
+    double volume = 0;
+};
+
+// Tissues of role vital by name; a structure that its tissue's name does not reach, because another structure is called so,
+// stands for itself.
+std::vector<VitalStructure> chooseVital(const Tissue& tissue, const std::string& target)
+{
+    const std::vector<std::uint16_t> sampled = tissue.labelsNamed(target);
+    const auto holds = [](const std::vector<std::uint16_t>& labels, std::uint16_t value) {
+        return std::find(labels.begin(), labels.end(), value) != labels.end();
+    };
+    std::vector<Candidate> candidates;
+    for (const Structure& s : tissue.structures()) {
+        if (roleOf(tissue, s) != Role::vital || holds(sampled, s.value)) {
+            continue;
+        }
+        const std::string& row = tissue.table().rows[s.tissue].name;
+        const std::string name = holds(tissue.labelsNamed(row), s.value) ? row : s.name;
+        const auto known =
+            std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& c) { return c.name == name; });
+        if (known == candidates.end()) {
+            candidates.push_back({name, s.volume});
+        } else {
+            known->volume += s.volume;
+        }
+    }
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.volume > b.volume; });
+    candidates.resize(std::min(candidates.size(), mostVital));
+    std::vector<VitalStructure> vital;
+    for (const Candidate& c : candidates) {
+        vital.push_back({.name = c.name});
+    }
+    return vital;
+}
+
+}  // namespace
+
+Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, const std::string& target)
+{
+    Scene scene;
+    scene.name = file.stem().string();
+    scene.source.file = std::filesystem::absolute(file).lexically_normal();
+    scene.dffb = builtInScene("breast")->dffb;
+    scene.target = target.empty() ? chooseTarget(file, tissue) : target;
+    scene.vital = chooseVital(tissue, scene.target);
+    return parseScene(sceneText(scene), file);
+}
+
+Tissue sceneVolume(const Scene& scene)
+{
+    if (scene.source.file.empty()) {
+        return makePhantom(scene.source.phantom, scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues));
+    }
+    if (scene.source.file.extension() != ".vdb") {
+        throw std::runtime_error(scene.source.file.string() + ": not a .vdb volume: convert it with `palpate import`");
+    }
+    return Tissue::load(scene.source.file);
+}
+
+}  // namespace palpate::datasets

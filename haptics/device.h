@@ -1,0 +1,19 @@
+#pragma once
+
+#include <haptics/tick.h>
+
+namespace palpate::haptics {
+
+/// A haptic device: real, simulated or replayed. Called from the servo thread, once each per tick.
+class Device {
+public:
+    virtual ~Device() = default;
+    /// H2. Allocates nothing, never blocks.
+    virtual DeviceSample read() noexcept = 0;
+    /// H5: the force on the hand [N].
+    virtual void write(Vec3 force) noexcept = 0;
+    /// True when there is nothing more to do: the script or the record has come to its end.
+    virtual bool finished() const noexcept = 0;
+};
+
+}  // namespace palpate::haptics

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <datasets/scene.h>
+#include <haptics/device.h>
+
+#include <vector>
+
+namespace palpate::haptics {
+
+/// Device and hand as one mass on a grip. Defaults: PHANToM Premium 1.0 in a firm stylus grip (docs and tissue tables give
+/// the ranges).
+struct HandParameters {
+    double mass = 0.172;          // device 0.072, hand and stylus 0.1 [kg]
+    double damping = 3.0;         // of the hand [N s/m]
+    double grip = 400.0;          // stiffness between the hand's goal and the stylus [N/m]
+    double encoder = 0.03e-3;     // step of the position that is read [m]
+    double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
+    double dropFelt = 0.4;        // share of the force that must go for the hand to feel that tissue gave way
+    double leastFelt = 0.3;       // forces below are not noticed [N]
+};
+
+/// Simulated device and hand that follow a script: the hand's goal moves along straight lines, the grip pulls the stylus
+/// after it, the force of the device acts back. It lives in ticks, not in wall time: a late tick changes nothing.
+class HandDevice final : public Device {
+public:
+    /// @param axis  of the tool, towards its tip (unit vector)    @param start  of the tip [m]
+    HandDevice(const HandParameters& parameters, std::vector<datasets::TraineeStep> script, Vec3 start, Vec3 axis);
+
+    DeviceSample read() noexcept override;
+    void write(Vec3 force) noexcept override;
+    bool finished() const noexcept override { return step_ >= script_.size(); }
+
+private:
+    void advance() noexcept;
+    bool feltDrop() const noexcept;
+    bool reached(const datasets::TraineeStep& step) const noexcept;
+    void nextStep() noexcept;
+
+    HandParameters parameters_;
+    std::vector<datasets::TraineeStep> script_;
+    std::size_t step_ = 0;
+    double inStep_ = 0;      // time since the step began [s]
+    Vec3 from_{0.0};         // goal when the step began
+    double travelled_ = 0;   // of the goal, along the step's line [m]
+    Vec3 goal_{0.0};
+    Vec3 position_{0.0};
+    Vec3 velocity_{0.0};
+    Vec3 force_{0.0};
+    double peak_ = 0;        // largest force felt in this step [N]
+    Vec3 axis_{0.0};
+};
+
+}  // namespace palpate::haptics

@@ -1,0 +1,127 @@
+#pragma once
+
+// How a record lies in its SQLite file; shared by the writer (recorder.cpp) and the reader (record.cpp), no public header.
+
+#include <haptics/recorder.h>
+#include <haptics/tick.h>
+
+#include <sqlite3.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace palpate::haptics::format {
+
+inline constexpr int applicationId = 0x50414C50;  // "PALP", in the file's header
+inline constexpr int version = 1;                 // user_version; raise it when a table changes
+
+inline constexpr std::uint8_t none = 0xFF;  // a structure that is not there; NULL in the file
+
+inline constexpr std::array<const char*, maxStructures> distanceColumns{
+    "distance_0_m",  "distance_1_m",  "distance_2_m",  "distance_3_m", "distance_4_m",  "distance_5_m",
+    "distance_6_m",  "distance_7_m",  "distance_8_m",  "distance_9_m", "distance_10_m", "distance_11_m",
+    "distance_12_m", "distance_13_m", "distance_14_m", "distance_15_m"};
+inline constexpr std::array<const char*, taskCount> taskColumns{"h2_us", "h3_us", "h4_us", "deform_us",
+                                                                "h6_us", "h7_us", "h5_us"};
+inline constexpr std::array<std::string_view, 3> phaseNames{"free", "contact", "inserted"};
+inline constexpr std::array<std::string_view, 7> eventNames{"contact",     "release", "puncture", "warning",
+                                                            "vital touch", "fire",    "fault"};
+
+/// The index of a structure, of which 0xFF means none.
+template <class Byte>
+struct OptionalIndex {
+    Byte& value;
+};
+
+/// A time [s] that the file holds in microseconds.
+template <class Seconds>
+struct Microseconds {
+    Seconds& value;
+};
+
+/// Calls `visit(column, field)` for every column of table `ticks`, in the order of the file. One list serves the table's
+/// making, the writing (Tick = const TickRecord) and the reading (Tick = TickRecord).
+template <class Tick, class Visit>
+void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
+{
+    const auto vector = [&](const char* x, const char* y, const char* z, auto& v) {
+        visit(x, v.x);
+        visit(y, v.y);
+        visit(z, v.z);
+    };
+    visit("tick", t.tick);
+    vector("tip_x_m", "tip_y_m", "tip_z_m", t.device.position);
+    vector("axis_x", "axis_y", "axis_z", t.device.axis);
+    visit("buttons", t.device.buttons);
+    visit("fresh", t.device.fresh);
+    vector("proxy_x_m", "proxy_y_m", "proxy_z_m", t.proxy);
+    vector("basic_x_n", "basic_y_n", "basic_z_n", t.basic);
+    vector("additional_x_n", "additional_y_n", "additional_z_n", t.additional);
+    vector("total_x_n", "total_y_n", "total_z_n", t.total);
+    visit("phase", t.phase);
+    visit("tissue", t.tissue);
+    visit("inserted_m", t.inserted);
+    visit("contacts", t.contacts);
+    visit("moved", t.moved);
+    visit("residual_m", t.residual);
+    visit("nearest_vital", OptionalIndex{t.nearestVital});
+    visit("fired", t.fired);
+    visit("faulted", t.faulted);
+    for (std::size_t i = 0; i < structures && i < maxStructures; ++i) {
+        visit(distanceColumns[i], t.distance[i]);
+    }
+    for (std::size_t i = 0; i < taskCount; ++i) {
+        visit(taskColumns[i], Microseconds{t.seconds[i]});
+    }
+}
+
+/// The names of all columns, separated by commas.
+std::string columnList(std::size_t structures);
+
+/// An open SQLite file. Errors come as std::runtime_error with SQLite's words and without the file's name.
+class Database {
+public:
+    Database(const std::string& file, int flags);
+    ~Database();
+    Database(const Database&) = delete;
+    Database& operator=(const Database&) = delete;
+
+    void execute(const std::string& sql);
+    sqlite3* get() const noexcept { return handle_; }
+
+private:
+    sqlite3* handle_ = nullptr;
+};
+
+/// A prepared statement: bind by position from 1 up, read by column from 0 up.
+class Statement {
+public:
+    Statement(const Database& database, const std::string& sql);
+    ~Statement();
+    Statement(const Statement&) = delete;
+    Statement& operator=(const Statement&) = delete;
+
+    void bind(int position, double value) { check(sqlite3_bind_double(handle_, position, value)); }
+    void bind(int position, std::int64_t value) { check(sqlite3_bind_int64(handle_, position, value)); }
+    void bind(int position, std::string_view value);
+    void bindNull(int position) { check(sqlite3_bind_null(handle_, position)); }
+
+    /// True when there is a row.
+    bool step();
+    /// Runs a statement that gives no rows, and makes it ready for the next.
+    void run();
+
+    double real(int column) const;
+    std::int64_t integer(int column) const { return sqlite3_column_int64(handle_, column); }
+    std::string_view text(int column) const;
+    bool isNull(int column) const { return sqlite3_column_type(handle_, column) == SQLITE_NULL; }
+
+private:
+    void check(int status);
+    sqlite3_stmt* handle_ = nullptr;
+    sqlite3* database_ = nullptr;
+};
+
+}  // namespace palpate::haptics::format

@@ -1,0 +1,453 @@
+#include <haptics/record_format.h>
+#include <haptics/recorder.h>
+
+#include <boost/lockfree/spsc_queue.hpp>
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+#include <thread>
+
+namespace palpate::haptics {
+
+using format::Database;
+using format::Statement;
+
+namespace {
+
+constexpr std::chrono::milliseconds commitPeriod{100};
+constexpr std::size_t ticksPerTransaction = 4096;  // bounds the write-ahead log
+
+using Results = std::vector<std::pair<std::string, std::string>>;
+
+void removeFile(const std::string& file) noexcept
+{
+    std::error_code ignored;
+    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+        std::filesystem::remove(file + suffix, ignored);
+    }
+}
+
+// Columns of real numbers have no declared type on purpose: a REAL column would turn -0.0 into the integer 0.
+std::string schema(const SessionInfo& info)
+{
+    std::ostringstream sql;
+    sql.precision(17);
+    sql << "CREATE TABLE session (key TEXT, value);"
+           "CREATE TABLE results (key TEXT, value TEXT);"
+           "CREATE TABLE structures (structure INTEGER PRIMARY KEY, name TEXT, warn_distance_m);"
+           "CREATE TABLE tissues (tissue INTEGER PRIMARY KEY, name TEXT);"
+           "CREATE TABLE ticks (tick INTEGER PRIMARY KEY"
+        << format::columnList(info.structures.size()).substr(std::string_view("tick").size()) << ", seconds AS (tick / "
+        << std::showpoint << info.rate
+        << ") VIRTUAL);"
+           "CREATE TABLE events (tick INTEGER, position INTEGER, kind TEXT, structure INTEGER, tissue INTEGER, value);"
+           "CREATE TABLE cores (tick INTEGER PRIMARY KEY, volume_m3, target_fraction, target_length_m,"
+           " notch_start_x_m, notch_start_y_m, notch_start_z_m, notch_end_x_m, notch_end_y_m, notch_end_z_m);"
+           "CREATE TABLE core_fractions (tick INTEGER, tissue INTEGER, fraction);";
+    return sql.str();
+}
+
+void insertPair(Database& database, const char* table, std::string_view key, const auto& value)
+{
+    Statement insert(database, std::string("INSERT INTO ") + table + " VALUES (?, ?)");
+    insert.bind(1, key);
+    insert.bind(2, value);
+    insert.run();
+}
+
+void writeInfo(Database& database, const SessionInfo& info)
+{
+    const auto put = [&](std::string_view key, const auto& value) { insertPair(database, "session", key, value); };
+    put("scene", std::string_view(info.scene));
+    put("scene_text", std::string_view(info.sceneText));
+    put("scene_origin", std::string_view(info.sceneOrigin));
+    put("volume_hash", std::string_view(info.volumeHash));
+    put("model", std::string_view(info.model));
+    put("device", std::string_view(info.device));
+    put("build", std::string_view(info.build));
+    put("rate_hz", info.rate);
+    put("seed", std::string_view(std::to_string(info.seed)));
+    for (const auto& [key, value] : info.extra) {
+        put("extra." + key, std::string_view(value));
+    }
+    Statement structure(database, "INSERT INTO structures VALUES (?, ?, ?)");
+    for (std::size_t i = 0; i < info.structures.size(); ++i) {
+        structure.bind(1, static_cast<std::int64_t>(i));
+        structure.bind(2, std::string_view(info.structures[i]));
+        structure.bind(3, i < info.warnDistances.size() ? info.warnDistances[i] : 0.0);
+        structure.run();
+    }
+    Statement tissue(database, "INSERT INTO tissues VALUES (?, ?)");
+    for (std::size_t i = 0; i < info.tissues.size(); ++i) {
+        tissue.bind(1, static_cast<std::int64_t>(i));
+        tissue.bind(2, std::string_view(info.tissues[i]));
+        tissue.run();
+    }
+}
+
+[[noreturn]] void refuse(const std::string& file, const std::string& why)
+{
+    throw std::runtime_error(file + ": cannot be made: " + why);
+}
+
+// Gives `part` the name `file`, never in another file's place.
+void giveName(const std::string& part, const std::string& file)
+{
+    int failed = ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, file.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+    if (failed == EINVAL && !std::filesystem::exists(file)) {  // a file system that cannot refuse by itself
+        failed = std::rename(part.c_str(), file.c_str()) == 0 ? 0 : errno;
+    }
+    if (failed == EEXIST || failed == EINVAL) {
+        throw std::runtime_error(file + ": exists already; choose another name or remove it");
+    }
+    if (failed != 0) {
+        refuse(file, std::strerror(failed));
+    }
+}
+
+// Makes a record without ticks under another name first, so that the file is there whole or not at all.
+void makeFile(const std::string& file, const SessionInfo& info)
+{
+    if (std::filesystem::exists(file)) {
+        throw std::runtime_error(file + ": exists already; choose another name or remove it");
+    }
+    const std::string part = file + "." + std::to_string(::getpid()) + ".part";
+    removeFile(part);
+    try {
+        Database database(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX);
+        database.execute("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; BEGIN");
+        database.execute("PRAGMA application_id = " + std::to_string(format::applicationId));
+        database.execute("PRAGMA user_version = " + std::to_string(format::version));
+        database.execute(schema(info));
+        writeInfo(database, info);
+        database.execute("COMMIT; PRAGMA journal_mode = WAL");
+    } catch (const std::exception& e) {
+        removeFile(part);
+        refuse(file, e.what());
+    }
+    try {
+        giveName(part, file);
+    } catch (const std::exception&) {
+        removeFile(part);
+        throw;
+    }
+}
+
+// Binds fields one after another, in the order of format::eachColumn.
+struct Binder {
+    Statement& row;
+    int position = 0;
+
+    void operator()(const char*, const double& v) { row.bind(++position, v); }
+    template <class Integer>
+    void operator()(const char*, const Integer& v)
+    {
+        row.bind(++position, static_cast<std::int64_t>(v));
+    }
+    void operator()(const char*, const Phase& v) { row.bind(++position, format::phaseNames[static_cast<std::size_t>(v)]); }
+    void operator()(const char*, const format::Microseconds<const float>& v)
+    {
+        row.bind(++position, static_cast<double>(v.value) * 1e6);
+    }
+    void operator()(const char*, const format::OptionalIndex<const std::uint8_t>& v)
+    {
+        if (v.value == format::none) {
+            row.bindNull(++position);
+        } else {
+            row.bind(++position, static_cast<std::int64_t>(v.value));
+        }
+    }
+};
+
+std::string tickInsert(std::size_t structures)
+{
+    const std::string columns = format::columnList(structures);
+    std::string places = "?";
+    for (auto n = std::ranges::count(columns, ','); n > 0; --n) {
+        places += ", ?";
+    }
+    return "INSERT INTO ticks (" + columns + ") VALUES (" + places + ")";
+}
+
+// The prepared statements of a session.
+class Writer {
+public:
+    Writer(Database& database, std::size_t structures)
+        : structures_(structures),
+          tick_(database, tickInsert(structures)),
+          event_(database, "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)"),
+          core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
+          fraction_(database, "INSERT INTO core_fractions VALUES (?, ?, ?)")
+    {
+    }
+
+    void write(const TickRecord& record)
+    {
+        format::eachColumn(record, structures_, Binder{tick_});
+        tick_.run();
+        for (std::uint32_t i = 0; i < std::min<std::size_t>(record.eventCount, maxEventsPerTick); ++i) {
+            const Event& event = record.events[i];
+            Binder bind{event_};
+            bind("tick", record.tick);
+            bind("position", i);
+            event_.bind(++bind.position, format::eventNames[static_cast<std::size_t>(event.kind)]);
+            bind("structure", format::OptionalIndex{event.structure});
+            bind("tissue", event.tissue);
+            bind("value", event.value);
+            event_.run();
+        }
+        if (record.fired) {
+            writeCore(record.tick, record.core);
+        }
+    }
+
+private:
+    void writeCore(std::uint64_t tick, const CoreSample& core)
+    {
+        Binder bind{core_};
+        bind("tick", tick);
+        for (const double value :
+             {core.volume, core.targetFraction, core.targetLength, core.notchStart.x, core.notchStart.y, core.notchStart.z,
+              core.notchEnd.x, core.notchEnd.y, core.notchEnd.z}) {
+            bind("", value);
+        }
+        core_.run();
+        for (std::size_t i = 0; i < maxTissues; ++i) {
+            if (core.fraction[i] != 0) {
+                fraction_.bind(1, static_cast<std::int64_t>(tick));
+                fraction_.bind(2, static_cast<std::int64_t>(i));
+                fraction_.bind(3, core.fraction[i]);
+                fraction_.run();
+            }
+        }
+    }
+
+    std::size_t structures_;
+    Statement tick_, event_, core_, fraction_;
+};
+
+// Eight seconds at the session's rate, and never of less than eight at 1 kHz.
+std::size_t ringCapacity(double rate)
+{
+    return static_cast<std::size_t>(std::clamp(8 * rate, 8192.0, 65536.0));
+}
+
+// The writer thread takes no signals; one about the size of files (RLIMIT_FSIZE) would end the process.
+class SignalsBlocked {
+public:
+    SignalsBlocked()
+    {
+        sigset_t all;
+        sigfillset(&all);
+        pthread_sigmask(SIG_SETMASK, &all, &before_);
+    }
+    ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+    SignalsBlocked(const SignalsBlocked&) = delete;
+    SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+private:
+    sigset_t before_{};
+};
+
+}  // namespace
+
+struct Recorder::Impl {
+    std::string file;
+    boost::lockfree::spsc_queue<TickRecord> ring;
+    std::atomic<std::uint64_t> lost{0};
+    std::optional<Database> database;
+    std::optional<Writer> writer;
+
+    mutable std::mutex mutex;  // guards what follows; the servo thread never takes it
+    std::condition_variable wake, served;
+    std::uint64_t requests = 0, answered = 0;
+    bool stopping = false;
+    std::optional<Results> results;
+    std::string error;
+    std::thread thread;
+
+    Impl(const std::string& path, const SessionInfo& info) : file(path), ring(ringCapacity(info.rate))
+    {
+        // Touches every page of the ring now and not in the servo loop.
+        while (ring.push(TickRecord{})) {
+        }
+        ring.reset();
+        makeFile(file, info);
+        try {
+            database.emplace(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+            // NORMAL syncs only when the log is folded into the file: a killed process loses nothing that was committed.
+            database->execute("PRAGMA synchronous = NORMAL");
+            writer.emplace(*database, info.structures.size());
+            const SignalsBlocked inherited;
+            thread = std::thread([this] { work(); });
+        } catch (const std::exception& e) {
+            removeFile(file);
+            refuse(file, e.what());
+        }
+    }
+
+    void work() noexcept
+    {
+        pthread_setname_np(pthread_self(), "palpate-record");
+        std::unique_lock lock(mutex);
+        for (bool last = false; !last;) {
+            wake.wait_for(lock, commitPeriod, [&] { return stopping || requests > answered; });
+            const std::uint64_t request = requests;
+            const std::optional<Results> toFinish = std::exchange(results, std::nullopt);
+            last = stopping;
+            const bool failed = !error.empty();
+            lock.unlock();
+            std::string problem = failed ? drop() : store(toFinish, last);
+            lock.lock();
+            if (!problem.empty()) {
+                error = file + ": recording stopped: " + problem + "; what was written until then can be read";
+            }
+            answered = request;
+            served.notify_all();
+        }
+    }
+
+    // After an error the session goes on without a record: one with a hole could not be replayed.
+    std::string drop() noexcept
+    {
+        lost += ring.consume_all([](const TickRecord&) {});
+        return {};
+    }
+
+    // Returns what went wrong, or nothing.
+    std::string store(const std::optional<Results>& toFinish, bool last) noexcept
+    {
+        std::size_t taken = 0;
+        try {
+            do {
+                taken = 0;
+                if (ring.read_available() == 0) {
+                    break;
+                }
+                database->execute("BEGIN IMMEDIATE");
+                while (taken < ticksPerTransaction && ring.consume_one([&](const TickRecord& r) {
+                    writer->write(r);
+                    ++taken;
+                })) {
+                }
+                database->execute("COMMIT");
+            } while (taken == ticksPerTransaction);
+            taken = 0;
+            if (toFinish || last) {
+                complete(toFinish.value_or(Results{}));
+            }
+            return {};
+        } catch (const std::exception& e) {
+            std::string why = e.what();
+            sqlite3_exec(database->get(), "ROLLBACK", nullptr, nullptr, nullptr);
+            lost += taken;
+            drop();
+            return why;
+        }
+    }
+
+    void complete(const Results& values)
+    {
+        database->execute("BEGIN IMMEDIATE; DELETE FROM session WHERE key IN ('complete', 'lost_ticks')");
+        insertPair(*database, "session", "complete", std::int64_t{1});
+        insertPair(*database, "session", "lost_ticks", static_cast<std::int64_t>(lost.load()));
+        for (const auto& [key, value] : values) {
+            insertPair(*database, "results", key, std::string_view(value));
+        }
+        database->execute("COMMIT");
+    }
+
+    void request(std::optional<Results> values)
+    {
+        std::unique_lock lock(mutex);
+        if (values) {
+            results = std::move(values);
+        }
+        const std::uint64_t mine = ++requests;
+        wake.notify_all();
+        served.wait(lock, [&] { return answered >= mine; });
+    }
+
+    ~Impl()
+    {
+        {
+            const std::scoped_lock lock(mutex);
+            stopping = true;
+        }
+        wake.notify_all();
+        thread.join();
+        const SignalsBlocked closing;
+        writer.reset();
+        if (error.empty()) {
+            // Folds the log into the file, so that one plain file is left. With a reader still there the log stays, which
+            // is as good.
+            sqlite3_exec(database->get(), "PRAGMA journal_mode = DELETE", nullptr, nullptr, nullptr);
+        }
+        database.reset();
+        const timespec now{};
+        sigset_t tooBig;
+        sigemptyset(&tooBig);
+        sigaddset(&tooBig, SIGXFSZ);
+        sigtimedwait(&tooBig, nullptr, &now);
+    }
+};
+
+Recorder::Recorder(const std::filesystem::path& file, const SessionInfo& info)
+{
+    if (info.structures.size() > maxStructures || info.tissues.size() > maxTissues) {
+        refuse(file.string(), "at most " + std::to_string(maxStructures) + " structures and " + std::to_string(maxTissues) +
+                                  " tissues fit into a record");
+    }
+    if (!(info.rate > 0)) {
+        refuse(file.string(), "a rate of " + std::to_string(info.rate) + " Hz is not above 0");
+    }
+    impl_ = std::make_unique<Impl>(file.string(), info);
+}
+
+Recorder::~Recorder() = default;
+
+void Recorder::push(const TickRecord& record) noexcept
+{
+    if (!impl_->ring.push(record)) {
+        impl_->lost.fetch_add(1, std::memory_order_relaxed);
+    }
+}
+
+void Recorder::flush()
+{
+    impl_->request(std::nullopt);
+}
+
+void Recorder::finish(const Results& results)
+{
+    impl_->request(results);
+}
+
+std::uint64_t Recorder::lost() const noexcept
+{
+    return impl_->lost.load(std::memory_order_relaxed);
+}
+
+std::string Recorder::error() const
+{
+    const std::scoped_lock lock(impl_->mutex);
+    return impl_->error;
+}
+
+}  // namespace palpate::haptics

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <haptics/tick.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::haptics {
+
+/// What a record says about its session.
+struct SessionInfo {
+    std::string scene;        // name
+    std::string sceneText;    // TOML, enough to build the same session again
+    std::string sceneOrigin;  // file that the text came from; relative paths start at its folder
+    std::string volumeHash;   // of the labels, so that replay can refuse another volume
+    std::string model;        // "chainmail", ..
+    std::string device;       // "hand", ..
+    std::string build;        // version and commit
+    double rate = 1000;       // [Hz]
+    std::uint64_t seed = 1;
+    std::vector<std::string> structures;  // target first, then vital structures
+    std::vector<std::string> tissues;     // rows of the tissue table
+    std::vector<double> warnDistances;    // by structure [m]; 0 for the target
+    std::vector<std::pair<std::string, std::string>> extra;
+};
+
+/// Writes a session to one SQLite file (WAL). The servo thread pushes, a thread of the recorder's own writes in batches, so
+/// that a kill at any moment loses at most 0.5 s.
+class Recorder {
+public:
+    /// Throws std::runtime_error when the file cannot be made or exists already.
+    Recorder(const std::filesystem::path& file, const SessionInfo& info);
+    /// Writes what is left, marks the session complete and leaves one plain file.
+    ~Recorder();
+    Recorder(const Recorder&) = delete;
+    Recorder& operator=(const Recorder&) = delete;
+
+    /// From one thread. Wait-free, allocates nothing; a full ring counts a lost record.
+    void push(const TickRecord& record) noexcept;
+    /// Waits until everything pushed so far is in the file. For sessions that run faster than real time, so that the ring
+    /// does not fill; never from a real-time loop.
+    void flush();
+    /// From the setting-up thread, after the servo loop has ended: writes what is left and key-value results, such as the
+    /// score, and marks the session complete.
+    void finish(const std::vector<std::pair<std::string, std::string>>& results);
+    std::uint64_t lost() const noexcept;
+    /// Empty, or what went wrong in writing (a full disk): the session goes on, and the user is told at its end.
+    std::string error() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// A record opened for reading; also one whose writer was killed.
+class Record {
+public:
+    /// Throws std::runtime_error ("FILE: what is wrong and what to do").
+    explicit Record(const std::filesystem::path& file);
+    Record(Record&&) noexcept;
+    ~Record();
+
+    const SessionInfo& info() const noexcept;
+    bool complete() const noexcept;  // false when the writer was killed
+    std::uint64_t ticks() const;
+    /// Calls `visit` for every tick in order, with events and cores filled in.
+    void each(const std::function<void(const TickRecord&)>& visit) const;
+    std::vector<std::pair<std::string, std::string>> results() const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::haptics

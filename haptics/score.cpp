@@ -1,0 +1,222 @@
+#include <haptics/score.h>
+
+#include <fmt/format.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::haptics {
+
+namespace {
+
+constexpr double pathStep = 0.2e-3;      // [m]
+constexpr double redirectLength = 5e-3;  // [m]
+constexpr double contactPause = 0.1;     // off the body, before a touch counts as another one [s]
+
+// 1 at `full` or before it, 0 at `none` or beyond it, straight between them. The two may lie either way round.
+double ramp(double value, double full, double none) noexcept
+{
+    return std::clamp((none - value) / (none - full), 0.0, 1.0);
+}
+
+}  // namespace
+
+// Weights: the list of measures is of Johnson 2012 and tissue.md's summary of published simulators; the points and the
+// limits are ours, and docs/score.md states them.
+ScoreParts parts(const Score& s) noexcept
+{
+    ScoreParts p;
+    if (s.skinContacts == 0) {
+        return p;
+    }
+    p.vital = 25 * std::max(0.0, 1 - 0.4 * s.vitalContacts - 0.1 * s.vitalSeconds - 0.1 * s.vitalDepth * 1e3);
+    if (s.passes == 0) {
+        return p;
+    }
+    p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
+             10 * ramp(s.targetingError, 0, 10e-3);
+    const double economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1;
+    p.technique = 5 * (ramp(s.passes, 1, 5) + ramp(s.skinContacts, 1, 5) + ramp(s.redirects, 0, 4) + economy +
+                       ramp(s.peakForce, 4, 8.5));
+    return p;
+}
+
+void PathMeter::add(Vec3 tip) noexcept
+{
+    if (!running) {
+        running = true;
+        anchor = tip;
+    }
+    const double step = glm::distance(anchor, tip);
+    if (step >= pathStep) {
+        counted += step;
+        anchor = tip;
+    }
+}
+
+void PathMeter::pause(Vec3 tip) noexcept
+{
+    counted = length(tip);
+    running = false;
+}
+
+double PathMeter::length(Vec3 tip) const noexcept
+{
+    return running ? counted + glm::distance(anchor, tip) : counted;
+}
+
+Scorer::Scorer(const SessionInfo& info)
+    : rate_(info.rate), structures_(std::min<std::size_t>(info.structures.size(), maxStructures))
+{
+}
+
+void Scorer::add(const TickRecord& record) noexcept
+{
+    const Vec3 tip = record.device.position;
+    path_.add(tip);
+    score_.peakForce = std::max(score_.peakForce, glm::length(record.total));
+    addContact(record);
+    addDepth(record);
+    addVital(record);
+    if (record.fired) {
+        addFiring(record);
+    }
+    tip_ = tip;
+    lastTick_ = record.tick;
+}
+
+void Scorer::addContact(const TickRecord& record) noexcept
+{
+    if (record.phase == Phase::free) {
+        return;
+    }
+    const double pause = static_cast<double>(record.tick - lastTouch_) / rate_;
+    if (!touched_) {
+        firstContact_ = record.tick;
+    }
+    if (!touched_ || pause > contactPause) {
+        ++score_.skinContacts;
+    }
+    touched_ = true;
+    lastTouch_ = record.tick;
+    ++contactTicks_;
+    forceSum_ += glm::length(record.total);
+}
+
+void Scorer::addDepth(const TickRecord& record) noexcept
+{
+    const double depth = record.inserted;
+    if (record.phase != Phase::inserted) {
+        if (insidePath_.running) {
+            insidePath_.pause(tip_);
+        }
+        depthPeak_ = 0;
+        withdrawing_ = false;
+        return;
+    }
+    insidePath_.add(record.device.position);
+    score_.deepest = std::max(score_.deepest, depth);
+    if (!withdrawing_) {
+        depthPeak_ = std::max(depthPeak_, depth);
+        withdrawing_ = depth < depthPeak_ - redirectLength;
+        depthValley_ = depth;
+    } else {
+        depthValley_ = std::min(depthValley_, depth);
+        if (depth > depthValley_ + redirectLength) {
+            ++score_.redirects;
+            withdrawing_ = false;
+            depthPeak_ = depth;
+        }
+    }
+}
+
+void Scorer::addVital(const TickRecord& record) noexcept
+{
+    const auto count = std::min<std::size_t>(record.eventCount, maxEventsPerTick);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Event& event = record.events[i];
+        score_.warnings += event.kind == EventKind::warning ? 1 : 0;
+        if (event.kind == EventKind::vitalTouch) {
+            ++score_.vitalContacts;
+            score_.vitalDepth = std::max(score_.vitalDepth, event.value);
+        }
+    }
+    bool inside = false;
+    for (std::size_t i = 1; i < structures_; ++i) {
+        inside = inside || record.distance[i] <= 0;
+        score_.vitalDepth = std::max(score_.vitalDepth, -record.distance[i]);
+    }
+    vitalTicks_ += inside ? 1 : 0;
+}
+
+void Scorer::addFiring(const TickRecord& record) noexcept
+{
+    double error = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < std::min<std::size_t>(record.eventCount, maxEventsPerTick); ++i) {
+        if (record.events[i].kind == EventKind::fire) {
+            error = std::max(0.0, record.events[i].value);
+        }
+    }
+    const double fraction = record.core.targetFraction;
+    const bool better = score_.passes == 0 || fraction > score_.bestTargetFraction ||
+                        (fraction == score_.bestTargetFraction && error < score_.targetingError);
+    ++score_.passes;
+    if (better) {
+        score_.targetingError = error;
+        score_.bestTargetFraction = fraction;
+        score_.bestTargetLength = record.core.targetLength;
+    }
+}
+
+Score Scorer::score() const noexcept
+{
+    Score s = score_;
+    s.seconds = touched_ ? static_cast<double>(lastTick_ - firstContact_) / rate_ : 0;
+    s.pathLength = path_.length(tip_);
+    s.insertedPath = insidePath_.length(tip_);
+    s.meanForce = contactTicks_ > 0 ? forceSum_ / static_cast<double>(contactTicks_) : 0;
+    s.vitalSeconds = static_cast<double>(vitalTicks_) / rate_;
+    const ScoreParts p = parts(s);
+    s.total = p.core + p.vital + p.technique;
+    return s;
+}
+
+Score scoreOf(const Record& record)
+{
+    Scorer scorer(record.info());
+    record.each([&](const TickRecord& tick) { scorer.add(tick); });
+    return scorer.score();
+}
+
+std::vector<std::pair<std::string, std::string>> describe(const Score& s)
+{
+    const ScoreParts p = parts(s);
+    const bool fired = s.passes > 0;
+    return {
+        {"Total", fmt::format("{:.0f} of 100", s.total)},
+        {"Core", fmt::format("{:.0f} of 50", p.core)},
+        {"Vital structures", fmt::format("{:.0f} of 25", p.vital)},
+        {"Technique", fmt::format("{:.0f} of 25", p.technique)},
+        {"Passes", fmt::format("{}", s.passes)},
+        {"Targeting error",
+         fired && std::isfinite(s.targetingError) ? fmt::format("{:.1f} mm", s.targetingError * 1e3) : "-"},
+        {"Target in best core", fired ? fmt::format("{:.0f} %", s.bestTargetFraction * 100) : "-"},
+        {"Length in target", fired ? fmt::format("{:.1f} mm", s.bestTargetLength * 1e3) : "-"},
+        {"Vital contacts", fmt::format("{}", s.vitalContacts)},
+        {"Time in vital structures", fmt::format("{:.2f} s", s.vitalSeconds)},
+        {"Depth in vital structures", fmt::format("{:.1f} mm", s.vitalDepth * 1e3)},
+        {"Warnings", fmt::format("{}", s.warnings)},
+        {"Time", fmt::format("{:.1f} s", s.seconds)},
+        {"Skin contacts", fmt::format("{}", s.skinContacts)},
+        {"Redirects", fmt::format("{}", s.redirects)},
+        {"Path of the tip", fmt::format("{:.0f} mm", s.pathLength * 1e3)},
+        {"Path inside", fmt::format("{:.0f} mm", s.insertedPath * 1e3)},
+        {"Deepest insertion", fmt::format("{:.1f} mm", s.deepest * 1e3)},
+        {"Peak force", fmt::format("{:.2f} N", s.peakForce)},
+        {"Mean force in contact", fmt::format("{:.2f} N", s.meanForce)},
+    };
+}
+
+}  // namespace palpate::haptics

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <haptics/recorder.h>
+#include <haptics/tick.h>
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::haptics {
+
+/// What simulators of needle procedures score (Johnson 2012 and the list in docs/score.md), computed tick by tick.
+struct Score {
+    double seconds = 0;              // first contact to the end
+    double pathLength = 0;           // of the tip, in steps of 0.2 mm [m]
+    double insertedPath = 0;         // of the tip while inside [m]
+    double deepest = 0;              // largest length of the shaft inside [m]
+    double peakForce = 0;            // total [N]
+    double meanForce = 0;            // total, while in contact [N]
+    std::uint32_t skinContacts = 0;  // after at least 0.1 s off the body
+    std::uint32_t redirects = 0;     // withdrawn by over 5 mm inside and pushed on again by over 5 mm
+    std::uint32_t passes = 0;        // fired
+    /// Middle of the notch to target's surface, 0 inside the target, at the best firing [m]: the one with the largest share
+    /// of target, then with the smallest error. Not finite when never fired.
+    double targetingError = std::numeric_limits<double>::infinity();
+    double bestTargetFraction = 0;  // of the core of that firing
+    double bestTargetLength = 0;    // [m]
+    std::uint32_t vitalContacts = 0;
+    double vitalSeconds = 0;  // time with the tip in contact with a vital structure
+    double vitalDepth = 0;    // deepest [m]
+    std::uint32_t warnings = 0;
+    double total = 0;  // 0-100; the formula is in score.cpp and docs/score.md
+};
+
+/// Where the points of a total come from.
+struct ScoreParts {
+    double core = 0;       // of 50
+    double vital = 0;      // of 25
+    double technique = 0;  // of 25
+};
+
+ScoreParts parts(const Score& score) noexcept;
+
+/// Length of a path, counted in steps of at least 0.2 mm so that noise of an encoder adds nothing; the last, shorter step
+/// counts too.
+struct PathMeter {
+    Vec3 anchor{0.0};
+    double counted = 0;  // [m]
+    bool running = false;
+
+    void add(Vec3 tip) noexcept;
+    /// Ends a stretch; the next add() starts another one.
+    void pause(Vec3 tip) noexcept;
+    double length(Vec3 tip) const noexcept;
+};
+
+/// Feeds on ticks, in a live session and from a record alike.
+class Scorer {
+public:
+    explicit Scorer(const SessionInfo& info);
+    void add(const TickRecord& record) noexcept;
+    Score score() const noexcept;
+
+private:
+    void addContact(const TickRecord& record) noexcept;
+    void addDepth(const TickRecord& record) noexcept;
+    void addFiring(const TickRecord& record) noexcept;
+    void addVital(const TickRecord& record) noexcept;
+
+    double rate_ = 1000;  // [Hz]
+    std::size_t structures_ = 0;
+    Score score_;
+    PathMeter path_, insidePath_;
+    Vec3 tip_{0.0};  // of the last tick [m]
+    std::uint64_t lastTick_ = 0, firstContact_ = 0, lastTouch_ = 0;
+    std::uint64_t contactTicks_ = 0, vitalTicks_ = 0;
+    double forceSum_ = 0;                     // [N]
+    double depthPeak_ = 0, depthValley_ = 0;  // of the shaft inside [m]
+    bool withdrawing_ = false, touched_ = false;
+};
+
+/// Scores a whole record.
+Score scoreOf(const Record& record);
+
+/// Label and value pairs in the units of screens (mm, N, s, %), for reports and for printing.
+std::vector<std::pair<std::string, std::string>> describe(const Score& score);
+
+}  // namespace palpate::haptics

@@ -1,0 +1,108 @@
+#include <haptics/servo.h>
+
+#include <sched.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+
+#include <chrono>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+
+namespace palpate::haptics {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+constexpr auto period = 1ms;
+constexpr auto spin = 50us;      // what a sleep may come late without harm
+constexpr int priority = 60;     // above everything ordinary, below the kernel's own threads
+
+double seconds(Clock::duration d) noexcept
+{
+    return std::chrono::duration<double>(d).count();
+}
+
+void sleepUntil(Clock::time_point due) noexcept
+{
+    const auto wake = (due - spin).time_since_epoch();
+    const auto whole = std::chrono::duration_cast<std::chrono::seconds>(wake);
+    timespec t{};
+    t.tv_sec = whole.count();
+    t.tv_nsec = std::chrono::duration_cast<std::chrono::nanoseconds>(wake - whole).count();
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) == EINTR) {
+    }
+    while (Clock::now() < due) {
+    }
+}
+
+TickRecord oneTick(Device& device, Simulation& simulation) noexcept
+{
+    const auto start = Clock::now();
+    const DeviceSample sample = device.read();
+    const auto read = Clock::now();
+    TickRecord record = simulation.tick(sample);
+    const auto computed = Clock::now();
+    device.write(record.total);
+    record.seconds[static_cast<std::size_t>(Task::h2)] = static_cast<float>(seconds(read - start));
+    record.seconds[static_cast<std::size_t>(Task::h5)] = static_cast<float>(seconds(Clock::now() - computed));
+    return record;
+}
+
+}  // namespace
+
+ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
+                     const std::atomic<bool>& stop)
+{
+    ServoTiming timing;
+    auto due = Clock::now() + period;
+    while (!device.finished() && !stop.load(std::memory_order_relaxed)) {
+        if (options.seconds > 0.0 && static_cast<double>(timing.ticks) * tickSeconds >= options.seconds) {
+            break;
+        }
+        if (options.paced) {
+            sleepUntil(due);
+        }
+        const auto start = Clock::now();
+        const TickRecord record = oneTick(device, simulation);
+        const auto sent = Clock::now();
+        timing.work.add(seconds(sent - start));
+        for (std::size_t i = 0; i < taskCount; ++i) {
+            timing.tasks[i].add(static_cast<double>(record.seconds[i]));
+        }
+        ++timing.ticks;
+        if (options.paced) {
+            timing.lateness.add(seconds(start - due));
+            due += period;
+            timing.missed += sent > due ? 1 : 0;
+        }
+        sink(record, timing);
+        const auto now = Clock::now();
+        while (options.paced && now > due + period) {
+            due += period;
+            ++timing.missed;
+        }
+    }
+    return timing;
+}
+
+std::vector<std::string> claimRealTime()
+{
+    std::vector<std::string> warnings;
+    sched_param parameters{};
+    parameters.sched_priority = priority;
+    if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0) {
+        prctl(PR_SET_TIMERSLACK, 1UL);
+        warnings.push_back("no real-time priority (SCHED_FIFO: " + std::string(std::strerror(errno)) +
+                           "): ticks may come late under load; allow it with 'ulimit -r 60' or run as root");
+    }
+    if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+        warnings.push_back("memory is not locked (mlockall: " + std::string(std::strerror(errno)) +
+                           "): a page fault may delay a tick; allow it with 'ulimit -l unlimited' or run as root");
+    }
+    return warnings;
+}
+
+}  // namespace palpate::haptics

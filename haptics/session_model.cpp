@@ -1,0 +1,84 @@
+#include <haptics/session_model.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace palpate::haptics {
+
+namespace {
+
+// Fields finer than this are not felt: half the width of a 14 G needle.
+constexpr double finestField = 0.75e-3;
+constexpr std::size_t surfaceNodes = 4U << 20;
+constexpr std::size_t structureNodes = 1U << 20;
+constexpr std::size_t latticeNodes = 4U << 20;
+
+volume::NodeGrid fieldGrid(const volume::Tissue& tissue, std::size_t nodes)
+{
+    const Vec3 voxel = tissue.affine().spacing();
+    const double wanted = std::max(finestField, std::min({voxel.x, voxel.y, voxel.z}));
+    const double margin = 4.0 * wanted;
+    return volume::coveringGrid(tissue.box(), volume::affordableSpacing(tissue.box(), wanted, margin, nodes), margin);
+}
+
+chainmail::Lattice latticeOf(const datasets::Scene& scene, const volume::Tissue& tissue)
+{
+    const double margin = 2.0 * scene.model.spacing;
+    const double spacing = volume::affordableSpacing(tissue.box(), scene.model.spacing, margin, latticeNodes);
+    const auto grid = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
+    return {grid, tissue.tissueOn(grid), tissue.table()};
+}
+
+std::string structureNames(const volume::Tissue& tissue)
+{
+    std::string names;
+    for (const auto& s : tissue.structures()) {
+        if (tissue.table().rows[s.tissue].role != volume::Role::air) {
+            names += (names.empty() ? "" : ", ") + s.name;
+        }
+    }
+    return names;
+}
+
+GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& grid, const std::string& name,
+                         const std::string& what, const std::string& scene)
+{
+    GuardedStructure s;
+    s.name = name;
+    s.labels = tissue.labelsNamed(name);
+    if (s.labels.empty()) {
+        throw std::runtime_error(fmt::format("{}: {} '{}' is not in the volume; it has: {}", scene, what, name,
+                                             structureNames(tissue)));
+    }
+    s.distance = tissue.distanceTo(s.labels, grid);
+    return s;
+}
+
+}  // namespace
+
+SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue)
+{
+    if (tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures) {
+        throw std::runtime_error(fmt::format("{}: at most {} tissues and {} vital structures are supported", scene.name,
+                                             maxTissues, maxStructures - 1));
+    }
+    const auto grid = fieldGrid(*tissue, surfaceNodes);
+    const auto coarse = fieldGrid(*tissue, structureNodes);
+    std::vector<GuardedStructure> structures;
+    structures.push_back(guarded(*tissue, coarse, scene.target, "target", scene.name));
+    for (const auto& vital : scene.vital) {
+        structures.push_back(guarded(*tissue, coarse, vital.name, "vital structure", scene.name));
+        structures.back().warnDistance = vital.warnDistance;
+        structures.back().gain = vital.gain;
+    }
+    const auto approach = datasets::planApproach(scene, *tissue);
+    auto surface = tissue->distanceToBody(grid);
+    auto modulus = tissue->youngsModulusOn(coarse);
+    auto lattice = latticeOf(scene, *tissue);
+    return {std::move(scene), std::move(tissue), approach, std::move(surface), std::move(modulus), std::move(lattice),
+            std::move(structures)};
+}
+
+}  // namespace palpate::haptics

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <chainmail/lattice.h>
+#include <datasets/scene.h>
+#include <haptics/tick.h>
+#include <volume/tissue.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace palpate::haptics {
+
+/// The target or a vital structure, with its distance at rest.
+struct GuardedStructure {
+    std::string name;
+    volume::DistanceField distance;  // at rest [m]
+    double warnDistance = 0;         // [m]; 0 for the target
+    double gain = 1;                 // of its proximity force
+    std::vector<std::uint16_t> labels;
+};
+
+/// Everything about a session that does not change while it runs.
+struct SessionModel {
+    datasets::Scene scene;
+    std::shared_ptr<const volume::Tissue> tissue;
+    datasets::Approach approach;
+    volume::DistanceField surface;             // of the body at rest [m]
+    volume::ScalarField youngsModulus;         // [Pa]
+    chainmail::Lattice lattice;
+    std::vector<GuardedStructure> structures;  // target first, then the lookup table of vital structures
+};
+
+/// Builds fields and lattice. Throws std::runtime_error for structures that the volume does not have, and more of them
+/// than maxStructures.
+SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue);
+
+}  // namespace palpate::haptics

@@ -1,0 +1,166 @@
+#include <haptics/simulation.h>
+
+#include <haptics/biopsy.h>
+#include <haptics/events.h>
+
+#include <glm/geometric.hpp>
+
+#include <chrono>
+#include <cmath>
+
+namespace palpate::haptics {
+
+namespace {
+
+// The part of a needle's shaft that collision looks at, from the tip [m].
+constexpr double shaftQueried = 20e-3;
+
+// Stops the time of one task after the other.
+class TaskClock {
+public:
+    explicit TaskClock(TickRecord& record) : record_(record), last_(now()) {}
+
+    void done(Task task) noexcept
+    {
+        const auto time = now();
+        record_.seconds[static_cast<std::size_t>(task)] = std::chrono::duration<float>(time - last_).count();
+        last_ = time;
+    }
+
+private:
+    static std::chrono::steady_clock::time_point now() noexcept { return std::chrono::steady_clock::now(); }
+    TickRecord& record_;
+    std::chrono::steady_clock::time_point last_;
+};
+
+bool finite(Vec3 v) noexcept
+{
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+}  // namespace
+
+Simulation::Simulation(const SessionModel& model)
+    : model_(model),
+      reader_(*model.tissue),
+      deformation_(model.lattice, model.scene.model.maxMoves),
+      body_(deformation_.body(model.surface)),
+      seeds_(chainmail::Deformation::maxSeeds),
+      contacts_(std::make_unique<occupancy::ContactSet>())
+{
+}
+
+const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
+{
+    const DeviceSample before = record_.device;
+    record_ = TickRecord{};
+    record_.device = before;
+    record_.tick = ticks_;
+    TaskClock clock(record_);
+    accept(device);
+    const Vec3 position = record_.device.position;
+
+    const auto way = collide();
+    clock.done(Task::h3);
+    const Vec3 basic = moveTip(model_, reader_, body_, record_.device, way, tip_, record_);
+    clock.done(Task::h4);
+    deform();
+    clock.done(Task::deform);
+    const auto near = monitor(model_, body_, tip_, position, monitor_, record_);
+    fire();
+    clock.done(Task::h6);
+    const Vec3 additional = additionalForce(model_.scene.dffb, model_.structures.size(), near, position,
+                                            tip_.phase != Phase::free, tickSeconds, dffb_);
+    const bool wasFaulted = stabiliser_.faulted;
+    const auto sent = stabilise(basic, additional, record_.device, model_.scene.forceCap, tickSeconds, stabiliser_);
+    if (sent.faulted && !wasFaulted) {
+        addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
+    }
+    record_.proxy = tip_.proxy;
+    record_.phase = tip_.phase;
+    record_.tissue = tip_.tissue;
+    record_.inserted = tip_.inserted;
+    record_.basic = sent.basic;
+    record_.additional = sent.additional;
+    record_.total = sent.basic + sent.additional;
+    record_.faulted = sent.faulted;
+    clock.done(Task::h7);
+    ++ticks_;
+    last_ = position;
+    return record_;
+}
+
+// A pose that is not finite is replaced by the last that was, and marked: the stabiliser latches the fault.
+void Simulation::accept(const DeviceSample& device) noexcept
+{
+    const double length = glm::length(device.axis);
+    if (finite(device.position) && std::isfinite(length) && length > 0.5 && (device.buttons & poseInvalid) == 0) {
+        record_.device = device;
+        // Adding zero turns -0 into +0, which is what a record gives back.
+        record_.device.position += 0.0;
+        record_.device.axis += 0.0;
+    } else {
+        record_.device.buttons = (device.buttons & ~buttonFire) | poseInvalid;
+        record_.device.fresh = false;
+    }
+    if (ticks_ == 0) {
+        last_ = record_.device.position;
+    }
+}
+
+occupancy::Sweep Simulation::collide() noexcept
+{
+    const auto& tool = model_.scene.tool;
+    const auto& device = record_.device;
+    const bool needle = tool.kind == datasets::ToolKind::needle;
+    const Vec3 back = needle ? device.position - shaftQueried * device.axis : device.position;
+    occupancy::touch(body_, {back, device.position, tool.radius}, *contacts_);
+    record_.contacts = static_cast<std::uint32_t>(contacts_->count);
+    if (tip_.phase != Phase::free) {
+        return {};
+    }
+    const double radius = needle ? 0.0 : tool.radius;
+    return occupancy::sweep(body_, {last_, last_, radius}, {device.position, device.position, radius});
+}
+
+void Simulation::deform() noexcept
+{
+    if (model_.scene.model.level == datasets::ModelLevel::spring) {
+        return;
+    }
+    const Vec3 position = record_.device.position;
+    const double radius = model_.scene.tool.radius;
+    const bool needle = model_.scene.tool.kind == datasets::ToolKind::needle;
+    std::size_t count = 0;
+    chainmail::Yield yield(0.0F);
+    if (tip_.phase == Phase::contact) {
+        const Vec3 centre = needle ? position + radius * tip_.normal : position;
+        count = chainmail::pressSeeds(model_.lattice, centre, radius, tip_.normal, seeds_);
+        yield = chainmail::Yield(-tip_.normal);
+    } else if (tip_.phase == Phase::inserted) {
+        count = chainmail::dragSeeds(model_.lattice, tip_.proxy, position - tip_.proxy, seeds_);
+    }
+    const auto result = deformation_.deform(std::span(seeds_).first(count), yield);
+    record_.moved = static_cast<std::uint32_t>(deformation_.moved().size());
+    record_.residual = result.residual;
+}
+
+// The gun fires once per press of its button, and only a needle that is inside takes a core.
+void Simulation::fire() noexcept
+{
+    const auto& device = record_.device;
+    const bool down = (device.buttons & buttonFire) != 0;
+    const bool pressed = down && !triggerWasDown_;
+    triggerWasDown_ = down;
+    if (!pressed || tip_.phase != Phase::inserted) {
+        return;
+    }
+    record_.fired = true;
+    record_.core = takeCore(model_, reader_, body_, device.position, device.axis);
+    const Vec3 middle = 0.5 * (record_.core.notchStart + record_.core.notchEnd);
+    const double miss = model_.structures[0].distance.distance(occupancy::restPoint(body_, middle));
+    addEvent(record_, {EventKind::fire, 0, tip_.tissue, miss});
+    monitorThrow(model_, body_, device.position, record_.core.notchEnd, record_);
+}
+
+}  // namespace palpate::haptics

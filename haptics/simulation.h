@@ -1,0 +1,56 @@
+#pragma once
+
+#include <chainmail/deformation.h>
+#include <haptics/dffb.h>
+#include <haptics/monitor.h>
+#include <haptics/session_model.h>
+#include <haptics/stabiliser.h>
+#include <haptics/tick.h>
+#include <haptics/tip.h>
+#include <occupancy/query.h>
+
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace palpate::haptics {
+
+inline constexpr double tickSeconds = 1e-3;
+
+/// The mutable half of a session. tick() is a pure function of the model and of the samples so far: the same samples give
+/// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
+class Simulation {
+public:
+    /// The model must outlive it.
+    explicit Simulation(const SessionModel& model);
+
+    /// H3 collide, H4 basic force, deform, H6 monitor, H7 additional force, stabilise. H2 and H5 are the servo loop's.
+    const TickRecord& tick(const DeviceSample& device) noexcept;
+
+    /// Nodes that are not at rest after the last tick, and the displacement of every node.
+    const chainmail::Deformation& deformation() const noexcept { return deformation_; }
+    const SessionModel& model() const noexcept { return model_; }
+
+private:
+    void accept(const DeviceSample& device) noexcept;
+    occupancy::Sweep collide() noexcept;
+    void deform() noexcept;
+    void fire() noexcept;
+
+    const SessionModel& model_;
+    volume::Tissue::Reader reader_;
+    chainmail::Deformation deformation_;
+    occupancy::Body body_;
+    std::vector<chainmail::Seed> seeds_;
+    std::unique_ptr<occupancy::ContactSet> contacts_;
+    TipState tip_;
+    MonitorState monitor_;
+    DffbState dffb_;
+    StabiliserState stabiliser_;
+    std::uint64_t ticks_ = 0;
+    Vec3 last_{0.0};  // tip in the tick before [m]
+    bool triggerWasDown_ = false;
+    TickRecord record_;
+};
+
+}  // namespace palpate::haptics

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <volume/geometry.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace palpate::haptics {
+
+inline constexpr std::size_t maxStructures = 16;  // target first, then the lookup table of vital structures
+inline constexpr std::size_t maxTissues = 64;
+inline constexpr std::size_t maxEventsPerTick = 8;
+
+inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
+inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
+inline constexpr std::uint32_t poseInvalid = 1U << 31;   // the pose was not finite; records keep the last that was
+
+/// What a device says in one tick.
+struct DeviceSample {
+    Vec3 position{0.0};      // of the tool's tip (sphere: its centre), patient frame [m]
+    Vec3 axis{0, 1, 0};      // unit vector along the tool, towards the tip
+    std::uint32_t buttons = 0;
+    bool fresh = true;       // false when the device had no new pose for this tick
+};
+
+/// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
+enum class Task : std::uint8_t { h2, h3, h4, deform, h6, h7, h5, count };
+inline constexpr std::size_t taskCount = static_cast<std::size_t>(Task::count);
+std::string_view name(Task task) noexcept;  // "H2", "H3", .., "deform"
+
+enum class Phase : std::uint8_t { free, contact, inserted };
+
+enum class EventKind : std::uint8_t {
+    contact,     // the tool touched the body; tissue: touched; value: how far it went on in this tick [m]
+    release,     // the tool left the body
+    puncture,    // tissue: entered; value: force at which it gave way [N]
+    warning,     // structure: came nearer than its warning distance; value: distance [m]
+    vitalTouch,  // structure: was touched; value: depth [m]
+    fire,        // the gun; value: distance from the notch's middle to the target's surface [m]
+    fault,       // a force was not finite; the output is zero from now on
+};
+std::string_view name(EventKind kind) noexcept;
+
+struct Event {
+    EventKind kind = EventKind::contact;
+    std::uint8_t structure = 0xFF;  // index in the session's structures, 0xFF = none
+    std::uint8_t tissue = 0;        // row of the tissue table
+    double value = 0;
+};
+
+/// The tissue in the notch when the gun fired, in rest space.
+struct CoreSample {
+    std::array<double, maxTissues> fraction{};  // by row of the tissue table; sums to 1 when anything is in the notch
+    double volume = 0;                          // of tissue [m^3]
+    double targetFraction = 0;                  // share of the target structure
+    double targetLength = 0;                    // length of the notch's axis inside the target [m]
+    Vec3 notchStart{0.0}, notchEnd{0.0};        // patient frame [m]
+};
+
+/// Everything that one tick computed. A pure function of the model and of the samples up to here, but for `seconds`.
+struct TickRecord {
+    std::uint64_t tick = 0;
+    DeviceSample device;
+    Vec3 proxy{0.0};                     // where the tip would be without penetration [m]
+    Vec3 basic{0.0};                     // F_BFFB, equation 2 [N]
+    Vec3 additional{0.0};                // F_AFFB, equations 3-8 [N]
+    Vec3 total{0.0};                     // F_DFFB as sent: stabilised and capped [N]
+    Phase phase = Phase::free;
+    std::uint8_t tissue = 0;             // row of the tissue table at the tip
+    std::uint8_t nearestVital = 0xFF;    // index of a structure
+    bool fired = false;
+    bool faulted = false;
+    double inserted = 0;                 // length of the shaft inside [m]
+    std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
+    std::uint32_t contacts = 0;          // elements of tissue that the tool touches
+    std::uint32_t moved = 0;             // nodes that the deformation moved
+    double residual = 0;                 // largest violated link that the work cap left over [m]
+    CoreSample core;                     // when fired
+    std::array<Event, maxEventsPerTick> events{};
+    std::uint32_t eventCount = 0;
+    std::array<float, taskCount> seconds{};  // by task, wall time [s]
+};
+
+}  // namespace palpate::haptics

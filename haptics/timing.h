@@ -1,0 +1,44 @@
+#pragma once
+
+#include <haptics/tick.h>
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+namespace palpate::haptics {
+
+/// Percentiles of a time [s].
+struct Percentiles {
+    double p50 = 0, p99 = 0, p999 = 0, max = 0;
+};
+
+/// How often which duration was seen: bins 1 % apart from 10 ns to 10 s. add() allocates nothing.
+class Histogram {
+public:
+    Histogram();
+    Histogram(Histogram&&) noexcept;
+    Histogram& operator=(Histogram&&) noexcept;
+    ~Histogram();
+
+    void add(double seconds) noexcept;
+    Percentiles percentiles() const;
+    /// The duration that `share` of all do not pass, to 1 % [s].
+    double quantile(double share) const noexcept;
+    std::uint64_t count() const noexcept;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// How the servo loop kept time.
+struct ServoTiming {
+    Histogram lateness;                       // start of a tick after its due time
+    Histogram work;                           // a tick, H2 to H5
+    std::array<Histogram, taskCount> tasks;
+    std::uint64_t ticks = 0;
+    std::uint64_t missed = 0;                 // force sent after the next tick was due, and ticks skipped to catch up
+};
+
+}  // namespace palpate::haptics

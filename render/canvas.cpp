@@ -1,0 +1,115 @@
+#include <render/canvas.h>
+
+#include <vtkCellData.h>
+#include <vtkPolyDataMapper2D.h>
+#include <vtkProperty2D.h>
+#include <vtkTextProperty.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::render {
+namespace {
+
+// Images, shapes and text lie on each other in this order.
+constexpr int shapeLayer = 1, textLayer = 2;
+
+unsigned char byte(double value)
+{
+    return static_cast<unsigned char>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
+}
+
+}  // namespace
+
+Canvas::Canvas(vtkRenderer& renderer) : renderer_(renderer)
+{
+    colours_->SetNumberOfComponents(4);
+    vtkNew<vtkPolyDataMapper2D> mapper;
+    mapper->SetInputData(shapes_);
+    vtkNew<vtkActor2D> actor;
+    actor->SetMapper(mapper);
+    actor->SetLayerNumber(shapeLayer);
+    renderer_.AddActor2D(actor);
+}
+
+void Canvas::begin()
+{
+    points_->Reset();
+    cells_->Reset();
+    colours_->Reset();
+    used_ = 0;
+}
+
+void Canvas::polygon(std::span<const Point2> corners, const Colour& colour, double opacity)
+{
+    cells_->InsertNextCell(static_cast<int>(corners.size()));
+    for (const Point2& p : corners)
+        cells_->InsertCellPoint(points_->InsertNextPoint(p[0], p[1], 0));
+    const std::array<unsigned char, 4> rgba{byte(colour[0]), byte(colour[1]), byte(colour[2]), byte(opacity)};
+    colours_->InsertNextTypedTuple(rgba.data());
+}
+
+void Canvas::rectangle(Point2 low, Point2 size, const Colour& colour, double opacity)
+{
+    const std::array<Point2, 4> corners{
+        {low, {low[0] + size[0], low[1]}, {low[0] + size[0], low[1] + size[1]}, {low[0], low[1] + size[1]}}};
+    polygon(corners, colour, opacity);
+}
+
+void Canvas::line(Point2 from, Point2 to, double width, const Colour& colour)
+{
+    const double dx = to[0] - from[0], dy = to[1] - from[1], length = std::hypot(dx, dy);
+    if (!(length > 0))
+        return;
+    const double nx = -dy / length * width / 2, ny = dx / length * width / 2;
+    const std::array<Point2, 4> corners{
+        {{from[0] + nx, from[1] + ny}, {from[0] - nx, from[1] - ny}, {to[0] - nx, to[1] - ny}, {to[0] + nx, to[1] + ny}}};
+    polygon(corners, colour);
+}
+
+void Canvas::ring(Point2 centre, double radius, double width, const Colour& colour)
+{
+    constexpr int sides = 24;
+    const double turn = 2 * std::acos(-1.0) / sides;
+    for (int i = 0; i < sides; ++i)
+        line({centre[0] + radius * std::cos(i * turn), centre[1] + radius * std::sin(i * turn)},
+             {centre[0] + radius * std::cos((i + 1) * turn), centre[1] + radius * std::sin((i + 1) * turn)}, width, colour);
+}
+
+void Canvas::text(Point2 at, const std::string& words, double size, const Colour& colour, Align align, bool bold)
+{
+    if (used_ == texts_.size()) {
+        texts_.push_back(vtkSmartPointer<vtkTextActor>::New());
+        texts_.back()->SetLayerNumber(textLayer);
+        texts_.back()->SetTextScaleModeToNone();
+        renderer_.AddActor2D(texts_.back());
+    }
+    vtkTextActor& actor = *texts_[used_++];
+    actor.SetVisibility(1);
+    actor.SetInput(words.c_str());
+    actor.SetDisplayPosition(static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])));
+    vtkTextProperty& look = *actor.GetTextProperty();
+    look.SetFontFamilyToArial();
+    look.SetFontSize(static_cast<int>(std::lround(size)));
+    look.SetColor(colour[0], colour[1], colour[2]);
+    look.SetBold(bold ? 1 : 0);
+    look.SetVerticalJustificationToBottom();
+    look.SetJustification(align == Align::left     ? VTK_TEXT_LEFT
+                          : align == Align::centre ? VTK_TEXT_CENTERED
+                                                   : VTK_TEXT_RIGHT);
+}
+
+void Canvas::end()
+{
+    for (std::size_t i = used_; i < texts_.size(); ++i)
+        texts_[i]->SetVisibility(0);
+    shapes_->SetPoints(points_);
+    shapes_->SetPolys(cells_);
+    shapes_->GetCellData()->SetScalars(colours_);
+    points_->Modified();
+    cells_->Modified();
+    colours_->Modified();
+    shapes_->Modified();
+}
+
+}  // namespace palpate::render

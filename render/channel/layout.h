@@ -1,0 +1,107 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <type_traits>
+
+/// What lies in the shared memory between the simulation and its viewers: plain data, no pointers, no VTK.
+///
+///     Header      magic, version, layout hash, offsets     written once
+///     Scenery     names, colours, grids, tool, line        written once
+///     labels      tissue row per display voxel (uint8)     written once
+///     State       sequence lock                            every tick
+///     Displaced   triple buffer                            at frame rate
+///
+/// Lengths in metres, forces in newtons, patient frame LPS.
+namespace palpate::channel {
+
+inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
+inline constexpr std::uint32_t version = 1;
+inline constexpr std::size_t maxTissues = 64;
+inline constexpr std::size_t maxStructures = 16;
+inline constexpr std::size_t maxDisplaced = 1U << 16;
+inline constexpr std::size_t nameLength = 32;
+
+using Name = std::array<char, nameLength>;  // ends with '\0'
+using Triple = std::array<double, 3>;
+
+/// A cubic grid aligned with the patient axes, x fastest.
+struct Grid {
+    std::array<std::int32_t, 3> size{};
+    std::int32_t padding = 0;
+    Triple origin{};     // of node (0, 0, 0) [m]
+    double spacing = 0;  // [m]
+};
+
+struct TissueLook {
+    Name name{};
+    std::array<float, 3> colour{};  // RGB in [0, 1]
+    float opacity = 0;
+};
+
+enum class ToolKind : std::uint32_t { sphere, needle };
+
+/// What does not change during a session.
+struct Scenery {
+    Name scene{};
+    Grid labels;   // grid of the display label volume
+    Grid lattice;  // grid of the displaced nodes
+    std::uint32_t tissues = 0;
+    std::uint32_t structures = 0;  // target first, then the vital structures of the lookup table
+    std::array<TissueLook, maxTissues> tissue{};
+    std::array<Name, maxStructures> structure{};
+    std::array<double, maxStructures> warnDistance{};
+    ToolKind tool = ToolKind::needle;
+    std::uint32_t padding = 0;
+    double toolRadius = 0;
+    double toolLength = 0;
+    Triple entry{};
+    Triple aim{};
+    double forceCap = 0;
+};
+
+enum class Phase : std::uint32_t { free, contact, inserted };
+enum class Warning : std::uint32_t { none, near, touching };
+enum class Status : std::uint32_t { running, finished, faulted };
+
+/// The state of one tick.
+struct State {
+    std::uint64_t tick = 0;
+    double time = 0;  // of the session [s]
+    Triple tip{};     // of the tool (sphere: centre)
+    Triple axis{};    // unit vector, from the shaft to the tip
+    Triple proxy{};   // where the tip would be without penetration
+    Triple basic{}, additional{}, total{};
+    Phase phase = Phase::free;
+    Status status = Status::running;
+    Warning warning = Warning::none;
+    std::uint32_t warned = 0;                      // index of the structure that the warning is about
+    std::uint32_t tissue = 0;                      // row of the tissue table at the tip
+    std::uint32_t cores = 0;                       // samples taken
+    double inserted = 0;                           // length of the shaft inside [m]
+    std::array<double, maxStructures> distance{};  // tip to structure, in the deformed tissue [m]
+    double coreTarget = 0;                         // share of target tissue in the last core
+    double coreLength = 0;                         // length in the target of the last core [m]
+    std::uint64_t missed = 0;                      // ticks
+    double tickP99 = 0;                            // [s]
+    std::uint64_t published = 0;                   // CLOCK_MONOTONIC when written [ns]
+};
+
+/// One displaced node of the lattice.
+struct Displacement {
+    std::uint32_t node = 0;  // offset in the lattice grid
+    std::array<float, 3> u{};
+};
+
+/// The displaced nodes of one moment; all others are at rest.
+struct Displaced {
+    std::uint64_t tick = 0;
+    std::uint32_t count = 0;
+    std::uint32_t padding = 0;
+    std::array<Displacement, maxDisplaced> nodes{};
+};
+
+static_assert(std::is_trivially_copyable_v<State> && std::is_trivially_copyable_v<Scenery> &&
+              std::is_trivially_copyable_v<Displaced>);
+
+}  // namespace palpate::channel

@@ -1,0 +1,271 @@
+#include <render/channel/channel.h>
+#include <render/channel/segment.h>
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <new>
+#include <stdexcept>
+
+namespace palpate::channel {
+namespace {
+
+struct File {
+    explicit File(int opened) : descriptor(opened) {}
+    File(const File&) = delete;
+    File& operator=(const File&) = delete;
+    ~File()
+    {
+        if (descriptor >= 0)
+            ::close(descriptor);
+    }
+    int descriptor;
+};
+
+[[noreturn]] void fail(const std::string& session, const std::string& what, int error)
+{
+    throw std::runtime_error("session " + session + ": " + what + ": " + std::strerror(error));
+}
+
+bool sameFile(int descriptor, const std::string& name)
+{
+    struct stat ours {
+    }, named{};
+    const File other(::shm_open(name.c_str(), O_RDONLY, 0));
+    return other.descriptor >= 0 && ::fstat(descriptor, &ours) == 0 && ::fstat(other.descriptor, &named) == 0 &&
+           ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
+}
+
+// The pid in a segment whose owner lives, else 0. A segment that is not ours to understand counts as left behind.
+std::uint64_t livingOwner(int descriptor)
+{
+    struct stat status {};
+    if (::fstat(descriptor, &status) != 0 || static_cast<std::size_t>(status.st_size) < sizeof(Header))
+        return 0;
+    void* mapped = ::mmap(nullptr, sizeof(Header), PROT_READ, MAP_SHARED, descriptor, 0);
+    if (mapped == MAP_FAILED)
+        return 0;
+    const auto& header = *static_cast<const Header*>(mapped);
+    const bool lives = header.magic.load(std::memory_order_acquire) == magic && ownerLives(header);
+    const std::uint64_t pid = lives ? header.ownerPid : 0;
+    ::munmap(mapped, sizeof(Header));
+    return pid;
+}
+
+// Removes the segment `name` if a dead process left it. The lock on it lets only one of several newcomers do so, and the
+// second look at the name keeps the slower one from removing what the faster one has put there.
+void removeLeftBehind(const std::string& session, const std::string& name)
+{
+    const File old(::shm_open(name.c_str(), O_RDWR, 0));
+    if (old.descriptor < 0 && errno == ENOENT)
+        return;
+    if (old.descriptor < 0)
+        fail(session, "there is one already that belongs to somebody else (choose another --session)", errno);
+    if (const std::uint64_t pid = livingOwner(old.descriptor))
+        throw std::runtime_error("session " + session + " is running already (pid " + std::to_string(pid) +
+                                 "): end it or choose another --session");
+    if (::flock(old.descriptor, LOCK_EX | LOCK_NB) != 0)
+        throw std::runtime_error("session " + session + " is being started by another process");
+    if (sameFile(old.descriptor, name))
+        ::shm_unlink(name.c_str());
+}
+
+constexpr std::size_t aligned(std::size_t bytes)
+{
+    constexpr std::size_t page = 4096;
+    return (bytes + page - 1) / page * page;
+}
+
+std::size_t labelCount(const Scenery& scenery)
+{
+    std::size_t count = 1;
+    for (const std::int32_t n : scenery.labels.size)
+        count *= static_cast<std::size_t>(std::max(n, 0));
+    return count;
+}
+
+void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels)
+{
+    if (labels == 0 || labels != labelCount(scenery))
+        throw std::runtime_error("session " + session + ": " + std::to_string(labels) + " labels for a grid of " +
+                                 std::to_string(labelCount(scenery)));
+    if (scenery.tissues > maxTissues || scenery.structures > maxStructures)
+        throw std::runtime_error("session " + session + ": at most " + std::to_string(maxTissues) + " tissues and " +
+                                 std::to_string(maxStructures) + " structures can be shown");
+}
+
+std::uint64_t now() noexcept
+{
+    timespec t{};
+    ::clock_gettime(CLOCK_MONOTONIC, &t);
+    return static_cast<std::uint64_t>(t.tv_sec) * 1000000000U + static_cast<std::uint64_t>(t.tv_nsec);
+}
+
+}  // namespace
+
+struct Publisher::Impl {
+    Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels);
+    ~Impl();
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+
+    void allocate(std::size_t size);
+    void fill(const Scenery& scenery, std::span<const std::uint8_t> labels);
+    void show();
+    void release() noexcept;
+
+    std::string session, name, temporary;
+    int descriptor = -1;
+    std::byte* base = nullptr;
+    std::size_t bytes = 0;
+    Header* header = nullptr;
+    StateBlock* state = nullptr;
+    DisplacedBlock* displaced = nullptr;
+    std::uint64_t sequence = 0, publication = 0;
+    std::unique_ptr<Displaced> back = std::make_unique<Displaced>();
+};
+
+Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels)
+    : session(sessionName), name(segmentName(sessionName)), temporary(name + "." + std::to_string(::getpid()))
+{
+    checkScenery(session, scenery, labels.size());
+    removeLeftBehind(session, name);
+    const std::size_t scene = aligned(sizeof(Header)), label = scene + aligned(sizeof(Scenery)),
+                      states = label + aligned(labels.size()), displacements = states + aligned(sizeof(StateBlock));
+    try {
+        allocate(displacements + aligned(sizeof(DisplacedBlock)));
+        header = new (base) Header;
+        header->sceneryOffset = scene;
+        header->labelsOffset = label;
+        header->labelsBytes = labels.size();
+        header->stateOffset = states;
+        header->displacedOffset = displacements;
+        fill(scenery, labels);
+        show();
+    } catch (...) {
+        release();
+        throw;
+    }
+}
+
+void Publisher::Impl::allocate(std::size_t size)
+{
+    bytes = size;
+    descriptor = ::shm_open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
+    if (descriptor < 0)
+        fail(session, "cannot make shared memory", errno);
+    // Reserved now, so that a full /dev/shm is an error here and not a SIGBUS in the servo loop.
+    if (const int error = ::posix_fallocate(descriptor, 0, static_cast<off_t>(bytes)))
+        fail(session, "no room for " + std::to_string(bytes >> 20U) + " MB in " + segmentFolder, error);
+    void* mapped = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, descriptor, 0);
+    if (mapped == MAP_FAILED)
+        fail(session, "cannot map shared memory", errno);
+    base = static_cast<std::byte*>(mapped);
+}
+
+void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t> labels)
+{
+    header->version = version;
+    header->layoutHash = layoutHash();
+    header->bytes = bytes;
+    header->ownerPid = static_cast<std::uint64_t>(::getpid());
+    header->ownerStart = processStart(header->ownerPid);
+    header->closed.store(0, std::memory_order_relaxed);
+    new (base + header->sceneryOffset) Scenery(scenery);
+    std::memcpy(base + header->labelsOffset, labels.data(), labels.size());
+    state = new (base + header->stateOffset) StateBlock;
+    displaced = new (base + header->displacedOffset) DisplacedBlock;
+    header->magic.store(magic, std::memory_order_release);
+}
+
+// A link, not a rename: it fails when another publisher has been faster.
+void Publisher::Impl::show()
+{
+    const std::string folder(segmentFolder);
+    if (::link((folder + temporary).c_str(), (folder + name).c_str()) != 0) {
+        if (errno == EEXIST)
+            throw std::runtime_error("session " + session + " has just been started by another process");
+        fail(session, "cannot show shared memory", errno);
+    }
+    ::shm_unlink(temporary.c_str());
+    temporary.clear();
+}
+
+void Publisher::Impl::release() noexcept
+{
+    if (!temporary.empty() && descriptor >= 0)
+        ::shm_unlink(temporary.c_str());
+    if (base != nullptr)
+        ::munmap(base, bytes);
+    if (descriptor >= 0)
+        ::close(descriptor);
+}
+
+Publisher::Impl::~Impl()
+{
+    // A forked child holds a copy of this object, but not the session.
+    if (header->ownerPid == static_cast<std::uint64_t>(::getpid())) {
+        header->closed.store(1, std::memory_order_release);
+        if (sameFile(descriptor, name))
+            ::shm_unlink(name.c_str());
+    }
+    release();
+}
+
+Publisher::Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels)
+    : impl_(std::make_unique<Impl>(session, scenery, labels))
+{
+}
+
+Publisher::Publisher(Publisher&&) noexcept = default;
+Publisher::~Publisher() = default;
+
+// Sequence lock without fences (H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012):
+// a reader that sees a word of this write (acquire) also sees the odd sequence before it, and throws its copy away.
+void Publisher::setState(const State& state) noexcept
+{
+    auto words = std::bit_cast<std::array<std::uint64_t, stateWords>>(state);
+    if (state.published == 0)
+        words[offsetof(State, published) / sizeof(std::uint64_t)] = now();
+    StateBlock& block = *impl_->state;
+    block.sequence.store(impl_->sequence + 1, std::memory_order_relaxed);
+    for (std::size_t i = 0; i < stateWords; ++i)
+        block.words[i].store(words[i], std::memory_order_release);
+    impl_->sequence += 2;
+    block.sequence.store(impl_->sequence, std::memory_order_release);
+}
+
+Displaced& Publisher::backBuffer() noexcept
+{
+    return *impl_->back;
+}
+
+void Publisher::publishDisplaced() noexcept
+{
+    const Displaced& back = *impl_->back;
+    const std::size_t count = std::min<std::size_t>(back.count, maxDisplaced);
+    const std::uint64_t publication = ++impl_->publication;
+    DisplacedSlot& slot = impl_->displaced->slot[publication % displacedSlots];
+    const std::uint64_t sequence = slot.sequence.load(std::memory_order_relaxed);
+
+    slot.sequence.store(sequence + 1, std::memory_order_relaxed);
+    slot.tick.store(back.tick, std::memory_order_release);
+    slot.count.store(count, std::memory_order_release);
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto words = std::bit_cast<std::array<std::uint64_t, displacementWords>>(back.nodes[i]);
+        for (std::size_t k = 0; k < displacementWords; ++k)
+            slot.words[i * displacementWords + k].store(words[k], std::memory_order_release);
+    }
+    slot.sequence.store(sequence + 2, std::memory_order_release);
+    impl_->displaced->latest.store(publication, std::memory_order_release);
+}
+
+}  // namespace palpate::channel

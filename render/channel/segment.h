@@ -1,0 +1,121 @@
+#pragma once
+
+#include <render/channel/layout.h>
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+/// The bytes of the segment, for channel.cpp's two ends and for their tests. Not part of the interface.
+namespace palpate::channel {
+
+/// Shared words are atomics so that a torn copy is a value to be thrown away and never a data race.
+using Word = std::atomic<std::uint64_t>;
+static_assert(Word::is_always_lock_free && sizeof(Word) == sizeof(std::uint64_t));
+
+inline constexpr std::size_t stateWords = sizeof(State) / sizeof(std::uint64_t);
+inline constexpr std::size_t displacementWords = sizeof(Displacement) / sizeof(std::uint64_t);
+inline constexpr std::size_t displacedSlots = 4;
+static_assert(sizeof(State) % sizeof(std::uint64_t) == 0 && sizeof(Displacement) % sizeof(std::uint64_t) == 0);
+
+/// `magic` is written last: who reads it (acquire) sees all that is written once.
+struct Header {
+    Word magic;
+    std::uint64_t version = 0;
+    std::uint64_t layoutHash = 0;
+    std::uint64_t bytes = 0;  // of the segment
+    std::uint64_t ownerPid = 0;
+    std::uint64_t ownerStart = 0;  // start time of the owner [clock ticks since boot]: a recycled pid has another
+    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, stateOffset = 0, displacedOffset = 0;
+    Word closed;  // 1: the owner has ended the session itself
+};
+
+/// Sequence lock: odd while the writer is inside. One writer, any number of readers.
+struct StateBlock {
+    alignas(64) Word sequence;
+    alignas(64) std::array<Word, stateWords> words;
+};
+
+struct DisplacedSlot {
+    alignas(64) Word sequence;  // as StateBlock's
+    Word tick, count;
+    std::array<Word, maxDisplaced * displacementWords> words;
+};
+
+/// Publication n (from 1) lies in slot n % displacedSlots. The writer fills the slot after the latest one and so never
+/// waits; a reader that is lapped notices by the slot's sequence and starts again at the latest.
+struct DisplacedBlock {
+    alignas(64) Word latest;
+    std::array<DisplacedSlot, displacedSlots> slot;
+};
+
+/// FNV-1a over what a reader compiled elsewhere must agree on.
+constexpr std::uint64_t layoutHash() noexcept
+{
+    std::uint64_t hash = 14695981039346656037ULL;
+    for (const std::size_t value : {sizeof(Header),
+                                    sizeof(Grid),
+                                    sizeof(TissueLook),
+                                    sizeof(Scenery),
+                                    sizeof(State),
+                                    sizeof(Displacement),
+                                    sizeof(StateBlock),
+                                    sizeof(DisplacedSlot),
+                                    sizeof(DisplacedBlock),
+                                    maxTissues,
+                                    maxStructures,
+                                    maxDisplaced,
+                                    nameLength,
+                                    displacedSlots,
+                                    offsetof(Header, ownerPid),
+                                    offsetof(Header, closed),
+                                    offsetof(Grid, origin),
+                                    offsetof(Grid, spacing),
+                                    offsetof(TissueLook, colour),
+                                    offsetof(TissueLook, opacity),
+                                    offsetof(Scenery, lattice),
+                                    offsetof(Scenery, tissues),
+                                    offsetof(Scenery, tissue),
+                                    offsetof(Scenery, structure),
+                                    offsetof(Scenery, warnDistance),
+                                    offsetof(Scenery, tool),
+                                    offsetof(Scenery, toolRadius),
+                                    offsetof(Scenery, entry),
+                                    offsetof(Scenery, aim),
+                                    offsetof(Scenery, forceCap),
+                                    offsetof(State, time),
+                                    offsetof(State, tip),
+                                    offsetof(State, proxy),
+                                    offsetof(State, basic),
+                                    offsetof(State, total),
+                                    offsetof(State, phase),
+                                    offsetof(State, warning),
+                                    offsetof(State, tissue),
+                                    offsetof(State, inserted),
+                                    offsetof(State, distance),
+                                    offsetof(State, coreTarget),
+                                    offsetof(State, missed),
+                                    offsetof(State, published),
+                                    offsetof(Displacement, u)})
+        for (int byte = 0; byte < 8; ++byte)
+            hash = (hash ^ ((value >> (8 * byte)) & 0xFF)) * 1099511628211ULL;
+    return hash;
+}
+
+/// "/palpate-SESSION". Throws std::runtime_error for a name that is not made of letters, digits, '-' and '_'.
+std::string segmentName(const std::string& session);
+
+/// Where the system keeps the segments (Linux).
+inline constexpr const char* segmentFolder = "/dev/shm";
+
+/// Start time of process `pid` [clock ticks since boot]; 0 when it is not there or dead and only not yet reaped.
+std::uint64_t processStart(std::uint64_t pid) noexcept;
+
+inline bool ownerLives(const Header& header) noexcept
+{
+    return header.ownerStart != 0 && processStart(header.ownerPid) == header.ownerStart;
+}
+
+}  // namespace palpate::channel

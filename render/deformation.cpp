@@ -1,0 +1,241 @@
+#include <render/deformation.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace palpate::render {
+namespace {
+
+std::size_t offset(const channel::Grid& grid, glm::ivec3 n) noexcept
+{
+    return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(grid.size[1]) + static_cast<std::size_t>(n.y)) *
+               static_cast<std::size_t>(grid.size[0]) +
+           static_cast<std::size_t>(n.x);
+}
+
+glm::ivec3 size(const channel::Grid& grid) noexcept
+{
+    return {grid.size[0], grid.size[1], grid.size[2]};
+}
+
+glm::ivec3 node(const channel::Grid& grid, std::uint32_t at) noexcept
+{
+    const auto nx = static_cast<std::uint32_t>(grid.size[0]), ny = static_cast<std::uint32_t>(grid.size[1]);
+    return {static_cast<int>(at % nx), static_cast<int>(at / nx % ny), static_cast<int>(at / nx / ny)};
+}
+
+bool inside(const channel::Grid& grid, glm::ivec3 n) noexcept
+{
+    return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < grid.size[0] && n.y < grid.size[1] && n.z < grid.size[2];
+}
+
+glm::dvec3 position(const channel::Grid& grid, glm::ivec3 n) noexcept
+{
+    return vec(grid.origin) + grid.spacing * glm::dvec3(n);
+}
+
+// Quadratic B-spline of a node `d` spacings away, |d| < 3/2.
+double spline(double d) noexcept
+{
+    d = std::abs(d);
+    return d < 0.5 ? 0.75 - d * d : 0.5 * (1.5 - d) * (1.5 - d);
+}
+
+}  // namespace
+
+VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept
+{
+    if (a.empty())
+        return b;
+    if (b.empty())
+        return a;
+    return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
+}
+
+Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels)
+    : labelGrid_(scenery.labels), lattice_(scenery.lattice), labels_(labels.begin(), labels.end())
+{
+    std::size_t nodes = 1;
+    for (const std::int32_t n : lattice_.size)
+        nodes *= static_cast<std::size_t>(std::max(n, 0));
+    u_.resize(nodes, glm::vec3(0));
+    visited_.resize(nodes, 0);
+    air_.resize(nodes, 0);
+    for (std::size_t i = 0; i < nodes; ++i)
+        air_[i] = restTissue(position(lattice_, node(lattice_, static_cast<std::uint32_t>(i)))) == 0;
+}
+
+VoxelBox Deformation::apply(const channel::Displaced& displaced)
+{
+    for (const std::uint32_t n : moved_)
+        u_[n] = glm::vec3(0);
+    moved_.clear();
+    ++pass_;
+    largest_ = 0;
+    const std::size_t count = std::min<std::size_t>(displaced.count, channel::maxDisplaced);
+    for (std::size_t i = 0; i < count; ++i) {
+        const channel::Displacement& d = displaced.nodes[i];
+        const glm::vec3 u(d.u[0], d.u[1], d.u[2]);
+        const double length = glm::length(glm::dvec3(u));
+        if (d.node >= u_.size() || !(length > 0) || !std::isfinite(length) || visited_[d.node] == pass_)
+            continue;
+        u_[d.node] = u;
+        visited_[d.node] = pass_;
+        moved_.push_back(d.node);
+        largest_ = std::max(largest_, length);
+    }
+    carryAir();
+    const VoxelBox now = touched();
+    const VoxelBox changed = enclosing(last_, now);
+    last_ = now;
+    return changed;
+}
+
+// The surface lies between nodes of the body, which move, and nodes of the air, which nobody moves. Without this it would
+// lag behind by up to a spacing, and deep dimples would fold. So the air goes along, and less from layer to layer.
+void Deformation::carryAir()
+{
+    constexpr int layers = 16, whole = 2;
+    constexpr float step = 0.6F;  // [lattice spacings per layer]; under 1, so that nothing folds
+    std::size_t begin = 0;
+    visible_ = moved_.size();
+    for (int layer = 0; layer < layers && begin < moved_.size(); ++layer) {
+        const std::size_t end = moved_.size();
+        frontier_.clear();
+        for (std::size_t m = begin; m < end; ++m)
+            reachAir(node(lattice_, moved_[m]));
+        for (const std::uint32_t at : frontier_) {
+            const glm::vec3 mean = meanAround(node(lattice_, at));
+            const float length = glm::length(mean), less = step * static_cast<float>(lattice_.spacing);
+            u_[at] = layer < whole ? mean : length > less ? mean * (1 - less / length) : glm::vec3(0);
+            if (u_[at] != glm::vec3(0))
+                moved_.push_back(at);
+        }
+        if (layer < whole)
+            visible_ = moved_.size();
+        begin = end;
+    }
+}
+
+void Deformation::reachAir(glm::ivec3 around)
+{
+    for (int k = 0; k < 27; ++k) {
+        const glm::ivec3 n = around + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
+        if (!inside(lattice_, n))
+            continue;
+        const auto at = static_cast<std::uint32_t>(offset(lattice_, n));
+        if (air_[at] != 0 && visited_[at] != pass_) {
+            visited_[at] = pass_;
+            frontier_.push_back(at);
+        }
+    }
+}
+
+glm::vec3 Deformation::meanAround(glm::ivec3 around) const noexcept
+{
+    glm::vec3 sum(0);
+    int neighbours = 0;
+    for (int k = 0; k < 27; ++k) {
+        const glm::ivec3 n = around + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
+        if (!inside(lattice_, n) || u_[offset(lattice_, n)] == glm::vec3(0))
+            continue;
+        sum += u_[offset(lattice_, n)];
+        ++neighbours;
+    }
+    return neighbours > 0 ? sum / static_cast<float>(neighbours) : sum;
+}
+
+VoxelBox Deformation::touched() const
+{
+    if (moved_.empty())
+        return {};
+    glm::ivec3 low = size(lattice_), high(-1);
+    for (std::size_t m = 0; m < visible_; ++m) {
+        low = glm::min(low, node(lattice_, moved_[m]));
+        high = glm::max(high, node(lattice_, moved_[m]));
+    }
+    // A node reaches one spacing into its cells, and what it moves lands up to |u| further away.
+    const glm::dvec3 reach(lattice_.spacing + largest_ + labelGrid_.spacing);
+    const glm::dvec3 from = (position(lattice_, low) - reach - vec(labelGrid_.origin)) / labelGrid_.spacing;
+    const glm::dvec3 to = (position(lattice_, high) + reach - vec(labelGrid_.origin)) / labelGrid_.spacing;
+    return {glm::clamp(glm::ivec3(glm::floor(from)), glm::ivec3(0), size(labelGrid_)),
+            glm::clamp(glm::ivec3(glm::ceil(to)) + 1, glm::ivec3(0), size(labelGrid_))};
+}
+
+glm::vec3 Deformation::displacement(glm::vec3 g) const noexcept
+{
+    const glm::vec3 last(lattice_.size[0] - 1, lattice_.size[1] - 1, lattice_.size[2] - 1);
+    if (!(g.x >= 0 && g.y >= 0 && g.z >= 0 && g.x < last.x && g.y < last.y && g.z < last.z))
+        return glm::vec3(0);
+    const glm::ivec3 cell(g);
+    const glm::vec3 part = g - glm::vec3(cell);
+    const auto row = static_cast<std::size_t>(lattice_.size[0]), layer = row * static_cast<std::size_t>(lattice_.size[1]);
+    const glm::vec3* u = &u_[offset(lattice_, cell)];
+    const auto alongX = [&](std::size_t at) { return u[at] + part.x * (u[at + 1] - u[at]); };
+    const auto alongXY = [&](std::size_t at) {
+        const glm::vec3 near = alongX(at);
+        return near + part.y * (alongX(at + row) - near);
+    };
+    const glm::vec3 below = alongXY(0);
+    return below + part.z * (alongXY(layer) - below);
+}
+
+// In lattice units and single precision: this runs for every voxel that moves, in every frame.
+glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
+{
+    constexpr int iterations = 5;
+    constexpr float enough = 0.03F;  // [lattice spacings]
+    const auto perMetre = static_cast<float>(1 / lattice_.spacing);
+    const glm::vec3 g((x - vec(lattice_.origin)) / lattice_.spacing);
+    for (int i = 0; i < iterations; ++i) {
+        const glm::vec3 next = -perMetre * displacement(g + shift);
+        const glm::vec3 step = glm::abs(next - shift);
+        shift = next;
+        if (std::max({step.x, step.y, step.z}) < enough)
+            break;
+    }
+    return shift == glm::vec3(0) ? x : x + lattice_.spacing * glm::dvec3(shift);
+}
+
+std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
+{
+    const glm::dvec3 g = (p - vec(labelGrid_.origin)) / labelGrid_.spacing, nearest = glm::floor(g + 0.5);
+    const glm::dvec3 last = glm::dvec3(size(labelGrid_)) - 1.0;
+    if (!(nearest.x >= 1 && nearest.y >= 1 && nearest.z >= 1 && nearest.x < last.x && nearest.y < last.y &&
+          nearest.z < last.z))
+        return 0;
+    const glm::ivec3 middle(nearest);
+    std::array<std::uint8_t, 27> tissue{};
+    bool same = true;
+    for (std::size_t k = 0; k < tissue.size(); ++k) {
+        const int i = static_cast<int>(k);
+        tissue[k] = labels_[offset(labelGrid_, middle + glm::ivec3(i % 3, i / 3 % 3, i / 9) - 1)];
+        same = same && tissue[k] == tissue[0];
+    }
+    if (same)
+        return tissue[0];
+    std::array<std::array<double, 3>, 3> along{};
+    for (int axis = 0; axis < 3; ++axis)
+        for (int step = 0; step < 3; ++step)
+            along[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step)] =
+                spline(g[axis] - nearest[axis] - (step - 1));
+    std::array<double, 256> sum{};
+    std::uint8_t best = tissue[0];
+    for (std::size_t k = 0; k < tissue.size(); ++k) {
+        sum[tissue[k]] += along[0][k % 3] * along[1][k / 3 % 3] * along[2][k / 9];
+        if (sum[tissue[k]] > sum[best])
+            best = tissue[k];
+    }
+    return best;
+}
+
+std::uint8_t Deformation::tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept
+{
+    return restTissue(rest(x, shift));
+}
+
+}  // namespace palpate::render

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <render/channel/layout.h>
+
+#include <glm/vec3.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate::render {
+
+inline glm::dvec3 vec(const channel::Triple& t) noexcept
+{
+    return {t[0], t[1], t[2]};
+}
+
+/// Voxels low <= v < high along each axis.
+struct VoxelBox {
+    glm::ivec3 low{0}, high{0};
+
+    bool empty() const noexcept { return low.x >= high.x || low.y >= high.y || low.z >= high.z; }
+};
+
+/// The smallest box around both.
+VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept;
+
+/// The deformed body as a viewer sees it: rest labels and the displacement u of the lattice nodes, trilinear between them.
+/// Rest point X lies at x = X + u(X).
+class Deformation {
+public:
+    /// `labels`: tissue row per display voxel, 0 = air; copied.
+    Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
+
+    /// Takes over the nodes of one moment. Returns the display voxels that look different from before.
+    VoxelBox apply(const channel::Displaced& displaced);
+    /// The rest point X that lies at `x` [m], by the fixed point X <- x - u(X).
+    /// @param shift  where to start, X - x in lattice spacings, and where it ended: the next point along a row starts there
+    glm::dvec3 rest(glm::dvec3 x, glm::vec3& shift) const noexcept;
+    /// Tissue at `x` [m] in the deformed body; `shift` as above. Around a point the tissue with the largest quadratic
+    /// spline weight wins: borders are smooth, and no label turns into another one.
+    std::uint8_t tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
+
+    const channel::Grid& grid() const noexcept { return labelGrid_; }
+    std::span<const std::uint8_t> labels() const noexcept { return labels_; }
+
+private:
+    /// At `g` [lattice spacings from the lattice's origin], in metres.
+    glm::vec3 displacement(glm::vec3 g) const noexcept;
+    std::uint8_t restTissue(glm::dvec3 p) const noexcept;
+    void carryAir();
+    void reachAir(glm::ivec3 around);
+    glm::vec3 meanAround(glm::ivec3 around) const noexcept;
+    VoxelBox touched() const;
+
+    channel::Grid labelGrid_, lattice_;
+    std::vector<std::uint8_t> labels_;
+    std::vector<std::uint8_t> air_;       // per lattice node: outside the body
+    std::vector<glm::vec3> u_;            // per lattice node [m]
+    std::vector<std::uint32_t> moved_;    // nodes with u != 0
+    std::vector<std::uint32_t> visited_;  // per lattice node: last pass that gave it a value
+    std::vector<std::uint32_t> frontier_;
+    std::uint32_t pass_ = 0;
+    std::size_t visible_ = 0;  // of moved_: body and the air next to it; further air moves only air
+    VoxelBox last_;            // what the previous moment touched
+    double largest_ = 0;       // |u| of this moment [m]
+};
+
+}  // namespace palpate::render

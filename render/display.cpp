@@ -1,0 +1,123 @@
+#include <render/display.h>
+
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/random.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+namespace palpate::render {
+namespace {
+
+// One record of an Xauthority file (Xau(3)): family "any", no address, no number, name, a random key.
+int secretCookie()
+{
+    const std::string name = "MIT-MAGIC-COOKIE-1";
+    std::array<char, 16> key{};
+    if (::getrandom(key.data(), key.size(), 0) != static_cast<ssize_t>(key.size()))
+        return -1;
+    std::string record("\xff\xff\0\0\0\0\0", 7);
+    record += static_cast<char>(name.size());
+    record += name;
+    record += '\0';
+    record += static_cast<char>(key.size());
+    record.append(key.data(), key.size());
+    const int file = ::memfd_create("palpate-xauthority", MFD_CLOEXEC);
+    if (file >= 0 && ::write(file, record.data(), record.size()) != static_cast<ssize_t>(record.size())) {
+        ::close(file);
+        return -1;
+    }
+    return file;
+}
+
+// In the child: becomes the server, or ends with the status that a shell gives for a program that is not there.
+[[noreturn]] void becomeServer(pid_t parent, int answer, const std::string& cookieFile)
+{
+    constexpr int notFound = 127;
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() != parent)
+        ::_exit(1);
+    const int nothing = ::open("/dev/null", O_RDWR);
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        ::dup2(nothing, stream);
+    const std::string number = std::to_string(answer);
+    ::execlp("Xvfb", "Xvfb", "-displayfd", number.c_str(), "-auth", cookieFile.c_str(), "-screen", "0", "1280x1024x24",
+             "-nolisten", "tcp", "-noreset", static_cast<char*>(nullptr));
+    ::_exit(notFound);
+}
+
+// What the server writes when it is ready: its number and a newline. Empty when it has ended or takes too long.
+std::string readNumber(int from)
+{
+    constexpr int patience = 20000;  // [ms]
+    std::string number;
+    pollfd waiting{from, POLLIN, 0};
+    char c = 0;
+    while (::poll(&waiting, 1, patience) > 0 && ::read(from, &c, 1) == 1) {
+        if (c == '\n')
+            return number;
+        number += c;
+    }
+    return {};
+}
+
+}  // namespace
+
+bool displayWorks()
+{
+    if (std::getenv("DISPLAY") == nullptr || glfwInit() == GLFW_FALSE)
+        return false;
+    glfwTerminate();
+    return true;
+}
+
+PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
+{
+    std::array<int, 2> answer{};
+    if (cookie_ < 0 || ::pipe(answer.data()) != 0)
+        throw std::runtime_error("cannot start a display: out of file descriptors");
+    const std::string cookieFile = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(cookie_);
+    const pid_t parent = ::getpid();
+    server_ = ::fork();
+    if (server_ == 0) {
+        ::close(answer[0]);
+        becomeServer(parent, answer[1], cookieFile);
+    }
+    ::close(answer[1]);
+    const std::string number = server_ > 0 ? readNumber(answer[0]) : std::string();
+    ::close(answer[0]);
+    if (number.empty()) {
+        int status = 0;
+        if (server_ > 0) {
+            ::kill(server_, SIGKILL);
+            ::waitpid(server_, &status, 0);
+        }
+        ::close(cookie_);
+        const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
+        throw std::runtime_error(missing ? "no display: set DISPLAY, or install the package xvfb for --offscreen"
+                                         : "no display: DISPLAY is not set and Xvfb could not be started");
+    }
+    ::setenv("DISPLAY", (":" + number).c_str(), 1);
+    ::setenv("XAUTHORITY", cookieFile.c_str(), 1);
+}
+
+PrivateDisplay::~PrivateDisplay()
+{
+    ::kill(server_, SIGTERM);
+    ::waitpid(server_, nullptr, 0);
+    ::close(cookie_);
+}
+
+}  // namespace palpate::render

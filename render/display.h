@@ -1,0 +1,25 @@
+#pragma once
+
+#include <sys/types.h>
+
+namespace palpate::render {
+
+/// True when the display that the environment names can be opened.
+bool displayWorks();
+
+/// A display without a screen (Xvfb) for pictures that go to files; it ends with this process, however that ends. Only its
+/// user can connect to it.
+class PrivateDisplay {
+public:
+    /// Starts it and points DISPLAY and XAUTHORITY at it. Throws std::runtime_error where Xvfb is not installed or fails.
+    PrivateDisplay();
+    PrivateDisplay(const PrivateDisplay&) = delete;
+    PrivateDisplay& operator=(const PrivateDisplay&) = delete;
+    ~PrivateDisplay();
+
+private:
+    pid_t server_ = 0;
+    int cookie_ = -1;
+};
+
+}  // namespace palpate::render

@@ -1,0 +1,190 @@
+#include <render/follower.h>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <ctime>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+namespace palpate::render {
+namespace {
+
+double seconds(Clock::duration d)
+{
+    return std::chrono::duration<double>(d).count();
+}
+
+double quantile(std::vector<double> values, double share)
+{
+    if (values.empty())
+        return 0;
+    const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), values.begin() + at, values.end());
+    return values[static_cast<std::size_t>(at)];
+}
+
+// The clock that State::published is in [s].
+double monotonic()
+{
+    timespec t{};
+    ::clock_gettime(CLOCK_MONOTONIC, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+double publishedAt(const channel::State& state)
+{
+    return 1e-9 * static_cast<double>(state.published);
+}
+
+std::string onlySession(const std::vector<std::string>& running)
+{
+    if (running.empty())
+        return {};
+    if (running.size() == 1)
+        return running.front();
+    std::string all;
+    for (const std::string& name : running)
+        all += (all.empty() ? "" : ", ") + name;
+    throw std::runtime_error("several sessions are running (" + all + "): choose one with --session NAME");
+}
+
+}  // namespace
+
+Follower::Follower(std::string session, double wait) : wanted_(std::move(session)), wait_(wait) {}
+
+bool Follower::over() const noexcept
+{
+    return !subscriber_ && ending_ == channel::Ending::finished && seconds(Clock::now() - since_) > wait_;
+}
+
+bool Follower::moving() const noexcept
+{
+    constexpr double settled = 0.4;  // [s]
+    return subscriber_ && seconds(Clock::now() - moved_) < settled;
+}
+
+void Follower::tryAttach(Picture& picture)
+{
+    constexpr double again = 0.1;  // [s]
+    if (seconds(Clock::now() - checked_) < again)
+        return;
+    checked_ = Clock::now();
+    const std::string name = wanted_.empty() ? onlySession(channel::sessions()) : wanted_;
+    if (name.empty())
+        return;
+    auto found = channel::Subscriber::attach(name);
+    if (!found || !found->alive())
+        return;
+    subscriber_ = std::move(found);
+    name_ = wanted_ = name;
+    pid_ = subscriber_->ownerPid();
+    ending_ = channel::Ending::none;
+    displaced_->tick = 0;
+    known_ = false;
+    state_ = {};
+    health_ = {};
+    structures_ = subscriber_->scenery().structure;
+    picture.open(subscriber_->scenery(), subscriber_->labels(), name);
+    picture.setNotice("", "");
+}
+
+void Follower::read(Picture& picture)
+{
+    const auto now = subscriber_->state();
+    const bool newer = subscriber_->displaced(*displaced_);
+    if (now && (!known_ || now->tick != state_.tick)) {
+        if (known_ && now->tick > state_.tick && now->published > state_.published)
+            health_.tickRate = static_cast<double>(now->tick - state_.tick) / (publishedAt(*now) - publishedAt(state_));
+        constexpr double still = 0.05e-3;  // [m]
+        if (newer || glm::distance(vec(now->tip), vec(state_.tip)) > still)
+            moved_ = polled_;
+        state_ = *now;
+        known_ = fresh_ = true;
+    }
+    if (known_)
+        picture.update(state_, newer ? displaced_.get() : nullptr, health_);
+}
+
+void Follower::leave(Picture& picture)
+{
+    const bool finished = ending_ == channel::Ending::finished;
+    picture.setNotice(finished ? "simulation ended" : "simulation stopped without ending",
+                      fmt::format("closes in {:.0f} s unless session {} starts again", wait_, name_));
+    subscriber_.reset();
+    since_ = Clock::now();
+}
+
+void Follower::giveUp() const
+{
+    if (ending_ == channel::Ending::killed)
+        throw std::runtime_error(fmt::format("session {} stopped without ending (process {} is gone)", name_, pid_));
+    if (ending_ == channel::Ending::none)
+        throw std::runtime_error(fmt::format("no session {}within {:g} s: start one with palpate train{}",
+                                             wanted_.empty() ? "" : wanted_ + " ", wait_,
+                                             wanted_.empty() ? "" : " --session " + wanted_));
+}
+
+void Follower::poll(Picture& picture)
+{
+    polled_ = Clock::now();
+    if (!subscriber_) {
+        if (ending_ == channel::Ending::none)
+            picture.setNotice("waiting for session" + (wanted_.empty() ? "" : " " + wanted_), "palpate train starts one");
+        tryAttach(picture);
+    }
+    if (!subscriber_) {
+        if (seconds(polled_ - since_) > wait_)
+            giveUp();
+        return;
+    }
+    // The way it ended first, the last state after it: so that the last state is the last.
+    ending_ = subscriber_->ending();
+    read(picture);
+    if (ending_ != channel::Ending::none)
+        leave(picture);
+}
+
+void Follower::draw(Picture& picture, Quality quality)
+{
+    picture.render(quality);
+    const auto now = Clock::now();
+    if (!known_)
+        return;
+    if (fresh_) {
+        const double delay = monotonic() - publishedAt(state_);
+        frameSeconds_.push_back(seconds(now - polled_));
+        delaySeconds_.push_back(delay);
+        health_.delay = delay;
+        fresh_ = false;
+    }
+    // Pictures of what stands still are slow on purpose.
+    const bool flowing = std::exchange(flowing_, quality == Quality::moving) && flowing_;
+    if (first_ && flowing) {
+        const double rate = 1 / std::max(seconds(now - last_), 1e-6);
+        constexpr double keep = 0.9;
+        health_.framesPerSecond = health_.framesPerSecond > 0 ? keep * health_.framesPerSecond + (1 - keep) * rate : rate;
+    }
+    if (!first_)
+        first_ = now;
+    last_ = now;
+    ++frames_;
+}
+
+ViewerFigures Follower::figures() const
+{
+    ViewerFigures figures;
+    figures.frames = frames_;
+    figures.frameP50 = quantile(frameSeconds_, 0.5);
+    figures.frameP90 = quantile(frameSeconds_, 0.9);
+    figures.delayP50 = quantile(delaySeconds_, 0.5);
+    figures.delayP99 = quantile(delaySeconds_, 0.99);
+    const double span = first_ ? seconds(last_ - *first_) : 0;
+    figures.rate = span > 0 ? static_cast<double>(frames_ - 1) / span : 0;
+    return figures;
+}
+
+}  // namespace palpate::render

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <render/channel/channel.h>
+#include <render/overlay.h>
+#include <render/picture.h>
+#include <render/viewer.h>
+
+#include <array>
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::render {
+
+using Clock = std::chrono::steady_clock;
+
+/// Follows the sessions of one name and keeps a picture up to date with them: attaches, attaches again, says in words what
+/// there is to wait for, and measures.
+class Follower {
+public:
+    /// `session` may be empty: then the only session that runs is taken.
+    Follower(std::string session, double wait);
+
+    /// Looks what has come. Throws std::runtime_error when there has been no session for `wait` seconds, or the one that
+    /// there was has been killed and has not come back.
+    void poll(Picture& picture);
+    /// Draws and measures.
+    void draw(Picture& picture, Quality quality);
+
+    bool attached() const noexcept { return subscriber_.has_value(); }
+    /// The last session has ended as it should, and nothing has come since for `wait` seconds.
+    bool over() const noexcept;
+    /// ... or just now.
+    channel::Ending ending() const noexcept { return ending_; }
+    const channel::State& state() const noexcept { return state_; }
+    /// Names of the structures that the state's distances are about.
+    const std::array<channel::Name, channel::maxStructures>& structures() const noexcept { return structures_; }
+    /// Whether the state is of a tick.
+    bool known() const noexcept { return known_; }
+    /// Tissue or tool have moved lately, so that speed counts more than detail.
+    bool moving() const noexcept;
+    ViewerFigures figures() const;
+
+private:
+    void tryAttach(Picture& picture);
+    void read(Picture& picture);
+    void leave(Picture& picture);
+    void giveUp() const;
+
+    std::string wanted_, name_;
+    double wait_;
+    std::optional<channel::Subscriber> subscriber_;
+    std::unique_ptr<channel::Displaced> displaced_ = std::make_unique<channel::Displaced>();
+    channel::State state_;
+    std::array<channel::Name, channel::maxStructures> structures_{};
+    bool known_ = false, fresh_ = false;
+    channel::Ending ending_ = channel::Ending::none;
+    std::uint64_t pid_ = 0;
+    Clock::time_point since_ = Clock::now();  // without a session
+    Clock::time_point moved_ = Clock::now();
+    Clock::time_point polled_ = Clock::now();  // start of the work on the present picture
+    Clock::time_point checked_{};              // whether the session is alive
+    std::optional<Clock::time_point> first_;
+    Clock::time_point last_{};
+    bool flowing_ = false;  // the last picture was of something that moves
+    Health health_;
+    std::uint64_t frames_ = 0;
+    std::vector<double> frameSeconds_, delaySeconds_;
+};
+
+}  // namespace palpate::render

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <render/viewer.h>
+
+#include <atomic>
+
+namespace palpate::render {
+
+/// Shows the session in a GLFW window until it is over, the window is closed or `stop` is set.
+ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>& stop);
+
+/// Writes the session as PNG files until it has ended or `stop` is set:
+///
+///     frame_00000.png ..      every `options.every` seconds of the session
+///     000_contact.png ..      at events: contact, inserted, warning_STRUCTURE, touching_STRUCTURE, fired, fault, finished
+ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace palpate::render

@@ -1,0 +1,183 @@
+#include <render/slice_picture.h>
+
+#include <render/tool_picture.h>
+
+#include <vtkImageMapper.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+namespace palpate::render {
+namespace {
+
+constexpr Colour white{1, 1, 1};
+constexpr std::array<std::uint8_t, 3> airPixel{12, 13, 18};
+
+std::uint8_t byte(float value)
+{
+    return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
+}
+
+double pixelsPerMetre(const ViewFrame& frame, const Area& area)
+{
+    return std::min(area.width, area.height) / frame.extent;
+}
+
+// The part of a segment that lies in the area (Liang-Barsky), or nothing.
+std::optional<std::pair<Point2, Point2>> clipped(Point2 a, Point2 b, const Area& area)
+{
+    double from = 0, to = 1;
+    const std::array<double, 2> low{static_cast<double>(area.x), static_cast<double>(area.y)};
+    const std::array<double, 2> high{low[0] + area.width, low[1] + area.height};
+    for (std::size_t k = 0; k < 2; ++k) {
+        const double d = b[k] - a[k];
+        if (d == 0 && (a[k] < low[k] || a[k] > high[k]))
+            return std::nullopt;
+        if (d == 0)
+            continue;
+        const double t0 = (low[k] - a[k]) / d, t1 = (high[k] - a[k]) / d;
+        from = std::max(from, std::min(t0, t1));
+        to = std::min(to, std::max(t0, t1));
+    }
+    if (from >= to)
+        return std::nullopt;
+    const auto at = [&](double t) { return Point2{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])}; };
+    return std::pair(at(from), at(to));
+}
+
+bool inside(Point2 p, const Area& area)
+{
+    return p[0] >= area.x && p[1] >= area.y && p[0] < area.x + area.width && p[1] < area.y + area.height;
+}
+
+}  // namespace
+
+SlicePicture::SlicePicture(vtkRenderer& renderer)
+{
+    vtkNew<vtkImageMapper> mapper;
+    mapper->SetInputData(image_);
+    mapper->SetColorWindow(255);
+    mapper->SetColorLevel(127.5);
+    actor_->SetMapper(mapper);
+    actor_->SetLayerNumber(0);
+    actor_->SetVisibility(0);
+    renderer.AddActor2D(actor_);
+}
+
+void SlicePicture::update(const channel::Scenery& scenery, const Deformation& deformation, const ViewFrame& frame,
+                          const Area& area, const VoxelBox& changed)
+{
+    const bool resized = area.width != area_.width || area.height != area_.height;
+    // Turns and shifts too small for a pixel are not worth a new picture.
+    const double turn = glm::distance(frame.centre, frame_.centre) +
+                        glm::distance(frame.right, frame_.right) * frame.extent +
+                        glm::distance(frame.up, frame_.up) * frame.extent;
+    const bool turned = turn * pixelsPerMetre(frame, area) > 1.0;
+    area_ = area;
+    actor_->SetPosition(area.x, area.y);
+    actor_->SetVisibility(1);
+    const bool all = resized || turned || !drawn_;
+    if (!all && changed.empty())
+        return;
+    if (all)
+        frame_ = frame;
+    drawn_ = true;
+    if (resized) {
+        image_->SetDimensions(area.width, area.height, 1);
+        image_->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+    }
+    auto* pixels = static_cast<std::array<std::uint8_t, 3>*>(image_->GetScalarPointer());
+    const double metres = 1 / pixelsPerMetre(frame_, area);
+    const channel::Grid& grid = deformation.grid();
+    const glm::dvec3 low = vec(grid.origin) + grid.spacing * glm::dvec3(changed.low),
+                     high = vec(grid.origin) + grid.spacing * glm::dvec3(changed.high);
+    for (int row = 0; row < area.height; ++row) {
+        glm::vec3 shift(0);
+        for (int column = 0; column < area.width; ++column) {
+            const glm::dvec3 p = frame_.centre + frame_.right * ((column + 0.5 - 0.5 * area.width) * metres) +
+                                 frame_.up * ((row + 0.5 - 0.5 * area.height) * metres);
+            if (!all && (glm::any(glm::lessThan(p, low)) || glm::any(glm::greaterThan(p, high))))
+                continue;
+            const std::size_t tissue = deformation.tissueAt(p, shift);
+            auto& out = pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(area.width) +
+                               static_cast<std::size_t>(column)];
+            const auto& colour = scenery.tissue[tissue % channel::maxTissues].colour;
+            out = tissue == 0 ? airPixel : std::array{byte(colour[0]), byte(colour[1]), byte(colour[2])};
+        }
+    }
+    image_->Modified();
+}
+
+void SlicePicture::hide()
+{
+    actor_->SetVisibility(0);
+    drawn_ = false;
+}
+
+Point2 SlicePicture::pixel(glm::dvec3 p) const
+{
+    const glm::dvec3 d = (p - frame_.centre) * pixelsPerMetre(frame_, area_);
+    return {area_.x + 0.5 * area_.width + glm::dot(d, frame_.right), area_.y + 0.5 * area_.height + glm::dot(d, frame_.up)};
+}
+
+void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const
+{
+    constexpr Colour outline{0, 0, 0};
+    const glm::dvec3 tip = vec(state.tip);
+    const double width = std::max(3.0, 2 * scenery.toolRadius * pixelsPerMetre(frame_, area_));
+    if (scenery.tool == channel::ToolKind::sphere) {
+        if (inside(pixel(tip), area_)) {
+            canvas.ring(pixel(tip), width / 2 + 1.5, 1.5, outline);
+            canvas.ring(pixel(tip), width / 2, 3, toolColour);
+        }
+        return;
+    }
+    const auto shaft = clipped(pixel(tip - vec(state.axis) * scenery.toolLength), pixel(tip), area_);
+    if (!shaft)
+        return;
+    canvas.line(shaft->first, shaft->second, width + 2, outline);
+    canvas.line(shaft->first, shaft->second, width, toolColour);
+    if (inside(pixel(tip), area_))
+        canvas.ring(pixel(tip), width / 2 + 2, 2, white);
+}
+
+void SlicePicture::annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const
+{
+    const glm::dvec3 entry = vec(scenery.entry), aim = vec(scenery.aim);
+    constexpr int dashes = 10;
+    for (int i = 0; i < dashes && entry != aim; ++i) {
+        const double a = static_cast<double>(i) / dashes, b = a + 0.5 / dashes;
+        if (const auto dash = clipped(pixel(glm::mix(entry, aim, a)), pixel(glm::mix(entry, aim, b)), area_)) {
+            canvas.line(dash->first, dash->second, 0.36 * font, {0, 0, 0});
+            canvas.line(dash->first, dash->second, 0.18 * font, planColour);
+        }
+    }
+    if (entry != aim && inside(pixel(aim), area_)) {
+        canvas.ring(pixel(aim), 0.55 * font, 0.36 * font, {0, 0, 0});
+        canvas.ring(pixel(aim), 0.55 * font, 0.18 * font, planColour);
+    }
+    drawTool(canvas, scenery, state);
+
+    const double left = area_.x, bottom = area_.y, right = left + area_.width, top = bottom + area_.height;
+    const double middleX = (left + right) / 2, middleY = (bottom + top) / 2;
+    const auto letter = [&](Point2 at, const std::string& words) {
+        canvas.rectangle({at[0] - 0.8 * font, at[1] - 2}, {1.6 * font, 1.3 * font}, {0, 0, 0}, 0.55);
+        canvas.text(at, words, font, white, Align::centre, true);
+    };
+    letter({right - font, middleY}, side(frame_.right));
+    letter({left + font, middleY}, side(-frame_.right));
+    letter({left + 0.8 * area_.width, top - 2.0 * font}, side(frame_.up));  // beside the tool
+    letter({middleX, bottom + 4}, side(-frame_.up));
+    const double bar = 0.01 * pixelsPerMetre(frame_, area_);
+    canvas.rectangle({left + 0.5 * font, bottom + 2}, {std::max(bar, 3.2 * font) + font, 1.9 * font}, {0, 0, 0}, 0.55);
+    canvas.rectangle({left + font, bottom + 0.35 * font}, {bar, 3}, white);
+    canvas.text({left + font, bottom + 0.6 * font}, "10 mm", 0.9 * font, white);
+}
+
+}  // namespace palpate::render

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <render/channel/layout.h>
+
+#include <glm/vec3.hpp>
+
+#include <string>
+
+namespace palpate::render {
+
+/// How the session is looked at, the same in the 3-D view and on the slice: the planned line lies in the plane of `right`
+/// and `up`, and `towards` points at the viewer. Unit vectors, right-handed, chosen so that the plane comes as near as it
+/// can to an axial (else sagittal, else coronal) one, drawn as radiologists do.
+struct ViewFrame {
+    glm::dvec3 right{1, 0, 0}, up{0, -1, 0}, towards{0, 0, -1};
+    glm::dvec3 centre{0.0};  // [m]
+    double extent = 0.1;     // of the slice [m]
+};
+
+ViewFrame viewFrame(const channel::Scenery& scenery);
+
+/// `frame` turned by the least that brings `axis` into its plane, and moved along `towards` to hold `tip`.
+ViewFrame through(const ViewFrame& frame, glm::dvec3 tip, glm::dvec3 axis);
+
+/// "L", or "LA" when oblique: the side of the patient that `direction` points to (LPS).
+std::string side(glm::dvec3 direction);
+
+}  // namespace palpate::render

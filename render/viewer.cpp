@@ -1,0 +1,62 @@
+#include <render/viewer.h>
+
+#include <render/display.h>
+#include <render/hosts.h>
+
+#include <sys/resource.h>
+
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+namespace palpate::render {
+namespace {
+
+// A signal handler can reach nothing else.
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+// The simulation comes first: a viewer that draws in software would take every core there is.
+void standBack()
+{
+    constexpr int nicer = 5;
+    ::setpriority(PRIO_PROCESS, 0, nicer);
+    const unsigned cores = std::thread::hardware_concurrency();
+    ::setenv("LP_NUM_THREADS", std::to_string(cores > 2 ? cores / 2 : 1).c_str(), 0);
+}
+
+void check(const ViewerOptions& options)
+{
+    constexpr int least = 320, most = 8192;
+    if (options.width < least || options.height < least || options.width > most || options.height > most)
+        throw std::runtime_error("size " + std::to_string(options.width) + "x" + std::to_string(options.height) +
+                                 ": each side must be 320 to 8192 pixels");
+    if (!(options.every >= 0) || !(options.wait >= 0))
+        throw std::runtime_error("the times for pictures and for waiting must be 0 s or more");
+}
+
+}  // namespace
+
+ViewerFigures runViewer(const ViewerOptions& options)
+{
+    check(options);
+    interrupted = false;
+    std::signal(SIGINT, [](int) { interrupted = true; });
+    std::signal(SIGTERM, [](int) { interrupted = true; });
+    standBack();
+    if (options.offscreen.empty()) {
+        if (!displayWorks())
+            throw std::runtime_error("no display: set DISPLAY, or use --offscreen DIR");
+        return showInWindow(options, interrupted);
+    }
+    std::optional<PrivateDisplay> display;
+    if (!displayWorks())
+        display.emplace();
+    return writePictures(options, interrupted);
+}
+
+}  // namespace palpate::render

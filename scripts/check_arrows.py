@@ -1,0 +1,61 @@
+#!/usr/bin/env python3
+"""Checks which folder includes which, and how long files are: docs/decisions.md says why these arrows and no others.
+
+    check_arrows.py [ROOT]      exit status 1 and one line per fault
+"""
+import pathlib
+import re
+import sys
+
+# A folder may include itself and these.
+ARROWS = {
+    "volume": set(),
+    "occupancy": {"volume"},
+    "chainmail": {"volume", "occupancy"},
+    "datasets": {"volume"},
+    "render/channel": set(),
+    "render": {"render/channel"},
+    "haptics": {"volume", "occupancy", "chainmail", "datasets", "render/channel"},
+    "experiments": {"volume", "occupancy", "chainmail", "datasets", "haptics"},
+    "apps": {"volume", "datasets", "haptics", "render", "experiments"},
+}
+# Third-party headers that stay in one folder.
+OWNERS = {"openvdb/": {"volume"}, "itk": {"volume"}, "vtk": {"render"}, "GLFW/": {"render"}, "sqlite3": {"haptics"}}
+MOST_LINES = 520
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^">]+)[">]')
+
+
+def folder_of(path):
+    """The folder of ARROWS that `path` (relative) lies in, or None."""
+    inside = [f for f in ARROWS if path.startswith(f + "/")]
+    return max(inside, key=len, default=None)
+
+
+def faults(root):
+    for path in sorted(p for f in ARROWS if "/" not in f for p in (root / f).rglob("*") if p.suffix in (".h", ".cpp", ".inl")):
+        name = path.relative_to(root).as_posix()
+        folder = folder_of(name)
+        lines = path.read_text(encoding="utf-8").splitlines()
+        if len(lines) > MOST_LINES:
+            yield f"{name}: {len(lines)} lines: a file has at most {MOST_LINES}"
+        for number, line in enumerate(lines, 1):
+            match = INCLUDE.match(line)
+            if not match:
+                continue
+            included = match.group(1)
+            target = folder_of(included)
+            if target and target != folder and target not in ARROWS[folder]:
+                yield f"{name}:{number}: {folder}/ must not include {target}/ ({included})"
+            for prefix, owners in OWNERS.items():
+                if included.startswith(prefix) and folder.split("/")[0] not in owners:
+                    yield f"{name}:{number}: {included} belongs in {', '.join(sorted(owners))}/ only"
+
+
+def main():
+    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".")
+    found = list(faults(root))
+    print("\n".join(found) if found else "the arrows between folders hold")
+    return 1 if found else 0
+
+
+sys.exit(main())

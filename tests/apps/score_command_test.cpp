@@ -1,0 +1,116 @@
+#include <apps/command.h>
+
+#include <haptics/score.h>
+
+#include <tests/haptics/synthetic_session.h>
+
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+
+namespace palpate::apps {
+namespace {
+
+namespace synthetic = haptics::synthetic;
+
+// What `palpate score ARGUMENTS` does, without its printing.
+void score(std::vector<std::string> arguments)
+{
+    CLI::App app;
+    addScore(app);
+    arguments.insert(arguments.begin(), "score");
+    std::ranges::reverse(arguments);
+    ::testing::internal::CaptureStdout();
+    try {
+        app.parse(arguments);
+    } catch (...) {
+        ::testing::internal::GetCapturedStdout();
+        throw;
+    }
+    ::testing::internal::GetCapturedStdout();
+}
+
+nlohmann::json readJson(const std::filesystem::path& file)
+{
+    return nlohmann::json::parse(std::ifstream(file));
+}
+
+// A session with a push of `depth` and of a peak force of `force`.
+std::string session(const synthetic::Folder& folder, const std::string& name, double depth, double force)
+{
+    std::vector<haptics::TickRecord> ticks(2000);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        ticks[n].phase = haptics::Phase::inserted;
+        ticks[n].inserted = depth * static_cast<double>(n) / 1999;
+        ticks[n].device.position.y = ticks[n].inserted;
+        ticks[n].distance = {1, 1, 1};
+        ticks[n].total.x = force;
+    }
+    synthetic::record(folder / name, synthetic::info(), ticks);
+    return (folder / name).string();
+}
+
+TEST(ScoreCommand, GivesEachSessionsMeasuresInTheUnitsOfTheirNames)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.030, 2.5);
+    score({a, "--json", (folder / "f.json").string()});
+    const auto s = readJson(folder / "f.json")["sessions"][0];
+    EXPECT_EQ(s["file"], a);
+    EXPECT_EQ(s["complete"], true);
+    EXPECT_NEAR(s["deepest_mm"].get<double>(), 30, 1e-9);
+    EXPECT_NEAR(s["path_mm"].get<double>(), 30, 1e-9);
+    EXPECT_NEAR(s["peak_force_n"].get<double>(), 2.5, 1e-12);
+    EXPECT_NEAR(s["seconds"].get<double>(), 1.999, 1e-9);
+    EXPECT_TRUE(s["targeting_error_mm"].is_null());
+    EXPECT_EQ(s["total"], 25);
+}
+
+// Depths 10, 20, 60 against 30, 40: of six pairs two are above and four below, delta = -1/3; medians 20 and 35. Forces 1,
+// 1, 1 against 1, 1 are ties.
+TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.010, 1), b = session(folder, "b", 0.020, 1),
+                      c = session(folder, "c", 0.060, 1);
+    const std::string d = session(folder, "d", 0.030, 1), e = session(folder, "e", 0.040, 1);
+    score({"--group", "new=" + a + "," + b + "," + c, "--group", "old=" + d + "," + e, "--json",
+           (folder / "f.json").string()});
+    const auto f = readJson(folder / "f.json");
+    EXPECT_EQ(f["sessions"].size(), 5U);
+    EXPECT_EQ(f["groups"][0]["name"], "new");
+    EXPECT_EQ(f["groups"][0]["n"], 3);
+    EXPECT_NEAR(f["groups"][0]["median"]["deepest_mm"].get<double>(), 20, 1e-9);
+    EXPECT_NEAR(f["groups"][1]["median"]["deepest_mm"].get<double>(), 35, 1e-9);
+    EXPECT_EQ(f["effect_size"]["kind"], "cliffs_delta");
+    EXPECT_NEAR(f["effect_size"]["deepest_mm"].get<double>(), -1.0 / 3, 1e-12);
+    EXPECT_EQ(f["effect_size"]["peak_force_n"], 0);
+}
+
+TEST(ScoreCommand, WrongRequestsAreToldOnOneLine)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.01, 1);
+    for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
+             {},
+             {a, (folder / "none").string()},
+             {"--group", "name"},
+             {"--group", "=" + a},
+             {"--group", "name=" + a + ",," + a},
+             {a, session(folder, "b", 0.01, 1), "--report", (folder / "r.html").string()}}) {
+        try {
+            score(arguments);
+            ADD_FAILURE() << "nothing was refused";
+        } catch (const std::runtime_error& e) {
+            EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+        }
+    }
+    EXPECT_FALSE(std::filesystem::exists(folder / "r.html"));
+}
+
+}  // namespace
+}  // namespace palpate::apps

@@ -1,0 +1,295 @@
+#include <render/channel/channel.h>
+#include <render/channel/segment.h>
+#include <tests/channel/example.h>
+
+#include <gtest/gtest.h>
+
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <csignal>
+
+#include <algorithm>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace palpate::channel {
+namespace {
+
+bool listed(const std::string& session)
+{
+    const auto all = sessions();
+    return std::find(all.begin(), all.end(), session) != all.end();
+}
+
+std::string messageOf(const std::function<void()>& action)
+{
+    try {
+        action();
+    } catch (const std::runtime_error& e) {
+        return e.what();
+    }
+    return {};
+}
+
+// Runs `action` in a forked process that keeps what it has made until it is killed.
+pid_t forkAndHold(const std::function<void()>& action)
+{
+    int ready[2] = {};
+    EXPECT_EQ(::pipe(ready), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+        action();
+        [[maybe_unused]] const auto written = ::write(ready[1], "x", 1);
+        for (;;)
+            ::pause();
+    }
+    char byte = 0;
+    EXPECT_EQ(::read(ready[0], &byte, 1), 1);
+    ::close(ready[0]);
+    ::close(ready[1]);
+    return child;
+}
+
+void killAndReap(pid_t child)
+{
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+}
+
+pid_t leaveSegmentOfDead(const std::string& session)
+{
+    const pid_t child = forkAndHold([&] { new Publisher(session, smallScenery(), smallLabels()); });
+    killAndReap(child);
+    return child;
+}
+
+void removeSegment(const std::string& session)
+{
+    ::shm_unlink(segmentName(session).c_str());
+}
+
+TEST(Session, NamesThatCouldLeaveTheFolderAreRefused)
+{
+    const std::string longest(64, 'a');
+    for (const std::string& good : {std::string("a"), std::string("Ward_3-bed-2"), longest})
+        EXPECT_EQ(segmentName(good), "/palpate-" + good);
+    for (const std::string& bad : {std::string(), std::string("a/b"), std::string("../x"), std::string("a b"),
+                                   std::string("a.1"), std::string("\xc3\xa9"), longest + "a"}) {
+        EXPECT_THROW(Publisher(bad, smallScenery(), smallLabels()), std::runtime_error) << bad;
+        EXPECT_THROW(Subscriber::attach(bad), std::runtime_error) << bad;
+    }
+}
+
+TEST(Session, OnlyItsUserMayOpenIt)
+{
+    const std::string session = sessionNamed("mode");
+    const mode_t before = ::umask(0);
+    const Publisher publisher(session, smallScenery(), smallLabels());
+    ::umask(before);
+    struct stat status {};
+    ASSERT_EQ(::stat((segmentFolder + segmentName(session)).c_str(), &status), 0);
+    EXPECT_EQ(status.st_mode & 07777U, 0600U);
+}
+
+TEST(Session, IsListedWhileItsPublisherLivesAndGoneAfterwards)
+{
+    const std::string session = sessionNamed("life");
+    EXPECT_FALSE(Subscriber::attach(session).has_value());
+    {
+        const Publisher publisher(session, smallScenery(), smallLabels());
+        EXPECT_TRUE(listed(session));
+        EXPECT_TRUE(Subscriber::attach(session).has_value());
+    }
+    EXPECT_FALSE(listed(session));
+    EXPECT_NE(::access((segmentFolder + segmentName(session)).c_str(), F_OK), 0);
+}
+
+TEST(Session, ALiveOneIsNotTakenOver)
+{
+    const std::string session = sessionNamed("two");
+    Publisher publisher(session, smallScenery(), smallLabels());
+    publisher.setState(stateOf(7));
+    const std::string message = messageOf([&] { Publisher(session, smallScenery(), smallLabels()); });
+    EXPECT_NE(message.find("running already (pid " + std::to_string(::getpid()) + ")"), std::string::npos) << message;
+    const auto subscriber = Subscriber::attach(session);
+    ASSERT_TRUE(subscriber);
+    EXPECT_EQ(subscriber->state()->tick, 7U);
+}
+
+TEST(Session, OfAKilledProcessIsNeitherListedNorAttachedToAndIsTakenOver)
+{
+    const std::string session = sessionNamed("killed");
+    const pid_t child = forkAndHold([&] { new Publisher(session, smallScenery(), smallLabels()); });
+    auto subscriber = Subscriber::attach(session);
+    ASSERT_TRUE(subscriber);
+    EXPECT_EQ(subscriber->ownerPid(), static_cast<std::uint64_t>(child));
+    EXPECT_EQ(subscriber->ending(), Ending::none);
+
+    ::kill(child, SIGKILL);
+    siginfo_t info{};
+    ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT);
+    EXPECT_EQ(subscriber->ending(), Ending::killed) << "dead, but not yet waited for";
+    ::waitpid(child, nullptr, 0);
+    EXPECT_EQ(subscriber->ending(), Ending::killed);
+    EXPECT_FALSE(listed(session));
+    EXPECT_FALSE(Subscriber::attach(session).has_value());
+    EXPECT_EQ(::access((segmentFolder + segmentName(session)).c_str(), F_OK), 0) << "a viewer removes nothing";
+
+    const Publisher next(session, smallScenery(), smallLabels());
+    EXPECT_TRUE(listed(session));
+    EXPECT_EQ(subscriber->ending(), Ending::killed) << "the new session is another one";
+}
+
+TEST(Session, OfARecycledPidIsTakenOver)
+{
+    const std::string session = sessionNamed("recycled");
+    Publisher old(session, smallScenery(), smallLabels());
+    RawSegment(segmentName(session)).at<Header>(0).ownerStart += 1;
+    EXPECT_FALSE(listed(session));
+    const Publisher next(session, smallScenery(), smallLabels());
+    EXPECT_TRUE(listed(session));
+    {
+        const Publisher gone = std::move(old);
+    }
+    EXPECT_TRUE(listed(session)) << "the old one removes only its own segment";
+}
+
+TEST(Session, GoesToExactlyOneOfSeveralNewcomers)
+{
+    constexpr int newcomers = 4;
+    for (int round = 0; round < 10; ++round) {
+        const std::string session = sessionNamed("race" + std::to_string(round));
+        leaveSegmentOfDead(session);
+        int start[2] = {}, hold[2] = {}, told[2] = {};
+        ASSERT_EQ(::pipe(start) + ::pipe(hold) + ::pipe(told), 0);
+        std::vector<pid_t> children;
+        for (int i = 0; i < newcomers; ++i) {
+            children.push_back(::fork());
+            if (children.back() != 0)
+                continue;
+            char byte = 0;
+            ::close(start[1]);
+            ::close(hold[1]);
+            [[maybe_unused]] auto n = ::read(start[0], &byte, 1);
+            try {
+                const Publisher publisher(session, smallScenery(), smallLabels());
+                n = ::write(told[1], "y", 1);
+                n = ::read(hold[0], &byte, 1);
+            } catch (const std::runtime_error&) {
+                n = ::write(told[1], "n", 1);
+            }
+            ::_exit(0);
+        }
+        ::close(start[1]);
+        int winners = 0;
+        for (int i = 0; i < newcomers; ++i) {
+            char answer = 0;
+            ASSERT_EQ(::read(told[0], &answer, 1), 1);
+            winners += answer == 'y';
+        }
+        ::close(hold[1]);
+        for (const pid_t child : children)
+            ::waitpid(child, nullptr, 0);
+        for (const int end : {start[0], hold[0], told[0], told[1]})
+            ::close(end);
+        EXPECT_EQ(winners, 1);
+        removeSegment(session);
+    }
+}
+
+TEST(Session, OutlivesAForkedChildOfItsPublisher)
+{
+    const std::string session = sessionNamed("forked");
+    auto publisher = std::make_unique<Publisher>(session, smallScenery(), smallLabels());
+    const pid_t child = ::fork();
+    if (child == 0) {
+        publisher.reset();
+        ::_exit(0);
+    }
+    ::waitpid(child, nullptr, 0);
+    EXPECT_TRUE(listed(session));
+}
+
+TEST(Session, OfAnotherVersionOrLayoutIsRefusedInWords)
+{
+    const std::string session = sessionNamed("version");
+    const Publisher publisher(session, smallScenery(), smallLabels());
+    RawSegment raw(segmentName(session));
+    auto& header = raw.at<Header>(0);
+
+    header.version = version + 1;
+    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("version 2"), std::string::npos);
+    header.version = version;
+    header.layoutHash ^= 1U;
+    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("different layouts"), std::string::npos);
+    EXPECT_FALSE(listed(session));
+    header.layoutHash ^= 1U;
+    header.stateOffset = header.bytes - 8;
+    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("damaged"), std::string::npos);
+}
+
+TEST(Session, HalfBuiltOrForeignSegmentsAreRefused)
+{
+    const std::string session = sessionNamed("foreign");
+    for (const std::size_t bytes : {std::size_t{10}, sizeof(Header), std::size_t{1} << 20U}) {
+        const RawSegment raw(segmentName(session), bytes);
+        EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("not made by palpate"), std::string::npos);
+        removeSegment(session);
+    }
+}
+
+TEST(Session, EndsAsFinishedByStatusAndByTheEndOfItsPublisher)
+{
+    const std::string session = sessionNamed("ends");
+    auto publisher = std::make_unique<Publisher>(session, smallScenery(), smallLabels());
+    const auto subscriber = Subscriber::attach(session);
+    ASSERT_TRUE(subscriber);
+    State state = stateOf(1);
+    publisher->setState(state);
+    EXPECT_TRUE(subscriber->alive());
+    state.status = Status::faulted;
+    publisher->setState(state);
+    EXPECT_TRUE(subscriber->alive()) << "a fault is shown, not the end";
+    state.status = Status::finished;
+    publisher->setState(state);
+    EXPECT_EQ(subscriber->ending(), Ending::finished);
+    state.status = Status::running;
+    publisher->setState(state);
+    EXPECT_TRUE(subscriber->alive());
+    publisher.reset();
+    EXPECT_EQ(subscriber->ending(), Ending::finished);
+    EXPECT_EQ(subscriber->state()->tick, 1U) << "the last state stays readable";
+}
+
+TEST(Session, ViewersMapItReadOnly)
+{
+    const std::string session = sessionNamed("readonly");
+    const pid_t child = forkAndHold([&] { new Publisher(session, smallScenery(), smallLabels()); });
+    const auto subscriber = Subscriber::attach(session);
+    ASSERT_TRUE(subscriber);
+    std::ifstream maps("/proc/self/maps");
+    int mappings = 0;
+    for (std::string line; std::getline(maps, line);)
+        if (line.find(segmentName(session)) != std::string::npos) {
+            ++mappings;
+            EXPECT_NE(line.find(" r--s "), std::string::npos) << line;
+        }
+    EXPECT_EQ(mappings, 1);
+    killAndReap(child);
+    removeSegment(session);
+}
+
+TEST(Session, LabelsThatDoNotFillTheGridAreRefused)
+{
+    const std::string session = sessionNamed("labels");
+    auto labels = smallLabels();
+    labels.pop_back();
+    EXPECT_THROW(Publisher(session, smallScenery(), labels), std::runtime_error);
+    EXPECT_FALSE(listed(session));
+}
+
+}  // namespace
+}  // namespace palpate::channel

@@ -1,0 +1,168 @@
+#include <datasets/scene.h>
+#include <datasets/scene_text.h>
+#include <datasets/tables.h>
+#include <tests/datasets/voxels.h>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+namespace palpate::datasets {
+namespace {
+
+using volume::Role;
+using volume::Tissue;
+
+std::uint16_t labelOf(const Tissue& tissue, const char* name)
+{
+    return structureNamed(tissue, name)->value;
+}
+
+// Voxel by voxel: is anything vital, of bone or fixed within `distance` of the segment?
+bool touchesForbidden(const Tissue& tissue, const Voxels& voxels, Vec3 from, Vec3 to, double distance)
+{
+    std::vector<char> forbidden(65536, 0);
+    for (const volume::Structure& s : tissue.structures()) {
+        const volume::TissueRow& row = tissue.table().rows[s.tissue];
+        forbidden[s.value] = row.role == Role::vital || row.role == Role::bone || row.fixed ? 1 : 0;
+    }
+    bool touches = false;
+    const Vec3 along = to - from;
+    voxels.forEach([&](Index3 n, std::uint16_t value) {
+        if (forbidden[value] != 0) {
+            const Vec3 p = tissue.affine().toPatient(Vec3(n));
+            const double t = glm::clamp(glm::dot(p - from, along) / glm::dot(along, along), 0.0, 1.0);
+            touches = touches || glm::length(p - from - t * along) < distance;
+        }
+    });
+    return touches;
+}
+
+TEST(PlanApproach, KeepsOffVitalStructuresAndStartsOnSkin)
+{
+    Scene scene = *builtInScene("breast");
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+        SCOPED_TRACE(seed);
+        scene.source.phantom.seed = seed;
+        const Tissue tissue = sceneVolume(scene);
+        const Tissue::Reader reader(tissue);
+        const Approach way = planApproach(scene, tissue);
+        const Vec3 inward = glm::normalize(way.aim - way.entry);
+        EXPECT_EQ(reader.label(way.entry + 0.3e-3 * inward), labelOf(tissue, "skin"));
+        EXPECT_EQ(reader.label(way.entry - 0.3e-3 * inward), 0);
+        EXPECT_EQ(reader.label(way.entry - 30e-3 * inward), 0);
+        EXPECT_EQ(reader.label(way.aim), labelOf(tissue, "tumour"));
+        const Vec3 fired = way.aim + scene.tool.notchLength / 2 * inward;
+        EXPECT_FALSE(touchesForbidden(tissue, Voxels(tissue), way.entry, fired, scene.tool.radius + 1e-3));
+        const Approach again = planApproach(scene, tissue);
+        EXPECT_EQ(again.entry, way.entry);
+        EXPECT_EQ(again.aim, way.aim);
+    }
+}
+
+// The deepest point of a sphere is its centre; the shortest way to it is straight from the front.
+TEST(PlanApproach, AimsAtTheMiddleOfASphereByTheShortestWay)
+{
+    Scene scene = *builtInScene("block");
+    scene.entry.reset();
+    scene.aim.reset();
+    const Tissue tissue = sceneVolume(scene);
+    const Approach way = planApproach(scene, tissue);
+    EXPECT_LT(glm::length(way.aim - Vec3(0, 0.025, 0)), 1e-3);
+    EXPECT_LT(std::abs(way.entry.y), 0.3e-3);
+    EXPECT_LT(glm::length(way.entry - way.aim), 0.0265);
+    scene.entry = Vec3(0.01, 0, 0);
+    EXPECT_EQ(planApproach(scene, tissue).entry, Vec3(0.01, 0, 0));
+}
+
+// The notch is 20 mm and the throw 22 mm: with 3 mm of tip in the skin the line must be 15 mm long for a centred notch. A
+// tumour whose middle is nearer to the skin is reached at a slant.
+TEST(PlanApproach, ReachesAShallowTargetAtASlant)
+{
+    Scene scene = *builtInScene("layered");
+    scene.source.phantom.numbers["tumour_depth_mm"] = 4;
+    const Tissue tissue = sceneVolume(scene);
+    const Approach way = planApproach(scene, tissue);
+    EXPECT_LT(way.aim.y, 0.0125);
+    EXPECT_GT(glm::length(way.entry - way.aim), 0.0145);
+}
+
+/// A ball of fat in skin with a tumour in its middle, in a shell of bone when `shell`. 60 voxels of 1 mm.
+Tissue ball(bool shell, const char* targetTissue)
+{
+    volume::LabelImage image;
+    image.size = Index3(60);
+    image.affine.linear = Mat3(1e-3);
+    image.affine.origin = Vec3(-29.5e-3);
+    for (int k = 0; k < 60; ++k) {
+        for (int j = 0; j < 60; ++j) {
+            for (int i = 0; i < 60; ++i) {
+                const double r = glm::length(Vec3(i, j, k) - Vec3(29.5));
+                const int bone = shell && r > 14 && r < 17 ? 4 : 1;
+                image.values.push_back(static_cast<std::uint16_t>(r > 24 ? 0 : r > 22 ? 2 : r < 6 ? 3 : bone));
+            }
+        }
+    }
+    std::vector<volume::LabelName> names{
+        {0, "air", "air"}, {1, "fat", "fat"}, {2, "skin", "skin"}, {3, "lump", targetTissue}, {4, "shell", "bone"}};
+    return Tissue::fromLabels(image, defaultTissues(), names, {});
+}
+
+TEST(PlanApproach, SaysWhenThereIsNoWay)
+{
+    const Tissue open = ball(false, "ilc");
+    const Scene scene = sceneForVolume("ball.vdb", open);
+    EXPECT_EQ(scene.target, "lump");
+    EXPECT_NEAR(glm::length(planApproach(scene, open).entry), 24e-3, 1.5e-3);
+    try {
+        planApproach(scene, ball(true, "ilc"));
+        FAIL() << "went through bone";
+    } catch (const std::runtime_error& e) {
+        EXPECT_NE(std::string(e.what()).find("no straight way to 'lump'"), std::string::npos) << e.what();
+    }
+}
+
+TEST(SceneForVolume, NamesItsTargetAndVitalStructures)
+{
+    Scene breast = *builtInScene("breast");
+    const Tissue tissue = sceneVolume(breast);
+    const Scene scene = sceneForVolume("folder/patient.vdb", tissue);
+    EXPECT_EQ(scene.target, "tumour");
+    ASSERT_EQ(scene.vital.size(), 2U);
+    const bool arteryFirst = structureNamed(tissue, "artery")->volume > structureNamed(tissue, "vein")->volume;
+    EXPECT_EQ(scene.vital[0].name, arteryFirst ? "artery" : "vein");
+    EXPECT_TRUE(scene.source.file.is_absolute());
+    EXPECT_EQ(sceneText(parseScene(scene.text, "/elsewhere/record.db")), sceneText(scene));
+    try {
+        sceneForVolume("healthy.vdb", ball(false, "fat"));
+        FAIL() << "chose a target";
+    } catch (const std::runtime_error& e) {
+        EXPECT_EQ(std::string(e.what()),
+                  "healthy.vdb: no tumour or lesion to aim at: choose with --target NAME, one of fat, skin, lump");
+    }
+}
+
+// After the throw the notch's middle is at the aim: tip = entry + depth + throw, middle half a notch behind the tip.
+TEST(TraineeScript, TheFiredNotchIsCentredOnTheAim)
+{
+    Scene scene = *builtInScene("breast");
+    const Approach way{Vec3(0.01, -0.05, 0), Vec3(0.0, -0.02, 0.01)};
+    const Vec3 inward = glm::normalize(way.aim - way.entry);
+    const std::vector<TraineeStep> script = traineeScript(scene, way);
+    ASSERT_EQ(script.size(), 7U);
+    EXPECT_NEAR(glm::length(script[0].to - way.entry), 30e-3, 1e-9);
+    EXPECT_EQ(script[2].kind, TraineeStep::Kind::pierce);
+    EXPECT_EQ(script[3].kind, TraineeStep::Kind::press);
+    EXPECT_EQ(script[4].kind, TraineeStep::Kind::fire);
+    const Vec3 middle = script[3].to + (scene.tool.throwLength - scene.tool.notchLength / 2) * inward;
+    EXPECT_LT(glm::length(middle - way.aim), 1e-9);
+    EXPECT_EQ(script[6].to, script[0].to);
+
+    // A shallow target: the tip goes 3 mm in all the same.
+    const Approach shallow{way.entry, way.entry + 8e-3 * inward};
+    EXPECT_NEAR(glm::dot(traineeScript(scene, shallow)[3].to - way.entry, inward), 3e-3, 1e-9);
+    scene.script = {{.kind = TraineeStep::Kind::fire}};
+    EXPECT_EQ(traineeScript(scene, way).size(), 1U);
+}
+
+}  // namespace
+}  // namespace palpate::datasets

@@ -1,0 +1,88 @@
+#include <haptics/hand.h>
+#include <haptics/simulation.h>
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+#include <cmath>
+
+namespace palpate::haptics {
+namespace {
+
+using datasets::TraineeStep;
+
+TraineeStep moveTo(Vec3 to, double seconds = 5)
+{
+    TraineeStep s;
+    s.to = to;
+    s.speed = 0.05;
+    s.seconds = seconds;
+    return s;
+}
+
+TEST(Hand, FollowsItsScriptInFreeSpace)
+{
+    HandDevice hand({}, {moveTo({0.05, 0, 0}), moveTo({0.05, 0.02, 0})}, Vec3(0.0), {0, 1, 0});
+    DeviceSample s;
+    int ticks = 0;
+    for (; !hand.finished() && ticks < 10000; ++ticks) {
+        s = hand.read();
+        hand.write(Vec3(0.0));
+    }
+    EXPECT_LT(glm::distance(s.position, Vec3(0.05, 0.02, 0)), 1.5e-3);
+    // 70 mm at 50 mm/s, and the grip's lag.
+    EXPECT_NEAR(ticks * tickSeconds, 1.4, 0.15);
+}
+
+// Under a constant force F the tip settles F / grip away from the hand's goal.
+TEST(Hand, GripYieldsByForceOverStiffness)
+{
+    TraineeStep wait;
+    wait.kind = TraineeStep::Kind::wait;
+    wait.seconds = 10;
+    const HandParameters p;
+    HandDevice hand(p, {wait}, Vec3(0.0), {0, 1, 0});
+    DeviceSample s;
+    for (int i = 0; i < 2000; ++i) {
+        s = hand.read();
+        hand.write(Vec3(0, -2.0, 0));
+    }
+    EXPECT_NEAR(s.position.y, -2.0 / p.grip, p.encoder);
+}
+
+TEST(Hand, PositionsAreWholeEncoderSteps)
+{
+    const HandParameters p;
+    HandDevice hand(p, {moveTo({0.03, 0.01, 0})}, Vec3(0.0), {0, 1, 0});
+    for (int i = 0; i < 300; ++i) {
+        const auto s = hand.read();
+        const double steps = s.position.x / p.encoder;
+        EXPECT_NEAR(steps, std::round(steps), 1e-6);
+    }
+}
+
+TEST(Hand, PiercesUntilTheForceDrops)
+{
+    TraineeStep pierce;
+    pierce.kind = TraineeStep::Kind::pierce;
+    pierce.to = {0, 0.05, 0};
+    pierce.speed = 0.02;
+    pierce.seconds = 20;
+    HandDevice hand({}, {pierce}, Vec3(0.0), {0, 1, 0});
+    double held = 0.0;
+    while (!hand.finished()) {
+        const auto s = hand.read();
+        // A wall at 5 mm that gives way at 10 mm.
+        const double depth = std::max(0.0, s.position.y - 5e-3);
+        const bool through = depth > 5e-3 || held < 0.0;
+        held = through ? -1.0 : depth;
+        hand.write(Vec3(0, through ? -0.1 : -200.0 * depth, 0));
+    }
+    const auto s = hand.read();
+    EXPECT_GT(s.position.y, 10e-3);
+    EXPECT_LT(s.position.y, 20e-3);
+}
+
+}  // namespace
+}  // namespace palpate::haptics

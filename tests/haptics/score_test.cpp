@@ -1,0 +1,283 @@
+#include <haptics/score.h>
+
+#include <tests/haptics/synthetic_session.h>
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace palpate::haptics {
+namespace {
+
+constexpr double millimetre = 1e-3;
+
+// Ticks of a tip that goes to depths straight along y, inside the body wherever the depth is above 0.
+std::vector<TickRecord> along(const std::vector<synthetic::Key>& keys)
+{
+    std::vector<TickRecord> ticks(static_cast<std::size_t>(std::lround(keys.back().time * 1000)) + 1);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        const double depth = synthetic::depthAt(keys, static_cast<double>(n) / 1000);
+        ticks[n].tick = n;
+        ticks[n].device.position = {0, depth, 0};
+        ticks[n].phase = depth > 0 ? Phase::inserted : Phase::free;
+        ticks[n].inserted = std::max(depth, 0.0);
+        ticks[n].distance = {0.1, 0.1, 0.1};
+    }
+    return ticks;
+}
+
+Score scoreTicks(const std::vector<TickRecord>& ticks)
+{
+    Scorer scorer(synthetic::info());
+    for (const TickRecord& tick : ticks) {
+        scorer.add(tick);
+    }
+    return scorer.score();
+}
+
+void fire(TickRecord& tick, double error, double fraction, double length)
+{
+    tick.fired = true;
+    tick.core.targetFraction = fraction;
+    tick.core.targetLength = length;
+    synthetic::addEvent(tick, synthetic::event(EventKind::fire, 0, 4, error));
+}
+
+// 30 mm in free space and 40 mm in: 70 mm, of which 40 mm less at most a tick's 0.04 mm are inside.
+TEST(Score, StraightLineHasItsLength)
+{
+    const Score s = scoreTicks(along({{0, -0.03}, {1, 0}, {2, 0.04}}));
+    EXPECT_NEAR(s.pathLength, 70 * millimetre, 1e-9);
+    EXPECT_NEAR(s.insertedPath, 40 * millimetre, 0.041 * millimetre);
+    EXPECT_NEAR(s.deepest, 40 * millimetre, 1e-9);
+}
+
+// Back out again it is 40 mm more; a turn costs at most two steps of 0.2 mm, on leaving at most a tick.
+TEST(Score, PathInsideIsInAndOut)
+{
+    const Score s = scoreTicks(along({{0, -0.03}, {1, 0}, {2, 0.04}, {3, -0.03}, {4, -0.01}}));
+    EXPECT_NEAR(s.insertedPath, 80 * millimetre, 0.55 * millimetre);
+    EXPECT_LE(s.insertedPath, 80 * millimetre);
+}
+
+// Steps of c = 0.2 mm are chords: a circle of radius r loses (c / r)^2 / 24 of its length, 1.7e-5, and steps end on ticks.
+TEST(Score, CircleHasItsCircumference)
+{
+    std::vector<TickRecord> ticks(10001);
+    const double radius = 10 * millimetre;
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        const double angle = 2 * std::numbers::pi * static_cast<double>(n) / 10000;
+        ticks[n].tick = n;
+        ticks[n].device.position = radius * Vec3(std::cos(angle), std::sin(angle), 0);
+    }
+    EXPECT_NEAR(scoreTicks(ticks).pathLength, 2 * std::numbers::pi * radius, 2e-5 * 2 * std::numbers::pi * radius);
+}
+
+TEST(Score, NoiseOfAnEncoderAddsNoPath)
+{
+    std::vector<TickRecord> ticks(5000);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        ticks[n].device.position.x = n % 2 == 0 ? 0 : 0.06 * millimetre;
+    }
+    EXPECT_LT(scoreTicks(ticks).pathLength, 0.2 * millimetre);
+}
+
+// From the touch at 1 s to the end at 3 s.
+TEST(Score, TimeRunsFromTheFirstContactToTheEnd)
+{
+    EXPECT_NEAR(scoreTicks(along({{0, -0.03}, {1, 0}, {3, 0.04}})).seconds, 2, 0.0015);
+    EXPECT_EQ(scoreTicks(along({{0, -0.03}, {3, -0.01}})).seconds, 0);
+}
+
+// Two reversals of 6 mm count, reversals of 4 mm or on one leg only do not, nor does leaving the body.
+TEST(Score, RedirectIsMoreThanFiveMillimetresOutAndInAgain)
+{
+    const auto redirects = [](const std::vector<synthetic::Key>& keys) { return scoreTicks(along(keys)).redirects; };
+    EXPECT_EQ(redirects({{0, -0.01}, {1, 0.040}, {2, 0.034}, {3, 0.040}, {4, 0.034}, {5, 0.040}}), 2U);
+    EXPECT_EQ(redirects({{0, -0.01}, {1, 0.040}, {2, 0.036}, {3, 0.050}}), 0U);
+    EXPECT_EQ(redirects({{0, -0.01}, {1, 0.040}, {2, 0.030}, {3, 0.034}, {4, 0.030}}), 0U);
+    EXPECT_EQ(redirects({{0, -0.01}, {1, 0.040}, {2, -0.010}, {3, 0.040}}), 0U);
+}
+
+// Three touches, of which the last comes 50 ms after the one before and is the same.
+TEST(Score, SkinContactsAreTouchesAfterATenthOfASecondOff)
+{
+    std::vector<TickRecord> ticks(2000);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        const bool touching = (n >= 200 && n < 400) || (n >= 900 && n < 1000) || (n >= 1050 && n < 1200);
+        ticks[n].phase = touching ? Phase::contact : Phase::free;
+    }
+    EXPECT_EQ(scoreTicks(ticks).skinContacts, 2U);
+}
+
+// |(3, 0, 4)| = 5 for half of the contact and 1 for the other half; without contact a force counts only for the peak.
+TEST(Score, ForcesArePeakAndMeanOfTheTotal)
+{
+    std::vector<TickRecord> ticks(400);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        ticks[n].phase = n < 200 ? Phase::contact : Phase::free;
+        ticks[n].total = n < 100 ? Vec3(3, 0, 4) : n < 200 ? Vec3(0, 1, 0) : Vec3(0);
+    }
+    const Score s = scoreTicks(ticks);
+    EXPECT_DOUBLE_EQ(s.peakForce, 5);
+    EXPECT_DOUBLE_EQ(s.meanForce, 3);
+}
+
+// Both vital structures overlap for 100 of 300 ticks: the time is that of their union, 500 ticks.
+TEST(Score, VitalContactIsTimeInAnyVitalStructure)
+{
+    auto ticks = along({{0, 0.01}, {2, 0.01}});
+    for (std::size_t n = 300; n < 600; ++n) {
+        ticks[n].distance[1] = -2 * millimetre;
+    }
+    for (std::size_t n = 500; n < 800; ++n) {
+        ticks[n].distance[2] = -3 * millimetre;
+    }
+    for (std::size_t n = 0; n < 2000; ++n) {
+        ticks[n].distance[0] = -1;
+    }
+    synthetic::addEvent(ticks[299], synthetic::event(EventKind::warning, 1, 0, 0.01));
+    synthetic::addEvent(ticks[300], synthetic::event(EventKind::vitalTouch, 1, 0, 0));
+    synthetic::addEvent(ticks[500], synthetic::event(EventKind::vitalTouch, 2, 0, 0));
+    const Score s = scoreTicks(ticks);
+    EXPECT_DOUBLE_EQ(s.vitalSeconds, 0.5);
+    EXPECT_DOUBLE_EQ(s.vitalDepth, 3 * millimetre);
+    EXPECT_EQ(s.vitalContacts, 2U);
+    EXPECT_EQ(s.warnings, 1U);
+}
+
+TEST(Score, BestFiringHasTheLargestShareThenTheSmallestError)
+{
+    auto ticks = along({{0, 0.01}, {2, 0.01}});
+    fire(ticks[100], 1 * millimetre, 0.2, 4 * millimetre);
+    fire(ticks[200], 3 * millimetre, 0.6, 9 * millimetre);
+    fire(ticks[300], 2 * millimetre, 0.6, 8 * millimetre);
+    fire(ticks[400], -5 * millimetre, 0.1, 1 * millimetre);
+    const Score s = scoreTicks(ticks);
+    EXPECT_EQ(s.passes, 4U);
+    EXPECT_DOUBLE_EQ(s.bestTargetFraction, 0.6);
+    EXPECT_DOUBLE_EQ(s.targetingError, 2 * millimetre);
+    EXPECT_DOUBLE_EQ(s.bestTargetLength, 8 * millimetre);
+}
+
+TEST(Score, NotchInsideTheTargetHasNoError)
+{
+    auto ticks = along({{0, 0.01}, {1, 0.01}});
+    fire(ticks[100], -5 * millimetre, 1, 20 * millimetre);
+    EXPECT_EQ(scoreTicks(ticks).targetingError, 0);
+}
+
+// One push, a core of target only, a firing inside it and no touch of anything vital is the perfect procedure.
+TEST(Score, PerfectProcedureHasAHundredPoints)
+{
+    auto ticks = along({{0, -0.01}, {1, 0.04}, {2, -0.01}});
+    fire(ticks[1000], 0, 1, 20 * millimetre);
+    EXPECT_DOUBLE_EQ(scoreTicks(ticks).total, 100);
+}
+
+TEST(Score, WithoutAFiringThereAreOnlyPointsForTheVitalStructures)
+{
+    const Score s = scoreTicks(along({{0, -0.01}, {1, 0.04}, {2, -0.01}}));
+    EXPECT_FALSE(std::isfinite(s.targetingError));
+    EXPECT_EQ(parts(s).core, 0);
+    EXPECT_EQ(parts(s).technique, 0);
+    EXPECT_EQ(s.total, 25);
+    EXPECT_EQ(scoreTicks(along({{0, -0.03}, {1, -0.01}})).total, 0);
+}
+
+// Half the target share of a full mark, half its length, half its error: 15 + 5 + 5. Two touches, 1 s and 0.5 mm: 25 (1 -
+// 0.8 - 0.1 - 0.05). Three passes, two redirects, two contacts, twice the path, 6.25 N: 5 (0.5 + 0.75 + 0.5 + 0.5 + 0.5).
+TEST(Score, PointsFollowTheFormula)
+{
+    Score s;
+    s.passes = 3;
+    s.bestTargetFraction = 0.25;
+    s.bestTargetLength = 5 * millimetre;
+    s.targetingError = 5 * millimetre;
+    s.vitalContacts = 2;
+    s.vitalSeconds = 1;
+    s.vitalDepth = 0.5 * millimetre;
+    s.skinContacts = 2;
+    s.redirects = 2;
+    s.deepest = 40 * millimetre;
+    s.insertedPath = 160 * millimetre;
+    s.peakForce = 6.25;
+    EXPECT_NEAR(parts(s).core, 25, 1e-12);
+    EXPECT_NEAR(parts(s).vital, 1.25, 1e-12);
+    EXPECT_NEAR(parts(s).technique, 13.75, 1e-12);
+}
+
+// Every point of the total falls, or stays, when a measure gets worse.
+TEST(Score, WorseMeasuresNeverGiveMorePoints)
+{
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> unit(0, 1);
+    const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
+    const auto total = [](const Score& s) {
+        const ScoreParts p = parts(s);
+        return p.core + p.vital + p.technique;
+    };
+    for (int round = 0; round < 2000; ++round) {
+        Score s;
+        s.passes = 1 + below(6);
+        s.skinContacts = 1 + below(6);
+        s.redirects = below(6);
+        s.vitalContacts = below(3);
+        s.vitalSeconds = unit(random);
+        s.vitalDepth = 5 * millimetre * unit(random);
+        s.bestTargetFraction = unit(random);
+        s.bestTargetLength = 20 * millimetre * unit(random);
+        s.targetingError = 15 * millimetre * unit(random);
+        s.deepest = 40 * millimetre;
+        s.insertedPath = s.deepest * (1 + 4 * unit(random));
+        s.peakForce = 10 * unit(random);
+        const double before = total(s);
+        EXPECT_GE(before, 0);
+        EXPECT_LE(before, 100);
+        for (const auto& worsen : std::vector<std::function<void(Score&)>>{
+                 [](Score& w) { ++w.passes; }, [](Score& w) { ++w.skinContacts; }, [](Score& w) { ++w.redirects; },
+                 [](Score& w) { ++w.vitalContacts; }, [](Score& w) { w.vitalSeconds += 0.3; },
+                 [](Score& w) { w.vitalDepth += millimetre; }, [](Score& w) { w.bestTargetFraction *= 0.8; },
+                 [](Score& w) { w.bestTargetLength *= 0.8; }, [](Score& w) { w.targetingError += millimetre; },
+                 [](Score& w) { w.insertedPath *= 1.3; }, [](Score& w) { w.peakForce += 1; }}) {
+            Score w = s;
+            worsen(w);
+            EXPECT_LE(total(w), before + 1e-12);
+        }
+    }
+}
+
+// The score of the live session and that of its record are the same bits.
+TEST(Score, LiveAndRecordedAreTheSame)
+{
+    const synthetic::Folder folder;
+    const auto ticks = synthetic::procedure(6, 0.4, 5);
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    const Score live = scoreTicks(ticks);
+    const Score recorded = scoreOf(Record(folder / "a"));
+    EXPECT_EQ(live.total, recorded.total);
+    EXPECT_EQ(live.seconds, recorded.seconds);
+    EXPECT_EQ(live.pathLength, recorded.pathLength);
+    EXPECT_EQ(live.insertedPath, recorded.insertedPath);
+    EXPECT_EQ(live.deepest, recorded.deepest);
+    EXPECT_EQ(live.peakForce, recorded.peakForce);
+    EXPECT_EQ(live.meanForce, recorded.meanForce);
+    EXPECT_EQ(live.targetingError, recorded.targetingError);
+    EXPECT_EQ(live.bestTargetFraction, recorded.bestTargetFraction);
+    EXPECT_EQ(live.vitalSeconds, recorded.vitalSeconds);
+    EXPECT_EQ(live.warnings, recorded.warnings);
+    EXPECT_EQ(live.warnings, 1U);
+    EXPECT_EQ(live.redirects, 1U);
+    EXPECT_EQ(describe(live), describe(recorded));
+}
+
+TEST(Score, MoreSkillScoresHigher)
+{
+    EXPECT_GT(scoreTicks(synthetic::procedure(6, 0.9, 1)).total, scoreTicks(synthetic::procedure(6, 0.2, 1)).total + 5);
+}
+
+}  // namespace
+}  // namespace palpate::haptics

@@ -1,0 +1,134 @@
+#include "models.h"
+
+#include <tests/allocations.h>
+
+#include <haptics/broadcast.h>
+#include <haptics/hand.h>
+#include <haptics/servo.h>
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+namespace palpate::haptics {
+namespace {
+
+std::vector<datasets::TraineeStep> waitFor(double seconds)
+{
+    datasets::TraineeStep wait;
+    wait.kind = datasets::TraineeStep::Kind::wait;
+    wait.seconds = seconds;
+    return {wait};
+}
+
+struct Rig {
+    explicit Rig(double seconds = 100)
+        : simulation(tests::blockSphere()), hand({}, waitFor(seconds), {0, -9e-3, 0}, {0, 1, 0})
+    {
+    }
+    Simulation simulation;
+    HandDevice hand;
+    std::atomic<bool> stop{false};
+};
+
+TEST(Servo, PacedLoopKeepsRealTimeOverHalfASecond)
+{
+    Rig rig;
+    const auto start = std::chrono::steady_clock::now();
+    const auto timing = runServo(rig.hand, rig.simulation, {true, 0.5}, [](auto&, auto&) {}, rig.stop);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    // Every period is either a tick or a miss: none is made up in a burst.
+    EXPECT_EQ(timing.ticks, 500U);
+    EXPECT_GE(seconds, 0.499);
+    EXPECT_LE(std::abs(seconds - 1e-3 * static_cast<double>(timing.ticks)), 0.01 + 2e-3 * static_cast<double>(timing.missed));
+}
+
+// A gap of 50 ms in the loop is counted as missed ticks, and the loop goes on from where it is.
+TEST(Servo, GapIsCountedAndNotMadeUp)
+{
+    Rig rig;
+    const auto sink = [&](const TickRecord& r, const ServoTiming&) {
+        if (r.tick == 100) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        }
+    };
+    const auto timing = runServo(rig.hand, rig.simulation, {true, 0.2}, sink, rig.stop);
+    EXPECT_EQ(timing.ticks, 200U);
+    EXPECT_GE(timing.missed, 45U);
+    EXPECT_LE(timing.lateness.quantile(0.5), 1e-3);
+}
+
+TEST(Servo, StopsWhenAskedAndWhenTheDeviceHasFinished)
+{
+    Rig rig(0.1);
+    EXPECT_NEAR(static_cast<double>(runServo(rig.hand, rig.simulation, {false, 0.0}, [](auto&, auto&) {}, rig.stop).ticks), 100.0, 2.0);
+    Rig stopped;
+    const auto sink = [&](const TickRecord& r, const ServoTiming&) { stopped.stop = r.tick == 41; };
+    EXPECT_EQ(runServo(stopped.hand, stopped.simulation, {false, 0.0}, sink, stopped.stop).ticks, 42U);
+}
+
+// The whole servo path: device, simulation, histograms, broadcast to viewers.
+TEST(Servo, AllocatesNothingPerTick)
+{
+    Rig rig;
+    Broadcast broadcast("test-servo-" + std::to_string(getpid()), tests::blockSphere());
+    std::uint64_t atStart = 0, atEnd = 0;
+    const auto sink = [&](const TickRecord& r, const ServoTiming& t) {
+        broadcast.publish(r, t, rig.simulation);
+        if (r.tick == 10) {
+            atStart = tests::allocations();
+        }
+        atEnd = tests::allocations();
+    };
+    runServo(rig.hand, rig.simulation, {false, 2.5}, sink, rig.stop);
+    EXPECT_EQ(atStart, atEnd);
+}
+
+// What a viewer sees is what the simulation did: state of the last tick, displaced nodes with their displacements.
+TEST(Broadcast, ViewerSeesTheStateAndTheDisplacedNodes)
+{
+    const std::string session = "test-broadcast-" + std::to_string(getpid());
+    Rig rig;
+    Broadcast broadcast(session, tests::blockSphere());
+    auto viewer = channel::Subscriber::attach(session);
+    ASSERT_TRUE(viewer);
+    TickRecord last;
+    const auto sink = [&](const TickRecord& r, const ServoTiming& t) {
+        broadcast.publish(r, t, rig.simulation);
+        last = r;
+    };
+    runServo(rig.hand, rig.simulation, {false, 0.331}, sink, rig.stop);
+    const auto state = viewer->state();
+    ASSERT_TRUE(state);
+    EXPECT_EQ(state->tick, last.tick);
+    EXPECT_EQ(state->total[1], last.total.y);
+    auto displaced = std::make_unique<channel::Displaced>();
+    displaced->tick = ~std::uint64_t{0};
+    displaced->tick = 0;
+    ASSERT_TRUE(viewer->displaced(*displaced));
+    ASSERT_GT(displaced->count, 0U);
+    const auto u = rig.simulation.deformation().u();
+    for (std::uint32_t i = 0; i < displaced->count; ++i) {
+        EXPECT_EQ(displaced->nodes[i].u[1], u[displaced->nodes[i].node].y);
+    }
+    broadcast.finish();
+    EXPECT_EQ(viewer->state()->status, channel::Status::finished);
+}
+
+TEST(Histogram, QuantilesAreWithinOnePercentOfTheExactOnes)
+{
+    Histogram h;
+    for (int i = 1; i <= 100000; ++i) {
+        h.add(1e-8 * i);
+    }
+    EXPECT_NEAR(h.quantile(0.5), 500e-6, 6e-6);
+    EXPECT_NEAR(h.quantile(0.99), 990e-6, 11e-6);
+    EXPECT_DOUBLE_EQ(h.percentiles().max, 1e-3);
+}
+
+}  // namespace
+}  // namespace palpate::haptics

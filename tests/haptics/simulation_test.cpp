@@ -1,0 +1,315 @@
+#include "models.h"
+
+#include <tests/allocations.h>
+
+#include <haptics/hand.h>
+#include <haptics/replay.h>
+#include <haptics/simulation.h>
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace palpate::haptics {
+namespace {
+
+DeviceSample at(Vec3 position)
+{
+    DeviceSample s;
+    s.position = position;
+    s.axis = {0, 1, 0};
+    s.buttons = buttonDeadMan;
+    return s;
+}
+
+// Runs the tip along y from `from` to `to` [m] at `speed` [m/s] and hands every tick to `visit`.
+template <typename Visit>
+void stroke(Simulation& simulation, double from, double to, double speed, Visit&& visit)
+{
+    const int ticks = static_cast<int>(std::abs(to - from) / (speed * tickSeconds));
+    for (int i = 0; i <= ticks; ++i) {
+        visit(simulation.tick(at({0, from + (to - from) * i / ticks, 0})));
+    }
+}
+
+void settle(Simulation& simulation, double y, int ticks = 700)
+{
+    for (int i = 0; i < ticks; ++i) {
+        simulation.tick(at({0, y, 0}));
+    }
+}
+
+double cutting(const SessionModel& model, const char* tissue)
+{
+    return model.tissue->table().rows[*model.tissue->table().find(tissue)].cuttingForce;
+}
+
+double puncturing(const SessionModel& model, const char* tissue)
+{
+    return model.tissue->table().rows[*model.tissue->table().find(tissue)].punctureForce;
+}
+
+// A sphere pressed d into the block feels Hertz's force in the tissue under it, straight out of the surface.
+TEST(Simulation, SphereOnTheBlockFeelsHertz)
+{
+    const auto& model = tests::blockSphere();
+    const volume::Tissue::Reader reader(*model.tissue);
+    Simulation simulation(model);
+    settle(simulation, -12e-3);
+    stroke(simulation, -12e-3, -10e-3 + 6e-3, 0.02, [](const TickRecord&) {});
+    settle(simulation, -4e-3);
+    const TickRecord r = simulation.tick(at({0, -4e-3, 0}));
+    const auto local = tissueUnder(model, reader, {0, 0, 0}, {0, 1, 0}, 10e-3);
+    const double expected = sphereForce(model, local, 6e-3);
+    EXPECT_NEAR(-r.total.y, expected, 0.03 * expected);
+    EXPECT_LT(std::hypot(r.total.x, r.total.z), 0.05 * expected);
+}
+
+// Level 1 deforms: the tissue under the sphere is where the sphere's lowest point is, level 0 leaves it.
+TEST(Simulation, ChainMailFollowsTheSphereAndSpringDoesNot)
+{
+    for (const bool deforms : {true, false}) {
+        auto model = tests::modelOf(tests::blockScene);
+        model.scene.model.level = deforms ? datasets::ModelLevel::chainmail : datasets::ModelLevel::spring;
+        Simulation simulation(model);
+        stroke(simulation, -15e-3, -3e-3, 0.05, [](const TickRecord&) {});
+        const auto& lattice = model.lattice;
+        double deepest = 0.0;
+        for (const auto n : simulation.deformation().moved()) {
+            deepest = std::max(deepest, static_cast<double>(simulation.deformation().u()[n].y));
+        }
+        EXPECT_NEAR(deepest, deforms ? 7e-3 : 0.0, lattice.grid.spacing);
+    }
+}
+
+// Load, drag aside, unload: the force is back at zero, and so is every node.
+TEST(Simulation, NothingIsLeftAfterRelease)
+{
+    Simulation simulation(tests::blockSphere());
+    stroke(simulation, -15e-3, -4e-3, 0.05, [](const TickRecord&) {});
+    for (int i = 0; i < 200; ++i) {
+        simulation.tick(at({i * 5e-5, -4e-3, 0}));
+    }
+    stroke(simulation, -4e-3, -20e-3, 0.1, [](const TickRecord&) {});
+    settle(simulation, -20e-3, 100);
+    const auto r = simulation.tick(at({0, -20e-3, 0}));
+    EXPECT_EQ(r.total, Vec3(0.0));
+    EXPECT_EQ(r.phase, Phase::free);
+    for (const Vec3f u : simulation.deformation().u()) {
+        ASSERT_EQ(u, Vec3f(0.0F));
+    }
+}
+
+// The needle: the force rises to the skin's puncture force, drops, then stays at cutting plus friction; every boundary on
+// the way is an event, in the order of the layers.
+TEST(Simulation, NeedleFeelsEveryLayerInOrder)
+{
+    const auto& model = tests::layeredNeedle();
+    Simulation simulation(model);
+    settle(simulation, -10e-3);
+    std::vector<std::string> entered;
+    double beforeSkin = 0.0;
+    stroke(simulation, -10e-3, 45e-3, 0.01, [&](const TickRecord& r) {
+        if (entered.empty()) {
+            beforeSkin = std::max(beforeSkin, glm::length(r.basic));
+        }
+        for (std::uint32_t i = 0; i < r.eventCount; ++i) {
+            if (r.events[i].kind == EventKind::puncture) {
+                entered.push_back(model.tissue->table().rows[r.events[i].tissue].name);
+            }
+        }
+    });
+    ASSERT_GE(entered.size(), 3U);
+    EXPECT_EQ(entered[0], "skin");
+    EXPECT_EQ(entered[1], "fat");
+    EXPECT_NEAR(beforeSkin, puncturing(model, "skin"), 0.05 * puncturing(model, "skin"));
+}
+
+// Deep in one tissue the force is its cutting force plus friction times the inserted length: linear in depth.
+TEST(Simulation, NeedleForceGrowsWithInsertedLengthByFriction)
+{
+    const auto model = tests::modelOf(R"(name = "fat"
+[volume]
+phantom = "block"
+voxel_mm = 1.0
+[volume.parameters]
+tumour_diameter_mm = 4
+tumour_centre_mm = 50
+[dffb]
+mode = "off"
+[target]
+structure = "tumour"
+aim_mm = [0, 50, 0]
+entry_mm = [0, 0, 0]
+)");
+    const auto& fat = model.tissue->table().rows[*model.tissue->table().find("fat")];
+    Simulation simulation(model);
+    settle(simulation, -10e-3);
+    std::vector<std::pair<double, double>> curve;
+    stroke(simulation, -10e-3, 40e-3, 0.02, [&](const TickRecord& r) {
+        if (r.inserted > 10e-3) {
+            curve.emplace_back(r.inserted, -r.basic.y);
+        }
+    });
+    ASSERT_GT(curve.size(), 300U);
+    for (std::size_t i = 0; i < curve.size(); i += 20) {
+        const double expected = fat.cuttingForce + fat.frictionPerMetre * curve[i].first;
+        EXPECT_NEAR(curve[i].second, expected, 0.05 * expected + 0.01) << curve[i].first;
+    }
+}
+
+// Withdrawal: the force turns round, only friction is left, and outside nothing is.
+TEST(Simulation, WithdrawalFeelsFrictionTheOtherWay)
+{
+    const auto& model = tests::layeredNeedle();
+    Simulation simulation(model);
+    settle(simulation, -10e-3);
+    stroke(simulation, -10e-3, 25e-3, 0.02, [](const TickRecord&) {});
+    double most = 0.0;
+    stroke(simulation, 25e-3, -10e-3, 0.02, [&](const TickRecord& r) { most = std::max(most, r.basic.y); });
+    EXPECT_GT(most, 0.05);
+    EXPECT_LT(most, cutting(model, "skin") + 2.0);
+    settle(simulation, -10e-3, 50);
+    EXPECT_EQ(simulation.tick(at({0, -10e-3, 0})).total, Vec3(0.0));
+}
+
+// A stab at 5 m/s, 5 mm per tick, does not pass the skin without contact and puncture.
+TEST(Simulation, FastStabCannotTunnelThroughTheSkin)
+{
+    const auto& model = tests::layeredNeedle();
+    Simulation simulation(model);
+    settle(simulation, -10.3e-3);
+    std::vector<EventKind> kinds;
+    stroke(simulation, -10.3e-3, 30e-3, 5.0, [&](const TickRecord& r) {
+        for (std::uint32_t i = 0; i < r.eventCount; ++i) {
+            kinds.push_back(r.events[i].kind);
+        }
+    });
+    ASSERT_GE(kinds.size(), 2U);
+    EXPECT_EQ(kinds[0], EventKind::contact);
+    EXPECT_EQ(kinds[1], EventKind::puncture);
+}
+
+// The core is looked up where the notch is: fired inside the tumour it is tumour, beside it there is none.
+TEST(Simulation, CoreHoldsTheTissueInTheNotch)
+{
+    const auto& model = tests::layeredNeedle();
+    const auto& tool = model.scene.tool;
+    const auto fireAt = [&](double tip) {
+        Simulation simulation(model);
+        settle(simulation, -10e-3);
+        stroke(simulation, -10e-3, tip, 0.02, [](const TickRecord&) {});
+        auto sample = at({0, tip, 0});
+        sample.buttons |= buttonFire;
+        const TickRecord r = simulation.tick(sample);
+        EXPECT_TRUE(r.fired);
+        EXPECT_FALSE(simulation.tick(sample).fired);  // once per press
+        return r.core;
+    };
+    // The tumour lies 20 to 32 mm deep: the notch is to be around 26 mm.
+    const double tip = 26e-3 - tool.throwLength + 0.5 * tool.notchLength;
+    const auto hit = fireAt(tip);
+    EXPECT_NEAR(hit.targetLength, 12e-3, 3.5e-3);
+    double sum = 0.0;
+    for (const double f : hit.fraction) {
+        sum += f;
+    }
+    EXPECT_NEAR(sum, 1.0, 1e-9);
+    EXPECT_NEAR(hit.targetFraction, 12.0 / 20.0, 0.2);
+    const auto miss = fireAt(tip + 25e-3);
+    EXPECT_LT(miss.targetFraction, 0.1);
+}
+
+// Recorded poses give the same bits again; one bit in one pose gives others.
+TEST(Simulation, SameSamplesGiveTheSameBits)
+{
+    const auto& model = tests::layeredNeedle();
+    const auto hashOf = [&](double nudge) {
+        Simulation simulation(model);
+        ForceHash hash;
+        std::mt19937 random(3);
+        std::normal_distribution<double> tremor(0.0, 2e-4);
+        for (int i = 0; i < 3000; ++i) {
+            const double y = -10e-3 + 50e-3 * std::sin(i * 1e-3);
+            auto s = at({tremor(random), y + (i == 1500 ? nudge : 0.0), tremor(random)});
+            hash.add(simulation.tick(s));
+        }
+        return hash.value();
+    };
+    EXPECT_EQ(hashOf(0.0), hashOf(0.0));
+    EXPECT_NE(hashOf(0.0), hashOf(1e-5));
+}
+
+// Poses that jump, shake, turn and go bad: the force stays finite, under the cap and its slew, and after a bad pose zero.
+TEST(Simulation, HostilePosesNeverHurtTheHand)
+{
+    for (const auto* model : {&tests::layeredNeedle(), &tests::blockSphere()}) {
+        Simulation simulation(*model);
+        std::mt19937 random(5);
+        std::uniform_real_distribution<double> place(-0.08, 0.08), chance(0.0, 1.0);
+        std::normal_distribution<double> noise(0.0, 1.0);
+        Vec3 p(0.0, -0.02, 0.0), before(0.0);
+        for (int i = 0; i < 4000; ++i) {
+            p = chance(random) < 0.02 ? Vec3(place(random), place(random), place(random))
+                                      : p + 5e-4 * Vec3(noise(random), noise(random), noise(random));
+            auto s = at(p);
+            s.axis = glm::normalize(Vec3(noise(random), 3.0 + noise(random), noise(random)));
+            s.buttons |= chance(random) < 0.01 ? buttonFire : 0;
+            const TickRecord& r = simulation.tick(s);
+            ASSERT_TRUE(std::isfinite(glm::length(r.total)));
+            ASSERT_LE(glm::length(r.total), model->scene.forceCap * (1 + 1e-12));
+            ASSERT_LE(glm::length(r.total - before), 0.12 * model->scene.forceCap);
+            before = r.total;
+        }
+        simulation.tick(at({0, std::numeric_limits<double>::quiet_NaN(), 0}));
+        const TickRecord& r = simulation.tick(at(p));
+        EXPECT_TRUE(r.faulted);
+        EXPECT_EQ(r.total, Vec3(0.0));
+    }
+}
+
+// Turning DFFB off changes the additional channel and nothing else.
+TEST(Simulation, DffbChangesOnlyItsOwnChannel)
+{
+    auto off = tests::modelOf(tests::layeredScene);
+    off.scene.dffb.mode = datasets::DffbMode::off;
+    auto on = tests::modelOf(tests::layeredScene);
+    on.scene.dffb.mode = datasets::DffbMode::field;
+    on.scene.dffb.structure.force = 1.0;
+    on.scene.dffb.range = 60e-3;
+    Simulation a(off), b(on);
+    double most = 0.0;
+    for (int i = 0; i < 2500; ++i) {
+        const auto s = at({0, -10e-3 + 2e-5 * i, 0});
+        const TickRecord ra = a.tick(s);
+        const TickRecord rb = b.tick(s);
+        ASSERT_EQ(ra.basic, rb.basic);
+        ASSERT_EQ(ra.additional, Vec3(0.0));
+        ASSERT_EQ(rb.total, rb.basic + rb.additional);
+        most = std::max(most, glm::length(rb.additional));
+    }
+    EXPECT_GT(most, 0.05);
+}
+
+TEST(Simulation, TickAllocatesNothing)
+{
+    for (const auto* model : {&tests::layeredNeedle(), &tests::blockSphere()}) {
+        Simulation simulation(*model);
+        const auto count = tests::allocationsIn([&] {
+            for (int i = 0; i < 2000; ++i) {
+                auto s = at({0, -15e-3 + 2e-5 * i, 0});
+                s.buttons |= i == 1900 ? buttonFire : 0;
+                simulation.tick(s);
+            }
+        });
+        EXPECT_EQ(count, 0U);
+    }
+}
+
+}  // namespace
+}  // namespace palpate::haptics

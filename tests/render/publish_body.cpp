@@ -1,0 +1,57 @@
+// Publishes the made-up body: publish_body SESSION play | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not shipped.
+#include <render/channel/channel.h>
+#include <tests/render/body.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string>
+#include <thread>
+
+namespace {
+
+using namespace palpate;
+
+void publish(const std::string& session, const std::string& mode, double argument)
+{
+    const bool wave = mode == "wave";
+    const int voxels = wave ? static_cast<int>(argument) : 104;
+    const channel::Scenery scenery = render::bodyScenery(voxels, 0.104 / voxels);
+    channel::Publisher publisher(session, scenery, render::bodyLabels(scenery));
+    const auto start = std::chrono::steady_clock::now();
+    for (std::uint64_t tick = 1;; ++tick) {
+        const double t = 1e-3 * static_cast<double>(tick);
+        channel::State state = render::storyState(scenery, mode == "hold" ? argument : wave ? 1.5 : t);
+        state.tick = tick;
+        if (tick % 16 == 1) {
+            if (wave)
+                render::waveDisplaced(scenery, t, 1.5e-3, publisher.backBuffer());
+            else
+                render::storyDisplaced(scenery, mode == "hold" ? argument : t, publisher.backBuffer());
+            publisher.backBuffer().tick = tick;
+            publisher.publishDisplaced();
+        }
+        if (mode == "hold")
+            state.time = t;
+        publisher.setState(state);
+        std::this_thread::sleep_until(start + std::chrono::milliseconds(tick));
+        if (mode == "play" && t > render::storySeconds + 0.2)
+            return;
+    }
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+    if (argc < 3)
+        return 2;
+    try {
+        publish(argv[1], argv[2], argc > 3 ? std::atof(argv[3]) : 0);
+        return 0;
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "publish_body: %s\n", e.what());
+        return 1;
+    }
+}

@@ -1,0 +1,310 @@
+#include <render/channel/channel.h>
+#include <render/overlay.h>
+#include <render/view_frame.h>
+#include <tests/render/body.h>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPNGReader.h>
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <csignal>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace palpate::render {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int width = 800, height = 600;
+
+// A process of ours: killed at the latest when it goes out of scope.
+class Process {
+public:
+    Process(const std::vector<std::string>& command, const fs::path& output, bool emptyPath = false)
+    {
+        id_ = ::fork();
+        if (id_ != 0)
+            return;
+        const int file = ::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+        ::dup2(file, STDOUT_FILENO);
+        ::dup2(file, STDERR_FILENO);
+        ::unsetenv("DISPLAY");
+        if (emptyPath)
+            ::setenv("PATH", "/nowhere", 1);
+        std::vector<char*> words;
+        for (const std::string& word : command)
+            words.push_back(const_cast<char*>(word.c_str()));
+        words.push_back(nullptr);
+        ::execvp(words[0], words.data());
+        ::_exit(127);
+    }
+    Process(const Process&) = delete;
+    Process& operator=(const Process&) = delete;
+    ~Process() { end(SIGKILL); }
+
+    void end(int signal)
+    {
+        if (id_ > 0)
+            ::kill(id_, signal);
+        wait();
+    }
+    // Exit status, or 1000 + signal.
+    int wait()
+    {
+        if (id_ > 0) {
+            int status = 0;
+            ::waitpid(id_, &status, 0);
+            id_ = 0;
+            result_ = WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status);
+        }
+        return result_;
+    }
+
+private:
+    pid_t id_ = 0;
+    int result_ = -1;
+};
+
+bool installed(const std::string& program)
+{
+    std::istringstream path(std::getenv("PATH") != nullptr ? std::getenv("PATH") : "");
+    for (std::string folder; std::getline(path, folder, ':');)
+        if (::access((folder + "/" + program).c_str(), X_OK) == 0)
+            return true;
+    return false;
+}
+
+class Viewer : public testing::Test {
+protected:
+    void SetUp() override
+    {
+        const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+        session_ = "view-" + std::to_string(::getpid());
+        folder_ = fs::temp_directory_path() / ("palpate-" + name + "-" + std::to_string(::getpid()));
+        fs::create_directories(folder_);
+        if (!fs::exists(program()))
+            GTEST_SKIP() << program() << " has not been built";
+        if (!installed("Xvfb") || !installed("xvfb-run"))
+            GTEST_SKIP() << "needs Xvfb (package xvfb)";
+    }
+    void TearDown() override
+    {
+        fs::remove_all(folder_);
+        fs::remove("/dev/shm/palpate-" + session_);  // of publishers that were killed
+    }
+
+    static std::string program() { return std::string(PALPATE_BIN_DIR) + "/palpate-view"; }
+    std::vector<std::string> publish(const std::string& mode, const std::string& argument = "0") const
+    {
+        return {PUBLISH_BODY, session_, mode, argument};
+    }
+    std::vector<std::string> view(const std::vector<std::string>& more) const
+    {
+        std::vector<std::string> command{program(), "--session", session_, "--offscreen", pictures(), "--size", "800x600"};
+        command.insert(command.end(), more.begin(), more.end());
+        return command;
+    }
+    std::string pictures() const { return folder_ / "pictures"; }
+    fs::path log(const std::string& name) const { return folder_ / name; }
+    std::string said(const std::string& name) const
+    {
+        std::ifstream file(log(name));
+        return {std::istreambuf_iterator<char>(file), {}};
+    }
+    bool waitFor(const std::string& picture) const
+    {
+        for (int i = 0; i < 600; ++i) {
+            if (fs::exists(fs::path(pictures()) / picture))
+                return true;
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        }
+        return false;
+    }
+    // The second picture of a body that stays at one moment of the story.
+    vtkSmartPointer<vtkImageData> pictureAt(const std::string& moment)
+    {
+        fs::remove_all(pictures());
+        Process publisher(publish("hold", moment), log("publisher"));
+        Process viewer(view({"--frames", "2", "--every", "0.05"}), log("viewer"));
+        EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+        vtkNew<vtkPNGReader> reader;
+        reader->SetFileName((fs::path(pictures()) / "frame_00001.png").c_str());
+        reader->Update();
+        return reader->GetOutput();
+    }
+
+    std::string session_;
+    fs::path folder_;
+};
+
+using Pixel = std::array<int, 3>;
+
+Pixel pixelAt(vtkImageData& image, int x, int y)
+{
+    const auto* p = static_cast<const unsigned char*>(image.GetScalarPointer(x, y, 0));
+    return {p[0], p[1], p[2]};
+}
+
+bool near(const Pixel& a, const Pixel& b, int tolerance)
+{
+    return std::abs(a[0] - b[0]) <= tolerance && std::abs(a[1] - b[1]) <= tolerance && std::abs(a[2] - b[2]) <= tolerance;
+}
+
+// Where the slice shows the point `p` [m] of its plane.
+Pixel onSlice(vtkImageData& image, const channel::Scenery& scenery, glm::dvec3 p)
+{
+    const Area area = ScreenPlan(width, height).slice;
+    const ViewFrame frame = viewFrame(scenery);
+    const glm::dvec3 d = (p - frame.centre) * (std::min(area.width, area.height) / frame.extent);
+    return pixelAt(image, area.x + area.width / 2 + static_cast<int>(std::lround(glm::dot(d, frame.right))),
+                   area.y + area.height / 2 + static_cast<int>(std::lround(glm::dot(d, frame.up))));
+}
+
+int countNear(vtkImageData& image, const Area& area, const Pixel& colour, int tolerance)
+{
+    int count = 0;
+    for (int y = area.y; y < area.y + area.height; ++y)
+        for (int x = area.x; x < area.x + area.width; ++x)
+            count += near(pixelAt(image, x, y), colour, tolerance);
+    return count;
+}
+
+TEST_F(Viewer, ShowsTheDimpleAndTheNeedleWhereTheyAre)
+{
+    const auto before = pictureAt("0.05"), after = pictureAt("1.99");
+    ASSERT_EQ(before->GetDimensions()[0], width);
+    ASSERT_EQ(after->GetDimensions()[1], height);
+    const channel::Scenery scenery = bodyScenery();
+    const glm::dvec3 entry = vec(scenery.entry), axis = glm::normalize(vec(scenery.aim) - entry);
+    const ViewFrame frame = viewFrame(scenery);
+    const glm::dvec3 aside = glm::cross(axis, frame.towards);
+    constexpr Pixel fat{242, 217, 128}, air{12, 13, 18}, needle{64, 217, 255};
+
+    const glm::dvec3 inDimple = entry + 4.5e-3 * axis + 3e-3 * aside;
+    EXPECT_TRUE(near(onSlice(*before, scenery, inDimple), fat, 3));
+    EXPECT_TRUE(near(onSlice(*after, scenery, inDimple), air, 3));
+    const glm::dvec3 farAway = entry + 20e-3 * axis - 25e-3 * aside;
+    EXPECT_EQ(onSlice(*before, scenery, farAway), onSlice(*after, scenery, farAway));
+
+    // Pressed 9 mm deep the shaft is 5 mm inside the rest surface; before that the tip was 23 mm off.
+    EXPECT_TRUE(near(onSlice(*after, scenery, entry + 3e-3 * axis), needle, 3));
+    EXPECT_FALSE(near(onSlice(*before, scenery, entry + 3e-3 * axis), needle, 60));
+    const Area view = ScreenPlan(width, height).view;
+    const int shown = countNear(*before, view, {70, 235, 255}, 60), longer = countNear(*after, view, {70, 235, 255}, 60);
+    EXPECT_GT(shown, 50);
+    EXPECT_GT(longer, shown + 200);
+}
+
+TEST_F(Viewer, WritesAPictureOfEveryEventAndEndsWithTheSession)
+{
+    Process viewer(view({"--every", "1"}), log("viewer"));
+    ASSERT_TRUE(waitFor(".")) << said("viewer");
+    Process publisher(publish("play"), log("publisher"));
+    EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+    EXPECT_EQ(publisher.wait(), 0) << said("publisher");
+    for (const char* name : {"frame_00000.png", "frame_00002.png", "000_contact.png", "001_inserted.png",
+                             "002_warning_artery.png", "003_fired.png", "004_finished.png"})
+        EXPECT_TRUE(fs::exists(fs::path(pictures()) / name)) << name;
+}
+
+TEST_F(Viewer, KilledLeavesTheSimulationUntouched)
+{
+    Process publisher(publish("hold", "1.5"), log("publisher"));
+    Process viewer(view({"--every", "0.05"}), log("viewer"));
+    ASSERT_TRUE(waitFor("frame_00001.png")) << said("viewer");
+    const auto subscriber = channel::Subscriber::attach(session_);
+    ASSERT_TRUE(subscriber);
+    viewer.end(SIGKILL);
+    const std::uint64_t tick = subscriber->state()->tick;
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    EXPECT_TRUE(subscriber->alive());
+    EXPECT_GT(subscriber->state()->tick, tick + 50);
+}
+
+TEST_F(Viewer, SaysThatTheSimulationWasKilled)
+{
+    Process publisher(publish("hold", "1.5"), log("publisher"));
+    Process viewer(view({"--every", "0.05", "--wait", "1"}), log("viewer"));
+    ASSERT_TRUE(waitFor("frame_00001.png")) << said("viewer");
+    publisher.end(SIGKILL);
+    EXPECT_EQ(viewer.wait(), 1);
+    EXPECT_NE(said("viewer").find("session " + session_ + " stopped without ending (process "), std::string::npos);
+}
+
+TEST_F(Viewer, ShowsASessionThatHasBeenStartedAgain)
+{
+    auto first = std::make_unique<Process>(publish("hold", "0.05"), log("first"));
+    Process viewer(view({"--every", "0.5", "--wait", "20"}), log("viewer"));
+    ASSERT_TRUE(waitFor("frame_00001.png")) << said("viewer");
+    first->end(SIGKILL);
+    Process second(publish("play"), log("second"));
+    EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+    int finished = 0;
+    for (const auto& entry : fs::directory_iterator(pictures()))
+        finished += entry.path().string().ends_with("_finished.png");
+    EXPECT_EQ(finished, 1);
+}
+
+TEST_F(Viewer, EndsCleanlyWhenInterrupted)
+{
+    for (const int signal : {SIGINT, SIGTERM}) {
+        Process publisher(publish("hold", "1.5"), log("publisher"));
+        Process viewer(view({"--every", "0.05"}), log("viewer"));
+        ASSERT_TRUE(waitFor("frame_00001.png")) << said("viewer");
+        viewer.end(signal);
+        EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+        fs::remove_all(pictures());
+    }
+}
+
+TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
+{
+    Process publisher(publish("hold", "1.5"), log("publisher"));
+    Process viewer({"xvfb-run", "-a", "-s", "-screen 0 1280x1024x24", program(), "--session", session_, "--size", "640x480",
+                    "--frames", "5", "--json", "-"},
+                   log("viewer"));
+    EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+    EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");
+}
+
+TEST_F(Viewer, TellsInOneLineWhatIsMissing)
+{
+    const auto expectError = [&](const std::vector<std::string>& command, const std::string& words,
+                                 bool emptyPath = false) {
+        Process viewer(command, log("viewer"), emptyPath);
+        EXPECT_EQ(viewer.wait(), 1) << words;
+        const std::string text = said("viewer");
+        EXPECT_EQ(text.rfind("palpate-view: ", 0), 0U) << text;
+        EXPECT_NE(text.find(words), std::string::npos) << text;
+        EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+    };
+    expectError(view({"--wait", "0.3"}), "no session " + session_);
+    expectError({program(), "--session", "a/b", "--offscreen", pictures()}, "a name is");
+    expectError({program(), "--session", session_}, "no display");
+    expectError(view({"--wait", "0.3"}), "install the package xvfb", true);
+    expectError(view({"--every", "-1"}), "0 s or more");
+    expectError({program(), "--size", "12"}, "WIDTHxHEIGHT");
+    fs::remove_all(pictures());
+    std::ofstream(pictures()) << "a file";
+    expectError(view({"--wait", "0.3"}), "cannot be made into a folder");
+}
+
+}  // namespace
+}  // namespace palpate::render

@@ -1,0 +1,225 @@
+#include "bodies.h"
+
+#include <volume/tissue.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace palpate::volume {
+namespace {
+
+using namespace bodies;
+
+Affine straight(Vec3 spacing)
+{
+    return {Mat3(spacing.x, 0, 0, 0, spacing.y, 0, 0, 0, spacing.z), Vec3(0.0)};
+}
+
+struct SphereCase {
+    const char* name;
+    Affine affine;
+    Index3 size;
+    double voxel;    // coarsest edge [m]
+    double spacing;  // of the nodes [m]
+};
+
+std::vector<SphereCase> sphereCases()
+{
+    return {{"nodes as fine as voxels", centred(straight(Vec3(1e-3)), {80, 80, 80}), {80, 80, 80}, 1e-3, 1e-3},
+            {"nodes twice as coarse", centred(straight(Vec3(1e-3)), {80, 80, 80}), {80, 80, 80}, 1e-3, 2e-3},
+            {"nodes twice as fine", centred(straight(Vec3(2e-3)), {40, 40, 40}), {40, 40, 40}, 2e-3, 1e-3},
+            {"oblique and left-handed",
+             centred(oblique(Vec3(1e-3), Vec3(0.0), true), {80, 80, 80}),
+             {80, 80, 80},
+             1e-3,
+             1.3e-3},
+            {"oblique and anisotropic",
+             centred(oblique({0.8e-3, 0.8e-3, 2.4e-3}, Vec3(0.0), false), {96, 96, 34}),
+             {96, 96, 34},
+             2.4e-3,
+             1.5e-3}};
+}
+
+constexpr double radius = 0.0203;
+const Vec3 centre(0.0011, -0.0007, 0.0004);
+
+DistanceField sphereField(const SphereCase& c, const NodeGrid& grid)
+{
+    const LabelImage image = voxelise(c.size, c.affine, [](Vec3 p) { return glm::length(p - centre) < radius ? 7 : 1; });
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    return tissue.distanceTo(std::vector<std::uint16_t>{7}, grid);
+}
+
+// d(p) = |p - c| - R. Where the sphere is parallel to a face of the voxels, no reader of them can know it to better than
+// half a voxel (or half a node spacing where that is more), and that stays so however far away; over all directions near
+// the surface the root mean square is a fifth of it.
+TEST(Distance, OfAVoxelisedSphereIsTheAnalyticOne)
+{
+    for (const SphereCase& c : sphereCases()) {
+        const NodeGrid grid = coveringGrid({Vec3(-0.1), Vec3(0.1)}, c.spacing, 0);
+        const DistanceField field = sphereField(c, grid);
+        double near = 0;
+        double squares = 0;
+        double far = 0;
+        double relative = 0;
+        int count = 0;
+        for (std::size_t i = 0; i < grid.count(); ++i) {
+            const double d = glm::length(grid.position(grid.node(i)) - centre) - radius;
+            const double error = std::abs(static_cast<double>(field.values[i]) - d);
+            if (std::abs(d) < 5 * c.voxel) {
+                near = std::max(near, error / c.voxel);
+                squares += error * error / c.voxel / c.voxel;
+                ++count;
+            } else if (d > 0) {
+                far = std::max(far, error / c.voxel);
+                relative = std::max(relative, d > 2 * radius ? error / d : 0.0);
+            }
+        }
+        const double rms = std::sqrt(squares / count);
+        const double half = 0.5 * std::max(c.voxel, c.spacing) / c.voxel;
+        EXPECT_LT(near, half) << c.name;
+        EXPECT_LT(rms, 0.12) << c.name;
+        EXPECT_LT(far, half) << c.name;
+        EXPECT_LT(relative, 0.025) << c.name;
+    }
+}
+
+// A finger that slides over the sphere at constant distance must not feel voxels: there the gradient has length 1 and
+// points away from the middle.
+TEST(Distance, GradientIsTheUnitNormalAwayFromTheSphere)
+{
+    for (const SphereCase& c : sphereCases()) {
+        const NodeGrid grid = coveringGrid({Vec3(-0.04), Vec3(0.04)}, c.spacing, 0);
+        const DistanceField field = sphereField(c, grid);
+        std::mt19937 random(11);
+        std::normal_distribution<double> normal;
+        double sum = 0;
+        const int count = 2000;
+        for (int i = 0; i < count; ++i) {
+            const Vec3 n = glm::normalize(Vec3(normal(random), normal(random), normal(random)));
+            const Vec3 p = centre + (radius + 1e-3) * n;
+            const double angle = std::acos(std::min(1.0, glm::dot(field.normal(p), n)));
+            sum += angle * angle;
+            EXPECT_NEAR(glm::length(field.gradient(p)), 1.0, 0.25) << c.name;
+        }
+        EXPECT_LT(std::sqrt(sum / count), 0.12) << c.name;
+    }
+}
+
+// Volume where the trilinear field is negative, by `s`^3 samples of every cell.
+double enclosedVolume(const DistanceField& field, int s)
+{
+    const NodeGrid& grid = field.grid;
+    std::uint64_t inside = 0;
+    for (int z = 0; z < (grid.size.z - 1) * s; ++z) {
+        for (int y = 0; y < (grid.size.y - 1) * s; ++y) {
+            for (int x = 0; x < (grid.size.x - 1) * s; ++x) {
+                inside += field.at(grid.origin + (Vec3(x, y, z) + 0.5) * (grid.spacing / s)) < 0 ? 1U : 0U;
+            }
+        }
+    }
+    return static_cast<double>(inside) * std::pow(grid.spacing / s, 3);
+}
+
+// A duct one voxel thick and a skin one voxel thick keep their volume, although half of every cell's fraction is smoothed
+// away.
+TEST(Distance, ThinStructuresKeepTheirVolume)
+{
+    const Affine affine = centred(straight(Vec3(1e-3)), {40, 40, 40});
+    const auto tube = [](Vec3 p) {
+        return std::abs(p.x) < 15e-3 && p.y > 0 && p.y < 1e-3 && p.z > 0 && p.z < 1e-3 ? 7 : 1;
+    };
+    const auto sheet = [](Vec3 p) {
+        return std::abs(p.x) < 15e-3 && std::abs(p.y) < 15e-3 && p.z > 0 && p.z < 1e-3 ? 7 : 1;
+    };
+    const auto expectVolume = [&](const LabelImage& image, double spacing) {
+        const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+        const double volume = tissue.structures().back().volume;
+        const NodeGrid grid = coveringGrid({Vec3(-18e-3), Vec3(18.1e-3)}, spacing, 0);
+        const DistanceField field = tissue.distanceTo(tissue.labelsNamed("lump"), grid);
+        EXPECT_NEAR(enclosedVolume(field, 6) / volume, 1.0, 0.2) << "spacing " << spacing;
+    };
+    for (const double spacing : {0.7e-3, 1e-3, 1.5e-3, 2e-3}) {
+        expectVolume(voxelise({40, 40, 40}, affine, tube), spacing);
+        expectVolume(voxelise({40, 40, 40}, affine, sheet), spacing);
+    }
+}
+
+// The body is what is not air; value 0 without a name is air, and so is a named cavity of role air.
+TEST(Distance, OfTheBodyIsToAir)
+{
+    std::vector<LabelName> labels = names();
+    labels.push_back({9, "trachea", "air"});
+    const Affine affine = centred(straight(Vec3(1e-3)), {48, 48, 48});
+    const LabelImage image = voxelise({48, 48, 48}, affine, [](Vec3 p) {
+        const double r = glm::length(p);
+        return r < 6e-3 ? 9 : r < 12e-3 ? 7 : r < 20e-3 ? 1 : 0;
+    });
+    const Tissue tissue = Tissue::fromLabels(image, table(), labels, {});
+    const DistanceField field = tissue.distanceToBody(coveringGrid(tissue.box(), 1e-3, 5e-3));
+    EXPECT_NEAR(field.at(Vec3(0.0)), 6e-3, 0.5e-3);
+    EXPECT_NEAR(field.at(Vec3(13e-3, 0, 0)), -7e-3, 0.4e-3);
+    EXPECT_NEAR(field.at(Vec3(24e-3, 0, 0)), 4e-3, 0.4e-3);
+}
+
+TEST(Distance, ToALabelThatNoVoxelHasIsRefused)
+{
+    const LabelImage image = voxelise({4, 4, 4}, straight(Vec3(1e-3)), [](Vec3) { return 1; });
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    EXPECT_THROW(tissue.distanceTo(std::vector<std::uint16_t>{7}, coveringGrid(tissue.box(), 1e-3, 1e-3)),
+                 std::runtime_error);
+}
+
+// A cell half fat, half tumour: E = sqrt(mean(E) / mean(1/E)) = sqrt(E1 E2); air in a cell does not count.
+TEST(Modulus, OfAHalfAndHalfCellIsTheRootOfArithmeticTimesHarmonicMean)
+{
+    LabelImage image = voxelise({8, 8, 8}, straight(Vec3(1e-3)), [](Vec3 p) { return p.x < 3.5e-3 ? 1 : 7; });
+    for (int i = 0; i < 8; ++i) {
+        for (int j = 0; j < 8; ++j) {
+            image.values[image.offset({i, j, 7})] = 0;
+        }
+    }
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    // The node at x = 3.5 mm has two voxels of fat and two of tumour in its cell of 2 mm on every side.
+    const NodeGrid grid{{3, 3, 4}, Vec3(1.5e-3), 2e-3};
+    const ScalarField field = tissue.youngsModulusOn(grid);
+    const auto at = [&](int x, int z) { return static_cast<double>(field.values[grid.offset({x, 1, z})]); };
+    EXPECT_NEAR(at(0, 1), 3.25e3, 1e-3);
+    EXPECT_NEAR(at(1, 1), std::sqrt(3.25e3 * 43.7e3), 1e-1);
+    EXPECT_NEAR(at(2, 1), 43.7e3, 1e-2);
+    EXPECT_NEAR(at(1, 3), std::sqrt(3.25e3 * 43.7e3), 1e-1) << "half of the cell is air";
+}
+
+TEST(Modulus, CellsWithoutTissueTakeTheNearestTissue)
+{
+    const LabelImage image = voxelise({20, 20, 20}, straight(Vec3(1e-3)), [](Vec3 p) {
+        return p.y < 5e-3 || p.y > 15e-3 ? 0 : p.x < 9.5e-3 ? 1 : 7;
+    });
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    const NodeGrid grid{{20, 20, 20}, Vec3(0.0), 1e-3};
+    const ScalarField field = tissue.youngsModulusOn(grid);
+    for (int y = 0; y < 20; ++y) {
+        EXPECT_NEAR(static_cast<double>(field.values[grid.offset({3, y, 10})]), 3.25e3, 1e-2) << y;
+        EXPECT_NEAR(static_cast<double>(field.values[grid.offset({16, y, 10})]), 43.7e3, 1e-1) << y;
+    }
+}
+
+// Most of a cell decides; less than half of it tissue is air.
+TEST(TissueOn, IsTheMajorityOfTheCell)
+{
+    const LabelImage image = voxelise({12, 12, 12}, straight(Vec3(1e-3)), [](Vec3 p) {
+        return p.x < 3.5e-3 ? 0 : p.x < 7.5e-3 ? 1 : 300;
+    });
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    const NodeGrid grid{{4, 3, 3}, Vec3(1e-3, 3e-3, 3e-3), 3e-3};  // cells of 3 voxels at x = 1, 4, 7, 10 mm
+    const std::vector<std::uint8_t> rows = tissue.tissueOn(grid);
+    EXPECT_EQ(rows[grid.offset({0, 1, 1})], 0);
+    EXPECT_EQ(rows[grid.offset({1, 1, 1})], 1);  // voxels 3 (air), 4, 5 (fat)
+    EXPECT_EQ(rows[grid.offset({2, 1, 1})], 1);  // voxels 6, 7 (fat), 8 (bone)
+    EXPECT_EQ(rows[grid.offset({3, 1, 1})], 3);
+}
+
+}  // namespace
+}  // namespace palpate::volume

@@ -1,0 +1,326 @@
+// Files made here, byte by byte, that tell the truth and that lie.
+#include <volume/import.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <vector>
+
+namespace palpate::volume {
+namespace {
+
+namespace fs = std::filesystem;
+
+class ImportFile : public ::testing::Test {
+protected:
+    void SetUp() override { fs::create_directories(folder); }
+    void TearDown() override { fs::remove_all(folder); }
+
+    fs::path write(const std::string& name, const std::string& bytes) const
+    {
+        std::ofstream(folder / name, std::ios::binary) << bytes;
+        return folder / name;
+    }
+    // The reason for which a file is refused; empty when it is taken.
+    static std::string reason(const fs::path& file)
+    {
+        try {
+            importLabels(file);
+            return "";
+        } catch (const std::runtime_error& e) {
+            EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos) << e.what();
+            EXPECT_EQ(std::string(e.what()).rfind(file.string(), 0), 0U) << e.what();
+            return std::string(e.what()).substr(file.string().size());
+        }
+    }
+    static void expectRefused(const fs::path& file, const std::string& word)
+    {
+        const std::string why = reason(file);
+        EXPECT_NE(why, "") << file << " was taken";
+        EXPECT_NE(why.find(word), std::string::npos) << why;
+    }
+
+    fs::path folder = fs::temp_directory_path() / fmt::format("palpate-import-{}", ::getpid());
+};
+
+template <typename T>
+std::string bytesOf(const std::vector<T>& values)
+{
+    return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
+}
+
+std::string gzip(const std::string& plain)
+{
+    z_stream z{};
+    deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY);
+    std::string packed(plain.size() + 1000, '\0');
+    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
+    z.avail_in = static_cast<uInt>(plain.size());
+    z.next_out = reinterpret_cast<Bytef*>(packed.data());
+    z.avail_out = static_cast<uInt>(packed.size());
+    deflate(&z, Z_FINISH);
+    packed.resize(packed.size() - z.avail_out);
+    deflateEnd(&z);
+    return packed;
+}
+
+// 4 x 5 x 6 voxels, values 0 to 6.
+constexpr int voxels = 120;
+
+template <typename T>
+std::vector<T> ramp()
+{
+    std::vector<T> values(voxels);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = static_cast<T>(i % 7);
+    }
+    return values;
+}
+
+std::string meta(const std::string& extra, const std::string& type = "MET_UCHAR", const std::string& size = "4 5 6",
+                 const std::string& data = "LOCAL")
+{
+    return fmt::format(
+        "ObjectType = Image\nNDims = 3\n{}DimSize = {}\nElementSpacing = 1 2 3\nOffset = 10 20 30\n"
+        "ElementType = {}\nElementDataFile = {}\n",
+        extra, size, type, data);
+}
+
+// A NIfTI-1 header with an identity sform of 1 mm, voxels from byte 352 on.
+struct Nifti {
+    std::string bytes = std::string(352, '\0');
+
+    explicit Nifti(std::int16_t type = 2, std::int16_t bits = 8)
+    {
+        put<std::int32_t>(0, 348);
+        const std::int16_t dim[8] = {3, 4, 5, 6, 1, 1, 1, 1};
+        const float pixdim[4] = {1, 1, 1, 1};
+        for (std::size_t i = 0; i < 8; ++i) {
+            put(40 + 2 * i, dim[i]);
+        }
+        for (std::size_t i = 0; i < 4; ++i) {
+            put(76 + 4 * i, pixdim[i]);
+        }
+        put(70, type);
+        put(72, bits);
+        put(108, 352.0F);
+        put<std::int16_t>(254, 1);
+        for (std::size_t row = 0; row < 3; ++row) {
+            put(280 + 20 * row, 1.0F);
+        }
+        std::memcpy(bytes.data() + 344, "n+1", 4);
+    }
+    template <typename T>
+    Nifti& put(std::size_t at, T value)
+    {
+        std::memcpy(bytes.data() + at, &value, sizeof value);
+        return *this;
+    }
+};
+
+void expectRamp(const ImportedLabels& labels)
+{
+    EXPECT_EQ(labels.image.size, Index3(4, 5, 6));
+    EXPECT_EQ(labels.image.values, ramp<std::uint16_t>());
+}
+
+TEST_F(ImportFile, MetaImageComesInWithItsGeometry)
+{
+    const auto labels =
+        importLabels(write("a.mha", meta("TransformMatrix = 0 1 0 -1 0 0 0 0 1\n") + bytesOf(ramp<std::uint8_t>())));
+    expectRamp(labels);
+    EXPECT_TRUE(labels.warnings.empty());
+    const Affine& a = labels.image.affine;
+    EXPECT_NEAR(a.origin.z, 30e-3, 1e-12);
+    EXPECT_NEAR(a.linear[0].y, 1e-3, 1e-12);   // first axis points to +y
+    EXPECT_NEAR(a.linear[1].x, -2e-3, 1e-12);  // second to -x
+}
+
+// The four combinations of what the header says of the packing and what the data are: all are read as they are.
+TEST_F(ImportFile, MetaImageThatLiesAboutItsPackingIsReadAsItIs)
+{
+    const std::string plain = bytesOf(ramp<std::uint16_t>());
+    for (const bool declared : {false, true}) {
+        for (const bool packed : {false, true}) {
+            const std::string said = declared ? "CompressedData = True\n" : "CompressedData = False\n";
+            write("v.raw", packed ? gzip(plain) : plain);
+            const auto labels = importLabels(write("v.mhd", meta(said, "MET_USHORT", "4 5 6", "v.raw")));
+            expectRamp(labels);
+            EXPECT_EQ(labels.warnings.empty(), declared == packed);
+        }
+    }
+    write("v.raw", gzip(plain));
+    const std::string shorter = "CompressedData = True\nCompressedDataSize = 20\n";
+    expectRamp(importLabels(write("v.mhd", meta(shorter, "MET_USHORT", "4 5 6", "v.raw"))));
+}
+
+TEST_F(ImportFile, BigEndianVoxelsOfAMisdeclaredFileAreTurned)
+{
+    std::string swapped = bytesOf(ramp<std::uint16_t>());
+    for (std::size_t i = 0; i < swapped.size(); i += 2) {
+        std::swap(swapped[i], swapped[i + 1]);
+    }
+    write("v.raw", gzip(swapped));
+    expectRamp(importLabels(write("v.mhd", meta("BinaryDataByteOrderMSB = True\n", "MET_USHORT", "4 5 6", "v.raw"))));
+}
+
+TEST_F(ImportFile, SizesThatDoNotFitTheBytesAreRefused)
+{
+    const std::string data = bytesOf(ramp<std::uint8_t>());
+    for (const char* size : {"4 5 7", "4 5 5", "4 4 6", "3 5 6", "40 50 60", "32767 32767 32767"}) {
+        expectRefused(write("a.mha", meta("", "MET_UCHAR", size) + data), "bytes");
+    }
+    expectRefused(write("a.mha", meta("", "MET_USHORT") + data), "cut short");
+    expectRefused(write("a.mha", meta("", "MET_UCHAR", "4 0 6") + data), "1 to 32767");
+    expectRefused(write("a.mha", meta("", "MET_UCHAR", "-4 5 6") + data), "1 to 32767");
+    expectRefused(write("a.mha", meta("", "MET_UCHAR", "4 5") + data), "contradicts");
+    expectRefused(write("a.nii", Nifti().put<std::int16_t>(46, 7).bytes + data), "cut short");
+    expectRefused(write("a.nii", Nifti().put<std::int16_t>(46, 5).bytes + data), "its header is wrong");
+    expectRefused(write("a.nii", Nifti(4, 8).bytes + data), "contradicts");
+    expectRefused(write("a.nii.gz", gzip(Nifti().put<std::int16_t>(46, 7).bytes + data)), "cut short");
+}
+
+TEST_F(ImportFile, DamagedCompressedDataAreRefused)
+{
+    std::string packed = gzip(Nifti().bytes + bytesOf(ramp<std::uint8_t>()));
+    expectRamp(importLabels(write("good.nii.gz", packed)));
+    expectRefused(write("short.nii.gz", packed.substr(0, packed.size() - 9)), "cut short");
+    packed[packed.size() - 6] = static_cast<char>(packed[packed.size() - 6] ^ 1);  // the checksum of the whole
+    expectRefused(write("flipped.nii.gz", packed), "damaged");
+}
+
+TEST_F(ImportFile, ValuesThatNoLabelMapHoldsAreNamedWithTheirPlace)
+{
+    auto floats = ramp<float>();
+    expectRamp(importLabels(write("a.nii", Nifti(16, 32).bytes + bytesOf(floats))));
+    floats[4 + 2] = 2.5F;
+    expectRefused(write("a.nii", Nifti(16, 32).bytes + bytesOf(floats)), "voxel (2, 1, 0) is 2.5");
+    floats[4 + 2] = std::numeric_limits<float>::quiet_NaN();
+    expectRefused(write("a.nii", Nifti(16, 32).bytes + bytesOf(floats)), "voxel (2, 1, 0) is not a number");
+    floats[4 + 2] = -1.0F;
+    expectRefused(write("a.nii", Nifti(16, 32).bytes + bytesOf(floats)), "voxel (2, 1, 0) is -1");
+    floats[4 + 2] = 70000.0F;
+    expectRefused(write("a.nii", Nifti(16, 32).bytes + bytesOf(floats)), "voxel (2, 1, 0) is 70000");
+    expectRefused(write("a.nii", Nifti().bytes + std::string(voxels, '\0')), "no voxel is set");
+}
+
+TEST_F(ImportFile, MoreThan1024ValuesAreAnImage)
+{
+    std::vector<std::uint16_t> values(40 * 50 * 2);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = static_cast<std::uint16_t>(i % 1024);
+    }
+    EXPECT_EQ(reason(write("a.mha", meta("", "MET_USHORT", "40 50 2") + bytesOf(values))), "");
+    values[7] = 2000;
+    expectRefused(write("a.mha", meta("", "MET_USHORT", "40 50 2") + bytesOf(values)), "1025 different values");
+}
+
+// value = slope * stored + intercept.
+TEST_F(ImportFile, ScaledNiftiIsTakenWhenTheResultsAreLabels)
+{
+    const auto labels =
+        importLabels(write("a.nii", Nifti().put(112, 2.0F).put(116, 1.0F).bytes + bytesOf(ramp<std::uint8_t>())));
+    EXPECT_EQ(labels.image.values[0], 1);
+    EXPECT_EQ(labels.image.values[6], 13);
+    expectRefused(write("a.nii", Nifti().put(112, 0.3F).bytes + bytesOf(ramp<std::uint8_t>())), "scl_slope");
+}
+
+// RAS in the file, LPS here; the sform counts, and a qform that disagrees is worth a warning.
+TEST_F(ImportFile, TheSformPlacesANifti)
+{
+    Nifti nifti;
+    nifti.put(280, 0.0F).put(284, -2.0F).put(292, 5.0F).put(296, 1.0F).put(300, 0.0F).put(308, 7.0F);
+    auto labels = importLabels(write("a.nii", nifti.bytes + bytesOf(ramp<std::uint8_t>())));
+    EXPECT_NEAR(labels.image.affine.linear[0].y, -1e-3, 1e-9);
+    EXPECT_NEAR(labels.image.affine.linear[1].x, 2e-3, 1e-9);
+    EXPECT_NEAR(labels.image.affine.origin.x, -5e-3, 1e-9);
+    EXPECT_NEAR(labels.image.affine.origin.y, -7e-3, 1e-9);
+    EXPECT_TRUE(labels.warnings.empty());
+    nifti.put<std::int16_t>(252, 1);
+    labels = importLabels(write("a.nii", nifti.bytes + bytesOf(ramp<std::uint8_t>())));
+    ASSERT_EQ(labels.warnings.size(), 1U);
+    EXPECT_NE(labels.warnings[0].find("sform is used"), std::string::npos);
+    EXPECT_NEAR(labels.image.affine.linear[1].x, 2e-3, 1e-9);
+    nifti.put<std::int16_t>(254, 0);  // no sform any more: qform, the unit quaternion
+    labels = importLabels(write("a.nii", nifti.bytes + bytesOf(ramp<std::uint8_t>())));
+    EXPECT_NEAR(labels.image.affine.linear[0].x, -1e-3, 1e-9);
+    EXPECT_NEAR(labels.image.affine.linear[1].y, -1e-3, 1e-9);
+}
+
+TEST_F(ImportFile, ShearedAndFlatGridsAreRefused)
+{
+    expectRefused(write("a.nii", Nifti().put(284, 0.2F).bytes + bytesOf(ramp<std::uint8_t>())), "sheared");
+    expectRefused(write("a.nii", Nifti().put(280, 0.0F).bytes + bytesOf(ramp<std::uint8_t>())), "spacing");
+    expectRefused(
+        write("a.nii", Nifti().put(280, std::numeric_limits<float>::quiet_NaN()).bytes + bytesOf(ramp<std::uint8_t>())),
+        "spacing");
+}
+
+TEST_F(ImportFile, NumbersThatAreNotFiniteInOtherHeadersAreRefused)
+{
+    const std::string data = bytesOf(ramp<std::uint8_t>());
+    for (const char* bad : {"nan", "inf", "0", "-1e999"}) {
+        EXPECT_NE(reason(write("a.mha", meta(fmt::format("TransformMatrix = {} 0 0 0 1 0 0 0 1\n", bad)) + data)), "")
+            << bad;
+        EXPECT_NE(reason(write("a.nrrd", fmt::format("NRRD0004\ntype: uchar\ndimension: 3\nspace: LPS\nsizes: 4 5 6\n"
+                                                     "space directions: ({},0,0) (0,2,0) (0,0,3)\nencoding: raw\n\n",
+                                                     bad) +
+                                             data)),
+                  "")
+            << bad;
+    }
+}
+
+TEST_F(ImportFile, ManyVolumesAndManyValuesPerVoxelAreRefused)
+{
+    const std::string twice = bytesOf(ramp<std::uint8_t>()) + bytesOf(ramp<std::uint8_t>());
+    expectRefused(write("a.nii", Nifti().put<std::int16_t>(40, 4).put<std::int16_t>(48, 2).bytes + twice), "4 dimensions");
+    expectRefused(write("a.mha", meta("ElementNumberOfChannels = 2\n") + twice), "2 values per voxel");
+    expectRefused(write("a.nrrd",
+                        "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 4 5 6\nkinds: list domain domain domain\n"
+                        "encoding: raw\n\n" +
+                            twice),
+                  "2 layers");
+}
+
+TEST_F(ImportFile, NrrdComesInRawAndPackedAndIsRefusedWhenItLies)
+{
+    const std::string head =
+        "NRRD0004\ntype: uchar\ndimension: 3\nspace: RAS\nsizes: 4 5 6\n"
+        "space directions: (1,0,0) (0,2,0) (0,0,3)\nspace origin: (10,20,30)\n";
+    const std::string data = bytesOf(ramp<std::uint8_t>());
+    for (const bool packed : {false, true}) {
+        const std::string encoding = packed ? "encoding: gzip\n\n" : "encoding: raw\n\n";
+        const auto labels = importLabels(write("a.nrrd", head + encoding + (packed ? gzip(data) : data)));
+        expectRamp(labels);
+        EXPECT_NEAR(labels.image.affine.origin.x, -10e-3, 1e-9);
+        EXPECT_NEAR(labels.image.affine.linear[1].y, -2e-3, 1e-9);
+        EXPECT_NEAR(labels.image.affine.linear[2].z, 3e-3, 1e-9);
+    }
+    expectRefused(write("a.nrrd", head + "encoding: gzip\n\n" + data), "not compressed");
+    expectRefused(write("a.nrrd", head + "encoding: raw\n\n" + data.substr(1)), "cut short");
+    expectRefused(write("a.nrrd", head + "encoding: raw\n\n" + data + data), "its header is wrong");
+    expectRefused(write("a.nhdr", head + "encoding: raw\ndata file: gone.raw\n\n"), "gone.raw is not there");
+}
+
+TEST_F(ImportFile, WhatIsNoLabelMapIsNamed)
+{
+    expectRefused(write("a.mha", "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 5\n"), "git-LFS");
+    expectRefused(write("a.nii", ""), "empty");
+    expectRefused(write("a.txt", "hello"), "no format");
+    expectRefused(write("a.nii", "hello"), "ends after 5 bytes");
+    expectRefused(write("a.nrrd", "hello"), "NRRD");
+    expectRefused(write("a.mha", "hello"), "not a MetaImage");
+    expectRefused(write("a.dcm", std::string(128, '\0') + "DICM"), "DICOM");
+    expectRefused(folder, "folder");
+    expectRefused(folder / "missing.nii", "no such file");
+}
+
+}  // namespace
+}  // namespace palpate::volume

@@ -1,0 +1,208 @@
+#include "bodies.h"
+
+#include <volume/tissue.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <random>
+
+namespace palpate::volume {
+namespace {
+
+using namespace bodies;
+namespace fs = std::filesystem;
+
+class TissueFile : public ::testing::Test {
+protected:
+    void SetUp() override { fs::create_directories(folder); }
+    void TearDown() override { fs::remove_all(folder); }
+
+    fs::path folder = fs::temp_directory_path() / fmt::format("palpate-tissue-{}", ::getpid());
+};
+
+// Blobs, single voxels and homogeneous regions on a size that no leaf divides.
+LabelImage randomImage(unsigned seed)
+{
+    std::mt19937 random(seed);
+    LabelImage image{{41, 29, 23}, oblique({0.9e-3, 1.1e-3, 2.3e-3}, {0.01, -0.02, 1.0 / 3.0}, true), {}};
+    image.values.assign(image.offset({0, 0, 23}), 0);
+    const std::vector<std::uint16_t> labels = {0, 1, 7, 300};
+    for (std::size_t i = 0; i < image.values.size(); ++i) {
+        image.values[i] = i < 14000 ? 1 : labels[random() % 50 < 4 ? random() % 4 : 0];
+    }
+    return image;
+}
+
+void expectSameVoxels(const LabelImage& image, const Tissue& tissue)
+{
+    const Tissue::Reader reader(tissue);
+    for (int z = 0; z < image.size.z; ++z) {
+        for (int y = 0; y < image.size.y; ++y) {
+            for (int x = 0; x < image.size.x; ++x) {
+                ASSERT_EQ(reader.label(image.affine.toPatient(Vec3(x, y, z))), image.values[image.offset({x, y, z})]);
+            }
+        }
+    }
+}
+
+TEST_F(TissueFile, SaveAndLoadGiveBackEverythingExactly)
+{
+    const LabelImage image = randomImage(3);
+    const Provenance provenance = {{"source", "a \"file\".nrrd"}, {"voxels", "ä\n\t"}};
+    const Tissue saved = Tissue::fromLabels(image, table(), names(), provenance);
+    saved.save(folder / "a.vdb");
+    const Tissue loaded = Tissue::load(folder / "a.vdb");
+
+    expectSameVoxels(image, loaded);
+    EXPECT_EQ(loaded.size(), image.size);
+    EXPECT_EQ(loaded.affine().linear, image.affine.linear);
+    EXPECT_EQ(loaded.affine().origin, image.affine.origin);
+    EXPECT_EQ(loaded.provenance(), provenance);
+    EXPECT_EQ(loaded.box().low, saved.box().low);
+    EXPECT_EQ(loaded.box().high, saved.box().high);
+    ASSERT_EQ(loaded.structures().size(), saved.structures().size());
+    for (std::size_t i = 0; i < saved.structures().size(); ++i) {
+        const Structure& a = saved.structures()[i];
+        const Structure& b = loaded.structures()[i];
+        EXPECT_EQ(std::tie(a.value, a.name, a.tissue, a.voxels, a.volume),
+                  std::tie(b.value, b.name, b.tissue, b.voxels, b.volume));
+    }
+    const auto all = [](const TissueRow& r) {
+        return std::tie(r.name, r.role, r.youngsModulus, r.poissonRatio, r.density, r.compress, r.stretch, r.shear,
+                        r.punctureForce, r.cuttingForce, r.frictionPerMetre, r.fixed, r.colour.x, r.colour.y, r.colour.z,
+                        r.opacity, r.source);
+    };
+    ASSERT_EQ(loaded.table().rows.size(), table().rows.size());
+    EXPECT_EQ(loaded.table().name, "test");
+    for (std::size_t i = 0; i < table().rows.size(); ++i) {
+        EXPECT_EQ(all(loaded.table().rows[i]), all(table().rows[i]));
+    }
+}
+
+TEST_F(TissueFile, EveryTruncatedFileIsRefused)
+{
+    const Tissue tissue = Tissue::fromLabels(randomImage(4), table(), names(), {});
+    const fs::path file = folder / "cut.vdb";
+    tissue.save(file);
+    const auto whole = fs::file_size(file);
+    for (int percent = 0; percent < 100; percent += 3) {
+        tissue.save(file);
+        fs::resize_file(file, whole * static_cast<std::uintmax_t>(percent) / 100);
+        EXPECT_THROW(Tissue::load(file), std::runtime_error) << percent << " %";
+    }
+    tissue.save(file);
+    fs::resize_file(file, whole - 1);
+    EXPECT_THROW(Tissue::load(file), std::runtime_error);
+}
+
+TEST_F(TissueFile, WhatIsNotOursIsRefusedInOneLine)
+{
+    std::ofstream(folder / "text.vdb") << "not a volume at all";
+    for (const fs::path& file : {folder / "text.vdb", folder / "missing.vdb", folder}) {
+        try {
+            Tissue::load(file);
+            ADD_FAILURE() << file << " was taken";
+        } catch (const std::runtime_error& e) {
+            const std::string what = e.what();
+            EXPECT_EQ(what.rfind(file.string() + ": ", 0), 0U) << what;
+            EXPECT_EQ(what.find('\n'), std::string::npos) << what;
+        }
+    }
+}
+
+// A limit on the size of files stands for a full disk: the write fails in the middle.
+TEST_F(TissueFile, AFullDiskLeavesTheOldFile)
+{
+    const fs::path file = folder / "kept.vdb";
+    const LabelImage old = randomImage(5);
+    Tissue::fromLabels(old, table(), names(), {}).save(file);
+    const Tissue larger = Tissue::fromLabels(randomImage(6), table(), names(), {});
+    std::signal(SIGXFSZ, SIG_IGN);
+    rlimit before{};
+    ::getrlimit(RLIMIT_FSIZE, &before);
+    for (const rlim_t bytes : {rlim_t{0}, rlim_t{1000}, rlim_t{9000}, static_cast<rlim_t>(fs::file_size(file) - 1000)}) {
+        const rlimit full{bytes, before.rlim_max};
+        ::setrlimit(RLIMIT_FSIZE, &full);
+        std::string what;
+        try {
+            larger.save(file);
+        } catch (const std::runtime_error& e) {
+            what = e.what();
+        }
+        ::setrlimit(RLIMIT_FSIZE, &before);
+        EXPECT_NE(what.find("cannot be written"), std::string::npos) << what;
+        expectSameVoxels(old, Tissue::load(file));
+        EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1) << "something is left behind";
+    }
+}
+
+TEST_F(TissueFile, AFolderThatIsNotThereIsNamed)
+{
+    const Tissue tissue = Tissue::fromLabels(randomImage(7), table(), names(), {});
+    EXPECT_THROW(tissue.save(folder / "no" / "a.vdb"), std::runtime_error);
+}
+
+TEST(Tissue, HomogeneousRegionsCostNothing)
+{
+    LabelImage image{{256, 256, 256}, {Mat3(1e-3), Vec3(0.0)}, {}};
+    image.values.assign(image.offset({0, 0, 256}), 1);
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    const MemoryUse use = tissue.memory();
+    EXPECT_LT(use.label + use.stiffness + use.occupancy, 4U << 20U);  // dense: 152 MB
+    EXPECT_EQ(tissue.structures().size(), 1U);
+    EXPECT_EQ(tissue.structures()[0].voxels, 256U * 256U * 256U);
+    EXPECT_NEAR(tissue.structures()[0].volume, 256e-3 * 256e-3 * 256e-3, 1e-12);
+}
+
+TEST(Tissue, NamesFindStructuresFirstAndTissuesNext)
+{
+    LabelImage image = randomImage(8);
+    const std::vector<LabelName> labels = {{1, "breast", "fat"}, {7, "fat pad", "fat"}, {300, "bone", "bone"}};
+    const Tissue tissue = Tissue::fromLabels(image, table(), labels, {});
+    EXPECT_EQ(tissue.labelsNamed("breast"), std::vector<std::uint16_t>{1});
+    EXPECT_EQ(tissue.labelsNamed("fat"), (std::vector<std::uint16_t>{1, 7}));
+    EXPECT_EQ(tissue.labelsNamed("bone"), std::vector<std::uint16_t>{300});
+    EXPECT_TRUE(tissue.labelsNamed("liver").empty());
+}
+
+TEST(Tissue, LabelsWithoutNameOrTissueAreRefused)
+{
+    const LabelImage image = randomImage(9);
+    const auto refused = [&](const std::vector<LabelName>& labels, const char* why) {
+        try {
+            Tissue::fromLabels(image, table(), labels, {});
+            ADD_FAILURE() << why << " was taken";
+        } catch (const std::runtime_error& e) {
+            EXPECT_NE(std::string(e.what()).find(why), std::string::npos) << e.what();
+        }
+    };
+    refused({{1, "breast", "fat"}, {7, "lump", "tumour"}}, "label 300");
+    refused({{1, "breast", "fat"}, {7, "lump", "cheese"}, {300, "rib", "bone"}}, "cheese");
+    refused({{1, "breast", "fat"}, {7, "lump", ""}, {300, "rib", "bone"}}, "'lump' has no tissue");
+}
+
+// A named 0 is tissue like any other; outside the volume there is still air.
+TEST(Tissue, ANamedZeroIsTissue)
+{
+    const LabelImage image = randomImage(10);
+    std::vector<LabelName> labels = names();
+    labels.push_back({0, "filling", "fat"});
+    const Tissue tissue = Tissue::fromLabels(image, table(), labels, {});
+    const Tissue::Reader reader(tissue);
+    const auto at = static_cast<std::size_t>(std::find(image.values.begin(), image.values.end(), 0) - image.values.begin());
+    const Index3 n(static_cast<int>(at) % 41, static_cast<int>(at) / 41 % 29, static_cast<int>(at) / 41 / 29);
+    EXPECT_EQ(reader.tissue(image.affine.toPatient(Vec3(n))), 1);
+    EXPECT_NEAR(reader.youngsModulus(image.affine.toPatient(Vec3(n))), 3.25e3, 1e-3);
+    EXPECT_EQ(reader.tissue(image.affine.toPatient(Vec3(-1, 0, 0))), 0);
+    EXPECT_EQ(reader.youngsModulus(image.affine.toPatient(Vec3(-1, 0, 0))), 0.0);
+}
+
+}  // namespace
+}  // namespace palpate::volume

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <volume/geometry.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+// Inside volume/ only: distance transforms of dense arrays on a NodeGrid.
+namespace palpate::volume {
+
+/// A point on a surface and the unit normal there, in node units; a zero normal means "unknown".
+struct SurfacePoint {
+    Vec3f at{0.0F};
+    Vec3f normal{0.0F};
+};
+
+/// Finds the nearest of `points` for every node.
+///
+/// @param nearest  index of a point, or -1 (nodes x 1). On entry each point is entered at the node in whose cell it lies
+///                 (at most half a spacing away along each axis); on return every node has one, unless there is none at
+///                 all.
+///
+/// Two sweeps, up and down through the slices, at the same time. Cost O(nodes).
+/// Source: P.-E. Danielsson, "Euclidean Distance Mapping", Computer Graphics and Image Processing 14, 1980, in three
+/// dimensions and with points that lie off the nodes.
+void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vector<std::int32_t>& nearest);
+
+/// Signed distance [m], negative where fraction > iso, to the surface fraction = iso of the trilinear `fraction` (nodes x
+/// 1). Where no surface crosses the grid, the diagonal of the grid with the sign of the side it lies on.
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso);
+
+/// The value between 0.05 and 0.6 whose isosurface encloses `volume` [m^3]; 0.5 when that does within 0.5 %.
+/// At most nine tenths of the largest fraction, so that something is inside. Source of `fraction`: nodes x 1, trilinear.
+float isoForVolume(const NodeGrid& grid, std::span<const float> fraction, double volume);
+
+/// Shifts `distance` by at most half a spacing so that its trilinear interpolant encloses `volume` [m^3], where it misses
+/// that by over 3 %: in structures thinner than a spacing the nodes alone do not see both walls.
+void keepVolume(const NodeGrid& grid, std::vector<float>& distance, double volume);
+
+/// Volume under the trilinear interpolant of `fraction` [m^3].
+double integral(const NodeGrid& grid, std::span<const float> fraction);
+
+}  // namespace palpate::volume

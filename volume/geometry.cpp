@@ -1,0 +1,48 @@
+#include <volume/geometry.h>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <cmath>
+
+namespace palpate::volume {
+
+Vec3 Affine::toIndex(Vec3 patient) const noexcept
+{
+    return glm::inverse(linear) * (patient - origin);
+}
+
+Vec3 Affine::spacing() const noexcept
+{
+    return {glm::length(linear[0]), glm::length(linear[1]), glm::length(linear[2])};
+}
+
+double Affine::voxelVolume() const noexcept
+{
+    return std::abs(glm::determinant(linear));
+}
+
+Index3 NodeGrid::node(std::size_t offset) const noexcept
+{
+    const auto nx = static_cast<std::size_t>(size.x);
+    const auto ny = static_cast<std::size_t>(size.y);
+    return {static_cast<int>(offset % nx), static_cast<int>(offset / nx % ny), static_cast<int>(offset / nx / ny)};
+}
+
+NodeGrid coveringGrid(const Box& box, double spacing, double margin)
+{
+    const Vec3 low = box.low - margin;
+    const Vec3 steps = glm::ceil((box.high + margin - low) / spacing - 1e-9);
+    return {Index3(steps) + 1, low, spacing};
+}
+
+double affordableSpacing(const Box& box, double wanted, double margin, std::size_t maxNodes)
+{
+    double spacing = wanted;
+    while (coveringGrid(box, spacing, margin).count() > maxNodes) {
+        spacing *= 1.02;
+    }
+    return spacing;
+}
+
+}  // namespace palpate::volume

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+
+#include <cstddef>
+
+namespace palpate {
+
+/// Patient frame LPS (x to the patient's left, y to the back, z to the head), as in ITK and DICOM [m], unless said otherwise.
+using Vec3 = glm::dvec3;
+using Vec3f = glm::vec3;
+using Mat3 = glm::dmat3;
+using Index3 = glm::ivec3;
+
+namespace volume {
+
+/// Axis-aligned box in the patient frame [m].
+struct Box {
+    Vec3 low{0.0};
+    Vec3 high{0.0};
+};
+
+/// Voxel index to patient frame: patient = linear * index + origin. Oblique and left-handed directions are kept.
+/// Integer indices are voxel centres.
+struct Affine {
+    Mat3 linear{1.0};  // column k is the step along voxel axis k [m]
+    Vec3 origin{0.0};  // centre of voxel (0, 0, 0) [m]
+
+    Vec3 toPatient(Vec3 index) const noexcept { return linear * index + origin; }
+    Vec3 toIndex(Vec3 patient) const noexcept;
+    /// Edge lengths of a voxel [m].
+    Vec3 spacing() const noexcept;
+    /// Volume of a voxel [m^3], positive also for left-handed directions.
+    double voxelVolume() const noexcept;
+};
+
+/// A cubic grid of nodes aligned with the patient axes; x runs fastest.
+///
+///     position(i, j, k) = origin + spacing * (i, j, k)
+struct NodeGrid {
+    Index3 size{0};      // nodes along each axis
+    Vec3 origin{0.0};    // position of node (0, 0, 0) [m]
+    double spacing = 0;  // [m]
+
+    std::size_t count() const noexcept
+    {
+        return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+    }
+    std::size_t offset(Index3 n) const noexcept
+    {
+        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
+                   static_cast<std::size_t>(size.x) +
+               static_cast<std::size_t>(n.x);
+    }
+    Index3 node(std::size_t offset) const noexcept;
+    Vec3 position(Index3 n) const noexcept { return origin + spacing * Vec3(n); }
+    bool contains(Index3 n) const noexcept
+    {
+        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size.x && n.y < size.y && n.z < size.z;
+    }
+    Box box() const noexcept { return {origin, position(size - Index3(1))}; }
+};
+
+/// The grid with nodes `spacing` [m] apart that covers `box` and `margin` [m] around it.
+NodeGrid coveringGrid(const Box& box, double spacing, double margin);
+
+/// The smallest spacing, not under `wanted` [m], with which a covering grid of `box` has at most `maxNodes` nodes.
+double affordableSpacing(const Box& box, double wanted, double margin, std::size_t maxNodes);
+
+}  // namespace volume
+}  // namespace palpate

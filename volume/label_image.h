@@ -1,0 +1,32 @@
+#pragma once
+
+#include <volume/geometry.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace palpate::volume {
+
+/// A dense label map: the form in which labels arrive from a file or a phantom. x runs fastest.
+struct LabelImage {
+    Index3 size{0};
+    Affine affine;
+    std::vector<std::uint16_t> values;  // size.x * size.y * size.z
+
+    std::size_t offset(Index3 n) const noexcept
+    {
+        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
+                   static_cast<std::size_t>(size.x) +
+               static_cast<std::size_t>(n.x);
+    }
+};
+
+/// A name for one label value, and the tissue it is made of.
+struct LabelName {
+    std::uint16_t value = 0;
+    std::string name;    // the structure: "tumour", "left lung"
+    std::string tissue;  // a row of the tissue table
+};
+
+}  // namespace palpate::volume

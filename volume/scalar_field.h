@@ -1,0 +1,30 @@
+#pragma once
+
+#include <volume/geometry.h>
+
+#include <vector>
+
+namespace palpate::volume {
+
+/// Scalar samples on a cubic grid, trilinear between nodes. Plain memory, so that the servo path can read it.
+struct ScalarField {
+    NodeGrid grid;
+    std::vector<float> values;  // one per node
+
+    /// Trilinear value at `p` [m]; points outside take the value at the nearest point of the border.
+    double at(Vec3 p) const noexcept;
+
+    /// Central difference of at() over one spacing, per metre. Smooth enough for a contact normal.
+    Vec3 gradient(Vec3 p) const noexcept;
+};
+
+/// A signed distance [m], negative inside.
+struct DistanceField : ScalarField {
+    /// As ScalarField::at(), but outside the grid the way to the border is added, so that the result keeps growing.
+    double distance(Vec3 p) const noexcept;
+
+    /// Unit vector away from the structure; +z where the field is flat.
+    Vec3 normal(Vec3 p) const noexcept;
+};
+
+}  // namespace palpate::volume

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <volume/geometry.h>
+#include <volume/label_image.h>
+#include <volume/scalar_field.h>
+#include <volume/tissue_table.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace palpate::volume {
+
+/// One structure of a volume: a label value with its name, tissue and size.
+struct Structure {
+    std::uint16_t value = 0;
+    std::string name;
+    std::uint8_t tissue = 0;  // row of the tissue table
+    std::uint64_t voxels = 0;
+    double volume = 0;  // [m^3]
+};
+
+/// Where a volume comes from, kept in the file.
+using Provenance = std::vector<std::pair<std::string, std::string>>;  // key, value
+
+/// Bytes held by each grid.
+struct MemoryUse {
+    std::uint64_t label = 0;
+    std::uint64_t stiffness = 0;
+    std::uint64_t occupancy = 0;
+};
+
+/// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.
+///
+///     label      Int32, background 0   the label value of every voxel
+///     stiffness  Float, background 0   Young's modulus [kPa], per voxel
+///     occupancy  Bool,  background 0   true where there is tissue
+///
+/// Homogeneous regions are stored as tiles. Immutable, so that threads may share it; each thread reads through its own Reader.
+/// OpenVDB stays behind this header.
+class Tissue {
+public:
+    /// Builds the grids. Throws std::runtime_error for a label value without a name or a name without a tissue.
+    /// Voxels of role air, and value 0 when it has no name, are outside.
+    static Tissue fromLabels(const LabelImage& image, TissueTable table, std::span<const LabelName> names,
+                             Provenance provenance);
+    /// Reads a .vdb that save() wrote. Throws std::runtime_error ("FILE: what is wrong and what to do").
+    static Tissue load(const std::filesystem::path& file);
+    /// Writes beside `file` and renames, so that a full disk leaves what was there.
+    void save(const std::filesystem::path& file) const;
+
+    Tissue(Tissue&&) noexcept;
+    Tissue& operator=(Tissue&&) noexcept;
+    ~Tissue();
+
+    Index3 size() const noexcept;
+    const Affine& affine() const noexcept;
+    const TissueTable& table() const noexcept;
+    std::span<const Structure> structures() const noexcept;  // every label value in the volume, 0 included, by value
+    const Provenance& provenance() const noexcept;
+    MemoryUse memory() const;
+    /// Box of the voxels that hold tissue [m].
+    Box box() const noexcept;
+    /// The structure called `name`, else those whose tissue is called so. Empty when there is none.
+    std::vector<std::uint16_t> labelsNamed(std::string_view name) const;
+
+    /// Reads voxels at 1 kHz: allocates nothing, locks nothing. One per thread; the Tissue must outlive it.
+    class Reader {
+    public:
+        explicit Reader(const Tissue& tissue);
+        Reader(Reader&&) noexcept;
+        ~Reader();
+        /// Label value of the voxel around `p` [m]; 0 outside.
+        std::uint16_t label(Vec3 p) const noexcept;
+        /// Row of the tissue table around `p`; 0 (air) outside.
+        std::uint8_t tissue(Vec3 p) const noexcept;
+        /// Young's modulus around `p` [Pa]; 0 outside.
+        double youngsModulus(Vec3 p) const noexcept;
+
+    private:
+        struct Impl;
+        std::unique_ptr<Impl> impl_;
+    };
+
+    /// Signed distance to the surface of all voxels whose label is in `labels`, sampled on `grid` [m], sub-voxel smooth;
+    /// the enclosed volume is kept also where the structure is thinner than the spacing. Throws when no voxel has these labels.
+    DistanceField distanceTo(std::span<const std::uint16_t> labels, const NodeGrid& grid) const;
+    /// Signed distance to the surface of the whole body.
+    DistanceField distanceToBody(const NodeGrid& grid) const;
+    /// Young's modulus [Pa] averaged over each node's cell: the root of arithmetic times harmonic mean over the tissue in it
+    /// (air does not count); cells without tissue take the value of the nearest tissue.
+    ScalarField youngsModulusOn(const NodeGrid& grid) const;
+    /// Row of the tissue table that fills most of each node's cell (count x 1); air where under half of it is tissue.
+    std::vector<std::uint8_t> tissueOn(const NodeGrid& grid) const;
+
+private:
+    struct Impl;
+    explicit Tissue(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::volume

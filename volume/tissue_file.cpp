@@ -1,0 +1,279 @@
+#include <volume/tissue.h>
+#include <volume/tissue_impl.h>
+
+#include <fmt/format.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/Stream.h>
+#include <nlohmann/json.hpp>
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <mutex>
+#include <stdexcept>
+
+namespace palpate::volume {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* metadataKey = "palpate_volume";
+constexpr int formatVersion = 1;
+
+// OpenVDB's registry of grid types must be filled once before anything is read.
+void initialise()
+{
+    static std::once_flag once;
+    std::call_once(once, [] { openvdb::initialize(); });
+}
+
+json triple(const Vec3& v)
+{
+    return json::array({v.x, v.y, v.z});
+}
+json triple(const Index3& v)
+{
+    return json::array({v.x, v.y, v.z});
+}
+
+Vec3 vec3(const json& j)
+{
+    return {j.at(0).get<double>(), j.at(1).get<double>(), j.at(2).get<double>()};
+}
+Index3 index3(const json& j)
+{
+    return {j.at(0).get<int>(), j.at(1).get<int>(), j.at(2).get<int>()};
+}
+
+json toJson(const TissueRow& row)
+{
+    return {{"name", row.name},
+            {"role", std::string(name(row.role))},
+            {"youngs_pa", row.youngsModulus},
+            {"poisson", row.poissonRatio},
+            {"density_kg_m3", row.density},
+            {"compress", row.compress},
+            {"stretch", row.stretch},
+            {"shear", row.shear},
+            {"puncture_n", row.punctureForce},
+            {"cutting_n", row.cuttingForce},
+            {"friction_n_m", row.frictionPerMetre},
+            {"fixed", row.fixed},
+            {"colour", json::array({row.colour.r, row.colour.g, row.colour.b})},
+            {"opacity", row.opacity},
+            {"source", row.source}};
+}
+
+TissueRow rowFrom(const json& j)
+{
+    const auto role = roleNamed(j.at("role").get<std::string>());
+    if (!role) {
+        throw std::runtime_error(fmt::format("unknown role '{}'", j.at("role").get<std::string>()));
+    }
+    const json& colour = j.at("colour");
+    TissueRow row;
+    row.name = j.at("name").get<std::string>();
+    row.role = *role;
+    row.youngsModulus = j.at("youngs_pa").get<double>();
+    row.poissonRatio = j.at("poisson").get<double>();
+    row.density = j.at("density_kg_m3").get<double>();
+    row.compress = j.at("compress").get<double>();
+    row.stretch = j.at("stretch").get<double>();
+    row.shear = j.at("shear").get<double>();
+    row.punctureForce = j.at("puncture_n").get<double>();
+    row.cuttingForce = j.at("cutting_n").get<double>();
+    row.frictionPerMetre = j.at("friction_n_m").get<double>();
+    row.fixed = j.at("fixed").get<bool>();
+    row.colour = {colour.at(0).get<float>(), colour.at(1).get<float>(), colour.at(2).get<float>()};
+    row.opacity = j.at("opacity").get<float>();
+    row.source = j.at("source").get<std::string>();
+    return row;
+}
+
+// Everything that the grids do not hold. JSON numbers keep all 17 digits of a double.
+json describe(const TissueData& t)
+{
+    json rows = json::array();
+    for (const TissueRow& row : t.table.rows) {
+        rows.push_back(toJson(row));
+    }
+    json structures = json::array();
+    for (std::size_t i = 0; i < t.structures.size(); ++i) {
+        const Structure& s = t.structures[i];
+        structures.push_back({{"value", s.value},
+                              {"name", s.name},
+                              {"tissue", t.table.rows[s.tissue].name},
+                              {"voxels", s.voxels},
+                              {"low", triple(t.extents[i].low)},
+                              {"high", triple(t.extents[i].high)}});
+    }
+    return {{"format", formatVersion},
+            {"size", triple(t.size)},
+            {"steps_m", {triple(t.affine.linear[0]), triple(t.affine.linear[1]), triple(t.affine.linear[2])}},
+            {"origin_m", triple(t.affine.origin)},
+            {"table", {{"name", t.table.name}, {"rows", rows}}},
+            {"structures", structures},
+            {"provenance", t.provenance}};
+}
+
+void readStructures(const json& list, TissueData& t)
+{
+    for (const json& j : list) {
+        const auto tissue = j.at("tissue").get<std::string>();
+        const auto row = t.table.find(tissue);
+        if (!row) {
+            throw std::runtime_error(fmt::format("structure of unknown tissue '{}'", tissue));
+        }
+        const auto voxels = j.at("voxels").get<std::uint64_t>();
+        t.structures.push_back({j.at("value").get<std::uint16_t>(), j.at("name").get<std::string>(), *row, voxels,
+                                static_cast<double>(voxels) * t.affine.voxelVolume()});
+        t.extents.push_back({index3(j.at("low")), index3(j.at("high"))});
+    }
+}
+
+void readDescription(const json& j, TissueData& t)
+{
+    const int version = j.at("format").get<int>();
+    if (version > formatVersion) {
+        throw std::runtime_error(
+            fmt::format("format {} is newer than this program reads ({}): use a newer palpate", version, formatVersion));
+    }
+    t.size = index3(j.at("size"));
+    const json& steps = j.at("steps_m");
+    t.affine.linear = Mat3(vec3(steps.at(0)), vec3(steps.at(1)), vec3(steps.at(2)));
+    t.affine.origin = vec3(j.at("origin_m"));
+    t.table.name = j.at("table").at("name").get<std::string>();
+    for (const json& row : j.at("table").at("rows")) {
+        t.table.rows.push_back(rowFrom(row));
+    }
+    t.provenance = j.at("provenance").get<Provenance>();
+    readStructures(j.at("structures"), t);
+}
+
+// openvdb::io::File does not report a failed write; this writes the same bytes through a stream that throws.
+class Writer : public openvdb::io::Archive {
+public:
+    void write(std::ostream& out, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& meta) const
+    {
+        Archive::write(out, grids, true, meta);
+    }
+};
+
+void writeFile(const std::filesystem::path& file, const TissueData& t)
+{
+    openvdb::MetaMap meta;
+    meta.insertMeta(metadataKey, openvdb::StringMetadata(describe(t).dump()));
+    meta.insertMeta("creator", openvdb::StringMetadata("palpate"));
+    std::ofstream out;
+    out.exceptions(std::ios::failbit | std::ios::badbit);
+    out.open(file, std::ios::binary | std::ios::trunc);
+    Writer().write(out, {t.label, t.stiffness, t.occupancy}, meta);
+    out.close();
+}
+
+// A stream that ends early throws instead of handing out zeros.
+openvdb::GridPtrVecPtr readGrids(const std::filesystem::path& file, json& description)
+{
+    std::ifstream in(file, std::ios::binary);
+    std::uint32_t magic = 0;
+    in.read(reinterpret_cast<char*>(&magic), sizeof magic);
+    if (!in || magic != static_cast<std::uint32_t>(openvdb::OPENVDB_MAGIC)) {
+        throw std::runtime_error("is not an OpenVDB file: import a label map with 'palpate import' first");
+    }
+    in.seekg(0);
+    in.exceptions(std::ios::failbit | std::ios::badbit);
+    openvdb::io::Stream stream(in, false);
+    const openvdb::MetaMap::Ptr meta = stream.getMetadata();
+    const auto text = meta ? meta->getMetadata<openvdb::StringMetadata>(metadataKey) : nullptr;
+    if (!text) {
+        throw std::runtime_error("is an OpenVDB file, but not one of palpate: make it with 'palpate import' or 'phantom'");
+    }
+    description = json::parse(text->value());
+    return stream.getGrids();
+}
+
+template <typename Grid>
+typename Grid::Ptr gridNamed(const openvdb::GridPtrVec& grids, const std::string& name)
+{
+    for (const auto& grid : grids) {
+        if (grid->getName() == name && grid->isType<Grid>()) {
+            return openvdb::gridPtrCast<Grid>(grid);
+        }
+    }
+    throw std::runtime_error(fmt::format("has no grid '{}': it is damaged", name));
+}
+
+// The counts in the description against the voxels that were read.
+void checkCounts(const TissueData& t)
+{
+    std::uint64_t described = 0;
+    std::uint64_t nonzero = 0;
+    std::uint64_t solid = 0;
+    for (const Structure& s : t.structures) {
+        described += s.voxels;
+        nonzero += s.value != 0 ? s.voxels : 0;
+        solid += t.lookup.solid[s.value] != 0 ? s.voxels : 0;
+    }
+    const auto count =
+        static_cast<std::uint64_t>(t.size.x) * static_cast<std::uint64_t>(t.size.y) * static_cast<std::uint64_t>(t.size.z);
+    if (described != count || nonzero != t.label->activeVoxelCount() || solid != t.occupancy->activeVoxelCount()) {
+        throw std::runtime_error("its voxels do not add up to what its table says: it is damaged, make it again");
+    }
+}
+
+std::string reasonOf(const std::exception& e)
+{
+    if (dynamic_cast<const std::ios_base::failure*>(&e) != nullptr) {
+        return "is cut short or damaged: make it again";
+    }
+    if (dynamic_cast<const json::exception*>(&e) != nullptr || dynamic_cast<const openvdb::Exception*>(&e) != nullptr) {
+        return fmt::format("is damaged ({}): make it again", e.what());
+    }
+    return e.what();
+}
+
+}  // namespace
+
+void Tissue::save(const std::filesystem::path& file) const
+{
+    initialise();
+    const std::filesystem::path beside = fmt::format("{}.{}.part", file.string(), ::getpid());
+    errno = 0;
+    try {
+        writeFile(beside, *impl_);
+        std::filesystem::rename(beside, file);
+    } catch (const std::exception& e) {
+        const std::string why = errno != 0 ? std::strerror(errno) : e.what();
+        std::error_code ignored;
+        std::filesystem::remove(beside, ignored);
+        throw std::runtime_error(
+            fmt::format("{}: cannot be written ({}): check the folder and the space on the disk", file.string(), why));
+    }
+}
+
+Tissue Tissue::load(const std::filesystem::path& file)
+{
+    initialise();
+    if (!std::filesystem::is_regular_file(file)) {
+        throw std::runtime_error(fmt::format("{}: there is no such file", file.string()));
+    }
+    auto impl = std::make_unique<Impl>();
+    try {
+        json description;
+        const auto grids = readGrids(file, description);
+        readDescription(description, *impl);
+        impl->label = gridNamed<openvdb::Int32Grid>(*grids, "label");
+        impl->stiffness = gridNamed<openvdb::FloatGrid>(*grids, "stiffness");
+        impl->occupancy = gridNamed<openvdb::BoolGrid>(*grids, "occupancy");
+        impl->derive();
+        checkCounts(*impl);
+    } catch (const std::exception& e) {
+        throw std::runtime_error(fmt::format("{}: {}", file.string(), reasonOf(e)));
+    }
+    return Tissue(std::move(impl));
+}
+
+}  // namespace palpate::volume

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate::volume {
+
+/// What a tissue means to the one who holds the needle.
+enum class Role : std::uint8_t { plain, skin, tumour, vital, bone, air };
+
+std::string_view name(Role role) noexcept;
+std::optional<Role> roleNamed(std::string_view name) noexcept;
+
+/// One tissue. SI units. Every row says where its numbers come from.
+struct TissueRow {
+    std::string name;
+    Role role = Role::plain;
+    double youngsModulus = 0;      // small strain [Pa]
+    double poissonRatio = 0;       // [-]
+    double density = 0;            // [kg/m^3]
+    double compress = 0;           // ChainMail: shortest link, share of its rest length, in (0, 1]
+    double stretch = 0;            // ChainMail: longest link, share of its rest length, >= 1
+    double shear = 0;              // ChainMail: largest shift across a link, share of its rest length, >= 0
+    double punctureForce = 0;      // tip force at which a 14 G needle enters [N]
+    double cuttingForce = 0;       // tip force while it cuts on [N]
+    double frictionPerMetre = 0;   // on the shaft, per metre inside [N/m]
+    bool fixed = false;            // held in space: bone, chest wall
+    glm::vec3 colour{1.0F};        // display, RGB in [0, 1]
+    float opacity = 0;             // display, in [0, 1]
+    std::string source;            // where the numbers come from
+};
+
+/// Rows in order; row 0 is always "air", the outside.
+struct TissueTable {
+    std::string name;
+    std::vector<TissueRow> rows;
+
+    /// Index of the row called `name`, or nothing.
+    std::optional<std::uint8_t> find(std::string_view name) const noexcept;
+};
+
+}  // namespace palpate::volume
