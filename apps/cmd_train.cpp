@@ -117,7 +117,7 @@ void summarise(const TrainResult& result, const haptics::SessionInfo& info)
 
 bool wantsWindow(const Options& o)
 {
-    return o.view || (!o.noView && std::getenv("DISPLAY") != nullptr);
+    return o.view || (!o.noView && !o.unpaced && std::getenv("DISPLAY") != nullptr);
 }
 
 std::string sessionName(const Options& o)
@@ -134,8 +134,8 @@ fs::path recordFile(const Options& o)
     return o.report.empty() ? fs::path() : fs::path(o.report).replace_extension(".db");
 }
 
-std::optional<ViewerProcess>& startViewers(const Options& o, const std::string& session,
-                                           std::optional<ViewerProcess>& window, std::optional<ViewerProcess>& camera)
+void startViewers(const Options& o, const std::string& session, std::optional<ViewerProcess>& window,
+                  std::optional<ViewerProcess>& camera)
 {
     if (wantsWindow(o)) {
         window.emplace(std::vector<std::string>{"--session", session, "--wait", "30"});
@@ -143,7 +143,6 @@ std::optional<ViewerProcess>& startViewers(const Options& o, const std::string& 
     if (!o.pictures.empty()) {
         camera.emplace(std::vector<std::string>{"--session", session, "--wait", "30", "--offscreen", o.pictures});
     }
-    return camera;
 }
 
 void train(const Options& o)
@@ -196,13 +195,13 @@ void addTrain(CLI::App& app)
     c->add_option("--target", o->changes.target, "Structure to sample");
     c->add_option("--seed", o->changes.seed, "Every random choice of a phantom");
     c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(CLI::PositiveNumber);
-    c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
-    c->add_flag("--view", o->view, "Open a window (default where there is a display)");
+    auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
+    c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);
     c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
     c->add_option("--session", o->session, "Name under which viewers find the session");
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
     c->add_option("--report", o->report, "Write a report (HTML) to this file");
-    c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder");
+    c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder")->excludes(unpaced);
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o] { train(*o); });
 }

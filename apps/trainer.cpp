@@ -24,6 +24,7 @@ namespace {
 using namespace haptics;
 
 constexpr std::size_t mostCores = 64;
+constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
 constexpr double startDistance = 30e-3;  // the hand begins this far outside the body [m]
 
 std::atomic<bool> interrupted{false};
@@ -99,6 +100,10 @@ struct Trainer::Impl {
             tally.add(record);
             if (recorder) {
                 recorder->push(record);
+                // Faster than real time the loop would outrun the writer: it waits, as nobody holds the device.
+                if (!options.servo.paced && record.tick % flushPeriod == 0) {
+                    recorder->flush();
+                }
             }
             broadcast.publish(record, timing, simulation);
         };

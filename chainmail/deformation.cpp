@@ -10,14 +10,14 @@ namespace palpate::chainmail {
 
 namespace {
 
-// Calls visit(node, position at rest) for the nodes that are not fixed within `reach` of `middle`.
+// Calls visit(node, position at rest) for the nodes that are not fixed in the box [low, high].
 template <typename Visit>
-void visitNodes(const Lattice& lattice, Vec3 middle, double reach, Visit&& visit) noexcept
+void visitNodes(const Lattice& lattice, Vec3 lowest, Vec3 highest, Visit&& visit) noexcept
 {
     const auto& grid = lattice.grid;
     const Vec3 last(grid.size - Index3(1));
-    const Index3 low(glm::clamp(glm::ceil((middle - reach - grid.origin) / grid.spacing), Vec3(0.0), last));
-    const Index3 high(glm::clamp(glm::floor((middle + reach - grid.origin) / grid.spacing), Vec3(0.0), last));
+    const Index3 low(glm::clamp(glm::ceil((lowest - grid.origin) / grid.spacing), Vec3(0.0), last));
+    const Index3 high(glm::clamp(glm::floor((highest - grid.origin) / grid.spacing), Vec3(0.0), last));
     for (int k = low.z; k <= high.z; ++k) {
         for (int j = low.y; j <= high.y; ++j) {
             for (int i = low.x; i <= high.x; ++i) {
@@ -68,22 +68,27 @@ occupancy::Body Deformation::body(const volume::DistanceField& surface) const no
     return {lattice_.grid, lattice_.tissue, u_, map_, surface};
 }
 
-std::size_t pressSeeds(const Lattice& lattice, Vec3 centre, double radius, Vec3 normal, std::span<Seed> out) noexcept
+std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept
 {
+    const double way = glm::distance(from, to);
+    if (way <= 0.0) {
+        return 0;
+    }
+    const Vec3 ahead = (to - from) / way;
     const double seen = std::max(radius, lattice.grid.spacing);
-    const Vec3 middle = centre + (seen - radius) * normal;
+    const Vec3 start = from - (seen - radius) * ahead;
+    const Vec3 end = start + way * ahead;
     std::size_t count = 0;
-    visitNodes(lattice, middle, seen, [&](Node n, Vec3 rest) {
-        const Vec3 r = rest - middle;
-        const double along = glm::dot(r, normal);
-        const double across = glm::dot(r, r) - along * along;
-        const double inside = seen * seen - across;
-        if (inside <= 0.0 || count == out.size()) {
+    visitNodes(lattice, glm::min(start, end) - seen, glm::max(start, end) + seen, [&](Node n, Vec3 rest) {
+        const Vec3 r = rest - start;
+        const double along = glm::dot(r, ahead);
+        const double inside = seen * seen - (glm::dot(r, r) - along * along);
+        if (inside <= 0.0 || along < -seen || count == out.size()) {
             return;
         }
-        const double push = along + std::sqrt(inside);
+        const double push = way + std::sqrt(inside) - along;
         if (push > 0.0) {
-            out[count++] = {n, Vec3f(-push * normal)};
+            out[count++] = {n, Vec3f(push * ahead)};
         }
     });
     return count;
@@ -93,7 +98,7 @@ std::size_t dragSeeds(const Lattice& lattice, Vec3 rest, Vec3 u, std::span<Seed>
 {
     const double reach = lattice.grid.spacing;
     std::size_t count = 0;
-    visitNodes(lattice, rest, reach, [&](Node n, Vec3 at) {
+    visitNodes(lattice, rest - reach, rest + reach, [&](Node n, Vec3 at) {
         if (glm::distance(at, rest) <= reach && count < out.size()) {
             out[count++] = {n, Vec3f(u)};
         }

@@ -37,10 +37,11 @@ private:
     occupancy::OccupancyMap map_;
 };
 
-/// The nodes that a ball pressed against the body pushes ahead of itself, and where to: straight against `normal` onto
-/// the far side of the ball. A ball smaller than the lattice can see is widened to one spacing with the same deepest point.
-/// @param centre  of the ball [m]    @param normal  unit vector out of the body    @returns seeds written to `out`
-std::size_t pressSeeds(const Lattice& lattice, Vec3 centre, double radius, Vec3 normal, std::span<Seed> out) noexcept;
+/// The nodes that a ball pushes ahead of itself on its way from `from`, where it first touched, to `to` [m]: those in the
+/// way, pushed along it onto the far side of the ball. A ball smaller than the lattice can see is widened to one spacing with
+/// the same foremost point. Hold them with Yield along the way.
+/// @returns  how many seeds were written to `out`
+std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept;
 
 /// The nodes within one spacing of `rest` [m], all displaced by `u` [m]: material that sticks to a needle's tip.
 std::size_t dragSeeds(const Lattice& lattice, Vec3 rest, Vec3 u, std::span<Seed> out) noexcept;

@@ -29,13 +29,24 @@ struct Run {
     float tolerance;  // violations below are rounding [m]
     PropagateResult result;
 
-    // The part of `step` that node `n` may follow.
+    // How node `n` may follow `step`: a held one only along `yield`, but then so far that the step's parts on this side of
+    // the body are made up at once.
     Vec3f allowed(Node n, Vec3f step) const noexcept
     {
         if (lattice.isFixed(n)) {
             return Vec3f(0.0F);
         }
-        return scratch.held[n] == scratch.pass ? std::max(0.0F, glm::dot(step, yield)) * yield : step;
+        if (scratch.held[n] != scratch.pass) {
+            return step;
+        }
+        constexpr float flattest = 0.3F;  // parts across the yield would need a long way along it
+        float way = 0.0F;
+        for (int axis = 0; axis < 3; ++axis) {
+            if (std::abs(yield[axis]) > flattest) {
+                way = std::max(way, step[axis] / yield[axis]);
+            }
+        }
+        return way * yield;
     }
 
     void move(Node n, Vec3f to) noexcept

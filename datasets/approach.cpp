@@ -33,6 +33,8 @@ constexpr double discSpacing = 0.7e-3;  // of the samples around a line [m]
 constexpr double beyondTip = 3e-3;      // a line must also be clear so far beyond the fired tip [m]
 constexpr double startDistance = 0.03;  // of the tip from the skin, before and after [m]
 constexpr double leastInside = 3e-3;    // the tip is so deep before the gun fires [m]
+constexpr double steepest = 0.5;        // cosine between needle and skin's normal; flatter, the tip slips on the skin
+constexpr double skinPatch = 5e-3;      // radius of the patch that tells the skin's normal [m]
 constexpr double clearances[] = {4e-3, 2.5e-3, 1.5e-3};  // tried in this order, beside the needle's radius [m]
 
 struct Blob {
@@ -122,7 +124,7 @@ std::vector<Vec3> aims(const Scene& scene, const Tissue& tissue)
     if (scene.aim) {
         return {*scene.aim};
     }
-    constexpr std::size_t mostBlobs = 6;
+    constexpr std::size_t mostBlobs = 12;
     const Labels labels = namedLabels(scene, tissue);
     const Vec3 voxel = tissue.affine().spacing();
     const Box body = tissue.box();
@@ -135,7 +137,7 @@ std::vector<Vec3> aims(const Scene& scene, const Tissue& tissue)
     }
     std::vector<Vec3> points;
     for (const Blob& piece : pieces) {
-        if (points.size() < mostBlobs && 2 * piece.nodes >= pieces.front().nodes) {
+        if (points.size() < mostBlobs && 4 * piece.nodes >= pieces.front().nodes) {
             points.push_back(deepestPoint(tissue, labels, piece.box, step));
         }
     }
@@ -228,6 +230,25 @@ std::optional<Vec3> exitPoint(const Surroundings& s, const Tissue::Reader& reade
     return aim + beyond * direction;
 }
 
+// Unit vector out of the body around `p` on its surface: from the middle of what is tissue to the middle of what is air.
+Vec3 skinNormal(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
+{
+    constexpr int half = 5;
+    Vec3 sum(0.0);
+    for (int k = -half; k <= half; ++k) {
+        for (int j = -half; j <= half; ++j) {
+            for (int i = -half; i <= half; ++i) {
+                const Vec3 away = skinPatch / half * Vec3(i, j, k);
+                if (glm::length(away) <= skinPatch) {
+                    sum += outside(s, reader, p + away) ? away : -away;
+                }
+            }
+        }
+    }
+    const double length = glm::length(sum);
+    return length > 0 ? sum / length : Vec3(0.0);
+}
+
 // Distance from the line to what is forbidden, up to the radius of the disc.
 double clearance(const Surroundings& s, const Tissue::Reader& reader, Vec3 from, Vec3 to)
 {
@@ -279,6 +300,9 @@ std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const T
 {
     const std::optional<Vec3> entry = exitPoint(s, reader, aim, direction);
     if (!entry || glm::length(*entry - aim) > scene.tool.length) {
+        return std::nullopt;
+    }
+    if (glm::dot(skinNormal(s, reader, *entry), direction) < steepest) {
         return std::nullopt;
     }
     const double length = glm::length(*entry - aim);
@@ -350,18 +374,18 @@ std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& appro
     const double depth = tipDepth(scene.tool, length);
     const Vec3 away = approach.entry - startDistance * inward;
     std::vector<TraineeStep> script{
-        {.kind = Kind::move, .to = away, .speed = 0.06, .seconds = 3, .tolerance = 1e-3},
-        {.kind = Kind::move, .to = approach.entry - 3e-3 * inward, .speed = 0.06, .seconds = 3, .tolerance = 1e-3}};
+        {.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 4, .tolerance = 1e-3},
+        {.kind = Kind::move, .to = approach.entry - 3e-3 * inward, .speed = 0.04, .seconds = 4, .tolerance = 1e-3}};
     if (scene.tool.kind == ToolKind::needle) {
-        script.push_back({.kind = Kind::pierce, .to = approach.aim, .speed = 0.018, .seconds = 15});
+        script.push_back({.kind = Kind::pierce, .to = approach.aim, .speed = 0.012, .seconds = 15});
     }
     script.push_back(
-        {.kind = Kind::press, .to = approach.entry + depth * inward, .speed = 0.018, .seconds = 15, .tolerance = 1e-3});
+        {.kind = Kind::press, .to = approach.entry + depth * inward, .speed = 0.012, .seconds = 15, .tolerance = 1e-3});
     if (scene.tool.kind == ToolKind::needle) {
         script.push_back({.kind = Kind::fire});
     }
     script.push_back({.kind = Kind::wait, .seconds = 0.5});
-    script.push_back({.kind = Kind::move, .to = away, .speed = 0.06, .seconds = 10, .tolerance = 2e-3});
+    script.push_back({.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 10, .tolerance = 2e-3});
     return script;
 }
 

@@ -13,7 +13,7 @@ namespace palpate::haptics {
 namespace {
 
 // The part of a needle's shaft that collision looks at, from the tip [m].
-constexpr double shaftQueried = 20e-3;
+constexpr double shaftQueried = 6e-3;
 
 // Stops the time of one task after the other.
 class TaskClock {
@@ -129,16 +129,18 @@ void Simulation::deform() noexcept
         return;
     }
     const Vec3 position = record_.device.position;
-    const double radius = model_.scene.tool.radius;
-    const bool needle = model_.scene.tool.kind == datasets::ToolKind::needle;
+    const Vec3 pushed = position - tip_.proxy;
     std::size_t count = 0;
     chainmail::Yield yield(0.0F);
     if (tip_.phase == Phase::contact) {
-        const Vec3 centre = needle ? position + radius * tip_.normal : position;
-        count = chainmail::pressSeeds(model_.lattice, centre, radius, tip_.normal, seeds_);
-        yield = chainmail::Yield(-tip_.normal);
+        // The proxy of a sphere is its centre where it first touched; a needle's tip is a ball of its own radius.
+        const bool needle = model_.scene.tool.kind == datasets::ToolKind::needle;
+        const double radius = model_.scene.tool.radius;
+        const Vec3 back = needle ? -radius * glm::normalize(pushed) : Vec3(0.0);
+        count = chainmail::pressSeeds(model_.lattice, tip_.proxy + back, position + back, radius, seeds_);
+        yield = chainmail::Yield(glm::normalize(pushed));
     } else if (tip_.phase == Phase::inserted) {
-        count = chainmail::dragSeeds(model_.lattice, tip_.proxy, position - tip_.proxy, seeds_);
+        count = chainmail::dragSeeds(model_.lattice, tip_.proxy, pushed, seeds_);
     }
     const auto result = deformation_.deform(std::span(seeds_).first(count), yield);
     record_.moved = static_cast<std::uint32_t>(deformation_.moved().size());

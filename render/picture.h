@@ -24,6 +24,9 @@ namespace palpate::render {
 class Picture {
 public:
     explicit Picture(vtkRenderWindow& window);
+    Picture(const Picture&) = delete;
+    Picture& operator=(const Picture&) = delete;
+    ~Picture();
 
     /// Takes a session's scenery on; the camera starts anew.
     void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session);
@@ -48,9 +51,6 @@ private:
     std::unique_ptr<Session> session_;
     std::string words_, smaller_;
     std::optional<bool> software_;
-
-public:
-    ~Picture();
 };
 
 }  // namespace palpate::render

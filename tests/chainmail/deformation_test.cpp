@@ -17,7 +17,7 @@ TEST(Deformation, UnloadedBodyIsExactlyAtRest)
     std::vector<Seed> seeds(Deformation::maxSeeds);
     for (int step = 0; step < 20; ++step) {
         const Vec3 centre(5.0 + 0.2 * step, 7.0, -1.5 + 0.15 * step);
-        const auto count = pressSeeds(lattice, centre, 2.0, Vec3(0, 0, -1), seeds);
+        const auto count = pressSeeds(lattice, {centre.x, centre.y, -2.5}, centre, 2.0, seeds);
         EXPECT_GT(count, 0U);
         body.deform(std::span(seeds).first(count));
         EXPECT_GT(body.moved().size(), count / 2);
@@ -36,7 +36,7 @@ TEST(Deformation, ShapeDoesNotDependOnThePath)
     Deformation direct(lattice, 20000), detour(lattice, 20000);
     std::vector<Seed> seeds(Deformation::maxSeeds);
     const auto press = [&](Deformation& d, Vec3 centre) {
-        d.deform(std::span(seeds).first(pressSeeds(lattice, centre, 2.0, Vec3(0, 0, -1), seeds)));
+        d.deform(std::span(seeds).first(pressSeeds(lattice, {centre.x, centre.y, -2.5}, centre, 2.0, seeds)), Yield(0, 0, 1));
     };
     press(direct, {8, 7, 1});
     press(detour, {3, 3, 2});
@@ -55,7 +55,7 @@ TEST(Deformation, NoPressedNodeIsInsideTheBall)
     std::vector<Seed> seeds(Deformation::maxSeeds);
     const Vec3 centre(10.2, 9.7, 0.5);
     const double radius = 3.3;
-    const auto count = pressSeeds(lattice, centre, radius, Vec3(0, 0, -1), seeds);
+    const auto count = pressSeeds(lattice, {centre.x, centre.y, -radius}, centre, radius, seeds);
     const auto result = body.deform(std::span(seeds).first(count), Yield(0, 0, 1));
     EXPECT_EQ(result.residual, 0.0);
     for (Node n = 0; n < lattice.tissue.size(); ++n) {
@@ -73,7 +73,7 @@ TEST(Deformation, OccupancyFollowsOnlyWhatMoved)
     Deformation body(lattice, 20000);
     volume::DistanceField surface;
     std::vector<Seed> seeds(Deformation::maxSeeds);
-    const auto count = pressSeeds(lattice, {7, 7, 0.6}, 2.0, Vec3(0, 0, -1), seeds);
+    const auto count = pressSeeds(lattice, {7, 7, -2.0}, {7, 7, 0.6}, 2.0, seeds);
     body.deform(std::span(seeds).first(count));
     const auto map = body.body(surface);
     const auto once = map.map.rewrites();

@@ -274,6 +274,44 @@ TEST_F(Viewer, EndsCleanlyWhenInterrupted)
     }
 }
 
+// How many pixels of a screen have a colour: Xvfb keeps its frame buffer in a file (X11/XWDFile.h, big endian, BGRX).
+int countOnScreen(const fs::path& file, const Pixel& colour)
+{
+    std::ifstream in(file, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(bytes[at]); };
+    const auto word = [&](std::size_t n) {
+        return static_cast<std::size_t>(byte(4 * n) << 24U | byte(4 * n + 1) << 16U | byte(4 * n + 2) << 8U |
+                                        byte(4 * n + 3));
+    };
+    constexpr std::size_t headerWords = 25, colourBytes = 12;
+    if (bytes.size() < 4 * headerWords)
+        return 0;
+    int count = 0;
+    for (std::size_t at = word(0) + word(19) * colourBytes; at + 3 < bytes.size(); at += 4)
+        count += near({byte(at + 2), byte(at + 1), byte(at)}, colour, 2);
+    return count;
+}
+
+TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
+{
+    Process publisher(publish("hold", "1.9"), log("publisher"));
+    Process viewer({"xvfb-run", "-a", "-s", "-screen 0 800x600x24 -fbdir " + folder_.string(), program(), "--session",
+                    session_, "--size", "800x600", "--wait", "1"},
+                   log("viewer"));
+    constexpr Pixel bar{89, 166, 255}, onSlice{64, 217, 255};
+    int bars = 0, needle = 0;
+    for (int i = 0; i < 300 && (bars < 300 || needle < 300); ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        bars = countOnScreen(folder_ / "Xvfb_screen0", bar);
+        needle = countOnScreen(folder_ / "Xvfb_screen0", onSlice);
+    }
+    EXPECT_GE(bars, 300) << "4.2 N of 8.5 N is half a bar";
+    EXPECT_GE(needle, 300);
+    publisher.end(SIGKILL);
+    EXPECT_EQ(viewer.wait(), 1) << "killed";
+}
+
 TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
 {
     Process publisher(publish("hold", "1.5"), log("publisher"));

@@ -1,0 +1,114 @@
+#include <tests/apps/program.h>
+
+#include <gtest/gtest.h>
+
+namespace palpate::apps {
+namespace {
+
+using Words = std::vector<std::string>;
+
+TEST(CommandLine, EveryCommandExplainsItself)
+{
+    const std::vector<Words> commands{{},         {"train"}, {"import"}, {"info"},         {"phantom"},
+                                      {"replay"}, {"score"}, {"bench"},  {"bench", "tick"}};
+    for (Words words : commands) {
+        words.push_back("--help");
+        const Outcome outcome = palpate(words);
+        EXPECT_EQ(outcome.status, 0) << words[0];
+        EXPECT_NE(outcome.out.find("Usage: palpate"), std::string::npos) << outcome.out;
+        EXPECT_EQ(outcome.err, "");
+    }
+    EXPECT_EQ(palpate({"--version"}).status, 0);
+}
+
+TEST(CommandLine, TheHelpListsEveryCommand)
+{
+    const std::string help = palpate({"--help"}).out;
+    for (const std::string command : {"train", "import", "info", "phantom", "replay", "score", "bench"}) {
+        EXPECT_NE(help.find("\n  " + command + " "), std::string::npos) << command;
+    }
+}
+
+TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
+{
+    expectRefusal({}, "--help");
+    expectRefusal({"nosuch"}, "--help");
+    expectRefusal({"train", "--nosuch"}, "--nosuch");
+    expectRefusal({"train", "--model", "nosuch"}, "nosuch");
+    expectRefusal({"train", "--seconds", "soon"}, "--seconds");
+    expectRefusal({"bench"}, "--help");
+    expectRefusal({"train", "nosuch"}, "breast, layered, block");
+    expectRefusal({"phantom", "nosuch", "-o", "never.vdb"}, "breast, layered, block");
+    expectRefusal({"train", "layered", "--headless", "--target", "nosuch"}, "nosuch");
+}
+
+TEST(CommandLine, AMissingFileIsRefusedOnOneLine)
+{
+    const Folder folder;
+    const std::string none = folder / "none";
+    expectRefusal({"info", none + ".vdb"}, none + ".vdb: ");
+    expectRefusal({"train", none + ".vdb", "--headless"}, none + ".vdb: ");
+    expectRefusal({"train", none + ".toml", "--headless"}, none + ".toml: ");
+    expectRefusal({"train", "layered", "--headless", "--device", none + ".db"}, none + ".db: ");
+    expectRefusal({"import", none + ".nii", "-o", none + ".vdb"}, none + ".nii: ");
+    expectRefusal({"replay", none + ".db"}, none + ".db: ");
+    expectRefusal({"score", none + ".db"}, none + ".db: ");
+}
+
+TEST(CommandLine, AFolderInPlaceOfAFileIsRefusedOnOneLine)
+{
+    const Folder folder;
+    const std::string inside = folder / "sub.vdb";
+    std::filesystem::create_directory(inside);
+    expectRefusal({"info", inside}, inside + ": ");
+    expectRefusal({"train", inside, "--headless"}, inside + ": ");
+    expectRefusal({"import", inside, "-o", folder / "out.vdb"}, inside + ": ");
+    expectRefusal({"replay", inside}, inside + ": ");
+    expectRefusal({"score", inside}, inside + ": ");
+    expectRefusal({"phantom", "block", "-o", inside}, inside + ": ");
+}
+
+TEST(CommandLine, AFileOfAnotherKindIsRefusedOnOneLine)
+{
+    const Folder folder;
+    const std::string text = folder / "letter.vdb";
+    writeText(text, "Dear reader,\n");
+    expectRefusal({"info", text}, text + ": ");
+    expectRefusal({"import", text, "-o", folder / "out.vdb"}, text + ": ");
+    expectRefusal({"replay", text}, text + ": ");
+    EXPECT_FALSE(std::filesystem::exists(folder / "out.vdb"));
+}
+
+TEST(CommandLine, AnOutputThatCannotBeWrittenIsRefusedOnOneLine)
+{
+    const Folder folder;
+    const std::string file = folder / "file", below = file + "/figures";
+    writeText(file, "not a folder");
+    const Words session{"train", "layered", "--headless", "--unpaced", "--seconds", "0.1"};
+    for (const std::string option : {"--json", "--record", "--report"}) {
+        Words words = session;
+        words.insert(words.end(), {option, below + ".db"});
+        expectRefusal(words, below);
+    }
+    expectRefusal({"phantom", "block", "-o", below + ".vdb"}, below);
+    expectRefusal({"phantom", "block", "-o", folder / "block.vdb", "--json", below}, below);
+    expectRefusal({"info", folder / "block.vdb", "--json", below}, below);
+}
+
+TEST(CommandLine, AWrongValueInASceneIsNamedByFileAndLine)
+{
+    const Folder folder;
+    const std::string scene = folder / "scene.toml";
+    const std::string good = "[volume]\nphantom = \"layered\"\n[target]\nstructure = \"tumour\"\n[dffb]\n";
+    writeText(scene, good + "range_mm = -4\n");
+    expectRefusal({"train", scene, "--headless"}, scene + ":6: [dffb] range_mm = -4 mm");
+    writeText(scene, good + "rang_mm = 4\n");
+    expectRefusal({"train", scene, "--headless"}, scene + ":6: ");
+    writeText(scene, good + "[model\n");
+    expectRefusal({"train", scene, "--headless"}, scene + ":6: ");
+    writeText(scene, good + "range_mm = 4\n");
+    EXPECT_EQ(palpate({"train", scene, "--headless", "--unpaced", "--seconds", "0.05"}).status, 0);
+}
+
+}  // namespace
+}  // namespace palpate::apps

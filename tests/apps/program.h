@@ -1,0 +1,66 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::apps {
+
+/// A folder of a test's own; gone with it.
+class Folder {
+public:
+    Folder();
+    ~Folder();
+    Folder(const Folder&) = delete;
+    Folder& operator=(const Folder&) = delete;
+
+    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+
+private:
+    std::filesystem::path path_;
+};
+
+/// How a program ended, and what it printed.
+struct Outcome {
+    int status = 0;  // exit status, or minus the signal that ended it
+    std::string out, err;
+};
+
+/// A program of ours as a user starts it, without a display.
+class Program {
+public:
+    /// `name`: palpate or palpate-view.
+    Program(const std::string& name, const std::vector<std::string>& arguments);
+    /// Kills it when it still runs.
+    ~Program();
+    Program(const Program&) = delete;
+    Program& operator=(const Program&) = delete;
+
+    void send(int signal);
+    Outcome wait();
+    bool running();
+
+private:
+    Folder folder_;  // of its standard output and error
+    int pid_ = -1;
+    int status_ = 0;
+};
+
+/// Whether the program was built.
+bool built(const std::string& name);
+
+/// `palpate ARGUMENTS` from start to end.
+Outcome palpate(const std::vector<std::string>& arguments);
+
+/// As palpate(); it has to succeed. Returns the figures of --json, which this adds.
+nlohmann::json figures(std::vector<std::string> arguments);
+
+/// Checks that `palpate ARGUMENTS` fails with one line that names the program and holds `hint`.
+void expectRefusal(const std::vector<std::string>& arguments, const std::string& hint);
+
+std::string readText(const std::filesystem::path& file);
+void writeText(const std::filesystem::path& file, const std::string& text);
+
+}  // namespace palpate::apps

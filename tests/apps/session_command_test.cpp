@@ -1,0 +1,229 @@
+#include <tests/apps/program.h>
+
+#include <haptics/recorder.h>
+#include <render/channel/channel.h>
+
+#include <gtest/gtest.h>
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <functional>
+#include <random>
+#include <thread>
+
+namespace palpate::apps {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr std::uint64_t mostLost = 500;  // ticks that a kill may cost: 0.5 s
+const std::vector<std::string> scripted{"train", "layered", "--unpaced", "--headless"};
+
+std::vector<std::string> operator+(std::vector<std::string> words, const std::vector<std::string>& more)
+{
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+}
+
+std::string sessionName(const std::string& test)
+{
+    return "test-" + test + "-" + std::to_string(getpid());
+}
+
+// Waits for `done` at most a minute.
+bool eventually(const std::function<bool()>& done)
+{
+    const auto end = std::chrono::steady_clock::now() + 60s;
+    while (!done()) {
+        if (std::chrono::steady_clock::now() > end) {
+            return false;
+        }
+        std::this_thread::sleep_for(2ms);
+    }
+    return true;
+}
+
+// The tick that a running session shows to viewers.
+std::uint64_t shownTick(const std::string& session)
+{
+    const auto subscriber = channel::Subscriber::attach(session);
+    const auto state = subscriber && subscriber->alive() ? subscriber->state() : std::nullopt;
+    return state ? state->tick : 0;
+}
+
+void expectKeys(const nlohmann::json& j, const std::vector<std::string>& pointers)
+{
+    for (const std::string& pointer : pointers) {
+        EXPECT_TRUE(j.contains(nlohmann::json::json_pointer(pointer))) << pointer;
+    }
+}
+
+TEST(Session, AReplayGivesTheSameBits)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db";
+    const auto trained = figures(scripted + std::vector<std::string>{"--record", record});
+    const auto replayed = figures({"replay", record});
+    EXPECT_EQ(replayed.at("identical"), true);
+    EXPECT_TRUE(replayed.at("first_difference_tick").is_null());
+    EXPECT_EQ(replayed.at("ticks"), trained.at("ticks"));
+    EXPECT_EQ(replayed.at("force_hash"), trained.at("force_hash"));
+    EXPECT_GT(trained.at("peak_force_n").at("basic").get<double>(), 0.0) << "nothing was felt, so nothing was compared";
+}
+
+// The same figures come from the simulation that is shown, watched and recorded, and from one that is not.
+TEST(Session, ForcesDependNeitherOnTheClockNorOnTheRecorder)
+{
+    const Folder folder;
+    const std::vector<std::string> half{"train", "layered", "--headless", "--seconds", "1.5"};
+    const auto paced = figures(half + std::vector<std::string>{"--record", folder / "session.db"});
+    const auto unpaced = figures(half + std::vector<std::string>{"--unpaced"});
+    EXPECT_EQ(paced.at("force_hash"), unpaced.at("force_hash"));
+}
+
+TEST(Session, ThePublicKeysOfTheFiguresAreThere)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db";
+    expectKeys(figures(scripted + std::vector<std::string>{"--record", record}), {"/ticks",
+                                                                                  "/missed_ticks",
+                                                                                  "/lateness_us/p50",
+                                                                                  "/lateness_us/p99",
+                                                                                  "/lateness_us/p999",
+                                                                                  "/lateness_us/max",
+                                                                                  "/tick_us/p50",
+                                                                                  "/tick_us/p99",
+                                                                                  "/tick_us/p999",
+                                                                                  "/tick_us/max",
+                                                                                  "/tasks_us/H2/p50",
+                                                                                  "/tasks_us/H3/p50",
+                                                                                  "/tasks_us/H4/p50",
+                                                                                  "/tasks_us/H5/p50",
+                                                                                  "/tasks_us/H6/p50",
+                                                                                  "/tasks_us/H7/p99",
+                                                                                  "/peak_force_n/basic",
+                                                                                  "/peak_force_n/additional",
+                                                                                  "/peak_force_n/total",
+                                                                                  "/model",
+                                                                                  "/score/total",
+                                                                                  "/core/0/fraction",
+                                                                                  "/core/0/length_in_lesion_mm",
+                                                                                  "/force_hash",
+                                                                                  "/peak_memory_mb"});
+    expectKeys(figures({"replay", record}), {"/ticks", "/identical", "/first_difference_tick"});
+    expectKeys(figures({"score", "--group", "a=" + record, "--group", "b=" + record}),
+               {"/sessions/0", "/groups/0/name", "/groups/0/n", "/groups/0/median/total", "/effect_size"});
+    expectKeys(figures({"bench", "tick", "--voxels", "32,48"}),
+               {"/cases/0/voxels_per_side", "/cases/0/tick_us_p50", "/cases/1/tick_us_p99", "/growth"});
+}
+
+TEST(Session, ScoringTheRecordGivesTheLiveScore)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db";
+    const auto live = figures(scripted + std::vector<std::string>{"--record", record}).at("score");
+    const auto scored = figures({"score", record}).at("sessions").at(0);
+    for (const std::string key : {"total", "passes", "targeting_error_mm", "seconds", "redirects", "skin_contacts"}) {
+        EXPECT_EQ(scored.at(key), live.at(key)) << key;
+    }
+}
+
+TEST(Session, ARecordThatExistsIsNeverTouched)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db";
+    writeText(record, "mine");
+    expectRefusal(scripted + std::vector<std::string>{"--record", record}, record + ": exists already");
+    EXPECT_EQ(readText(record), "mine");
+}
+
+TEST(Session, AnInterruptEndsItInGoodOrder)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db", session = sessionName("interrupt");
+    Program train("palpate", {"train", "layered", "--headless", "--session", session, "--record", record});
+    ASSERT_TRUE(eventually([&] { return !train.running() || shownTick(session) > 300; }));
+    const std::uint64_t seen = shownTick(session);
+    train.send(SIGINT);
+    const Outcome outcome = train.wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+
+    const haptics::Record cut(record);
+    EXPECT_TRUE(cut.complete());
+    EXPECT_GT(seen, 300U);
+    EXPECT_GE(cut.ticks(), seen);
+    EXPECT_LT(cut.ticks(), figures(scripted).at("ticks").get<std::uint64_t>()) << "it ran to its end all the same";
+    EXPECT_EQ(figures({"replay", record}).at("identical"), true);
+    EXPECT_FALSE(channel::Subscriber::attach(session)) << "the session's segment was left behind";
+}
+
+// One session name for all: a killed session's segment is taken over by the next.
+TEST(Session, AKillAtAnyMomentCostsAtMostHalfASecond)
+{
+    const Folder folder;
+    const std::string session = sessionName("kill");
+    std::mt19937 random(std::random_device{}());
+    std::uniform_int_distribution<std::uint64_t> moment(20, 2200);
+    for (int run = 0; run < 4; ++run) {
+        const std::uint64_t when = moment(random);
+        SCOPED_TRACE("killed at tick " + std::to_string(when));
+        const std::string record = folder / ("session-" + std::to_string(run) + ".db");
+        Program train("palpate", {"train", "layered", "--headless", "--session", session, "--record", record});
+        ASSERT_TRUE(eventually([&] { return !train.running() || shownTick(session) >= when; }));
+        const std::uint64_t seen = shownTick(session);
+        train.send(SIGKILL);
+        ASSERT_EQ(train.wait().status, -SIGKILL);
+
+        const haptics::Record cut(record);
+        EXPECT_FALSE(cut.complete());
+        EXPECT_GE(cut.ticks() + mostLost, seen);
+        const auto replayed = figures({"replay", record});
+        EXPECT_EQ(replayed.at("identical"), true);
+        EXPECT_EQ(replayed.at("ticks"), cut.ticks());
+    }
+    EXPECT_EQ(palpate(scripted + std::vector<std::string>{"--seconds", "0.05", "--session", session}).status, 0);
+}
+
+// Long enough at rest for a viewer to come up, then a press.
+constexpr const char* slowScene = R"(
+[volume]
+phantom = "layered"
+[target]
+structure = "tumour"
+[[script]]
+kind = "wait"
+seconds = 6
+[[script]]
+kind = "press"
+to_mm = [0, 1, 0]
+seconds = 2
+)";
+
+TEST(Session, AViewerThatIsKilledChangesNothing)
+{
+    if (!built("palpate-view") || (access("/usr/bin/Xvfb", X_OK) != 0)) {
+        GTEST_SKIP() << "there is no palpate-view, or no Xvfb to draw with";
+    }
+    const Folder folder;
+    const std::string session = sessionName("viewer"), pictures = folder / "pictures", scene = folder / "scene.toml";
+    writeText(scene, slowScene);
+    Program train("palpate", {"train", scene, "--headless", "--session", session, "--json", folder / "train.json"});
+    Program view("palpate-view", {"--session", session, "--offscreen", pictures, "--size", "320x320", "--every", "0.1"});
+    const auto drawn = [&] { return std::filesystem::exists(pictures) && !std::filesystem::is_empty(pictures); };
+    ASSERT_TRUE(eventually([&] { return !train.running() || !view.running() || drawn(); }));
+    ASSERT_TRUE(train.running()) << "the session was over before the viewer drew: nothing is tested";
+    ASSERT_TRUE(view.running()) << view.wait().err;
+    view.send(SIGKILL);
+    EXPECT_EQ(view.wait().status, -SIGKILL);
+
+    const Outcome outcome = train.wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    const auto watched = nlohmann::json::parse(readText(folder / "train.json"));
+    EXPECT_GT(watched.at("contacts"), 0);
+    EXPECT_EQ(watched.at("force_hash"), figures({"train", scene, "--headless", "--unpaced"}).at("force_hash"));
+}
+
+}  // namespace
+}  // namespace palpate::apps
