@@ -4,8 +4,8 @@
 #include <apps/session.h>
 #include <experiments/bench_tick.h>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -32,15 +32,9 @@ nlohmann::json caseFigures(int side, const haptics::SessionModel& model, const e
         tasks[std::string(name(static_cast<haptics::Task>(i)))] = microseconds(c.contactTasks[i].percentiles());
     }
     const auto size = model.tissue->size();
-    return {{"voxels_per_side", side},
-            {"size", {size.x, size.y, size.z}},
-            {"lattice_nodes", model.lattice.grid.count()},
-            {"ticks", c.contact.count()},
-            {"tick_us_p50", 1e6 * tick.p50},
-            {"tick_us_p99", 1e6 * tick.p99},
-            {"tasks_us", tasks},
-            {"moved_nodes", c.meanMoved},
-            {"all", timingFigures(c.all)}};
+    return {{"voxels_per_side", side},    {"size", {size.x, size.y, size.z}}, {"lattice_nodes", model.lattice.grid.count()},
+            {"ticks", c.contact.count()}, {"tick_us_p50", 1e6 * tick.p50},    {"tick_us_p99", 1e6 * tick.p99},
+            {"tasks_us", tasks},          {"moved_nodes", c.meanMoved},       {"all", timingFigures(c.all)}};
 }
 
 void printCase(int side, const experiments::TickCase& c)
@@ -94,7 +88,8 @@ void addBench(CLI::App& app)
     auto* tick = bench->add_subcommand("tick", "Time per tick and task, for phantoms of growing resolution");
     tick->add_option("SCENE", o->scene, "Scene with a phantom")->capture_default_str();
     tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")->delimiter(',')->capture_default_str();
-    tick->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember({"spring", "chainmail"}));
+    tick->add_option("--model", o->changes.model, "Level of the tissue model")
+        ->check(CLI::IsMember({"spring", "chainmail"}));
     tick->add_flag("--paced", o->paced, "One tick per millisecond instead of one after the other");
     tick->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     tick->final_callback([o] { benchTick(*o); });

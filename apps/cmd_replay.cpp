@@ -4,8 +4,8 @@
 #include <apps/session.h>
 #include <haptics/replay.h>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <memory>
@@ -42,10 +42,10 @@ void replayRecord(const Options& o)
         fmt::print("{}: the session was cut off; what there is of it is replayed\n", o.file);
     }
     if (!result.identical) {
-        throw std::runtime_error(fmt::format("{}: forces differ from tick {} on, by up to {:.3g} N: the record was made "
-                                             "by another build ({}) or machine",
-                                             o.file, *result.firstDifference, result.largestDifference,
-                                             record.info().build));
+        throw std::runtime_error(
+            fmt::format("{}: forces differ from tick {} on, by up to {:.3g} N: the record was made "
+                        "by another build ({}) or machine",
+                        o.file, *result.firstDifference, result.largestDifference, record.info().build));
     }
     fmt::print("{} ticks replayed: every force is the same, bit for bit ({})\n", result.ticks,
                hexadecimal(result.forceHash));

@@ -6,8 +6,8 @@
 #include <apps/trainer.h>
 #include <apps/viewer_process.h>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
 #include <unistd.h>
@@ -82,7 +82,8 @@ nlohmann::json figuresOf(const TrainResult& result, const haptics::SessionInfo& 
     figures["build"] = info.build;
     figures["contacts"] = result.contacts;
     figures["punctures"] = result.punctures;
-    figures["peak_force_n"] = {{"basic", result.peakBasic}, {"additional", result.peakAdditional}, {"total", result.peakTotal}};
+    figures["peak_force_n"] = {
+        {"basic", result.peakBasic}, {"additional", result.peakAdditional}, {"total", result.peakTotal}};
     nlohmann::json nearest = nlohmann::json::object();
     for (std::size_t i = 0; i < info.structures.size(); ++i) {
         nearest[info.structures[i]] = 1e3 * result.nearest[i];
@@ -101,14 +102,15 @@ void summarise(const TrainResult& result, const haptics::SessionInfo& info)
 {
     const auto tick = result.timing.work.percentiles();
     const auto late = result.timing.lateness.percentiles();
-    fmt::print("{} ticks, {} missed; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
-               result.timing.ticks, result.timing.missed, 1e6 * tick.p50, 1e6 * tick.p99, 1e6 * late.p50, 1e6 * late.p99);
+    fmt::print(
+        "{} ticks, {} missed; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
+        result.timing.ticks, result.timing.missed, 1e6 * tick.p50, 1e6 * tick.p99, 1e6 * late.p50, 1e6 * late.p99);
     fmt::print("peak force {:.2f} N (tissue {:.2f} N, guidance {:.2f} N)\n", result.peakTotal, result.peakBasic,
                result.peakAdditional);
     for (std::size_t i = 0; i < result.cores.size(); ++i) {
         const auto& core = result.cores[i];
-        fmt::print("core {}: {:.0f} % {}, {:.1f} mm of it in the {}\n", i + 1, 100.0 * core.targetFraction, info.structures[0],
-                   1e3 * core.targetLength, info.structures[0]);
+        fmt::print("core {}: {:.0f} % {}, {:.1f} mm of it in the {}\n", i + 1, 100.0 * core.targetFraction,
+                   info.structures[0], 1e3 * core.targetLength, info.structures[0]);
     }
     for (const auto& [label, value] : haptics::describe(result.score)) {
         fmt::print("  {:<28} {}\n", label, value);
@@ -189,9 +191,11 @@ void addTrain(CLI::App& app)
     auto o = std::make_shared<Options>();
     auto* c = app.add_subcommand("train", "Perform a procedure: a built-in scene, a scene file or a volume");
     c->add_option("SCENE", o->scene, "breast, layered, block; a scene (.toml) or a volume (.vdb)")->capture_default_str();
-    c->add_option("--device", o->device, "hand (a scripted trainee), or a record (.db) whose poses are played")->capture_default_str();
+    c->add_option("--device", o->device, "hand (a scripted trainee), or a record (.db) whose poses are played")
+        ->capture_default_str();
     c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember({"spring", "chainmail"}));
-    c->add_option("--dffb", o->changes.dffb, "Differential force feedback")->check(CLI::IsMember({"off", "thesis", "field"}));
+    c->add_option("--dffb", o->changes.dffb, "Differential force feedback")
+        ->check(CLI::IsMember({"off", "thesis", "field"}));
     c->add_option("--target", o->changes.target, "Structure to sample");
     c->add_option("--seed", o->changes.seed, "Every random choice of a phantom");
     c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(CLI::PositiveNumber);

@@ -1,3 +1,4 @@
+#include <apps/command.h>
 #include <render/viewer.h>
 
 #include <CLI/CLI.hpp>
@@ -6,8 +7,6 @@
 
 #include <cstdio>
 #include <exception>
-#include <fstream>
-#include <iostream>
 #include <stdexcept>
 #include <string>
 
@@ -24,22 +23,14 @@ void readSize(const std::string& text, palpate::render::ViewerOptions& options)
 void writeFigures(const std::string& file, const palpate::render::ViewerFigures& figures)
 {
     constexpr double ms = 1e3;
-    const nlohmann::ordered_json json{{"display", figures.display},
-                                      {"frames", figures.frames},
-                                      {"frames_per_second", figures.rate},
-                                      {"frame_ms_p50", figures.frameP50 * ms},
-                                      {"frame_ms_p90", figures.frameP90 * ms},
-                                      {"delay_ms_p50", figures.delayP50 * ms},
-                                      {"delay_ms_p99", figures.delayP99 * ms}};
-    if (file == "-") {
-        std::cout << json.dump(2) << '\n';
-        return;
-    }
-    std::ofstream out(file);
-    out << json.dump(2) << '\n';
-    out.close();
-    if (!out)
-        throw std::runtime_error(file + ": cannot be written");
+    const nlohmann::json json{{"display", figures.display},
+                              {"frames", figures.frames},
+                              {"frames_per_second", figures.rate},
+                              {"frame_ms_p50", figures.frameP50 * ms},
+                              {"frame_ms_p90", figures.frameP90 * ms},
+                              {"delay_ms_p50", figures.delayP50 * ms},
+                              {"delay_ms_p99", figures.delayP99 * ms}};
+    palpate::apps::writeJson(file, json);
 }
 
 }  // namespace

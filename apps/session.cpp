@@ -83,8 +83,9 @@ haptics::SessionModel reopenSession(const std::string& file, const haptics::Sess
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
     auto model = haptics::buildModel(std::move(scene), std::move(tissue));
     if (haptics::modelHash(model) != info.volumeHash) {
-        throw std::runtime_error(file + ": the volume or the tissue table of this session has changed since it was "
-                                        "recorded; replay it with those it was recorded with");
+        throw std::runtime_error(file +
+                                 ": the volume or the tissue table of this session has changed since it was "
+                                 "recorded; replay it with those it was recorded with");
     }
     return model;
 }

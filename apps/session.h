@@ -19,8 +19,8 @@ struct SceneChanges {
     std::optional<double> voxelsPerSide;
 };
 
-/// The scene called `what`: a built-in one by name, a TOML file, or a volume (.vdb) with the standard biopsy on it. Loads the
-/// volume and builds the model. Throws std::runtime_error.
+/// The scene called `what`: a built-in one by name, a TOML file, or a volume (.vdb) with the standard biopsy on it. Loads
+/// the volume and builds the model. Throws std::runtime_error.
 haptics::SessionModel openSession(const std::string& what, const SceneChanges& changes);
 
 /// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now.

@@ -25,7 +25,7 @@ using namespace haptics;
 
 constexpr std::size_t mostCores = 64;
 constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
-constexpr double startDistance = 30e-3;  // the hand begins this far outside the body [m]
+constexpr double startDistance = 30e-3;      // the hand begins this far outside the body [m]
 
 std::atomic<bool> interrupted{false};
 
@@ -150,7 +150,7 @@ Trainer::~Trainer() = default;
 
 TrainResult Trainer::run()
 {
-    struct sigaction action{};
+    struct sigaction action {};
     action.sa_handler = onSignal;
     sigaction(SIGINT, &action, nullptr);
     sigaction(SIGTERM, &action, nullptr);

@@ -15,9 +15,9 @@
 namespace palpate::apps {
 
 struct TrainOptions {
-    std::string device = "hand";    // or the file of a record
-    std::string session;            // name for viewers
-    std::filesystem::path record;   // empty: none
+    std::string device = "hand";   // or the file of a record
+    std::string session;           // name for viewers
+    std::filesystem::path record;  // empty: none
     haptics::ServoOptions servo;
 };
 

@@ -49,9 +49,7 @@ PropagateResult Deformation::deform(std::span<const Seed> seeds, Yield yield) no
     }
     const PropagateResult result = propagate(lattice_, u_, scratch_, seeds, yield);
 
-    const auto place = [&](Node n) {
-        map_.place(n, lattice_.grid.position(lattice_.grid.node(n)) + Vec3(u_[n]));
-    };
+    const auto place = [&](Node n) { map_.place(n, lattice_.grid.position(lattice_.grid.node(n)) + Vec3(u_[n])); };
     for (const Node n : before_) {
         if (scratch_.seen[n] != scratch_.pass) {
             place(n);

@@ -17,7 +17,8 @@ public:
     /// @param maxMoves  node moves per tick; what is left over is reported as residual
     Deformation(const Lattice& lattice, std::uint32_t maxMoves);
 
-    /// The shape with these nodes held, at most maxSeeds, free to yield along `yield` (see propagate()). Cost O(nodes moved now and last time); allocates nothing.
+    /// The shape with these nodes held, at most maxSeeds, free to yield along `yield` (see propagate()). Cost O(nodes moved
+    /// now and last time); allocates nothing.
     PropagateResult deform(std::span<const Seed> seeds, Yield yield = Yield(0.0F)) noexcept;
 
     /// Nodes that are not at rest, in the order in which they moved.
@@ -31,15 +32,15 @@ public:
 
 private:
     const Lattice& lattice_;
-    std::vector<Vec3f> u_;            // displacement [m] (count x 3)
+    std::vector<Vec3f> u_;  // displacement [m] (count x 3)
     PropagateScratch scratch_;
-    std::vector<Node> before_;        // moved last time
+    std::vector<Node> before_;  // moved last time
     occupancy::OccupancyMap map_;
 };
 
 /// The nodes that a ball pushes ahead of itself on its way from `from`, where it first touched, to `to` [m]: those in the
-/// way, pushed along it onto the far side of the ball. A ball smaller than the lattice can see is widened to one spacing with
-/// the same foremost point. Hold them with Yield along the way.
+/// way, pushed along it onto the far side of the ball. A ball smaller than the lattice can see is widened to one spacing
+/// with the same foremost point. Hold them with Yield along the way.
 /// @returns  how many seeds were written to `out`
 std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept;
 

@@ -29,8 +29,8 @@ Lattice::Lattice(const volume::NodeGrid& nodes, std::vector<std::uint8_t> tissue
     const auto mean = [&](double a, double b) { return static_cast<float>(0.5 * (a + b) * grid.spacing); };
     for (const auto& a : table.rows) {
         for (const auto& b : table.rows) {
-            limits.push_back({mean(1.0 - a.compress, 1.0 - b.compress), mean(a.stretch - 1.0, b.stretch - 1.0),
-                              mean(a.shear, b.shear)});
+            limits.push_back(
+                {mean(1.0 - a.compress, 1.0 - b.compress), mean(a.stretch - 1.0, b.stretch - 1.0), mean(a.shear, b.shear)});
         }
     }
 }

@@ -23,16 +23,16 @@ struct PropagateScratch {
     PropagateScratch(const Lattice& lattice, std::uint32_t maxMoves, std::uint32_t maxSeeds);
 
     struct Pull {
-        float violation;     // [m]
+        float violation;      // [m]
         std::uint32_t order;  // of arrival: breaks ties first in, first out
         Node from;
-        int side;            // of the node that is pulled, seen from `from`
+        int side;  // of the node that is pulled, seen from `from`
     };
 
-    std::vector<Pull> queue;           // a heap: largest violation on top
-    std::vector<Node> moved;           // nodes moved since clear(), in the order first moved
-    std::vector<std::uint32_t> seen;   // last pass that listed the node in `moved`  (count x 1)
-    std::vector<std::uint32_t> held;   // last pass that held the node as a seed     (count x 1)
+    std::vector<Pull> queue;          // a heap: largest violation on top
+    std::vector<Node> moved;          // nodes moved since clear(), in the order first moved
+    std::vector<std::uint32_t> seen;  // last pass that listed the node in `moved`  (count x 1)
+    std::vector<std::uint32_t> held;  // last pass that held the node as a seed     (count x 1)
     std::uint32_t pass = 1;
     std::uint32_t order = 0;
     std::uint32_t maxMoves;
@@ -50,18 +50,18 @@ struct PropagateResult {
 ///
 /// A violated link pulls its far end by the smallest step that makes the link legal; that end then pulls its own
 /// neighbours, and the one that pulled it is tested again. Links are taken in the order of largest violation, ties first
-/// in, first out: the order in which links of many materials end up legal. Where the far end is of fixed tissue, or held and
-/// may not yield that way, the near end moves instead.
+/// in, first out: the order in which links of many materials end up legal. Where the far end is of fixed tissue, or held
+/// and may not yield that way, the near end moves instead.
 ///
 /// @param u      displacement of every node [m] (count x 3); updated in place
 /// @param seeds  at most scratch's maxSeeds
 /// @param yield  how the seeds may still be pulled
 /// @returns      how much was done and what is left; scratch.moved lists the nodes, seeds included
 ///
-/// Cost O(moves log moves), at most scratch.maxMoves moves. Allocates nothing, never throws. One call at a time per scratch.
-/// Sources: S. F. F. Gibson, "3D ChainMail: a Fast Algorithm for Deforming Volumetric Objects", Symposium on Interactive
-/// 3D Graphics, 1997; M. A. Schill, S. F. F. Gibson, H.-J. Bender, R. Maenner, "Biomechanical Simulation of the Vitreous
-/// Humor in the Eye Using an Enhanced ChainMail Algorithm", MICCAI 1998 (order by violation).
+/// Cost O(moves log moves), at most scratch.maxMoves moves. Allocates nothing, never throws. One call at a time per
+/// scratch. Sources: S. F. F. Gibson, "3D ChainMail: a Fast Algorithm for Deforming Volumetric Objects", Symposium on
+/// Interactive 3D Graphics, 1997; M. A. Schill, S. F. F. Gibson, H.-J. Bender, R. Maenner, "Biomechanical Simulation of the
+/// Vitreous Humor in the Eye Using an Enhanced ChainMail Algorithm", MICCAI 1998 (order by violation).
 PropagateResult propagate(const Lattice& lattice, std::span<Vec3f> u, PropagateScratch& scratch,
                           std::span<const Seed> seeds, Yield yield = Yield(0.0F)) noexcept;
 

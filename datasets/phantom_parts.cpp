@@ -30,8 +30,8 @@ volume::LabelImage phantomImage(const PhantomValues& values, Vec3 low, Vec3 high
         low = Vec3((low.x + high.x - side) / 2, high.y - side, (low.z + high.z - side) / 2);
         image.size = Index3(perSide);
     } else {
-        // Faces of voxels pass through the planes of the axes, where flat phantoms have their surface. The small share keeps
-        // a rounding error from adding an empty slice.
+        // Faces of voxels pass through the planes of the axes, where flat phantoms have their surface. The small share
+        // keeps a rounding error from adding an empty slice.
         low = edge * glm::floor(low / edge + 1e-6);
         for (int axis = 0; axis < 3; ++axis) {
             image.size[axis] = static_cast<int>(std::ceil((high[axis] - low[axis]) / edge - 1e-6));

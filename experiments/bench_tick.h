@@ -7,10 +7,10 @@ namespace palpate::experiments {
 
 /// Time per tick of one scripted session.
 struct TickCase {
-    haptics::ServoTiming all;       // every tick
-    haptics::Histogram contact;     // ticks in which the tool has hold of tissue: what a bigger volume could slow down
+    haptics::ServoTiming all;    // every tick
+    haptics::Histogram contact;  // ticks in which the tool has hold of tissue: what a bigger volume could slow down
     std::array<haptics::Histogram, haptics::taskCount> contactTasks;
-    double meanMoved = 0;           // nodes per tick in contact
+    double meanMoved = 0;  // nodes per tick in contact
 };
 
 /// Runs the scene's scripted trainee once through the servo loop and times each tick by task.

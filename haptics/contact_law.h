@@ -11,7 +11,8 @@ struct LocalTissue {
 };
 
 /// Effective tissue under a contact at `point` [m]: Young's modulus along `inward` to a depth of five radii (at least
-/// 10 mm), weighted as the stress under a punch falls off, 1 / (1 + (s / a)^2), and mixed as the root of arithmetic times harmonic mean.
+/// 10 mm), weighted as the stress under a punch falls off, 1 / (1 + (s / a)^2), and mixed as the root of arithmetic times
+/// harmonic mean.
 LocalTissue tissueUnder(const SessionModel& model, const volume::Tissue::Reader& reader, Vec3 point, Vec3 inward,
                         double radius) noexcept;
 

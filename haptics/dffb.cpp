@@ -95,9 +95,8 @@ Vec3 fieldForce(const DffbParameters& p, std::size_t count, const std::array<Pro
 
 }  // namespace
 
-Vec3 additionalForce(const DffbParameters& p, std::size_t count,
-                     const std::array<Proximity, maxStructures>& structures, Vec3 tip, bool touching, double dt,
-                     DffbState& s) noexcept
+Vec3 additionalForce(const DffbParameters& p, std::size_t count, const std::array<Proximity, maxStructures>& structures,
+                     Vec3 tip, bool touching, double dt, DffbState& s) noexcept
 {
     if (!s.started) {
         s.last = s.mass = tip;

@@ -11,19 +11,19 @@ namespace palpate::haptics {
 
 /// One structure as the tool sees it now.
 struct Proximity {
-    double distance = 0;     // tip to the structure's surface in the deformed tissue, negative inside [m]
-    Vec3 away{0, 0, 1};      // unit vector from the structure to the tip
+    double distance = 0;  // tip to the structure's surface in the deformed tissue, negative inside [m]
+    Vec3 away{0, 0, 1};   // unit vector from the structure to the tip
     double gain = 1;
-    bool vital = true;       // false for the target
+    bool vital = true;  // false for the target
 };
 
 /// State of the additional force between ticks.
 struct DffbState {
-    Vec3 mass{0.0};          // position of the virtual mass [m]
-    Vec3 massVelocity{0.0};  // [m/s]
-    Vec3 last{0.0};          // tip in the tick before [m]
-    Vec3 velocity{0.0};      // of the tip, low-passed [m/s]
-    std::uint8_t cursor = 1; // `thesis`: row of the lookup table that is the nearest vital structure now
+    Vec3 mass{0.0};           // position of the virtual mass [m]
+    Vec3 massVelocity{0.0};   // [m/s]
+    Vec3 last{0.0};           // tip in the tick before [m]
+    Vec3 velocity{0.0};       // of the tip, low-passed [m/s]
+    std::uint8_t cursor = 1;  // `thesis`: row of the lookup table that is the nearest vital structure now
     bool started = false;
     bool active = false;
 };

@@ -39,14 +39,14 @@ private:
     HandParameters parameters_;
     std::vector<datasets::TraineeStep> script_;
     std::size_t step_ = 0;
-    double inStep_ = 0;      // time since the step began [s]
-    Vec3 from_{0.0};         // goal when the step began
-    double travelled_ = 0;   // of the goal, along the step's line [m]
+    double inStep_ = 0;     // time since the step began [s]
+    Vec3 from_{0.0};        // goal when the step began
+    double travelled_ = 0;  // of the goal, along the step's line [m]
     Vec3 goal_{0.0};
     Vec3 position_{0.0};
     Vec3 velocity_{0.0};
     Vec3 force_{0.0};
-    double peak_ = 0;        // largest force felt in this step [N]
+    double peak_ = 0;  // largest force felt in this step [N]
     Vec3 axis_{0.0};
 };
 

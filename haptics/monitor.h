@@ -18,8 +18,8 @@ struct MonitorState {
 /// Task H6: distance and direction from the tip to the target and to every vital structure, in the deformed tissue, and
 /// the events that follow from them.
 ///
-/// The nearest point of a structure at rest is Y = X - d grad d, X being the tissue at the tip and d the distance field; now it
-/// is at Y + u(Y). Fills record.distance and record.nearestVital.
+/// The nearest point of a structure at rest is Y = X - d grad d, X being the tissue at the tip and d the distance field;
+/// now it is at Y + u(Y). Fills record.distance and record.nearestVital.
 std::array<Proximity, maxStructures> monitor(const SessionModel& model, const occupancy::Body& body, const TipState& tip,
                                              Vec3 position, MonitorState& state, TickRecord& record) noexcept;
 

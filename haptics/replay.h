@@ -46,8 +46,8 @@ struct ReplayResult {
 /// Feeds a record's poses to a fresh simulation and compares every force, bit by bit.
 ReplayResult replay(const Record& record, const SessionModel& model);
 
-/// A hash of the body that forces depend on: lattice, surface and structures (64-bit FNV-1a, in hexadecimal). A record keeps it,
-/// so that it is never replayed on another volume.
+/// A hash of the body that forces depend on: lattice, surface and structures (64-bit FNV-1a, in hexadecimal). A record
+/// keeps it, so that it is never replayed on another volume.
 std::string modelHash(const SessionModel& model);
 
 }  // namespace palpate::haptics

@@ -4,8 +4,8 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 
-#include <chrono>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <ctime>
 
@@ -17,8 +17,8 @@ using Clock = std::chrono::steady_clock;
 using namespace std::chrono_literals;
 
 constexpr auto period = 1ms;
-constexpr auto spin = 50us;      // what a sleep may come late without harm
-constexpr int priority = 60;     // above everything ordinary, below the kernel's own threads
+constexpr auto spin = 50us;   // what a sleep may come late without harm
+constexpr int priority = 60;  // above everything ordinary, below the kernel's own threads
 
 double seconds(Clock::duration d) noexcept
 {

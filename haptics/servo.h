@@ -12,15 +12,15 @@
 namespace palpate::haptics {
 
 struct ServoOptions {
-    bool paced = true;      // one tick per millisecond; false: as fast as it goes, for batches
-    double seconds = 0;     // end after this much session time; 0 = when the device has finished
+    bool paced = true;   // one tick per millisecond; false: as fast as it goes, for batches
+    double seconds = 0;  // end after this much session time; 0 = when the device has finished
 };
 
 /// Called after every tick, in the servo thread: must not allocate, lock or block.
 using TickSink = std::function<void(const TickRecord&, const ServoTiming&)>;
 
-/// The 1 kHz loop: H2, the simulation's tasks, H5, then `sink`. Runs in the calling thread until the device has finished, the
-/// time is over or `stop` is set. Sleeps until 50 us before a tick is due and spins the rest. After a gap it goes on
+/// The 1 kHz loop: H2, the simulation's tasks, H5, then `sink`. Runs in the calling thread until the device has finished,
+/// the time is over or `stop` is set. Sleeps until 50 us before a tick is due and spins the rest. After a gap it goes on
 /// from where it is: the ticks in between are counted as missed, never made up in a burst.
 ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
                      const std::atomic<bool>& stop);

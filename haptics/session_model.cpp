@@ -49,8 +49,8 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     s.name = name;
     s.labels = tissue.labelsNamed(name);
     if (s.labels.empty()) {
-        throw std::runtime_error(fmt::format("{}: {} '{}' is not in the volume; it has: {}", scene, what, name,
-                                             structureNames(tissue)));
+        throw std::runtime_error(
+            fmt::format("{}: {} '{}' is not in the volume; it has: {}", scene, what, name, structureNames(tissue)));
     }
     s.distance = tissue.distanceTo(s.labels, grid);
     return s;
@@ -77,8 +77,8 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     auto surface = tissue->distanceToBody(grid);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
-    return {std::move(scene), std::move(tissue), approach, std::move(surface), std::move(modulus), std::move(lattice),
-            std::move(structures)};
+    return {std::move(scene),   std::move(tissue),    approach, std::move(surface), std::move(modulus),
+            std::move(lattice), std::move(structures)};
 }
 
 }  // namespace palpate::haptics

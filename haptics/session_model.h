@@ -25,8 +25,8 @@ struct SessionModel {
     datasets::Scene scene;
     std::shared_ptr<const volume::Tissue> tissue;
     datasets::Approach approach;
-    volume::DistanceField surface;             // of the body at rest [m]
-    volume::ScalarField youngsModulus;         // [Pa]
+    volume::DistanceField surface;      // of the body at rest [m]
+    volume::ScalarField youngsModulus;  // [Pa]
     chainmail::Lattice lattice;
     std::vector<GuardedStructure> structures;  // target first, then the lookup table of vital structures
 };

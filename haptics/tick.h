@@ -19,10 +19,10 @@ inline constexpr std::uint32_t poseInvalid = 1U << 31;   // the pose was not fin
 
 /// What a device says in one tick.
 struct DeviceSample {
-    Vec3 position{0.0};      // of the tool's tip (sphere: its centre), patient frame [m]
-    Vec3 axis{0, 1, 0};      // unit vector along the tool, towards the tip
+    Vec3 position{0.0};  // of the tool's tip (sphere: its centre), patient frame [m]
+    Vec3 axis{0, 1, 0};  // unit vector along the tool, towards the tip
     std::uint32_t buttons = 0;
-    bool fresh = true;       // false when the device had no new pose for this tick
+    bool fresh = true;  // false when the device had no new pose for this tick
 };
 
 /// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
@@ -63,21 +63,21 @@ struct CoreSample {
 struct TickRecord {
     std::uint64_t tick = 0;
     DeviceSample device;
-    Vec3 proxy{0.0};                     // where the tip would be without penetration [m]
-    Vec3 basic{0.0};                     // F_BFFB, equation 2 [N]
-    Vec3 additional{0.0};                // F_AFFB, equations 3-8 [N]
-    Vec3 total{0.0};                     // F_DFFB as sent: stabilised and capped [N]
+    Vec3 proxy{0.0};       // where the tip would be without penetration [m]
+    Vec3 basic{0.0};       // F_BFFB, equation 2 [N]
+    Vec3 additional{0.0};  // F_AFFB, equations 3-8 [N]
+    Vec3 total{0.0};       // F_DFFB as sent: stabilised and capped [N]
     Phase phase = Phase::free;
-    std::uint8_t tissue = 0;             // row of the tissue table at the tip
-    std::uint8_t nearestVital = 0xFF;    // index of a structure
+    std::uint8_t tissue = 0;           // row of the tissue table at the tip
+    std::uint8_t nearestVital = 0xFF;  // index of a structure
     bool fired = false;
     bool faulted = false;
-    double inserted = 0;                 // length of the shaft inside [m]
+    double inserted = 0;                           // length of the shaft inside [m]
     std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
-    std::uint32_t contacts = 0;          // elements of tissue that the tool touches
-    std::uint32_t moved = 0;             // nodes that the deformation moved
-    double residual = 0;                 // largest violated link that the work cap left over [m]
-    CoreSample core;                     // when fired
+    std::uint32_t contacts = 0;                    // elements of tissue that the tool touches
+    std::uint32_t moved = 0;                       // nodes that the deformation moved
+    double residual = 0;                           // largest violated link that the work cap left over [m]
+    CoreSample core;                               // when fired
     std::array<Event, maxEventsPerTick> events{};
     std::uint32_t eventCount = 0;
     std::array<float, taskCount> seconds{};  // by task, wall time [s]

@@ -34,11 +34,11 @@ private:
 
 /// How the servo loop kept time.
 struct ServoTiming {
-    Histogram lateness;                       // start of a tick after its due time
-    Histogram work;                           // a tick, H2 to H5
+    Histogram lateness;  // start of a tick after its due time
+    Histogram work;      // a tick, H2 to H5
     std::array<Histogram, taskCount> tasks;
     std::uint64_t ticks = 0;
-    std::uint64_t missed = 0;                 // force sent after the next tick was due, and ticks skipped to catch up
+    std::uint64_t missed = 0;  // force sent after the next tick was due, and ticks skipped to catch up
 };
 
 }  // namespace palpate::haptics

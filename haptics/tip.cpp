@@ -12,12 +12,13 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double tipFriction = 2.0;        // a sharp tip bites: it slips only when dragged flatter than 27 degrees over the skin [-]
-constexpr double longestSlip = 1e-3;       // of the proxy over the surface in one step [m]
+constexpr double tipFriction =
+    2.0;  // a sharp tip bites: it slips only when dragged flatter than 27 degrees over the skin [-]
+constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
 constexpr int slipSteps = 8;
-constexpr double sidewaysLimit = 3.0;      // sideways the tissue gives way at this many cutting forces
-constexpr double sidewaysDepth = 10e-3;    // inserted length that doubles the sideways stiffness [m]
-constexpr double shaftStiffness = 200.0;   // of the tissue that sticks to the shaft [N/m]
+constexpr double sidewaysLimit = 3.0;     // sideways the tissue gives way at this many cutting forces
+constexpr double sidewaysDepth = 10e-3;   // inserted length that doubles the sideways stiffness [m]
+constexpr double shaftStiffness = 200.0;  // of the tissue that sticks to the shaft [N/m]
 constexpr int shaftSamples = 16;
 
 // Inside, tissue resists on all sides: a rigid disc in an infinite medium is twice as stiff as a punch on its surface

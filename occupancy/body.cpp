@@ -35,7 +35,7 @@ Vec3 restPoint(const Body& body, Vec3 p) noexcept
     Vec3 start = p;
     double nearest = 4.0 * h * h;
     bool moved = false;
-    body.map.visit(p - h, p + h, [&](Element e) {
+    body.map.visit(p - 0.5 * h, p + 0.5 * h, [&](Element e) {
         const Vec3 away = p - body.position(e);
         const double square = glm::dot(away, away);
         moved = moved || body.u[e] != Vec3f(0.0F);

@@ -10,11 +10,11 @@ namespace palpate::occupancy {
 
 /// A deformed body, as the queries see it. Views only: whoever deforms owns the memory.
 struct Body {
-    const volume::NodeGrid& grid;            // of the elements at rest
-    std::span<const std::uint8_t> solid;     // not 0 where there is an element      (count x 1)
-    std::span<const Vec3f> u;                // displacement of each element [m]     (count x 3)
-    const OccupancyMap& map;                 // where the displaced elements are
-    const volume::DistanceField& surface;    // signed distance to the surface at rest [m]
+    const volume::NodeGrid& grid;          // of the elements at rest
+    std::span<const std::uint8_t> solid;   // not 0 where there is an element      (count x 1)
+    std::span<const Vec3f> u;              // displacement of each element [m]     (count x 3)
+    const OccupancyMap& map;               // where the displaced elements are
+    const volume::DistanceField& surface;  // signed distance to the surface at rest [m]
 
     Vec3 restPosition(Element e) const noexcept { return grid.position(grid.node(e)); }
     Vec3 position(Element e) const noexcept { return restPosition(e) + Vec3(u[e]); }

@@ -56,11 +56,11 @@ private:
     void unlink(Element e) noexcept;
     void link(Element e, std::uint32_t cell) noexcept;
 
-    volume::NodeGrid cells_;            // node = middle of a cell; a margin wider than the lattice
-    std::vector<Element> head_;         // first element of each cell   (cells x 1)
-    std::vector<Element> next_;         // the one behind it            (elements x 1)
-    std::vector<Element> previous_;     // the one before it            (elements x 1)
-    std::vector<std::uint32_t> cell_;   // the cell of each element     (elements x 1)
+    volume::NodeGrid cells_;           // node = middle of a cell; a margin wider than the lattice
+    std::vector<Element> head_;        // first element of each cell   (cells x 1)
+    std::vector<Element> next_;        // the one behind it            (elements x 1)
+    std::vector<Element> previous_;    // the one before it            (elements x 1)
+    std::vector<std::uint32_t> cell_;  // the cell of each element     (elements x 1)
     std::uint64_t rewrites_ = 0;
 };
 

@@ -39,13 +39,13 @@ void touch(const Body& body, const Capsule& tool, ContactSet& out) noexcept;
 struct Sweep {
     double fraction = 1;  // of the way, up to the first touch or to the end
     bool hit = false;
-    Vec3 point{0.0};      // of the tool's axis that touches [m]
+    Vec3 point{0.0};  // of the tool's axis that touches [m]
 };
 
 /// Moves the tool from `from` to `to` and stops at the first touch, however fast it goes: steps are never longer than half
-/// the clearance or a quarter of an element, whichever is more, so that a wall of one element cannot be jumped. Work is bounded: a way
-/// that needs more than `sweepSteps` steps ends where they end, and counts as a hit.
-/// Both poses have the same length.
+/// the clearance or a quarter of an element, whichever is more, so that a wall of one element cannot be jumped. Work is
+/// bounded: a way that needs more than `sweepSteps` steps ends where they end, and counts as a hit. Both poses have the
+/// same length.
 inline constexpr int sweepSteps = 512;
 Sweep sweep(const Body& body, const Capsule& from, const Capsule& to) noexcept;
 

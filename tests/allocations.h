@@ -4,7 +4,7 @@
 
 namespace palpate::tests {
 
-/// Heap allocations of the whole test program so far. Link palpate_allocations: it replaces operator new.
+/// Heap allocations of the calling thread so far. Link palpate_allocations: it replaces operator new.
 std::uint64_t allocations() noexcept;
 
 /// How often operator new is called while `work` runs.

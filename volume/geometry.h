@@ -7,7 +7,8 @@
 
 namespace palpate {
 
-/// Patient frame LPS (x to the patient's left, y to the back, z to the head), as in ITK and DICOM [m], unless said otherwise.
+/// Patient frame LPS (x to the patient's left, y to the back, z to the head), as in ITK and DICOM [m], unless said
+/// otherwise.
 using Vec3 = glm::dvec3;
 using Vec3f = glm::vec3;
 using Mat3 = glm::dmat3;

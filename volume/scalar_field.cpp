@@ -16,8 +16,8 @@ double ScalarField::at(Vec3 p) const noexcept
     const std::size_t base = grid.offset(n);
     const auto dx = static_cast<std::size_t>(step.x);
     const auto dy = static_cast<std::size_t>(step.y * grid.size.x);
-    const auto dz = static_cast<std::size_t>(step.z) * static_cast<std::size_t>(grid.size.x) *
-                    static_cast<std::size_t>(grid.size.y);
+    const auto dz =
+        static_cast<std::size_t>(step.z) * static_cast<std::size_t>(grid.size.x) * static_cast<std::size_t>(grid.size.y);
     const float* v = values.data() + base;
     const auto alongX = [&](std::size_t o) {
         return static_cast<double>(v[o]) * (1.0 - t.x) + static_cast<double>(v[o + dx]) * t.x;

@@ -41,8 +41,8 @@ struct MemoryUse {
 ///     stiffness  Float, background 0   Young's modulus [kPa], per voxel
 ///     occupancy  Bool,  background 0   true where there is tissue
 ///
-/// Homogeneous regions are stored as tiles. Immutable, so that threads may share it; each thread reads through its own Reader.
-/// OpenVDB stays behind this header.
+/// Homogeneous regions are stored as tiles. Immutable, so that threads may share it; each thread reads through its own
+/// Reader. OpenVDB stays behind this header.
 class Tissue {
 public:
     /// Builds the grids. Throws std::runtime_error for a label value without a name or a name without a tissue.
@@ -88,12 +88,13 @@ public:
     };
 
     /// Signed distance to the surface of all voxels whose label is in `labels`, sampled on `grid` [m], sub-voxel smooth;
-    /// the enclosed volume is kept also where the structure is thinner than the spacing. Throws when no voxel has these labels.
+    /// the enclosed volume is kept also where the structure is thinner than the spacing. Throws when no voxel has these
+    /// labels.
     DistanceField distanceTo(std::span<const std::uint16_t> labels, const NodeGrid& grid) const;
     /// Signed distance to the surface of the whole body.
     DistanceField distanceToBody(const NodeGrid& grid) const;
-    /// Young's modulus [Pa] averaged over each node's cell: the root of arithmetic times harmonic mean over the tissue in it
-    /// (air does not count); cells without tissue take the value of the nearest tissue.
+    /// Young's modulus [Pa] averaged over each node's cell: the root of arithmetic times harmonic mean over the tissue in
+    /// it (air does not count); cells without tissue take the value of the nearest tissue.
     ScalarField youngsModulusOn(const NodeGrid& grid) const;
     /// Row of the tissue table that fills most of each node's cell (count x 1); air where under half of it is tissue.
     std::vector<std::uint8_t> tissueOn(const NodeGrid& grid) const;

@@ -20,19 +20,19 @@ std::optional<Role> roleNamed(std::string_view name) noexcept;
 struct TissueRow {
     std::string name;
     Role role = Role::plain;
-    double youngsModulus = 0;      // small strain [Pa]
-    double poissonRatio = 0;       // [-]
-    double density = 0;            // [kg/m^3]
-    double compress = 0;           // ChainMail: shortest link, share of its rest length, in (0, 1]
-    double stretch = 0;            // ChainMail: longest link, share of its rest length, >= 1
-    double shear = 0;              // ChainMail: largest shift across a link, share of its rest length, >= 0
-    double punctureForce = 0;      // tip force at which a 14 G needle enters [N]
-    double cuttingForce = 0;       // tip force while it cuts on [N]
-    double frictionPerMetre = 0;   // on the shaft, per metre inside [N/m]
-    bool fixed = false;            // held in space: bone, chest wall
-    glm::vec3 colour{1.0F};        // display, RGB in [0, 1]
-    float opacity = 0;             // display, in [0, 1]
-    std::string source;            // where the numbers come from
+    double youngsModulus = 0;     // small strain [Pa]
+    double poissonRatio = 0;      // [-]
+    double density = 0;           // [kg/m^3]
+    double compress = 0;          // ChainMail: shortest link, share of its rest length, in (0, 1]
+    double stretch = 0;           // ChainMail: longest link, share of its rest length, >= 1
+    double shear = 0;             // ChainMail: largest shift across a link, share of its rest length, >= 0
+    double punctureForce = 0;     // tip force at which a 14 G needle enters [N]
+    double cuttingForce = 0;      // tip force while it cuts on [N]
+    double frictionPerMetre = 0;  // on the shaft, per metre inside [N/m]
+    bool fixed = false;           // held in space: bone, chest wall
+    glm::vec3 colour{1.0F};       // display, RGB in [0, 1]
+    float opacity = 0;            // display, in [0, 1]
+    std::string source;           // where the numbers come from
 };
 
 /// Rows in order; row 0 is always "air", the outside.

@@ -36,7 +36,8 @@ TEST(Deformation, ShapeDoesNotDependOnThePath)
     Deformation direct(lattice, 20000), detour(lattice, 20000);
     std::vector<Seed> seeds(Deformation::maxSeeds);
     const auto press = [&](Deformation& d, Vec3 centre) {
-        d.deform(std::span(seeds).first(pressSeeds(lattice, {centre.x, centre.y, -2.5}, centre, 2.0, seeds)), Yield(0, 0, 1));
+        d.deform(std::span(seeds).first(pressSeeds(lattice, {centre.x, centre.y, -2.5}, centre, 2.0, seeds)),
+                 Yield(0, 0, 1));
     };
     press(direct, {8, 7, 1});
     press(detour, {3, 3, 2});

@@ -93,9 +93,7 @@ TEST(Propagate, LinksBetweenTissuesTakeTheMeanOfBothLimits)
 TEST(Propagate, MirroredAndRotatedPushesGiveMirroredAndRotatedAnswers)
 {
     constexpr int n = 11;
-    const auto material = [](Index3 at) {
-        return glm::length(glm::dvec3(at) - glm::dvec3(6.0, 4.5, 5.5)) < 2.6 ? 2 : 1;
-    };
+    const auto material = [](Index3 at) { return glm::length(glm::dvec3(at) - glm::dvec3(6.0, 4.5, 5.5)) < 2.6 ? 2 : 1; };
     const auto mirror = [](Index3 at) { return Index3(n - 1 - at.x, at.y, at.z); };
     const auto rotate = [](Index3 at) { return Index3(at.y, at.z, at.x); };  // a cyclic turn: its inverse is (z, x, y)
     const auto unrotate = [](Index3 at) { return Index3(at.z, at.x, at.y); };
@@ -134,12 +132,13 @@ TEST(Propagate, NoLinkIsViolatedAfterAnyOfTenThousandRandomDrags)
     const auto uniform = [&](double low, double high) { return std::uniform_real_distribution(low, high)(random); };
     double worst = 0.0;
     for (int blockNumber = 0; blockNumber < 100; ++blockNumber) {
-        const TwoMaterials m{uniform(0.3, 0.8), uniform(1.1, 1.8), uniform(0.1, 0.8),
+        const TwoMaterials m{uniform(0.3, 0.8),  uniform(1.1, 1.8), uniform(0.1, 0.8),
                              uniform(0.85, 1.0), uniform(1.0, 1.1), uniform(0.0, 0.1)};
         const int n = 7;
         std::vector<int> pattern(n * n * n);
         std::generate(pattern.begin(), pattern.end(), [&] { return uniform(0, 1) < 0.3 ? 2 : 1; });
-        const auto lattice = block(n, m, [&](Index3 at) { return pattern[static_cast<std::size_t>((at.z * n + at.y) * n + at.x)]; });
+        const auto lattice =
+            block(n, m, [&](Index3 at) { return pattern[static_cast<std::size_t>((at.z * n + at.y) * n + at.x)]; });
         State s(lattice);
         for (int drag = 0; drag < 100; ++drag) {
             const auto pick = [&] { return static_cast<int>(uniform(0, n)) % n; };
@@ -159,7 +158,9 @@ TEST(Propagate, NoLinkIsViolatedAfterAnyOfTenThousandRandomDrags)
 TEST(Propagate, StiffInclusionStaysRigidWithinItsLimits)
 {
     const TwoMaterials m{.stiffCompress = 0.98, .stiffStretch = 1.02, .stiffShear = 0.02};
-    const auto inside = [](Index3 at) { return std::max({std::abs(at.x - 9), std::abs(at.y - 9), std::abs(at.z - 7)}) <= 3; };
+    const auto inside = [](Index3 at) {
+        return std::max({std::abs(at.x - 9), std::abs(at.y - 9), std::abs(at.z - 7)}) <= 3;
+    };
     const auto lattice = block(19, m, [&](Index3 at) { return inside(at) ? 2 : 1; });
     State s(lattice);
     const Seed seed{nodeAt(lattice, {8, 10, 1}), Vec3f(0, 0, 4.0F)};
@@ -207,7 +208,8 @@ TEST(Propagate, SeveralSeedsLeaveNoViolatedLink)
 {
     const auto lattice = block(15, {}, [](Index3 at) { return (at.x + at.y + at.z) % 5 == 0 ? 2 : 1; });
     State s(lattice);
-    const std::array seeds{Seed{nodeAt(lattice, {4, 7, 0}), Vec3f(0, 0, 2.0F)}, Seed{nodeAt(lattice, {10, 7, 0}), Vec3f(0, 0, 2.5F)},
+    const std::array seeds{Seed{nodeAt(lattice, {4, 7, 0}), Vec3f(0, 0, 2.0F)},
+                           Seed{nodeAt(lattice, {10, 7, 0}), Vec3f(0, 0, 2.5F)},
                            Seed{nodeAt(lattice, {7, 3, 14}), Vec3f(0, 0, -1.5F)}};
     const auto result = propagate(lattice, s.u, s.scratch, seeds);
     EXPECT_EQ(result.residual, 0.0);

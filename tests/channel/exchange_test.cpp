@@ -1,6 +1,6 @@
 #include <render/channel/channel.h>
 #include <render/channel/segment.h>
-#include <tests/channel/allocations.h>
+#include <tests/allocations.h>
 #include <tests/channel/example.h>
 
 #include <gtest/gtest.h>
@@ -85,15 +85,15 @@ TEST(Exchange, PublishingAllocatesNothing)
     const std::string session = sessionNamed("heap");
     Publisher publisher(session, smallScenery(), smallLabels());
     const State state;
-    const std::size_t before = allocations();
+    const auto before = tests::allocations();
     for (std::uint64_t tick = 1; tick <= 1000; ++tick) {
         publisher.setState(state);
         fillDisplaced(publisher.backBuffer(), tick);
         publisher.publishDisplaced();
     }
-    EXPECT_EQ(allocations(), before);
+    EXPECT_EQ(tests::allocations(), before);
     ::operator delete(::operator new(1));
-    EXPECT_GT(allocations(), before) << "the counter counts";
+    EXPECT_GT(tests::allocations(), before) << "the counter counts";
 }
 
 TEST(Exchange, TheTimeOfPublishingIsFilledIn)

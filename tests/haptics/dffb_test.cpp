@@ -81,8 +81,8 @@ TEST(Dffb, NoContactNoForce)
     EXPECT_EQ(additionalForce(p, 2, vitalAt(1e-3, Vec3(0, 0, 1)), Vec3(0.0), false, dt, state), Vec3(0.0));
 }
 
-// Equations 5-8: a mass M on spring K and damper C, driven at the tip by x(t) = A sin(w t). In the steady state the force on
-// the tip is M times the mass's acceleration, amplitude M w^2 |H| A with H = (K + i w C) / (K - M w^2 + i w C).
+// Equations 5-8: a mass M on spring K and damper C, driven at the tip by x(t) = A sin(w t). In the steady state the force
+// on the tip is M times the mass's acceleration, amplitude M w^2 |H| A with H = (K + i w C) / (K - M w^2 + i w C).
 TEST(Dffb, ThesisIsTheInertiaEffectOfTheSummedParameters)
 {
     DffbParameters p;

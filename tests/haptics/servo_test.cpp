@@ -39,12 +39,14 @@ TEST(Servo, PacedLoopKeepsRealTimeOverHalfASecond)
 {
     Rig rig;
     const auto start = std::chrono::steady_clock::now();
-    const auto timing = runServo(rig.hand, rig.simulation, {true, 0.5}, [](auto&, auto&) {}, rig.stop);
+    const auto timing = runServo(
+        rig.hand, rig.simulation, {true, 0.5}, [](auto&, auto&) {}, rig.stop);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     // Every period is either a tick or a miss: none is made up in a burst.
     EXPECT_EQ(timing.ticks, 500U);
     EXPECT_GE(seconds, 0.499);
-    EXPECT_LE(std::abs(seconds - 1e-3 * static_cast<double>(timing.ticks)), 0.01 + 2e-3 * static_cast<double>(timing.missed));
+    EXPECT_LE(std::abs(seconds - 1e-3 * static_cast<double>(timing.ticks)),
+              0.01 + 2e-3 * static_cast<double>(timing.missed));
 }
 
 // A gap of 50 ms in the loop is counted as missed ticks, and the loop goes on from where it is.
@@ -65,7 +67,10 @@ TEST(Servo, GapIsCountedAndNotMadeUp)
 TEST(Servo, StopsWhenAskedAndWhenTheDeviceHasFinished)
 {
     Rig rig(0.1);
-    EXPECT_NEAR(static_cast<double>(runServo(rig.hand, rig.simulation, {false, 0.0}, [](auto&, auto&) {}, rig.stop).ticks), 100.0, 2.0);
+    EXPECT_NEAR(static_cast<double>(runServo(
+                                        rig.hand, rig.simulation, {false, 0.0}, [](auto&, auto&) {}, rig.stop)
+                                        .ticks),
+                100.0, 2.0);
     Rig stopped;
     const auto sink = [&](const TickRecord& r, const ServoTiming&) { stopped.stop = r.tick == 41; };
     EXPECT_EQ(runServo(stopped.hand, stopped.simulation, {false, 0.0}, sink, stopped.stop).ticks, 42U);

@@ -19,7 +19,10 @@ namespace {
 /// A body on an n^3 grid, 1 m apart, whose surface is given by a signed distance.
 struct Solid {
     Solid(int n, const std::function<double(Vec3)>& sd)
-        : grid{Index3(n), Vec3(0.0), 1.0}, solid(grid.count()), u(grid.count(), Vec3f(0)), surface{{grid, std::vector<float>(grid.count())}}
+        : grid{Index3(n), Vec3(0.0), 1.0},
+          solid(grid.count()),
+          u(grid.count(), Vec3f(0)),
+          surface{{grid, std::vector<float>(grid.count())}}
     {
         for (std::size_t i = 0; i < grid.count(); ++i) {
             const double d = sd(grid.position(grid.node(i)));
@@ -94,7 +97,8 @@ TEST(OccupancyMap, RewritesOnlyElementsThatChangeTheirCell)
     s.displace([](Vec3) { return Vec3(0.2, -0.3, 0.4); });
     EXPECT_EQ(s.map->rewrites(), 0U);
     s.displace([](Vec3 p) { return p.x == 5.0 ? Vec3(0.7, 0, 0) : Vec3(0.0); });
-    const auto column = static_cast<std::uint64_t>(std::count_if(s.solid.begin(), s.solid.end(), [](auto v) { return v != 0; }) / 12);
+    const auto column =
+        static_cast<std::uint64_t>(std::count_if(s.solid.begin(), s.solid.end(), [](auto v) { return v != 0; }) / 12);
     EXPECT_EQ(s.map->rewrites(), column);
 }
 

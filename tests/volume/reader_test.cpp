@@ -1,49 +1,14 @@
-// A program of its own, because it counts every allocation.
 #include "bodies.h"
 
 #include <volume/tissue.h>
 
+#include <tests/allocations.h>
+
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
 #include <limits>
-#include <new>
 #include <random>
 #include <thread>
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-void* operator new(std::size_t bytes)
-{
-    ++allocations;
-    if (void* p = std::malloc(bytes)) {
-        return p;
-    }
-    throw std::bad_alloc();
-}
-void* operator new[](std::size_t bytes)
-{
-    return operator new(bytes);
-}
-void operator delete(void* p) noexcept
-{
-    std::free(p);
-}
-void operator delete[](void* p) noexcept
-{
-    std::free(p);
-}
-void operator delete(void* p, std::size_t) noexcept
-{
-    std::free(p);
-}
-void operator delete[](void* p, std::size_t) noexcept
-{
-    std::free(p);
-}
 
 namespace palpate::volume {
 namespace {
@@ -103,13 +68,13 @@ TEST(Reader, AllocatesNothing)
     const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
     const std::vector<Vec3> indices = randomIndices(image.size);
     const Tissue::Reader reader(tissue);
-    const long before = allocations;
+    const auto before = tests::allocations();
     double sum = 0;
     for (const Vec3& index : indices) {
         const Vec3 p = image.affine.toPatient(index);
         sum += reader.label(p) + reader.tissue(p) + reader.youngsModulus(p);
     }
-    EXPECT_EQ(allocations - before, 0);
+    EXPECT_EQ(tests::allocations() - before, 0U);
     EXPECT_GT(sum, 0);
 }
 
