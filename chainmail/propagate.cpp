@@ -10,16 +10,6 @@ namespace palpate::chainmail {
 
 namespace {
 
-using Pull = PropagateScratch::Pull;
-
-// A function object, so that the heap's loops take it in.
-struct Later {
-    bool operator()(const Pull& a, const Pull& b) const noexcept
-    {
-        return a.violation != b.violation ? a.violation < b.violation : a.order > b.order;
-    }
-};
-
 // One run of propagate(): the lattice, the state and the queue together.
 struct Run {
     const Lattice& lattice;
@@ -58,21 +48,6 @@ struct Run {
         }
     }
 
-    void push(Pull pull) noexcept
-    {
-        pull.order = scratch.order++;
-        scratch.queue.push_back(pull);
-        std::push_heap(scratch.queue.begin(), scratch.queue.end(), Later{});
-    }
-
-    Pull pop() noexcept
-    {
-        std::pop_heap(scratch.queue.begin(), scratch.queue.end(), Later{});
-        const Pull pull = scratch.queue.back();
-        scratch.queue.pop_back();
-        return pull;
-    }
-
     void pullNeighbours(Node a) noexcept
     {
         for (int side = 0; side < 6; ++side) {
@@ -83,15 +58,14 @@ struct Run {
             const Vec3f step = correction(u[b] - u[a], side, lattice.between(a, b));
             const float square = glm::dot(step, step);
             if (square > tolerance * tolerance) {
-                push({std::sqrt(square), 0, a, side});
+                scratch.queue.push({a, side}, std::sqrt(square));
             }
         }
     }
 
     // Moves the far end of the link, or the near end where the far one may not.
-    void follow(const Pull& pull, Node b, Vec3f step) noexcept
+    void follow(Node a, Node b, Vec3f step) noexcept
     {
-        const Node a = pull.from;
         const Vec3f far = allowed(b, step);
         const Vec3f near = allowed(a, -step);
         if (glm::length(far) > tolerance) {
@@ -107,37 +81,45 @@ struct Run {
         ++result.moves;
     }
 
+    Vec3f violationOf(const Pull& pull, Node b) const noexcept
+    {
+        return correction(u[b] - u[pull.from], pull.side, lattice.between(pull.from, b));
+    }
+
     void settle() noexcept
     {
         while (!scratch.queue.empty() && result.moves < scratch.maxMoves) {
-            Pull pull = pop();
+            const Pull pull = scratch.queue.pop();
             const Node b = lattice.beside(pull.from, pull.side);
-            const Vec3f step = correction(u[b] - u[pull.from], pull.side, lattice.between(pull.from, b));
+            const Vec3f step = violationOf(pull, b);
             const float violation = glm::length(step);
             if (violation <= tolerance) {
                 continue;
             }
-            if (violation < pull.violation && !scratch.queue.empty() && violation < scratch.queue.front().violation) {
-                pull.violation = violation;
-                push(pull);
+            // Its ends have moved since it was put in: it may be another's turn.
+            if (scratch.queue.holdsLarger(violation)) {
+                scratch.queue.push(pull, violation);
                 continue;
             }
-            follow(pull, b, step);
+            follow(pull.from, b, step);
         }
-        for (const Pull& left : scratch.queue) {
-            result.residual = std::max(result.residual, static_cast<double>(left.violation));
+        while (!scratch.queue.empty()) {
+            const Pull left = scratch.queue.pop();
+            const Vec3f step = violationOf(left, lattice.beside(left.from, left.side));
+            result.residual = std::max(result.residual, static_cast<double>(glm::length(step)));
         }
-        scratch.queue.clear();
     }
 };
 
 }  // namespace
 
 PropagateScratch::PropagateScratch(const Lattice& lattice, std::uint32_t most, std::uint32_t maxSeeds)
-    : seen(lattice.tissue.size(), 0), held(lattice.tissue.size(), 0), maxMoves(most)
-{
     // A move takes one pull out of the queue and puts in six at most.
-    queue.reserve(6 * (static_cast<std::size_t>(most) + maxSeeds) + 6);
+    : queue(lattice.grid.spacing, 6 * (static_cast<std::size_t>(most) + maxSeeds) + 6),
+      seen(lattice.tissue.size(), 0),
+      held(lattice.tissue.size(), 0),
+      maxMoves(most)
+{
     moved.reserve(static_cast<std::size_t>(most) + maxSeeds);
 }
 
@@ -145,7 +127,6 @@ void PropagateScratch::clear() noexcept
 {
     moved.clear();
     ++pass;
-    order = 0;
 }
 
 PropagateResult propagate(const Lattice& lattice, std::span<Vec3f> u, PropagateScratch& scratch,

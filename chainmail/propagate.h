@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chainmail/lattice.h>
+#include <chainmail/violation_queue.h>
 
 #include <cstdint>
 #include <span>
@@ -22,19 +23,11 @@ struct PropagateScratch {
     /// @param maxMoves  node moves that one call may make
     PropagateScratch(const Lattice& lattice, std::uint32_t maxMoves, std::uint32_t maxSeeds);
 
-    struct Pull {
-        float violation;      // [m]
-        std::uint32_t order;  // of arrival: breaks ties first in, first out
-        Node from;
-        int side;  // of the node that is pulled, seen from `from`
-    };
-
-    std::vector<Pull> queue;          // a heap: largest violation on top
+    ViolationQueue queue;
     std::vector<Node> moved;          // nodes moved since clear(), in the order first moved
     std::vector<std::uint32_t> seen;  // last pass that listed the node in `moved`  (count x 1)
     std::vector<std::uint32_t> held;  // last pass that held the node as a seed     (count x 1)
     std::uint32_t pass = 1;
-    std::uint32_t order = 0;
     std::uint32_t maxMoves;
 
     /// Forgets which nodes moved and which are held.
@@ -58,7 +51,7 @@ struct PropagateResult {
 /// @param yield  how the seeds may still be pulled
 /// @returns      how much was done and what is left; scratch.moved lists the nodes, seeds included
 ///
-/// Cost O(moves log moves), at most scratch.maxMoves moves. Allocates nothing, never throws. One call at a time per
+/// Cost O(moves), at most scratch.maxMoves moves. Allocates nothing, never throws. One call at a time per
 /// scratch. Sources: S. F. F. Gibson, "3D ChainMail: a Fast Algorithm for Deforming Volumetric Objects", Symposium on
 /// Interactive 3D Graphics, 1997; M. A. Schill, S. F. F. Gibson, H.-J. Bender, R. Maenner, "Biomechanical Simulation of the
 /// Vitreous Humor in the Eye Using an Enhanced ChainMail Algorithm", MICCAI 1998 (order by violation).

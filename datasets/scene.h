@@ -54,7 +54,7 @@ enum class ModelLevel : std::uint8_t { spring, chainmail };
 struct ModelSettings {
     ModelLevel level = ModelLevel::chainmail;
     double spacing = 2e-3;          // of the ChainMail lattice [m]; widened when the body would need over maxNodes
-    std::uint32_t maxMoves = 2500;  // node moves per tick; what is left over is reported as residual
+    std::uint32_t maxMoves = 5000;  // node moves per tick; what is left over is reported as residual
     double stiffness = 0;           // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact
 };
 
