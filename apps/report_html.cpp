@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace palpate::apps {
@@ -177,6 +178,15 @@ std::string coresCard(const ReportData& d, const haptics::SessionInfo& info)
         return out + "<p class=\"note\">The gun was not fired.</p></section>";
     }
     out += "<p class=\"note\">Tissue in the notch at each firing, by volume.</p>";
+    // Colours go to the tissues that were met, so that neighbours in a bar differ.
+    std::map<std::size_t, std::size_t> met;
+    for (const auto& core : d.cores) {
+        for (std::size_t t = 0; t < core.sample.fraction.size(); ++t) {
+            if (core.sample.fraction[t] > 0) {
+                met.emplace(t, met.size());
+            }
+        }
+    }
     for (std::size_t n = 0; n < d.cores.size(); ++n) {
         const haptics::CoreSample& core = d.cores[n].sample;
         out += fmt::format(
@@ -190,8 +200,9 @@ std::string coresCard(const ReportData& d, const haptics::SessionInfo& info)
             }
             const std::string name = escape(nameOf(info.tissues, t));
             bar += fmt::format("<i style=\"width:{:.2f}%;background:var(--{})\" title=\"{}: {:.1f} %\"></i>", percent,
-                               colour(t), name, percent);
-            key += fmt::format("<span><i style=\"background:var(--{})\"></i>{} {:.1f} %</span>", colour(t), name, percent);
+                               colour(met.at(t)), name, percent);
+            key += fmt::format("<span><i style=\"background:var(--{})\"></i>{} {:.1f} %</span>", colour(met.at(t)), name,
+                               percent);
         }
         out += "<div class=\"core-bar\">" + bar + "</div><div class=\"key\">" +
                (key.empty() ? "nothing in the notch" : key) + "</div></div>";

@@ -4,14 +4,18 @@
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
 #include <haptics/simulation.h>
+#include <render/channel/channel.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <signal.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -43,6 +47,23 @@ std::unique_ptr<Device> openDevice(const std::string& name, const SessionModel& 
     const Vec3 axis = glm::normalize(way.aim - way.entry);
     return std::make_unique<HandDevice>(HandParameters{}, datasets::traineeScript(model.scene, way),
                                         way.entry - startDistance * axis, axis);
+}
+
+// One line on the terminal that tells how the session goes, read as a viewer reads it.
+void showProgress(const std::string& session, const std::atomic<bool>& done)
+{
+    constexpr std::array phases{"free", "touching", "inserted"};
+    const auto viewer = channel::Subscriber::attach(session);
+    while (viewer && !done) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        if (const auto s = viewer->state()) {
+            const Vec3 force(s->total[0], s->total[1], s->total[2]);
+            fmt::print(stderr, "\r{:6.1f} s  {:<8} {:5.1f} mm inside  {:5.2f} N  target {:5.1f} mm  ", s->time,
+                       phases[static_cast<std::size_t>(s->phase)], 1e3 * s->inserted, glm::length(force),
+                       1e3 * s->distance[0]);
+        }
+    }
+    fmt::print(stderr, "\r{:70}\r", "");
 }
 
 // Takes in what the session's figures need, tick by tick, in the servo thread.
@@ -156,7 +177,14 @@ TrainResult Trainer::run()
     sigaction(SIGTERM, &action, nullptr);
 
     std::vector<std::string> warnings;
-    std::thread servo([&] { impl_->servo(warnings); });
+    std::atomic<bool> done{false};
+    std::thread servo([&] {
+        impl_->servo(warnings);
+        done = true;
+    });
+    if (isatty(STDERR_FILENO) != 0) {
+        showProgress(impl_->options.session, done);
+    }
     servo.join();
     for (const auto& warning : warnings) {
         fmt::print(stderr, "palpate: {}\n", warning);

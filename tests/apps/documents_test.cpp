@@ -109,6 +109,34 @@ TEST(Documents, DefaultsOfScenesAreTheParsersAndNoKeyIsMissing)
     }
 }
 
+// Each `palpate COMMAND .. --option ..` of the README, by the programs' own help.
+TEST(Documents, CommandsAndOptionsOfTheReadmeExist)
+{
+    static const std::regex call(R"(^    (?:for .* do )?(palpate|palpate-view) ([^#;]*).*)"), option("--[a-z-]+");
+    std::size_t seen = 0;
+    std::string line;
+    std::smatch m;
+    for (std::istringstream in(readText(PALPATE_SOURCE_DIR "/README.md")); std::getline(in, line);) {
+        if (!std::regex_match(line, m, call) || !built(m[1])) {
+            continue;
+        }
+        const std::string program = m[1], rest = m[2];
+        std::vector<std::string> command{"--help"};
+        if (rest.starts_with("bench tick")) {
+            command = {"bench", "tick", "--help"};
+        } else if (program == "palpate") {
+            command = {rest.substr(0, rest.find(' ')), "--help"};
+        }
+        const Outcome help = Program(program, command).wait();
+        EXPECT_EQ(help.status, 0) << line;
+        for (std::sregex_iterator i(rest.begin(), rest.end(), option), end; i != end; ++i) {
+            EXPECT_NE(help.out.find(i->str()), std::string::npos) << line << ": there is no " << i->str();
+        }
+        ++seen;
+    }
+    EXPECT_GT(seen, 12U);
+}
+
 TEST(Documents, TheExamplesLoad)
 {
     const Folder folder;
