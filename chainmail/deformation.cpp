@@ -10,6 +10,9 @@ namespace palpate::chainmail {
 
 namespace {
 
+// Of a way through the body no more than this is looked at, in spacings: a pose that jumps must not cost a tick.
+constexpr double longestPress = 25.0;
+
 // Calls visit(node, position at rest) for the nodes that are not fixed in the box [low, high].
 template <typename Visit>
 void visitNodes(const Lattice& lattice, Vec3 lowest, Vec3 highest, Visit&& visit) noexcept
@@ -68,13 +71,14 @@ occupancy::Body Deformation::body(const volume::DistanceField& surface) const no
 
 std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept
 {
-    const double way = glm::distance(from, to);
-    if (way <= 0.0) {
+    const double whole = glm::distance(from, to);
+    if (whole <= 0.0) {
         return 0;
     }
-    const Vec3 ahead = (to - from) / way;
+    const Vec3 ahead = (to - from) / whole;
+    const double way = std::min(whole, longestPress * lattice.grid.spacing);
     const double seen = std::max(radius, lattice.grid.spacing);
-    const Vec3 start = from - (seen - radius) * ahead;
+    const Vec3 start = to - (way + seen - radius) * ahead;
     const Vec3 end = start + way * ahead;
     std::size_t count = 0;
     visitNodes(lattice, glm::min(start, end) - seen, glm::max(start, end) + seen, [&](Node n, Vec3 rest) {

@@ -64,6 +64,7 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
     visit("tissue", t.tissue);
     visit("inserted_m", t.inserted);
     visit("contacts", t.contacts);
+    visit("penetration_m", t.penetration);
     visit("moved", t.moved);
     visit("residual_m", t.residual);
     visit("nearest_vital", OptionalIndex{t.nearestVital});

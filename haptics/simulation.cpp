@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -116,6 +117,10 @@ occupancy::Sweep Simulation::collide() noexcept
     const Vec3 back = needle ? device.position - shaftQueried * device.axis : device.position;
     occupancy::touch(body_, {back, device.position, tool.radius}, *contacts_);
     record_.contacts = static_cast<std::uint32_t>(contacts_->count);
+    if (tip_.phase == Phase::contact) {
+        // A needle touches with the point on its axis, a sphere with its whole surface.
+        record_.penetration = std::max(0.0, contacts_->depth - (needle ? tool.radius : 0.0));
+    }
     if (tip_.phase != Phase::free) {
         return {};
     }

@@ -75,9 +75,10 @@ struct TickRecord {
     double inserted = 0;                           // length of the shaft inside [m]
     std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
     std::uint32_t contacts = 0;                    // elements of tissue that the tool touches
-    std::uint32_t moved = 0;                       // nodes that the deformation moved
-    double residual = 0;                           // largest violated link that the work cap left over [m]
-    CoreSample core;                               // when fired
+    double penetration = 0;   // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
+    std::uint32_t moved = 0;  // nodes that the deformation moved
+    double residual = 0;      // largest violated link that the work cap left over [m]
+    CoreSample core;          // when fired
     std::array<Event, maxEventsPerTick> events{};
     std::uint32_t eventCount = 0;
     std::array<float, taskCount> seconds{};  // by task, wall time [s]

@@ -26,28 +26,12 @@ Vec3 axisPoint(const Capsule& tool, int i, int samples) noexcept
     return samples == 1 ? tool.b : glm::mix(tool.b, tool.a, static_cast<double>(i) / (samples - 1));
 }
 
-// Least clearance between the tool's surface and the body, and the point of the axis that has it.
-double clearance(const Body& body, const Capsule& tool, Vec3& nearest) noexcept
-{
-    const int samples = axisSamples(body, tool);
-    double least = 0.0;
-    for (int i = 0; i < samples; ++i) {
-        const Vec3 p = axisPoint(tool, i, samples);
-        const double d = distance(body, p) - tool.radius;
-        if (i == 0 || d < least) {
-            least = d;
-            nearest = p;
-        }
-    }
-    return least;
-}
-
-double distanceToAxis(const Capsule& tool, Vec3 p) noexcept
+Vec3 nearestOnAxis(const Capsule& tool, Vec3 p) noexcept
 {
     const Vec3 along = tool.b - tool.a;
     const double square = glm::dot(along, along);
     const double t = square > 0.0 ? glm::clamp(glm::dot(p - tool.a, along) / square, 0.0, 1.0) : 0.0;
-    return glm::distance(p, tool.a + t * along);
+    return tool.a + t * along;
 }
 
 // Normal of the deformed surface at `p`: the gradient of the distance composed with the inverse displacement.
@@ -64,22 +48,97 @@ Vec3 surfaceNormal(const Body& body, Vec3 p) noexcept
     return length > 1e-12 ? g / length : Vec3(0, 0, 1);
 }
 
+// What lies around a tool: the element whose piece of surface is nearest to the tool's axis, and whether anything has
+// moved.
+struct Surroundings {
+    Element nearest = none;
+    double distance = 0;  // from the axis to that piece of surface, to half an element [m]
+    bool moved = false;
+};
+
+// Visits the elements within `reach` of the tool's axis; visit(element, distance to the axis).
+template <typename Visit>
+Surroundings look(const Body& body, const Capsule& tool, double reach, Visit&& visit) noexcept
+{
+    Surroundings found;
+    body.map.visit(glm::min(tool.a, tool.b) - reach, glm::max(tool.a, tool.b) + reach, [&](Element e) {
+        const Vec3 p = body.position(e);
+        const double away = glm::distance(p, nearestOnAxis(tool, p));
+        if (away >= reach) {
+            return;
+        }
+        // Its surface lies beyond it by its own depth at rest.
+        const double surface = away + body.surface.at(body.restPosition(e));
+        if (found.nearest == none || surface < found.distance) {
+            found.nearest = e;
+            found.distance = surface;
+        }
+        found.moved = found.moved || body.u[e] != Vec3f(0.0F);
+        visit(e, away);
+    });
+    return found;
+}
+
+// Clearance between the tool's surface and the body, and where the axis is nearest.
+struct Gap {
+    double clear = 0;
+    Vec3 point{0.0};
+};
+
+// At rest the distance field answers for the axis itself.
+Gap gapAtRest(const Body& body, const Capsule& tool) noexcept
+{
+    const int samples = axisSamples(body, tool);
+    Gap gap;
+    for (int i = 0; i < samples; ++i) {
+        const Vec3 p = axisPoint(tool, i, samples);
+        const double d = body.surface.distance(p) - tool.radius;
+        if (i == 0 || d < gap.clear) {
+            gap = {d, p};
+        }
+    }
+    return gap;
+}
+
+// Deformed tissue is known only where elements are: look from the point of the tool's surface that faces the nearest of
+// them, and turn it towards the body's surface.
+Gap gapDeformed(const Body& body, const Capsule& tool, const Surroundings& around) noexcept
+{
+    constexpr int turns = 2;
+    Gap gap;
+    gap.point = nearestOnAxis(tool, body.position(around.nearest));
+    const Vec3 facing = body.position(around.nearest) - gap.point;
+    Vec3 normal = glm::dot(facing, facing) > 0.0 ? -glm::normalize(facing) : body.surface.normal(gap.point);
+    for (int i = 0; i < turns && tool.radius > 0.0; ++i) {
+        normal = surfaceNormal(body, gap.point - tool.radius * normal);
+        gap.point = nearestOnAxis(tool, gap.point - tool.radius * normal);
+    }
+    gap.clear = distance(body, gap.point - tool.radius * normal);
+    return gap;
+}
+
+Gap gapOf(const Body& body, const Capsule& tool, const Surroundings& around) noexcept
+{
+    return around.moved ? gapDeformed(body, tool, around) : gapAtRest(body, tool);
+}
+
 }  // namespace
 
 void touch(const Body& body, const Capsule& tool, ContactSet& out) noexcept
 {
     const double reach = tool.radius + 0.5 * body.grid.spacing;
     out.count = 0;
-    body.map.visit(glm::min(tool.a, tool.b) - reach, glm::max(tool.a, tool.b) + reach, [&](Element e) {
-        const double depth = reach - distanceToAxis(tool, body.position(e));
-        if (depth > 0.0 && out.count < ContactSet::capacity) {
-            out.contacts[out.count++] = {e, depth};
+    const auto around = look(body, tool, reach, [&](Element e, double away) {
+        if (out.count < ContactSet::capacity) {
+            out.contacts[out.count++] = {e, reach - away};
         }
     });
-    out.depth = -clearance(body, tool, out.point);
+    const Gap gap = gapOf(body, tool, around);
+    out.depth = -gap.clear;
+    out.point = gap.point;
     out.touching = out.depth > 0.0;
     if (out.touching || out.count > 0) {
-        out.normal = surfaceNormal(body, out.point);
+        out.normal = surfaceNormal(body, out.point - tool.radius * surfaceNormal(body, out.point));
     }
 }
 
@@ -87,12 +146,15 @@ Sweep sweep(const Body& body, const Capsule& from, const Capsule& to) noexcept
 {
     const double way = std::max(glm::distance(from.a, to.a), glm::distance(from.b, to.b));
     const double shortest = 0.25 * std::min(body.grid.spacing, body.surface.grid.spacing);
+    const double reach = 1.5 * body.grid.spacing;
     Sweep result;
     double travelled = 0.0;
     for (int step = 0; step < sweepSteps; ++step) {
         result.fraction = way > 0.0 ? travelled / way : 1.0;
         const Capsule now{glm::mix(from.a, to.a, result.fraction), glm::mix(from.b, to.b, result.fraction), from.radius};
-        const double clear = clearance(body, now, result.point);
+        const Gap gap = gapOf(body, now, look(body, now, now.radius + reach, [](Element, double) {}));
+        const double clear = gap.clear;
+        result.point = gap.point;
         if (clear <= 0.0) {
             result.hit = true;
             return result;

@@ -54,6 +54,7 @@ void expectSame(const TickRecord& a, const TickRecord& b, std::size_t structures
     EXPECT_EQ(a.faulted, b.faulted);
     EXPECT_EQ(bits(a.inserted), bits(b.inserted));
     EXPECT_EQ(bits(a.residual), bits(b.residual));
+    EXPECT_EQ(bits(a.penetration), bits(b.penetration));
     EXPECT_EQ(a.contacts, b.contacts);
     EXPECT_EQ(a.moved, b.moved);
     for (std::size_t i = 0; i < structures; ++i) {

@@ -77,13 +77,15 @@ TEST(Simulation, ChainMailFollowsTheSphereAndSpringDoesNot)
         auto model = tests::modelOf(tests::blockScene);
         model.scene.model.level = deforms ? datasets::ModelLevel::chainmail : datasets::ModelLevel::spring;
         Simulation simulation(model);
-        stroke(simulation, -15e-3, -3e-3, 0.05, [](const TickRecord&) {});
+        double penetration = 0.0;
+        stroke(simulation, -15e-3, -3e-3, 0.05, [&](const TickRecord& r) { penetration = r.penetration; });
         const auto& lattice = model.lattice;
         double deepest = 0.0;
         for (const auto n : simulation.deformation().moved()) {
             deepest = std::max(deepest, static_cast<double>(simulation.deformation().u()[n].y));
         }
         EXPECT_NEAR(deepest, deforms ? 7e-3 : 0.0, lattice.grid.spacing);
+        EXPECT_NEAR(penetration, deforms ? 0.0 : 7e-3, deforms ? lattice.grid.spacing : 0.2e-3);
     }
 }
 

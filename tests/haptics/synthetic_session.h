@@ -207,6 +207,7 @@ inline TickRecord anyTick(std::uint64_t tick, std::mt19937_64& random)
     r.faulted = random() % 2 == 0;
     r.inserted = anyDouble(random);
     r.residual = anyDouble(random);
+    r.penetration = anyDouble(random);
     for (std::size_t i = 0; i < 3; ++i) {
         r.distance[i] = anyDouble(random);
     }
