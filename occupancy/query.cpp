@@ -79,10 +79,11 @@ Surroundings look(const Body& body, const Capsule& tool, double reach, Visit&& v
     return found;
 }
 
-// Clearance between the tool's surface and the body, and where the axis is nearest.
+// Clearance between the tool's surface and the body, where the axis is nearest, and the body's normal there.
 struct Gap {
     double clear = 0;
     Vec3 point{0.0};
+    Vec3 normal{0, 0, 1};
 };
 
 // At rest the distance field answers for the axis itself.
@@ -94,9 +95,11 @@ Gap gapAtRest(const Body& body, const Capsule& tool) noexcept
         const Vec3 p = axisPoint(tool, i, samples);
         const double d = body.surface.distance(p) - tool.radius;
         if (i == 0 || d < gap.clear) {
-            gap = {d, p};
+            gap.clear = d;
+            gap.point = p;
         }
     }
+    gap.normal = body.surface.normal(gap.point);
     return gap;
 }
 
@@ -108,12 +111,12 @@ Gap gapDeformed(const Body& body, const Capsule& tool, const Surroundings& aroun
     Gap gap;
     gap.point = nearestOnAxis(tool, body.position(around.nearest));
     const Vec3 facing = body.position(around.nearest) - gap.point;
-    Vec3 normal = glm::dot(facing, facing) > 0.0 ? -glm::normalize(facing) : body.surface.normal(gap.point);
-    for (int i = 0; i < turns && tool.radius > 0.0; ++i) {
-        normal = surfaceNormal(body, gap.point - tool.radius * normal);
-        gap.point = nearestOnAxis(tool, gap.point - tool.radius * normal);
+    gap.normal = glm::dot(facing, facing) > 0.0 ? -glm::normalize(facing) : body.surface.normal(gap.point);
+    for (int i = 0; i < turns; ++i) {
+        gap.normal = surfaceNormal(body, gap.point - tool.radius * gap.normal);
+        gap.point = nearestOnAxis(tool, gap.point - tool.radius * gap.normal);
     }
-    gap.clear = distance(body, gap.point - tool.radius * normal);
+    gap.clear = distance(body, gap.point - tool.radius * gap.normal);
     return gap;
 }
 
@@ -137,9 +140,7 @@ void touch(const Body& body, const Capsule& tool, ContactSet& out) noexcept
     out.depth = -gap.clear;
     out.point = gap.point;
     out.touching = out.depth > 0.0;
-    if (out.touching || out.count > 0) {
-        out.normal = surfaceNormal(body, out.point - tool.radius * surfaceNormal(body, out.point));
-    }
+    out.normal = gap.normal;
 }
 
 Sweep sweep(const Body& body, const Capsule& from, const Capsule& to) noexcept

@@ -17,7 +17,7 @@ ARROWS = {
     "render": {"render/channel"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "render/channel"},
     "experiments": {"volume", "occupancy", "chainmail", "datasets", "haptics"},
-    "apps": {"volume", "datasets", "haptics", "render", "experiments"},
+    "apps": {"volume", "datasets", "haptics", "render", "render/channel", "experiments"},
 }
 # Third-party headers that stay in one folder.
 OWNERS = {"openvdb/": {"volume"}, "itk": {"volume"}, "vtk": {"render"}, "GLFW/": {"render"}, "sqlite3": {"haptics"}}
