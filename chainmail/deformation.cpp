@@ -21,16 +21,12 @@ void visitNodes(const Lattice& lattice, Vec3 lowest, Vec3 highest, Visit&& visit
     const Vec3 last(grid.size - Index3(1));
     const Index3 low(glm::clamp(glm::ceil((lowest - grid.origin) / grid.spacing), Vec3(0.0), last));
     const Index3 high(glm::clamp(glm::floor((highest - grid.origin) / grid.spacing), Vec3(0.0), last));
-    for (int k = low.z; k <= high.z; ++k) {
-        for (int j = low.y; j <= high.y; ++j) {
-            for (int i = low.x; i <= high.x; ++i) {
-                const auto n = static_cast<Node>(grid.offset({i, j, k}));
-                if (lattice.isNode(n) && !lattice.isFixed(n)) {
-                    visit(n, grid.position({i, j, k}));
-                }
-            }
+    volume::forEachIndex(low, high, [&](Index3 at) {
+        const auto n = static_cast<Node>(grid.offset(at));
+        if (lattice.isNode(n) && !lattice.isFixed(n)) {
+            visit(n, grid.position(at));
         }
-    }
+    });
 }
 
 }  // namespace

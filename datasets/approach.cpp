@@ -76,33 +76,37 @@ std::vector<char> samplesInside(const Tissue& tissue, const NodeGrid& grid, cons
     return inside;
 }
 
-// Connected pieces (faces) of the marked nodes, largest first; unmarks them.
+// Unmarks the connected piece (faces) that `start` lies in.
+Blob takeBlob(const NodeGrid& grid, std::vector<char>& marked, std::size_t start)
+{
+    Blob blob{0, {grid.position(grid.node(start)), grid.position(grid.node(start))}};
+    std::vector<std::size_t> open{start};
+    marked[start] = 0;
+    while (!open.empty()) {
+        const Index3 n = grid.node(open.back());
+        open.pop_back();
+        ++blob.nodes;
+        blob.box = {glm::min(blob.box.low, grid.position(n)), glm::max(blob.box.high, grid.position(n))};
+        for (int side = 0; side < 6; ++side) {
+            Index3 next = n;
+            next[side / 2] += side % 2 == 0 ? 1 : -1;
+            if (grid.contains(next) && marked[grid.offset(next)] != 0) {
+                marked[grid.offset(next)] = 0;
+                open.push_back(grid.offset(next));
+            }
+        }
+    }
+    return blob;
+}
+
+// Connected pieces of the marked nodes, largest first; unmarks them.
 std::vector<Blob> blobs(const NodeGrid& grid, std::vector<char>& marked)
 {
     std::vector<Blob> out;
-    std::vector<std::size_t> open;
     for (std::size_t start = 0; start < marked.size(); ++start) {
-        if (marked[start] == 0) {
-            continue;
+        if (marked[start] != 0) {
+            out.push_back(takeBlob(grid, marked, start));
         }
-        Blob blob{0, {grid.position(grid.node(start)), grid.position(grid.node(start))}};
-        open.assign(1, start);
-        marked[start] = 0;
-        while (!open.empty()) {
-            const Index3 n = grid.node(open.back());
-            open.pop_back();
-            ++blob.nodes;
-            blob.box = {glm::min(blob.box.low, grid.position(n)), glm::max(blob.box.high, grid.position(n))};
-            for (int side = 0; side < 6; ++side) {
-                Index3 next = n;
-                next[side / 2] += side % 2 == 0 ? 1 : -1;
-                if (grid.contains(next) && marked[grid.offset(next)] != 0) {
-                    marked[grid.offset(next)] = 0;
-                    open.push_back(grid.offset(next));
-                }
-            }
-        }
-        out.push_back(blob);
     }
     std::stable_sort(out.begin(), out.end(), [](const Blob& a, const Blob& b) { return a.nodes > b.nodes; });
     return out;
@@ -235,16 +239,12 @@ Vec3 skinNormal(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
 {
     constexpr int half = 5;
     Vec3 sum(0.0);
-    for (int k = -half; k <= half; ++k) {
-        for (int j = -half; j <= half; ++j) {
-            for (int i = -half; i <= half; ++i) {
-                const Vec3 away = skinPatch / half * Vec3(i, j, k);
-                if (glm::length(away) <= skinPatch) {
-                    sum += outside(s, reader, p + away) ? away : -away;
-                }
-            }
+    volume::forEachIndex(Index3(-half), Index3(half), [&](Index3 n) {
+        const Vec3 away = skinPatch / half * Vec3(n);
+        if (glm::length(away) <= skinPatch) {
+            sum += outside(s, reader, p + away) ? away : -away;
         }
-    }
+    });
     const double length = glm::length(sum);
     return length > 0 ? sum / length : Vec3(0.0);
 }

@@ -44,16 +44,18 @@ BreastInterior::BreastInterior(const BreastShape& shape, double density) : shape
     }
     // The threshold is a quantile of the score over a fixed 3 mm sampling: it does not depend on the voxels.
     std::vector<double> scores;
+    const auto sample = [&](double x, double z) {
+        const SurfaceColumn column = surfaceColumn(shape, x, z);
+        for (double y = column.skinFront + 1; y < column.muscleFront; y += 3) {
+            if (column.depth(y) > shape.skin) {
+                scores.push_back(glandScore({x, y, z}, column));
+            }
+        }
+    };
     for (double z = -shape.radius; z < shape.radius; z += 3) {
         for (double x = -shape.radius; x < shape.radius; x += 3) {
-            if (x * x + z * z > shape.radius * shape.radius) {
-                continue;
-            }
-            const SurfaceColumn column = surfaceColumn(shape, x, z);
-            for (double y = column.skinFront + 1; y < column.muscleFront; y += 3) {
-                if (column.depth(y) > shape.skin) {
-                    scores.push_back(glandScore({x, y, z}, column));
-                }
+            if (x * x + z * z <= shape.radius * shape.radius) {
+                sample(x, z);
             }
         }
     }

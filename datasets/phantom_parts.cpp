@@ -219,20 +219,24 @@ std::vector<Tube> growTree(const TreeShape& shape, Vec3 root, Vec3 direction, Ve
         Branch branch = open[b];
         const double endRadius = std::max(branch.radius * 0.85, shape.smallest);
         const int steps = std::max(1, static_cast<int>(branch.length / shape.step));
+        const auto advance = [&](int s, int attempt) {
+            const double wander = shape.wander * (1.0 + attempt / 4.0);
+            const Vec3 way = branch.level == 0 ? glm::normalize(goal - branch.at) : branch.direction;
+            const Vec3 d = glm::normalize(branch.direction + shape.pull * way + wander * random.direction());
+            const double radius = branch.radius + (endRadius - branch.radius) / (steps - s);
+            const Vec3 to = branch.at + shape.step * d;
+            if (!allowed(to, radius) || !allowed((branch.at + to) * 0.5, radius)) {
+                return false;
+            }
+            tubes.push_back({branch.at, to, branch.radius, radius});
+            branch = {to, d, radius, branch.length, branch.level};
+            return true;
+        };
         bool blocked = false;
         for (int s = 0; s < steps && !blocked; ++s) {
             blocked = true;
             for (int attempt = 0; attempt < attempts && blocked; ++attempt) {
-                const double wander = shape.wander * (1.0 + attempt / 4.0);
-                const Vec3 way = branch.level == 0 ? glm::normalize(goal - branch.at) : branch.direction;
-                const Vec3 d = glm::normalize(branch.direction + shape.pull * way + wander * random.direction());
-                const double radius = branch.radius + (endRadius - branch.radius) / (steps - s);
-                const Vec3 to = branch.at + shape.step * d;
-                if (allowed(to, radius) && allowed((branch.at + to) * 0.5, radius)) {
-                    tubes.push_back({branch.at, to, branch.radius, radius});
-                    branch = {to, d, radius, branch.length, branch.level};
-                    blocked = false;
-                }
+                blocked = !advance(s, attempt);
             }
         }
         if (branch.level + 1 < shape.levels && branch.radius * murray >= shape.smallest) {

@@ -45,15 +45,13 @@ CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& rea
         // The displacement varies over the lattice's spacing, far more slowly than over the notch's width.
         const Vec3 rest = occupancy::restPoint(body, middle);
         slicesInTarget += inTarget(rest) ? 1 : 0;
-        for (int r = 0; r < coreRings; ++r) {
+        for (int n = 0; n < coreRings * coreSectors; ++n) {
+            const int r = n / coreSectors;
             const double radius = tool.notchRadius * std::sqrt((r + 0.5) / coreRings);  // rings of equal area
-            for (int s = 0; s < coreSectors; ++s) {
-                const double turn = 2.0 * std::numbers::pi * (s + 0.5 * (r % 2)) / coreSectors;
-                const Vec3 p = rest + radius * (std::cos(turn) * right + std::sin(turn) * up);
-                const auto row = reader.tissue(p);
-                if (row == 0) {
-                    continue;
-                }
+            const double turn = 2.0 * std::numbers::pi * (n % coreSectors + 0.5 * (r % 2)) / coreSectors;
+            const Vec3 p = rest + radius * (std::cos(turn) * right + std::sin(turn) * up);
+            const auto row = reader.tissue(p);
+            if (row != 0) {
                 ++filled;
                 core.fraction[row] += 1.0;
                 hits += inTarget(p) ? 1 : 0;

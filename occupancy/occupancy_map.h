@@ -34,18 +34,11 @@ public:
     template <typename Visit>
     void visit(Vec3 low, Vec3 high, Visit&& visitElement) const noexcept
     {
-        const Index3 first = cellAt(low);
-        const Index3 last = cellAt(high);
-        for (int k = first.z; k <= last.z; ++k) {
-            for (int j = first.y; j <= last.y; ++j) {
-                std::size_t cell = cells_.offset({first.x, j, k});
-                for (int i = first.x; i <= last.x; ++i, ++cell) {
-                    for (Element e = head_[cell]; e != none; e = next_[e]) {
-                        visitElement(e);
-                    }
-                }
+        volume::forEachIndex(cellAt(low), cellAt(high), [&](Index3 cell) {
+            for (Element e = head_[cells_.offset(cell)]; e != none; e = next_[e]) {
+                visitElement(e);
             }
-        }
+        });
     }
 
     /// How many elements changed their cell since the map was made.

@@ -63,6 +63,19 @@ struct NodeGrid {
     Box box() const noexcept { return {origin, position(size - Index3(1))}; }
 };
 
+/// Calls visit(index) for every index from `first` to `last`, both included, x fastest.
+template <typename Visit>
+void forEachIndex(Index3 first, Index3 last, Visit&& visit)
+{
+    for (int k = first.z; k <= last.z; ++k) {
+        for (int j = first.y; j <= last.y; ++j) {
+            for (int i = first.x; i <= last.x; ++i) {
+                visit(Index3(i, j, k));
+            }
+        }
+    }
+}
+
 /// The grid with nodes `spacing` [m] apart that covers `box` and `margin` [m] around it.
 NodeGrid coveringGrid(const Box& box, double spacing, double margin);
 

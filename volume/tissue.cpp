@@ -90,18 +90,21 @@ Block<Leaf> makeBlock(const LabelImage& image, const std::vector<typename Leaf::
     const Value first = valueOf[image.values[image.offset(low)]];
     bool uniform = high == low + leafSide || first == Value{};
     auto leaf = std::make_unique<Leaf>(openvdb::Coord(low.x, low.y, low.z), Value{}, false);
+    const std::size_t slice = image.offset({0, 0, 1});
+    const auto fillColumn = [&](int x, int y) {
+        const openvdb::Index at = Leaf::coordToOffset(openvdb::Coord(x, y, low.z));
+        const std::size_t from = image.offset({x, y, low.z});
+        for (int z = 0; z < high.z - low.z; ++z) {
+            const Value value = valueOf[image.values[from + static_cast<std::size_t>(z) * slice]];
+            uniform = uniform && value == first;
+            if (value != Value{}) {
+                leaf->setValueOn(at + static_cast<openvdb::Index>(z), value);
+            }
+        }
+    };
     for (int x = low.x; x < high.x; ++x) {
         for (int y = low.y; y < high.y; ++y) {
-            const openvdb::Index at = Leaf::coordToOffset(openvdb::Coord(x, y, low.z));
-            const std::size_t from = image.offset({x, y, low.z});
-            const std::size_t slice = image.offset({0, 0, 1});
-            for (int z = 0; z < high.z - low.z; ++z) {
-                const Value value = valueOf[image.values[from + static_cast<std::size_t>(z) * slice]];
-                uniform = uniform && value == first;
-                if (value != Value{}) {
-                    leaf->setValueOn(at + static_cast<openvdb::Index>(z), value);
-                }
-            }
+            fillColumn(x, y);
         }
     }
     if (uniform) {
