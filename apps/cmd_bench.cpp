@@ -1,6 +1,7 @@
 #include <apps/command.h>
 
 #include <apps/figures.h>
+#include <apps/outputs.h>
 #include <apps/session.h>
 #include <experiments/bench_tick.h>
 
@@ -48,14 +49,22 @@ void printCase(int side, const experiments::TickCase& c)
     std::fflush(stdout);
 }
 
-void benchTick(const Options& o)
+void printHead()
 {
     fmt::print("ticks in contact; times in us, tasks p50\n{:>8} {:>8} {:>8} {:>8}", "voxels", "ticks", "p50", "p99");
     for (std::size_t i = 0; i < haptics::taskCount; ++i) {
         fmt::print(" {:>7}", name(static_cast<haptics::Task>(i)));
     }
     fmt::print(" {:>8}\n", "moved");
+}
 
+void benchTick(const Options& o)
+{
+    checkOutput(o.json);
+    const bool tell = o.json != "-";
+    if (tell) {
+        printHead();
+    }
     auto cases = nlohmann::json::array();
     double first = 0.0;
     double most = 0.0;
@@ -64,14 +73,18 @@ void benchTick(const Options& o)
         changes.voxelsPerSide = side;
         const auto model = openSession(o.scene, changes);
         const auto result = experiments::benchTick(model, {o.paced, 0.0});
-        printCase(side, result);
+        if (tell) {
+            printCase(side, result);
+        }
         cases.push_back(caseFigures(side, model, result));
         const double p50 = result.contact.percentiles().p50;
         first = first == 0.0 ? p50 : first;
         most = std::max(most, p50);
     }
     const double growth = most / first;
-    fmt::print("the largest median is {:.2f} x that of the first volume\n", growth);
+    if (tell) {
+        fmt::print("the largest median is {:.2f} x that of the first volume\n", growth);
+    }
     if (!o.json.empty()) {
         writeJson(o.json, {{"cases", cases}, {"growth", growth}, {"scene", o.scene}});
     }

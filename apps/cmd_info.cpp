@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/session.h>
 #include <apps/volume_report.h>
 
 #include <fmt/format.h>
@@ -17,7 +18,7 @@ struct InfoOptions {
 
 void runInfo(const InfoOptions& options)
 {
-    const volume::Tissue tissue = volume::Tissue::load(options.file);
+    const volume::Tissue tissue = loadVolume(options.file);
     if (options.json != "-") {
         fmt::print("{}\n\n", options.file.string());
         printVolume(tissue);

@@ -38,7 +38,8 @@ void replayRecord(const Options& o)
     if (!o.json.empty()) {
         writeJson(o.json, figures);
     }
-    if (!record.complete()) {
+    const bool tell = o.json != "-";
+    if (tell && !record.complete()) {
         fmt::print("{}: the session was cut off; what there is of it is replayed\n", o.file);
     }
     if (!result.identical) {
@@ -47,8 +48,10 @@ void replayRecord(const Options& o)
                         "by another build ({}) or machine",
                         o.file, *result.firstDifference, result.largestDifference, record.info().build));
     }
-    fmt::print("{} ticks replayed: every force is the same, bit for bit ({})\n", result.ticks,
-               hexadecimal(result.forceHash));
+    if (tell) {
+        fmt::print("{} ticks replayed: every force is the same, bit for bit ({})\n", result.ticks,
+                   hexadecimal(result.forceHash));
+    }
 }
 
 }  // namespace

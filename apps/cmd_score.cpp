@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/measures.h>
 #include <apps/report.h>
 
 #include <haptics/score.h>
@@ -8,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -41,33 +41,6 @@ struct Group {
     std::string name;
     std::vector<std::size_t> sessions;  // rows of all sessions
 };
-
-struct Measure {
-    const char* key;    // in --json
-    const char* title;  // in a table
-    int decimals;
-    double (*value)(const Score&);
-};
-
-constexpr std::array<Measure, 17> measures{{
-    {"total", "total", 0, [](const Score& s) { return s.total; }},
-    {"passes", "passes", 0, [](const Score& s) { return static_cast<double>(s.passes); }},
-    {"targeting_error_mm", "target mm", 1, [](const Score& s) { return s.targetingError * 1e3; }},
-    {"best_target_pct", "core %", 0, [](const Score& s) { return s.bestTargetFraction * 100; }},
-    {"best_target_length_mm", "core mm", 1, [](const Score& s) { return s.bestTargetLength * 1e3; }},
-    {"vital_contacts", "vital", 0, [](const Score& s) { return static_cast<double>(s.vitalContacts); }},
-    {"vital_s", "vital s", 2, [](const Score& s) { return s.vitalSeconds; }},
-    {"vital_depth_mm", "vital mm", 1, [](const Score& s) { return s.vitalDepth * 1e3; }},
-    {"warnings", "warnings", 0, [](const Score& s) { return static_cast<double>(s.warnings); }},
-    {"skin_contacts", "skin", 0, [](const Score& s) { return static_cast<double>(s.skinContacts); }},
-    {"redirects", "redirects", 0, [](const Score& s) { return static_cast<double>(s.redirects); }},
-    {"seconds", "time s", 1, [](const Score& s) { return s.seconds; }},
-    {"path_mm", "path mm", 0, [](const Score& s) { return s.pathLength * 1e3; }},
-    {"inserted_path_mm", "inside mm", 0, [](const Score& s) { return s.insertedPath * 1e3; }},
-    {"deepest_mm", "deepest mm", 1, [](const Score& s) { return s.deepest * 1e3; }},
-    {"peak_force_n", "peak N", 2, [](const Score& s) { return s.peakForce; }},
-    {"mean_force_n", "mean N", 2, [](const Score& s) { return s.meanForce; }},
-}};
 
 // Infinity, the targeting error of a session that never fired, sorts last and is worse than any other.
 double median(std::vector<double> values)
@@ -106,7 +79,7 @@ Group parseGroup(const std::string& text, std::vector<Session>& sessions)
 {
     const std::size_t equals = text.find('=');
     if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
-        throw std::runtime_error("--group " + text + ": give a name and files, as in --group experts=a.palpate,b.palpate");
+        throw std::runtime_error("--group " + text + ": give a name and files, as in --group experts=a.db,b.db");
     }
     Group group{text.substr(0, equals), {}};
     for (const std::string& file : CLI::detail::split(text.substr(equals + 1), ',')) {
@@ -127,19 +100,10 @@ std::vector<double> valuesOf(const Group& group, const std::vector<Session>& ses
     return values;
 }
 
-json measuresOf(const Score& score)
-{
-    json out;
-    for (const Measure& m : measures) {
-        out[m.key] = m.value(score);
-    }
-    return out;
-}
-
 json effectSize(const Group& a, const Group& b, const std::vector<Session>& sessions)
 {
     json out = {{"kind", "cliffs_delta"}, {"of", a.name}, {"over", b.name}};
-    for (const Measure& m : measures) {
+    for (const Measure& m : measures()) {
         out[m.key] = cliffsDelta(valuesOf(a, sessions, m), valuesOf(b, sessions, m));
     }
     return out;
@@ -149,20 +113,18 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
 {
     json out = {{"sessions", json::array()}};
     for (const Session& s : sessions) {
-        json one = measuresOf(s.score);
-        const haptics::ScoreParts p = haptics::parts(s.score);
+        json one = scoreFigures(s.score);
         one.update({{"file", s.file.string()},
                     {"scene", s.scene},
                     {"model", s.model},
                     {"device", s.device},
-                    {"complete", s.complete},
-                    {"points", {{"core", p.core}, {"vital", p.vital}, {"technique", p.technique}}}});
+                    {"complete", s.complete}});
         out["sessions"].push_back(std::move(one));
     }
     out["groups"] = json::array();
     for (const Group& g : groups) {
         json medians;
-        for (const Measure& m : measures) {
+        for (const Measure& m : measures()) {
             medians[m.key] = median(valuesOf(g, sessions, m));
         }
         out["groups"].push_back({{"name", g.name}, {"n", g.sessions.size()}, {"median", medians}});
@@ -193,8 +155,8 @@ void printTable(const std::vector<std::string>& heads, const std::vector<std::ve
     for (std::size_t c = 0; c < heads.size(); ++c) {
         text += fmt::format("  {:>{}}", heads[c], std::max<std::size_t>(heads[c].size(), 8));
     }
-    for (std::size_t m = 0; m < measures.size(); ++m) {
-        text += fmt::format("\n{:<12}", measures[m].title);
+    for (std::size_t m = 0; m < measures().size(); ++m) {
+        text += fmt::format("\n{:<12}", measures()[m].title);
         for (std::size_t c = 0; c < heads.size(); ++c) {
             text += fmt::format("  {:>{}}", columns[c][m], std::max<std::size_t>(heads[c].size(), 8));
         }
@@ -214,7 +176,7 @@ void printSessions(const std::vector<Session>& sessions)
         for (const Session& s : sessions) {
             heads.push_back(s.file.filename().string());
             columns.emplace_back();
-            for (const Measure& m : measures) {
+            for (const Measure& m : measures()) {
                 columns.back().push_back(cell(m.value(s.score), m.decimals));
             }
         }
@@ -234,7 +196,7 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
     for (const Group& g : groups) {
         heads.push_back(fmt::format("{} (n={})", g.name, g.sessions.size()));
         columns.emplace_back();
-        for (const Measure& m : measures) {
+        for (const Measure& m : measures()) {
             columns.back().push_back(cell(median(valuesOf(g, sessions, m)), m.decimals + (m.decimals == 0 ? 1 : 0)));
         }
     }
@@ -243,7 +205,7 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
         for (std::size_t b = a + 1; b < groups.size(); ++b) {
             heads.push_back(groups[a].name + " over " + groups[b].name);
             columns.emplace_back();
-            for (const Measure& m : measures) {
+            for (const Measure& m : measures()) {
                 const double delta = cliffsDelta(valuesOf(groups[a], sessions, m), valuesOf(groups[b], sessions, m));
                 columns.back().push_back(fmt::format("{:+.2f}", delta));
             }

@@ -1,6 +1,8 @@
 #include <apps/command.h>
 
 #include <apps/figures.h>
+#include <apps/measures.h>
+#include <apps/outputs.h>
 #include <apps/report.h>
 #include <apps/session.h>
 #include <apps/trainer.h>
@@ -17,12 +19,17 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 namespace palpate::apps {
 
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double longestSession = 86400.0;  // [s]
+constexpr double picturesTimeout = 60.0;    // after the end of a session [s]
 
 struct Options {
     std::string scene = "breast";
@@ -35,25 +42,6 @@ struct Options {
     std::string session;
     std::string record, report, json, pictures;
 };
-
-nlohmann::json scoreFigures(const haptics::Score& s)
-{
-    return {{"total", s.total},
-            {"seconds", s.seconds},
-            {"path_length_mm", 1e3 * s.pathLength},
-            {"inserted_path_mm", 1e3 * s.insertedPath},
-            {"mean_force_n", s.meanForce},
-            {"skin_contacts", s.skinContacts},
-            {"redirects", s.redirects},
-            {"passes", s.passes},
-            {"targeting_error_mm", s.passes > 0 ? nlohmann::json(1e3 * s.targetingError) : nlohmann::json(nullptr)},
-            {"best_target_fraction", s.bestTargetFraction},
-            {"best_target_length_mm", 1e3 * s.bestTargetLength},
-            {"vital_contacts", s.vitalContacts},
-            {"vital_seconds", s.vitalSeconds},
-            {"vital_depth_mm", 1e3 * s.vitalDepth},
-            {"warnings", s.warnings}};
-}
 
 nlohmann::json coreFigures(const TrainResult& result, const haptics::SessionInfo& info)
 {
@@ -136,52 +124,100 @@ fs::path recordFile(const Options& o)
     return o.report.empty() ? fs::path() : fs::path(o.report).replace_extension(".db");
 }
 
-void startViewers(const Options& o, const std::string& session, std::optional<ViewerProcess>& window,
-                  std::optional<ViewerProcess>& camera)
+// Everything that would fail at the end of a session for a reason that is there at its beginning.
+void checkOutputs(const Options& o)
+{
+    checkOutput(o.json);
+    checkOutput(o.report);
+    checkOutputFolder(o.pictures);
+    const auto record = recordFile(o);
+    checkOutput(record);
+    if (!record.empty() && fs::exists(record)) {
+        throw std::runtime_error(record.string() + ": exists already; choose another name or remove it" +
+                                 (o.record.empty() ? " (the record beside the report)" : ""));
+    }
+    if (!o.report.empty() && record == fs::path(o.report)) {
+        throw std::runtime_error(o.report + ": would be record and report in one: call the report .html");
+    }
+}
+
+struct Viewers {
+    std::optional<ViewerProcess> window, camera;
+};
+
+void startViewers(const Options& o, const std::string& session, Viewers& viewers)
 {
     if (wantsWindow(o)) {
-        window.emplace(std::vector<std::string>{"--session", session, "--wait", "30"});
+        viewers.window.emplace(std::vector<std::string>{"--session", session, "--wait", "30"});
     }
     if (!o.pictures.empty()) {
-        camera.emplace(std::vector<std::string>{"--session", session, "--wait", "30", "--offscreen", o.pictures});
+        viewers.camera.emplace(std::vector<std::string>{"--session", session, "--wait", "30", "--offscreen", o.pictures});
+    }
+}
+
+// Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`.
+void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& viewers, TrainResult& result)
+{
+    const auto blame = [&result](const std::string& what) {
+        result.problem += result.problem.empty() ? what : "; " + what;
+    };
+    const auto attempt = [&blame](const auto& write) {
+        try {
+            write();
+        } catch (const std::runtime_error& e) {
+            blame(e.what());
+        }
+    };
+    if (viewers.camera && viewers.camera->wait(picturesTimeout) != 0) {
+        blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
+    }
+    if (!o.json.empty()) {
+        attempt([&] { writeJson(o.json, figuresOf(result, info)); });
+    }
+    if (!o.report.empty()) {
+        attempt([&] { writeReport(o.report, haptics::Record(recordFile(o)), o.pictures); });
     }
 }
 
 void train(const Options& o)
 {
+    checkOutputs(o);
     const auto record = recordFile(o);
-    if (!record.empty() && fs::exists(record)) {
-        throw std::runtime_error(record.string() + ": exists already; choose another name or remove it");
-    }
     const auto model = openSession(o.scene, o.changes);
     const auto info = describeSession(model, o.scene, o.device);
-    TrainOptions options{o.device, sessionName(o), record, {!o.unpaced, o.seconds}};
+    const TrainOptions options{o.device, sessionName(o), record, {!o.unpaced, o.seconds}};
 
-    std::optional<ViewerProcess> window, camera;
+    // Before the record is made, so that a viewer that cannot be started leaves none.
+    Viewers viewers;
+    startViewers(o, options.session, viewers);
     Trainer trainer(model, info, options);
-    startViewers(o, options.session, window, camera);
-    const TrainResult result = trainer.run();
+    TrainResult result = trainer.run();
+    writeOutputs(o, info, viewers, result);
 
-    summarise(result, info);
-    if (camera && camera->wait(60.0) != 0) {
-        fmt::print(stderr, "palpate: {}: the pictures are not complete: the viewer ended early\n", o.pictures);
-    }
-    if (!o.json.empty()) {
-        writeJson(o.json, figuresOf(result, info));
-    }
-    if (!o.report.empty()) {
-        writeReport(o.report, haptics::Record(record), o.pictures);
-        fmt::print("report: {}\n", o.report);
-    }
-    if (!record.empty()) {
-        fmt::print("record: {}\n", record.string());
-    }
-    if (!o.pictures.empty()) {
-        fmt::print("pictures: {}\n", o.pictures);
+    if (o.json != "-") {
+        summarise(result, info);
+        for (const auto& [name, file] : {std::pair<const char*, std::string>{"report", o.report},
+                                         {"record", record.string()},
+                                         {"pictures", o.pictures}}) {
+            if (!file.empty()) {
+                fmt::print("{}: {}\n", name, file);
+            }
+        }
     }
     if (!result.problem.empty()) {
         throw std::runtime_error(result.problem);
     }
+}
+
+// Empty, or what is wrong with a value of --seconds.
+std::string secondsFault(const std::string& text)
+{
+    double seconds = -1.0;
+    const bool number = CLI::detail::lexical_cast(text, seconds);
+    // The negation also catches what is not a number.
+    return !number || !(seconds >= 0.0 && seconds <= longestSession)
+               ? fmt::format("{}: must be 0 to {:g} s (0: to the end of the script)", text, longestSession)
+               : "";
 }
 
 }  // namespace
@@ -198,7 +234,7 @@ void addTrain(CLI::App& app)
         ->check(CLI::IsMember({"off", "thesis", "field"}));
     c->add_option("--target", o->changes.target, "Structure to sample");
     c->add_option("--seed", o->changes.seed, "Every random choice of a phantom");
-    c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(CLI::PositiveNumber);
+    c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);
     c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
@@ -206,7 +242,7 @@ void addTrain(CLI::App& app)
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
     c->add_option("--report", o->report, "Write a report (HTML) to this file");
     c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder")->excludes(unpaced);
-    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
     c->final_callback([o] { train(*o); });
 }
 

@@ -4,14 +4,20 @@
 
 #include <cstdio>
 #include <exception>
+#include <string>
 
 int main(int argc, char** argv)
 {
     CLI::App app("Palpate: feel inside a segmented volume", "palpate");
     app.set_version_flag("--version", PALPATE_BUILD);
     app.require_subcommand(1);
-    app.failure_message([](const CLI::App*, const CLI::Error& e) {
-        return std::string("palpate: ") + e.what() + " (palpate --help lists what there is)\n";
+    app.failure_message([](const CLI::App* program, const CLI::Error& e) {
+        // CLI11 notices a missing command before a wrong word in its place.
+        const auto unknown = program->remaining(true);
+        const std::string what = e.get_name() == "RequiredError" && !unknown.empty()
+                                     ? unknown[0] + ": there is no such command or option"
+                                     : e.what();
+        return "palpate: " + what + " (palpate --help lists what there is)\n";
     });
 
     using namespace palpate::apps;

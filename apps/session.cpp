@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 
@@ -48,6 +47,10 @@ Scene changed(Scene scene, const SceneChanges& changes, const std::string& origi
     if (!anyOf(changes)) {
         return scene;
     }
+    if (!scene.source.file.empty() && (changes.seed || changes.voxelsPerSide)) {
+        throw std::runtime_error(
+            fmt::format("{}: the volume is no phantom: {} changes nothing", origin, changes.seed ? "--seed" : "--voxels"));
+    }
     change(scene, changes);
     return datasets::parseScene(datasets::sceneText(scene), origin);
 }
@@ -59,15 +62,26 @@ Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissu
 
 }  // namespace
 
+volume::Tissue loadVolume(const std::filesystem::path& file)
+{
+    if (std::filesystem::is_directory(file)) {
+        throw std::runtime_error(file.string() + ": is a folder: give a volume (.vdb)");
+    }
+    return volume::Tissue::load(file);
+}
+
 haptics::SessionModel openSession(const std::string& what, const SceneChanges& changes)
 {
     const std::filesystem::path path(what);
     if (path.extension() == ".vdb") {
-        auto tissue = std::make_shared<const volume::Tissue>(volume::Tissue::load(path));
+        auto tissue = std::make_shared<const volume::Tissue>(loadVolume(path));
         auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
         return haptics::buildModel(std::move(scene), std::move(tissue));
     }
     auto builtIn = datasets::builtInScene(what);
+    if (!builtIn && std::filesystem::is_directory(path)) {
+        throw std::runtime_error(what + ": is a folder: give a scene (.toml) or a volume (.vdb)");
+    }
     if (!builtIn && !std::filesystem::exists(path)) {
         throw std::runtime_error(fmt::format("{}: no such scene or volume; built-in scenes are: {}", what,
                                              fmt::join(datasets::builtInScenes(), ", ")));

@@ -3,8 +3,10 @@
 #include <datasets/scene.h>
 #include <haptics/recorder.h>
 #include <haptics/session_model.h>
+#include <volume/tissue.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 
@@ -19,8 +21,11 @@ struct SceneChanges {
     std::optional<double> voxelsPerSide;
 };
 
+/// Loads a volume (.vdb). Throws std::runtime_error, also for a folder.
+volume::Tissue loadVolume(const std::filesystem::path& file);
+
 /// The scene called `what`: a built-in one by name, a TOML file, or a volume (.vdb) with the standard biopsy on it. Loads
-/// the volume and builds the model. Throws std::runtime_error.
+/// the volume and builds the model. Throws std::runtime_error, also for a change that has nothing to change.
 haptics::SessionModel openSession(const std::string& what, const SceneChanges& changes);
 
 /// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now.

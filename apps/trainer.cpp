@@ -38,6 +38,29 @@ void onSignal(int)
     interrupted = true;
 }
 
+// Ctrl-C and a polite kill end the session in good order, and end the program again once the session is over.
+class GoodOrder {
+public:
+    GoodOrder()
+    {
+        struct sigaction action {};
+        action.sa_handler = onSignal;
+        sigaction(SIGINT, &action, &interrupt_);
+        sigaction(SIGTERM, &action, &terminate_);
+    }
+    ~GoodOrder()
+    {
+        sigaction(SIGINT, &interrupt_, nullptr);
+        sigaction(SIGTERM, &terminate_, nullptr);
+    }
+    GoodOrder(const GoodOrder&) = delete;
+    GoodOrder& operator=(const GoodOrder&) = delete;
+
+private:
+    struct sigaction interrupt_ {
+    }, terminate_{};
+};
+
 std::unique_ptr<Device> openDevice(const std::string& name, const SessionModel& model)
 {
     if (name != "hand") {
@@ -148,6 +171,10 @@ struct Trainer::Impl {
                               {"score_total", fmt::format("{:.1f}", result.score.total)}});
             result.lostRecords = recorder->lost();
             result.problem = recorder->error();
+            if (result.lostRecords > 0 && result.problem.empty()) {
+                result.problem = fmt::format("{}: {} ticks were lost by the recorder: record to a faster disk",
+                                             options.record.string(), result.lostRecords);
+            }
         }
         if (tally.faulted && result.problem.empty()) {
             result.problem = "a force or a pose was not finite: the force was switched off (event 'fault' in the record)";
@@ -171,11 +198,7 @@ Trainer::~Trainer() = default;
 
 TrainResult Trainer::run()
 {
-    struct sigaction action {};
-    action.sa_handler = onSignal;
-    sigaction(SIGINT, &action, nullptr);
-    sigaction(SIGTERM, &action, nullptr);
-
+    const GoodOrder untilItsEnd;
     std::vector<std::string> warnings;
     std::atomic<bool> done{false};
     std::thread servo([&] {

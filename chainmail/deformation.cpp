@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace palpate::chainmail {
 
@@ -31,7 +32,7 @@ void visitNodes(const Lattice& lattice, Vec3 lowest, Vec3 highest, Visit&& visit
 
 }  // namespace
 
-Deformation::Deformation(const Lattice& lattice, std::uint32_t maxMoves)
+Deformation::Deformation(const Lattice& lattice, std::uint32_t maxMoves, std::size_t maxSeeds)
     : lattice_(lattice),
       u_(lattice.tissue.size(), Vec3f(0.0F)),
       scratch_(lattice, maxMoves, static_cast<std::uint32_t>(maxSeeds)),
@@ -63,6 +64,13 @@ PropagateResult Deformation::deform(std::span<const Seed> seeds, Yield yield) no
 occupancy::Body Deformation::body(const volume::DistanceField& surface) const noexcept
 {
     return {lattice_.grid, lattice_.tissue, u_, map_, surface};
+}
+
+std::size_t mostPressSeeds(const Lattice& lattice, double radius) noexcept
+{
+    // Nodes in a capsule, widened by one spacing for those on its rim.
+    const double r = std::max(radius / lattice.grid.spacing, 1.0) + 1.0;
+    return static_cast<std::size_t>(std::numbers::pi * r * r * (longestPress + 2.0 * r)) + 1;
 }
 
 std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept

@@ -15,9 +15,10 @@ namespace palpate::chainmail {
 class Deformation {
 public:
     /// @param maxMoves  node moves per tick; what is left over is reported as residual
-    Deformation(const Lattice& lattice, std::uint32_t maxMoves);
+    /// @param maxSeeds  nodes that may be held at a time
+    Deformation(const Lattice& lattice, std::uint32_t maxMoves, std::size_t maxSeeds);
 
-    /// The shape with these nodes held, at most maxSeeds, free to yield along `yield` (see propagate()). Cost O(nodes moved
+    /// The shape with these nodes held, free to yield along `yield` (see propagate()). Cost O(nodes moved
     /// now and last time); allocates nothing.
     PropagateResult deform(std::span<const Seed> seeds, Yield yield = Yield(0.0F)) noexcept;
 
@@ -27,8 +28,6 @@ public:
     const Lattice& lattice() const noexcept { return lattice_; }
     /// What the queries of occupancy/ see. `surface` must outlive it.
     occupancy::Body body(const volume::DistanceField& surface) const noexcept;
-
-    static constexpr std::size_t maxSeeds = 4096;
 
 private:
     const Lattice& lattice_;
@@ -43,6 +42,9 @@ private:
 /// with the same foremost point. Hold them with Yield along the way.
 /// @returns  how many seeds were written to `out`
 std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept;
+
+/// No press of a ball of this radius [m] has more seeds than this.
+std::size_t mostPressSeeds(const Lattice& lattice, double radius) noexcept;
 
 /// The nodes within one spacing of `rest` [m], all displaced by `u` [m]: material that sticks to a needle's tip.
 std::size_t dragSeeds(const Lattice& lattice, Vec3 rest, Vec3 u, std::span<Seed> out) noexcept;

@@ -137,6 +137,10 @@ void readDffb(Section& top, DffbParameters& dffb)
             inner->finish();
         }
     }
+    const double mass = dffb.surgery.mass + dffb.structure.mass + dffb.tissue.mass + dffb.task.mass;
+    if (dffb.mode == DffbMode::thesis && mass <= 0) {
+        section->refuse("mode", "gives no force without a mass: set mass_kg in [dffb.surgery] or another term");
+    }
     section->finish();
 }
 

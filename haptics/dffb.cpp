@@ -68,7 +68,7 @@ Vec3 thesisForce(const DffbParameters& p, std::size_t count, const std::array<Pr
     ForceTerm sum = p.surgery + p.structure + p.tissue + p.task;
     if (s.cursor < count) {
         sum = sum + nearness(p, structures[s.cursor].distance) * (p.structure + p.tissue);
-        if (structures[s.cursor].distance <= 0.0) {
+        if (structures[s.cursor].touching) {
             ++s.cursor;
         }
     }

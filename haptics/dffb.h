@@ -14,7 +14,8 @@ struct Proximity {
     double distance = 0;  // tip to the structure's surface in the deformed tissue, negative inside [m]
     Vec3 away{0, 0, 1};   // unit vector from the structure to the tip
     double gain = 1;
-    bool vital = true;  // false for the target
+    bool vital = true;      // false for the target
+    bool touching = false;  // by the tool's surface
 };
 
 /// State of the additional force between ticks.

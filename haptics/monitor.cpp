@@ -19,12 +19,12 @@ Proximity proximityOf(const GuardedStructure& s, const occupancy::Body& body, Ve
     const double d = s.distance.distance(rest);
     const Vec3 normal = s.distance.normal(rest);
     if (d <= 0.0) {
-        return {d, normal, s.gain, true};
+        return {d, normal, s.gain, true, false};
     }
     const Vec3 nearest = rest - d * normal;
     const Vec3 away = position - (nearest + occupancy::displacementAt(body, nearest));
     const double length = glm::length(away);
-    return {length, length > 1e-6 ? away / length : normal, s.gain, true};
+    return {length, length > 1e-6 ? away / length : normal, s.gain, true, false};
 }
 
 }  // namespace
@@ -51,11 +51,11 @@ std::array<Proximity, maxStructures> monitor(const SessionModel& model, const oc
             addEvent(record, {EventKind::warning, index, 0, d});
         }
         state.near[i] = d < s.warnDistance * (state.near[i] ? hysteresis : 1.0);
-        const bool touching = tip.phase != Phase::free && d < radius;
-        if (touching && !state.touching[i]) {
+        found[i].touching = tip.phase != Phase::free && d < radius;
+        if (found[i].touching && !state.touching[i]) {
             addEvent(record, {EventKind::vitalTouch, index, 0, radius - d});
         }
-        state.touching[i] = touching;
+        state.touching[i] = found[i].touching;
     }
     return found;
 }

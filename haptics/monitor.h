@@ -23,8 +23,8 @@ struct MonitorState {
 std::array<Proximity, maxStructures> monitor(const SessionModel& model, const occupancy::Body& body, const TipState& tip,
                                              Vec3 position, MonitorState& state, TickRecord& record) noexcept;
 
-/// Looks along a needle's throw before it happens: which vital structures lie within `radius` of the way from
-/// `from` to `to` [m], at rest. Adds an event for each.
+/// Looks along a needle's throw: which vital structures lie within the needle's radius of the way from `from` to `to` [m],
+/// in the deformed tissue. Adds an event for each.
 void monitorThrow(const SessionModel& model, const occupancy::Body& body, Vec3 from, Vec3 to, TickRecord& record) noexcept;
 
 }  // namespace palpate::haptics

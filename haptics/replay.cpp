@@ -7,20 +7,37 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <span>
+#include <stdexcept>
 
 namespace palpate::haptics {
 
 namespace {
 
-std::uint64_t fnv(std::uint64_t hash, std::span<const std::byte> bytes) noexcept
-{
-    for (const std::byte b : bytes) {
-        hash = (hash ^ static_cast<std::uint64_t>(b)) * 0x100000001b3;
+// 64-bit FNV-1a over plain data.
+struct Fnv {
+    std::uint64_t value = 0xcbf29ce484222325;
+
+    template <typename T>
+    void addAll(std::span<const T> data) noexcept
+    {
+        for (const std::byte b : std::as_bytes(data)) {
+            value = (value ^ static_cast<std::uint64_t>(b)) * 0x100000001b3;
+        }
     }
-    return hash;
-}
+    template <typename T>
+    void addAll(const std::vector<T>& data) noexcept
+    {
+        addAll(std::span<const T>(data));
+    }
+    template <typename T>
+    void add(const T& one) noexcept
+    {
+        addAll(std::span<const T>(&one, 1));
+    }
+};
 
 bool sameBits(Vec3 a, Vec3 b) noexcept
 {
@@ -31,9 +48,11 @@ bool sameBits(Vec3 a, Vec3 b) noexcept
 
 void ForceHash::add(const TickRecord& record) noexcept
 {
+    Fnv hash{hash_};
     for (const Vec3& f : {record.basic, record.additional, record.total}) {
-        hash_ = fnv(hash_, std::as_bytes(std::span(&f, 1)));
+        hash.add(f);
     }
+    hash_ = hash.value;
 }
 
 ReplayDevice::ReplayDevice(const Record& record)
@@ -53,6 +72,12 @@ ReplayResult replay(const Record& record, const SessionModel& model)
     ReplayResult result;
     ForceHash hash;
     record.each([&](const TickRecord& then) {
+        if (then.tick != result.ticks) {
+            throw std::runtime_error(
+                fmt::format("tick {} is missing in the record: forces depend on every tick, so it "
+                            "cannot be replayed",
+                            result.ticks));
+        }
         const TickRecord& now = simulation.tick(then.device);
         hash.add(now);
         ++result.ticks;
@@ -66,20 +91,33 @@ ReplayResult replay(const Record& record, const SessionModel& model)
             result.firstDifference = then.tick;
         }
     });
+    if (result.ticks == 0) {
+        throw std::runtime_error("the record holds no ticks: there is nothing to replay");
+    }
     result.forceHash = hash.value();
     return result;
 }
 
 std::string modelHash(const SessionModel& model)
 {
-    std::uint64_t hash = 0xcbf29ce484222325;
-    hash = fnv(hash, std::as_bytes(std::span(model.lattice.tissue)));
-    hash = fnv(hash, std::as_bytes(std::span(model.surface.values)));
-    hash = fnv(hash, std::as_bytes(std::span(model.youngsModulus.values)));
-    for (const auto& s : model.structures) {
-        hash = fnv(hash, std::as_bytes(std::span(s.distance.values)));
+    Fnv hash;
+    for (const auto& row : model.tissue->table().rows) {
+        hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
+                            row.cuttingForce, row.frictionPerMetre, row.fixed ? 1.0 : 0.0});
     }
-    return fmt::format("{:016x}", hash);
+    hash.add(model.tissue->affine());
+    for (const auto& s : model.tissue->structures()) {
+        hash.add(std::array<std::uint64_t, 3>{s.value, s.tissue, s.voxels});
+    }
+    hash.addAll(model.lattice.tissue);
+    hash.add(model.lattice.grid.origin);
+    hash.add(model.lattice.grid.spacing);
+    hash.addAll(model.surface.values);
+    hash.addAll(model.youngsModulus.values);
+    for (const auto& s : model.structures) {
+        hash.addAll(s.distance.values);
+    }
+    return fmt::format("{:016x}", hash.value);
 }
 
 }  // namespace palpate::haptics

@@ -43,11 +43,12 @@ struct ReplayResult {
     std::uint64_t forceHash = 0;
 };
 
-/// Feeds a record's poses to a fresh simulation and compares every force, bit by bit.
+/// Feeds a record's poses to a fresh simulation and compares every force, bit by bit. Throws std::runtime_error for a
+/// record with holes or without ticks.
 ReplayResult replay(const Record& record, const SessionModel& model);
 
-/// A hash of the body that forces depend on: lattice, surface and structures (64-bit FNV-1a, in hexadecimal). A record
-/// keeps it, so that it is never replayed on another volume.
+/// A hash of what forces depend on: tissue table, grids, labels' counts, lattice and fields (64-bit FNV-1a, in
+/// hexadecimal). A record keeps it, so that it is never replayed on another volume.
 std::string modelHash(const SessionModel& model);
 
 }  // namespace palpate::haptics

@@ -4,6 +4,7 @@
 #include <sys/mman.h>
 #include <sys/prctl.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -19,6 +20,8 @@ using namespace std::chrono_literals;
 constexpr auto period = 1ms;
 constexpr auto spin = 50us;   // what a sleep may come late without harm
 constexpr int priority = 60;  // above everything ordinary, below the kernel's own threads
+
+constexpr int longestStale = 50;  // ticks: the watchdog has faded the force to zero by then
 
 double seconds(Clock::duration d) noexcept
 {
@@ -38,10 +41,11 @@ void sleepUntil(Clock::time_point due) noexcept
     }
 }
 
-TickRecord oneTick(Device& device, Simulation& simulation) noexcept
+TickRecord oneTick(Device& device, Simulation& simulation, bool late) noexcept
 {
     const auto start = Clock::now();
-    const DeviceSample sample = device.read();
+    DeviceSample sample = device.read();
+    sample.fresh = sample.fresh && !late;
     const auto read = Clock::now();
     TickRecord record = simulation.tick(sample);
     const auto computed = Clock::now();
@@ -58,6 +62,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
 {
     ServoTiming timing;
     auto due = Clock::now() + period;
+    int stale = 0;  // ticks that the force still fades, after a gap
     while (!device.finished() && !stop.load(std::memory_order_relaxed)) {
         if (options.seconds > 0.0 && static_cast<double>(timing.ticks) * tickSeconds >= options.seconds) {
             break;
@@ -66,7 +71,8 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
             sleepUntil(due);
         }
         const auto start = Clock::now();
-        const TickRecord record = oneTick(device, simulation);
+        const TickRecord record = oneTick(device, simulation, stale > 0);
+        stale = std::max(0, stale - 1);
         const auto sent = Clock::now();
         timing.work.add(seconds(sent - start));
         for (std::size_t i = 0; i < taskCount; ++i) {
@@ -83,6 +89,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
         while (options.paced && now > due + period) {
             due += period;
             ++timing.missed;
+            stale = std::min(stale + 1, longestStale);
         }
     }
     return timing;

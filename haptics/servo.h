@@ -21,7 +21,8 @@ using TickSink = std::function<void(const TickRecord&, const ServoTiming&)>;
 
 /// The 1 kHz loop: H2, the simulation's tasks, H5, then `sink`. Runs in the calling thread until the device has finished,
 /// the time is over or `stop` is set. Sleeps until 50 us before a tick is due and spins the rest. After a gap it goes on
-/// from where it is: the ticks in between are counted as missed, never made up in a burst.
+/// from where it is: the ticks in between are counted as missed, never made up in a burst, and for as many ticks the
+/// samples are marked stale, so that the stabiliser's watchdog fades the force.
 ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
                      const std::atomic<bool>& stop);
 

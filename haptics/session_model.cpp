@@ -1,5 +1,7 @@
 #include <haptics/session_model.h>
 
+#include <chainmail/deformation.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,6 +16,7 @@ constexpr double finestField = 0.75e-3;
 constexpr std::size_t surfaceNodes = 4U << 20;
 constexpr std::size_t structureNodes = 1U << 20;
 constexpr std::size_t latticeNodes = 4U << 20;
+constexpr std::size_t mostSeeds = 1U << 16;  // nodes that a tool may hold: beyond, a tick has no time for them
 
 volume::NodeGrid fieldGrid(const volume::Tissue& tissue, std::size_t nodes)
 {
@@ -77,6 +80,12 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     auto surface = tissue->distanceToBody(grid);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
+    if (chainmail::mostPressSeeds(lattice, scene.tool.radius) > mostSeeds) {
+        throw std::runtime_error(
+            fmt::format("{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise "
+                        "[model] spacing_mm",
+                        scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing));
+    }
     return {std::move(scene),   std::move(tissue),    approach, std::move(surface), std::move(modulus),
             std::move(lattice), std::move(structures)};
 }

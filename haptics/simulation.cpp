@@ -34,9 +34,10 @@ private:
     std::chrono::steady_clock::time_point last_;
 };
 
-bool finite(Vec3 v) noexcept
+// A tip within ten metres of the patient's origin and a unit vector: anything else is no pose, and NaN fails both.
+bool isPose(const DeviceSample& device) noexcept
 {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+    return glm::length(device.position) < 10.0 && std::abs(glm::length(device.axis) - 1.0) < 1e-3;
 }
 
 }  // namespace
@@ -44,9 +45,10 @@ bool finite(Vec3 v) noexcept
 Simulation::Simulation(const SessionModel& model)
     : model_(model),
       reader_(*model.tissue),
-      deformation_(model.lattice, model.scene.model.maxMoves),
+      deformation_(model.lattice, model.scene.model.maxMoves,
+                   chainmail::mostPressSeeds(model.lattice, model.scene.tool.radius)),
       body_(deformation_.body(model.surface)),
-      seeds_(chainmail::Deformation::maxSeeds),
+      seeds_(chainmail::mostPressSeeds(model.lattice, model.scene.tool.radius)),
       contacts_(std::make_unique<occupancy::ContactSet>())
 {
 }
@@ -91,11 +93,10 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     return record_;
 }
 
-// A pose that is not finite is replaced by the last that was, and marked: the stabiliser latches the fault.
+// What is no pose is replaced by the last that was one, and marked: the stabiliser latches the fault.
 void Simulation::accept(const DeviceSample& device) noexcept
 {
-    const double length = glm::length(device.axis);
-    if (finite(device.position) && std::isfinite(length) && length > 0.5 && (device.buttons & poseInvalid) == 0) {
+    if (isPose(device) && (device.buttons & poseInvalid) == 0) {
         record_.device = device;
         // Adding zero turns -0 into +0, which is what a record gives back.
         record_.device.position += 0.0;

@@ -18,6 +18,12 @@ bool finite(Vec3 v) noexcept
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+Vec3 bounded(Vec3 v, double most) noexcept
+{
+    const double length = glm::length(v);
+    return length > most ? v * (most / length) : v;
+}
+
 Vec3 towards(Vec3 from, Vec3 to, double most) noexcept
 {
     const Vec3 step = to - from;
@@ -38,8 +44,9 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, dou
         return {Vec3(0.0), Vec3(0.0), s.faulted};
     }
     s.gain = std::clamp(s.gain + (device.fresh ? dt / rampTime : -dt / fadeTime), 0.0, 1.0);
-    s.basic = towards(s.basic, basic, slewShare * cap);
-    s.additional = towards(s.additional, additional, slewShare * cap);
+    // What is over the cap is no force to return from later.
+    s.basic = towards(s.basic, bounded(basic, cap), slewShare * cap);
+    s.additional = towards(s.additional, bounded(additional, cap), slewShare * cap);
     const double size = glm::length(s.basic + s.additional);
     const double scale = s.gain * (size > cap ? cap / size : 1.0);
     // Adding zero turns -0 into +0: records keep every bit but that one.

@@ -11,11 +11,12 @@ namespace palpate::haptics {
 
 inline constexpr std::size_t maxStructures = 16;  // target first, then the lookup table of vital structures
 inline constexpr std::size_t maxTissues = 64;
-inline constexpr std::size_t maxEventsPerTick = 8;
+inline constexpr std::size_t maxEventsPerTick = 16;
 
 inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
 inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
-inline constexpr std::uint32_t poseInvalid = 1U << 31;   // the pose was not finite; records keep the last that was
+inline constexpr std::uint32_t poseInvalid = 1U
+                                             << 31;  // the pose was none (not finite, out of bounds); records keep the last
 
 /// What a device says in one tick.
 struct DeviceSample {

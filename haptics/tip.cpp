@@ -18,14 +18,17 @@ constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one st
 constexpr int slipSteps = 8;
 constexpr double sidewaysLimit = 3.0;     // sideways the tissue gives way at this many cutting forces
 constexpr double sidewaysDepth = 10e-3;   // inserted length that doubles the sideways stiffness [m]
+constexpr double embedding = 10e-3;       // inserted length at which the tip is surrounded [m]
 constexpr double shaftStiffness = 200.0;  // of the tissue that sticks to the shaft [N/m]
 constexpr int shaftSamples = 16;
 
 // Inside, tissue resists on all sides: a rigid disc in an infinite medium is twice as stiff as a punch on its surface
-// (Selvadurai, "The displacement of a rigid disc inclusion embedded in an infinite elastic medium", 1979; nu = 0.5).
-DepthLaw embedded(DepthLaw surface) noexcept
+// (Selvadurai, "The displacement of a rigid disc inclusion embedded in an infinite elastic medium", 1979; nu = 0.5). It
+// comes in over `embedding`: sooner, the force would rise while a pierced skin springs back over the needle.
+DepthLaw embedded(DepthLaw surface, double inserted) noexcept
 {
-    return {2.0 * surface.linear, 2.0 * surface.quadratic, surface.stiffest};
+    const double share = 1.0 + std::clamp(inserted / embedding, 0.0, 1.0);
+    return {share * surface.linear, share * surface.quadratic, surface.stiffest};
 }
 
 struct Tip {
@@ -45,7 +48,7 @@ struct Tip {
     {
         state.phase = Phase::free;
         state.proxy = device.position;
-        state.inserted = state.reach = state.anchor = 0.0;
+        state.inserted = state.anchor = 0.0;
         addEvent(record, {EventKind::release, 0xFF, 0, 0.0});
     }
 
@@ -113,10 +116,19 @@ struct Tip {
     {
         state.phase = Phase::inserted;
         state.entry = state.proxy;
-        state.reach = 0.0;
+        state.deepest = state.proxy;
         state.inserted = 0.0;
         state.anchor = glm::dot(device.position - state.entry, device.axis);
         addEvent(record, {EventKind::puncture, 0xFF, state.tissue, force});
+    }
+
+    // How far the path is cut ahead of the proxy; a needle that was turned or shifted by over its radius is off that path.
+    double openAhead(Vec3 axis) const noexcept
+    {
+        const Vec3 rest = state.deepest - state.proxy;
+        const double along = glm::dot(rest, axis);
+        const bool onPath = glm::length(rest - along * axis) <= model.scene.tool.radius;
+        return onPath ? std::max(along, 0.0) : 0.0;
     }
 
     // Follows the needle along its axis: back freely, forward through what is cut already, and on by cutting.
@@ -124,13 +136,13 @@ struct Tip {
     {
         const Vec3 axis = device.axis;
         double ahead = glm::dot(device.position - state.proxy, axis);
-        if (ahead < 0.0 && reader.tissue(state.proxy) != 0) {
-            state.tissue = reader.tissue(state.proxy);
-        }
-        const double open = state.reach - glm::dot(state.proxy - state.entry, axis);
-        const double free = ahead < 0.0 ? ahead : std::clamp(open, 0.0, ahead);
+        const double free = ahead < 0.0 ? ahead : std::min(openAhead(axis), ahead);
         state.proxy += free * axis;
         ahead -= free;
+        const auto passed = reader.tissue(state.proxy);
+        if (free != 0.0 && passed != 0) {
+            state.tissue = passed;
+        }
         for (int i = 0; i < cutSteps && ahead > 0.0; ++i) {
             const double force = law.force(ahead);
             const auto next = reader.tissue(state.proxy + cutStep * axis);
@@ -148,7 +160,9 @@ struct Tip {
                 addEvent(record, {EventKind::puncture, 0xFF, next, force});
             }
         }
-        state.reach = std::max(state.reach, glm::dot(state.proxy - state.entry, axis));
+        if (openAhead(axis) <= 0.0) {
+            state.deepest = state.proxy;
+        }
         return std::max(ahead, 0.0);
     }
 
@@ -188,7 +202,7 @@ struct Tip {
     Vec3 insert() noexcept
     {
         const auto local = tissueUnder(model, reader, state.proxy, device.axis, model.scene.tool.radius);
-        const auto law = embedded(needleLaw(model, local));
+        const auto law = embedded(needleLaw(model, local), state.inserted);
         const double ahead = cut(law);
         const Vec3 sideways = holdSideways(law);
         state.inserted = glm::dot(state.proxy - state.entry, device.axis);

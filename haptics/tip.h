@@ -16,7 +16,7 @@ struct TipState {
     Vec3 proxy{0.0};          // at rest; while free: the tip itself [m]
     Vec3 normal{0.0};         // out of the body at the proxy, while in contact
     Vec3 entry{0.0};          // where the needle went in, at rest [m]
-    double reach = 0;         // how deep the path is cut, along the needle from `entry` [m]
+    Vec3 deepest{0.0};        // end of the path that is cut, at rest [m]
     double inserted = 0;      // length of the shaft inside, at rest [m]
     double anchor = 0;        // where the shaft sticks, along the needle from `entry` [m]
     std::uint8_t tissue = 0;  // row at the proxy

@@ -31,9 +31,9 @@ Index3 NodeGrid::node(std::size_t offset) const noexcept
 
 NodeGrid coveringGrid(const Box& box, double spacing, double margin)
 {
-    const Vec3 low = box.low - margin;
-    const Vec3 steps = glm::ceil((box.high + margin - low) / spacing - 1e-9);
-    return {Index3(steps) + 1, low, spacing};
+    const Vec3 low = glm::floor((box.low - margin) / spacing - 0.5) + 0.5;
+    const Vec3 high = glm::ceil((box.high + margin) / spacing - 0.5) + 0.5;
+    return {Index3(high - low + 0.5) + 1, spacing * low, spacing};
 }
 
 double affordableSpacing(const Box& box, double wanted, double margin, std::size_t maxNodes)

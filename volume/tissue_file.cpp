@@ -165,7 +165,7 @@ public:
 void writeFile(const std::filesystem::path& file, const TissueData& t)
 {
     openvdb::MetaMap meta;
-    meta.insertMeta(metadataKey, openvdb::StringMetadata(describe(t).dump()));
+    meta.insertMeta(metadataKey, openvdb::StringMetadata(describe(t).dump(-1, ' ', false, json::error_handler_t::replace)));
     meta.insertMeta("creator", openvdb::StringMetadata("palpate"));
     std::ofstream out;
     out.exceptions(std::ios::failbit | std::ios::badbit);

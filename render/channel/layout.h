@@ -10,7 +10,7 @@
 ///     Scenery     names, colours, grids, tool, line        written once
 ///     labels      tissue row per display voxel (uint8)     written once
 ///     State       sequence lock                            every tick
-///     Displaced   triple buffer                            at frame rate
+///     Displaced   four slots, a sequence lock each         at frame rate
 ///
 /// Lengths in metres, forces in newtons, patient frame LPS.
 namespace palpate::channel {

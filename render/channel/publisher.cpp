@@ -12,8 +12,10 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
+#include <system_error>
 
 namespace palpate::channel {
 namespace {
@@ -44,24 +46,38 @@ bool sameFile(int descriptor, const std::string& name)
            ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
 }
 
-// The pid in a segment whose owner lives, else 0. A segment that is not ours to understand counts as left behind.
-std::uint64_t livingOwner(int descriptor)
+struct Owner {
+    bool known = false;     // the segment is one of ours, complete and laid out as here
+    std::uint64_t pid = 0;  // 0: dead
+};
+
+Owner ownerOf(int descriptor)
 {
     struct stat status {};
     if (::fstat(descriptor, &status) != 0 || static_cast<std::size_t>(status.st_size) < sizeof(Header))
-        return 0;
+        return {};
     void* mapped = ::mmap(nullptr, sizeof(Header), PROT_READ, MAP_SHARED, descriptor, 0);
     if (mapped == MAP_FAILED)
-        return 0;
+        return {};
     const auto& header = *static_cast<const Header*>(mapped);
-    const bool lives = header.magic.load(std::memory_order_acquire) == magic && ownerLives(header);
-    const std::uint64_t pid = lives ? header.ownerPid : 0;
+    Owner owner;
+    if (header.magic.load(std::memory_order_acquire) == magic) {
+        owner.known = header.version == version && header.layoutHash == layoutHash();
+        owner.pid = ownerLives(header) ? header.ownerPid : 0;
+    }
     ::munmap(mapped, sizeof(Header));
-    return pid;
+    return owner;
 }
 
-// Removes the segment `name` if a dead process left it. The lock on it lets only one of several newcomers do so, and the
-// second look at the name keeps the slower one from removing what the faster one has put there.
+// Removes the segment `name` that is open as `old`. The lock on it lets only one process at a time do so, and the second
+// look at the name keeps a slower one from removing what a faster one has put there. Nobody holds the lock for longer.
+void removeLocked(const File& old, const std::string& name)
+{
+    if (::flock(old.descriptor, LOCK_EX) == 0 && sameFile(old.descriptor, name))
+        ::shm_unlink(name.c_str());
+}
+
+// Removes the segment `name` if a dead process left it, or if it is not ours to understand.
 void removeLeftBehind(const std::string& session, const std::string& name)
 {
     const File old(::shm_open(name.c_str(), O_RDWR, 0));
@@ -69,13 +85,38 @@ void removeLeftBehind(const std::string& session, const std::string& name)
         return;
     if (old.descriptor < 0)
         fail(session, "there is one already that belongs to somebody else (choose another --session)", errno);
-    if (const std::uint64_t pid = livingOwner(old.descriptor))
+    if (const std::uint64_t pid = ownerOf(old.descriptor).pid)
         throw std::runtime_error("session " + session + " is running already (pid " + std::to_string(pid) +
                                  "): end it or choose another --session");
-    if (::flock(old.descriptor, LOCK_EX | LOCK_NB) != 0)
-        throw std::runtime_error("session " + session + " is being started by another process");
-    if (sameFile(old.descriptor, name))
-        ::shm_unlink(name.c_str());
+    removeLocked(old, name);
+}
+
+// Whether `file` is the temporary name (Publisher::Impl::temporary) of a process that is dead.
+bool unfinished(const std::string& file)
+{
+    const std::size_t dot = file.rfind('.');
+    const std::string pid = dot == std::string::npos ? "" : file.substr(dot + 1);
+    const bool number = !pid.empty() && pid.size() < 12 && pid.find_first_not_of("0123456789") == std::string::npos;
+    return number && processStart(std::stoull(pid)) == 0;
+}
+
+// Removes the segments that killed processes have left under other names: each may be 100 MB of memory. One that is not
+// ours to understand, or not to open, stays.
+void removeOthersLeftBehind()
+{
+    std::error_code failed;
+    for (auto i = std::filesystem::directory_iterator(segmentFolder, failed); !failed && i != end(i); i.increment(failed)) {
+        const std::string file = i->path().filename();
+        if (!file.starts_with("palpate-"))
+            continue;
+        const std::string name = "/" + file;
+        const File old(::shm_open(name.c_str(), O_RDWR, 0));
+        if (old.descriptor < 0)
+            continue;
+        const Owner owner = ownerOf(old.descriptor);
+        if (owner.pid == 0 && (owner.known || unfinished(file)))
+            removeLocked(old, name);
+    }
 }
 
 constexpr std::size_t aligned(std::size_t bytes)
@@ -138,6 +179,7 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
 {
     checkScenery(session, scenery, labels.size());
     removeLeftBehind(session, name);
+    removeOthersLeftBehind();
     const std::size_t scene = aligned(sizeof(Header)), label = scene + aligned(sizeof(Scenery)),
                       states = label + aligned(labels.size()), displacements = states + aligned(sizeof(StateBlock));
     try {

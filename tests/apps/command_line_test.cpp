@@ -32,10 +32,13 @@ TEST(CommandLine, TheHelpListsEveryCommand)
 TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
 {
     expectRefusal({}, "--help");
-    expectRefusal({"nosuch"}, "--help");
+    expectRefusal({"nosuch"}, "nosuch: there is no such command");
+    expectRefusal({"bench", "nosuch"}, "nosuch: there is no such command");
     expectRefusal({"train", "--nosuch"}, "--nosuch");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
-    expectRefusal({"train", "--seconds", "soon"}, "--seconds");
+    for (const std::string seconds : {"soon", "-1", "nan", "inf", "86401"}) {
+        expectRefusal({"train", "--seconds", seconds}, "--seconds: " + seconds + ": must be 0 to 86400 s");
+    }
     expectRefusal({"bench"}, "--help");
     expectRefusal({"train", "nosuch"}, "breast, layered, block");
     expectRefusal({"phantom", "nosuch", "-o", "never.vdb"}, "breast, layered, block");
@@ -60,8 +63,9 @@ TEST(CommandLine, AFolderInPlaceOfAFileIsRefusedOnOneLine)
     const Folder folder;
     const std::string inside = folder / "sub.vdb";
     std::filesystem::create_directory(inside);
-    expectRefusal({"info", inside}, inside + ": ");
-    expectRefusal({"train", inside, "--headless"}, inside + ": ");
+    expectRefusal({"info", inside}, inside + ": is a folder");
+    expectRefusal({"train", inside, "--headless"}, inside + ": is a folder");
+    expectRefusal({"train", folder / "", "--headless"}, "is a folder");
     expectRefusal({"import", inside, "-o", folder / "out.vdb"}, inside + ": ");
     expectRefusal({"replay", inside}, inside + ": ");
     expectRefusal({"score", inside}, inside + ": ");
@@ -93,6 +97,53 @@ TEST(CommandLine, AnOutputThatCannotBeWrittenIsRefusedOnOneLine)
     expectRefusal({"phantom", "block", "-o", below + ".vdb"}, below);
     expectRefusal({"phantom", "block", "-o", folder / "block.vdb", "--json", below}, below);
     expectRefusal({"info", folder / "block.vdb", "--json", below}, below);
+}
+
+// The scene is wrong, too: the output is looked at first, and nothing is lost that took time.
+TEST(CommandLine, AnOutputThatCannotBeWrittenIsRefusedBeforeTheSession)
+{
+    const Folder folder;
+    const std::string file = folder / "file";
+    writeText(file, "not a folder");
+    for (const std::string option : {"--json", "--record", "--report", "--pictures"}) {
+        expectRefusal({"train", "nosuch", option, file + "/a.html"}, file + "/a.html: cannot be ");
+        expectRefusal({"train", "nosuch", option, folder / "none/.."}, option == "--pictures" ? "nosuch: " : "/none/..: ");
+    }
+    expectRefusal({"train", "nosuch", "--report", folder / "a.db"}, "call the report .html");
+    writeText(folder / "b.db", "mine");
+    expectRefusal({"train", "nosuch", "--report", folder / "b.html"}, "b.db: exists already");
+    expectRefusal({"train", "nosuch", "--json", folder / ""}, "is a folder");
+}
+
+TEST(CommandLine, ASeedForAVolumeIsRefused)
+{
+    const Folder folder;
+    const std::string volume = folder / "block.vdb", scene = folder / "scene.toml";
+    ASSERT_EQ(palpate({"phantom", "block", "-o", volume}).status, 0);
+    writeText(scene, "[volume]\nfile = \"block.vdb\"\n[target]\nstructure = \"tumour\"\n");
+    for (const std::string& what : {volume, scene}) {
+        expectRefusal({"train", what, "--headless", "--seed", "2"}, what + ": the volume is no phantom: --seed");
+    }
+}
+
+// Standard output is one JSON text and nothing else.
+TEST(CommandLine, FiguresOnStandardOutputStandAlone)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db", report = folder / "report.html", volume = folder / "block.vdb";
+    const std::vector<Words> commands{
+        {"train", "layered", "--headless", "--unpaced", "--seconds", "0.1", "--record", record, "--report", report},
+        {"replay", record},
+        {"score", record, "--group", "all=" + record},
+        {"bench", "tick", "layered", "--voxels", "32"},
+        {"phantom", "block", "-o", volume},
+        {"info", volume}};
+    for (Words words : commands) {
+        words.insert(words.end(), {"--json", "-"});
+        const Outcome outcome = palpate(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << words[0] << " printed:\n" << outcome.out;
+    }
 }
 
 TEST(CommandLine, AWrongValueInASceneIsNamedByFileAndLine)

@@ -137,6 +137,15 @@ TEST(Documents, CommandsAndOptionsOfTheReadmeExist)
     EXPECT_GT(seen, 12U);
 }
 
+TEST(Documents, EveryKeyOfAScoreIsExplained)
+{
+    const std::string text = readText(PALPATE_SOURCE_DIR "/docs/score.md");
+    const auto trained = figures({"train", "layered", "--headless", "--unpaced", "--seconds", "0.1"});
+    for (const auto& [key, value] : trained.at("score").items()) {
+        EXPECT_NE(text.find("`" + key + "`"), std::string::npos) << key;
+    }
+}
+
 TEST(Documents, TheExamplesLoad)
 {
     const Folder folder;

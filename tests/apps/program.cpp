@@ -21,7 +21,7 @@ namespace {
 
 std::string programFile(const std::string& name)
 {
-    return std::string(PALPATE_BIN_DIR) + "/" + name;
+    return std::filesystem::path(PALPATE_BIN_DIR) / name;
 }
 
 std::vector<char*> pointers(std::vector<std::string>& words)

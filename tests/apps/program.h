@@ -31,7 +31,7 @@ struct Outcome {
 /// A program of ours as a user starts it, without a display.
 class Program {
 public:
-    /// `name`: palpate or palpate-view.
+    /// `name`: palpate or palpate-view, or the whole path of a copy.
     Program(const std::string& name, const std::vector<std::string>& arguments);
     /// Kills it when it still runs.
     ~Program();

@@ -70,6 +70,15 @@ TEST(ScoreCommand, GivesEachSessionsMeasuresInTheUnitsOfTheirNames)
     EXPECT_EQ(s["total"], 25);
 }
 
+// Names of files are bytes and need not be UTF-8; JSON is.
+TEST(ScoreCommand, ANameThatIsNotUtf8IsReplacedAndTheFileIsWhole)
+{
+    const synthetic::Folder folder;
+    score({session(folder, "a\xff", 0.030, 2.5), "--json", (folder / "f.json").string()});
+    const auto file = readJson(folder / "f.json")["sessions"][0]["file"].get<std::string>();
+    EXPECT_TRUE(file.ends_with("a\xef\xbf\xbd")) << file;
+}
+
 // Depths 10, 20, 60 against 30, 40: of six pairs two are above and four below, delta = -1/3; medians 20 and 35. Forces 1,
 // 1, 1 against 1, 1 are ties.
 TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)

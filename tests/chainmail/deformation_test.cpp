@@ -9,12 +9,14 @@
 namespace palpate::chainmail {
 namespace {
 
+constexpr std::size_t maxSeeds = 4096;
+
 // Load, move aside, unload: the body is back at rest, to the bit.
 TEST(Deformation, UnloadedBodyIsExactlyAtRest)
 {
     const auto lattice = tests::block(15, {}, [](Index3) { return 1; });
-    Deformation body(lattice, 20000);
-    std::vector<Seed> seeds(Deformation::maxSeeds);
+    Deformation body(lattice, 20000, maxSeeds);
+    std::vector<Seed> seeds(maxSeeds);
     for (int step = 0; step < 20; ++step) {
         const Vec3 centre(5.0 + 0.2 * step, 7.0, -1.5 + 0.15 * step);
         const auto count = pressSeeds(lattice, {centre.x, centre.y, -2.5}, centre, 2.0, seeds);
@@ -33,8 +35,8 @@ TEST(Deformation, UnloadedBodyIsExactlyAtRest)
 TEST(Deformation, ShapeDoesNotDependOnThePath)
 {
     const auto lattice = tests::block(15, {}, [](Index3 at) { return at.x > 9 ? 2 : 1; });
-    Deformation direct(lattice, 20000), detour(lattice, 20000);
-    std::vector<Seed> seeds(Deformation::maxSeeds);
+    Deformation direct(lattice, 20000, maxSeeds), detour(lattice, 20000, maxSeeds);
+    std::vector<Seed> seeds(maxSeeds);
     const auto press = [&](Deformation& d, Vec3 centre) {
         d.deform(std::span(seeds).first(pressSeeds(lattice, {centre.x, centre.y, -2.5}, centre, 2.0, seeds)),
                  Yield(0, 0, 1));
@@ -48,12 +50,26 @@ TEST(Deformation, ShapeDoesNotDependOnThePath)
     }
 }
 
+// However the ball lies and moves, its seeds fit what mostPressSeeds() sets aside.
+TEST(PressSeeds, NeverMoreThanSetAside)
+{
+    const auto lattice = tests::block(40, {}, [](Index3) { return 1; });
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> place(-5.0, 45.0), size(0.2, 9.0);
+    std::vector<Seed> seeds(60000);
+    for (int i = 0; i < 300; ++i) {
+        const auto pick = [&] { return Vec3(place(random), place(random), place(random)); };
+        const double radius = size(random);
+        EXPECT_LE(pressSeeds(lattice, pick(), pick(), radius, seeds), mostPressSeeds(lattice, radius));
+    }
+}
+
 // After a press no node is inside the ball, and those under it lie on its far side.
 TEST(Deformation, NoPressedNodeIsInsideTheBall)
 {
     const auto lattice = tests::block(21, {}, [](Index3) { return 1; });
-    Deformation body(lattice, 100000);
-    std::vector<Seed> seeds(Deformation::maxSeeds);
+    Deformation body(lattice, 100000, maxSeeds);
+    std::vector<Seed> seeds(maxSeeds);
     const Vec3 centre(10.2, 9.7, 0.5);
     const double radius = 3.3;
     const auto count = pressSeeds(lattice, {centre.x, centre.y, -radius}, centre, radius, seeds);
@@ -71,9 +87,9 @@ TEST(Deformation, NoPressedNodeIsInsideTheBall)
 TEST(Deformation, OccupancyFollowsOnlyWhatMoved)
 {
     const auto lattice = tests::block(15, {}, [](Index3) { return 1; });
-    Deformation body(lattice, 20000);
+    Deformation body(lattice, 20000, maxSeeds);
     volume::DistanceField surface;
-    std::vector<Seed> seeds(Deformation::maxSeeds);
+    std::vector<Seed> seeds(maxSeeds);
     const auto count = pressSeeds(lattice, {7, 7, -2.0}, {7, 7, 0.6}, 2.0, seeds);
     body.deform(std::span(seeds).first(count));
     const auto map = body.body(surface);

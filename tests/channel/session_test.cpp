@@ -136,11 +136,36 @@ TEST(Session, OfAKilledProcessIsNeitherListedNorAttachedToAndIsTakenOver)
     EXPECT_EQ(subscriber->ending(), Ending::killed);
     EXPECT_FALSE(listed(session));
     EXPECT_FALSE(Subscriber::attach(session).has_value());
-    EXPECT_EQ(::access((segmentFolder + segmentName(session)).c_str(), F_OK), 0) << "a viewer removes nothing";
 
     const Publisher next(session, smallScenery(), smallLabels());
     EXPECT_TRUE(listed(session));
     EXPECT_EQ(subscriber->ending(), Ending::killed) << "the new session is another one";
+}
+
+bool inMemory(const std::string& name)
+{
+    return ::access((segmentFolder + name).c_str(), F_OK) == 0;
+}
+
+// Also one that died before it had a header, known by the process in its temporary name.
+TEST(Session, OfAnyNameThatAKilledProcessHasLeftIsRemovedByTheNextPublisher)
+{
+    const std::string dead = segmentName(sessionNamed("dead")), living = segmentName(sessionNamed("living")),
+                      foreign = segmentName(sessionNamed("alien"));
+    const Publisher held(sessionNamed("living"), smallScenery(), smallLabels());
+    const RawSegment alien(foreign, 4096), young(living + "." + std::to_string(::getpid()), 4096);
+    const pid_t child = leaveSegmentOfDead(sessionNamed("dead"));
+    const RawSegment unfinished(dead + "." + std::to_string(child), 4096);
+    {
+        const Publisher next(sessionNamed("next"), smallScenery(), smallLabels());
+    }
+    EXPECT_FALSE(inMemory(dead));
+    EXPECT_FALSE(inMemory(dead + "." + std::to_string(child)));
+    EXPECT_TRUE(inMemory(living));
+    EXPECT_TRUE(inMemory(living + "." + std::to_string(::getpid()))) << "of a process that lives";
+    EXPECT_TRUE(inMemory(foreign)) << "not made by us";
+    removeSegment(sessionNamed("alien"));
+    ::shm_unlink((living + "." + std::to_string(::getpid())).c_str());
 }
 
 TEST(Session, OfARecycledPidIsTakenOver)

@@ -19,8 +19,8 @@ using datasets::DffbParameters;
 Structures vitalAt(double distance, Vec3 away, double gain = 1.0)
 {
     Structures s{};
-    s[0] = {1.0, away, 1.0, false};
-    s[1] = {distance, away, gain, true};
+    s[0] = {1.0, away, 1.0, false, false};
+    s[1] = {distance, away, gain, true, false};
     return s;
 }
 
@@ -60,16 +60,20 @@ TEST(Dffb, ForceStaysFiniteAndBoundedAtTheStructureAndIsZeroBeyondTheRange)
     EXPECT_EQ(additionalForce(p, 2, vitalAt(20e-3, Vec3(1, 0, 0)), Vec3(0.0), true, dt, state), Vec3(0.0));
 }
 
-// No step over 5 % of the cap per tick while moving at 200 mm/s up to a structure and away again.
-TEST(Dffb, FieldIsSmoothInDistance)
+// Smooth in distance: between neighbouring distances the force changes by no more than the steepest slope of equation 4
+// with its fade allows, 1 / d0 + 1.5 / range per newton, also at the floor, at the range and at contact.
+TEST(Dffb, FieldHasNoStepInDistance)
 {
     const auto p = fieldOf(0.6, 0.4);
-    DffbState state;
-    Vec3 before(0.0);
-    for (int i = 0; i < 400; ++i) {
-        const double d = 25e-3 - 200e-3 * dt * (i < 200 ? i : 400 - i) * 0.6;
-        const Vec3 f = additionalForce(p, 2, vitalAt(d, Vec3(0, 0, 1)), Vec3(0, 0, d), true, dt, state);
-        EXPECT_LT(glm::length(f - before), 0.05 * 8.5);
+    const double step = 1e-6;
+    const double slope = 1.0 / p.floorDistance + 1.5 / p.range;
+    double before = 0.0;
+    for (double d = -2e-3; d < 25e-3; d += step) {
+        DffbState state;
+        const double f = additionalForce(p, 2, vitalAt(d, Vec3(0, 0, 1)), Vec3(0.0), true, dt, state).z;
+        if (d > -2e-3) {
+            ASSERT_LE(std::abs(f - before), slope * step * (1 + 1e-6)) << d;
+        }
         before = f;
     }
 }
@@ -108,11 +112,11 @@ TEST(Dffb, ThesisTakesTheNextVitalStructureOnContact)
     p.mode = DffbMode::thesis;
     p.structure = {1.0, 0.1, 1.0, 50.0};
     auto s = vitalAt(10e-3, Vec3(0, 0, 1));
-    s[2] = {5e-3, Vec3(0, 0, 1), 1.0, true};
+    s[2] = {5e-3, Vec3(0, 0, 1), 1.0, true, false};
     DffbState state;
     additionalForce(p, 3, s, Vec3(0.0), true, dt, state);
     EXPECT_EQ(state.cursor, 1);
-    s[1].distance = -0.1e-3;
+    s[1].touching = true;
     additionalForce(p, 3, s, Vec3(0.0), true, dt, state);
     EXPECT_EQ(state.cursor, 2);
     additionalForce(p, 3, s, Vec3(0.0), true, dt, state);

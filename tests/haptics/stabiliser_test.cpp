@@ -38,6 +38,20 @@ TEST(Stabiliser, RandomForcesStayUnderCapAndSlew)
     }
 }
 
+// A force far over the cap leaves nothing behind: when it ends, the hand is free within the slew from the cap to zero.
+TEST(Stabiliser, OverloadDoesNotWindUp)
+{
+    StabiliserState state;
+    for (int i = 0; i < 2000; ++i) {
+        stabilise(Vec3(0, 1000, 0), Vec3(30, 0, 0), held(), cap, dt, state);
+    }
+    SentForce sent;
+    for (int i = 0; i < 20; ++i) {
+        sent = stabilise(Vec3(0.0), Vec3(0.0), held(), cap, dt, state);
+    }
+    EXPECT_LT(glm::length(sent.basic + sent.additional), 1e-12);
+}
+
 // Below the limits, and once the ramp is up, the force passes unchanged.
 TEST(Stabiliser, SteadyForcePassesUnchanged)
 {
