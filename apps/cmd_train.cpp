@@ -175,7 +175,8 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& v
         attempt([&] { writeJson(o.json, figuresOf(result, info)); });
     }
     if (!o.report.empty()) {
-        attempt([&] { writeReport(o.report, haptics::Record(recordFile(o)), o.pictures); });
+        const fs::path pictures = fs::is_directory(o.pictures) ? o.pictures : "";  // not there when the viewer failed
+        attempt([&] { writeReport(o.report, haptics::Record(recordFile(o)), pictures); });
     }
 }
 
@@ -233,7 +234,7 @@ void addTrain(CLI::App& app)
     c->add_option("--dffb", o->changes.dffb, "Differential force feedback")
         ->check(CLI::IsMember({"off", "thesis", "field"}));
     c->add_option("--target", o->changes.target, "Structure to sample");
-    c->add_option("--seed", o->changes.seed, "Every random choice of a phantom");
+    c->add_option("--seed", o->changes.seed, "Every random choice of a phantom")->check(CLI::NonNegativeNumber);
     c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);

@@ -42,8 +42,9 @@ double checked(const std::string& phantom, const PhantomParameter& p, double val
 {
     // The negation also catches what is not a number.
     if (!(value >= p.low && value <= p.high)) {
-        throw std::runtime_error(fmt::format("phantom '{}': {} = {} {}: must be {:g} to {:g} {}", phantom, p.name, value,
-                                             p.unit, p.low, p.high, p.unit));
+        const std::string unit = p.unit.empty() ? "" : " " + p.unit;
+        throw std::runtime_error(fmt::format("phantom '{}': {} = {}{}: must be {:g} to {:g}{}", phantom, p.name, value,
+                                             unit, p.low, p.high, unit));
     }
     if (p.whole && value != std::floor(value)) {
         throw std::runtime_error(fmt::format("phantom '{}': {} = {}: must be a whole number", phantom, p.name, value));

@@ -76,8 +76,8 @@ void forEachIndex(Index3 first, Index3 last, Visit&& visit)
     }
 }
 
-/// The grid with nodes `spacing` [m] apart that covers `box` and `margin` [m] around it. Nodes lie at half-odd multiples of the
-/// spacing, whatever the box: the same body gets the same nodes at any resolution of its voxels, and faces through the
+/// The grid with nodes `spacing` [m] apart that covers `box` and `margin` [m] around it. Nodes lie at half-odd multiples of
+/// the spacing, whatever the box: the same body gets the same nodes at any resolution of its voxels, and faces through the
 /// origin lie between nodes.
 NodeGrid coveringGrid(const Box& box, double spacing, double margin);
 

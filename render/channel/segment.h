@@ -8,7 +8,8 @@
 #include <cstdint>
 #include <string>
 
-/// The bytes of the segment, for its two ends, publisher.cpp and subscriber.cpp, and for their tests. Not part of the interface.
+/// The bytes of the segment, for its two ends, publisher.cpp and subscriber.cpp, and for their tests. Not part of the
+/// interface.
 namespace palpate::channel {
 
 /// Shared words are atomics so that a torn copy is a value to be thrown away and never a data race.
