@@ -291,8 +291,11 @@ struct Recorder::Impl {
         makeFile(file, info);
         try {
             database.emplace(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
-            // NORMAL syncs only when the log is folded into the file: a killed process loses nothing that was committed.
-            database->execute("PRAGMA synchronous = NORMAL");
+            // A killed process loses nothing that was committed, so no commit has to wait for the disk. NORMAL syncs when a
+            // log is begun, which the update does before the session, and when it is folded into the file, which then is
+            // left to the end: a sync may take a second on a busy disk.
+            database->execute("PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0");
+            database->execute("UPDATE session SET value = value");
             writer.emplace(*database, info.structures.size());
             const SignalsBlocked inherited;
             thread = std::thread([this] { work(); });
