@@ -47,21 +47,6 @@ std::vector<std::string> environmentWithoutDisplay()
 
 }  // namespace
 
-Folder::Folder()
-{
-    std::string name = (std::filesystem::temp_directory_path() / "palpate-test-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) {
-        throw std::runtime_error(name + ": " + std::strerror(errno));
-    }
-    path_ = name;
-}
-
-Folder::~Folder()
-{
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-}
-
 Program::Program(const std::string& name, const std::vector<std::string>& arguments)
 {
     std::vector<std::string> words{programFile(name)};

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <tests/folder.h>
+
 #include <nlohmann/json.hpp>
 
 #include <filesystem>
@@ -8,19 +10,7 @@
 
 namespace palpate::apps {
 
-/// A folder of a test's own; gone with it.
-class Folder {
-public:
-    Folder();
-    ~Folder();
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-
-    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
-private:
-    std::filesystem::path path_;
-};
+using tests::Folder;
 
 /// How a program ended, and what it printed.
 struct Outcome {

@@ -164,7 +164,7 @@ TEST(Session, AnInterruptEndsItInGoodOrder)
 // One session name for all: a killed session's segment is taken over by the next.
 TEST(Session, AKillAtAnyMomentCostsAtMostHalfASecond)
 {
-    const Folder folder;
+    const Folder folder(tests::memoryFolder());
     const std::string session = sessionName("kill");
     std::mt19937 random(std::random_device{}());
     std::uniform_int_distribution<std::uint64_t> moment(20, 2200);

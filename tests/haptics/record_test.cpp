@@ -284,7 +284,7 @@ TEST(Recorder, KilledWriterLosesAtMostHalfASecond)
     ASSERT_NE(shared, MAP_FAILED);
     auto* pushed = new (shared) std::atomic<std::uint64_t>(0);
     std::mt19937 random(11);
-    const synthetic::Folder folder;
+    const synthetic::Folder folder(tests::memoryFolder());
     for (int round = 0; round < 12; ++round) {
         const auto file = folder / (std::to_string(round) + ".palpate");
         pushed->store(0);

@@ -2,6 +2,8 @@
 
 #include <haptics/recorder.h>
 
+#include <tests/folder.h>
+
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -16,30 +18,7 @@
 
 namespace palpate::haptics::synthetic {
 
-/// A folder of its own that goes away at the end.
-class Folder {
-public:
-    Folder()
-    {
-        std::string name = (std::filesystem::temp_directory_path() / "palpate-test-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error("no temporary folder");
-        }
-        path_ = name;
-    }
-    ~Folder()
-    {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    Folder(const Folder&) = delete;
-    Folder& operator=(const Folder&) = delete;
-    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-    const std::filesystem::path& path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
-};
+using tests::Folder;
 
 inline SessionInfo info()
 {
