@@ -219,7 +219,8 @@ std::string page(const haptics::Record& record, const std::filesystem::path& pic
     const double cap = capOf(info);
     json events = json::array();
     for (const MarkedEvent& e : d.events) {
-        events.push_back({{"seconds", e.seconds}, {"kind", kindName(e.event.kind)}, {"label", eventLabel(e.event, info)}});
+        events.push_back(
+            {{"seconds", e.seconds}, {"kind", haptics::name(e.event.kind)}, {"label", eventLabel(e.event, info)}});
     }
     const json data = {
         {"events", events},

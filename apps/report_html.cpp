@@ -12,27 +12,6 @@ namespace palpate::apps {
 
 using haptics::EventKind;
 
-std::string_view kindName(EventKind kind)
-{
-    switch (kind) {
-        case EventKind::contact:
-            return "contact";
-        case EventKind::release:
-            return "release";
-        case EventKind::puncture:
-            return "puncture";
-        case EventKind::warning:
-            return "warning";
-        case EventKind::vitalTouch:
-            return "vital touch";
-        case EventKind::fire:
-            return "fire";
-        case EventKind::fault:
-            return "fault";
-    }
-    return {};
-}
-
 std::string escape(std::string_view text)
 {
     std::string out;
@@ -279,8 +258,8 @@ std::string eventsCard(const ReportData& d, const haptics::SessionInfo& info)
         "</th></tr></thead><tbody>",
         d.eventCount, d.eventCount > d.events.size() ? ", of which the first are here" : "");
     for (const MarkedEvent& e : d.events) {
-        out += fmt::format("<tr><td class=\"n\">{:.3f}</td><th>{}</th><td>{}</td></tr>", e.seconds, kindName(e.event.kind),
-                           escape(eventLabel(e.event, info)));
+        out += fmt::format("<tr><td class=\"n\">{:.3f}</td><th>{}</th><td>{}</td></tr>", e.seconds,
+                           haptics::name(e.event.kind), escape(eventLabel(e.event, info)));
     }
     return out + "</tbody></table></div></details></section>";
 }

@@ -14,7 +14,6 @@ namespace palpate::apps {
 /// Text as it may stand in HTML, also in an attribute.
 std::string escape(std::string_view text);
 
-std::string_view kindName(haptics::EventKind kind);
 /// A few words for a mark in a chart; not escaped.
 std::string eventLabel(const haptics::Event& event, const haptics::SessionInfo& info);
 

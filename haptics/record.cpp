@@ -43,7 +43,7 @@ struct Reader {
     {
         v = static_cast<Integer>(row.integer(++column));
     }
-    void operator()(const char*, Phase& v) { v = fromName<Phase>(row.text(++column), format::phaseNames); }
+    void operator()(const char*, Phase& v) { v = fromName<Phase>(row.text(++column), phaseNames); }
     void operator()(const char*, format::Microseconds<float> v) { v.value = static_cast<float>(row.real(++column) / 1e6); }
     void operator()(const char*, format::OptionalIndex<std::uint8_t> v) { v.value = optionalIndex(row, ++column); }
 };
@@ -73,7 +73,7 @@ void readEvent(const Statement& row, TickRecord& record)
 {
     if (record.eventCount < maxEventsPerTick) {
         Event& event = record.events[record.eventCount++];
-        event.kind = fromName<EventKind>(row.text(1), format::eventNames);
+        event.kind = fromName<EventKind>(row.text(1), eventNames);
         event.structure = optionalIndex(row, 2);
         event.tissue = static_cast<std::uint8_t>(row.integer(3));
         event.value = row.real(4);

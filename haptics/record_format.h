@@ -25,9 +25,6 @@ inline constexpr std::array<const char*, maxStructures> distanceColumns{
     "distance_12_m", "distance_13_m", "distance_14_m", "distance_15_m"};
 inline constexpr std::array<const char*, taskCount> taskColumns{"h2_us", "h3_us", "h4_us", "deform_us",
                                                                 "h6_us", "h7_us", "h5_us"};
-inline constexpr std::array<std::string_view, 3> phaseNames{"free", "contact", "inserted"};
-inline constexpr std::array<std::string_view, 7> eventNames{"contact",     "release", "puncture", "warning",
-                                                            "vital touch", "fire",    "fault"};
 
 /// The index of a structure, of which 0xFF means none.
 template <class Byte>

@@ -160,7 +160,7 @@ struct Binder {
     {
         row.bind(++position, static_cast<std::int64_t>(v));
     }
-    void operator()(const char*, const Phase& v) { row.bind(++position, format::phaseNames[static_cast<std::size_t>(v)]); }
+    void operator()(const char*, const Phase& v) { row.bind(++position, phaseNames[static_cast<std::size_t>(v)]); }
     void operator()(const char*, const format::Microseconds<const float>& v)
     {
         row.bind(++position, static_cast<double>(v.value) * 1e6);
@@ -206,7 +206,7 @@ public:
             Binder bind{event_};
             bind("tick", record.tick);
             bind("position", i);
-            event_.bind(++bind.position, format::eventNames[static_cast<std::size_t>(event.kind)]);
+            event_.bind(++bind.position, eventNames[static_cast<std::size_t>(event.kind)]);
             bind("structure", format::OptionalIndex{event.structure});
             bind("tissue", event.tissue);
             bind("value", event.value);

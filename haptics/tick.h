@@ -29,9 +29,14 @@ struct DeviceSample {
 /// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
 enum class Task : std::uint8_t { h2, h3, h4, deform, h6, h7, h5, count };
 inline constexpr std::size_t taskCount = static_cast<std::size_t>(Task::count);
-std::string_view name(Task task) noexcept;  // "H2", "H3", .., "deform"
+inline constexpr std::array<std::string_view, taskCount> taskNames{"H2", "H3", "H4", "deform", "H6", "H7", "H5"};
+constexpr std::string_view name(Task task) noexcept
+{
+    return taskNames[static_cast<std::size_t>(task)];
+}
 
 enum class Phase : std::uint8_t { free, contact, inserted };
+inline constexpr std::array<std::string_view, 3> phaseNames{"free", "contact", "inserted"};
 
 enum class EventKind : std::uint8_t {
     contact,     // the tool touched the body; tissue: touched; value: how far it went on in this tick [m]
@@ -42,7 +47,12 @@ enum class EventKind : std::uint8_t {
     fire,        // the gun; value: distance from the notch's middle to the target's surface [m]
     fault,       // a force was not finite; the output is zero from now on
 };
-std::string_view name(EventKind kind) noexcept;
+inline constexpr std::array<std::string_view, 7> eventNames{"contact",     "release", "puncture", "warning",
+                                                            "vital touch", "fire",    "fault"};
+constexpr std::string_view name(EventKind kind) noexcept
+{
+    return eventNames[static_cast<std::size_t>(kind)];
+}
 
 struct Event {
     EventKind kind = EventKind::contact;
