@@ -181,6 +181,10 @@ TEST(Session, AKillAtAnyMomentCostsAtMostHalfASecond)
         const haptics::Record cut(record);
         EXPECT_FALSE(cut.complete());
         EXPECT_GE(cut.ticks() + mostLost, seen);
+        if (cut.ticks() == 0) {  // killed before the first batch was written
+            EXPECT_EQ(palpate({"replay", record}).status, 1);
+            continue;
+        }
         const auto replayed = figures({"replay", record});
         EXPECT_EQ(replayed.at("identical"), true);
         EXPECT_EQ(replayed.at("ticks"), cut.ticks());
