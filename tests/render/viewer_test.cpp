@@ -303,13 +303,18 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
     int bars = 0, needle = 0;
     for (int i = 0; i < 300 && (bars < 300 || needle < 300); ++i) {
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        if (said("viewer").find("no display") != std::string::npos) {
+            GTEST_SKIP() << "xvfb-run gave the viewer no display";
+        }
         bars = countOnScreen(folder_ / "Xvfb_screen0", bar);
         needle = countOnScreen(folder_ / "Xvfb_screen0", onSlice);
     }
     EXPECT_GE(bars, 300) << "4.2 N of 8.5 N is half a bar";
     EXPECT_GE(needle, 300);
     publisher.end(SIGKILL);
-    EXPECT_EQ(viewer.wait(), 1) << "killed";
+    // xvfb-run's own status may be about its cleaning up (5): the viewer's line tells.
+    viewer.wait();
+    EXPECT_NE(said("viewer").find("stopped without ending"), std::string::npos) << said("viewer");
 }
 
 TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
@@ -318,7 +323,10 @@ TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
     Process viewer({"xvfb-run", "-a", "-s", "-screen 0 1280x1024x24", program(), "--session", session_, "--size", "640x480",
                     "--frames", "5", "--json", "-"},
                    log("viewer"));
-    EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+    viewer.wait();
+    if (said("viewer").find("no display") != std::string::npos) {
+        GTEST_SKIP() << "xvfb-run gave the viewer no display";
+    }
     EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");
 }
 
