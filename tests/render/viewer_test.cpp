@@ -295,6 +295,8 @@ int countOnScreen(const fs::path& file, const Pixel& colour)
 
 TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
 {
+    // xvfb-run trips over a display that is just going.
+    std::this_thread::sleep_for(std::chrono::seconds(2));
     Process publisher(publish("hold", "1.9"), log("publisher"));
     Process viewer({"xvfb-run", "-a", "-s", "-screen 0 800x600x24 -fbdir " + folder_.string(), program(), "--session",
                     session_, "--size", "800x600", "--wait", "1"},
@@ -319,6 +321,7 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
 
 TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
 {
+    std::this_thread::sleep_for(std::chrono::seconds(2));
     Process publisher(publish("hold", "1.5"), log("publisher"));
     Process viewer({"xvfb-run", "-a", "-s", "-screen 0 1280x1024x24", program(), "--session", session_, "--size", "640x480",
                     "--frames", "5", "--json", "-"},
