@@ -1,6 +1,5 @@
 #include <apps/trainer.h>
 
-#include <datasets/scene.h>
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
 #include <haptics/simulation.h>
@@ -66,10 +65,7 @@ std::unique_ptr<Device> openDevice(const std::string& name, const SessionModel& 
     if (name != "hand") {
         return std::make_unique<ReplayDevice>(Record(name));
     }
-    const auto& way = model.approach;
-    const Vec3 axis = glm::normalize(way.aim - way.entry);
-    return std::make_unique<HandDevice>(HandParameters{}, datasets::traineeScript(model.scene, way),
-                                        way.entry - startDistance * axis, axis);
+    return std::make_unique<HandDevice>(handBefore(model, startDistance));
 }
 
 // One line on the terminal that tells how the session goes, read as a viewer reads it.

@@ -2,11 +2,8 @@
 
 #include <haptics/hand.h>
 
-#include <glm/geometric.hpp>
-
 #include <algorithm>
 #include <atomic>
-#include <numeric>
 
 namespace palpate::experiments {
 
@@ -15,9 +12,7 @@ using namespace haptics;
 TickCase benchTick(const SessionModel& model, const ServoOptions& options)
 {
     constexpr double startDistance = 10e-3;
-    const auto& way = model.approach;
-    const Vec3 axis = glm::normalize(way.aim - way.entry);
-    HandDevice hand({}, datasets::traineeScript(model.scene, way), way.entry - startDistance * axis, axis);
+    HandDevice hand = handBefore(model, startDistance);
     Simulation simulation(model);
 
     TickCase result;

@@ -3,7 +3,6 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
-#include <chrono>
 
 namespace palpate::haptics {
 
@@ -72,13 +71,9 @@ channel::Publisher publisherOf(const std::string& session, const SessionModel& m
 
 }  // namespace
 
-Broadcast::Broadcast(const std::string& session, const SessionModel& model)
-    : publisher_(publisherOf(session, model)), structures_(model.structures.size())
+Broadcast::Broadcast(const std::string& session, const SessionModel& model) : publisher_(publisherOf(session, model))
 {
     static_assert(channel::maxStructures == maxStructures && channel::maxTissues == maxTissues);
-    for (std::size_t i = 0; i < structures_; ++i) {
-        warnDistance_[i] = model.structures[i].warnDistance;
-    }
 }
 
 void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Simulation& simulation) noexcept
@@ -97,12 +92,13 @@ void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Si
     state_.inserted = r.inserted;
     state_.distance = r.distance;
     state_.warning = channel::Warning::none;
-    if (r.nearestVital < structures_) {
+    const SessionModel& model = simulation.model();
+    if (r.nearestVital < model.structures.size()) {
         const double d = r.distance[r.nearestVital];
         state_.warned = r.nearestVital;
-        state_.warning = d <= simulation.model().scene.tool.radius ? channel::Warning::touching
-                         : d < warnDistance_[r.nearestVital]       ? channel::Warning::near
-                                                                   : channel::Warning::none;
+        state_.warning = d <= model.scene.tool.radius                        ? channel::Warning::touching
+                         : d < model.structures[r.nearestVital].warnDistance ? channel::Warning::near
+                                                                             : channel::Warning::none;
     }
     if (r.fired) {
         ++state_.cores;
@@ -113,8 +109,6 @@ void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Si
     if (r.tick % p99Period == p99Period - 1) {
         state_.tickP99 = timing.work.quantile(0.99);
     }
-    const auto now = std::chrono::steady_clock::now().time_since_epoch();
-    state_.published = static_cast<std::uint64_t>(std::chrono::nanoseconds(now).count());
     publisher_.setState(state_);
     if (r.tick % framePeriod == 0) {
         publishDisplaced(simulation);

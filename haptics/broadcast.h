@@ -25,8 +25,6 @@ private:
 
     channel::Publisher publisher_;
     channel::State state_;
-    std::size_t structures_;
-    std::array<double, maxStructures> warnDistance_{};
 };
 
 }  // namespace palpate::haptics

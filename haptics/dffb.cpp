@@ -1,5 +1,7 @@
 #include <haptics/dffb.h>
 
+#include <haptics/bounded.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -36,12 +38,6 @@ double fade(const DffbParameters& p, double distance) noexcept
 {
     const double t = p.range > 0.0 ? std::clamp(1.0 - std::max(distance, 0.0) / p.range, 0.0, 1.0) : 0.0;
     return t * t * (3.0 - 2.0 * t);
-}
-
-Vec3 bounded(Vec3 force, double most) noexcept
-{
-    const double length = glm::length(force);
-    return length > most ? force * (most / length) : force;
 }
 
 // Equation 5: the mass hangs on the tip. Implicit in the spring and damper, so that no choice of M, C, K blows up.
@@ -108,10 +104,8 @@ Vec3 additionalForce(const DffbParameters& p, std::size_t count, const std::arra
     if (p.mode == datasets::DffbMode::off || !touching) {
         s.mass = tip;
         s.massVelocity = s.velocity;
-        s.active = false;
         return Vec3(0.0);
     }
-    s.active = true;
     return p.mode == datasets::DffbMode::thesis ? thesisForce(p, count, structures, tip, dt, s)
                                                 : fieldForce(p, count, structures, s);
 }

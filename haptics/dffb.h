@@ -26,7 +26,6 @@ struct DffbState {
     Vec3 velocity{0.0};       // of the tip, low-passed [m/s]
     std::uint8_t cursor = 1;  // `thesis`: row of the lookup table that is the nearest vital structure now
     bool started = false;
-    bool active = false;
 };
 
 /// Additional force F_AFFB of equations 3-8 of the thesis [N], before the slew limit and the cap.

@@ -96,6 +96,13 @@ DeviceSample HandDevice::read() noexcept
     return sample;
 }
 
+HandDevice handBefore(const SessionModel& model, double distance)
+{
+    const auto& way = model.approach;
+    const Vec3 axis = glm::normalize(way.aim - way.entry);
+    return {HandParameters{}, datasets::traineeScript(model.scene, way), way.entry - distance * axis, axis};
+}
+
 void HandDevice::write(Vec3 force) noexcept
 {
     force_ = force;

@@ -2,6 +2,7 @@
 
 #include <datasets/scene.h>
 #include <haptics/device.h>
+#include <haptics/session_model.h>
 
 #include <vector>
 
@@ -49,5 +50,8 @@ private:
     double peak_ = 0;  // largest force felt in this step [N]
     Vec3 axis_{0.0};
 };
+
+/// The scripted trainee of a session, its tip `distance` [m] outside the body on the planned line.
+HandDevice handBefore(const SessionModel& model, double distance);
 
 }  // namespace palpate::haptics

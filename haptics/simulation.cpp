@@ -98,7 +98,7 @@ void Simulation::accept(const DeviceSample& device) noexcept
 {
     if (isPose(device) && (device.buttons & poseInvalid) == 0) {
         record_.device = device;
-        // Adding zero turns -0 into +0, which is what a record gives back.
+        // One zero and not two: -0 becomes +0.
         record_.device.position += 0.0;
         record_.device.axis += 0.0;
     } else {

@@ -1,5 +1,7 @@
 #include <haptics/stabiliser.h>
 
+#include <haptics/bounded.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -18,17 +20,10 @@ bool finite(Vec3 v) noexcept
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-Vec3 bounded(Vec3 v, double most) noexcept
-{
-    const double length = glm::length(v);
-    return length > most ? v * (most / length) : v;
-}
-
 Vec3 towards(Vec3 from, Vec3 to, double most) noexcept
 {
     const Vec3 step = to - from;
-    const double length = glm::length(step);
-    return length > most ? from + step * (most / length) : to;
+    return glm::length(step) > most ? from + bounded(step, most) : to;
 }
 
 }  // namespace
@@ -49,7 +44,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, dou
     s.additional = towards(s.additional, bounded(additional, cap), slewShare * cap);
     const double size = glm::length(s.basic + s.additional);
     const double scale = s.gain * (size > cap ? cap / size : 1.0);
-    // Adding zero turns -0 into +0: records keep every bit but that one.
+    // One zero and not two: without a force the hash of all forces must not tell from which side it came.
     return {scale * s.basic + 0.0, scale * s.additional + 0.0, false};
 }
 

@@ -12,8 +12,8 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double tipFriction =
-    2.0;  // a sharp tip bites: it slips only when dragged flatter than 27 degrees over the skin [-]
+// A sharp tip bites: it slips only when dragged flatter than 27 degrees over the skin.
+constexpr double tipFriction = 2.0;
 constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
 constexpr int slipSteps = 8;
 constexpr double sidewaysLimit = 3.0;     // sideways the tissue gives way at this many cutting forces
