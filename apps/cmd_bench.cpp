@@ -3,6 +3,7 @@
 #include <apps/figures.h>
 #include <apps/outputs.h>
 #include <apps/session.h>
+#include <experiments/bench_query.h>
 #include <experiments/bench_tick.h>
 
 #include <fmt/format.h>
@@ -11,6 +12,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace palpate::apps {
@@ -90,6 +92,77 @@ void benchTick(const Options& o)
     }
 }
 
+struct QueryOptions {
+    std::vector<int> sides{64, 128, 256};
+    std::string json;
+};
+
+nlohmann::json queryFigures(const experiments::QueryCase& c)
+{
+    const auto touch = c.touch.percentiles();
+    return {{"tool", c.tool},
+            {"elements_per_side", c.elementsPerSide},
+            {"deformed", c.deformed},
+            {"touch_us_p50", 1e6 * touch.p50},
+            {"touch_us_p99", 1e6 * touch.p99},
+            {"sweep_us_p50", 1e6 * c.sweep.percentiles().p50},
+            {"elements_touched", c.meanTouched}};
+}
+
+void printQuery(const experiments::QueryCase& c)
+{
+    const auto touch = c.touch.percentiles();
+    fmt::print("{:>6}^3 {:<18} {:<9} {:>8.1f} {:>8.2f} {:>8.2f} {:>8.2f}\n", c.elementsPerSide, c.tool,
+               c.deformed ? "deformed" : "at rest", c.meanTouched, 1e6 * touch.p50, 1e6 * touch.p99,
+               1e6 * c.sweep.percentiles().p50);
+    std::fflush(stdout);
+}
+
+void benchQuery(const QueryOptions& o)
+{
+    checkOutput(o.json);
+    const bool tell = o.json != "-";
+    if (tell) {
+        fmt::print("times in us\n{:>8} {:<18} {:<9} {:>8} {:>8} {:>8} {:>8}\n", "elements", "tool", "body", "touched",
+                   "touch", "p99", "sweep");
+    }
+    auto cases = nlohmann::json::array();
+    std::vector<double> first;
+    double growth = 0.0;
+    for (const int side : o.sides) {
+        const auto results = experiments::benchQuery(side);
+        for (std::size_t i = 0; i < results.size(); ++i) {
+            if (tell) {
+                printQuery(results[i]);
+            }
+            cases.push_back(queryFigures(results[i]));
+            const double p50 = results[i].touch.percentiles().p50;
+            if (first.size() == i) {
+                first.push_back(p50);
+            }
+            growth = std::max(growth, p50 / first[i]);
+        }
+    }
+    if (tell) {
+        fmt::print("no median of a touch is over {:.2f} x that in the first body\n", growth);
+    }
+    if (!o.json.empty()) {
+        writeJson(o.json, {{"cases", cases}, {"growth", growth}});
+    }
+}
+
+void addBenchQuery(CLI::App& bench)
+{
+    auto o = std::make_shared<QueryOptions>();
+    auto* query = bench.add_subcommand("query", "Time per question what a tool touches, for bodies of growing size");
+    query->add_option("--elements", o->sides, "Elements along each side of the body")
+        ->delimiter(',')
+        ->check(CLI::Range(32, 384))
+        ->capture_default_str();
+    query->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    query->final_callback([o] { benchQuery(*o); });
+}
+
 }  // namespace
 
 void addBench(CLI::App& app)
@@ -101,11 +174,11 @@ void addBench(CLI::App& app)
     auto* tick = bench->add_subcommand("tick", "Time per tick and task, for phantoms of growing resolution");
     tick->add_option("SCENE", o->scene, "Scene with a phantom")->capture_default_str();
     tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")->delimiter(',')->capture_default_str();
-    tick->add_option("--model", o->changes.model, "Level of the tissue model")
-        ->check(CLI::IsMember({"spring", "chainmail"}));
+    tick->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
     tick->add_flag("--paced", o->paced, "One tick per millisecond instead of one after the other");
     tick->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     tick->final_callback([o] { benchTick(*o); });
+    addBenchQuery(*bench);
 }
 
 }  // namespace palpate::apps

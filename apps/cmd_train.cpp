@@ -227,10 +227,13 @@ void addTrain(CLI::App& app)
 {
     auto o = std::make_shared<Options>();
     auto* c = app.add_subcommand("train", "Perform a procedure: a built-in scene, a scene file or a volume");
-    c->add_option("SCENE", o->scene, "breast, layered, block; a scene (.toml) or a volume (.vdb)")->capture_default_str();
+    c->add_option("SCENE", o->scene, "breast, layered, block, plate, pair; a scene (.toml) or a volume (.vdb)")
+        ->capture_default_str();
     c->add_option("--device", o->device, "hand (a scripted trainee), or a record (.db) whose poses are played")
         ->capture_default_str();
-    c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember({"spring", "chainmail"}));
+    c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
+    c->add_option("--setting", o->changes.setting, "How fine level elastic is")
+        ->check(CLI::IsMember(datasets::elasticSettings()));
     c->add_option("--dffb", o->changes.dffb, "Differential force feedback")
         ->check(CLI::IsMember({"off", "thesis", "field"}));
     c->add_option("--target", o->changes.target, "Structure to sample");

@@ -6,6 +6,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -49,6 +50,24 @@ void checkOutputFolder(const fs::path& folder)
     if (access(there.c_str(), W_OK) != 0) {
         throw std::runtime_error(
             fmt::format("{}: cannot be written ({}): choose another place", folder.string(), std::strerror(errno)));
+    }
+}
+
+void writeWhole(const fs::path& file, std::string_view bytes)
+{
+    fs::path half = file;
+    half += ".part";
+    std::ofstream out(half, std::ios::binary);
+    out << bytes;
+    out.close();
+    std::error_code failed;
+    if (out) {
+        fs::rename(half, file, failed);
+    }
+    if (!out || failed) {
+        std::error_code ignored;
+        fs::remove(half, ignored);
+        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
     }
 }
 

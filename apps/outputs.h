@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 namespace palpate::apps {
 
@@ -10,5 +11,8 @@ void checkOutput(const std::filesystem::path& file);
 
 /// As checkOutput() for a folder that is made, with those above it, when it is not there.
 void checkOutputFolder(const std::filesystem::path& folder);
+
+/// Writes a file that appears whole or not at all; one that is there is replaced. Throws std::runtime_error.
+void writeWhole(const std::filesystem::path& file, std::string_view bytes);
 
 }  // namespace palpate::apps

@@ -1,5 +1,6 @@
 #include <apps/report.h>
 
+#include <apps/outputs.h>
 #include <apps/report_data.h>
 #include <apps/report_html.h>
 
@@ -18,9 +19,6 @@
 #include <vector>
 
 namespace palpate::apps {
-
-// Generated from apps/assets by palpate_embed().
-std::string_view asset(std::string_view file) noexcept;
 
 namespace {
 
@@ -138,22 +136,6 @@ json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
             {"series", series}};
 }
 
-// JSON that may stand in a script element: no "</script" and nothing that is not UTF-8.
-std::string embedded(const json& data)
-{
-    const std::string text = data.dump(-1, ' ', false, json::error_handler_t::replace);
-    std::string out;
-    out.reserve(text.size());
-    for (const char c : text) {
-        if (c == '<') {
-            out += "\\u003c";
-        } else {
-            out += c;
-        }
-    }
-    return out;
-}
-
 std::string base64(std::string_view bytes)
 {
     constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -212,7 +194,7 @@ std::string picturesCard(const std::filesystem::path& folder)
     return out + "</div></section>";
 }
 
-std::string page(const haptics::Record& record, const std::filesystem::path& pictures)
+std::string sessionPage(const haptics::Record& record, const std::filesystem::path& pictures)
 {
     const ReportData d = collect(record);
     const haptics::SessionInfo& info = record.info();
@@ -226,12 +208,7 @@ std::string page(const haptics::Record& record, const std::filesystem::path& pic
         {"events", events},
         {"charts", {{"forces", forceChart(d, cap)}, {"depth", depthChart(d, cap)}, {"distances", distanceChart(d, info)}}}};
 
-    std::string out =
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-        "content=\"width=device-width, initial-scale=1\"><title>" +
-        escape(info.scene) + " - Palpate session</title>\n<style>" + std::string(asset("assets/uPlot.min.css")) +
-        std::string(asset("assets/report.css")) + "</style></head>\n<body><main>";
-    out += header(d, record) + scoreCard(d.score) + coresCard(d, info);
+    std::string out = header(d, record) + scoreCard(d.score) + coresCard(d, info);
     out +=
         chartCard("forces", "Force against time",
                   "Basic force of the tissue, additional force that warns, and the total as sent to the hand. Drag to look "
@@ -245,34 +222,14 @@ std::string page(const haptics::Record& record, const std::filesystem::path& pic
                          "Total force by the length of the shaft inside, in bins of half a millimetre.");
     }
     out += picturesCard(pictures) + eventsCard(d, info) + timingCard(d, record) + sessionCard(record);
-    out +=
-        "<footer>Written by Palpate. Charts by uPlot (MIT licence).</footer></main>\n"
-        "<noscript><p>The charts need JavaScript; everything else is here without it.</p></noscript>\n"
-        "<script type=\"application/json\" id=\"data\">" +
-        embedded(data) + "</script>\n<script>" + std::string(asset("assets/uPlot.iife.min.js")) + "</script>\n<script>" +
-        std::string(asset("assets/report.js")) + "</script></body></html>\n";
-    return out;
+    return page(info.scene + " - Palpate session", out, data);
 }
 
 }  // namespace
 
 void writeReport(const std::filesystem::path& html, const haptics::Record& record, const std::filesystem::path& pictures)
 {
-    const std::string text = page(record, pictures);
-    std::filesystem::path half = html;
-    half += ".part";
-    std::ofstream out(half, std::ios::binary);
-    out << text;
-    out.close();
-    std::error_code failed;
-    if (out) {
-        std::filesystem::rename(half, html, failed);
-    }
-    if (!out || failed) {
-        std::error_code ignored;
-        std::filesystem::remove(half, ignored);
-        throw std::runtime_error(html.string() + ": cannot be written: check the folder and the space on the disk");
-    }
+    writeWhole(html, sessionPage(record, pictures));
 }
 
 }  // namespace palpate::apps

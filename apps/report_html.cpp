@@ -1,6 +1,7 @@
 #include <apps/report_html.h>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +12,9 @@
 namespace palpate::apps {
 
 using haptics::EventKind;
+
+// Generated from apps/assets by palpate_embed().
+std::string_view asset(std::string_view file) noexcept;
 
 std::string escape(std::string_view text)
 {
@@ -86,6 +90,22 @@ std::string outcome(const ReportData& d, const haptics::Record& record)
     return escape(text) + (record.complete() ? "" : " The record ends early.");
 }
 
+// JSON that may stand in a script element: no "</script" and nothing that is not UTF-8.
+std::string embedded(const nlohmann::json& data)
+{
+    const std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    std::string out;
+    out.reserve(text.size());
+    for (const char c : text) {
+        if (c == '<') {
+            out += "\\u003c";
+        } else {
+            out += c;
+        }
+    }
+    return out;
+}
+
 // What the servo loop said about its own punctuality, where it did.
 std::string lateness(const haptics::Record& record)
 {
@@ -101,6 +121,25 @@ std::string lateness(const haptics::Record& record)
 }
 
 }  // namespace
+
+std::string page(std::string_view title, std::string_view body, const nlohmann::json& data)
+{
+    std::string out =
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+        "content=\"width=device-width, initial-scale=1\"><title>" +
+        escape(title) + "</title>\n<style>";
+    out.append(asset("assets/uPlot.min.css")).append(asset("assets/report.css"));
+    out.append("</style></head>\n<body><main>").append(body);
+    out +=
+        "<footer>Written by Palpate. Charts by uPlot (MIT licence).</footer></main>\n"
+        "<noscript><p>The charts need JavaScript; everything else is here without it.</p></noscript>\n"
+        "<script type=\"application/json\" id=\"data\">" +
+        embedded(data) + "</script>";
+    for (const auto* script : {"assets/uPlot.iife.min.js", "assets/scatter.js", "assets/report.js"}) {
+        out.append("\n<script>").append(asset(script)).append("</script>");
+    }
+    return out + "</body></html>\n";
+}
 
 std::string header(const ReportData& d, const haptics::Record& record)
 {

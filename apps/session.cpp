@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cassert>
 #include <memory>
 #include <stdexcept>
 
@@ -18,7 +20,13 @@ using datasets::Scene;
 void change(Scene& scene, const SceneChanges& changes)
 {
     if (changes.model) {
-        scene.model.level = *changes.model == "spring" ? datasets::ModelLevel::spring : datasets::ModelLevel::chainmail;
+        const auto* const at = std::find(datasets::modelLevels.begin(), datasets::modelLevels.end(), *changes.model);
+        assert(at != datasets::modelLevels.end());
+        scene.model.level = static_cast<datasets::ModelLevel>(at - datasets::modelLevels.begin());
+    }
+    if (changes.setting) {
+        scene.model.setting = *changes.setting;
+        scene.model.elastic = datasets::elasticSetting(*changes.setting, scene.model.elastic);
     }
     if (changes.dffb) {
         scene.dffb.mode = *changes.dffb == "off"      ? datasets::DffbMode::off
@@ -36,9 +44,14 @@ void change(Scene& scene, const SceneChanges& changes)
     }
 }
 
+std::string_view levelOf(const Scene& scene)
+{
+    return datasets::modelLevels[static_cast<std::size_t>(scene.model.level)];
+}
+
 bool anyOf(const SceneChanges& c)
 {
-    return c.model || c.dffb || c.target || c.seed || c.voxelsPerSide;
+    return c.model || c.setting || c.dffb || c.target || c.seed || c.voxelsPerSide;
 }
 
 // The text must stay the scene: a replay is built from it.
@@ -52,6 +65,10 @@ Scene changed(Scene scene, const SceneChanges& changes, const std::string& origi
             fmt::format("{}: the volume is no phantom: {} changes nothing", origin, changes.seed ? "--seed" : "--voxels"));
     }
     change(scene, changes);
+    if (changes.setting && scene.model.level != datasets::ModelLevel::elastic) {
+        throw std::runtime_error(fmt::format("{}: the tissue model is {}: --setting changes nothing; add --model elastic",
+                                             origin, levelOf(scene)));
+    }
     return datasets::parseScene(datasets::sceneText(scene), origin);
 }
 
@@ -112,7 +129,7 @@ haptics::SessionInfo describeSession(const haptics::SessionModel& model, const s
     info.sceneText = model.scene.text;
     info.sceneOrigin = origin;
     info.volumeHash = haptics::modelHash(model);
-    info.model = model.scene.model.level == datasets::ModelLevel::spring ? "spring" : "chainmail";
+    info.model = levelOf(model.scene);
     info.device = device;
     info.build = PALPATE_BUILD;
     info.seed = model.scene.source.phantom.seed;

@@ -14,10 +14,11 @@ namespace palpate::apps {
 
 /// What the command line changes in a scene.
 struct SceneChanges {
-    std::optional<std::string> model;   // "spring", "chainmail"
-    std::optional<std::string> dffb;    // "off", "thesis", "field"
-    std::optional<std::string> target;  // structure
-    std::optional<std::uint64_t> seed;  // of a phantom
+    std::optional<std::string> model;    // one of datasets::modelLevels
+    std::optional<std::string> setting;  // of level `elastic`: one of datasets::elasticSettings()
+    std::optional<std::string> dffb;     // "off", "thesis", "field"
+    std::optional<std::string> target;   // structure
+    std::optional<std::uint64_t> seed;   // of a phantom
     std::optional<double> voxelsPerSide;
 };
 

@@ -12,6 +12,7 @@ namespace palpate::datasets {
 namespace {
 
 constexpr std::uint16_t tumourLabel = 6;
+constexpr std::uint16_t secondTumourLabel = 7;
 
 struct Layer {
     std::uint16_t label;
@@ -104,9 +105,10 @@ std::vector<PhantomParameter> blockParameters()
     return {{"width_mm", "mm", "width and height", 20, 300, 100, ""},
             {"thickness_mm", "mm", "from the free front to the base", 10, 200, 60, ""},
             {"base_mm", "mm", "thickness of the bone that holds the back", 1, 20, 4, ""},
-            {"tumours", "", "how many: none or one in the middle", 0, 1, 1, "", true},
-            {"tumour_diameter_mm", "mm", "diameter of the tumour, a sphere", 2, 100, 20, ""},
-            {"tumour_centre_mm", "mm", "depth of the tumour's centre below the front", 2, 150, 25, ""},
+            {"tumours", "", "none, one in the middle, or two side by side along x", 0, 2, 1, "", true},
+            {"tumour_diameter_mm", "mm", "diameter of a tumour, a sphere", 2, 100, 20, ""},
+            {"tumour_centre_mm", "mm", "depth of a tumour's centre below the front", 2, 150, 25, ""},
+            {"gap_mm", "mm", "between the nearest points of two tumours", 0, 100, 3, ""},
             {"tissue", "", "what the block is made of, a tissue of the table", 0, 0, 0, "fat"},
             {"tumour_kind", "", "a tissue of the table", 0, 0, 0, "idc_high_grade"}};
 }
@@ -118,8 +120,11 @@ PhantomLabels blockPhantom(const PhantomValues& values)
     const double thickness = values.number("thickness_mm");
     const double back = thickness + values.number("base_mm");
     const double radius = values.number("tumours") >= 1 ? values.number("tumour_diameter_mm") / 2 : 0.0;
-    const Vec3 centre(0, values.number("tumour_centre_mm"), 0);
-    requireRoom(radius == 0 || (centre.y >= radius && centre.y + radius <= thickness && radius <= half), "block", values);
+    const bool two = values.number("tumours") >= 2;
+    // Two tumours mirror each other in the plane x = 0.
+    const Vec3 centre(two ? values.number("gap_mm") / 2 + radius : 0.0, values.number("tumour_centre_mm"), 0);
+    requireRoom(radius == 0 || (centre.y >= radius && centre.y + radius <= thickness && centre.x + radius <= half), "block",
+                values);
 
     PhantomLabels out;
     out.image = phantomImage(values, Vec3(-half - air, -air, -half - air), Vec3(half + air, back + air, half + air));
@@ -127,8 +132,10 @@ PhantomLabels blockPhantom(const PhantomValues& values)
         for (int i = 0; i < out.image.size.x; ++i) {
             const Vec3 p = voxelCentre(out.image, {i, j, k});
             const bool inside = p.y > 0 && p.y < back && std::abs(p.x) < half && std::abs(p.z) < half;
-            const bool tumour = glm::dot(p - centre, p - centre) < radius * radius && p.y < thickness;
-            const std::uint16_t tissue = p.y > thickness ? 5 : tumour ? tumourLabel : 2;
+            const Vec3 away = Vec3(std::abs(p.x), p.y, p.z) - centre;
+            const bool tumour = glm::dot(away, away) < radius * radius && p.y < thickness;
+            const std::uint16_t lump = two && p.x > 0 ? secondTumourLabel : tumourLabel;
+            const std::uint16_t tissue = p.y > thickness ? 5 : tumour ? lump : 2;
             out.image.values[out.image.offset({i, j, k})] = inside ? tissue : std::uint16_t{0};
         }
     });
@@ -136,6 +143,9 @@ PhantomLabels blockPhantom(const PhantomValues& values)
                  {2, values.word("tissue"), values.word("tissue")},
                  {5, "base", "bone"},
                  {tumourLabel, "tumour", values.word("tumour_kind")}};
+    if (two) {
+        out.names.push_back({secondTumourLabel, "tumour_2", values.word("tumour_kind")});
+    }
     return out;
 }
 

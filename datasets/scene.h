@@ -4,23 +4,28 @@
 #include <volume/geometry.h>
 #include <volume/tissue.h>
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::datasets {
 
-enum class ToolKind : std::uint8_t { sphere, needle };
+/// `sphere`: its centre is the device's position. `capsule`: a rod with hemispherical ends, like a finger; the middle of
+/// its front end is the device's position, that of the other end lies `length` behind, along the device's axis.
+enum class ToolKind : std::uint8_t { sphere, needle, capsule };
 
 struct ToolSpec {
     ToolKind kind = ToolKind::needle;
-    double radius = 1.05e-3;      // sphere, or needle shaft [m]; 14 G: 2.1 mm across
-    double length = 0.12;         // of the needle [m]
+    double radius = 1.05e-3;      // sphere, capsule, or needle shaft [m]; 14 G: 2.1 mm across
+    double length = 0.12;         // of the needle; of the capsule between the middles of its ends [m]
     double throwLength = 0.022;   // of the biopsy gun [m]
     double notchLength = 0.020;   // [m]
     double notchRadius = 0.8e-3;  // inner radius of the notch [m]
+    double tipLength = 4e-3;      // of the needle's conical tip [m]
 };
 
 /// A mass, damper and spring with a magnitude: one term of equation 3 of the thesis and its share of equations 6-8.
@@ -49,13 +54,37 @@ struct VitalStructure {
     double warnDistance = 5e-3;  // [m]
 };
 
-enum class ModelLevel : std::uint8_t { spring, chainmail };
+enum class ModelLevel : std::uint8_t { spring, chainmail, elastic };
+/// Their names in scenes, records and on the command line, in the order of the enum.
+inline constexpr std::array<std::string_view, 3> modelLevels{"spring", "chainmail", "elastic"};
+
+enum class Strain : std::uint8_t { small, finite };
+
+/// Level `elastic`: relaxation on nested windows around the tool.
+struct ElasticSettings {
+    double spacing = 2e-3;  // of the finest window [m]; each window further out is twice as coarse
+    int window = 17;        // nodes along each side of a window: odd, 9 to 41
+    int cycles = 2;         // relaxation cycles per tick
+    Strain strain = Strain::small;
+    double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-], 0 to 0.499
+    double viscosity = 0;      // Kelvin-Voigt: time that a strain lags behind its stress [s]; 0 = none
+    double friction = 0;       // of sphere and capsule on tissue (Coulomb) [-]
+
+    bool operator==(const ElasticSettings&) const = default;
+};
+
+std::vector<std::string> elasticSettings();  // "fast", "default", "fine"
+/// `base` with spacing, window and cycles of the setting called `name`; what it says of the tissue stays. Throws
+/// std::runtime_error for a name that is not there.
+ElasticSettings elasticSetting(const std::string& name, const ElasticSettings& base = {});
 
 struct ModelSettings {
     ModelLevel level = ModelLevel::chainmail;
-    double spacing = 2e-3;          // of the ChainMail lattice [m]; widened when the body would need over maxNodes
-    std::uint32_t maxMoves = 5000;  // node moves per tick; what is left over is reported as residual
-    double stiffness = 0;           // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact
+    double spacing = 2e-3;            // of the ChainMail lattice [m]; widened when the body would need over maxNodes
+    std::uint32_t maxMoves = 5000;    // node moves per tick; what is left over is reported as residual
+    double stiffness = 0;             // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact
+    std::string setting = "default";  // of level `elastic`: the one that `elastic` started from, see elasticSettings()
+    ElasticSettings elastic;
 };
 
 /// What the scripted trainee does next.
@@ -97,7 +126,7 @@ Scene loadScene(const std::filesystem::path& file);
 /// As loadScene() from text; `origin` stands for the file in errors, and relative paths start at its folder.
 Scene parseScene(const std::string& text, const std::filesystem::path& origin);
 
-std::vector<std::string> builtInScenes();  // "breast", "layered", "block"
+std::vector<std::string> builtInScenes();  // "breast", "layered", "block", "plate", "pair"
 std::optional<Scene> builtInScene(const std::string& name);
 /// The scene for a volume file alone: target = the first tumour (else the structure nearest the middle), vital = all of
 /// role vital.

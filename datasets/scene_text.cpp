@@ -14,23 +14,33 @@ namespace {
 constexpr double farthest = 5000;        // of a coordinate from the origin [mm]
 constexpr std::size_t mostSteps = 1000;  // of a script
 
-constexpr std::array<std::string_view, 2> toolKinds{"sphere", "needle"};
+constexpr std::array<std::string_view, 3> toolKinds{"sphere", "needle", "capsule"};
 constexpr std::array<std::string_view, 3> dffbModes{"off", "thesis", "field"};
-constexpr std::array<std::string_view, 2> modelLevels{"spring", "chainmail"};
+constexpr std::array<std::string_view, 2> strains{"small", "finite"};
 constexpr std::array<std::string_view, 5> stepKinds{"move", "press", "fire", "wait", "pierce"};
 
-constexpr std::array<Field<ToolSpec>, 5> toolFields{{
+constexpr std::array<Field<ToolSpec>, 6> toolFields{{
     {"radius_mm", "mm", 0.1, 30, 1e-3, &ToolSpec::radius},
     {"length_mm", "mm", 10, 500, 1e-3, &ToolSpec::length},
     {"throw_mm", "mm", 0, 50, 1e-3, &ToolSpec::throwLength},
     {"notch_mm", "mm", 1, 50, 1e-3, &ToolSpec::notchLength},
     {"notch_radius_mm", "mm", 0.05, 10, 1e-3, &ToolSpec::notchRadius},
+    {"tip_mm", "mm", 0.1, 50, 1e-3, &ToolSpec::tipLength},
 }};
 
 constexpr std::array<Field<ModelSettings>, 3> modelFields{{
     {"spacing_mm", "mm", 0.2, 20, 1e-3, &ModelSettings::spacing},
     {"max_moves", "", 1, 1e6, 1, &ModelSettings::maxMoves},
     {"stiffness_n_m", "N/m", 0, 10000, 1, &ModelSettings::stiffness},
+}};
+
+constexpr std::array<Field<ElasticSettings>, 6> elasticFields{{
+    {"spacing_mm", "mm", 0.2, 20, 1e-3, &ElasticSettings::spacing},
+    {"window", "", 9, 41, 1, &ElasticSettings::window},
+    {"cycles", "", 1, 100, 1, &ElasticSettings::cycles},
+    {"poisson_cap", "", 0, 0.499, 1, &ElasticSettings::poissonCap},
+    {"viscosity_ms", "ms", 0, 1000, 1e-3, &ElasticSettings::viscosity},
+    {"friction", "", 0, 5, 1, &ElasticSettings::friction},
 }};
 
 constexpr std::array<Field<DffbParameters>, 3> dffbFields{{
@@ -154,6 +164,22 @@ void readTool(Section& top, ToolSpec& tool)
             section->refuse(section->has("notch_radius_mm") ? "notch_radius_mm" : "radius_mm",
                             "the notch must be narrower than the needle", "mm");
         }
+        if (tool.kind == ToolKind::needle && tool.tipLength >= tool.length) {
+            section->refuse(section->has("tip_mm") ? "tip_mm" : "length_mm", "the tip must be shorter than the needle",
+                            "mm");
+        }
+    }
+}
+
+void readElastic(Section& model, ElasticSettings& elastic)
+{
+    if (std::optional<Section> section = model.section("elastic")) {
+        readFields<ElasticSettings>(*section, elasticFields, elastic, Need::some);
+        readChoice(*section, "strain", strains, elastic.strain);
+        section->finish();
+        if (elastic.window % 2 == 0) {
+            section->refuse("window", "must be odd");
+        }
     }
 }
 
@@ -162,6 +188,13 @@ void readModel(Section& top, ModelSettings& model)
     if (std::optional<Section> section = top.section("model")) {
         readChoice(*section, "level", modelLevels, model.level);
         readFields<ModelSettings>(*section, modelFields, model, Need::some);
+        const std::vector<std::string> names = elasticSettings();
+        const std::vector<std::string_view> choices(names.begin(), names.end());
+        if (const auto index = section->choice("setting", choices)) {
+            model.setting = names[*index];
+            model.elastic = elasticSetting(model.setting);
+        }
+        readElastic(*section, model.elastic);
         section->finish();
     }
 }
@@ -256,6 +289,16 @@ std::string phantomText(const PhantomSpec& spec)
     return out;
 }
 
+std::string modelText(const ModelSettings& model)
+{
+    std::string out = fmt::format("\n[model]\nlevel = \"{}\"\n{}", modelLevels[static_cast<std::size_t>(model.level)],
+                                  writeFields<ModelSettings>(modelFields, model));
+    out += fmt::format("setting = {}\n", tomlString(model.setting));
+    out += fmt::format("\n[model.elastic]\nstrain = \"{}\"\n{}", strains[static_cast<std::size_t>(model.elastic.strain)],
+                       writeFields<ElasticSettings>(elasticFields, model.elastic));
+    return out;
+}
+
 std::string stepText(const TraineeStep& step)
 {
     const bool moves = step.kind != TraineeStep::Kind::fire && step.kind != TraineeStep::Kind::wait;
@@ -308,7 +351,7 @@ Scene loadScene(const std::filesystem::path& file)
 
 std::vector<std::string> builtInScenes()
 {
-    return {"breast", "layered", "block"};
+    return {"breast", "layered", "block", "plate", "pair"};
 }
 
 std::optional<Scene> builtInScene(const std::string& name)
@@ -328,8 +371,7 @@ std::string sceneText(const Scene& scene)
                                      : fmt::format("file = {}\n", tomlString(scene.source.file.string()));
     out += fmt::format("\n[tool]\nkind = \"{}\"\n{}", toolKinds[static_cast<std::size_t>(scene.tool.kind)],
                        writeFields<ToolSpec>(toolFields, scene.tool));
-    out += fmt::format("\n[model]\nlevel = \"{}\"\n{}", modelLevels[static_cast<std::size_t>(scene.model.level)],
-                       writeFields<ModelSettings>(modelFields, scene.model));
+    out += modelText(scene.model);
     out += fmt::format("\n[dffb]\nmode = \"{}\"\n{}", dffbModes[static_cast<std::size_t>(scene.dffb.mode)],
                        writeFields<DffbParameters>(dffbFields, scene.dffb));
     for (const Term& term : terms) {

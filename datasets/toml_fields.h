@@ -16,7 +16,7 @@ struct Field {
     std::string_view unit;
     double low = 0, high = 0;  // in `unit`; of numbers
     double si = 1;             // SI units in one `unit`
-    std::variant<double T::*, float T::*, std::uint32_t T::*, bool T::*, std::string T::*> member;
+    std::variant<double T::*, float T::*, std::uint32_t T::*, int T::*, bool T::*, std::string T::*> member;
 };
 
 enum class Need : std::uint8_t { all, some };
@@ -33,7 +33,7 @@ void readFields(Section& section, std::span<const Field<T>> fields, T& target, N
                     target.*member = section.flag(f.key).value_or(target.*member);
                 } else if constexpr (std::is_same_v<Value, std::string>) {
                     target.*member = section.word(f.key).value_or(target.*member);
-                } else if constexpr (std::is_same_v<Value, std::uint32_t>) {
+                } else if constexpr (std::is_same_v<Value, std::uint32_t> || std::is_same_v<Value, int>) {
                     const auto low = static_cast<std::int64_t>(f.low), high = static_cast<std::int64_t>(f.high);
                     target.*member = static_cast<Value>(section.integer(f.key, f.unit, low, high).value_or(target.*member));
                 } else if (const auto v = section.number(f.key, f.unit, f.low, f.high)) {

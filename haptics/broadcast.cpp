@@ -37,6 +37,18 @@ volume::NodeGrid displayGrid(const volume::Tissue& tissue)
     return volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
 }
 
+channel::ToolKind shown(datasets::ToolKind kind)
+{
+    switch (kind) {
+        case datasets::ToolKind::needle:
+            return channel::ToolKind::needle;
+        case datasets::ToolKind::capsule:
+            return channel::ToolKind::capsule;
+        default:
+            return channel::ToolKind::sphere;
+    }
+}
+
 channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& labels)
 {
     channel::Scenery s;
@@ -54,7 +66,7 @@ channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& la
         s.warnDistance[i] = model.structures[i].warnDistance;
     }
     const auto& tool = model.scene.tool;
-    s.tool = tool.kind == datasets::ToolKind::needle ? channel::ToolKind::needle : channel::ToolKind::sphere;
+    s.tool = shown(tool.kind);
     s.toolRadius = tool.radius;
     s.toolLength = tool.length;
     s.entry = triple(model.approach.entry);

@@ -16,6 +16,19 @@ namespace {
 // The part of a needle's shaft that collision looks at, from the tip [m].
 constexpr double shaftQueried = 6e-3;
 
+// How much of the tool behind its tip collision looks at [m].
+double queriedLength(const datasets::ToolSpec& tool) noexcept
+{
+    switch (tool.kind) {
+        case datasets::ToolKind::needle:
+            return shaftQueried;
+        case datasets::ToolKind::capsule:
+            return tool.length;
+        default:
+            return 0.0;
+    }
+}
+
 // Stops the time of one task after the other.
 class TaskClock {
 public:
@@ -115,7 +128,7 @@ occupancy::Sweep Simulation::collide() noexcept
     const auto& tool = model_.scene.tool;
     const auto& device = record_.device;
     const bool needle = tool.kind == datasets::ToolKind::needle;
-    const Vec3 back = needle ? device.position - shaftQueried * device.axis : device.position;
+    const Vec3 back = device.position - queriedLength(tool) * device.axis;
     occupancy::touch(body_, {back, device.position, tool.radius}, *contacts_);
     record_.contacts = static_cast<std::uint32_t>(contacts_->count);
     if (tip_.phase == Phase::contact) {
@@ -125,6 +138,7 @@ occupancy::Sweep Simulation::collide() noexcept
     if (tip_.phase != Phase::free) {
         return {};
     }
+    // The force laws know one proxy, that of the tip: a capsule's is the middle of its front end.
     const double radius = needle ? 0.0 : tool.radius;
     return occupancy::sweep(body_, {last_, last_, radius}, {device.position, device.position, radius});
 }

@@ -31,7 +31,8 @@ OccupancyMap::OccupancyMap(const volume::NodeGrid& grid, std::span<const std::ui
 
 Index3 OccupancyMap::cellAt(Vec3 p) const noexcept
 {
-    const Vec3 g = glm::floor((p - cells_.origin) / cells_.spacing + 0.5);
+    // Clamped first, rounding towards zero is rounding down.
+    const Vec3 g = (p - cells_.origin) / cells_.spacing + 0.5;
     return Index3(glm::clamp(g, Vec3(0.0), Vec3(cells_.size - Index3(1))));
 }
 

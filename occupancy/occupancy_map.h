@@ -34,9 +34,13 @@ public:
     template <typename Visit>
     void visit(Vec3 low, Vec3 high, Visit&& visitElement) const noexcept
     {
-        volume::forEachIndex(cellAt(low), cellAt(high), [&](Index3 cell) {
-            for (Element e = head_[cells_.offset(cell)]; e != none; e = next_[e]) {
-                visitElement(e);
+        const Index3 first = cellAt(low), last = cellAt(high);
+        const auto inRow = static_cast<std::size_t>(last.x - first.x) + 1;
+        volume::forEachIndex(first, {first.x, last.y, last.z}, [&](Index3 cell) {
+            for (const Element head : std::span(head_).subspan(cells_.offset(cell), inRow)) {
+                for (Element e = head; e != none; e = next_[e]) {
+                    visitElement(e);
+                }
             }
         });
     }

@@ -26,24 +26,27 @@ Vec3 axisPoint(const Capsule& tool, int i, int samples) noexcept
     return samples == 1 ? tool.b : glm::mix(tool.b, tool.a, static_cast<double>(i) / (samples - 1));
 }
 
-Vec3 nearestOnAxis(const Capsule& tool, Vec3 p) noexcept
-{
-    const Vec3 along = tool.b - tool.a;
-    const double square = glm::dot(along, along);
-    const double t = square > 0.0 ? glm::clamp(glm::dot(p - tool.a, along) / square, 0.0, 1.0) : 0.0;
-    return tool.a + t * along;
-}
+// The segment in the middle of a tool.
+class Axis {
+public:
+    explicit Axis(const Capsule& tool) noexcept : a_(tool.a), along_(tool.b - tool.a), square_(glm::dot(along_, along_)) {}
+
+    Vec3 nearest(Vec3 p) const noexcept
+    {
+        const double t = square_ > 0.0 ? glm::clamp(glm::dot(p - a_, along_) / square_, 0.0, 1.0) : 0.0;
+        return a_ + t * along_;
+    }
+
+private:
+    Vec3 a_;
+    Vec3 along_;
+    double square_;
+};
 
 // Normal of the deformed surface at `p`: the gradient of the distance composed with the inverse displacement.
 Vec3 surfaceNormal(const Body& body, Vec3 p) noexcept
 {
-    const double h = body.surface.grid.spacing;
-    Vec3 g;
-    for (int axis = 0; axis < 3; ++axis) {
-        Vec3 e(0.0);
-        e[axis] = h;
-        g[axis] = distance(body, p + e) - distance(body, p - e);
-    }
+    const Vec3 g = distanceDifference(body, p, body.surface.grid.spacing);
     const double length = glm::length(g);
     return length > 1e-12 ? g / length : Vec3(0, 0, 1);
 }
@@ -56,34 +59,43 @@ struct Surroundings {
     bool moved = false;
 };
 
-// Visits the elements within `reach` of the tool's axis; visit(element, distance to the axis).
+// Visits the elements within `reach` of the tool's axis; visit(element).
 template <typename Visit>
 Surroundings look(const Body& body, const Capsule& tool, double reach, Visit&& visit) noexcept
 {
+    // Beyond doubt out of reach: spares most elements the square root.
+    const double far = (1.0 + 1e-9) * reach * reach;
+    const Axis axis(tool);
+    RestPositions restPosition(body.grid);
     Surroundings found;
     body.map.visit(glm::min(tool.a, tool.b) - reach, glm::max(tool.a, tool.b) + reach, [&](Element e) {
-        const Vec3 p = body.position(e);
-        const double away = glm::distance(p, nearestOnAxis(tool, p));
+        const Vec3 rest = restPosition(e);
+        const Vec3 p = rest + Vec3(body.u[e]);
+        const Vec3 way = axis.nearest(p) - p;
+        const double square = glm::dot(way, way);
+        if (square > far) {
+            return;
+        }
+        const double away = std::sqrt(square);
         if (away >= reach) {
             return;
         }
         // Its surface lies beyond it by its own depth at rest.
-        const double surface = away + body.surface.at(body.restPosition(e));
+        const double surface = away + body.surface.at(rest);
         if (found.nearest == none || surface < found.distance) {
             found.nearest = e;
             found.distance = surface;
         }
         found.moved = found.moved || body.u[e] != Vec3f(0.0F);
-        visit(e, away);
+        visit(e);
     });
     return found;
 }
 
-// Clearance between the tool's surface and the body, where the axis is nearest, and the body's normal there.
+// Clearance between the tool's surface and the body [m], and the point of the tool's axis where it is least.
 struct Gap {
     double clear = 0;
     Vec3 point{0.0};
-    Vec3 normal{0, 0, 1};
 };
 
 // At rest the distance field answers for the axis itself.
@@ -99,7 +111,6 @@ Gap gapAtRest(const Body& body, const Capsule& tool) noexcept
             gap.point = p;
         }
     }
-    gap.normal = body.surface.normal(gap.point);
     return gap;
 }
 
@@ -108,15 +119,16 @@ Gap gapAtRest(const Body& body, const Capsule& tool) noexcept
 Gap gapDeformed(const Body& body, const Capsule& tool, const Surroundings& around) noexcept
 {
     constexpr int turns = 2;
+    const Axis axis(tool);
     Gap gap;
-    gap.point = nearestOnAxis(tool, body.position(around.nearest));
+    gap.point = axis.nearest(body.position(around.nearest));
     const Vec3 facing = body.position(around.nearest) - gap.point;
-    gap.normal = glm::dot(facing, facing) > 0.0 ? -glm::normalize(facing) : body.surface.normal(gap.point);
+    Vec3 normal = glm::dot(facing, facing) > 0.0 ? -glm::normalize(facing) : body.surface.normal(gap.point);
     for (int i = 0; i < turns; ++i) {
-        gap.normal = surfaceNormal(body, gap.point - tool.radius * gap.normal);
-        gap.point = nearestOnAxis(tool, gap.point - tool.radius * gap.normal);
+        normal = surfaceNormal(body, gap.point - tool.radius * normal);
+        gap.point = axis.nearest(gap.point - tool.radius * normal);
     }
-    gap.clear = distance(body, gap.point - tool.radius * gap.normal);
+    gap.clear = distance(body, gap.point - tool.radius * normal);
     return gap;
 }
 
@@ -131,16 +143,12 @@ void touch(const Body& body, const Capsule& tool, ContactSet& out) noexcept
 {
     const double reach = tool.radius + 0.5 * body.grid.spacing;
     out.count = 0;
-    const auto around = look(body, tool, reach, [&](Element e, double away) {
+    const auto around = look(body, tool, reach, [&](Element e) {
         if (out.count < ContactSet::capacity) {
-            out.contacts[out.count++] = {e, reach - away};
+            out.elements[out.count++] = e;
         }
     });
-    const Gap gap = gapOf(body, tool, around);
-    out.depth = -gap.clear;
-    out.point = gap.point;
-    out.touching = out.depth > 0.0;
-    out.normal = gap.normal;
+    out.depth = -gapOf(body, tool, around).clear;
 }
 
 Sweep sweep(const Body& body, const Capsule& from, const Capsule& to) noexcept
@@ -153,7 +161,7 @@ Sweep sweep(const Body& body, const Capsule& from, const Capsule& to) noexcept
     for (int step = 0; step < sweepSteps; ++step) {
         result.fraction = way > 0.0 ? travelled / way : 1.0;
         const Capsule now{glm::mix(from.a, to.a, result.fraction), glm::mix(from.b, to.b, result.fraction), from.radius};
-        const Gap gap = gapOf(body, now, look(body, now, now.radius + reach, [](Element, double) {}));
+        const Gap gap = gapOf(body, now, look(body, now, now.radius + reach, [](Element) {}));
         const double clear = gap.clear;
         result.point = gap.point;
         if (clear <= 0.0) {

@@ -1,37 +1,22 @@
 #pragma once
 
 #include <occupancy/body.h>
+#include <occupancy/tool_shape.h>
 
 #include <array>
 #include <cstddef>
 
 namespace palpate::occupancy {
 
-/// A tool: all points within `radius` of the segment from `a` to `b` [m]. A sphere has a == b.
-struct Capsule {
-    Vec3 a{0.0};
-    Vec3 b{0.0};
-    double radius = 0;
-};
-
-/// One element that a tool touches.
-struct Contact {
-    Element element = none;
-    double depth = 0;  // of the element's middle below the tool's surface, widened by half an element [m]
-};
-
-/// What a tool touches, deepest point first. Fixed size: the servo path allocates nothing.
+/// What a tool touches. Fixed size: the servo path allocates nothing.
 struct ContactSet {
     static constexpr std::size_t capacity = 1024;
-    std::array<Contact, capacity> contacts;
-    std::size_t count = 0;
-    bool touching = false;  // the tool's surface is below the body's
-    double depth = 0;       // of the deepest point, from the distance field [m]
-    Vec3 point{0.0};        // of the tool's axis where it is deepest [m]
-    Vec3 normal{0, 0, 1};   // unit vector out of the body there, smooth
+    std::array<Element, capacity> elements;  // whose middles are within the tool, widened by half an element (count x 1)
+    std::size_t count = 0;                   // further ones are left out
+    double depth = 0;  // of the tool's deepest point below the body's surface [m]; negative: clearance
 };
 
-/// Fills `out` with the elements that the tool touches, and with depth and normal from the distance field.
+/// Fills `out` with the elements that the tool touches, and with the depth from the distance field.
 /// Cost O(cells in the tool's box); allocates nothing.
 void touch(const Body& body, const Capsule& tool, ContactSet& out) noexcept;
 

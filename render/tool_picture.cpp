@@ -53,14 +53,44 @@ vtkSmartPointer<vtkPolyData> needleShape(double radius, double length)
     return both->GetOutput();
 }
 
-vtkSmartPointer<vtkPolyData> ball(double radius)
+vtkSmartPointer<vtkPolyData> ball(double radius, double y = 0)
 {
     vtkNew<vtkSphereSource> sphere;
     sphere->SetRadius(radius);
+    sphere->SetCenter(0, y, 0);
     sphere->SetThetaResolution(facets);
     sphere->SetPhiResolution(facets);
     sphere->Update();
     return sphere->GetOutput();
+}
+
+// A rod with round ends along y, the middle of its front end at the origin.
+vtkSmartPointer<vtkPolyData> rodShape(double radius, double length)
+{
+    vtkNew<vtkCylinderSource> rod;
+    rod->SetRadius(radius);
+    rod->SetHeight(length);
+    rod->SetCenter(0, -length / 2, 0);
+    rod->SetResolution(facets);
+    vtkNew<vtkAppendPolyData> all;
+    all->AddInputConnection(rod->GetOutputPort());
+    all->AddInputData(ball(radius));
+    all->AddInputData(ball(radius, -length));
+    all->Update();
+    return all->GetOutput();
+}
+
+vtkSmartPointer<vtkPolyData> toolShape(const channel::Scenery& scenery)
+{
+    const double radius = std::max(scenery.toolRadius, 0.2e-3) * mm, length = scenery.toolLength * mm;
+    switch (scenery.tool) {
+        case channel::ToolKind::needle:
+            return needleShape(radius, std::max(length, 4 * radius));
+        case channel::ToolKind::capsule:
+            return rodShape(radius, length);
+        default:
+            return ball(radius);
+    }
 }
 
 void show(vtkRenderer& renderer, vtkActor& actor, vtkPolyData* shape, const std::array<double, 3>& colour)
@@ -75,12 +105,11 @@ void show(vtkRenderer& renderer, vtkActor& actor, vtkPolyData* shape, const std:
 }  // namespace
 
 ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
-    : needle_(scenery.tool == channel::ToolKind::needle)
+    : turns_(scenery.tool != channel::ToolKind::sphere)
 {
     const double radius = std::max(scenery.toolRadius, 0.2e-3) * mm;
     vtkNew<vtkActor> tool;
-    show(renderer, *tool, needle_ ? needleShape(radius, std::max(scenery.toolLength * mm, 4 * radius)) : ball(radius),
-         toolColour);
+    show(renderer, *tool, toolShape(scenery), toolColour);
     tool->SetUserTransform(pose_);
     show(renderer, *proxy_, ball(std::max(0.8 * radius, 0.8)), proxyColour);
     addPlan(scenery, renderer);
@@ -121,7 +150,7 @@ void ToolPicture::update(const channel::State& state)
     axis = length > 0 && std::isfinite(length) ? axis / length : glm::dvec3(0, 1, 0);
     pose_->Identity();
     pose_->Translate(tip.x, tip.y, tip.z);
-    if (needle_) {
+    if (turns_) {
         // The turn that takes +y to the axis.
         const glm::dvec3 turn = glm::cross(glm::dvec3(0, 1, 0), axis);
         const double degrees = std::atan2(glm::length(turn), axis.y) * 180.0 / std::acos(-1.0);

@@ -23,7 +23,7 @@ public:
 private:
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
 
-    bool needle_ = false;
+    bool turns_ = false;  // with the axis: no sphere
     vtkNew<vtkTransform> pose_;
     vtkNew<vtkActor> proxy_;
 };

@@ -35,6 +35,13 @@ struct MemoryUse {
     std::uint64_t occupancy = 0;
 };
 
+/// The tissue in a cell as one elastic material.
+struct CellMaterial {
+    float youngsModulus = 0;  // root of arithmetic times harmonic mean, times the share of the cell that is tissue [Pa]
+    float poissonRatio = 0;   // mean over the tissue [-]
+    float fixed = 0;          // share of the cell that is tissue held in space [-]
+};
+
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.
 ///
 ///     label      Int32, background 0   the label value of every voxel
@@ -96,6 +103,8 @@ public:
     /// Young's modulus [Pa] averaged over each node's cell: the root of arithmetic times harmonic mean over the tissue in
     /// it (air does not count); cells without tissue take the value of the nearest tissue.
     ScalarField youngsModulusOn(const NodeGrid& grid) const;
+    /// What fills each node's cell, for elastic models (count x 1).
+    std::vector<CellMaterial> materialOn(const NodeGrid& grid) const;
     /// Row of the tissue table that fills most of each node's cell (count x 1); air where under half of it is tissue.
     std::vector<std::uint8_t> tissueOn(const NodeGrid& grid) const;
 

@@ -111,6 +111,29 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
     });
 }
 
+CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vector<const TissueRow*>& rows)
+{
+    double tissue = 0.0;
+    double stiffness = 0.0;
+    double compliance = 0.0;
+    double poisson = 0.0;
+    double fixed = 0.0;
+    sampler.visit(n, [&](std::uint16_t label, double weight) {
+        if (const TissueRow* row = rows[label]) {
+            tissue += weight;
+            stiffness += weight * row->youngsModulus;
+            compliance += weight / row->youngsModulus;
+            poisson += weight * row->poissonRatio;
+            fixed += row->fixed ? weight : 0.0;
+        }
+    });
+    if (tissue <= 0.0) {
+        return {};
+    }
+    return {static_cast<float>(tissue * std::sqrt(stiffness / compliance)), static_cast<float>(poisson / tissue),
+            static_cast<float>(fixed)};
+}
+
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)
 {
     return {glm::max(range.low - by, Index3(0)), glm::min(range.high + by, grid.size - 1)};
@@ -361,6 +384,24 @@ ScalarField Tissue::youngsModulusOn(const NodeGrid& grid) const
     });
     fillFromNearest(grid, field.values);
     return field;
+}
+
+std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
+{
+    checkGrid(grid);
+    const TissueData& tissue = *impl_;
+    std::vector<const TissueRow*> rows(65536, nullptr);
+    for (const Structure& s : tissue.structures) {
+        rows[s.value] = tissue.lookup.solid[s.value] != 0 ? &tissue.table.rows[s.tissue] : nullptr;
+    }
+    std::vector<CellMaterial> cells(grid.count());
+    const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
+    forEachRow(tissue, grid, range, [&](const CellSampler& sampler, Index3 n) {
+        for (; n.x <= range.high.x; ++n.x) {
+            cells[grid.offset(n)] = cellMaterial(sampler, n, rows);
+        }
+    });
+    return cells;
 }
 
 std::vector<std::uint8_t> Tissue::tissueOn(const NodeGrid& grid) const

@@ -1,5 +1,5 @@
 "use strict";
-// Draws the charts of a report from the data in the page. uPlot comes before this script.
+// Draws the charts of a report from the data in the page. uPlot and scatter.js come before this script.
 const data = JSON.parse(document.getElementById("data").textContent);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
 const charts = [];
@@ -69,18 +69,23 @@ function vertical(u, events) {
   }
 }
 
+const axis = (label, size) => ({
+  label, labelSize: 18, size, gap: 4, stroke: colour("soft"), labelFont: "12px system-ui, sans-serif",
+  font: "12px system-ui, sans-serif", grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("line"), width: 1, size: 5 },
+});
+
 function draw(id, chart) {
   const place = document.getElementById(id);
   if (!place) return;
+  if (chart.scatter) {
+    charts.push({ plot: scatter(place, chart, axis), place });
+    return;
+  }
   if (chart.columns[0].length < 2) {
     place.className = "note";
     place.textContent = "The record is too short to draw.";
     return;
   }
-  const axis = (label, size) => ({
-    label, labelSize: 18, size, gap: 4, stroke: colour("soft"), labelFont: "12px system-ui, sans-serif",
-    font: "12px system-ui, sans-serif", grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("line"), width: 1, size: 5 },
-  });
   const value = (unit) => (u, v) => (v == null ? "–" : v.toFixed(2) + " " + unit);
   const limits = (chart.lines || []).map((line) => line.at);
   const options = {

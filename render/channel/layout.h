@@ -39,7 +39,7 @@ struct TissueLook {
     float opacity = 0;
 };
 
-enum class ToolKind : std::uint32_t { sphere, needle };
+enum class ToolKind : std::uint32_t { sphere, needle, capsule };
 
 /// What does not change during a session.
 struct Scenery {
@@ -68,7 +68,7 @@ enum class Status : std::uint32_t { running, finished, faulted };
 struct State {
     std::uint64_t tick = 0;
     double time = 0;  // of the session [s]
-    Triple tip{};     // of the tool (sphere: centre)
+    Triple tip{};     // of the tool (sphere: centre; capsule: middle of its front end)
     Triple axis{};    // unit vector, from the shaft to the tip
     Triple proxy{};   // where the tip would be without penetration
     Triple basic{}, additional{}, total{};

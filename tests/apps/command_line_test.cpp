@@ -9,8 +9,8 @@ using Words = std::vector<std::string>;
 
 TEST(CommandLine, EveryCommandExplainsItself)
 {
-    const std::vector<Words> commands{{},         {"train"}, {"import"}, {"info"},         {"phantom"},
-                                      {"replay"}, {"score"}, {"bench"},  {"bench", "tick"}};
+    const std::vector<Words> commands{{},         {"train"}, {"import"}, {"info"},          {"phantom"},
+                                      {"replay"}, {"score"}, {"bench"},  {"bench", "tick"}, {"bench", "query"}};
     for (Words words : commands) {
         words.push_back("--help");
         const Outcome outcome = palpate(words);
@@ -36,11 +36,15 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"bench", "nosuch"}, "nosuch: there is no such command");
     expectRefusal({"train", "--nosuch"}, "--nosuch");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
+    expectRefusal({"bench", "tick", "--model", "nosuch"}, "nosuch");
+    expectRefusal({"train", "--setting", "nosuch"}, "nosuch");
+    expectRefusal({"train", "block", "--headless", "--model", "spring", "--setting", "fine"},
+                  "block: the tissue model is spring: --setting changes nothing");
     for (const std::string seconds : {"soon", "-1", "nan", "inf", "86401"}) {
         expectRefusal({"train", "--seconds", seconds}, "--seconds: " + seconds + ": must be 0 to 86400 s");
     }
     expectRefusal({"bench"}, "--help");
-    expectRefusal({"train", "nosuch"}, "breast, layered, block");
+    expectRefusal({"train", "nosuch"}, "breast, layered, block, plate, pair");
     expectRefusal({"phantom", "nosuch", "-o", "never.vdb"}, "breast, layered, block");
     expectRefusal({"train", "layered", "--headless", "--target", "nosuch"}, "nosuch");
 }
@@ -136,6 +140,7 @@ TEST(CommandLine, FiguresOnStandardOutputStandAlone)
         {"replay", record},
         {"score", record, "--group", "all=" + record},
         {"bench", "tick", "layered", "--voxels", "32"},
+        {"bench", "query", "--elements", "32"},
         {"phantom", "block", "-o", volume},
         {"info", volume}};
     for (Words words : commands) {

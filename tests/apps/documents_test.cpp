@@ -46,6 +46,7 @@ std::string sceneWith(const std::string& section, const std::string& line)
     std::map<std::string, std::string> lines{{"[volume]", "phantom = \"layered\""},
                                              {"[tool]", ""},
                                              {"[model]", ""},
+                                             {"[model.elastic]", ""},
                                              {"[dffb]", ""},
                                              {"[dffb.surgery]", ""},
                                              {"[[vital]]", "name = \"bone\""},
@@ -109,6 +110,17 @@ TEST(Documents, DefaultsOfScenesAreTheParsersAndNoKeyIsMissing)
     }
 }
 
+TEST(Documents, SettingsOfLevelElasticAreThePrograms)
+{
+    for (const std::string& name : datasets::elasticSettings()) {
+        const datasets::ElasticSettings setting = datasets::elasticSetting(name);
+        std::ostringstream row;
+        row << "| `" << name << "` | " << 1e3 * setting.spacing << " | " << setting.window << " | " << setting.cycles
+            << " |\n";
+        EXPECT_NE(page().find(row.str()), std::string::npos) << row.str();
+    }
+}
+
 // Each `palpate COMMAND .. --option ..` of the README, by the programs' own help.
 TEST(Documents, CommandsAndOptionsOfTheReadmeExist)
 {
@@ -122,8 +134,9 @@ TEST(Documents, CommandsAndOptionsOfTheReadmeExist)
         }
         const std::string program = m[1], rest = m[2];
         std::vector<std::string> command{"--help"};
-        if (rest.starts_with("bench tick")) {
-            command = {"bench", "tick", "--help"};
+        if (rest.starts_with("bench ")) {
+            const std::size_t second = rest.find_first_not_of(' ', 6);
+            command = {"bench", rest.substr(second, rest.find(' ', second) - second), "--help"};
         } else if (program == "palpate") {
             command = {rest.substr(0, rest.find(' ')), "--help"};
         }

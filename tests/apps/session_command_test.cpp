@@ -1,5 +1,6 @@
 #include <tests/apps/program.h>
 
+#include <datasets/scene.h>
 #include <haptics/recorder.h>
 #include <render/channel/channel.h>
 
@@ -117,6 +118,10 @@ TEST(Session, ThePublicKeysOfTheFiguresAreThere)
                {"/sessions/0", "/groups/0/name", "/groups/0/n", "/groups/0/median/total", "/effect_size"});
     expectKeys(figures({"bench", "tick", "--voxels", "32,48"}),
                {"/cases/0/voxels_per_side", "/cases/0/tick_us_p50", "/cases/1/tick_us_p99", "/growth"});
+    const auto query = figures({"bench", "query", "--elements", "32,48"});
+    expectKeys(query, {"/cases/0/tool", "/cases/0/elements_per_side", "/cases/0/touch_us_p50", "/cases/0/touch_us_p99",
+                       "/cases/0/sweep_us_p50", "/growth"});
+    EXPECT_EQ(query.at("cases").size(), 12U) << "three tools, at rest and deformed, two sizes";
 }
 
 TEST(Session, ScoringTheRecordGivesTheLiveScore)
@@ -130,6 +135,31 @@ TEST(Session, ScoringTheRecordGivesTheLiveScore)
         ASSERT_TRUE(scored.contains(key)) << key;
         EXPECT_EQ(scored.at(key), value) << key;
     }
+}
+
+TEST(Session, EveryPressingSceneRunsToItsEndAtEveryLevel)
+{
+    for (const std::string scene : {"block", "plate", "pair"}) {
+        for (const std::string level : {"spring", "chainmail", "elastic"}) {
+            const auto f = figures({"train", scene, "--unpaced", "--headless", "--model", level});
+            EXPECT_EQ(f.at("model"), level) << scene;
+            EXPECT_GT(f.at("contacts"), 0) << scene << " " << level;
+            EXPECT_GT(f.at("peak_force_n").at("basic"), 0.5) << scene << " " << level;
+        }
+    }
+}
+
+// The record holds the setting with its values: replay needs no table of settings.
+TEST(Session, ASettingIsInTheRecordAndIsReplayed)
+{
+    const Folder folder;
+    const std::string record = folder / "session.db";
+    figures({"train", "plate", "--unpaced", "--headless", "--model", "elastic", "--setting", "fast", "--record", record});
+    const auto model = datasets::parseScene(haptics::Record(record).info().sceneText, record).model;
+    EXPECT_EQ(model.level, datasets::ModelLevel::elastic);
+    EXPECT_EQ(model.setting, "fast");
+    EXPECT_EQ(model.elastic, datasets::elasticSetting("fast"));
+    EXPECT_EQ(figures({"replay", record}).at("identical"), true);
 }
 
 TEST(Session, ARecordThatExistsIsNeverTouched)

@@ -1,4 +1,5 @@
 #include <datasets/phantom.h>
+#include <datasets/scene.h>
 #include <datasets/tables.h>
 #include <tests/datasets/voxels.h>
 
@@ -241,6 +242,66 @@ TEST(BlockPhantom, HasTheVolumesOfItsShapes)
     EXPECT_TRUE(tissue.table().rows[reader.tissue(Vec3(0, 0.062, 0))].fixed);
 }
 
+// Two spheres of 12 mm, their centres 14 mm deep and 15 mm apart: the gap of 3 mm is as wide on the grid.
+TEST(BlockPhantom, TwoTumoursHaveTheirVolumesTheirDepthAndTheirGap)
+{
+    const Scene scene = *builtInScene("pair");
+    const Tissue tissue = sceneVolume(scene);
+    const Voxels voxels(tissue);
+    const double sphere = std::numbers::pi / 6 * std::pow(0.012, 3);
+    const std::pair<const char*, double> expected[] = {{"tumour", -7.5e-3}, {"tumour_2", 7.5e-3}};
+    std::vector<double> inner;  // of each tumour, its face nearest to the other
+    for (const auto& [name, x] : expected) {
+        const volume::Structure* tumour = structureNamed(tissue, name);
+        ASSERT_NE(tumour, nullptr) << name;
+        EXPECT_NEAR(tumour->volume, sphere, 0.02 * sphere);
+        Vec3 sum(0.0);
+        double count = 0, nearest = 1;
+        voxels.forEach([&](Index3 n, std::uint16_t value) {
+            if (value == tumour->value) {
+                const Vec3 p = tissue.affine().toPatient(Vec3(n));
+                sum += p;
+                ++count;
+                nearest = std::min(nearest, std::abs(p.x) - voxels.edge / 2);
+            }
+        });
+        EXPECT_LT(glm::length(sum / count - Vec3(x, 14e-3, 0)), 1e-6) << name;
+        inner.push_back(nearest);
+    }
+    EXPECT_NEAR(inner[0] + inner[1], 3e-3, 1e-9);
+    EXPECT_NEAR(structureNamed(tissue, "fat")->volume + 2 * structureNamed(tissue, "tumour")->volume, 0.08 * 0.08 * 0.04,
+                1e-9);
+}
+
+TEST(BlockPhantom, OneTumourTakesNoNoticeOfTheGap)
+{
+    PhantomSpec spec{.name = "block", .voxel = 2e-3};
+    const std::uint64_t hash = hashOf(Voxels(makePhantom(spec, defaultTissues())));
+    spec.numbers["gap_mm"] = 40;
+    EXPECT_EQ(hashOf(Voxels(makePhantom(spec, defaultTissues()))), hash);
+    EXPECT_EQ(structureNamed(makePhantom(spec, defaultTissues()), "tumour_2"), nullptr);
+}
+
+// The block's plate: 10 mm of fat, 100 x 100 mm, on 6 mm of bone, and nothing else.
+TEST(BlockPhantom, ThePlateIsALayerOnBone)
+{
+    const Tissue tissue = sceneVolume(*builtInScene("plate"));
+    EXPECT_NEAR(structureNamed(tissue, "fat")->volume, 0.1 * 0.1 * 0.01, 1e-9);
+    EXPECT_NEAR(structureNamed(tissue, "base")->volume, 0.1 * 0.1 * 0.006, 1e-9);
+    double body = 0;
+    for (const volume::Structure& s : tissue.structures()) {
+        body += tissue.table().rows[s.tissue].role == Role::air ? 0.0 : s.volume;
+    }
+    EXPECT_NEAR(body, 0.1 * 0.1 * 0.016, 1e-9);
+    const volume::Tissue::Reader reader(tissue);
+    const std::pair<double, const char*> expected[] = {{-0.5, "air"},  {0.5, "fat"},   {9.5, "fat"},
+                                                       {10.5, "bone"}, {15.5, "bone"}, {16.5, "air"}};
+    for (const auto& [depth, name] : expected) {
+        EXPECT_EQ(tissue.table().rows[reader.tissue(Vec3(0.0105, depth * 1e-3, 0.0205))].name, name) << depth;
+    }
+    EXPECT_TRUE(tissue.table().rows[structureNamed(tissue, "base")->tissue].fixed);
+}
+
 TEST(LayeredPhantom, LayersLieWhereTheyAreAsked)
 {
     PhantomSpec spec{.name = "layered"};
@@ -285,6 +346,8 @@ TEST(Phantom, EveryParameterIsCheckedAgainstItsRange)
             }
         }
     }
+    const PhantomSpec wide{.name = "block", .numbers = {{"tumours", 2}, {"gap_mm", 65}, {"tumour_diameter_mm", 20}}};
+    EXPECT_NE(errorOf(wide).find("finds no room"), std::string::npos) << errorOf(wide);
     EXPECT_NE(errorOf({.name = "knee"}).find("breast, layered, block"), std::string::npos);
     EXPECT_NE(errorOf({.name = "block", .numbers = {{"depth", 1.0}}}).find("no such parameter 'depth'"), std::string::npos);
 }

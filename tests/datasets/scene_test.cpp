@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <sstream>
 
@@ -33,9 +34,16 @@ Scene fullScene(std::mt19937_64& random)
     scene.source.phantom = {.name = "breast", .seed = random() >> 1U, .voxel = draw(0.5e-3, 2e-3)};
     scene.source.phantom.numbers = {{"tumour_depth_mm", draw(5, 20)}, {"tumours", 2}};
     scene.source.phantom.words = {{"tumour_kind", "ilc"}};
-    scene.tool = {ToolKind::needle, draw(1e-3, 2e-3), draw(0.05, 0.2),
-                  draw(0.01, 0.03), draw(0.01, 0.03), draw(2e-4, 8e-4)};
-    scene.model = {ModelLevel::spring, draw(1e-3, 4e-3), 3000, draw(0, 1000)};
+    scene.tool = {ToolKind::needle, draw(1e-3, 2e-3), draw(0.05, 0.2), draw(0.01, 0.03),
+                  draw(0.01, 0.03), draw(2e-4, 8e-4), draw(1e-3, 8e-3)};
+    scene.model = {ModelLevel::elastic, draw(1e-3, 4e-3), 3000, draw(0, 1000), "fast", {}};
+    scene.model.elastic = {.spacing = draw(1e-3, 4e-3),
+                           .window = 9 + 2 * static_cast<int>(draw(0, 16.99)),
+                           .cycles = static_cast<int>(draw(1, 9)),
+                           .strain = Strain::finite,
+                           .poissonCap = draw(0, 0.499),
+                           .viscosity = draw(0, 0.1),
+                           .friction = draw(0, 1)};
     scene.dffb.mode = DffbMode::thesis;
     for (ForceTerm* term : {&scene.dffb.surgery, &scene.dffb.structure, &scene.dffb.tissue, &scene.dffb.task}) {
         *term = {draw(0, 5), draw(0, 1), draw(0, 5), draw(0, 500)};
@@ -70,6 +78,80 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
         EXPECT_NEAR(again.aim->y, scene.aim->y, 1e-12);
         EXPECT_EQ(again.dffb.mode, DffbMode::thesis);
         EXPECT_EQ(again.script.at(1).kind, TraineeStep::Kind::pierce);
+        EXPECT_NEAR(again.tool.tipLength, scene.tool.tipLength, 1e-12);
+        EXPECT_EQ(again.model.level, ModelLevel::elastic);
+        EXPECT_EQ(again.model.setting, "fast");
+        const ElasticSettings &a = again.model.elastic, &e = scene.model.elastic;
+        EXPECT_NEAR(a.spacing, e.spacing, 1e-12);
+        EXPECT_EQ(a.window, e.window);
+        EXPECT_EQ(a.cycles, e.cycles);
+        EXPECT_EQ(a.strain, Strain::finite);
+        EXPECT_NEAR(a.poissonCap, e.poissonCap, 1e-12);
+        EXPECT_NEAR(a.viscosity, e.viscosity, 1e-12);
+        EXPECT_NEAR(a.friction, e.friction, 1e-12);
+    }
+}
+
+const std::string head = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n";
+
+TEST(Scene, EveryLevelAndEveryToolIsReadByItsName)
+{
+    for (const std::string_view name : modelLevels) {
+        const Scene scene = parseScene(head + fmt::format("[model]\nlevel = \"{}\"\n", name), origin);
+        EXPECT_EQ(modelLevels[static_cast<std::size_t>(scene.model.level)], name);
+        EXPECT_EQ(parseScene(sceneText(scene), origin).model.level, scene.model.level);
+    }
+    EXPECT_EQ(parseScene(head + "[model]\nlevel = \"elastic\"\n", origin).model.level, ModelLevel::elastic);
+    for (const auto& [name, kind] : {std::pair{"sphere", ToolKind::sphere}, std::pair{"needle", ToolKind::needle},
+                                     std::pair{"capsule", ToolKind::capsule}}) {
+        const Scene scene = parseScene(head + fmt::format("[tool]\nkind = \"{}\"\n", name), origin);
+        EXPECT_EQ(scene.tool.kind, kind);
+        EXPECT_EQ(parseScene(sceneText(scene), origin).tool.kind, kind);
+    }
+}
+
+// The work of a tick is some cycles over the nodes of a window: it rises from setting to setting, and nodes come closer.
+TEST(ElasticSetting, FromFastToFineNodesAreNearerAndWorkIsMore)
+{
+    const std::vector<std::string> names = elasticSettings();
+    ASSERT_EQ(names, (std::vector<std::string>{"fast", "default", "fine"}));
+    EXPECT_EQ(elasticSetting("default"), ElasticSettings{});
+    for (std::size_t i = 1; i < names.size(); ++i) {
+        const ElasticSettings coarse = elasticSetting(names[i - 1]), fine = elasticSetting(names[i]);
+        EXPECT_GT(coarse.spacing, fine.spacing);
+        EXPECT_LT(coarse.cycles * std::pow(coarse.window, 3), fine.cycles * std::pow(fine.window, 3));
+    }
+    EXPECT_THROW(elasticSetting("coarse"), std::runtime_error);
+}
+
+TEST(ElasticSetting, KeepsWhatItsBaseSaysOfTheTissue)
+{
+    const ElasticSettings base{.strain = Strain::finite, .poissonCap = 0.4, .viscosity = 0.01, .friction = 0.3};
+    ElasticSettings expected = base;
+    expected.spacing = elasticSetting("fine").spacing;
+    expected.window = elasticSetting("fine").window;
+    expected.cycles = elasticSetting("fine").cycles;
+    EXPECT_EQ(elasticSetting("fine", base), expected);
+}
+
+TEST(ElasticSetting, IsReadByNameAndKeysBesideItWin)
+{
+    EXPECT_EQ(parseScene(head, origin).model.elastic, ElasticSettings{});
+    for (const std::string& name : elasticSettings()) {
+        const std::string text = head + fmt::format("[model]\nlevel = \"elastic\"\nsetting = \"{}\"\n", name);
+        const Scene scene = parseScene(text, origin);
+        EXPECT_EQ(scene.model.setting, name);
+        EXPECT_EQ(scene.model.elastic, elasticSetting(name));
+        EXPECT_EQ(parseScene(sceneText(scene), origin).model.elastic, elasticSetting(name));
+
+        ElasticSettings expected = elasticSetting(name);
+        expected.window = 21;
+        expected.viscosity = 5e-3;
+        expected.strain = Strain::finite;
+        const Scene changed =
+            parseScene(text + "[model.elastic]\nwindow = 21\nviscosity_ms = 5\nstrain = \"finite\"\n", origin);
+        EXPECT_EQ(changed.model.elastic, expected);
+        EXPECT_EQ(parseScene(sceneText(changed), origin).model.elastic, expected);
     }
 }
 
@@ -84,6 +166,9 @@ TEST(Scene, BuiltInScenesParseAndTheirTextParsesToTheSame)
         EXPECT_EQ(sceneText(again), sceneText(*scene));
         EXPECT_EQ(sceneText(parseScene(sceneText(*scene), origin)), sceneText(*scene));
         EXPECT_FALSE(sceneVolume(*scene).labelsNamed(scene->target).empty());
+    }
+    for (const char* name : {"breast", "layered", "block", "plate", "pair"}) {
+        EXPECT_TRUE(builtInScene(name)) << name;
     }
     EXPECT_FALSE(builtInScene("knee"));
 }
@@ -149,7 +234,6 @@ TEST(Scene, EveryBrokenKeyIsNamedWithFileAndLine)
 
 TEST(Scene, AnUnknownKeyProposesTheNearest)
 {
-    const std::string head = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n";
     EXPECT_EQ(errorOf(head + "[dffb]\nrnage_mm = 4\n"),
               "/data/scenes/full.toml:6: [dffb] rnage_mm: unknown key; did you mean range_mm?");
     EXPECT_EQ(errorOf(head + "[dffb.surgery]\nforce = 4\n"),
@@ -161,11 +245,20 @@ TEST(Scene, AnUnknownKeyProposesTheNearest)
 
 TEST(Scene, ARangeErrorReadsAsPromised)
 {
-    const std::string head = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n";
     EXPECT_EQ(errorOf(head + "[dffb]\nrange_mm = -4\n"),
               "/data/scenes/full.toml:6: [dffb] range_mm = -4 mm: must be 0 to 100 mm");
     EXPECT_EQ(errorOf(head + "[tool]\nkind = \"drill\"\n"),
-              "/data/scenes/full.toml:6: [tool] kind = \"drill\": must be one of sphere, needle");
+              "/data/scenes/full.toml:6: [tool] kind = \"drill\": must be one of sphere, needle, capsule");
+    EXPECT_EQ(errorOf(head + "[model]\nsetting = \"coarse\"\n"),
+              "/data/scenes/full.toml:6: [model] setting = \"coarse\": must be one of fast, default, fine");
+    EXPECT_EQ(errorOf(head + "[model.elastic]\nwindow = 12\n"),
+              "/data/scenes/full.toml:6: [model.elastic] window = 12: must be odd");
+    EXPECT_EQ(errorOf(head + "[model.elastic]\npoisson_cap = 0.5\n"),
+              "/data/scenes/full.toml:6: [model.elastic] poisson_cap = 0.5: must be 0 to 0.499");
+    EXPECT_EQ(errorOf(head + "[model.elastic]\nviscosity = 1\n"),
+              "/data/scenes/full.toml:6: [model.elastic] viscosity: unknown key; did you mean viscosity_ms?");
+    EXPECT_EQ(errorOf(head + "[tool]\nlength_mm = 20\ntip_mm = 20\n"),
+              "/data/scenes/full.toml:7: [tool] tip_mm = 20 mm: the tip must be shorter than the needle");
     EXPECT_NE(errorOf("[target]\nstructure = \"a\"\n").find("[volume] is missing"), std::string::npos);
     EXPECT_NE(errorOf("[volume]\nfile = \"a.vdb\"\n").find("[target] is missing"), std::string::npos);
     EXPECT_NE(errorOf("[volume]\nfile = \"a.vdb\"\nphantom = \"block\"\n").find(":1: volume"), std::string::npos);

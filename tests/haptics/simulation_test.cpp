@@ -65,6 +65,40 @@ TEST(Simulation, SphereOnTheBlockFeelsHertz)
     EXPECT_LT(std::hypot(r.total.x, r.total.z), 0.05 * expected);
 }
 
+// End on, a capsule is a sphere: the rod behind it stays in the air.
+TEST(Simulation, CapsuleEndOnFeelsLikeASphere)
+{
+    auto capsule = tests::modelOf(tests::blockScene);
+    capsule.scene.tool.kind = datasets::ToolKind::capsule;
+    Simulation round(tests::blockSphere()), rod(capsule);
+    std::vector<Vec3> expected;
+    stroke(round, -15e-3, -4e-3, 0.05, [&](const TickRecord& r) { expected.push_back(r.basic); });
+    std::size_t i = 0;
+    stroke(rod, -15e-3, -4e-3, 0.05, [&](const TickRecord& r) { EXPECT_EQ(r.basic, expected[i++]); });
+    EXPECT_LT(expected.back().y, -0.1);
+}
+
+// On its side, a capsule of radius R pressed d deep touches one and the same section of the body all along: every column
+// of elements adds as many, and at least those of the chord 2 sqrt(2 R d - d^2) on the surface.
+TEST(Simulation, CapsuleOnItsSideTouchesAsManyElementsAsItIsLong)
+{
+    constexpr double radius = 10e-3, deep = 3e-3;
+    auto model = tests::modelOf(tests::blockScene);
+    model.scene.model.level = datasets::ModelLevel::spring;
+    const double h = model.lattice.grid.spacing;
+    std::vector<double> touched;
+    for (const int columns : {0, 10, 20}) {
+        model.scene.tool.kind = columns == 0 ? datasets::ToolKind::sphere : datasets::ToolKind::capsule;
+        model.scene.tool.length = columns * h;
+        Simulation simulation(model);
+        DeviceSample device = at({columns * h / 2, deep - radius, 0});
+        device.axis = {1, 0, 0};
+        touched.push_back(simulation.tick(device).contacts);
+    }
+    EXPECT_EQ(touched[2] - touched[1], touched[1] - touched[0]);
+    EXPECT_GT(touched[2] - touched[1], 10 * 2 * std::sqrt(2 * radius * deep - deep * deep) / h);
+}
+
 // Level 1 deforms: the tissue under the sphere is where the sphere's lowest point is, level 0 leaves it.
 TEST(Simulation, ChainMailFollowsTheSphereAndSpringDoesNot)
 {

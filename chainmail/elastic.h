@@ -1,0 +1,106 @@
+#pragma once
+
+#include <chainmail/elastic_contact.h>
+#include <chainmail/multigrid.h>
+#include <chainmail/window_stack.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace palpate::chainmail {
+
+struct ElasticOptions {
+    int window = 15;            // nodes along each side of a window, odd; a level with fewer is held whole
+    int cycles = 2;             // per call of relax()
+    bool finiteStrain = false;  // stable neo-Hookean instead of small strain
+    std::size_t maxSites = 4096;
+};
+
+struct ElasticResult {
+    double energy = 0;           // of tissue and contacts [J]
+    double residual = 0;         // forces that are not in balance, Euclidean norm over the degrees of freedom [N]
+    double depth = 0;            // of the deepest point of tissue inside a tool [m]
+    std::uint32_t contacts = 0;  // points that a tool presses
+    std::uint32_t cycles = 0;
+    std::uint32_t shortened = 0;  // steps that would have raised the energy
+    bool moved = false;           // windows moved
+};
+
+/// Level 2: the equilibrium of an elastic body that tools press and pull, tracked from call to call on nested windows
+/// around the tool.
+///
+/// Each call first goes along the last call's increment, as far as lowers the energy most: a tool that moves on steadily
+/// finds almost all of its answer there. Then come cycles of conjugate gradients, preconditioned by one multigrid cycle
+/// over the windows and conjugate to the step before, the last call's increment included. Every step has a line search on
+/// the energy with the contacts as they are along it, so that none raises the energy: one that would is shortened, and
+/// dropped at last.
+/// Sources: S. F. McCormick, "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids);
+/// A. V. Knyazev, "Toward the optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps).
+/// Mathematics, pictures and figures: docs/kernel.md.
+class Elastic {
+public:
+    /// @param focus  where the finest window starts, at rest [m]
+    /// The body must outlive it.
+    Elastic(const ElasticBody& body, const ElasticOptions& options, Vec3 focus);
+
+    /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
+    /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
+    ElasticResult relax(const ElasticLoad& load) noexcept { return relax(load, options_.cycles, 0.0); }
+    /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces.
+    ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept;
+
+    /// Force of the tissue on tool `i` and on tie `i` of the last load [N].
+    Vec3 toolForce(std::size_t i) const noexcept { return force(i, false); }
+    Vec3 tieForce(std::size_t i) const noexcept { return force(i, true); }
+    /// Displacement of the material that is at `rest` [m].
+    Vec3 displacement(Vec3 rest) const noexcept;
+    bool atRest() const noexcept { return atRest_; }
+    const WindowStack& stack() const noexcept { return stack_; }
+    /// Nodes of all windows.
+    std::size_t nodes() const noexcept;
+    std::span<const ContactSite> sites() const noexcept { return std::span(sites_).first(siteCount_); }
+
+private:
+    // The energy along a direction, less what it is now, and its derivatives.
+    struct Along {
+        double energy = 0;
+        double slope = 0;
+        double curvature = 0;
+    };
+
+    // The step that a cycle's direction is made conjugate to.
+    enum class Before : std::uint8_t { none, increment, direction };
+
+    std::span<ContactSite> sites() noexcept { return std::span(sites_).first(siteCount_); }
+    void settle() noexcept;
+    void meet(const ElasticLoad& load) noexcept;
+    void refreshForces() noexcept;
+    void refreshResidual() noexcept;
+    void prepareContacts() noexcept;
+    void look(Field direction) noexcept;
+    Along contactsAlong(double alpha) const noexcept;
+    double contactProduct(Field a) const noexcept;
+    double lineSearch(double slope, double curvature, ElasticResult& result) const noexcept;
+    bool takeStep(Field direction, Field image, ElasticResult& result) noexcept;
+    double tryFinite(Field direction, double alpha, ElasticResult& result) noexcept;
+    bool oneCycle(Before before, ElasticResult& result) noexcept;
+    bool touched() const noexcept;
+    double contactForce() const noexcept;
+    void measure(ElasticResult& result) const noexcept;
+    ContactPush push(const ContactSite& site, double alpha) const noexcept;
+    Vec3 force(std::size_t owner, bool isTie) const noexcept;
+
+    ElasticOptions options_;
+    WindowStack stack_;
+    Multigrid multigrid_;
+    std::vector<ContactSite> sites_;
+    std::size_t siteCount_ = 0;
+    std::vector<occupancy::ShapeDistance> shapes_;
+    std::span<const Tie> ties_;
+    double energy_ = 0;  // of the tissue, finite strain [J]
+    int sinceRefresh_ = 0;
+    bool atRest_ = true;
+    bool hasIncrement_ = false;
+};
+
+}  // namespace palpate::chainmail

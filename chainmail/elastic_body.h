@@ -1,0 +1,55 @@
+#pragma once
+
+#include <volume/scalar_field.h>
+#include <volume/tissue.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// The whole body at one spacing: cubic cells, each of one material, between nodes.
+struct ElasticLevel {
+    volume::NodeGrid nodes;           // cell (i, j, k) lies between nodes (i, j, k) and (i + 1, j + 1, k + 1)
+    std::vector<float> mu;            // Lame's second parameter of each cell, by its lowest node [Pa]  (count x 1)
+    std::vector<float> lambda;        // Lame's first parameter                                    [Pa] (count x 1)
+    std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
+    std::vector<float> diagonal;      // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
+};
+
+/// A piece of the body's surface at rest.
+struct SurfacePoint {
+    Vec3f position{0.0F};  // [m]
+    float area = 0;        // [m^2]
+    float mu = 0;          // of the tissue under it [Pa]
+};
+
+/// The points in one cell of the finest level: head of a run in ElasticBody::points.
+struct SurfaceCell {
+    Index3 cell{0};
+    std::uint32_t first = 0;
+    std::uint32_t count = 0;
+};
+
+/// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
+/// before, and its nodes are every second node of it.
+struct ElasticBody {
+    std::vector<ElasticLevel> levels;  // finest first; the last has few nodes
+    std::vector<SurfaceCell> cells;    // that the surface runs through, by z, then y, then x
+    std::vector<std::uint32_t> rows;   // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
+    std::vector<SurfacePoint> points;
+    bool held = true;  // false: the body had nothing fixed, and was laid on its back
+};
+
+/// @param cells        centres of the finest level's cells; the cells at its border must be empty
+/// @param surface      signed distance to the body's surface at rest [m]
+/// @param poissonCap   Poisson's ratios above are lowered to this [-], under 0.5
+///
+/// Cells that are half or more fixed tissue fix their nodes. A body without fixed tissue lies on its back: the nodes of
+/// the rear 5 % are fixed (frame LPS: y to the back).
+///
+/// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
+ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellMaterial> materials,
+                        const volume::DistanceField& surface, double poissonCap);
+
+}  // namespace palpate::chainmail

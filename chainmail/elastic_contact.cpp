@@ -1,0 +1,211 @@
+#include <chainmail/elastic_contact.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
+constexpr double near = 1.0;      // spacings from the tool within which a point is looked at
+
+Vec3 componentsAt(const Window& w, std::size_t node, Field field) noexcept
+{
+    const float* f = w.field(field) + node;
+    return {f[0], f[w.layout.count], f[2 * w.layout.count]};
+}
+
+std::size_t corner(const Layout& l, std::size_t node, int c) noexcept
+{
+    return node + static_cast<std::size_t>(c & 1) + (static_cast<std::size_t>(c >> 1) & 1) * l.row +
+           (static_cast<std::size_t>(c >> 2) & 1) * l.plane;
+}
+
+// Stiffness of a surface point. A whole contact must not be stiffer than `stiffest`: spread over a quarter of the tool's
+// cross-section, what a shallow press touches.
+double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
+{
+    const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
+    const double cap = tool.stiffest / (0.25 * std::numbers::pi * radius * radius);
+    const double e = 2.0 * static_cast<double>(p.mu) * 1.45;
+    return std::min(penalty * e / spacing, cap) * static_cast<double>(p.area);
+}
+
+class Finder {
+public:
+    Finder(const ElasticBody& body, std::span<const Window> windows, std::span<ContactSite> out)
+        : body_(body), windows_(windows), out_(out)
+    {
+    }
+
+    void addTie(const Tie& tie, std::size_t index) noexcept
+    {
+        ContactSite site;
+        site.rest = tie.rest;
+        site.owner = static_cast<std::uint16_t>(index);
+        site.isTie = true;
+        add(site);
+    }
+
+    void addTool(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        const auto& s = tool.shape;
+        const double radius = std::max(s.radiusA, s.radiusB) + near * grid.spacing;
+        const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.carried) - radius;
+        const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.carried) + radius;
+        // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
+        const Vec3 last(grid.size - 2);
+        const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), last));
+        const Index3 to(glm::clamp(glm::floor((high - grid.origin) / grid.spacing), Vec3(0.0), last));
+        for (int z = from.z; z <= to.z; ++z) {
+            for (int y = from.y; y <= to.y; ++y) {
+                addRow(tool, shape, index, static_cast<std::size_t>(y + z * grid.size.y), from.x, to.x);
+            }
+        }
+    }
+
+    std::size_t count() const noexcept { return count_; }
+
+private:
+    void addRow(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index, std::size_t row,
+                int first, int last) noexcept
+    {
+        for (std::uint32_t c = body_.rows[row]; c < body_.rows[row + 1]; ++c) {
+            const SurfaceCell& cell = body_.cells[c];
+            if (cell.cell.x >= first && cell.cell.x <= last && mayTouch(shape, cell)) {
+                addCell(tool, shape, index, cell);
+            }
+        }
+    }
+
+    bool mayTouch(const occupancy::ShapeDistance& shape, const SurfaceCell& cell) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        ContactSite middle;
+        middle.rest = grid.position(cell.cell) + 0.5 * grid.spacing;
+        locate(body_, windows_, middle.rest, middle);
+        if (middle.level >= windows_.size()) {
+            return false;
+        }
+        return nearest(shape, middle.rest, gather(windows_, middle, Field::u)) < (near + 1.5) * grid.spacing;
+    }
+
+    void addCell(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
+                 const SurfaceCell& cell) noexcept
+    {
+        const double spacing = body_.levels.front().nodes.spacing;
+        for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
+            const SurfacePoint& point = body_.points[i];
+            ContactSite site;
+            site.rest = Vec3(point.position);
+            site.owner = static_cast<std::uint16_t>(index);
+            site.stiffness = siteStiffness(point, spacing, tool);
+            if (add(site) && nearest(shape, site.rest, site.u) > near * spacing) {
+                --count_;
+            }
+        }
+    }
+
+    // Tissue that a tool left behind still has to find back to it.
+    static double nearest(const occupancy::ShapeDistance& shape, Vec3 rest, Vec3 u) noexcept
+    {
+        return std::min(shape.distance(rest + u), shape.distance(rest));
+    }
+
+    bool add(ContactSite& site) noexcept
+    {
+        locate(body_, windows_, site.rest, site);
+        if (site.level >= windows_.size() || count_ == out_.size()) {
+            return false;
+        }
+        site.u = gather(windows_, site, Field::u);
+        out_[count_++] = site;
+        return true;
+    }
+
+    const ElasticBody& body_;
+    std::span<const Window> windows_;
+    std::span<ContactSite> out_;
+    std::size_t count_ = 0;
+};
+
+}  // namespace
+
+void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept
+{
+    for (std::size_t l = 0; l < windows.size(); ++l) {
+        const auto& grid = body.levels[l].nodes;
+        const Vec3 at = (rest - grid.origin) / grid.spacing;
+        const Index3 cell(glm::floor(at));
+        if (!windows[l].contains(cell) || !windows[l].contains(cell + 1)) {
+            continue;
+        }
+        const Vec3 t = at - Vec3(cell);
+        for (int c = 0; c < 8; ++c) {
+            const Vec3 w = glm::mix(1.0 - t, t, Vec3(c & 1, (c >> 1) & 1, c >> 2));
+            site.share[static_cast<std::size_t>(c)] = static_cast<float>(w.x * w.y * w.z);
+        }
+        site.node = static_cast<std::uint32_t>(windows[l].at(cell));
+        site.level = static_cast<std::uint16_t>(l);
+        return;
+    }
+    site.level = static_cast<std::uint16_t>(windows.size());
+}
+
+Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept
+{
+    const Window& w = windows[site.level];
+    Vec3 sum(0.0);
+    for (int c = 0; c < 8; ++c) {
+        sum += static_cast<double>(site.share[static_cast<std::size_t>(c)]) *
+               componentsAt(w, corner(w.layout, site.node, c), field);
+    }
+    return sum;
+}
+
+ContactPush pushAt(const ContactSite& site, Vec3 u, std::span<const occupancy::ShapeDistance> shapes,
+                   std::span<const Tie> ties) noexcept
+{
+    ContactPush push;
+    if (site.isTie) {
+        const Tie& tie = ties[site.owner];
+        push.tangent = tie.across * glm::dmat3(1.0) + (tie.along - tie.across) * glm::outerProduct(tie.axis, tie.axis);
+        const Vec3 stretch = tie.u - u;
+        push.force = push.tangent * stretch;
+        push.energy = 0.5 * glm::dot(push.force, stretch);
+        return push;
+    }
+    const auto& shape = shapes[site.owner];
+    const Vec3 at = site.rest + u;
+    const double depth = -shape.distance(at);
+    if (depth <= 0.0) {
+        return push;
+    }
+    const Vec3 normal = shape.gradient(at);
+    push.force = site.stiffness * depth * normal;
+    push.tangent = site.stiffness * glm::outerProduct(normal, normal);
+    push.energy = 0.5 * site.stiffness * depth * depth;
+    return push;
+}
+
+std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
+                      std::span<const occupancy::ShapeDistance> shapes, std::span<ContactSite> out) noexcept
+{
+    Finder finder(body, windows, out);
+    for (std::size_t i = 0; i < load.ties.size(); ++i) {
+        finder.addTie(load.ties[i], i);
+    }
+    for (std::size_t i = 0; i < load.tools.size(); ++i) {
+        finder.addTool(load.tools[i], shapes[i], i);
+    }
+    return finder.count();
+}
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chainmail/window.h>
+#include <occupancy/tool_shape.h>
+
+#include <glm/mat3x3.hpp>
+
+#include <span>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// A rigid tool that tissue cannot enter.
+struct ElasticTool {
+    occupancy::RoundCone shape;  // where it is now [m]
+    Vec3 carried{0.0};           // about how far it has carried the tissue that it touches [m]: where to look for contacts
+    double stiffest = 1000;      // of the whole contact [N/m]: a rigid body is not rendered stiffer
+};
+
+/// A material point that is held by springs: by a needle's tip, or along its shaft.
+struct Tie {
+    Vec3 rest{0.0};         // [m]
+    Vec3 u{0.0};            // the displacement that the springs pull to [m]
+    Vec3 axis{0, 0, 1};     // unit vector
+    double along = 0;       // stiffness along the axis [N/m]
+    double across = 0;      // and across it [N/m]
+};
+
+struct ElasticLoad {
+    std::span<const ElasticTool> tools;
+    std::span<const Tie> ties;
+    Vec3 focus{0.0};  // where the finest window shall be, at rest [m]
+};
+
+/// Where tool and tissue meet: a point of the surface that a tool may press, or a tie.
+struct ContactSite {
+    std::uint32_t node = 0;  // lowest node of the cell that it lies in
+    std::uint16_t level = 0;
+    std::uint16_t owner = 0;  // index of tool or tie
+    bool isTie = false;
+    std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
+    Vec3 rest{0.0};
+    Vec3 u{0.0};           // its displacement [m]
+    Vec3 p{0.0};           // and that of the search direction
+    double stiffness = 0;  // of a surface point [N/m]
+};
+
+/// What the contact does at one site.
+struct ContactPush {
+    Vec3 force{0.0};      // on the tissue [N]
+    glm::dmat3 tangent{0.0};  // by how much the force falls per displacement, positive semi-definite [N/m]
+    double energy = 0;    // [J]
+};
+
+/// A penalty that grows with the square of the depth: E = k d^2 / 2 at each surface point, so that the force is smooth
+/// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
+/// pop from node to node; points four times as dense as the nodes, with their areas, do not.
+/// k = 20 E / h per area: the tool is about 2 % of its depth inside the tissue.
+ContactPush pushAt(const ContactSite& site, Vec3 u, std::span<const occupancy::ShapeDistance> shapes,
+                   std::span<const Tie> ties) noexcept;
+
+/// Fills `out` with the ties and with the surface points that a tool may touch: those within a spacing of it, as the
+/// tissue lies now.
+/// @returns  how many; more than out holds are left out
+std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
+                      std::span<const occupancy::ShapeDistance> shapes, std::span<ContactSite> out) noexcept;
+
+/// Value of a field at a site.
+Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;
+
+/// Finest window with the cell around `rest` [m], and where in it. `level` = number of windows when none has it.
+void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept;
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+namespace palpate::chainmail {
+
+/// Layout of one window's arrays: nodes (i, j, k), x fastest, rows padded with zeros to whole vectors.
+///
+///     node (i, j, k) is at  i + row * j + plane * k;   cell (i, j, k) lies between nodes i .. i + 1 and has the same index
+///
+/// A field has three components, one behind the other, `count` floats each, and room for one vector behind the last.
+struct Layout {
+    int nx = 0, ny = 0, nz = 0;  // nodes
+    std::size_t row = 0;         // floats, a multiple of `lanes`
+    std::size_t plane = 0;       // floats
+    std::size_t count = 0;       // floats
+
+    static constexpr std::size_t lanes = 16;  // of the widest vector unit
+    static Layout of(int nx, int ny, int nz) noexcept;
+    std::size_t at(int i, int j, int k) const noexcept
+    {
+        return static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    }
+    /// Floats that a field of three components takes.
+    std::size_t fieldSize() const noexcept { return 3 * count + lanes; }
+    /// Floats of working memory that apply() needs.
+    std::size_t scratchSize() const noexcept { return 24 * plane + 6 * row + lanes; }
+};
+
+/// Stiffness of each cell (count x 1), both scaled by spacing / 32; zero where there is no tissue.
+struct CellStiffness {
+    const float* mu = nullptr;      // Lame's second parameter, times h / 32 [N/m]
+    const float* lambda = nullptr;  // Lame's first parameter, times h / 32 [N/m]
+};
+
+/// The arithmetic of the elastic level, compiled once per instruction set. All sets do the same operations in the same
+/// order, without fused multiply-add, so that their results agree to the bit.
+///
+/// The element is a trilinear brick with selective reduced integration, in modal form: for each component the eight nodal
+/// values become modes m (x, y, z, xy, yz, zx, xyz: eighths of sums with signs), and with D = u_x + v_y + w_z its energy is
+///
+///     E = 2 h (mu Q + lambda D^2)
+///     Q = 2 (u_x^2 + v_y^2 + w_z^2) + (u_y + v_x)^2 + (u_z + w_x)^2 + (v_z + w_y)^2
+///       + u_xy^2 + u_zx^2 + v_xy^2 + v_yz^2 + w_yz^2 + w_zx^2
+///       + 2/3 (u_yz^2 + v_zx^2 + w_xy^2 + u_yz v_zx + v_zx w_xy + w_xy u_yz) + 4/9 (u_xyz^2 + v_xyz^2 + w_xyz^2)
+///
+/// The mean divergence alone carries lambda: no locking towards nu = 0.5, and no hourglass mode without energy.
+/// Sources: D. P. Flanagan, T. Belytschko, "A uniform strain hexahedron and quadrilateral with orthogonal hourglass
+/// control", Int. J. Numer. Methods Eng. 17, 1981 (modes); T. J. R. Hughes, "Generalization of selective integration
+/// procedures to anisotropic and nonlinear media", Int. J. Numer. Methods Eng. 15, 1980.
+struct Kernels {
+    const char* name;
+    int width;  // floats per vector
+
+    /// out = A u: the gradient of the energy at every node [N], u in [m]. `scratch` has layout.scratchSize() floats.
+    void (*apply)(const Layout& layout, CellStiffness stiffness, const float* u, float* out, float* scratch) noexcept;
+
+    /// As apply(), for finite strain: the mean deformation gradient F of each cell goes through the stable neo-Hookean
+    /// energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim, "Stable
+    /// Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite when a
+    /// cell inverts; the other modes keep their linear stiffness. `inverse` is 1 / spacing [1/m].
+    /// @returns  the energy [J]
+    double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
+                          float* scratch) noexcept;
+
+    double (*dot)(const float* a, const float* b, std::size_t n) noexcept;
+    /// y += a x
+    void (*add)(float a, const float* x, float* y, std::size_t n) noexcept;
+    /// y = x + a y
+    void (*scaleAdd)(const float* x, float a, float* y, std::size_t n) noexcept;
+    /// z = weight * diagonal r, for each of three components
+    void (*smoothFirst)(float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept;
+    /// z += weight * diagonal (r - q), for each of three components
+    void (*smooth)(float weight, const float* diagonal, const float* r, const float* q, float* z,
+                   std::size_t count) noexcept;
+    /// t = open (r - q), for each of three components
+    void (*residual)(const float* open, const float* r, const float* q, float* t, std::size_t count) noexcept;
+    /// y = y + border (x - y), for each of three components: takes x over at a window's border
+    void (*blend)(const float* border, const float* x, float* y, std::size_t count) noexcept;
+    /// y += mask x, for each of three components
+    void (*addMasked)(const float* mask, const float* x, float* y, std::size_t count) noexcept;
+    /// y = -mask x, for each of three components
+    void (*negate)(const float* mask, const float* x, float* y, std::size_t count) noexcept;
+    /// out = (a + b) / 2
+    void (*average)(const float* a, const float* b, float* out, std::size_t n) noexcept;
+    /// out = b + (a + c) / 2
+    void (*hat)(const float* a, const float* b, const float* c, float* out, std::size_t n) noexcept;
+};
+
+/// The widest that this machine can run.
+const Kernels& kernels() noexcept;
+/// All that this machine can run, narrowest first.
+std::span<const Kernels* const> supportedKernels() noexcept;
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,459 @@
+// Included by one source per instruction set, which defines PALPATE_LANES. Nothing here has external linkage, so that no
+// vector code leaks into programs on lesser machines.
+
+#include <chainmail/kernels.h>
+
+#include <cstring>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr int W = PALPATE_LANES;
+using Lanes = float __attribute__((vector_size(4 * W)));
+
+inline Lanes load(const float* p) noexcept
+{
+    Lanes v;
+    std::memcpy(&v, p, sizeof v);
+    return v;
+}
+
+inline void store(float* p, Lanes v) noexcept
+{
+    std::memcpy(p, &v, sizeof v);
+}
+
+// The lanes one to the left: the last of `before`, then all but the last of `v`.
+inline Lanes shifted(Lanes before, Lanes v) noexcept
+{
+#if PALPATE_LANES == 4
+    return __builtin_shufflevector(before, v, 3, 4, 5, 6);
+#elif PALPATE_LANES == 8
+    return __builtin_shufflevector(before, v, 7, 8, 9, 10, 11, 12, 13, 14);
+#else
+    return __builtin_shufflevector(before, v, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30);
+#endif
+}
+
+// Modes of one component in a cell, eight times their size; the constant mode carries no energy.
+struct Modes {
+    Lanes x, y, z, xy, yz, zx, xyz;
+};
+
+// The same in one plane of nodes: sums (s) and differences (d) along x, then y.
+struct Plane {
+    Lanes ss, ds, sd, dd;
+};
+
+inline Plane planeOf(const float* u, std::size_t row) noexcept
+{
+    const Lanes a0 = load(u);
+    const Lanes a1 = load(u + 1);
+    const Lanes b0 = load(u + row);
+    const Lanes b1 = load(u + row + 1);
+    const Lanes as = a0 + a1;
+    const Lanes ad = a1 - a0;
+    const Lanes bs = b0 + b1;
+    const Lanes bd = b1 - b0;
+    return {as + bs, ad + bd, bs - as, bd - ad};
+}
+
+inline Plane loadPlane(const float* p, std::size_t plane) noexcept
+{
+    return {load(p), load(p + plane), load(p + 2 * plane), load(p + 3 * plane)};
+}
+
+inline void storePlane(float* p, std::size_t plane, const Plane& v) noexcept
+{
+    store(p, v.ss);
+    store(p + plane, v.ds);
+    store(p + 2 * plane, v.sd);
+    store(p + 3 * plane, v.dd);
+}
+
+inline Modes modesOf(const Plane& low, const Plane& high) noexcept
+{
+    return {low.ds + high.ds, low.sd + high.sd, high.ss - low.ss, low.dd + high.dd,
+            high.sd - low.sd, high.ds - low.ds, high.dd - low.dd};
+}
+
+// What the modes' gradient gives to the lower and to the upper plane of nodes.
+inline Plane lower(const Modes& g) noexcept
+{
+    return {-g.z, g.x - g.zx, g.y - g.yz, g.xy - g.xyz};
+}
+
+inline Plane upper(const Modes& g) noexcept
+{
+    return {g.z, g.x + g.zx, g.y + g.yz, g.xy + g.xyz};
+}
+
+inline Plane operator+(const Plane& a, const Plane& b) noexcept
+{
+    return {a.ss + b.ss, a.ds + b.ds, a.sd + b.sd, a.dd + b.dd};
+}
+
+// Modes that bend and twist a cell: linear in every model.
+inline void hourglass(Lanes mu, const Modes (&m)[3], Modes (&g)[3]) noexcept
+{
+    const Lanes two = 2.0F * mu;
+    const Lanes third = (2.0F / 3.0F) * mu;
+    const Lanes ninth = (8.0F / 9.0F) * mu;
+    const Lanes c = third * (m[0].yz + m[1].zx + m[2].xy);
+    g[0].xy = two * m[0].xy;
+    g[0].zx = two * m[0].zx;
+    g[0].yz = third * m[0].yz + c;
+    g[1].xy = two * m[1].xy;
+    g[1].yz = two * m[1].yz;
+    g[1].zx = third * m[1].zx + c;
+    g[2].yz = two * m[2].yz;
+    g[2].zx = two * m[2].zx;
+    g[2].xy = third * m[2].xy + c;
+#pragma GCC unroll 3
+    for (int q = 0; q < 3; ++q) {
+        g[q].xyz = ninth * m[q].xyz;
+    }
+}
+
+// Small strain: the law of kernels.h.
+struct Linear {
+    void operator()(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    {
+        const Lanes two = 2.0F * mu;
+        const Lanes four = 4.0F * mu;
+        const Lanes d = 2.0F * lambda * (m[0].x + m[1].y + m[2].z);
+        g[0].x = four * m[0].x + d;
+        g[1].y = four * m[1].y + d;
+        g[2].z = four * m[2].z + d;
+        g[0].y = g[1].x = two * (m[0].y + m[1].x);
+        g[0].z = g[2].x = two * (m[0].z + m[2].x);
+        g[1].z = g[2].y = two * (m[1].z + m[2].y);
+        hourglass(mu, m, g);
+    }
+};
+
+// Finite strain: stable neo-Hookean on the mean deformation gradient. With modes eight times their size F = I + m / (4 h),
+// and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h times the scaled stiffness.
+struct NeoHookean {
+    float inverse;  // 1 / h
+    Lanes energy{};
+
+    void operator()(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    {
+        const float q = 0.25F * inverse;
+        const float h8 = 8.0F / inverse;
+        Lanes f[3][3] = {{q * m[0].x + 1.0F, q * m[0].y, q * m[0].z},
+                         {q * m[1].x, q * m[1].y + 1.0F, q * m[1].z},
+                         {q * m[2].x, q * m[2].y, q * m[2].z + 1.0F}};
+        Lanes c[3][3];
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 3
+            for (int j = 0; j < 3; ++j) {
+                const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+                c[i][j] = f[i1][j1] * f[i2][j2] - f[i1][j2] * f[i2][j1];
+            }
+        }
+        const Lanes volume = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2] - 1.0F;
+        const Lanes bulk = lambda + mu;
+        const Lanes pressure = bulk * volume - mu;
+        Lanes p[3][3];
+        Lanes stretch = Lanes{} - 3.0F;
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 3
+            for (int j = 0; j < 3; ++j) {
+                p[i][j] = h8 * (mu * f[i][j] + pressure * c[i][j]);
+                stretch += f[i][j] * f[i][j];
+            }
+        }
+        g[0].x = p[0][0];
+        g[0].y = p[0][1];
+        g[0].z = p[0][2];
+        g[1].x = p[1][0];
+        g[1].y = p[1][1];
+        g[1].z = p[1][2];
+        g[2].x = p[2][0];
+        g[2].y = p[2][1];
+        g[2].z = p[2][2];
+        hourglass(mu, m, g);
+        // h^3 W is 32 h^2 times W of the scaled stiffness; the linear modes hold half of their gradient times themselves.
+        Lanes bend{};
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+            bend += g[i].xy * m[i].xy + g[i].yz * m[i].yz + g[i].zx * m[i].zx + g[i].xyz * m[i].xyz;
+        }
+        const float h2 = 32.0F / (inverse * inverse);
+        energy += h2 * (0.5F * mu * stretch + (0.5F * bulk * volume - mu) * volume) + 0.5F * bend;
+    }
+};
+
+// One row of cells gives to two rows of nodes: `first` is its lower row, complete with what the row before left in `carry`.
+// Along x a node takes from the cell on its right and from the one on its left.
+class RowSum {
+public:
+    RowSum(float* carry, float* out) : carry_(carry), out_(out) {}
+
+    void add(std::size_t i, const Plane& v) noexcept
+    {
+        const Lanes s = v.ss - v.sd + load(carry_ + 2 * i);
+        const Lanes d = v.ds - v.dd + load(carry_ + 2 * i + W);
+        store(carry_ + 2 * i, v.ss + v.sd);
+        store(carry_ + 2 * i + W, v.ds + v.dd);
+        emit(i, s, d);
+    }
+
+    // The last row of nodes has no cells of its own.
+    void finish(std::size_t i) noexcept { emit(i, load(carry_ + 2 * i), load(carry_ + 2 * i + W)); }
+
+private:
+    void emit(std::size_t i, Lanes s, Lanes d) noexcept
+    {
+        const Lanes right = s + d;
+        store(out_ + i, s - d + shifted(before_, right));
+        before_ = right;
+    }
+
+    float* carry_;
+    float* out_;
+    Lanes before_{};
+};
+
+// Gives what was gathered for one plane of nodes to its rows.
+struct Sweep {
+    const Layout& layout;
+    const float* u;
+    float* out;
+    float* planes;   // sums and differences of the plane below (12 x plane)
+    float* pending;  // what the layer below gave to the plane (12 x plane)
+    float* carry;    // what the row before gave to this row (6 x row)
+
+    Plane planeAt(int c, std::size_t at) const noexcept
+    {
+        return planeOf(u + static_cast<std::size_t>(c) * layout.count + at, layout.row);
+    }
+    float* component(float* p, int c) const noexcept { return p + static_cast<std::size_t>(c) * 4 * layout.plane; }
+    float* rowOut(int c, std::size_t at) const noexcept
+    {
+        return out + static_cast<std::size_t>(c) * layout.count + at;
+    }
+    float* carryOf(int c) const noexcept { return carry + static_cast<std::size_t>(c) * 2 * layout.row; }
+
+    void begin() noexcept
+    {
+        std::memset(pending, 0, 12 * layout.plane * sizeof(float));
+#pragma GCC unroll 3
+        for (int c = 0; c < 3; ++c) {
+            for (std::size_t at = 0; at + layout.row < layout.plane; at += W) {
+                storePlane(component(planes, c) + at, layout.plane, planeAt(c, at));
+            }
+        }
+    }
+
+    void lastRow(std::size_t at) noexcept
+    {
+#pragma GCC unroll 3
+        for (int c = 0; c < 3; ++c) {
+            RowSum sum(carryOf(c), rowOut(c, at));
+            for (std::size_t i = 0; i < layout.row; i += W) {
+                sum.finish(i);
+            }
+        }
+    }
+
+    template <typename Law>
+    void layer(int k, CellStiffness stiffness, Law& law) noexcept
+    {
+        const std::size_t above = layout.at(0, 0, k + 1);
+        std::memset(carry, 0, 6 * layout.row * sizeof(float));
+        for (int j = 0; j + 1 < layout.ny; ++j) {
+            const std::size_t at = layout.at(0, j, k);
+            const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
+            RowSum sum[3] = {{carryOf(0), rowOut(0, at)}, {carryOf(1), rowOut(1, at)}, {carryOf(2), rowOut(2, at)}};
+            for (std::size_t i = 0; i < layout.row; i += W) {
+                Modes m[3];
+                Modes g[3];
+#pragma GCC unroll 3
+                for (int c = 0; c < 3; ++c) {
+                    const Plane high = planeAt(c, above + inPlane + i);
+                    m[c] = modesOf(loadPlane(component(planes, c) + inPlane + i, layout.plane), high);
+                    storePlane(component(planes, c) + inPlane + i, layout.plane, high);
+                }
+                law(load(stiffness.mu + at + i), load(stiffness.lambda + at + i), m, g);
+#pragma GCC unroll 3
+                for (int c = 0; c < 3; ++c) {
+                    float* wait = component(pending, c) + inPlane + i;
+                    sum[c].add(i, lower(g[c]) + loadPlane(wait, layout.plane));
+                    storePlane(wait, layout.plane, upper(g[c]));
+                }
+            }
+        }
+        lastRow(layout.at(0, layout.ny - 1, k));
+    }
+
+    void end() noexcept
+    {
+        std::memset(carry, 0, 6 * layout.row * sizeof(float));
+        for (int j = 0; j + 1 < layout.ny; ++j) {
+            const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
+#pragma GCC unroll 3
+            for (int c = 0; c < 3; ++c) {
+                RowSum sum(carryOf(c), rowOut(c, layout.at(0, j, layout.nz - 1)));
+                for (std::size_t i = 0; i < layout.row; i += W) {
+                    sum.add(i, loadPlane(component(pending, c) + inPlane + i, layout.plane));
+                }
+            }
+        }
+        lastRow(layout.at(0, layout.ny - 1, layout.nz - 1));
+    }
+};
+
+template <typename Law>
+void sweepCells(const Layout& layout, CellStiffness stiffness, const float* u, float* out, float* scratch,
+                Law& law) noexcept
+{
+    Sweep sweep{layout, u, out, scratch, scratch + 12 * layout.plane, scratch + 24 * layout.plane};
+    sweep.begin();
+    for (int k = 0; k + 1 < layout.nz; ++k) {
+        sweep.layer(k, stiffness, law);
+    }
+    sweep.end();
+}
+
+void apply(const Layout& layout, CellStiffness stiffness, const float* u, float* out, float* scratch) noexcept
+{
+    Linear law;
+    sweepCells(layout, stiffness, u, out, scratch, law);
+}
+
+double sumOf(Lanes v) noexcept
+{
+    double sum = 0.0;
+    for (int i = 0; i < W; ++i) {
+        sum += static_cast<double>(v[i]);
+    }
+    return sum;
+}
+
+double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
+                   float* scratch) noexcept
+{
+    NeoHookean law{inverse};
+    sweepCells(layout, stiffness, u, out, scratch, law);
+    return sumOf(law.energy);
+}
+
+// Sixteen partial sums at any width, flushed into doubles, so that every instruction set adds in the same order.
+double dot(const float* a, const float* b, std::size_t n) noexcept
+{
+    constexpr std::size_t vectors = Layout::lanes / W;
+    constexpr std::size_t block = 64 * Layout::lanes;
+    double sum = 0.0;
+    for (std::size_t start = 0; start < n; start += block) {
+        Lanes part[vectors] = {};
+        const std::size_t stop = start + block < n ? start + block : n;
+        for (std::size_t i = start; i < stop; i += Layout::lanes) {
+            for (std::size_t v = 0; v < vectors; ++v) {
+                part[v] += load(a + i + v * W) * load(b + i + v * W);
+            }
+        }
+        for (const Lanes& p : part) {
+            sum += sumOf(p);
+        }
+    }
+    return sum;
+}
+
+void add(float a, const float* x, float* y, std::size_t n) noexcept
+{
+    for (std::size_t i = 0; i < n; i += W) {
+        store(y + i, load(y + i) + a * load(x + i));
+    }
+}
+
+void scaleAdd(const float* x, float a, float* y, std::size_t n) noexcept
+{
+    for (std::size_t i = 0; i < n; i += W) {
+        store(y + i, load(x + i) + a * load(y + i));
+    }
+}
+
+void smoothFirst(float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, r += count, z += count) {
+        for (std::size_t i = 0; i < count; i += W) {
+            store(z + i, weight * load(diagonal + i) * load(r + i));
+        }
+    }
+}
+
+void smooth(float weight, const float* diagonal, const float* r, const float* q, float* z, std::size_t count) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, r += count, q += count, z += count) {
+        for (std::size_t i = 0; i < count; i += W) {
+            store(z + i, load(z + i) + weight * load(diagonal + i) * (load(r + i) - load(q + i)));
+        }
+    }
+}
+
+void residual(const float* open, const float* r, const float* q, float* t, std::size_t count) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, r += count, q += count, t += count) {
+        for (std::size_t i = 0; i < count; i += W) {
+            store(t + i, load(open + i) * (load(r + i) - load(q + i)));
+        }
+    }
+}
+
+void addMasked(const float* m, const float* x, float* y, std::size_t count) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, x += count, y += count) {
+        for (std::size_t i = 0; i < count; i += W) {
+            store(y + i, load(y + i) + load(m + i) * load(x + i));
+        }
+    }
+}
+
+void negate(const float* m, const float* x, float* y, std::size_t count) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, x += count, y += count) {
+        for (std::size_t i = 0; i < count; i += W) {
+            store(y + i, load(m + i) * -load(x + i));
+        }
+    }
+}
+
+void average(const float* a, const float* b, float* out, std::size_t n) noexcept
+{
+    for (std::size_t i = 0; i < n; i += W) {
+        store(out + i, 0.5F * (load(a + i) + load(b + i)));
+    }
+}
+
+void hat(const float* a, const float* b, const float* c, float* out, std::size_t n) noexcept
+{
+    for (std::size_t i = 0; i < n; i += W) {
+        store(out + i, load(b + i) + 0.5F * (load(a + i) + load(c + i)));
+    }
+}
+
+void blend(const float* border, const float* x, float* y, std::size_t count) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, x += count, y += count) {
+        for (std::size_t i = 0; i < count; i += W) {
+            const Lanes old = load(y + i);
+            store(y + i, old + load(border + i) * (load(x + i) - old));
+        }
+    }
+}
+
+constexpr Kernels table(const char* name) noexcept
+{
+    return {name, W, apply, applyFinite, dot, add, scaleAdd, smoothFirst, smooth, residual, blend, addMasked, negate,
+            average, hat};
+}
+
+}  // namespace
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,176 @@
+#include <chainmail/window.h>
+
+#include <glm/common.hpp>
+
+#include <algorithm>
+#include <cstring>
+
+namespace palpate::chainmail {
+
+namespace {
+
+bool onFace(const Layout& l, Index3 n) noexcept
+{
+    return n.x == 0 || n.y == 0 || n.z == 0 || n.x == l.nx - 1 || n.y == l.ny - 1 || n.z == l.nz - 1;
+}
+
+Index3 offsetIn(const Window& fine, const Window& coarse) noexcept
+{
+    return fine.low / 2 - coarse.low;
+}
+
+// A row of the coarse window, spread to the nodes of the fine one.
+void spread(const float* from, int fineNodes, float* to) noexcept
+{
+    for (int i = 0; i + 1 < fineNodes; i += 2) {
+        to[i] = from[i / 2];
+        to[i + 1] = 0.5F * (from[i / 2] + from[i / 2 + 1]);
+    }
+    to[fineNodes - 1] = from[fineNodes / 2];
+}
+
+// The transpose: a row of the fine window, gathered to the coarse one.
+void gatherAdd(const float* from, int fineNodes, float* to) noexcept
+{
+    for (int i = 0; i < fineNodes; i += 2) {
+        const float left = i > 0 ? from[i - 1] : 0.0F;
+        const float right = i + 1 < fineNodes ? from[i + 1] : 0.0F;
+        to[i / 2] += from[i] + 0.5F * (left + right);
+    }
+}
+
+}  // namespace
+
+Window::Window(Index3 size) : layout(Layout::of(size.x, size.y, size.z))
+{
+    for (Floats* cells : {&mu, &lambda, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof}) {
+        cells->assign(layout.count + Layout::lanes, 0.0F);
+    }
+    for (Floats& f : fields) {
+        f.assign(layout.fieldSize(), 0.0F);
+    }
+}
+
+void Window::place(const ElasticLevel& level, Index3 at, bool coarsest) noexcept
+{
+    low = at;
+    const float scale = static_cast<float>(level.nodes.spacing / 32.0);
+    for (int k = 0; k + 1 < layout.nz; ++k) {
+        for (int j = 0; j + 1 < layout.ny; ++j) {
+            const std::size_t from = level.nodes.offset(low + Index3(0, j, k));
+            const std::size_t to = layout.at(0, j, k);
+            for (std::size_t i = 0; i + 1 < static_cast<std::size_t>(layout.nx); ++i) {
+                mu[to + i] = scale * level.mu[from + i];
+                lambda[to + i] = scale * level.lambda[from + i];
+            }
+        }
+    }
+    std::copy(mu.begin(), mu.end(), uncoveredMu.begin());
+    std::copy(lambda.begin(), lambda.end(), uncoveredLambda.begin());
+    volume::forEachIndex(Index3(0), size() - 1, [&](Index3 n) {
+        const std::size_t node = layout.at(n.x, n.y, n.z);
+        const std::size_t inLevel = level.nodes.offset(low + n);
+        const float sum = level.diagonal[inLevel];
+        const bool held = level.fixed[inLevel] != 0;
+        const bool follows = !coarsest && onFace(layout, n);
+        border[node] = follows && !held ? 1.0F : 0.0F;
+        open[node] = held ? 0.0F : 1.0F;
+        const bool isFree = !held && !follows && sum > 0.0F;
+        diagonal[node] = isFree ? 1.0F / sum : 0.0F;
+        dof[node] = isFree ? 1.0F : 0.0F;
+    });
+}
+
+void Window::cover(const Window& finer) noexcept
+{
+    const Index3 o = offsetIn(finer, *this);
+    const Index3 cells = (finer.size() - 1) / 2;
+    volume::forEachIndex(o, o + cells - 1, [&](Index3 c) {
+        uncoveredMu[layout.at(c.x, c.y, c.z)] = 0.0F;
+        uncoveredLambda[layout.at(c.x, c.y, c.z)] = 0.0F;
+    });
+    volume::forEachIndex(o + 1, o + cells - 1, [&](Index3 n) { dof[layout.at(n.x, n.y, n.z)] = 0.0F; });
+}
+
+void prolong(const Kernels& k, const Window& coarse, const float* from, const Window& fine, float* to) noexcept
+{
+    const Index3 o = offsetIn(fine, coarse);
+    const Layout& l = fine.layout;
+    for (std::size_t c = 0; c < 3; ++c) {
+        const float* source = from + c * coarse.layout.count;
+        float* target = to + c * l.count;
+        for (int z = 0; z < l.nz; z += 2) {
+            for (int y = 0; y < l.ny; y += 2) {
+                spread(source + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2), l.nx, target + l.at(0, y, z));
+            }
+            for (int y = 1; y < l.ny; y += 2) {
+                k.average(target + l.at(0, y - 1, z), target + l.at(0, y + 1, z), target + l.at(0, y, z), l.row);
+            }
+        }
+        for (int z = 1; z < l.nz; z += 2) {
+            k.average(target + l.at(0, 0, z - 1), target + l.at(0, 0, z + 1), target + l.at(0, 0, z), l.plane);
+        }
+    }
+}
+
+void restrictAdd(const Kernels& k, const Window& fine, const float* from, const Window& coarse, float* to,
+                 float* scratch) noexcept
+{
+    const Index3 o = offsetIn(fine, coarse);
+    const Layout& l = fine.layout;
+    float* zeros = scratch;
+    float* sum = scratch + l.plane;
+    float* rows = scratch + 2 * l.plane;
+    std::memset(zeros, 0, l.plane * sizeof(float));
+    for (std::size_t c = 0; c < 3; ++c) {
+        const float* source = from + c * l.count;
+        float* target = to + c * coarse.layout.count;
+        for (int z = 0; z < l.nz; z += 2) {
+            const float* below = z > 0 ? source + l.at(0, 0, z - 1) : zeros;
+            const float* above = z + 1 < l.nz ? source + l.at(0, 0, z + 1) : zeros;
+            k.hat(below, source + l.at(0, 0, z), above, sum, l.plane);
+            for (int y = 0; y < l.ny; y += 2) {
+                const float* before = y > 0 ? sum + l.at(0, y - 1, 0) : zeros;
+                const float* after = y + 1 < l.ny ? sum + l.at(0, y + 1, 0) : zeros;
+                k.hat(before, sum + l.at(0, y, 0), after, rows, l.row);
+                gatherAdd(rows, l.nx, target + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2));
+            }
+        }
+    }
+}
+
+void inject(const Window& fine, const float* from, const Window& coarse, float* to) noexcept
+{
+    const Index3 o = offsetIn(fine, coarse);
+    volume::forEachIndex(Index3(0), (fine.size() - 1) / 2, [&](Index3 n) {
+        const std::size_t target = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
+        const std::size_t source = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
+        for (std::size_t c = 0; c < 3; ++c) {
+            to[c * coarse.layout.count + target] = from[c * fine.layout.count + source];
+        }
+    });
+}
+
+void carryOver(const Layout& layout, Index3 oldLow, const float* from, Index3 newLow, float* to) noexcept
+{
+    const Index3 size(layout.nx, layout.ny, layout.nz);
+    const Index3 first = glm::max(newLow, oldLow);
+    const Index3 last = glm::min(newLow, oldLow) + size - 1;
+    if (first.x > last.x) {
+        return;
+    }
+    const std::size_t n = static_cast<std::size_t>(last.x - first.x + 1) * sizeof(float);
+    for (std::size_t c = 0; c < 3; ++c) {
+        for (int k = first.z; k <= last.z; ++k) {
+            for (int j = first.y; j <= last.y; ++j) {
+                const Index3 start(first.x, j, k);
+                const Index3 a = start - oldLow;
+                const Index3 b = start - newLow;
+                std::memcpy(to + c * layout.count + layout.at(b.x, b.y, b.z),
+                            from + c * layout.count + layout.at(a.x, a.y, a.z), n);
+            }
+        }
+    }
+}
+
+}  // namespace palpate::chainmail

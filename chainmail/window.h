@@ -1,0 +1,106 @@
+#pragma once
+
+#include <chainmail/elastic_body.h>
+#include <chainmail/kernels.h>
+
+#include <array>
+#include <cstdlib>
+#include <new>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// Memory that starts on a cache line: vectors of 64 bytes must not straddle two.
+template <typename T>
+struct CacheAligned {
+    using value_type = T;
+    CacheAligned() = default;
+    template <typename U>
+    CacheAligned(const CacheAligned<U>&) noexcept
+    {
+    }
+    T* allocate(std::size_t n) { return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t(64))); }
+    void deallocate(T* p, std::size_t) noexcept { ::operator delete(p, std::align_val_t(64)); }
+    bool operator==(const CacheAligned&) const noexcept { return true; }
+};
+using Floats = std::vector<float, CacheAligned<float>>;
+
+/// What a window keeps for every node: three components each, Layout::fieldSize() floats.
+enum class Field : std::uint8_t {
+    u,     // displacement [m]
+    a,     // A u, by the elastic energy alone [N]
+    d,     // the last tick's increment of u
+    e,     // and of a
+    p,     // search direction
+    q,     // A p
+    r,     // residual: force of the contacts less a, where the node is a degree of freedom [N]
+    f,     // right side of the cycle
+    z,     // its answer
+    t,     // working memory
+    count
+};
+inline constexpr std::size_t fieldCount = static_cast<std::size_t>(Field::count);
+
+/// A box of nodes of one level that follows the tool. Windows are nested; together they are one finite-element space:
+///
+///     +-----------------------------+      every node inside a window that no finer window covers is a degree of
+///     |           4 h               |      freedom; a node on a window's border takes what the next coarser window
+///     |    +----------------+       |      has there (trilinear), so that the displacement is continuous
+///     |    |     2 h        |       |
+///     |    |   +--------+   |       |
+///     |    |   |  h     |   |       |
+///     |    |   +--------+   |       |
+///     |    +----------------+       |
+///     +-----------------------------+
+///
+/// The masks are 1 or 0 per node, so that the kernels multiply where others would branch.
+struct Window {
+    Layout layout;
+    Index3 low{0};  // index of node (0, 0, 0) in the level; even but in the coarsest window
+    Floats mu, lambda;                    // of each cell, times spacing / 32 [N/m]
+    Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
+    Floats diagonal;                      // reciprocal of the operator's diagonal, zero where the node is not free
+    Floats border;                        // nodes that follow the next coarser window
+    Floats open;                          // free, or border
+    Floats dof;                           // degrees of freedom: free and not covered
+    std::array<Floats, fieldCount> fields;
+    float weight = 0.2F;  // of the smoother
+
+    float* field(Field f) noexcept { return fields[static_cast<std::size_t>(f)].data(); }
+    const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
+    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data()}; }
+    CellStiffness uncovered() const noexcept { return {uncoveredMu.data(), uncoveredLambda.data()}; }
+    Index3 size() const noexcept { return {layout.nx, layout.ny, layout.nz}; }
+    bool contains(Index3 node) const noexcept  // in the level's indices
+    {
+        const Index3 n = node - low;
+        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < layout.nx && n.y < layout.ny && n.z < layout.nz;
+    }
+    std::size_t at(Index3 node) const noexcept
+    {
+        const Index3 n = node - low;
+        return layout.at(n.x, n.y, n.z);
+    }
+
+    explicit Window(Index3 size);
+
+    /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
+    void place(const ElasticLevel& level, Index3 at, bool coarsest) noexcept;
+    /// Leaves out what `finer`, the next finer window, covers.
+    void cover(const Window& finer) noexcept;
+};
+
+/// fine = P coarse: trilinear, at all nodes of the fine window.
+void prolong(const Kernels& k, const Window& coarse, const float* from, const Window& fine, float* to) noexcept;
+
+/// coarse += P^T fine. `scratch`: as for Kernels::apply() on the fine window.
+void restrictAdd(const Kernels& k, const Window& fine, const float* from, const Window& coarse, float* to,
+                 float* scratch) noexcept;
+
+/// coarse = fine where the coarse window has a node that the fine one covers.
+void inject(const Window& fine, const float* from, const Window& coarse, float* to) noexcept;
+
+/// Moves what a field holds to a window's new place; `to` keeps what it has where the old window was not.
+void carryOver(const Layout& layout, Index3 oldLow, const float* from, Index3 newLow, float* to) noexcept;
+
+}  // namespace palpate::chainmail

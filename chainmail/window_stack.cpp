@@ -1,0 +1,202 @@
+#include <chainmail/window_stack.h>
+
+#include <glm/common.hpp>
+
+#include <algorithm>
+#include <cstring>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double inwards = 0.2;  // the focus lies this share of a window above its middle, towards the air
+constexpr int slack = 4;         // nodes that a window may be off before it moves; even, so that coarse nodes stay nodes
+
+Index3 nodeOf(const Layout& l, std::size_t at) noexcept
+{
+    return {static_cast<int>(at % l.row), static_cast<int>(at % l.plane / l.row), static_cast<int>(at / l.plane)};
+}
+
+}  // namespace
+
+WindowStack::WindowStack(const ElasticBody& body, int window, Vec3 focus) : body_(&body), kernels_(&chainmail::kernels())
+{
+    std::size_t scratch = 0;
+    for (const auto& level : body.levels) {
+        windows_.emplace_back(glm::min(level.nodes.size, Index3(window)));
+        scratch = std::max(scratch, windows_.back().layout.scratchSize());
+    }
+    scratch_.assign(scratch, 0.0F);
+    low_.assign(windows_.size(), Index3(0));
+    oldLow_ = low_;
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        low_[l] = wantedLow(l, focus);
+    }
+    place();
+}
+
+Index3 WindowStack::wantedLow(std::size_t level, Vec3 focus) const noexcept
+{
+    const auto& grid = body_->levels[level].nodes;
+    const Index3 size = windows_[level].size();
+    const Vec3 middle = (focus - grid.origin) / grid.spacing;
+    const Index3 low = 2 * Index3(glm::round(0.5 * (middle - 0.5 * Vec3(size - 1))));
+    return glm::clamp(low, Index3(0), grid.size - size);
+}
+
+void WindowStack::place() noexcept
+{
+    // A window must lie in the next coarser one.
+    for (std::size_t l = 0; l + 1 < windows_.size(); ++l) {
+        const Index3 size = windows_[l].size();
+        const Index3 coarse = windows_[l + 1].size();
+        const Index3 last = body_->levels[l + 1].nodes.size - coarse;
+        const Index3 need = low_[l] / 2 + (size - 1) / 2 - coarse + 1;
+        low_[l + 1] = glm::clamp(low_[l + 1], glm::max(need, Index3(0)), glm::min(low_[l] / 2, last));
+        if (l + 2 < windows_.size()) {
+            low_[l + 1] -= low_[l + 1] % 2;
+        }
+    }
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        windows_[l].place(body_->levels[l], low_[l], l + 1 == windows_.size());
+        if (l > 0) {
+            windows_[l].cover(windows_[l - 1]);
+        }
+    }
+}
+
+bool WindowStack::follow(Vec3 focus, bool carry) noexcept
+{
+    bool moves = false;
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        oldLow_[l] = low_[l];
+        const Index3 off = glm::abs(wantedLow(l, focus) - low_[l]);
+        if (std::max({off.x, off.y, off.z}) > slack) {
+            low_[l] = wantedLow(l, focus);
+            moves = true;
+        }
+    }
+    if (!moves) {
+        return false;
+    }
+    if (carry) {
+        for (std::size_t l = 0; l + 1 < windows_.size(); ++l) {
+            for (const Field f : {Field::u, Field::d}) {
+                inject(windows_[l], windows_[l].field(f), windows_[l + 1], windows_[l + 1].field(f));
+            }
+        }
+    }
+    place();
+    if (carry) {
+        transfer(Field::u);
+        transfer(Field::d);
+    }
+    return true;
+}
+
+void WindowStack::transfer(Field field) noexcept
+{
+    for (std::size_t l = windows_.size(); l-- > 0;) {
+        Window& w = windows_[l];
+        if (w.low == oldLow_[l]) {
+            continue;
+        }
+        if (l + 1 < windows_.size()) {
+            prolong(*kernels_, windows_[l + 1], windows_[l + 1].field(field), w, w.field(Field::t));
+        } else {
+            std::memset(w.field(Field::t), 0, 3 * w.layout.count * sizeof(float));
+        }
+        carryOver(w.layout, oldLow_[l], w.field(field), w.low, w.field(Field::t));
+        w.fields[static_cast<std::size_t>(field)].swap(w.fields[static_cast<std::size_t>(Field::t)]);
+    }
+}
+
+double WindowStack::applyWith(Field x, Field y, bool finite) noexcept
+{
+    const Kernels& k = *kernels_;
+    for (std::size_t l = windows_.size() - 1; l-- > 0;) {
+        Window& w = windows_[l];
+        prolong(k, windows_[l + 1], windows_[l + 1].field(x), w, w.field(Field::t));
+        k.blend(w.border.data(), w.field(Field::t), w.field(x), w.layout.count);
+    }
+    double energy = 0.0;
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        Window& w = windows_[l];
+        if (finite) {
+            const float inverse = static_cast<float>(1.0 / body_->levels[l].nodes.spacing);
+            energy += k.applyFinite(w.layout, w.uncovered(), inverse, w.field(x), w.field(y), scratch());
+        } else {
+            k.apply(w.layout, w.uncovered(), w.field(x), w.field(y), scratch());
+        }
+    }
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        Window& w = windows_[l];
+        if (l + 1 < windows_.size()) {
+            k.smoothFirst(1.0F, w.border.data(), w.field(y), w.field(Field::t), w.layout.count);
+            restrictAdd(k, w, w.field(Field::t), windows_[l + 1], windows_[l + 1].field(y), scratch());
+        }
+        k.negate(w.dof.data(), w.field(y), w.field(y), w.layout.count);
+    }
+    return energy;
+}
+
+void WindowStack::addForce(std::size_t level, std::size_t node, Vec3 force) noexcept
+{
+    Window& w = windows_[level];
+    if (w.dof[node] != 0.0F) {
+        float* r = w.field(Field::r) + node;
+        for (int c = 0; c < 3; ++c, r += w.layout.count) {
+            *r += static_cast<float>(force[c]);
+        }
+        return;
+    }
+    if (w.border[node] == 0.0F) {
+        return;
+    }
+    const Window& coarse = windows_[level + 1];
+    const Index3 n = w.low + nodeOf(w.layout, node);
+    const Index3 odd = n % 2;
+    const double share = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
+    volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) {
+        addForce(level + 1, coarse.at(parent), share * force);
+    });
+}
+
+double WindowStack::dot(Field a, Field b) const noexcept
+{
+    double sum = 0.0;
+    for (const Window& w : windows_) {
+        sum += kernels_->dot(w.field(a), w.field(b), 3 * w.layout.count);
+    }
+    return sum;
+}
+
+void WindowStack::add(double a, Field x, Field y) noexcept
+{
+    for (Window& w : windows_) {
+        kernels_->add(static_cast<float>(a), w.field(x), w.field(y), 3 * w.layout.count);
+    }
+}
+
+void WindowStack::scaleAdd(Field x, double a, Field y) noexcept
+{
+    for (Window& w : windows_) {
+        kernels_->scaleAdd(w.field(x), static_cast<float>(a), w.field(y), 3 * w.layout.count);
+    }
+}
+
+void WindowStack::copy(Field x, Field y) noexcept
+{
+    for (Window& w : windows_) {
+        std::memcpy(w.field(y), w.field(x), 3 * w.layout.count * sizeof(float));
+    }
+}
+
+void WindowStack::clear(Field field) noexcept
+{
+    for (Window& w : windows_) {
+        std::memset(w.field(field), 0, 3 * w.layout.count * sizeof(float));
+    }
+}
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <chainmail/window.h>
+
+#include <span>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// The nested windows as one finite-element space: where they are, and the operator on all of them together.
+class WindowStack {
+public:
+    /// @param window  nodes along each side of a window, odd; a level with fewer is held whole
+    /// @param focus   where the finest window starts, at rest [m]
+    /// The body must outlive it.
+    WindowStack(const ElasticBody& body, int window, Vec3 focus);
+
+    std::span<Window> windows() noexcept { return windows_; }
+    std::span<const Window> windows() const noexcept { return windows_; }
+    Window& operator[](std::size_t level) noexcept { return windows_[level]; }
+    std::size_t size() const noexcept { return windows_.size(); }
+    const ElasticBody& body() const noexcept { return *body_; }
+    const Kernels& kernels() const noexcept { return *kernels_; }
+    float* scratch() noexcept { return scratch_.data(); }
+
+    /// Moves windows whose middle is more than a quarter of them away from `focus` [m]; where `carry`, takes u and d along.
+    /// @returns  true when a window moved: what was computed from u and d has to be computed again
+    bool follow(Vec3 focus, bool carry) noexcept;
+
+    /// y = -A x on the degrees of freedom, over all windows; makes x continuous at the windows' borders first.
+    void apply(Field x, Field y) noexcept { applyWith(x, y, false); }
+    /// As apply(), for finite strain; returns the energy [J].
+    double applyFinite(Field x, Field y) noexcept { return applyWith(x, y, true); }
+
+    /// Adds a force at a node: to the residual of a degree of freedom; at a border node, to those it follows.
+    void addForce(std::size_t level, std::size_t node, Vec3 force) noexcept;
+
+    /// Over the degrees of freedom, where one of both is zero elsewhere.
+    double dot(Field a, Field b) const noexcept;
+    /// y += a x
+    void add(double a, Field x, Field y) noexcept;
+    /// y = x + a y
+    void scaleAdd(Field x, double a, Field y) noexcept;
+    void copy(Field x, Field y) noexcept;
+    void clear(Field field) noexcept;
+
+private:
+    Index3 wantedLow(std::size_t level, Vec3 focus) const noexcept;
+    void place() noexcept;
+    void transfer(Field field) noexcept;
+    double applyWith(Field x, Field y, bool finite) noexcept;
+
+    const ElasticBody* body_;
+    const Kernels* kernels_;
+    std::vector<Window> windows_;
+    std::vector<Index3> low_, oldLow_;
+    Floats scratch_;
+};
+
+}  // namespace palpate::chainmail

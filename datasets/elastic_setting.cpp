@@ -1,0 +1,52 @@
+#include <datasets/scene.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <stdexcept>
+
+namespace palpate::datasets {
+
+namespace {
+
+struct Setting {
+    std::string_view name;
+    double spacing;  // [m]
+    int window;
+    int cycles;
+};
+
+constexpr ElasticSettings standard;
+constexpr std::array<Setting, 3> settings{{
+    {"fast", 3e-3, 13, 1},
+    {"default", standard.spacing, standard.window, standard.cycles},
+    {"fine", 1e-3, 25, 2},
+}};
+
+}  // namespace
+
+std::vector<std::string> elasticSettings()
+{
+    std::vector<std::string> names;
+    for (const Setting& setting : settings) {
+        names.emplace_back(setting.name);
+    }
+    return names;
+}
+
+ElasticSettings elasticSetting(const std::string& name, const ElasticSettings& base)
+{
+    for (const Setting& setting : settings) {
+        if (name == setting.name) {
+            ElasticSettings out = base;
+            out.spacing = setting.spacing;
+            out.window = setting.window;
+            out.cycles = setting.cycles;
+            return out;
+        }
+    }
+    throw std::runtime_error(
+        fmt::format("setting '{}': there is none; there are {}", name, fmt::join(elasticSettings(), ", ")));
+}
+
+}  // namespace palpate::datasets
