@@ -1,6 +1,8 @@
 #include <chainmail/elastic.h>
 
 #include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -10,11 +12,10 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t mostTools = 16;
-constexpr int newtonSteps = 3;     // of a line search: contacts open and close along it
-constexpr int mostHalvings = 8;    // of a step that raises the energy
-constexpr int mostFiniteTrials = 4;
+constexpr int newtonSteps = 3;      // of a line search: contacts open and close along it
+constexpr int mostHalvings = 8;     // of a step that raises the energy
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
-constexpr double rounding = 1e-6;  // relative: sums of single-precision products are no better
+constexpr double rounding = 1e-6;   // relative: sums of single-precision products are no better
 
 std::size_t cornerNode(const Layout& l, std::size_t node, int c) noexcept
 {
@@ -72,11 +73,17 @@ void Elastic::meet(const ElasticLoad& load) noexcept
     }
     ties_ = load.ties;
     siteCount_ = findSites(stack_.body(), stack_.windows(), load, shapes_, sites_);
+    for (ContactSite& s : active()) {
+        touch(s, shapes_, ties_);
+    }
 }
 
-ContactPush Elastic::push(const ContactSite& site, double alpha) const noexcept
+// True when a tool is inside the tissue, as it lies or as it would lie at rest.
+bool Elastic::touched() const noexcept
 {
-    return pushAt(site, site.u + alpha * site.p, shapes_, ties_);
+    const auto all = sites();
+    return std::any_of(all.begin(), all.end(),
+                       [&](const ContactSite& s) { return s.active() || shapes_[s.owner].distance(s.rest) < 0.0; });
 }
 
 // The tissue's forces anew, where they cannot be carried along.
@@ -86,6 +93,7 @@ void Elastic::refreshForces() noexcept
         energy_ = stack_.applyFinite(Field::u, Field::a);
     } else {
         stack_.apply(Field::u, Field::a);
+        energy_ = -0.5 * stack_.dot(Field::u, Field::a);
     }
     if (hasIncrement_) {
         stack_.apply(Field::d, Field::e);
@@ -99,16 +107,14 @@ void Elastic::refreshResidual() noexcept
     for (Window& w : stack_.windows()) {
         k.smoothFirst(1.0F, w.dof.data(), w.field(Field::a), w.field(Field::r), w.layout.count);
     }
-    for (ContactSite& s : sites()) {
-        s.p = Vec3(0.0);
-        const Vec3 f = push(s, 0.0).force;
-        if (f == Vec3(0.0)) {
+    for (const ContactSite& s : sites()) {
+        if (!s.active()) {
             continue;
         }
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             stack_.addForce(s.level, cornerNode(l, s.node, c),
-                            static_cast<double>(s.share[static_cast<std::size_t>(c)]) * f);
+                            static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
         }
     }
 }
@@ -117,16 +123,15 @@ void Elastic::prepareContacts() noexcept
 {
     multigrid_.clearContacts();
     for (const ContactSite& s : sites()) {
-        const ContactPush at = push(s, 0.0);
-        if (at.energy <= 0.0 && !s.isTie) {
+        if (!s.active()) {
             continue;
         }
+        const glm::dmat3 tangent =
+            s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             const double share = static_cast<double>(s.share[static_cast<std::size_t>(c)]);
-            if (share > 0.0) {
-                multigrid_.addContact(s.level, cornerNode(l, s.node, c), share * at.tangent);
-            }
+            multigrid_.addContact(s.level, cornerNode(l, s.node, c), share * tangent);
         }
     }
     multigrid_.prepare();
@@ -134,107 +139,76 @@ void Elastic::prepareContacts() noexcept
 
 void Elastic::look(Field direction) noexcept
 {
-    for (ContactSite& s : sites()) {
+    for (ContactSite& s : active()) {
         s.p = gather(stack_.windows(), s, direction);
     }
 }
 
-Elastic::Along Elastic::contactsAlong(double alpha) const noexcept
+// How far to go: Newton on the slope of the energy, the tissue's part a parabola, contacts opening and closing on the way.
+double Elastic::lineSearch(double slope, double curvature) const noexcept
 {
-    Along sum;
-    for (const ContactSite& s : sites()) {
-        const ContactPush at = push(s, alpha);
-        sum.energy += at.energy;
-        sum.slope -= glm::dot(at.force, s.p);
-        sum.curvature += glm::dot(s.p, at.tangent * s.p);
+    double alpha = 0.0;
+    for (int i = 0; i < newtonSteps; ++i) {
+        const Along at = contactsAlong(sites(), alpha);
+        const double stiffness = curvature + at.curvature;
+        const double change = -(slope + alpha * curvature + at.slope) / stiffness;
+        if (!(stiffness > 0.0) || !std::isfinite(change)) {
+            return 0.0;
+        }
+        alpha += change;
     }
-    return sum;
+    return alpha;
 }
 
-// Field `a`, times the contacts' stiffness, times the direction that look() saw.
-double Elastic::contactProduct(Field a) const noexcept
+double Elastic::contactEnergy() const noexcept
 {
     double sum = 0.0;
     for (const ContactSite& s : sites()) {
-        const ContactPush at = push(s, 0.0);
-        if (at.energy > 0.0 || s.isTie) {
-            sum += glm::dot(gather(stack_.windows(), s, a), at.tangent * s.p);
-        }
+        sum += s.energy;
     }
     return sum;
 }
 
-// How far to go: Newton on the slope of the energy, the tissue's part a parabola, then the check on the energy itself.
-double Elastic::lineSearch(double slope, double curvature, ElasticResult& result) const noexcept
+void Elastic::go(double alpha, Field direction) noexcept
 {
-    const Along start = contactsAlong(0.0);
-    const double stiffness = curvature + start.curvature;
-    if (!(stiffness > 0.0) || !std::isfinite(stiffness)) {
-        return 0.0;
+    stack_.add(alpha, direction, Field::u);
+    for (ContactSite& s : active()) {
+        s.u += alpha * s.p;
+        touch(s, shapes_, ties_);
     }
-    double alpha = -(slope + start.slope) / stiffness;
-    for (int i = 0; i < newtonSteps; ++i) {
-        const Along at = contactsAlong(alpha);
-        alpha -= (slope + alpha * curvature + at.slope) / (curvature + at.curvature);
-    }
-    const double scale = std::abs(start.energy) + std::abs(slope * alpha);
-    for (int i = 0; i <= mostHalvings; ++i) {
-        const double change = (slope + 0.5 * curvature * alpha) * alpha + contactsAlong(alpha).energy - start.energy;
-        if (change <= rounding * scale) {
-            return alpha;
-        }
-        alpha *= 0.5;
-        ++result.shortened;
-    }
-    return 0.0;
 }
 
-// Goes along a direction whose image under -A is known, as far as lowers the energy. False: nowhere.
+// Goes along the direction that look() saw, whose image under -A is known, as far as lowers the energy. A step after which
+// the energy is higher (the contacts' line search is of first order, and finite strain has no parabola) is halved, and
+// taken back at last. False: nowhere.
 bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noexcept
 {
-    look(direction);
     const double slope = -stack_.dot(Field::a, direction);
     const double curvature = -stack_.dot(image, direction);
-    double alpha = lineSearch(slope, curvature, result);
-    if (!std::isfinite(alpha)) {
-        alpha = 0.0;
+    const double tissue = energy_;
+    const double before = tissue + contactEnergy();
+    double alpha = lineSearch(slope, curvature);
+    double gone = 0.0;
+    for (int i = 0; alpha != gone; ++i) {
+        go(alpha - gone, direction);
+        gone = alpha;
+        energy_ = options_.finiteStrain ? stack_.applyFinite(Field::u, Field::a)
+                                        : tissue + (slope + 0.5 * curvature * alpha) * alpha;
+        const double scale = std::abs(before) + std::abs(slope * alpha);
+        if (energy_ + contactEnergy() <= before + rounding * scale) {
+            break;
+        }
+        alpha = i < mostHalvings ? 0.5 * alpha : 0.0;
+        ++result.shortened;
     }
-    if (options_.finiteStrain) {
-        alpha = tryFinite(direction, alpha, result);
-    } else if (alpha != 0.0) {
-        stack_.add(alpha, direction, Field::u);
+    if (!options_.finiteStrain) {
         stack_.add(alpha, image, Field::a);
-    }
-    for (ContactSite& s : sites()) {
-        s.u += alpha * s.p;
     }
     // The increment of this call so far: what was kept of the last one's, and the steps since.
     const double kept = direction == Field::d ? alpha - 1.0 : alpha;
     stack_.add(kept, direction, Field::d);
     stack_.add(kept, image, Field::e);
     return alpha != 0.0;
-}
-
-// The parabola is not the energy in finite strain: goes there and looks. Leaves the tissue's forces and energy.
-double Elastic::tryFinite(Field direction, double alpha, ElasticResult& result) noexcept
-{
-    const double before = energy_ + contactsAlong(0.0).energy;
-    double gone = 0.0;
-    for (int i = 0; i <= mostFiniteTrials && alpha != 0.0; ++i) {
-        stack_.add(alpha - gone, direction, Field::u);
-        gone = alpha;
-        energy_ = stack_.applyFinite(Field::u, Field::a);
-        if (energy_ + contactsAlong(alpha).energy <= before + rounding * std::abs(before)) {
-            return alpha;
-        }
-        alpha = i < mostFiniteTrials ? 0.5 * alpha : 0.0;
-        ++result.shortened;
-    }
-    if (gone != 0.0) {
-        stack_.add(-gone, direction, Field::u);
-        energy_ = stack_.applyFinite(Field::u, Field::a);
-    }
-    return 0.0;
 }
 
 // One step of preconditioned conjugate gradients, conjugate to `before`.
@@ -249,13 +223,18 @@ bool Elastic::oneCycle(Before before, ElasticResult& result) noexcept
     }
     double beta = 0.0;
     if (before != Before::none) {
-        look(Field::p);
-        const double own = -stack_.dot(Field::p, Field::q) + contactProduct(Field::p);
-        const double mixed = -stack_.dot(Field::z, Field::q) + contactProduct(Field::z);
+        double own = -stack_.dot(Field::p, Field::q);
+        double mixed = -stack_.dot(Field::z, Field::q);
+        for (const ContactSite& s : sites()) {
+            const Vec3 resisted = s.resist(s.p);
+            own += glm::dot(s.p, resisted);
+            mixed += glm::dot(gather(stack_.windows(), s, Field::z), resisted);
+        }
         beta = own > 0.0 && std::isfinite(mixed / own) ? -mixed / own : 0.0;
     }
     stack_.scaleAdd(Field::z, beta, Field::p);
     stack_.scaleAdd(Field::f, beta, Field::q);
+    look(Field::p);
     return takeStep(Field::p, Field::q, result);
 }
 
@@ -275,6 +254,7 @@ ElasticResult Elastic::relax(const ElasticLoad& load, int cycles, double toleran
         sinceRefresh_ = 0;
     }
     Before before = Before::none;
+    look(Field::d);
     if (hasIncrement_ && takeStep(Field::d, Field::e, result)) {
         before = Before::increment;
     } else {
@@ -297,24 +277,13 @@ ElasticResult Elastic::relax(const ElasticLoad& load, int cycles, double toleran
     return result;
 }
 
-// True when a tool is inside the tissue, as it lies or as it would lie at rest.
-bool Elastic::touched() const noexcept
-{
-    return std::any_of(sites_.begin(), sites_.begin() + static_cast<std::ptrdiff_t>(siteCount_), [&](const auto& s) {
-        return s.isTie || pushAt(s, s.u, shapes_, ties_).energy > 0.0 ||
-               pushAt(s, Vec3(0.0), shapes_, ties_).energy > 0.0;
-    });
-}
-
 void Elastic::measure(ElasticResult& result) const noexcept
 {
-    result.energy = options_.finiteStrain ? energy_ : -0.5 * stack_.dot(Field::u, Field::a);
+    result.energy = energy_ + contactEnergy();
     for (const ContactSite& s : sites()) {
-        const ContactPush at = pushAt(s, s.u, shapes_, ties_);
-        result.energy += at.energy;
-        if (!s.isTie && at.energy > 0.0) {
+        if (!s.isTie && s.active()) {
             ++result.contacts;
-            result.depth = std::max(result.depth, -shapes_[s.owner].distance(s.rest + s.u));
+            result.depth = std::max(result.depth, s.depth);
         }
     }
 }
@@ -324,7 +293,7 @@ double Elastic::contactForce() const noexcept
 {
     double sum = 0.0;
     for (const ContactSite& s : sites()) {
-        sum += glm::length(pushAt(s, s.u, shapes_, ties_).force);
+        sum += glm::length(s.force);
     }
     return sum;
 }
@@ -334,7 +303,7 @@ Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept
     Vec3 sum(0.0);
     for (const ContactSite& s : sites()) {
         if (s.owner == owner && s.isTie == isTie) {
-            sum -= pushAt(s, s.u, shapes_, ties_).force;
+            sum -= s.force;
         }
     }
     return sum;

@@ -61,33 +61,24 @@ public:
     std::span<const ContactSite> sites() const noexcept { return std::span(sites_).first(siteCount_); }
 
 private:
-    // The energy along a direction, less what it is now, and its derivatives.
-    struct Along {
-        double energy = 0;
-        double slope = 0;
-        double curvature = 0;
-    };
-
     // The step that a cycle's direction is made conjugate to.
     enum class Before : std::uint8_t { none, increment, direction };
 
-    std::span<ContactSite> sites() noexcept { return std::span(sites_).first(siteCount_); }
+    std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
     void settle() noexcept;
     void meet(const ElasticLoad& load) noexcept;
+    bool touched() const noexcept;
     void refreshForces() noexcept;
     void refreshResidual() noexcept;
     void prepareContacts() noexcept;
     void look(Field direction) noexcept;
-    Along contactsAlong(double alpha) const noexcept;
-    double contactProduct(Field a) const noexcept;
-    double lineSearch(double slope, double curvature, ElasticResult& result) const noexcept;
+    double lineSearch(double slope, double curvature) const noexcept;
+    double contactEnergy() const noexcept;
+    void go(double alpha, Field direction) noexcept;
     bool takeStep(Field direction, Field image, ElasticResult& result) noexcept;
-    double tryFinite(Field direction, double alpha, ElasticResult& result) noexcept;
     bool oneCycle(Before before, ElasticResult& result) noexcept;
-    bool touched() const noexcept;
     double contactForce() const noexcept;
     void measure(ElasticResult& result) const noexcept;
-    ContactPush push(const ContactSite& site, double alpha) const noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
 
     ElasticOptions options_;
@@ -97,7 +88,7 @@ private:
     std::size_t siteCount_ = 0;
     std::vector<occupancy::ShapeDistance> shapes_;
     std::span<const Tie> ties_;
-    double energy_ = 0;  // of the tissue, finite strain [J]
+    double energy_ = 0;  // of the tissue [J]
     int sinceRefresh_ = 0;
     bool atRest_ = true;
     bool hasIncrement_ = false;

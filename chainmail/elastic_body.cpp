@@ -11,10 +11,10 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr int fewestNodes = 9;         // the coarsest level has at most as many along each side
-constexpr float leastTissue = 0.01F;   // cells with less of a typical stiffness are empty
-constexpr double onItsBack = 0.05;     // share of the body's depth that is fixed when nothing else is
-constexpr int pointsPerEdge = 2;       // surface points sit in sub-cells of half the spacing
+constexpr int fewestNodes = 9;        // the coarsest level has at most as many along each side
+constexpr float leastTissue = 0.01F;  // cells with less of a typical stiffness are empty
+constexpr double onItsBack = 0.05;    // share of the body's depth that is fixed when nothing else is
+constexpr int pointsPerEdge = 2;      // surface points sit in sub-cells of half the spacing
 
 struct Moduli {
     double mu = 0;
@@ -70,9 +70,8 @@ public:
             coarse.mu[at] = static_cast<float>(m.mu);
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
         });
-        volume::forEachIndex(Index3(0), coarse.nodes.size - 1, [&](Index3 n) {
-            coarse.fixed[coarse.nodes.offset(n)] = mostlyFixed(2 * n) ? 1 : 0;
-        });
+        volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
+                             [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = mostlyFixed(2 * n) ? 1 : 0; });
         return coarse;
     }
 
@@ -152,8 +151,7 @@ void layOnItsBack(ElasticLevel& level)
         }
     });
     const int first = back - static_cast<int>(onItsBack * (back - front));
-    volume::forEachIndex({0, first, 0}, level.nodes.size - 1,
-                         [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
+    volume::forEachIndex({0, first, 0}, level.nodes.size - 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
 }
 
 // The surface as points with areas: in every sub-cell near it the distance field gives the nearest point, and a hat as wide
@@ -200,8 +198,7 @@ void addDiagonal(ElasticLevel& level)
     level.diagonal.assign(g.count(), 0.0F);
     volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
         const std::size_t at = g.offset(c);
-        const float share =
-            static_cast<float>(g.spacing / 32.0) * (128.0F / 9.0F * level.mu[at] + 2.0F * level.lambda[at]);
+        const float share = static_cast<float>(g.spacing / 32.0) * (128.0F / 9.0F * level.mu[at] + 2.0F * level.lambda[at]);
         if (share > 0.0F) {
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += share; });
         }

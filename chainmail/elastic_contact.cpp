@@ -2,7 +2,6 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +12,7 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
-constexpr double near = 1.0;      // spacings from the tool within which a point is looked at
+constexpr double near = 0.3;      // spacings from the tool within which a point is looked at
 
 Vec3 componentsAt(const Window& w, std::size_t node, Field field) noexcept
 {
@@ -50,6 +49,9 @@ public:
         site.rest = tie.rest;
         site.owner = static_cast<std::uint16_t>(index);
         site.isTie = true;
+        site.stiffness = tie.along;
+        site.across = tie.across;
+        site.normal = tie.axis;
         add(site);
     }
 
@@ -57,7 +59,7 @@ public:
     {
         const auto& grid = body_.levels.front().nodes;
         const auto& s = tool.shape;
-        const double radius = std::max(s.radiusA, s.radiusB) + near * grid.spacing;
+        const double radius = std::max(s.radiusA, s.radiusB) + (near + 1.0) * grid.spacing;
         const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.carried) - radius;
         const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.carried) + radius;
         // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
@@ -94,7 +96,7 @@ private:
         if (middle.level >= windows_.size()) {
             return false;
         }
-        return nearest(shape, middle.rest, gather(windows_, middle, Field::u)) < (near + 1.5) * grid.spacing;
+        return nearest(shape, middle.rest, gather(windows_, middle, Field::u)) < (near + 1.2) * grid.spacing;
     }
 
     void addCell(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
@@ -170,29 +172,44 @@ Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field fiel
     return sum;
 }
 
-ContactPush pushAt(const ContactSite& site, Vec3 u, std::span<const occupancy::ShapeDistance> shapes,
-                   std::span<const Tie> ties) noexcept
+void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept
 {
-    ContactPush push;
     if (site.isTie) {
-        const Tie& tie = ties[site.owner];
-        push.tangent = tie.across * glm::dmat3(1.0) + (tie.along - tie.across) * glm::outerProduct(tie.axis, tie.axis);
-        const Vec3 stretch = tie.u - u;
-        push.force = push.tangent * stretch;
-        push.energy = 0.5 * glm::dot(push.force, stretch);
-        return push;
+        const Vec3 stretch = ties[site.owner].u - site.u;
+        site.force = site.resist(stretch);
+        site.energy = 0.5 * glm::dot(site.force, stretch);
+        return;
     }
     const auto& shape = shapes[site.owner];
-    const Vec3 at = site.rest + u;
-    const double depth = -shape.distance(at);
-    if (depth <= 0.0) {
-        return push;
+    const Vec3 at = site.rest + site.u;
+    site.depth = -shape.distance(at);
+    site.normal = shape.gradient(at);
+    const double push = site.stiffness * std::max(site.depth, 0.0);
+    site.force = push * site.normal;
+    site.energy = 0.5 * push * site.depth;
+}
+
+Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
+{
+    Along sum;
+    for (const ContactSite& s : sites) {
+        if (s.isTie) {
+            const Vec3 resisted = s.resist(s.p);
+            const double curvature = glm::dot(resisted, s.p);
+            const double slope = -glm::dot(s.force, s.p);
+            sum.energy += s.energy + (slope + 0.5 * curvature * alpha) * alpha;
+            sum.slope += slope + curvature * alpha;
+            sum.curvature += curvature;
+            continue;
+        }
+        const double rate = -glm::dot(s.normal, s.p);
+        const double depth = std::max(s.depth + alpha * rate, 0.0);
+        const double push = s.stiffness * depth;
+        sum.energy += 0.5 * push * depth;
+        sum.slope += push * rate;
+        sum.curvature += depth > 0.0 ? s.stiffness * rate * rate : 0.0;
     }
-    const Vec3 normal = shape.gradient(at);
-    push.force = site.stiffness * depth * normal;
-    push.tangent = site.stiffness * glm::outerProduct(normal, normal);
-    push.energy = 0.5 * site.stiffness * depth * depth;
-    return push;
+    return sum;
 }
 
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,

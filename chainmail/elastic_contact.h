@@ -3,7 +3,7 @@
 #include <chainmail/window.h>
 #include <occupancy/tool_shape.h>
 
-#include <glm/mat3x3.hpp>
+#include <glm/geometric.hpp>
 
 #include <span>
 #include <vector>
@@ -19,11 +19,11 @@ struct ElasticTool {
 
 /// A material point that is held by springs: by a needle's tip, or along its shaft.
 struct Tie {
-    Vec3 rest{0.0};         // [m]
-    Vec3 u{0.0};            // the displacement that the springs pull to [m]
-    Vec3 axis{0, 0, 1};     // unit vector
-    double along = 0;       // stiffness along the axis [N/m]
-    double across = 0;      // and across it [N/m]
+    Vec3 rest{0.0};      // [m]
+    Vec3 u{0.0};         // the displacement that the springs pull to [m]
+    Vec3 axis{0, 0, 1};  // unit vector
+    double along = 0;    // stiffness along the axis [N/m]
+    double across = 0;   // and across it [N/m]
 };
 
 struct ElasticLoad {
@@ -33,6 +33,11 @@ struct ElasticLoad {
 };
 
 /// Where tool and tissue meet: a point of the surface that a tool may press, or a tie.
+///
+/// The penalty grows with the square of the depth, E = k depth^2 / 2 at each surface point, so that the force is smooth
+/// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
+/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area: a tool
+/// is about 2 % of its depth inside the tissue.
 struct ContactSite {
     std::uint32_t node = 0;  // lowest node of the cell that it lies in
     std::uint16_t level = 0;
@@ -40,24 +45,38 @@ struct ContactSite {
     bool isTie = false;
     std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
     Vec3 rest{0.0};
-    Vec3 u{0.0};           // its displacement [m]
-    Vec3 p{0.0};           // and that of the search direction
-    double stiffness = 0;  // of a surface point [N/m]
+    double stiffness = 0;  // of a surface point; of a tie along its axis [N/m]
+    double across = 0;     // of a tie, across its axis [N/m]
+
+    Vec3 u{0.0};        // its displacement [m]
+    Vec3 p{0.0};        // and that of the search direction
+    double depth = 0;   // of a surface point inside the tool [m]
+    Vec3 normal{0.0};   // out of the tool there; of a tie, its axis
+    Vec3 force{0.0};    // on the tissue [N]
+    double energy = 0;  // [J]
+
+    bool active() const noexcept { return isTie || depth > 0.0; }
+    /// By how much the force falls when the point moves by v [N].
+    Vec3 resist(Vec3 v) const noexcept
+    {
+        if (!isTie && depth <= 0.0) {
+            return Vec3(0.0);
+        }
+        return across * v + (stiffness - across) * glm::dot(normal, v) * normal;
+    }
 };
 
-/// What the contact does at one site.
-struct ContactPush {
-    Vec3 force{0.0};      // on the tissue [N]
-    glm::dmat3 tangent{0.0};  // by how much the force falls per displacement, positive semi-definite [N/m]
-    double energy = 0;    // [J]
-};
+/// Depth, normal, force and energy of a site where it is now.
+void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept;
 
-/// A penalty that grows with the square of the depth: E = k d^2 / 2 at each surface point, so that the force is smooth
-/// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
-/// pop from node to node; points four times as dense as the nodes, with their areas, do not.
-/// k = 20 E / h per area: the tool is about 2 % of its depth inside the tissue.
-ContactPush pushAt(const ContactSite& site, Vec3 u, std::span<const occupancy::ShapeDistance> shapes,
-                   std::span<const Tie> ties) noexcept;
+/// The energy of the contacts along the direction p, and its derivatives by the way.
+struct Along {
+    double energy = 0;  // [J]
+    double slope = 0;
+    double curvature = 0;
+};
+/// To first order in the tool's surface: depth falls by normal . p.
+Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
 
 /// Fills `out` with the ties and with the surface points that a tool may touch: those within a spacing of it, as the
 /// tissue lies now.

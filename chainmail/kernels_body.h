@@ -234,10 +234,7 @@ struct Sweep {
         return planeOf(u + static_cast<std::size_t>(c) * layout.count + at, layout.row);
     }
     float* component(float* p, int c) const noexcept { return p + static_cast<std::size_t>(c) * 4 * layout.plane; }
-    float* rowOut(int c, std::size_t at) const noexcept
-    {
-        return out + static_cast<std::size_t>(c) * layout.count + at;
-    }
+    float* rowOut(int c, std::size_t at) const noexcept { return out + static_cast<std::size_t>(c) * layout.count + at; }
     float* carryOf(int c) const noexcept { return carry + static_cast<std::size_t>(c) * 2 * layout.row; }
 
     void begin() noexcept
@@ -450,8 +447,8 @@ void blend(const float* border, const float* x, float* y, std::size_t count) noe
 
 constexpr Kernels table(const char* name) noexcept
 {
-    return {name, W, apply, applyFinite, dot, add, scaleAdd, smoothFirst, smooth, residual, blend, addMasked, negate,
-            average, hat};
+    return {name,   W,        apply, applyFinite, dot,    add,     scaleAdd, smoothFirst,
+            smooth, residual, blend, addMasked,   negate, average, hat};
 }
 
 }  // namespace

@@ -27,16 +27,16 @@ using Floats = std::vector<float, CacheAligned<float>>;
 
 /// What a window keeps for every node: three components each, Layout::fieldSize() floats.
 enum class Field : std::uint8_t {
-    u,     // displacement [m]
-    a,     // A u, by the elastic energy alone [N]
-    d,     // the last tick's increment of u
-    e,     // and of a
-    p,     // search direction
-    q,     // A p
-    r,     // residual: force of the contacts less a, where the node is a degree of freedom [N]
-    f,     // right side of the cycle
-    z,     // its answer
-    t,     // working memory
+    u,  // displacement [m]
+    a,  // A u, by the elastic energy alone [N]
+    d,  // the last tick's increment of u
+    e,  // and of a
+    p,  // search direction
+    q,  // A p
+    r,  // residual: force of the contacts less a, where the node is a degree of freedom [N]
+    f,  // right side of the cycle
+    z,  // its answer
+    t,  // working memory
     count
 };
 inline constexpr std::size_t fieldCount = static_cast<std::size_t>(Field::count);
@@ -56,7 +56,7 @@ inline constexpr std::size_t fieldCount = static_cast<std::size_t>(Field::count)
 /// The masks are 1 or 0 per node, so that the kernels multiply where others would branch.
 struct Window {
     Layout layout;
-    Index3 low{0};  // index of node (0, 0, 0) in the level; even but in the coarsest window
+    Index3 low{0};                        // index of node (0, 0, 0) in the level; even but in the coarsest window
     Floats mu, lambda;                    // of each cell, times spacing / 32 [N/m]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
     Floats diagonal;                      // reciprocal of the operator's diagonal, zero where the node is not free

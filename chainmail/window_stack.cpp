@@ -157,9 +157,7 @@ void WindowStack::addForce(std::size_t level, std::size_t node, Vec3 force) noex
     const Index3 n = w.low + nodeOf(w.layout, node);
     const Index3 odd = n % 2;
     const double share = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
-    volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) {
-        addForce(level + 1, coarse.at(parent), share * force);
-    });
+    volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { addForce(level + 1, coarse.at(parent), share * force); });
 }
 
 double WindowStack::dot(Field a, Field b) const noexcept

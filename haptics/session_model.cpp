@@ -28,10 +28,21 @@ volume::NodeGrid fieldGrid(const volume::Tissue& tissue, std::size_t nodes)
 
 chainmail::Lattice latticeOf(const datasets::Scene& scene, const volume::Tissue& tissue)
 {
-    const double margin = 2.0 * scene.model.spacing;
-    const double spacing = volume::affordableSpacing(tissue.box(), scene.model.spacing, margin, latticeNodes);
+    const bool elastic = scene.model.level == datasets::ModelLevel::elastic;
+    const double wanted = elastic ? scene.model.elastic.spacing : scene.model.spacing;
+    const double spacing = volume::affordableSpacing(tissue.box(), wanted, 2.0 * wanted, latticeNodes);
     const auto grid = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
     return {grid, tissue.tissueOn(grid), tissue.table()};
+}
+
+std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& scene, const volume::Tissue& tissue,
+                                                        const volume::NodeGrid& cells, const volume::DistanceField& surface)
+{
+    if (scene.model.level != datasets::ModelLevel::elastic) {
+        return nullptr;
+    }
+    return std::make_shared<chainmail::ElasticBody>(
+        chainmail::elasticBody(cells, tissue.materialOn(cells), surface, scene.model.elastic.poissonCap));
 }
 
 std::string structureNames(const volume::Tissue& tissue)
@@ -86,8 +97,9 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
                         "[model] spacing_mm",
                         scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing));
     }
-    return {std::move(scene),   std::move(tissue),    approach, std::move(surface), std::move(modulus),
-            std::move(lattice), std::move(structures)};
+    auto elastic = elasticOf(scene, *tissue, lattice.grid, surface);
+    return {std::move(scene),   std::move(tissue),  approach,           std::move(surface),
+            std::move(modulus), std::move(lattice), std::move(elastic), std::move(structures)};
 }
 
 }  // namespace palpate::haptics

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chainmail/elastic_body.h>
 #include <chainmail/lattice.h>
 #include <datasets/scene.h>
 #include <haptics/tick.h>
@@ -28,7 +29,8 @@ struct SessionModel {
     volume::DistanceField surface;      // of the body at rest [m]
     volume::ScalarField youngsModulus;  // [Pa]
     chainmail::Lattice lattice;
-    std::vector<GuardedStructure> structures;  // target first, then the lookup table of vital structures
+    std::shared_ptr<const chainmail::ElasticBody> elastic;  // level `elastic`: its cells are the lattice's nodes
+    std::vector<GuardedStructure> structures;               // target first, then the lookup table of vital structures
 };
 
 /// Builds fields and lattice. Throws std::runtime_error for structures that the volume does not have, and more of them
