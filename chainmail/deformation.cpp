@@ -33,37 +33,28 @@ void visitNodes(const Lattice& lattice, Vec3 lowest, Vec3 highest, Visit&& visit
 }  // namespace
 
 Deformation::Deformation(const Lattice& lattice, std::uint32_t maxMoves, std::size_t maxSeeds)
-    : lattice_(lattice),
-      u_(lattice.tissue.size(), Vec3f(0.0F)),
-      scratch_(lattice, maxMoves, static_cast<std::uint32_t>(maxSeeds)),
-      map_(lattice.grid, lattice.tissue)
+    : shape_(lattice), scratch_(lattice, maxMoves, static_cast<std::uint32_t>(maxSeeds))
 {
-    before_.reserve(scratch_.moved.capacity());
+    before_.reserve(lattice.tissue.size());
 }
 
 PropagateResult Deformation::deform(std::span<const Seed> seeds, Yield yield) noexcept
 {
-    before_.assign(scratch_.moved.begin(), scratch_.moved.end());
+    before_.assign(shape_.moved().begin(), shape_.moved().end());
+    const auto u = shape_.raw();
     for (const Node n : before_) {
-        u_[n] = Vec3f(0.0F);
+        u[n] = Vec3f(0.0F);
     }
-    const PropagateResult result = propagate(lattice_, u_, scratch_, seeds, yield);
-
-    const auto place = [&](Node n) { map_.place(n, lattice_.grid.position(lattice_.grid.node(n)) + Vec3(u_[n])); };
+    const PropagateResult result = propagate(shape_.lattice(), u, scratch_, seeds, yield);
     for (const Node n : before_) {
         if (scratch_.seen[n] != scratch_.pass) {
-            place(n);
+            shape_.place(n);
         }
     }
     for (const Node n : scratch_.moved) {
-        place(n);
+        shape_.place(n);
     }
     return result;
-}
-
-occupancy::Body Deformation::body(const volume::DistanceField& surface) const noexcept
-{
-    return {lattice_.grid, lattice_.tissue, u_, map_, surface};
 }
 
 std::size_t mostPressSeeds(const Lattice& lattice, double radius) noexcept

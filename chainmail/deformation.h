@@ -1,8 +1,7 @@
 #pragma once
 
-#include <chainmail/lattice.h>
+#include <chainmail/displaced_lattice.h>
 #include <chainmail/propagate.h>
-#include <occupancy/body.h>
 
 #include <span>
 #include <vector>
@@ -22,19 +21,16 @@ public:
     /// now and last time); allocates nothing.
     PropagateResult deform(std::span<const Seed> seeds, Yield yield = Yield(0.0F)) noexcept;
 
-    /// Nodes that are not at rest, in the order in which they moved.
-    std::span<const Node> moved() const noexcept { return scratch_.moved; }
-    std::span<const Vec3f> u() const noexcept { return u_; }
-    const Lattice& lattice() const noexcept { return lattice_; }
-    /// What the queries of occupancy/ see. `surface` must outlive it.
-    occupancy::Body body(const volume::DistanceField& surface) const noexcept;
+    /// Nodes that are not at rest.
+    std::span<const Node> moved() const noexcept { return shape_.moved(); }
+    std::span<const Vec3f> u() const noexcept { return shape_.u(); }
+    DisplacedLattice& shape() noexcept { return shape_; }
+    const DisplacedLattice& shape() const noexcept { return shape_; }
 
 private:
-    const Lattice& lattice_;
-    std::vector<Vec3f> u_;  // displacement [m] (count x 3)
+    DisplacedLattice shape_;
     PropagateScratch scratch_;
     std::vector<Node> before_;  // moved last time
-    occupancy::OccupancyMap map_;
 };
 
 /// The nodes that a ball pushes ahead of itself on its way from `from`, where it first touched, to `to` [m]: those in the

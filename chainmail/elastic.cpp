@@ -25,7 +25,7 @@ std::size_t cornerNode(const Layout& l, std::size_t node, int c) noexcept
 
 }  // namespace
 
-Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, Vec3 focus)
+Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const Focus& focus)
     : options_(options),
       stack_(body, options.window, focus),
       multigrid_(stack_, 8 * options.maxSites),

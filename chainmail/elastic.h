@@ -10,8 +10,8 @@
 namespace palpate::chainmail {
 
 struct ElasticOptions {
-    int window = 15;            // nodes along each side of a window, odd; a level with fewer is held whole
-    int cycles = 2;             // per call of relax()
+    int window = 15;            // nodes of a window along the way in, odd; see WindowStack
+    int cycles = 1;             // per call of relax()
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
     std::size_t maxSites = 4096;
 };
@@ -39,9 +39,9 @@ struct ElasticResult {
 /// Mathematics, pictures and figures: docs/kernel.md.
 class Elastic {
 public:
-    /// @param focus  where the finest window starts, at rest [m]
+    /// @param focus  where the windows start
     /// The body must outlive it.
-    Elastic(const ElasticBody& body, const ElasticOptions& options, Vec3 focus);
+    Elastic(const ElasticBody& body, const ElasticOptions& options, const Focus& focus);
 
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
@@ -56,6 +56,7 @@ public:
     Vec3 displacement(Vec3 rest) const noexcept;
     bool atRest() const noexcept { return atRest_; }
     const WindowStack& stack() const noexcept { return stack_; }
+    const ElasticBody& body() const noexcept { return stack_.body(); }
     /// Nodes of all windows.
     std::size_t nodes() const noexcept;
     std::span<const ContactSite> sites() const noexcept { return std::span(sites_).first(siteCount_); }

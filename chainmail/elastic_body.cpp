@@ -1,11 +1,14 @@
 #include <chainmail/elastic_body.h>
 
+#include <chainmail/kernels.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <random>
 
 namespace palpate::chainmail {
 
@@ -13,8 +16,9 @@ namespace {
 
 constexpr int fewestNodes = 9;        // the coarsest level has at most as many along each side
 constexpr float leastTissue = 0.01F;  // cells with less of a typical stiffness are empty
-constexpr double onItsBack = 0.05;    // share of the body's depth that is fixed when nothing else is
-constexpr int pointsPerEdge = 2;      // surface points sit in sub-cells of half the spacing
+constexpr int powerSteps = 30;
+constexpr double onItsBack = 0.05;  // share of the body's depth that is fixed when nothing else is
+constexpr int pointsPerEdge = 2;    // surface points sit in sub-cells of half the spacing
 
 struct Moduli {
     double mu = 0;
@@ -53,11 +57,11 @@ double between(double sum, double inverse, int filled)
 
 class Coarsening {
 public:
-    explicit Coarsening(const ElasticLevel& fine) : fine_(fine) {}
+    explicit Coarsening(const CellLevel& fine) : fine_(fine) {}
 
-    ElasticLevel level() const
+    CellLevel level() const
     {
-        ElasticLevel coarse;
+        CellLevel coarse;
         const auto& g = fine_.nodes;
         coarse.nodes = {{coarseNodes(g.size.x), coarseNodes(g.size.y), coarseNodes(g.size.z)}, g.origin, 2.0 * g.spacing};
         const std::size_t count = coarse.nodes.count();
@@ -112,13 +116,13 @@ private:
         return {between(mu, inverseMu, filled), between(bulk, inverseBulk, filled)};
     }
 
-    const ElasticLevel& fine_;
+    const CellLevel& fine_;
 };
 
-ElasticLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, double poissonCap,
-                    Index3 size)
+CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, double poissonCap,
+                 Index3 size)
 {
-    ElasticLevel level;
+    CellLevel level;
     level.nodes = {size, cells.origin - 0.5 * cells.spacing, cells.spacing};
     level.mu.assign(level.nodes.count(), 0.0F);
     level.lambda.assign(level.nodes.count(), 0.0F);
@@ -140,7 +144,7 @@ ElasticLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cel
     return level;
 }
 
-void layOnItsBack(ElasticLevel& level)
+void layOnItsBack(CellLevel& level)
 {
     int front = level.nodes.size.y;
     int back = 0;
@@ -192,7 +196,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
 }
 
 // What one cell's modes give to the diagonal at each of its nodes: h / 32 (128 / 9 mu + 2 lambda).
-void addDiagonal(ElasticLevel& level)
+void addDiagonal(CellLevel& level)
 {
     const auto& g = level.nodes;
     level.diagonal.assign(g.count(), 0.0F);
@@ -203,6 +207,39 @@ void addDiagonal(ElasticLevel& level)
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += share; });
         }
     });
+}
+
+// By power iteration; a start of random signs has a share of every eigenvector.
+double spectralRadius(const CellLevel& level)
+{
+    const Index3 size = level.nodes.size;
+    const Layout l = Layout::of(size.x, size.y, size.z);
+    const Kernels& k = kernels();
+    std::vector<float> mu(l.count + Layout::lanes), lambda(mu), inverse(mu);
+    std::vector<float> z(l.fieldSize()), az(l.fieldSize()), scratch(l.scratchSize());
+    std::minstd_rand random(7);
+    const float scale = static_cast<float>(level.nodes.spacing / 32.0);
+    volume::forEachIndex(Index3(0), size - 1, [&](Index3 n) {
+        const std::size_t from = level.nodes.offset(n);
+        const std::size_t to = l.at(n.x, n.y, n.z);
+        mu[to] = scale * level.mu[from];
+        lambda[to] = scale * level.lambda[from];
+        inverse[to] = level.diagonal[from] > 0.0F && level.fixed[from] == 0 ? 1.0F / level.diagonal[from] : 0.0F;
+        for (std::size_t c = 0; c < 3; ++c) {
+            z[c * l.count + to] = inverse[to] == 0.0F ? 0.0F : random() % 2 != 0 ? 1.0F : -1.0F;
+        }
+    });
+    double radius = 0.0;
+    for (int i = 0; i < powerSteps; ++i) {
+        const double before = std::sqrt(k.dot(z.data(), z.data(), 3 * l.count));
+        if (before <= 0.0) {
+            break;
+        }
+        k.apply(l, {mu.data(), lambda.data()}, z.data(), az.data(), scratch.data());
+        k.smoothFirst(static_cast<float>(1.0 / before), inverse.data(), az.data(), z.data(), l.count);
+        radius = std::sqrt(k.dot(z.data(), z.data(), 3 * l.count));
+    }
+    return radius > 0.0 ? radius : 1.0;
 }
 
 void indexRows(ElasticBody& body)
@@ -236,6 +273,9 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellM
     while (static_cast<int>(body.levels.size()) < levels) {
         body.levels.push_back(Coarsening(body.levels.back()).level());
         addDiagonal(body.levels.back());
+    }
+    for (auto& level : body.levels) {
+        level.radius = spectralRadius(level);
     }
     indexRows(body);
     return body;

@@ -9,12 +9,13 @@
 namespace palpate::chainmail {
 
 /// The whole body at one spacing: cubic cells, each of one material, between nodes.
-struct ElasticLevel {
+struct CellLevel {
     volume::NodeGrid nodes;           // cell (i, j, k) lies between nodes (i, j, k) and (i + 1, j + 1, k + 1)
     std::vector<float> mu;            // Lame's second parameter of each cell, by its lowest node [Pa]  (count x 1)
     std::vector<float> lambda;        // Lame's first parameter                                    [Pa] (count x 1)
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
     std::vector<float> diagonal;      // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
+    double radius = 1;  // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
 };
 
 /// A piece of the body's surface at rest.
@@ -34,9 +35,9 @@ struct SurfaceCell {
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
 /// before, and its nodes are every second node of it.
 struct ElasticBody {
-    std::vector<ElasticLevel> levels;  // finest first; the last has few nodes
-    std::vector<SurfaceCell> cells;    // that the surface runs through, by z, then y, then x
-    std::vector<std::uint32_t> rows;   // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
+    std::vector<CellLevel> levels;    // finest first; the last has few nodes
+    std::vector<SurfaceCell> cells;   // that the surface runs through, by z, then y, then x
+    std::vector<std::uint32_t> rows;  // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
     std::vector<SurfacePoint> points;
     bool held = true;  // false: the body had nothing fixed, and was laid on its back
 };

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <chainmail/window.h>
+#include <chainmail/window_stack.h>
 #include <occupancy/tool_shape.h>
 
 #include <glm/geometric.hpp>
@@ -29,7 +29,7 @@ struct Tie {
 struct ElasticLoad {
     std::span<const ElasticTool> tools;
     std::span<const Tie> ties;
-    Vec3 focus{0.0};  // where the finest window shall be, at rest [m]
+    Focus focus;
 };
 
 /// Where tool and tissue meet: a point of the surface that a tool may press, or a tie.

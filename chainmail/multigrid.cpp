@@ -5,14 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 namespace palpate::chainmail {
 
 namespace {
 
-constexpr int powerSteps = 20;
-constexpr double margin = 1.1;         // on the estimate of the largest eigenvalue
+constexpr double margin = 1.05;        // on the estimate of the largest eigenvalue
 constexpr double smoothed = 4.0;       // the smoother takes the upper three quarters of the spectrum
 constexpr int coarsestSteps = 8;       // Chebyshev steps on the coarsest level
 constexpr double coarsestSpread = 40;  // largest to smallest eigenvalue there
@@ -40,34 +38,9 @@ Multigrid::Multigrid(WindowStack& stack, std::size_t maxBlocks) : stack_(stack)
         blockOf_.emplace_back(stack_[l].layout.count, 0U);
     }
     for (std::size_t l = 0; l < stack_.size(); ++l) {
-        const double largest = margin * spectralRadius(l);
+        const double largest = margin * stack_.body().levels[l].radius;
         stack_[l].weight = static_cast<float>(2.0 / (largest + largest / smoothed));
     }
-}
-
-// Largest eigenvalue of D^-1 A on the window as it lies, by power iteration.
-double Multigrid::spectralRadius(std::size_t level) noexcept
-{
-    Window& w = stack_[level];
-    const Kernels& k = stack_.kernels();
-    std::minstd_rand random(7);
-    std::uniform_real_distribution<float> value(-1.0F, 1.0F);
-    const std::size_t n = 3 * w.layout.count;
-    for (std::size_t i = 0; i < n; ++i) {
-        w.field(Field::z)[i] = w.diagonal[i % w.layout.count] > 0.0F ? value(random) : 0.0F;
-    }
-    double radius = 0.0;
-    for (int i = 0; i < powerSteps; ++i) {
-        const double before = std::sqrt(k.dot(w.field(Field::z), w.field(Field::z), n));
-        if (before <= 0.0) {
-            break;
-        }
-        k.apply(w.layout, w.stiffness(), w.field(Field::z), w.field(Field::t), stack_.scratch());
-        k.smoothFirst(static_cast<float>(1.0 / before), w.diagonal.data(), w.field(Field::t), w.field(Field::z),
-                      w.layout.count);
-        radius = std::sqrt(k.dot(w.field(Field::z), w.field(Field::z), n));
-    }
-    return radius > 0.0 ? radius : 1.0;
 }
 
 void Multigrid::clearContacts() noexcept

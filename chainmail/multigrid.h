@@ -39,7 +39,6 @@ private:
     void operate(std::size_t level) noexcept;
     void smoothContacts(std::size_t level, bool first) noexcept;
     void solveCoarsest() noexcept;
-    double spectralRadius(std::size_t level) noexcept;
 
     WindowStack& stack_;
     std::vector<std::vector<Block>> blocks_;           // by level

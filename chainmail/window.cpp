@@ -51,7 +51,7 @@ Window::Window(Index3 size) : layout(Layout::of(size.x, size.y, size.z))
     }
 }
 
-void Window::place(const ElasticLevel& level, Index3 at, bool coarsest) noexcept
+void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
 {
     low = at;
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);

@@ -85,7 +85,7 @@ struct Window {
     explicit Window(Index3 size);
 
     /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
-    void place(const ElasticLevel& level, Index3 at, bool coarsest) noexcept;
+    void place(const CellLevel& level, Index3 at, bool coarsest) noexcept;
     /// Leaves out what `finer`, the next finer window, covers.
     void cover(const Window& finer) noexcept;
 };

@@ -9,8 +9,20 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double inwards = 0.2;  // the focus lies this share of a window above its middle, towards the air
-constexpr int slack = 4;         // nodes that a window may be off before it moves; even, so that coarse nodes stay nodes
+constexpr int slack = 4;  // nodes that a window may be off before it moves; even, so that coarse nodes stay nodes
+
+// A window is as deep as asked for and half as wide again: what a tool moves spreads along the surface. Along x it is as
+// wide as whole vectors allow at about the same cost.
+Index3 windowSize(int depth, const Focus& focus) noexcept
+{
+    const Vec3 in = glm::abs(focus.inward);
+    const int axis = in.x > in.y && in.x > in.z ? 0 : in.y >= in.z ? 1 : 2;
+    const int width = (3 * depth / 2) | 1;
+    constexpr int lanes = static_cast<int>(Layout::lanes);
+    Index3 size(std::max(lanes, (width + lanes / 2 + 2) / lanes * lanes) - 1, width, width);
+    size[axis] = depth;
+    return size;
+}
 
 Index3 nodeOf(const Layout& l, std::size_t at) noexcept
 {
@@ -19,11 +31,18 @@ Index3 nodeOf(const Layout& l, std::size_t at) noexcept
 
 }  // namespace
 
-WindowStack::WindowStack(const ElasticBody& body, int window, Vec3 focus) : body_(&body), kernels_(&chainmail::kernels())
+Focus focusAt(const volume::DistanceField& surface, Vec3 point) noexcept
+{
+    return {point, -surface.normal(point), std::max(0.0, -surface.distance(point))};
+}
+
+WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus)
+    : body_(&body), kernels_(&chainmail::kernels())
 {
     std::size_t scratch = 0;
+    const Index3 wanted = windowSize(window, focus);
     for (const auto& level : body.levels) {
-        windows_.emplace_back(glm::min(level.nodes.size, Index3(window)));
+        windows_.emplace_back(glm::min(level.nodes.size, wanted));
         scratch = std::max(scratch, windows_.back().layout.scratchSize());
     }
     scratch_.assign(scratch, 0.0F);
@@ -35,11 +54,14 @@ WindowStack::WindowStack(const ElasticBody& body, int window, Vec3 focus) : body
     place();
 }
 
-Index3 WindowStack::wantedLow(std::size_t level, Vec3 focus) const noexcept
+Index3 WindowStack::wantedLow(std::size_t level, const Focus& focus) const noexcept
 {
     const auto& grid = body_->levels[level].nodes;
     const Index3 size = windows_[level].size();
-    const Vec3 middle = (focus - grid.origin) / grid.spacing;
+    // Half of a window less what lies between surface and focus, and a cell and a half for what the grid cuts off.
+    const double half = 0.5 * (std::min({size.x, size.y, size.z}) - 1) - 1.5;
+    const double shift = std::max(0.0, half - focus.depth / grid.spacing);
+    const Vec3 middle = (focus.point - grid.origin) / grid.spacing + shift * focus.inward;
     const Index3 low = 2 * Index3(glm::round(0.5 * (middle - 0.5 * Vec3(size - 1))));
     return glm::clamp(low, Index3(0), grid.size - size);
 }
@@ -65,7 +87,7 @@ void WindowStack::place() noexcept
     }
 }
 
-bool WindowStack::follow(Vec3 focus, bool carry) noexcept
+bool WindowStack::follow(const Focus& focus, bool carry) noexcept
 {
     bool moves = false;
     for (std::size_t l = 0; l < windows_.size(); ++l) {

@@ -7,13 +7,28 @@
 
 namespace palpate::chainmail {
 
+/// Where the windows shall be: around a point, but with as little air in them as can be.
+struct Focus {
+    Vec3 point{0.0};   // at rest [m]
+    Vec3 inward{0.0};  // unit vector into the body, or zero: windows are centred on the point
+    double depth = 0;  // of the point under the surface [m]
+
+    Focus(Vec3 at = Vec3(0.0), Vec3 into = Vec3(0.0), double under = 0.0) noexcept : point(at), inward(into), depth(under)
+    {
+    }
+};
+
+/// The focus around a point at rest [m].
+Focus focusAt(const volume::DistanceField& surface, Vec3 point) noexcept;
+
 /// The nested windows as one finite-element space: where they are, and the operator on all of them together.
 class WindowStack {
 public:
-    /// @param window  nodes along each side of a window, odd; a level with fewer is held whole
-    /// @param focus   where the finest window starts, at rest [m]
+    /// @param window  nodes of a window along the way in, odd; sideways it has half as many again. A level with fewer is
+    ///                held whole
+    /// @param focus   where the windows start; its inward direction decides which way is in
     /// The body must outlive it.
-    WindowStack(const ElasticBody& body, int window, Vec3 focus);
+    WindowStack(const ElasticBody& body, int window, const Focus& focus);
 
     std::span<Window> windows() noexcept { return windows_; }
     std::span<const Window> windows() const noexcept { return windows_; }
@@ -23,9 +38,9 @@ public:
     const Kernels& kernels() const noexcept { return *kernels_; }
     float* scratch() noexcept { return scratch_.data(); }
 
-    /// Moves windows whose middle is more than a quarter of them away from `focus` [m]; where `carry`, takes u and d along.
+    /// Moves windows whose middle is some nodes away from where `focus` has it; where `carry`, takes u and d along.
     /// @returns  true when a window moved: what was computed from u and d has to be computed again
-    bool follow(Vec3 focus, bool carry) noexcept;
+    bool follow(const Focus& focus, bool carry) noexcept;
 
     /// y = -A x on the degrees of freedom, over all windows; makes x continuous at the windows' borders first.
     void apply(Field x, Field y) noexcept { applyWith(x, y, false); }
@@ -45,7 +60,7 @@ public:
     void clear(Field field) noexcept;
 
 private:
-    Index3 wantedLow(std::size_t level, Vec3 focus) const noexcept;
+    Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
     void place() noexcept;
     void transfer(Field field) noexcept;
     double applyWith(Field x, Field y, bool finite) noexcept;

@@ -129,13 +129,13 @@ void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Si
 
 void Broadcast::publishDisplaced(const Simulation& simulation) noexcept
 {
-    const auto& deformation = simulation.deformation();
-    const auto moved = deformation.moved();
+    const auto& shape = simulation.shape();
+    const auto moved = shape.moved();
     channel::Displaced& out = publisher_.backBuffer();
     out.tick = state_.tick;
     out.count = static_cast<std::uint32_t>(std::min(moved.size(), channel::maxDisplaced));
     for (std::uint32_t i = 0; i < out.count; ++i) {
-        const Vec3f u = deformation.u()[moved[i]];
+        const Vec3f u = shape.u()[moved[i]];
         out.nodes[i] = {moved[i], {u.x, u.y, u.z}};
     }
     publisher_.publishDisplaced();

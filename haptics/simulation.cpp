@@ -60,10 +60,20 @@ Simulation::Simulation(const SessionModel& model)
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
                    chainmail::mostPressSeeds(model.lattice, model.scene.tool.radius)),
-      body_(deformation_.body(model.surface)),
-      seeds_(chainmail::mostPressSeeds(model.lattice, model.scene.tool.radius)),
+      chainmail_(deformation_, model.scene.tool.radius),
+      level_(model.scene.model.level),
+      body_(deformation_.shape().body(model.surface)),
       contacts_(std::make_unique<occupancy::ContactSet>())
 {
+    if (level_ == datasets::ModelLevel::elastic) {
+        const auto& settings = model.scene.model.elastic;
+        chainmail::ElasticOptions options;
+        options.window = settings.window;
+        options.cycles = settings.cycles;
+        options.finiteStrain = settings.strain == datasets::Strain::finite;
+        elastic_ = std::make_unique<chainmail::ElasticLevel>(deformation_.shape(), *model.elastic, model.surface, options,
+                                                             model.approach.entry);
+    }
 }
 
 const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
@@ -78,9 +88,11 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
 
     const auto way = collide();
     clock.done(Task::h3);
-    const Vec3 basic = moveTip(model_, reader_, body_, record_.device, way, tip_, record_);
+    Vec3 basic = moveTip(model_, reader_, body_, record_.device, way, tip_, record_);
     clock.done(Task::h4);
-    deform();
+    if (const auto reaction = deform(); reaction.force) {
+        basic = *reaction.force;
+    }
     clock.done(Task::deform);
     const auto near = monitor(model_, body_, tip_, position, monitor_, record_);
     fire();
@@ -143,28 +155,43 @@ occupancy::Sweep Simulation::collide() noexcept
     return occupancy::sweep(body_, {last_, last_, radius}, {device.position, device.position, radius});
 }
 
-void Simulation::deform() noexcept
+chainmail::Grip Simulation::grip() const noexcept
 {
-    if (model_.scene.model.level == datasets::ModelLevel::spring) {
-        return;
+    using Kind = chainmail::Grip::Kind;
+    const auto& tool = model_.scene.tool;
+    const Vec3 tip = record_.device.position;
+    const bool needle = tool.kind == datasets::ToolKind::needle;
+    chainmail::Grip grip;
+    grip.proxy = tip_.proxy;
+    grip.position = tip;
+    grip.radius = tool.radius;
+    if (tip_.phase == Phase::free) {
+        return grip;
     }
-    const Vec3 position = record_.device.position;
-    const Vec3 pushed = position - tip_.proxy;
-    std::size_t count = 0;
-    chainmail::Yield yield(0.0F);
-    if (tip_.phase == Phase::contact) {
-        // The proxy of a sphere is its centre where it first touched; a needle's tip is a ball of its own radius.
-        const bool needle = model_.scene.tool.kind == datasets::ToolKind::needle;
-        const double radius = model_.scene.tool.radius;
-        const Vec3 back = needle ? -radius * glm::normalize(pushed) : Vec3(0.0);
-        count = chainmail::pressSeeds(model_.lattice, tip_.proxy + back, position + back, radius, seeds_);
-        yield = chainmail::Yield(glm::normalize(pushed));
-    } else if (tip_.phase == Phase::inserted) {
-        count = chainmail::dragSeeds(model_.lattice, tip_.proxy, pushed, seeds_);
+    grip.kind = needle ? Kind::point : Kind::press;
+    grip.inside = tip_.phase == Phase::inserted;
+    const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * record_.device.axis : tip;
+    grip.shape = {tip, back, tool.radius, tool.radius};
+    return grip;
+}
+
+chainmail::Reaction Simulation::deform() noexcept
+{
+    chainmail::Reaction reaction;
+    switch (level_) {
+        case datasets::ModelLevel::spring:
+            reaction = spring_.deform(grip());
+            break;
+        case datasets::ModelLevel::chainmail:
+            reaction = chainmail_.deform(grip());
+            break;
+        case datasets::ModelLevel::elastic:
+            reaction = elastic_->deform(grip());
+            break;
     }
-    const auto result = deformation_.deform(std::span(seeds_).first(count), yield);
-    record_.moved = static_cast<std::uint32_t>(deformation_.moved().size());
-    record_.residual = result.residual;
+    record_.moved = reaction.moved;
+    record_.residual = reaction.residual;
+    return reaction;
 }
 
 // The gun fires once per press of its button, and only a needle that is inside takes a core.

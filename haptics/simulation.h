@@ -1,6 +1,6 @@
 #pragma once
 
-#include <chainmail/deformation.h>
+#include <chainmail/level.h>
 #include <haptics/dffb.h>
 #include <haptics/monitor.h>
 #include <haptics/session_model.h>
@@ -28,20 +28,26 @@ public:
     const TickRecord& tick(const DeviceSample& device) noexcept;
 
     /// Nodes that are not at rest after the last tick, and the displacement of every node.
-    const chainmail::Deformation& deformation() const noexcept { return deformation_; }
+    const chainmail::DisplacedLattice& shape() const noexcept { return deformation_.shape(); }
+    /// The level in use: the scene's, or a lower one that it stepped down to.
+    datasets::ModelLevel level() const noexcept { return level_; }
     const SessionModel& model() const noexcept { return model_; }
 
 private:
     void accept(const DeviceSample& device) noexcept;
     occupancy::Sweep collide() noexcept;
-    void deform() noexcept;
+    chainmail::Grip grip() const noexcept;
+    chainmail::Reaction deform() noexcept;
     void fire() noexcept;
 
     const SessionModel& model_;
     volume::Tissue::Reader reader_;
     chainmail::Deformation deformation_;
+    chainmail::SpringLevel spring_;
+    chainmail::ChainMailLevel chainmail_;
+    std::unique_ptr<chainmail::ElasticLevel> elastic_;  // where the scene's level is `elastic`
+    datasets::ModelLevel level_;
     occupancy::Body body_;
-    std::vector<chainmail::Seed> seeds_;
     std::unique_ptr<occupancy::ContactSet> contacts_;
     TipState tip_;
     MonitorState monitor_;

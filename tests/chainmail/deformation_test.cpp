@@ -92,7 +92,7 @@ TEST(Deformation, OccupancyFollowsOnlyWhatMoved)
     std::vector<Seed> seeds(maxSeeds);
     const auto count = pressSeeds(lattice, {7, 7, -2.0}, {7, 7, 0.6}, 2.0, seeds);
     body.deform(std::span(seeds).first(count));
-    const auto map = body.body(surface);
+    const auto map = body.shape().body(surface);
     const auto once = map.map.rewrites();
     EXPECT_GT(once, 0U);
     EXPECT_LE(once, body.moved().size());

@@ -119,7 +119,7 @@ TEST(Broadcast, ViewerSeesTheStateAndTheDisplacedNodes)
     displaced->tick = 0;
     ASSERT_TRUE(viewer->displaced(*displaced));
     ASSERT_GT(displaced->count, 0U);
-    const auto u = rig.simulation.deformation().u();
+    const auto u = rig.simulation.shape().u();
     for (std::uint32_t i = 0; i < displaced->count; ++i) {
         EXPECT_EQ(displaced->nodes[i].u[1], u[displaced->nodes[i].node].y);
     }

@@ -110,8 +110,8 @@ TEST(Simulation, ChainMailFollowsTheSphereAndSpringDoesNot)
         stroke(simulation, -15e-3, -3e-3, 0.05, [&](const TickRecord& r) { penetration = r.penetration; });
         const auto& lattice = model.lattice;
         double deepest = 0.0;
-        for (const auto n : simulation.deformation().moved()) {
-            deepest = std::max(deepest, static_cast<double>(simulation.deformation().u()[n].y));
+        for (const auto n : simulation.shape().moved()) {
+            deepest = std::max(deepest, static_cast<double>(simulation.shape().u()[n].y));
         }
         EXPECT_NEAR(deepest, deforms ? 7e-3 : 0.0, lattice.grid.spacing);
         EXPECT_NEAR(penetration, deforms ? 0.0 : 7e-3, deforms ? lattice.grid.spacing : 0.2e-3);
@@ -131,7 +131,7 @@ TEST(Simulation, NothingIsLeftAfterRelease)
     const auto r = simulation.tick(at({0, -20e-3, 0}));
     EXPECT_EQ(r.total, Vec3(0.0));
     EXPECT_EQ(r.phase, Phase::free);
-    for (const Vec3f u : simulation.deformation().u()) {
+    for (const Vec3f u : simulation.shape().u()) {
         ASSERT_EQ(u, Vec3f(0.0F));
     }
 }

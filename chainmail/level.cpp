@@ -1,0 +1,267 @@
+#include <chainmail/level.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double tieStiffness = 8.0;     // of a held point, in E h: stiff beside the tissue, soft enough to converge fast
+constexpr float leastShown = 20e-6F;     // displacements below are not carried to the outer lattice [m]
+constexpr int turnsPerCall = 128;        // nodes of the outer lattice per call and window
+constexpr std::size_t windowsShown = 3;  // the finest, and two by turns
+constexpr float leastVolume = 0.05F;     // of a cell that still counts as not inverted, share of its volume at rest
+constexpr std::array<float, 4> shares{1.0F, 0.5F, 0.25F, 0.0F};
+
+float largest(Vec3f v) noexcept
+{
+    return glm::max(glm::max(std::abs(v.x), std::abs(v.y)), std::abs(v.z));
+}
+
+}  // namespace
+
+ChainMailLevel::ChainMailLevel(Deformation& deformation, double toolRadius)
+    : deformation_(deformation), seeds_(mostPressSeeds(deformation.shape().lattice(), toolRadius))
+{
+}
+
+Reaction ChainMailLevel::deform(const Grip& grip) noexcept
+{
+    const Lattice& lattice = deformation_.shape().lattice();
+    const Vec3 pushed = grip.position - grip.proxy;
+    std::size_t count = 0;
+    Yield yield(0.0F);
+    if (grip.kind == Grip::Kind::press) {
+        count = pressSeeds(lattice, grip.proxy, grip.position, grip.shape.radiusA, seeds_);
+        yield = Yield(glm::normalize(pushed));
+    } else if (grip.kind == Grip::Kind::point && grip.inside) {
+        count = dragSeeds(lattice, grip.proxy, pushed, seeds_);
+    } else if (grip.kind == Grip::Kind::point) {
+        // The tip that presses is a ball of its own radius, with the held point in front.
+        const Vec3 back = -grip.radius * glm::normalize(pushed);
+        count = pressSeeds(lattice, grip.proxy + back, grip.position + back, grip.radius, seeds_);
+        yield = Yield(glm::normalize(pushed));
+    }
+    const auto result = deformation_.deform(std::span(seeds_).first(count), yield);
+    return {static_cast<std::uint32_t>(deformation_.moved().size()), result.residual, std::nullopt};
+}
+
+ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, const volume::DistanceField& surface,
+                           const ElasticOptions& options, Vec3 start)
+    : shape_(shape),
+      surface_(surface),
+      elastic_(body, options, focusAt(surface, start)),
+      turns_(body.levels.size(), Index3(0))
+{
+    const Index3 size = elastic_.stack().windows().front().size();
+    const auto cells =
+        static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+    strained_.assign(shape.u().size(), 0);
+    before_.resize(cells);
+    now_.resize(cells);
+}
+
+ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
+{
+    const Vec3 pushed = grip.position - grip.proxy;
+    if (grip.kind == Grip::Kind::press) {
+        tool_.shape = grip.shape;
+        tool_.carried = pushed;
+        const Vec3 under = grip.proxy - surface_.distance(grip.proxy) * surface_.normal(grip.proxy);
+        return {{&tool_, 1}, {}, focusAt(surface_, under)};
+    }
+    if (grip.kind == Grip::Kind::point) {
+        // At the surface the cell around the point may be half empty: the tie holds the tissue just under it.
+        const auto& level = elastic_.body().levels.front();
+        const double h = level.nodes.spacing;
+        const double under = std::max(0.0, 0.5 * h + surface_.distance(grip.proxy));
+        tie_.rest = grip.proxy - under * surface_.normal(grip.proxy);
+        tie_.u = pushed;
+        const Index3 cell(glm::floor((tie_.rest - level.nodes.origin) / h));
+        const double mu = level.nodes.contains(cell) ? static_cast<double>(level.mu[level.nodes.offset(cell)]) : 0.0;
+        tie_.along = tie_.across = tieStiffness * 2.9 * mu * h;
+        return {{}, {&tie_, 1}, focusAt(surface_, grip.proxy)};
+    }
+    return {{}, {}, focusAt(surface_, grip.position)};
+}
+
+Reaction ElasticLevel::deform(const Grip& grip) noexcept
+{
+    const bool wasAtRest = elastic_.atRest();
+    last_ = elastic_.relax(load(grip));
+    if (!wasAtRest || !elastic_.atRest()) {
+        writeFinest();
+    }
+    for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
+        writeByTurns(l);
+    }
+    revisitMoved();
+    Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
+    if (grip.kind == Grip::Kind::press) {
+        reaction.force = elastic_.atRest() ? Vec3(0.0) : elastic_.toolForce(0);
+    }
+    return reaction;
+}
+
+Vec3f ElasticLevel::cellMean(const Window& window, Index3 cell) const noexcept
+{
+    const Layout& l = window.layout;
+    const std::size_t at = window.at(cell);
+    Vec3f mean(0.0F);
+    for (int c = 0; c < 3; ++c) {
+        const float* f = window.field(Field::u) + static_cast<std::size_t>(c) * l.count + at;
+        const float low = f[0] + f[1] + f[l.row] + f[l.row + 1];
+        const float high = f[l.plane] + f[l.plane + 1] + f[l.plane + l.row] + f[l.plane + l.row + 1];
+        mean[c] = 0.125F * (low + high);
+    }
+    return mean;
+}
+
+void ElasticLevel::writeFinest() noexcept
+{
+    const Window& window = elastic_.stack().windows().front();
+    const auto& grid = shape_.lattice().grid;
+    const Index3 low = glm::max(window.low, Index3(1));
+    const Index3 high = glm::min(window.low + window.size() - 2, grid.size - 2);
+    const auto u = shape_.raw();
+    std::size_t i = 0;
+    volume::forEachIndex(low, high, [&](Index3 at) {
+        const auto n = static_cast<Node>(grid.offset(at));
+        before_[i] = u[n];
+        now_[i++] = shape_.lattice().isNode(n) ? cellMean(window, at) : Vec3f(0.0F);
+    });
+    for (const float share : shares) {
+        i = 0;
+        volume::forEachIndex(low, high, [&](Index3 at) {
+            const Vec3f old = before_[i];
+            u[grid.offset(at)] = old + share * (now_[i] - old);
+            ++i;
+        });
+        if (keepsOrientation(low, high)) {
+            break;
+        }
+    }
+    i = 0;
+    volume::forEachIndex(low, high, [&](Index3 at) {
+        const auto n = static_cast<Node>(grid.offset(at));
+        if (u[n] != before_[i++]) {
+            shape_.place(n);
+        }
+    });
+}
+
+// Edges that are shifted by less than a third of their length cannot turn a cell over: their matrix is diagonally dominant.
+// So only nodes with a longer shift are looked at in full, with those beside them.
+bool ElasticLevel::keepsOrientation(Index3 low, Index3 high) noexcept
+{
+    const auto& lattice = shape_.lattice();
+    bool all = true;
+    volume::forEachIndex(low, high, [&](Index3 at) { markStrained(static_cast<Node>(lattice.grid.offset(at))); });
+    volume::forEachIndex(low, high, [&](Index3 at) {
+        const auto n = static_cast<Node>(lattice.grid.offset(at));
+        all = all && (strained_[n] == 0 || upright(n));
+    });
+    return all;
+}
+
+void ElasticLevel::markStrained(Node n) noexcept
+{
+    const auto& lattice = shape_.lattice();
+    const auto u = shape_.u();
+    const float third = static_cast<float>(lattice.grid.spacing) / 3.0F;
+    const auto link = [&](Node other) { return lattice.isNode(other) && largest(u[other] - u[n]) > third; };
+    strained_[n] =
+        lattice.isNode(n) && (link(lattice.beside(n, 1)) || link(lattice.beside(n, 3)) || link(lattice.beside(n, 5)) ||
+                              link(lattice.beside(n, 0)) || link(lattice.beside(n, 2)) || link(lattice.beside(n, 4)))
+            ? 1
+            : 0;
+}
+
+// True when the three edges that meet at node n keep their orientation, on all eight sides of it.
+bool ElasticLevel::upright(Node n) const noexcept
+{
+    const Lattice& lattice = shape_.lattice();
+    const auto u = shape_.u();
+    const auto spacing = static_cast<float>(lattice.grid.spacing);
+    std::array<Vec3f, 6> edge{};
+    for (int side = 0; side < 6; ++side) {
+        const Node other = lattice.beside(n, side);
+        Vec3f shift = lattice.isNode(other) ? u[other] - u[n] : Vec3f(0.0F);
+        shift[side / 2] += side % 2 != 0 ? spacing : -spacing;
+        edge[static_cast<std::size_t>(side)] = shift;
+    }
+    const float least = leastVolume * spacing * spacing * spacing;
+    for (std::size_t octant = 0; octant < 8; ++octant) {
+        const std::size_t x = octant & 1, y = (octant >> 1) & 1, z = octant >> 2;
+        const float sign = (x + y + z) % 2 != 0 ? 1.0F : -1.0F;
+        if (sign * glm::dot(edge[x], glm::cross(edge[2 + y], edge[4 + z])) < least) {
+            return false;
+        }
+    }
+    return true;
+}
+
+// Node by node, where one alone may not turn a cell over.
+void ElasticLevel::write(Node n) noexcept
+{
+    const auto& lattice = shape_.lattice();
+    Vec3f u(elastic_.atRest() ? Vec3(0.0) : elastic_.displacement(lattice.grid.position(lattice.grid.node(n))));
+    if (glm::dot(u, u) < leastShown * leastShown) {
+        u = Vec3f(0.0F);
+    }
+    const auto all = shape_.raw();
+    const Vec3f old = all[n];
+    if (u == old) {
+        return;
+    }
+    all[n] = u;
+    markStrained(n);
+    bool keeps = strained_[n] == 0 || upright(n);
+    for (int side = 0; side < 6 && keeps; ++side) {
+        const Node other = lattice.beside(n, side);
+        keeps = strained_[other] == 0 || upright(other);
+    }
+    all[n] = keeps ? u : old;
+    shape_.place(n);
+}
+
+void ElasticLevel::writeByTurns(std::size_t level) noexcept
+{
+    const auto& grid = shape_.lattice().grid;
+    const Window& window = elastic_.stack().windows()[level];
+    const int scale = 1 << level;
+    const Index3 low = glm::max(scale * window.low, Index3(1));
+    const Index3 high = glm::min(scale * (window.low + window.size() - 1) - 1, grid.size - 2);
+    Index3& at = turns_[level];
+    for (int i = 0; i < turnsPerCall; ++i) {
+        if (at.x < low.x || at.x > high.x || at.y < low.y || at.y > high.y || at.z < low.z || at.z > high.z) {
+            at = low;
+        }
+        const auto n = static_cast<Node>(grid.offset(at));
+        if (shape_.lattice().isNode(n)) {
+            write(n);
+        }
+        if (++at.x > high.x) {
+            at.x = low.x;
+            if (++at.y > high.y) {
+                at.y = low.y;
+                at.z = at.z < high.z ? at.z + 1 : low.z;
+            }
+        }
+    }
+}
+
+// What moved once is looked at again, also where no window is any more.
+void ElasticLevel::revisitMoved() noexcept
+{
+    for (int i = 0; i < turnsPerCall && !shape_.moved().empty(); ++i) {
+        revisited_ = revisited_ + 1 < shape_.moved().size() ? revisited_ + 1 : 0;
+        write(shape_.moved()[revisited_]);
+    }
+}
+
+}  // namespace palpate::chainmail

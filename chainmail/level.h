@@ -1,0 +1,100 @@
+#pragma once
+
+#include <chainmail/deformation.h>
+#include <chainmail/elastic.h>
+
+#include <concepts>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// How a tool holds on to tissue in this tick.
+struct Grip {
+    enum class Kind : std::uint8_t {
+        none,
+        press,  // from outside, with its surface
+        point,  // a tip has hold of the material point `proxy`, at the surface or inside
+    } kind = Kind::none;
+    occupancy::RoundCone shape;  // of a tool that presses, where it is now [m]
+    Vec3 proxy{0.0};             // what it holds, at rest: of a sphere its centre without penetration [m]
+    Vec3 position{0.0};          // where the tool has it now [m]
+    double radius = 0;           // of a tip that holds a point [m]
+    bool inside = false;         // that point is inside the tissue
+};
+
+struct Reaction {
+    std::uint32_t moved = 0;    // nodes that are not at rest
+    double residual = 0;        // of the level's own: largest violated link [m]
+    std::optional<Vec3> force;  // of the tissue on the tool, where the level knows it [N]
+};
+
+/// A level of the model ladder: leaves the displaced lattice behind for collision, distances and the viewer. Bounded work,
+/// no allocation.
+template <typename L>
+concept Level = requires(L& level, const Grip& grip)
+{
+    {
+        level.deform(grip)
+    }
+    noexcept->std::same_as<Reaction>;
+};
+
+/// Level 0: rigid tissue.
+struct SpringLevel {
+    Reaction deform(const Grip&) noexcept { return {}; }
+};
+
+/// Level 1: ChainMail from rest.
+class ChainMailLevel {
+public:
+    /// Both must outlive it.
+    ChainMailLevel(Deformation& deformation, double toolRadius);
+    Reaction deform(const Grip& grip) noexcept;
+
+private:
+    Deformation& deformation_;
+    std::vector<Seed> seeds_;
+};
+
+/// Level 2: elastic equilibrium on nested windows; forces of a pressing tool come from its energy.
+///
+/// The lattice gets the windows' displacement at the middles of their cells: in every call where the finest window is, and
+/// by turns, a fixed number of nodes per call, further out. Tissue that would turn inside out keeps the shape it had:
+/// the lattice goes towards the windows' shape only as far as every cell keeps its orientation.
+class ElasticLevel {
+public:
+    /// All must outlive it. The body's cells are the lattice's nodes.
+    ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, const volume::DistanceField& surface,
+                 const ElasticOptions& options, Vec3 start);
+    Reaction deform(const Grip& grip) noexcept;
+    const Elastic& elastic() const noexcept { return elastic_; }
+
+private:
+    ElasticLoad load(const Grip& grip) noexcept;
+    Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
+    void writeFinest() noexcept;
+    void write(Node n) noexcept;
+    void writeByTurns(std::size_t level) noexcept;
+    void revisitMoved() noexcept;
+    bool keepsOrientation(Index3 low, Index3 high) noexcept;
+    void markStrained(Node n) noexcept;
+    bool upright(Node n) const noexcept;
+
+    DisplacedLattice& shape_;
+    const volume::DistanceField& surface_;
+    Elastic elastic_;
+    ElasticTool tool_;
+    Tie tie_;
+    std::vector<Vec3f> before_;  // the finest window's nodes in the last call, and now
+    std::vector<Vec3f> now_;
+    std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
+    std::vector<Index3> turns_;           // by level: where its turn is
+    std::size_t revisited_ = 0;
+    ElasticResult last_;
+};
+
+static_assert(Level<SpringLevel> && Level<ChainMailLevel> && Level<ElasticLevel>);
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,329 @@
+#include <experiments/kernel_trial.h>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::experiments {
+
+using namespace chainmail;
+
+namespace {
+
+constexpr int wholeWindow = 1023;   // nodes along each side: more than any level has
+constexpr double tolerance = 3e-5;       // of a reference, share of the contacts' forces
+constexpr int mostCycles = 200;          // of a reference
+constexpr double nearField = 30e-3;      // [m]
+constexpr double leastForce = 0.05;      // share of the path's peak
+constexpr double strainedVolume = 1e-7;  // [m^3]
+
+// Nodes of the finest level that are tissue and free, by z, then y, then x.
+std::vector<Index3> freeNodes(const CellLevel& level)
+{
+    std::vector<Index3> out;
+    volume::forEachIndex(Index3(0), level.nodes.size - 1, [&](Index3 n) {
+        const std::size_t at = level.nodes.offset(n);
+        if (level.diagonal[at] > 0.0F && level.fixed[at] == 0) {
+            out.push_back(n);
+        }
+    });
+    return out;
+}
+
+// |e| sqrt(2/3) of the strain e of the mean deformation in a cell: the stretch of an incompressible bar with as much.
+double equivalentStrain(const Elastic& elastic, const volume::NodeGrid& grid, Index3 cell)
+{
+    Mat3 gradient(0.0);
+    for (int c = 0; c < 8; ++c) {
+        const Index3 corner(c & 1, (c >> 1) & 1, c >> 2);
+        const Vec3 u = elastic.displacement(grid.position(cell + corner));
+        gradient += glm::outerProduct(u, (2.0 * Vec3(corner) - 1.0) / (4.0 * grid.spacing));
+    }
+    double sum = 0.0;
+    const Mat3 strain = 0.5 * (gradient + glm::transpose(gradient));
+    for (int i = 0; i < 3; ++i) {
+        sum += glm::dot(strain[i], strain[i]);
+    }
+    return std::sqrt(2.0 / 3.0 * sum);
+}
+
+// The strain that strainedVolume of tissue exceeds, in the near field.
+double localStrain(const Elastic& elastic, Vec3 focus)
+{
+    const CellLevel& level = elastic.stack().body().levels.front();
+    const auto& grid = level.nodes;
+    const Vec3 last(grid.size - 2);
+    const Index3 low(glm::clamp(glm::floor((focus - nearField - grid.origin) / grid.spacing), Vec3(0.0), last));
+    const Index3 high(glm::clamp(glm::floor((focus + nearField - grid.origin) / grid.spacing), Vec3(0.0), last));
+    std::vector<double> strains;
+    volume::forEachIndex(low, high, [&](Index3 cell) {
+        if (level.mu[grid.offset(cell)] > 0.0F) {
+            strains.push_back(equivalentStrain(elastic, grid, cell));
+        }
+    });
+    const double cellVolume = grid.spacing * grid.spacing * grid.spacing;
+    const auto beyond = static_cast<std::ptrdiff_t>(strainedVolume / cellVolume);
+    if (static_cast<std::ptrdiff_t>(strains.size()) <= beyond) {
+        return 0.0;
+    }
+    std::nth_element(strains.begin(), strains.begin() + beyond, strains.end(), std::greater<>());
+    return strains[static_cast<std::size_t>(beyond)];
+}
+
+Vec3 forceOn(const Elastic& elastic, const TrialPath& path)
+{
+    if (path.ties.empty()) {
+        return elastic.toolForce(0);
+    }
+    Vec3 sum(0.0);
+    for (std::size_t i = 0; i < path.ties.size(); ++i) {
+        sum += elastic.tieForce(i);
+    }
+    return sum;
+}
+
+double contactForces(const Elastic& elastic)
+{
+    double sum = 0.0;
+    for (const ContactSite& s : elastic.sites()) {
+        sum += glm::length(s.force);
+    }
+    return sum;
+}
+
+// What is left of the residual, as a share of the contacts' forces.
+double shareLeft(const Elastic& elastic, const ElasticResult& result)
+{
+    const double force = contactForces(elastic);
+    return force > 0.0 ? result.residual / force : 0.0;
+}
+
+// From rest, or, where the energy may have more than one minimum, from the state before.
+double converge(Elastic& elastic, const ElasticLoad& load, bool fromRest, ElasticResult& result)
+{
+    if (fromRest) {
+        elastic.relax({.focus = load.focus}, 0, 0.0);
+    }
+    result = elastic.relax(load, mostCycles, tolerance);
+    return shareLeft(elastic, result);
+}
+
+std::vector<TrialPose> looksOf(const TrialPath& path, std::span<const double> speeds)
+{
+    std::vector<TrialPose> poses;
+    for (const double speed : speeds) {
+        for (const TrialTick& t : schedule(path, speed)) {
+            if (t.look) {
+                poses.push_back(t.pose);
+            }
+        }
+    }
+    const auto order = [](const TrialPose& p) { return std::pair(p.dragged, p.pressed); };
+    std::ranges::sort(poses, {}, order);
+    poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
+    return poses;
+}
+
+ReferenceState stateOf(const Elastic& elastic, const TrialLoad& load, std::span<const Vec3f> position)
+{
+    ReferenceState state;
+    state.pose = load.pose();
+    state.focus = load.load().focus.point;
+    state.u.reserve(position.size());
+    for (const Vec3f& p : position) {
+        state.u.emplace_back(elastic.displacement(Vec3(p)));
+        state.largest = std::max(state.largest, static_cast<double>(glm::length(state.u.back())));
+    }
+    state.force = forceOn(elastic, load.path());
+    state.sites = static_cast<std::uint32_t>(elastic.sites().size());
+    state.strain = localStrain(elastic, state.focus);
+    return state;
+}
+
+TrialErrors errorsOf(const TrialModel& model, const Reference& reference, const ReferenceState& state)
+{
+    TrialErrors errors;
+    double all = 0.0, near = 0.0, worst = 0.0;
+    std::size_t nearCount = 0;
+    for (std::size_t i = 0; i < state.u.size(); ++i) {
+        const Vec3 at(reference.position[i]);
+        const Vec3 off = model.displacement(at) - Vec3(state.u[i]);
+        const double square = glm::dot(off, off);
+        all += square;
+        worst = std::max(worst, square);
+        if (glm::distance(at, state.focus) < nearField) {
+            near += square;
+            ++nearCount;
+        }
+    }
+    const double percent = state.largest > 0.0 ? 100.0 / state.largest : 0.0;
+    errors.rms = percent * std::sqrt(all / static_cast<double>(std::max<std::size_t>(state.u.size(), 1)));
+    errors.near = percent * std::sqrt(near / static_cast<double>(std::max<std::size_t>(nearCount, 1)));
+    errors.max = percent * std::sqrt(worst);
+    const double force = std::max(glm::length(state.force), leastForce * reference.peakForce);
+    if (model.force && force > 0.0) {
+        errors.force = 100.0 * glm::distance(model.force(), state.force) / force;
+    }
+    return errors;
+}
+
+const ReferenceState& stateAt(const Reference& reference, TrialPose pose)
+{
+    for (const ReferenceState& s : reference.states) {
+        if (s.pose == pose) {
+            return s;
+        }
+    }
+    throw std::logic_error("trial: the reference was solved for other speeds");
+}
+
+}  // namespace
+
+ElasticOptions wholeGrid(int cycles, bool finiteStrain)
+{
+    return {.window = wholeWindow, .cycles = cycles, .finiteStrain = finiteStrain};
+}
+
+Reference solveReference(const ElasticBody& body, const TrialPath& path, std::span<const double> speeds, bool finiteStrain)
+{
+    Reference reference;
+    const auto& level = body.levels.front();
+    for (const Index3 n : freeNodes(level)) {
+        reference.position.emplace_back(level.nodes.position(n));
+    }
+    TrialLoad load(path);
+    Elastic elastic(body, wholeGrid(1, finiteStrain), load.load().focus);
+    reference.nodes = elastic.nodes();
+    for (const TrialPose& pose : looksOf(path, speeds)) {
+        load.set(pose);
+        ElasticResult result;
+        const double residual = converge(elastic, load.load(), !finiteStrain, result);
+        reference.states.push_back(stateOf(elastic, load, reference.position));
+        ReferenceState& state = reference.states.back();
+        state.energy = result.energy;
+        state.residual = residual;
+        reference.peakForce = std::max(reference.peakForce, glm::length(state.force));
+        reference.strain = std::max(reference.strain, state.strain);
+        reference.residual = std::max(reference.residual, residual);
+    }
+    return reference;
+}
+
+TrialModel elasticModel(Elastic& elastic)
+{
+    // The load's path lives as long as the load: what it says of ties is asked for after the tick.
+    auto path = std::make_shared<const TrialPath*>(nullptr);
+    return {[&elastic, path](const TrialLoad& load) {
+                *path = &load.path();
+                return elastic.relax(load.load());
+            },
+            [&elastic](Vec3 rest) { return elastic.displacement(rest); },
+            [&elastic, path] { return *path != nullptr ? forceOn(elastic, **path) : Vec3(0.0); },
+            [&elastic] { return elastic.sites().size(); }};
+}
+
+TrialModel nothingModel()
+{
+    return {[](const TrialLoad&) { return ElasticResult{}; }, [](Vec3) { return Vec3(0.0); }, {}, [] { return 1; }};
+}
+
+TrialResult runTrial(const TrialModel& model, const TrialPath& path, double speed, const Reference& reference)
+{
+    using Clock = std::chrono::steady_clock;
+    TrialResult out;
+    TrialLoad load(path);
+    std::vector<double> seconds;
+    bool cold = true;  // a look at the errors leaves other things in the caches
+    for (const TrialTick& t : schedule(path, speed)) {
+        load.set(t.pose);
+        const auto start = Clock::now();
+        const ElasticResult result = model.tick(load);
+        const double took = std::chrono::duration<double>(Clock::now() - start).count();
+        const std::size_t touched = model.touched();
+        if (touched > 0) {
+            ++out.ticks;
+            out.meanTouched += static_cast<double>(touched);
+            out.shortened += result.shortened;
+            out.windowMoves += result.moved ? 1 : 0;
+        }
+        if (touched > 0 && !cold) {
+            seconds.push_back(took);
+        }
+        cold = t.look;
+        if (t.look) {
+            const ReferenceState& state = stateAt(reference, t.pose);
+            out.looks.push_back(errorsOf(model, reference, state));
+            out.looks.back().phase = t.phase;
+            out.looks.back().energy = state.energy > 0.0 ? 100.0 * (result.energy / state.energy - 1.0) : 0.0;
+        }
+    }
+    out.meanTouched /= static_cast<double>(std::max<std::size_t>(out.ticks, 1));
+    std::ranges::sort(seconds);
+    if (!seconds.empty()) {
+        out.p50 = seconds[seconds.size() / 2];
+        out.p99 = seconds[seconds.size() * 99 / 100];
+    }
+    return out;
+}
+
+Spread spreadOf(std::span<const TrialErrors> looks, double TrialErrors::*figure)
+{
+    std::vector<double> values;
+    Spread spread;
+    for (const TrialErrors& look : looks) {
+        values.push_back(look.*figure);
+        spread.worst = std::max(spread.worst, look.*figure);
+    }
+    spread.median = median(std::move(values));
+    return spread;
+}
+
+TrialErrors atRest(const TrialResult& result)
+{
+    return result.looks.empty() ? TrialErrors{} : result.looks.back();
+}
+
+double median(std::vector<double> values)
+{
+    if (values.empty()) {
+        return 0.0;
+    }
+    std::ranges::sort(values);
+    const std::size_t n = values.size();
+    return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+}
+
+FullSolve fullSolve(const ElasticBody& body, const TrialPath& path, double speed, bool finiteStrain)
+{
+    using Clock = std::chrono::steady_clock;
+    constexpr int few = 5;
+    constexpr double thousandth = 1e-3;
+    TrialLoad load(path);
+    Elastic elastic(body, wholeGrid(1, finiteStrain), load.load().focus);
+    const double step = speed * 1e-3;
+    const auto solve = [&](int tick) {
+        load.set({0.6 * path.press + tick * step, 0.0});
+        const auto start = Clock::now();
+        elastic.relax(load.load(), mostCycles, thousandth);
+        return std::chrono::duration<double>(Clock::now() - start).count();
+    };
+    FullSolve times;
+    times.fromRest = solve(-2);
+    solve(-1);
+    solve(0);  // from here on there is an increment to go on from
+    std::vector<double> seconds;
+    for (int t = 1; t <= few; ++t) {
+        seconds.push_back(solve(t));
+    }
+    times.warm = median(seconds);
+    return times;
+}
+
+}  // namespace palpate::experiments

@@ -1,0 +1,175 @@
+#include "elastic_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace palpate::chainmail {
+namespace {
+
+using tests::ElasticBlock;
+
+double areaOf(const ElasticBody& body)
+{
+    double area = 0.0;
+    for (const SurfacePoint& p : body.points) {
+        area += static_cast<double>(p.area);
+    }
+    return area;
+}
+
+double bulkOf(const CellLevel& level, std::size_t at)
+{
+    return static_cast<double>(level.lambda[at]) + 2.0 / 3.0 * static_cast<double>(level.mu[at]);
+}
+
+// Harmonic and arithmetic mean of eight cells.
+struct Means {
+    double harmonic = 0;
+    double arithmetic = 0;
+};
+
+template <typename Value>
+Means meansOf(const CellLevel& fine, Index3 low, const Value& value)
+{
+    double sum = 0.0;
+    double inverse = 0.0;
+    volume::forEachIndex(low, low + 1, [&](Index3 c) {
+        const double v = value(fine.nodes.offset(c));
+        sum += v;
+        inverse += 1.0 / v;
+    });
+    return {8.0 / inverse, sum / 8.0};
+}
+
+// A block of random stiffness over two decades: the bounds of Reuss and Voigt hold for every coarse cell of every level.
+TEST(ElasticBody, CoarseCellsLieBetweenTheBoundsOfReussAndVoigt)
+{
+    std::minstd_rand random(1);
+    std::uniform_real_distribution<double> power(3.0, 5.0), poisson(0.3, 0.49);
+    const auto material = [&](Index3) { return tests::tissue(std::pow(10.0, power(random)), poisson(random)); };
+    const ElasticBody body = tests::bodyOf(ElasticBlock{Index3(32), 1e-3, material, 8, Vec3(0.0)});
+    ASSERT_GE(body.levels.size(), 3U);
+    for (std::size_t l = 1; l < 3; ++l) {
+        const CellLevel& fine = body.levels[l - 1];
+        const CellLevel& coarse = body.levels[l];
+        const int air = 8 >> l;
+        int strictly = 0;
+        volume::forEachIndex(Index3(air), Index3(air + (32 >> l) - 1), [&](Index3 c) {
+            const std::size_t at = coarse.nodes.offset(c);
+            const Means mu = meansOf(fine, 2 * c, [&](std::size_t i) { return static_cast<double>(fine.mu[i]); });
+            const Means bulk = meansOf(fine, 2 * c, [&](std::size_t i) { return bulkOf(fine, i); });
+            const double ourMu = static_cast<double>(coarse.mu[at]);
+            EXPECT_GE(ourMu, mu.harmonic * (1.0 - 1e-5));
+            EXPECT_LE(ourMu, mu.arithmetic * (1.0 + 1e-5));
+            EXPECT_GE(bulkOf(coarse, at), bulk.harmonic * (1.0 - 1e-5));
+            EXPECT_LE(bulkOf(coarse, at), bulk.arithmetic * (1.0 + 1e-5));
+            strictly += ourMu > 1.01 * mu.harmonic && ourMu < 0.99 * mu.arithmetic ? 1 : 0;
+        });
+        EXPECT_GT(strictly, 0);
+    }
+}
+
+// Where all is the same, it stays the same at every level.
+TEST(ElasticBody, HomogeneousTissueIsTheSameAtEveryLevel)
+{
+    const ElasticBody body = tests::bodyOf(tests::shell(32, 1e-3, 1e4, 0.45, 8));
+    for (const CellLevel& level : body.levels) {
+        const Index3 middle = level.nodes.size / 2;
+        const std::size_t at = level.nodes.offset(middle);
+        EXPECT_NEAR(level.mu[at], 1e4 / 2.9, 0.1);
+        EXPECT_NEAR(level.lambda[at], 1e4 * 0.45 / (1.45 * 0.1), 1.0);
+    }
+}
+
+// Poisson's ratio is lowered to the cap.
+TEST(ElasticBody, PoissonsRatioIsCapped)
+{
+    const ElasticBody body = tests::bodyOf(tests::heldBlock(Index3(8), 1e-3, 1e4, 0.499), 0.47);
+    const CellLevel& level = body.levels.front();
+    const std::size_t at = level.nodes.offset(Index3(4));
+    EXPECT_NEAR(level.lambda[at] / (level.lambda[at] + level.mu[at]), 2.0 * 0.47, 1e-5);
+}
+
+// Where the faces lie in the grid must not matter: areas of a box, but for its edges, and of a sphere, each within 2 %.
+TEST(ElasticBody, SurfacePointsHaveTheAreaOfAPlane)
+{
+    for (const double shift : {0.0, 0.2, 0.5, 0.7}) {
+        for (const Vec3 normal : {Vec3(0, -1, 0), glm::normalize(Vec3(0.3, -1, 0.2)), glm::normalize(Vec3(1, -1, 1))}) {
+            const volume::NodeGrid grid{Index3(40), Vec3(0.5e-3), 1e-3};
+            const Vec3 middle(20e-3 + shift * 1e-3);
+            std::vector<volume::CellMaterial> materials(grid.count(), tests::tissue(1e4, 0.45));
+            const auto plane = tests::distanceOn(grid, [&](Vec3 p) { return glm::dot(p - middle, normal); });
+            const ElasticBody body = elasticBody(grid, materials, plane, 0.49);
+            double area = 0.0;
+            const double radius = 12e-3;
+            for (const SurfacePoint& p : body.points) {
+                EXPECT_NEAR(glm::dot(Vec3(p.position) - middle, normal), 0.0, 1e-7);
+                area += glm::distance(Vec3(p.position), middle) < radius ? static_cast<double>(p.area) : 0.0;
+            }
+            EXPECT_NEAR(area / (std::numbers::pi * radius * radius), 1.0, 0.02) << shift;
+        }
+    }
+}
+
+TEST(ElasticBody, SurfacePointsHaveTheAreaOfASphere)
+{
+    for (const double radius : {6e-3, 10.3e-3, 17e-3}) {
+        const volume::NodeGrid grid{Index3(40), Vec3(0.5e-3), 1e-3};
+        const Vec3 middle(20.3e-3, 19.8e-3, 20.1e-3);
+        std::vector<volume::CellMaterial> materials(grid.count());
+        volume::forEachIndex(Index3(0), grid.size - 1, [&](Index3 c) {
+            const double share = std::clamp(0.5 - (glm::distance(grid.position(c), middle) - radius) / 1e-3, 0.0, 1.0);
+            materials[grid.offset(c)] = tests::tissue(1e4 * share, 0.45);
+        });
+        const auto ball = tests::distanceOn(grid, [&](Vec3 p) { return glm::distance(p, middle) - radius; });
+        const ElasticBody body = elasticBody(grid, materials, ball, 0.49);
+        EXPECT_NEAR(areaOf(body) / (4.0 * std::numbers::pi * radius * radius), 1.0, 0.02) << radius;
+    }
+}
+
+// The lists that a search goes through have every point exactly once.
+TEST(ElasticBody, RowsListEveryCellAndCellsEveryPoint)
+{
+    const ElasticBody body = tests::bodyOf(tests::heldBlock({12, 9, 7}, 1e-3, 1e4, 0.45));
+    const Index3 size = body.levels.front().nodes.size;
+    std::size_t points = 0;
+    for (int z = 0; z < size.z; ++z) {
+        for (int y = 0; y < size.y; ++y) {
+            const auto row = static_cast<std::size_t>(y + z * size.y);
+            for (std::uint32_t c = body.rows[row]; c < body.rows[row + 1]; ++c) {
+                EXPECT_EQ(body.cells[c].cell.y, y);
+                EXPECT_EQ(body.cells[c].cell.z, z);
+                EXPECT_EQ(body.cells[c].first, points);
+                points += body.cells[c].count;
+            }
+        }
+    }
+    EXPECT_EQ(points, body.points.size());
+    EXPECT_GT(points, 500U);
+}
+
+// Frame LPS: y to the back. Nothing but the rear twentieth is held, at every level something.
+TEST(ElasticBody, BodyWithoutFixedTissueIsHeldAtItsBack)
+{
+    const auto material = [](Index3) { return tests::tissue(1e4, 0.45); };
+    const ElasticBody free = tests::bodyOf(ElasticBlock{{20, 40, 20}, 1e-3, material, 1, Vec3(0.0)});
+    EXPECT_FALSE(free.held);
+    for (const CellLevel& level : free.levels) {
+        int fixed = 0;
+        volume::forEachIndex(Index3(0), level.nodes.size - 1, [&](Index3 n) {
+            const std::size_t at = level.nodes.offset(n);
+            if (level.fixed[at] != 0 && level.diagonal[at] > 0.0F) {
+                ++fixed;
+                EXPECT_GT(level.nodes.position(n).y, 0.95 * 40e-3 - level.nodes.spacing);
+            }
+        });
+        EXPECT_GT(fixed, 0);
+    }
+    const ElasticBody held = tests::bodyOf(tests::heldBlock({20, 40, 20}, 1e-3, 1e4, 0.45));
+    EXPECT_TRUE(held.held);
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

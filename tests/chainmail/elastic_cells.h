@@ -1,0 +1,98 @@
+#pragma once
+
+// Cells and fields as the kernels take them, with nothing around.
+#include <chainmail/window.h>
+
+#include <random>
+
+namespace palpate::tests {
+
+/// A box of cells with its fields; spacing 1 m, so that a cell's scaled stiffness is its modulus / 32.
+struct Cells {
+    explicit Cells(Index3 nodes)
+        : layout(chainmail::Layout::of(nodes.x, nodes.y, nodes.z)),
+          mu(layout.count + chainmail::Layout::lanes, 0.0F),
+          lambda(mu),
+          u(layout.fieldSize(), 0.0F),
+          out(u),
+          scratch(layout.scratchSize(), 0.0F)
+    {
+    }
+
+    Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
+    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data()}; }
+
+    /// Moduli of one cell [Pa].
+    void set(Index3 cell, double shear, double lame)
+    {
+        const std::size_t at = layout.at(cell.x, cell.y, cell.z);
+        mu[at] = static_cast<float>(shear / 32.0);
+        lambda[at] = static_cast<float>(lame / 32.0);
+    }
+    void fill(double shear, double lame)
+    {
+        volume::forEachIndex(Index3(0), nodes() - 2, [&](Index3 c) { set(c, shear, lame); });
+    }
+    /// Moduli between 1 and 100 Pa, one cell in ten empty.
+    void fillRandom(std::minstd_rand& random)
+    {
+        std::uniform_real_distribution<double> power(0.0, 2.0);
+        volume::forEachIndex(Index3(0), nodes() - 2, [&](Index3 c) {
+            const bool empty = random() % 10 == 0;
+            set(c, empty ? 0.0 : std::pow(10.0, power(random)), empty ? 0.0 : std::pow(10.0, power(random)));
+        });
+    }
+
+    /// u(n) = value(n) at every node n.
+    template <typename Function>
+    void move(const Function& value)
+    {
+        volume::forEachIndex(Index3(0), nodes() - 1, [&](Index3 n) {
+            const Vec3 v = value(n);
+            for (int c = 0; c < 3; ++c) {
+                u[index(n, c)] = static_cast<float>(v[c]);
+            }
+        });
+    }
+    void moveRandom(double size, std::minstd_rand& random)
+    {
+        std::uniform_real_distribution<double> value(-size, size);
+        move([&](Index3) { return Vec3(value(random), value(random), value(random)); });
+    }
+
+    std::size_t index(Index3 n, int c) const
+    {
+        return static_cast<std::size_t>(c) * layout.count + layout.at(n.x, n.y, n.z);
+    }
+    Vec3 force(Index3 n) const { return {out[index(n, 0)], out[index(n, 1)], out[index(n, 2)]}; }
+
+    /// out = A u.
+    void apply() { chainmail::kernels().apply(layout, stiffness(), u.data(), out.data(), scratch.data()); }
+    double applyFinite()
+    {
+        return chainmail::kernels().applyFinite(layout, stiffness(), 1.0F, u.data(), out.data(), scratch.data());
+    }
+    double largestForce() const
+    {
+        double most = 0.0;
+        volume::forEachIndex(Index3(0), nodes() - 1, [&](Index3 n) { most = std::max(most, glm::length(force(n))); });
+        return most;
+    }
+
+    chainmail::Layout layout;
+    chainmail::Floats mu, lambda, u, out, scratch;
+};
+
+/// Sum over all nodes, in double.
+inline double dot(const Cells& cells, const chainmail::Floats& a, const chainmail::Floats& b)
+{
+    double sum = 0.0;
+    volume::forEachIndex(Index3(0), cells.nodes() - 1, [&](Index3 n) {
+        for (int c = 0; c < 3; ++c) {
+            sum += static_cast<double>(a[cells.index(n, c)]) * static_cast<double>(b[cells.index(n, c)]);
+        }
+    });
+    return sum;
+}
+
+}  // namespace palpate::tests

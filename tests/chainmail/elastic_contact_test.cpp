@@ -1,0 +1,152 @@
+#include "elastic_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace palpate::chainmail {
+namespace {
+
+// Force of a ball of radius R pressed by d into a layer of thickness H that is bonded to a rigid base.
+// Source: E. K. Dimitriadis and others, "Determination of elastic moduli of thin layers of soft material using the atomic
+// force microscope", Biophys. J. 82, 2002 (Hertz's force, times a series in sqrt(R d) / H; first order here).
+double hertz(double e, double nu, double r, double d, double thickness)
+{
+    const double alpha = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
+    const double chi = std::sqrt(r * d) / thickness;
+    return 4.0 / 3.0 * e / (1.0 - nu * nu) * std::sqrt(r) * std::pow(d, 1.5) * (1.0 - 2.0 * alpha * chi / std::numbers::pi);
+}
+
+// Converged force over the closed form: a ball of 10 mm pressed by 1 mm into a block of 48 mm.
+double hertzRatio(double spacing, double nu)
+{
+    const double e = 1e4;
+    const double r = 10e-3;
+    const double d = 1e-3;
+    const double size = 48e-3;
+    const int cells = static_cast<int>(std::lround(size / spacing));
+    const ElasticBody body = tests::bodyOf(tests::heldBlock(Index3(cells), spacing, e, nu));
+    const Vec3 top(0.5 * size, 0.0, 0.5 * size);
+    ElasticOptions options;
+    options.window = 17;
+    Elastic elastic(body, options, tests::focusAt(top));
+    const std::array tools{tests::ball(top + Vec3(0.0, d - r, 0.0), r)};
+    tests::settle(elastic, tests::loadOf(tools, {}, top), 1e-4);
+    return -elastic.toolForce(0).y / hertz(e, nu, r, d, size - spacing);
+}
+
+TEST(ElasticContact, BallOnABigBlockFollowsHertz)
+{
+    for (const double nu : {0.3, 0.45}) {
+        const double coarse = hertzRatio(2e-3, nu);
+        const double middle = hertzRatio(1e-3, nu);
+        const double fine = hertzRatio(0.75e-3, nu);
+        std::printf("hertz nu %g: %g %g %g\n", nu, coarse, middle, fine);
+        EXPECT_NEAR(fine, 1.0, 0.05) << "nu " << nu;
+        EXPECT_NEAR(middle, 1.0, 0.1) << "nu " << nu;
+        EXPECT_LT(std::abs(fine - 1.0), std::abs(coarse - 1.0)) << "nu " << nu;
+    }
+}
+
+// A block of voxels of 1 mm as a session makes it: materials and surface from the label map, its faces between nodes.
+ElasticBody voxelBlock(double spacing)
+{
+    volume::TissueTable table;
+    table.rows.resize(3);
+    table.name = "block";
+    const auto set = [&](std::size_t row, const char* name, volume::Role role, double e) {
+        table.rows[row].name = name;
+        table.rows[row].role = role;
+        table.rows[row].youngsModulus = e;
+        table.rows[row].poissonRatio = 0.45;
+        table.rows[row].fixed = role == volume::Role::bone;
+    };
+    set(0, "air", volume::Role::air, 0.0);
+    set(1, "soft", volume::Role::plain, 1e4);
+    set(2, "board", volume::Role::bone, 1e4);
+    const Index3 size(60, 40, 60);
+    const Index3 air(4);
+    volume::LabelImage image{size + 2 * air, {}, {}};
+    image.affine.linear = Mat3(1e-3);
+    image.affine.origin = 1e-3 * (0.5 - Vec3(air));
+    image.values.assign(image.offset({0, 0, image.size.z}), 0);
+    volume::forEachIndex(air, air + size - 1,
+                         [&](Index3 v) { image.values[image.offset(v)] = v.y >= air.y + size.y - 2 ? 2 : 1; });
+    const std::array<volume::LabelName, 2> names{{{1, "soft", "soft"}, {2, "board", "board"}}};
+    const auto tissue = volume::Tissue::fromLabels(image, table, names, {});
+    const auto grid = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
+    return elasticBody(grid, tissue.materialOn(grid), tissue.distanceToBody(grid), 0.49);
+}
+
+const Vec3 middleOfTop(30e-3, 0.0, 30e-3);
+constexpr double ballRadius = 5e-3;
+constexpr double ballDepth = 3e-3;
+
+ElasticTool slid(Vec3 direction, double way)
+{
+    return tests::ball(middleOfTop + Vec3(0.0, ballDepth - ballRadius, 0.0) + way * direction, ballRadius);
+}
+
+// Force across a slide of 6 mm at one depth, at equilibrium in every place: ripple is (max - min) / mean.
+double ripple(const ElasticBody& body, Vec3 direction)
+{
+    Elastic elastic(body, {}, tests::focusAt(middleOfTop));
+    double least = 1e9;
+    double most = 0.0;
+    double sum = 0.0;
+    const int places = 30;
+    for (int i = 0; i < places; ++i) {
+        const std::array tools{slid(direction, (i - places / 2) * 0.2e-3)};
+        tests::settle(elastic, tests::loadOf(tools, {}, tools[0].shape.a), 1e-4, 100);
+        const double force = glm::length(elastic.toolForce(0));
+        least = std::min(least, force);
+        most = std::max(most, force);
+        sum += force;
+    }
+    return (most - least) / (sum / places);
+}
+
+// The grid must not be felt, along its axes and across them.
+TEST(ElasticContact, SlidingOverAFlatSurfaceIsSmooth)
+{
+    for (const double spacing : {2e-3, 1e-3}) {
+        const ElasticBody body = voxelBlock(spacing);
+        for (const double degrees : {0.0, 17.0, 45.0, 90.0}) {
+            const double angle = degrees * std::numbers::pi / 180.0;
+            const double r = ripple(body, {std::cos(angle), 0.0, std::sin(angle)});
+            std::printf("ripple %g mm %g deg: %.2f %%\n", 1e3 * spacing, degrees, 100 * r);
+            EXPECT_LT(r, 0.03) << spacing << " " << degrees;
+        }
+    }
+}
+
+// Pressed in, then dragged by 20 mm/s over 12 mm: no tick changes the force by more than 2 %, windows moving or not.
+TEST(ElasticContact, MovingWindowsMakeNoJumpOfForce)
+{
+    for (const double spacing : {2e-3, 1e-3}) {
+        const ElasticBody body = voxelBlock(spacing);
+        Elastic elastic(body, {}, tests::focusAt(middleOfTop));
+        const Vec3 direction = glm::normalize(Vec3(1.0, 0.0, 0.35));
+        const std::array first{slid(direction, -6e-3)};
+        tests::settle(elastic, tests::loadOf(first, {}, first[0].shape.a), 1e-4);
+        Vec3 before = elastic.toolForce(0);
+        int moves = 0;
+        double worst = 0.0;
+        for (int tick = 1; tick <= 600; ++tick) {
+            const std::array tools{slid(direction, -6e-3 + tick * 0.02e-3)};
+            moves += elastic.relax(tests::loadOf(tools, {}, tools[0].shape.a)).moved ? 1 : 0;
+            const Vec3 now = elastic.toolForce(0);
+            worst = std::max(worst, glm::distance(now, before) / glm::length(before));
+            before = now;
+        }
+        std::printf("jump %g mm: %.3f %%, %d moves\n", 1e3 * spacing, 100 * worst, moves);
+        EXPECT_LT(worst, 0.02);
+        EXPECT_GT(moves, 0);
+    }
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

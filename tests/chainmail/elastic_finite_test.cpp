@@ -1,0 +1,142 @@
+#include "elastic_cells.h"
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/mat3x3.hpp>
+
+#include <cmath>
+
+namespace palpate::chainmail {
+namespace {
+
+using tests::Cells;
+
+Cells randomCells(std::minstd_rand& random)
+{
+    Cells cells({11, 6, 7});
+    cells.fillRandom(random);
+    return cells;
+}
+
+// Any rotation, however large: forces under 1e-5 of what the linear operator takes for the same displacements, energy under
+// the rounding of the cells' invariants.
+TEST(ElasticFinite, RotationsCostNothing)
+{
+    std::minstd_rand random(1);
+    Cells cells = randomCells(random);
+    double moduli = 0.0;
+    for (const float mu : cells.mu) {
+        moduli += 32.0 * static_cast<double>(mu);
+    }
+    for (const double angle : {0.2, 1.0, 2.5, 3.1}) {
+        const Mat3 turn(glm::rotate(glm::dmat4(1.0), angle, glm::normalize(Vec3(0.3, -0.8, 0.5))));
+        cells.move([&](Index3 n) { return (turn - Mat3(1.0)) * (Vec3(n) - Vec3(5, 3, 3)); });
+        const double energy = cells.applyFinite();
+        const double force = cells.largestForce();
+        cells.apply();
+        EXPECT_LT(std::abs(energy), 5e-7 * moduli) << angle;
+        EXPECT_LT(force, 1e-5 * cells.largestForce()) << angle;
+    }
+}
+
+// A homogeneous stretch F = diag(a, b, c): energy per volume by hand.
+TEST(ElasticFinite, EnergyOfAStretchIsTheLaw)
+{
+    const double mu = 2.0;
+    const double lambda = 30.0;
+    const Vec3 stretch(1.3, 0.9, 0.8);
+    Cells cells({12, 6, 5});
+    cells.fill(mu, lambda);
+    cells.move([&](Index3 n) { return (stretch - 1.0) * Vec3(n); });
+    const double j = stretch.x * stretch.y * stretch.z - 1.0;
+    const double density = 0.5 * mu * (glm::dot(stretch, stretch) - 3.0) - mu * j + 0.5 * (lambda + mu) * j * j;
+    EXPECT_NEAR(cells.applyFinite(), density * 11 * 5 * 4, 1e-5 * density * 220);
+}
+
+// f(s u) = s A u + O(s^2): the difference falls by four when s is halved.
+TEST(ElasticFinite, SmallStrainTendsToTheLinearOperator)
+{
+    std::minstd_rand random(2);
+    Cells cells = randomCells(random);
+    cells.moveRandom(1.0, random);
+    const Floats u = cells.u;
+    const auto difference = [&](float s) {
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            cells.u[i] = s * u[i];
+        }
+        cells.apply();
+        const Floats linear = cells.out;
+        cells.applyFinite();
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            cells.out[i] -= linear[i];
+        }
+        return std::sqrt(dot(cells, cells.out, cells.out));
+    };
+    const double coarse = difference(0.02F);
+    const double middle = difference(0.01F);
+    const double fine = difference(0.005F);
+    EXPECT_NEAR(std::log2(coarse / middle), 2.0, 0.1);
+    EXPECT_NEAR(std::log2(middle / fine), 2.0, 0.1);
+}
+
+// And the energy to half of u.A u: a strain of 1e-3 must not drown in the rounding of I_C - 3.
+TEST(ElasticFinite, EnergyOfSmallStrainIsHalfOfForceTimesWay)
+{
+    Cells cells({12, 6, 5});
+    cells.fill(2.0, 30.0);
+    for (const double strain : {1e-2, 1e-3, 1e-4}) {
+        cells.move([&](Index3 n) { return strain * Vec3(n.y, 0.3 * n.z, -0.2 * n.z); });
+        const double energy = cells.applyFinite();
+        cells.apply();
+        const double linear = 0.5 * dot(cells, cells.u, cells.out);
+        EXPECT_NEAR(energy, linear, (0.01 + 2.0 * strain) * linear) << strain;
+    }
+}
+
+// dE/dt along v is v.f, by central differences: error of second order in t, here under 1e-3.
+TEST(ElasticFinite, ForceIsTheDerivativeOfTheEnergy)
+{
+    std::minstd_rand random(3);
+    Cells cells = randomCells(random);
+    Cells shifted = cells;
+    Cells direction = cells;
+    for (int i = 0; i < 5; ++i) {
+        cells.moveRandom(0.3, random);
+        cells.applyFinite();
+        direction.moveRandom(1.0, random);
+        const auto energy = [&](float t) {
+            for (std::size_t n = 0; n < shifted.u.size(); ++n) {
+                shifted.u[n] = cells.u[n] + t * direction.u[n];
+            }
+            return shifted.applyFinite();
+        };
+        const double step = 4e-3;
+        const double slope = (energy(static_cast<float>(step)) - energy(static_cast<float>(-step))) / (2.0 * step);
+        const double scale = std::sqrt(dot(cells, cells.out, cells.out) * dot(cells, direction.u, direction.u));
+        EXPECT_NEAR(slope, dot(cells, direction.u, cells.out), 1e-3 * scale);
+    }
+}
+
+// Cells turned inside out, flattened and blown up: finite energy and forces, and never under -mu^2 / 2 (lambda + mu) less
+// 3/2 mu per volume, the bound that W has over all deformation gradients.
+TEST(ElasticFinite, EnergyIsFiniteForInvertedCells)
+{
+    std::minstd_rand random(4);
+    Cells cells({11, 6, 7});
+    cells.fill(2.0, 30.0);
+    const double least = -(0.5 * 4.0 / 32.0 + 3.0) * 10 * 5 * 6;
+    for (const double size : {0.0, 0.5, 3.0, 50.0}) {
+        cells.moveRandom(size, random);
+        EXPECT_GE(cells.applyFinite(), least);
+        EXPECT_TRUE(std::isfinite(cells.largestForce()));
+    }
+    cells.move([](Index3 n) { return -2.0 * Vec3(n); });
+    EXPECT_GT(cells.applyFinite(), 0.0);
+    cells.move([](Index3 n) { return -1.0 * Vec3(n); });
+    EXPECT_GE(cells.applyFinite(), least);
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

@@ -1,0 +1,144 @@
+#include "elastic_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+namespace palpate::chainmail {
+namespace {
+
+bool isFinite(Vec3 v)
+{
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+bool allFinite(const Elastic& elastic)
+{
+    for (const Window& w : elastic.stack().windows()) {
+        for (const Field f : {Field::u, Field::a, Field::d, Field::e, Field::p, Field::q}) {
+            const float* v = w.field(f);
+            if (!std::all_of(v, v + 3 * w.layout.count, [](float x) { return std::isfinite(x); })) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+// A hand that wants to break things: it jumps, turns back, presses through the block, drags aside, goes away, and ties
+// material points down with springs of any stiffness, none included.
+class HostileHand {
+public:
+    explicit HostileHand(Vec3 size) : size_(size) {}
+
+    void next()
+    {
+        switch (random_() % 8) {
+            case 0:  // anywhere, outside too
+                at_ = size_ * (2.0 * Vec3(unit(), unit(), unit()) - 0.5);
+                break;
+            case 1:  // far away
+                at_ = Vec3(unit(), unit(), unit()) - 0.5;
+                break;
+            case 2:  // deep
+                at_.y += 8e-3 * unit();
+                break;
+            case 3:  // back
+                step_ = -step_;
+                [[fallthrough]];
+            case 4:  // aside
+                at_ += step_;
+                break;
+            case 5:
+                step_ = 4e-3 * (Vec3(unit(), unit(), unit()) - 0.5);
+                [[fallthrough]];
+            default:
+                at_ += 0.25 * step_;
+        }
+        tools_[0] = tests::ball(at_, 5e-3 * unit(), std::pow(10.0, 6.0 * unit()));
+        const Vec3 end = at_ + 20e-3 * (Vec3(unit(), unit(), unit()) - 0.5);
+        tools_[1] = {{at_, end, 4e-3 * unit(), 4e-3 * unit()}, step_, 1000.0};
+        toolCount_ = random_() % 3;
+        tieCount_ = random_() % 3;
+        for (Tie& tie : ties_) {
+            const double along = random_() % 4 == 0 ? 0.0 : std::pow(10.0, 5.0 * unit());
+            const double across = random_() % 4 == 0 ? 0.0 : std::pow(10.0, 5.0 * unit());
+            const Vec3 axis = glm::normalize(Vec3(unit(), unit(), unit()) + 0.01);
+            tie = {size_ * (1.4 * Vec3(unit(), unit(), unit()) - 0.2), 10e-3 * (Vec3(unit(), unit(), unit()) - 0.5), axis,
+                   along, across};
+        }
+    }
+
+    ElasticLoad load() const
+    {
+        return tests::loadOf(std::span(tools_).first(toolCount_), std::span(ties_).first(tieCount_), at_);
+    }
+    std::size_t tools() const { return toolCount_; }
+    std::size_t ties() const { return tieCount_; }
+    std::size_t random() { return random_(); }
+
+private:
+    double unit() { return value_(random_); }
+
+    Vec3 size_;
+    Vec3 at_{0.0};
+    Vec3 step_{1e-3};
+    std::array<ElasticTool, 2> tools_;
+    std::array<Tie, 2> ties_;
+    std::size_t toolCount_ = 0, tieCount_ = 0;
+    std::minstd_rand random_{11};
+    std::uniform_real_distribution<double> value_{0.0, 1.0};
+};
+
+// Every number stays finite, and under a load that stays no call raises the energy.
+void push(const ElasticBody& body, Vec3 size, bool finiteStrain, int pushes)
+{
+    ElasticOptions options;
+    options.window = 9;
+    options.finiteStrain = finiteStrain;
+    Elastic elastic(body, options, tests::focusAt(0.5 * size));
+    HostileHand hand(size);
+    int contacts = 0;
+    for (int i = 0; i < pushes; ++i) {
+        hand.next();
+        const auto load = hand.load();
+        auto result = elastic.relax(load);
+        contacts += result.contacts > 0 ? 1 : 0;
+        ASSERT_TRUE(std::isfinite(result.energy) && std::isfinite(result.depth)) << "push " << i;
+        for (std::size_t t = 0; t < hand.tools(); ++t) {
+            ASSERT_TRUE(isFinite(elastic.toolForce(t))) << "push " << i;
+        }
+        for (std::size_t t = 0; t < hand.ties(); ++t) {
+            ASSERT_TRUE(isFinite(elastic.tieForce(t))) << "push " << i;
+        }
+        const int repeats = hand.random() % 10 == 0 ? 4 : 0;
+        const double first = result.energy;
+        for (int again = 0; again < repeats; ++again) {
+            const double before = result.energy;
+            result = elastic.relax(load);
+            ASSERT_LE(result.energy, before + 1e-5 * (first + before)) << "push " << i << ", again " << again;
+        }
+        if (i % 100 == 0) {
+            ASSERT_TRUE(allFinite(elastic)) << "push " << i;
+        }
+    }
+    EXPECT_GT(contacts, pushes / 10);
+    elastic.relax({});
+    EXPECT_TRUE(elastic.atRest());
+}
+
+TEST(ElasticHostile, TenThousandPushesStayFiniteAndNeverRaiseTheEnergy)
+{
+    const Vec3 size(20e-3, 14e-3, 17e-3);
+    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, false, 10000);
+}
+
+TEST(ElasticHostile, FiniteStrainStaysFiniteAndNeverRaisesTheEnergy)
+{
+    const Vec3 size(20e-3, 14e-3, 17e-3);
+    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, true, 1500);
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

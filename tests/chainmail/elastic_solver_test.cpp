@@ -1,0 +1,223 @@
+#include "elastic_bodies.h"
+
+#include <tests/allocations.h>
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+namespace palpate::chainmail {
+namespace {
+
+constexpr double spacing = 1e-3;
+constexpr double radius = 5e-3;
+
+ElasticBody body(double nu = 0.45)
+{
+    return tests::bodyOf(tests::heldBlock({30, 18, 26}, spacing, 1e4, nu));
+}
+
+const Vec3 top(15e-3, 0.0, 13e-3);
+
+// A ball `depth` deep in the middle of the top, moved aside by `aside`.
+ElasticTool pressed(double depth, Vec3 aside = Vec3(0.0))
+{
+    return tests::ball(top + Vec3(0.0, depth - radius, 0.0) + aside, radius);
+}
+
+Tie tieAt(Vec3 rest, Vec3 u)
+{
+    return {rest, u, glm::normalize(Vec3(0.3, 1.0, -0.2)), 40.0, 15.0};
+}
+
+// Ties are springs and the tissue is linear: displacements and forces of two loads add.
+TEST(Elastic, LoadsOfTiesSuperpose)
+{
+    const ElasticBody block = body();
+    const Vec3 a(12e-3, 3.3e-3, 10.2e-3);
+    const Vec3 b(17.5e-3, 6e-3, 15.1e-3);
+    const std::array<Vec3, 3> probes{a, b, {14e-3, 9e-3, 13e-3}};
+    const auto solved = [&](Vec3 ua, Vec3 ub) {
+        Elastic elastic(block, {}, tests::focusAt(top));
+        const std::array<Tie, 2> ties{tieAt(a, ua), tieAt(b, ub)};
+        tests::settle(elastic, tests::loadOf({}, ties, top), 1e-6);
+        std::array<Vec3, 5> out;
+        for (std::size_t i = 0; i < 3; ++i) {
+            out[i] = elastic.displacement(probes[i]);
+        }
+        out[3] = 1e-2 * elastic.tieForce(0);
+        out[4] = 1e-2 * elastic.tieForce(1);
+        return out;
+    };
+    const Vec3 ua(1e-3, 2e-3, -0.5e-3);
+    const Vec3 ub(-0.3e-3, -1e-3, 1.5e-3);
+    const auto first = solved(ua, Vec3(0.0));
+    const auto second = solved(Vec3(0.0), ub);
+    const auto both = solved(ua, ub);
+    for (std::size_t i = 0; i < both.size(); ++i) {
+        EXPECT_LT(glm::distance(both[i], first[i] + second[i]), 1e-3 * glm::length(both[i])) << i;
+        EXPECT_GT(glm::length(first[i]), 1e-6);
+    }
+}
+
+// Whatever the load, while it stays the same no call raises the energy, but for the rounding of its sums.
+TEST(Elastic, EnergyNeverRisesWhileTheLoadStays)
+{
+    const ElasticBody block = body();
+    std::minstd_rand random(1);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (const bool finite : {false, true}) {
+        ElasticOptions options;
+        options.finiteStrain = finite;
+        Elastic elastic(block, options, tests::focusAt(top));
+        for (int load = 0; load < 12; ++load) {
+            const std::array tools{pressed(2.5e-3 + 2e-3 * unit(random), 5e-3 * Vec3(unit(random), 0.0, unit(random)))};
+            const std::array ties{tieAt(top + 4e-3 * Vec3(unit(random), 1.2, unit(random)),
+                                        2e-3 * Vec3(unit(random), unit(random), unit(random)))};
+            const auto both = tests::loadOf(tools, ties, top);
+            double before = elastic.relax(both).energy;
+            const double first = before;
+            for (int call = 0; call < 12; ++call) {
+                const double now = elastic.relax(both).energy;
+                ASSERT_LE(now, before + 1e-5 * first) << "load " << load << ", call " << call;
+                before = now;
+            }
+            EXPECT_LT(before, first);
+        }
+    }
+}
+
+// Nothing touches: the body is at rest to the bit, whatever was before.
+TEST(Elastic, UnloadedBodyIsExactlyAtRest)
+{
+    const ElasticBody block = body();
+    Elastic elastic(block, {}, tests::focusAt(top));
+    const std::array ties{tieAt(top + Vec3(0.0, 4e-3, 0.0), Vec3(1e-3))};
+    for (int i = 0; i < 20; ++i) {
+        const std::array tools{pressed(0.2e-3 * i, Vec3(0.3e-3 * i, 0.0, 0.0))};
+        elastic.relax(tests::loadOf(tools, ties, tools[0].shape.a));
+    }
+    EXPECT_FALSE(elastic.atRest());
+    EXPECT_GT(glm::length(elastic.displacement(top)), 1e-4);
+    const std::array away{pressed(-8e-3)};
+    const auto result = elastic.relax(tests::loadOf(away, {}, top));
+    EXPECT_TRUE(elastic.atRest());
+    EXPECT_EQ(result.energy, 0.0);
+    EXPECT_EQ(result.contacts, 0U);
+    EXPECT_EQ(elastic.toolForce(0), Vec3(0.0));
+    for (const Window& w : elastic.stack().windows()) {
+        for (const Field f : {Field::u, Field::a}) {
+            const float* v = w.field(f);
+            EXPECT_TRUE(std::all_of(v, v + 3 * w.layout.count, [](float x) { return x == 0.0F; }));
+        }
+    }
+}
+
+// Work done on a tool is energy taken from the tissue: F = -dE/dx, each E at its equilibrium. A ball and a tie, along each
+// axis, by central differences.
+TEST(Elastic, ReactionIsTheDerivativeOfTheConvergedEnergy)
+{
+    const ElasticBody block = body();
+    const double step = 0.1e-3;
+    for (const int axis : {0, 1, 2}) {
+        Vec3 way(0.0);
+        way[axis] = step;
+        const auto solved = [&](Vec3 ball, Vec3 tie) {
+            Elastic elastic(block, {}, tests::focusAt(top));
+            const std::array tools{pressed(2.5e-3, Vec3(-2e-3, 0.0, 1e-3) + ball)};
+            const std::array ties{tieAt(top + Vec3(4e-3, 3.5e-3, 2e-3), Vec3(1e-3, -0.5e-3, 2e-3) + tie)};
+            const auto result = tests::settle(elastic, tests::loadOf(tools, ties, top), 1e-6);
+            return std::array{result.energy, elastic.toolForce(0)[axis], elastic.tieForce(0)[axis]};
+        };
+        const auto here = solved(Vec3(0.0), Vec3(0.0));
+        const double byBall = (solved(way, Vec3(0.0))[0] - solved(-way, Vec3(0.0))[0]) / (2.0 * step);
+        const double byTie = (solved(Vec3(0.0), way)[0] - solved(Vec3(0.0), -way)[0]) / (2.0 * step);
+        EXPECT_NEAR(here[1], -byBall, 0.002 * 0.3) << "axis " << axis;
+        EXPECT_NEAR(here[2], -byTie, 0.002 * 0.05) << "axis " << axis;
+    }
+}
+
+// What tools and ties push in, the fixed nodes hold.
+TEST(Elastic, ActionEqualsReaction)
+{
+    const ElasticBody block = body();
+    ElasticOptions whole;
+    whole.window = 65;
+    Elastic elastic(block, whole, tests::focusAt(top));
+    const std::array tools{pressed(2.5e-3, Vec3(-3e-3, 0.0, 0.0)), pressed(1.5e-3, Vec3(6e-3, 0.0, 2e-3))};
+    const std::array ties{tieAt(top + Vec3(0.0, 5e-3, -5e-3), Vec3(2e-3, 1e-3, 0.0))};
+    tests::settle(elastic, tests::loadOf(tools, ties, top), 1e-6);
+    const Vec3 pushed = elastic.toolForce(0) + elastic.toolForce(1) + elastic.tieForce(0);
+
+    Window w = elastic.stack().windows().front();
+    Floats scratch(w.layout.scratchSize());
+    kernels().apply(w.layout, w.stiffness(), w.field(Field::u), w.field(Field::t), scratch.data());
+    Vec3 held(0.0);
+    volume::forEachIndex(Index3(0), w.size() - 1, [&](Index3 n) {
+        const std::size_t node = w.layout.at(n.x, n.y, n.z);
+        held += w.open[node] == 0.0F ? tests::valueAt(w, node, Field::t) : Vec3(0.0);
+    });
+    EXPECT_LT(pushed.y, -0.1);
+    EXPECT_LT(glm::distance(held, pushed), 1e-3 * glm::length(pushed));
+}
+
+// Two balls and a tie go their ways at the same time, slowly: the work of all three, each force times its way, is the
+// energy in the end. By the trapezoidal rule, 1 %.
+TEST(Elastic, WorkOfAllToolsAndTiesIsTheEnergy)
+{
+    const ElasticBody block = body();
+    Elastic elastic(block, {}, tests::focusAt(top));
+    const Vec3 wayA(0.0, 2e-3, 0.0);
+    const Vec3 wayB(1e-3, 1.5e-3, 0.5e-3);
+    const Vec3 wayTie(1e-3, -1e-3, 2e-3);
+    const int steps = 40;
+    double work = 0.0;
+    double energy = 0.0;
+    std::array<Vec3, 3> before{Vec3(0.0), Vec3(0.0), Vec3(0.0)};
+    for (int i = 1; i <= steps; ++i) {
+        const double s = static_cast<double>(i) / steps;
+        const std::array tools{pressed(0.0, Vec3(-5e-3, 0.0, 0.0) + s * wayA),
+                               pressed(0.0, Vec3(5e-3, 0.0, 0.0) + s * wayB)};
+        const std::array ties{tieAt(top + Vec3(0.0, 6e-3, 3e-3), s * wayTie)};
+        energy = tests::settle(elastic, tests::loadOf(tools, ties, top), 1e-4).energy;
+        const std::array now{elastic.toolForce(0), elastic.toolForce(1), elastic.tieForce(0)};
+        const std::array ways{wayA, wayB, wayTie};
+        for (std::size_t t = 0; t < 3; ++t) {
+            work -= 0.5 * glm::dot(now[t] + before[t], ways[t]) / steps;
+        }
+        before = now;
+    }
+    EXPECT_GT(energy, 1e-4);
+    EXPECT_NEAR(work, energy, 0.01 * energy);
+}
+
+// Touching, sliding, moving windows, letting go: nothing comes from the heap.
+TEST(Elastic, RelaxAllocatesNothing)
+{
+    const ElasticBody block = body();
+    for (const bool finite : {false, true}) {
+        ElasticOptions options;
+        options.window = 11;
+        options.finiteStrain = finite;
+        Elastic elastic(block, options, tests::focusAt(top));
+        std::array tools{pressed(1e-3), pressed(0.5e-3)};
+        const std::array ties{tieAt(top + Vec3(0.0, 4e-3, 0.0), Vec3(1e-3))};
+        bool moved = false;
+        const auto allocations = tests::allocationsIn([&] {
+            for (int i = 0; i < 60; ++i) {
+                tools[0] = pressed(2e-3, Vec3(-8e-3 + 0.3e-3 * i, 0.0, 0.0));
+                const auto load =
+                    tests::loadOf(tools, i % 2 == 0 ? std::span(ties) : std::span<const Tie>(), tools[0].shape.a);
+                moved = elastic.relax(load).moved || moved;
+            }
+            elastic.relax({});
+        });
+        EXPECT_EQ(allocations, 0U);
+        EXPECT_TRUE(moved);
+        EXPECT_TRUE(elastic.atRest());
+    }
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

@@ -1,0 +1,253 @@
+#include "elastic_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <glm/mat3x3.hpp>
+
+#include <cmath>
+
+namespace palpate::chainmail {
+namespace {
+
+constexpr double spacing = 1e-3;
+constexpr double modulus = 1e4;
+
+// A block whose outer cells are fixed, its coarser levels whole: every degree of freedom lies in the same material.
+ElasticBody wholeBody(double nu)
+{
+    return tests::bodyOf(tests::shell(48, spacing, modulus, nu, 8));
+}
+
+Vec3 affine(Vec3 x)
+{
+    const Mat3 gradient(0.02, -0.01, 0.03, 0.015, -0.04, 0.01, 0.005, 0.02, 0.03);
+    return Vec3(1e-4, 2e-4, -3e-4) + gradient * x;
+}
+
+double largest(WindowStack& stack, Field field)
+{
+    double most = 0.0;
+    tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3) {
+        most = std::max(most, glm::length(tests::valueAt(w, node, field)));
+    });
+    return most;
+}
+
+// Largest |field - affine| over all nodes of all windows.
+double offAffine(WindowStack& stack, Field field)
+{
+    double most = 0.0;
+    tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3 rest) {
+        most = std::max(most, glm::distance(tests::valueAt(w, node, field), affine(rest)));
+    });
+    return most;
+}
+
+// What stands at a border before apply() must not matter.
+void spoilBorders(WindowStack& stack, Field field)
+{
+    tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3) {
+        if (w.border[node] != 0.0F) {
+            tests::setAt(w, node, field, spacing * Vec3(1.0, -2.0, 3.0));
+        }
+    });
+}
+
+// An affine displacement is in the composite space, across every border, and leaves no force at any degree of freedom; one
+// node of the finest window moved aside does.
+TEST(ElasticWindows, AffineFieldsPassThePatchTestAcrossBorders)
+{
+    for (const double nu : {0.3, 0.49}) {
+        const ElasticBody body = wholeBody(nu);
+        WindowStack stack(body, 15, tests::focusAt({0.022, 0.024, 0.026}));
+        ASSERT_GE(stack.size(), 3U);
+        tests::setField(stack, Field::u, affine);
+        spoilBorders(stack, Field::u);
+        stack.apply(Field::u, Field::a);
+        EXPECT_LT(offAffine(stack, Field::u), 1e-9) << "nu " << nu;
+        const double forces = largest(stack, Field::a);
+
+        Window& finest = stack[0];
+        const std::size_t middle = finest.layout.at(7, 7, 7);
+        tests::setAt(finest, middle, Field::u, tests::valueAt(finest, middle, Field::u) + Vec3(spacing * 0.02, 0.0, 0.0));
+        stack.apply(Field::u, Field::a);
+        EXPECT_LT(forces, 1e-4 * largest(stack, Field::a)) << "nu " << nu;
+    }
+}
+
+// Every node inside the body is a degree of freedom of exactly one window, but those at borders, which follow.
+TEST(ElasticWindows, CoveredNodesAreNoDegreesOfFreedom)
+{
+    const ElasticBody body = wholeBody(0.45);
+    WindowStack stack(body, 15, tests::focusAt(Vec3(0.024)));
+    tests::forEachNode(stack, [&](std::size_t l, Window& w, std::size_t node, Vec3 rest) {
+        EXPECT_EQ(w.dof[node] * w.border[node], 0.0F);
+        if (l == 0) {
+            return;
+        }
+        const Window& finer = stack[l - 1];
+        const auto& grid = body.levels[l - 1].nodes;
+        const Vec3 low = grid.position(finer.low);
+        const Vec3 high = grid.position(finer.low + finer.size() - 1);
+        if (tests::boxDistance(rest, low, high) < -0.1 * grid.spacing) {
+            EXPECT_EQ(w.dof[node], 0.0F);
+        }
+    });
+}
+
+TEST(ElasticWindows, CompositeOperatorIsSymmetricAndPositive)
+{
+    std::minstd_rand random(1);
+    for (const double nu : {0.3, 0.499}) {
+        const ElasticBody body = tests::bodyOf(tests::heldBlock({40, 30, 36}, spacing, modulus, nu));
+        WindowStack stack(body, 13, tests::focusAt({0.02, 0.0, 0.02}));
+        for (int i = 0; i < 5; ++i) {
+            tests::randomise(stack, Field::p, random);
+            tests::randomise(stack, Field::z, random);
+            stack.apply(Field::p, Field::q);
+            stack.apply(Field::z, Field::a);
+            const double own = -stack.dot(Field::p, Field::q);
+            EXPECT_GT(own, 0.0);
+            EXPECT_NEAR(stack.dot(Field::z, Field::q), stack.dot(Field::p, Field::a), 1e-5 * own) << "nu " << nu;
+        }
+    }
+}
+
+// Largest |b.M^-1 a - a.M^-1 b| over a.M^-1 a, a and b random.
+double asymmetry(WindowStack& stack, Multigrid& multigrid)
+{
+    std::minstd_rand random(2);
+    double most = 0.0;
+    for (int i = 0; i < 5; ++i) {
+        tests::randomise(stack, Field::p, random);
+        tests::randomise(stack, Field::q, random);
+        stack.copy(Field::p, Field::r);
+        multigrid.solve();
+        const double own = stack.dot(Field::p, Field::z);
+        const double mixed = stack.dot(Field::q, Field::z);
+        EXPECT_GT(own, 0.0);
+        stack.copy(Field::q, Field::r);
+        multigrid.solve();
+        most = std::max(most, std::abs(stack.dot(Field::p, Field::z) - mixed) / own);
+    }
+    return most;
+}
+
+// The cycle may precondition conjugate gradients: b.M^-1 a = a.M^-1 b, and a.M^-1 a > 0.
+TEST(ElasticWindows, MultigridIsSymmetricAndPositive)
+{
+    for (const double nu : {0.3, 0.45, 0.49}) {
+        const ElasticBody body = tests::bodyOf(tests::heldBlock({40, 30, 36}, spacing, modulus, nu));
+        WindowStack stack(body, 13, tests::focusAt({0.02, 0.0, 0.02}));
+        Multigrid multigrid(stack, 1);
+        EXPECT_LT(asymmetry(stack, multigrid), 1e-5) << "nu " << nu;
+    }
+}
+
+// And with a contact on top that is stiffer than the tissue.
+TEST(ElasticWindows, MultigridWithContactsIsSymmetricAndPositive)
+{
+    for (const double nu : {0.3, 0.49}) {
+        const ElasticBody body = tests::bodyOf(tests::heldBlock({40, 30, 36}, spacing, modulus, nu));
+        WindowStack stack(body, 13, tests::focusAt({0.02, 0.0, 0.02}));
+        Multigrid multigrid(stack, 64);
+        const Window& finest = stack[0];
+        for (int i = 0; i < 9; ++i) {
+            multigrid.addContact(0, finest.layout.at(5 + i % 3, 3, 5 + i / 3), glm::dmat3(30.0));
+        }
+        multigrid.prepare();
+        EXPECT_LT(asymmetry(stack, multigrid), 1e-5) << "nu " << nu;
+    }
+}
+
+// Cycles of conjugate gradients until a force on the surface is in balance to 1e-4.
+int cyclesFor(int cells, double nu)
+{
+    const ElasticBody body = tests::bodyOf(tests::heldBlock(Index3(cells), spacing, modulus, nu));
+    const Vec3 top(0.5 * cells * spacing, 0.0, 0.5 * cells * spacing);
+    WindowStack stack(body, 15, tests::focusAt(top));
+    Multigrid multigrid(stack, 1);
+    tests::forEachNode(stack, [&](std::size_t l, Window& w, std::size_t node, Vec3 rest) {
+        const bool pressed = l == 0 && glm::distance(rest, top) < 2.5 * spacing;
+        tests::setAt(w, node, Field::r, pressed ? Vec3(0.0, static_cast<double>(w.dof[node]) * 1e-3, 0.0) : Vec3(0.0));
+    });
+    return tests::solve(stack, multigrid, 1e-4, 200);
+}
+
+// The factor per cycle depends on Poisson's ratio, not on how many levels there are.
+TEST(ElasticWindows, CyclesDoNotGrowWithTheNumberOfLevels)
+{
+    for (const auto& [nu, most] : {std::pair(0.3, 32), std::pair(0.45, 72), std::pair(0.49, 185)}) {
+        for (const int cells : {12, 26, 54}) {
+            EXPECT_LE(cyclesFor(cells, nu), most) << "nu " << nu << ", " << cells << " cells";
+        }
+    }
+}
+
+// Where old and new windows overlap, the finest has what it had, to the bit.
+TEST(ElasticWindows, FollowingKeepsTheDisplacement)
+{
+    std::minstd_rand random(3);
+    const ElasticBody body = wholeBody(0.45);
+    WindowStack stack(body, 15, tests::focusAt(Vec3(0.02)));
+    tests::randomise(stack, Field::u, random);
+    tests::randomise(stack, Field::d, random);
+    stack.apply(Field::u, Field::a);
+    stack.apply(Field::d, Field::e);
+    const Window before = stack[0];
+    ASSERT_FALSE(stack.follow(tests::focusAt(Vec3(0.021)), true));
+    ASSERT_TRUE(stack.follow(tests::focusAt(Vec3(0.026, 0.02, 0.014)), true));
+    const Window& now = stack[0];
+    ASSERT_NE(now.low, before.low);
+    int kept = 0;
+    volume::forEachIndex(now.low, now.low + now.size() - 1, [&](Index3 n) {
+        if (before.contains(n)) {
+            ++kept;
+            for (const Field f : {Field::u, Field::d}) {
+                EXPECT_EQ(tests::valueAt(now, now.at(n), f), tests::valueAt(before, before.at(n), f));
+            }
+        }
+    });
+    EXPECT_GT(kept, 500);
+    EXPECT_LT(kept, 15 * 15 * 15);
+}
+
+// However the windows go, an affine field stays what it is, at every node of every window.
+TEST(ElasticWindows, FollowingKeepsAnAffineFieldExactly)
+{
+    std::minstd_rand random(4);
+    std::uniform_real_distribution<double> place(-0.01, 0.06);
+    const ElasticBody body = wholeBody(0.45);
+    WindowStack stack(body, 15, tests::focusAt(Vec3(0.024)));
+    tests::setField(stack, Field::u, affine);
+    int moves = 0;
+    for (int i = 0; i < 40; ++i) {
+        moves += stack.follow(tests::focusAt({place(random), place(random), place(random)}), true) ? 1 : 0;
+        ASSERT_LT(offAffine(stack, Field::u), 2e-9);
+    }
+    EXPECT_GT(moves, 30);
+}
+
+// Windows stay nested and inside the body wherever the focus is, far outside too.
+TEST(ElasticWindows, WindowsStayNested)
+{
+    std::minstd_rand random(5);
+    std::uniform_real_distribution<double> place(-0.2, 0.2);
+    const ElasticBody body = tests::bodyOf(tests::heldBlock({50, 20, 33}, spacing, modulus, 0.45));
+    WindowStack stack(body, 11, tests::focusAt(Vec3(0.0)));
+    for (int i = 0; i < 200; ++i) {
+        stack.follow(tests::focusAt({place(random), place(random), place(random)}), false);
+        for (std::size_t l = 0; l < stack.size(); ++l) {
+            const Window& w = stack[l];
+            const auto& level = body.levels[l].nodes;
+            EXPECT_TRUE(level.contains(w.low) && level.contains(w.low + w.size() - 1));
+            if (l + 1 < stack.size()) {
+                EXPECT_EQ(w.low % 2, Index3(0));
+                EXPECT_TRUE(stack[l + 1].contains(w.low / 2) && stack[l + 1].contains((w.low + w.size() - 1) / 2));
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace palpate::chainmail
