@@ -12,6 +12,8 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t mostTools = 16;
+constexpr double reach = 0.6;       // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;      // spacings that a tool may move until they are looked for again
 constexpr int newtonSteps = 3;      // of a line search: contacts open and close along it
 constexpr int mostHalvings = 8;     // of a step that raises the energy
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
@@ -32,6 +34,7 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
       sites_(options.maxSites)
 {
     shapes_.reserve(mostTools);
+    foundFor_.reserve(mostTools);
 }
 
 std::size_t Elastic::nodes() const noexcept
@@ -65,14 +68,47 @@ void Elastic::settle() noexcept
     hasIncrement_ = false;
 }
 
-void Elastic::meet(const ElasticLoad& load) noexcept
+// True when the sites found for an earlier call still serve: nothing moved far.
+bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
+{
+    if (moved || atRest_ || load.tools.size() != foundFor_.size() || load.ties.size() != tiesFound_) {
+        return false;
+    }
+    const double far = drift * stack_.body().levels.front().nodes.spacing;
+    for (std::size_t i = 0; i < foundFor_.size(); ++i) {
+        const auto& now = load.tools[i].shape;
+        const auto& then = foundFor_[i];
+        if (glm::distance(now.a, then.a) > far || glm::distance(now.b, then.b) > far || now.radiusA != then.radiusA ||
+            now.radiusB != then.radiusB) {
+            return false;
+        }
+    }
+    for (std::size_t i = 0; i < tiesFound_; ++i) {
+        const ContactSite& s = sites_[i];
+        const Tie& tie = load.ties[i];
+        if (s.rest != tie.rest || s.stiffness != tie.along || s.across != tie.across || s.normal != tie.axis) {
+            return false;
+        }
+    }
+    return true;
+}
+
+void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 {
     shapes_.clear();
-    for (const ElasticTool& tool : load.tools.first(std::min(load.tools.size(), mostTools))) {
+    for (const ElasticTool& tool : load.tools) {
         shapes_.emplace_back(tool.shape);
     }
     ties_ = load.ties;
-    siteCount_ = findSites(stack_.body(), stack_.windows(), load, shapes_, sites_);
+    if (!sitesHold(load, moved)) {
+        const double near = reach * stack_.body().levels.front().nodes.spacing;
+        siteCount_ = findSites(stack_.body(), stack_.windows(), load, shapes_, near, sites_);
+        foundFor_.clear();
+        for (const ElasticTool& tool : load.tools) {
+            foundFor_.push_back(tool.shape);
+        }
+        tiesFound_ = load.ties.size();
+    }
     for (ContactSite& s : active()) {
         touch(s, shapes_, ties_);
     }
@@ -103,10 +139,7 @@ void Elastic::refreshForces() noexcept
 // r = forces of the tissue and of the contacts.
 void Elastic::refreshResidual() noexcept
 {
-    const Kernels& k = stack_.kernels();
-    for (Window& w : stack_.windows()) {
-        k.smoothFirst(1.0F, w.dof.data(), w.field(Field::a), w.field(Field::r), w.layout.count);
-    }
+    stack_.copy(Field::a, Field::r);
     for (const ContactSite& s : sites()) {
         if (!s.active()) {
             continue;
@@ -169,9 +202,8 @@ double Elastic::contactEnergy() const noexcept
     return sum;
 }
 
-void Elastic::go(double alpha, Field direction) noexcept
+void Elastic::moveSites(double alpha) noexcept
 {
-    stack_.add(alpha, direction, Field::u);
     for (ContactSite& s : active()) {
         s.u += alpha * s.p;
         touch(s, shapes_, ties_);
@@ -183,17 +215,22 @@ void Elastic::go(double alpha, Field direction) noexcept
 // taken back at last. False: nowhere.
 bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noexcept
 {
-    const double slope = -stack_.dot(Field::a, direction);
-    const double curvature = -stack_.dot(image, direction);
+    const auto product = stack_.dots(direction, Field::a, image);
+    const double slope = -product[0];
+    const double curvature = -product[1];
     const double tissue = energy_;
     const double before = tissue + contactEnergy();
     double alpha = lineSearch(slope, curvature);
     double gone = 0.0;
     for (int i = 0; alpha != gone; ++i) {
-        go(alpha - gone, direction);
+        moveSites(alpha - gone);
+        if (options_.finiteStrain) {
+            stack_.combine(Field::u, alpha - gone, direction, Field::u);
+            energy_ = stack_.applyFinite(Field::u, Field::f);
+        } else {
+            energy_ = tissue + (slope + 0.5 * curvature * alpha) * alpha;
+        }
         gone = alpha;
-        energy_ = options_.finiteStrain ? stack_.applyFinite(Field::u, Field::a)
-                                        : tissue + (slope + 0.5 * curvature * alpha) * alpha;
         const double scale = std::abs(before) + std::abs(slope * alpha);
         if (energy_ + contactEnergy() <= before + rounding * scale) {
             break;
@@ -201,14 +238,29 @@ bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noex
         alpha = i < mostHalvings ? 0.5 * alpha : 0.0;
         ++result.shortened;
     }
-    if (!options_.finiteStrain) {
-        stack_.add(alpha, image, Field::a);
-    }
-    // The increment of this call so far: what was kept of the last one's, and the steps since.
-    const double kept = direction == Field::d ? alpha - 1.0 : alpha;
-    stack_.add(kept, direction, Field::d);
-    stack_.add(kept, image, Field::e);
+    keepStep(direction, image, alpha);
     return alpha != 0.0;
+}
+
+// d and e become the increment of this call so far: of the last call's what was taken again, and the steps since.
+void Elastic::keepStep(Field direction, Field image, double alpha) noexcept
+{
+    const bool again = direction == Field::d;
+    for (ContactSite& s : active()) {
+        s.p *= again ? alpha : 1.0;
+    }
+    if (!options_.finiteStrain) {
+        stack_.advance(alpha, direction, image, again ? 0.0 : 1.0);
+        return;
+    }
+    stack_.combine(Field::d, again ? alpha - 1.0 : alpha, direction, Field::d);
+    stack_.combine(Field::f, -1.0, Field::a, Field::a);
+    if (again) {
+        stack_.copy(Field::a, Field::e);
+    } else {
+        stack_.combine(Field::e, 1.0, Field::a, Field::e);
+    }
+    stack_.copy(Field::f, Field::a);
 }
 
 // One step of preconditioned conjugate gradients, conjugate to `before`.
@@ -217,33 +269,39 @@ bool Elastic::oneCycle(Before before, ElasticResult& result) noexcept
     prepareContacts();
     multigrid_.solve();
     stack_.apply(Field::z, Field::f);
-    if (before == Before::increment) {
-        stack_.copy(Field::d, Field::p);
-        stack_.copy(Field::e, Field::q);
-    }
+    const Field old = before == Before::increment ? Field::d : Field::p;
+    const Field oldImage = before == Before::increment ? Field::e : Field::q;
     double beta = 0.0;
     if (before != Before::none) {
-        double own = -stack_.dot(Field::p, Field::q);
-        double mixed = -stack_.dot(Field::z, Field::q);
-        for (const ContactSite& s : sites()) {
+        const auto product = stack_.dots(oldImage, old, Field::z);
+        double own = -product[0];
+        double mixed = -product[1];
+        for (ContactSite& s : active()) {
             const Vec3 resisted = s.resist(s.p);
+            s.z = gather(stack_.windows(), s, Field::z);
             own += glm::dot(s.p, resisted);
-            mixed += glm::dot(gather(stack_.windows(), s, Field::z), resisted);
+            mixed += glm::dot(s.z, resisted);
         }
         beta = own > 0.0 && std::isfinite(mixed / own) ? -mixed / own : 0.0;
+        for (ContactSite& s : active()) {
+            s.p = s.z + beta * s.p;
+        }
+    } else {
+        look(Field::z);
     }
-    stack_.scaleAdd(Field::z, beta, Field::p);
-    stack_.scaleAdd(Field::f, beta, Field::q);
-    look(Field::p);
+    stack_.combine(Field::z, beta, old, Field::p);
+    stack_.combine(Field::f, beta, oldImage, Field::q);
     return takeStep(Field::p, Field::q, result);
 }
 
-ElasticResult Elastic::relax(const ElasticLoad& load, int cycles, double tolerance) noexcept
+ElasticResult Elastic::relax(const ElasticLoad& all, int cycles, double tolerance) noexcept
 {
     ElasticResult result;
+    ElasticLoad load = all;
+    load.tools = load.tools.first(std::min(load.tools.size(), mostTools));
     multigrid_.clearContacts();
     result.moved = stack_.follow(load.focus, !atRest_);
-    meet(load);
+    meet(load, result.moved);
     if (!touched()) {
         settle();
         return result;
@@ -254,7 +312,9 @@ ElasticResult Elastic::relax(const ElasticLoad& load, int cycles, double toleran
         sinceRefresh_ = 0;
     }
     Before before = Before::none;
-    look(Field::d);
+    if (hasIncrement_) {
+        look(Field::d);
+    }
     if (hasIncrement_ && takeStep(Field::d, Field::e, result)) {
         before = Before::increment;
     } else {

@@ -67,7 +67,7 @@ private:
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
     void settle() noexcept;
-    void meet(const ElasticLoad& load) noexcept;
+    void meet(const ElasticLoad& load, bool moved) noexcept;
     bool touched() const noexcept;
     void refreshForces() noexcept;
     void refreshResidual() noexcept;
@@ -75,8 +75,10 @@ private:
     void look(Field direction) noexcept;
     double lineSearch(double slope, double curvature) const noexcept;
     double contactEnergy() const noexcept;
-    void go(double alpha, Field direction) noexcept;
+    bool sitesHold(const ElasticLoad& load, bool moved) noexcept;
+    void moveSites(double alpha) noexcept;
     bool takeStep(Field direction, Field image, ElasticResult& result) noexcept;
+    void keepStep(Field direction, Field image, double alpha) noexcept;
     bool oneCycle(Before before, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
     void measure(ElasticResult& result) const noexcept;
@@ -88,6 +90,8 @@ private:
     std::vector<ContactSite> sites_;
     std::size_t siteCount_ = 0;
     std::vector<occupancy::ShapeDistance> shapes_;
+    std::vector<occupancy::RoundCone> foundFor_;  // the tools when the sites were looked for
+    std::size_t tiesFound_ = 0;
     std::span<const Tie> ties_;
     double energy_ = 0;  // of the tissue [J]
     int sinceRefresh_ = 0;

@@ -229,15 +229,20 @@ double spectralRadius(const CellLevel& level)
             z[c * l.count + to] = inverse[to] == 0.0F ? 0.0F : random() % 2 != 0 ? 1.0F : -1.0F;
         }
     });
+    const auto norm = [&] {
+        std::array<double, 2> sums{};
+        k.dots(z.data(), z.data(), z.data(), 3 * l.count, sums.data());
+        return std::sqrt(sums[0]);
+    };
     double radius = 0.0;
     for (int i = 0; i < powerSteps; ++i) {
-        const double before = std::sqrt(k.dot(z.data(), z.data(), 3 * l.count));
+        const double before = norm();
         if (before <= 0.0) {
             break;
         }
         k.apply(l, {mu.data(), lambda.data()}, z.data(), az.data(), scratch.data());
         k.smoothFirst(static_cast<float>(1.0 / before), inverse.data(), az.data(), z.data(), l.count);
-        radius = std::sqrt(k.dot(z.data(), z.data(), 3 * l.count));
+        radius = norm();
     }
     return radius > 0.0 ? radius : 1.0;
 }

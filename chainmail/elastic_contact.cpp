@@ -12,7 +12,6 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
-constexpr double near = 0.3;      // spacings from the tool within which a point is looked at
 
 Vec3 componentsAt(const Window& w, std::size_t node, Field field) noexcept
 {
@@ -38,8 +37,8 @@ double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& t
 
 class Finder {
 public:
-    Finder(const ElasticBody& body, std::span<const Window> windows, std::span<ContactSite> out)
-        : body_(body), windows_(windows), out_(out)
+    Finder(const ElasticBody& body, std::span<const Window> windows, double near, std::span<ContactSite> out)
+        : body_(body), windows_(windows), near_(near), out_(out)
     {
     }
 
@@ -59,7 +58,7 @@ public:
     {
         const auto& grid = body_.levels.front().nodes;
         const auto& s = tool.shape;
-        const double radius = std::max(s.radiusA, s.radiusB) + (near + 1.0) * grid.spacing;
+        const double radius = std::max(s.radiusA, s.radiusB) + near_ + grid.spacing;
         const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.carried) - radius;
         const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.carried) + radius;
         // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
@@ -96,7 +95,7 @@ private:
         if (middle.level >= windows_.size()) {
             return false;
         }
-        return nearest(shape, middle.rest, gather(windows_, middle, Field::u)) < (near + 1.2) * grid.spacing;
+        return nearest(shape, middle.rest, gather(windows_, middle, Field::u)) < near_ + 1.2 * grid.spacing;
     }
 
     void addCell(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
@@ -109,7 +108,7 @@ private:
             site.rest = Vec3(point.position);
             site.owner = static_cast<std::uint16_t>(index);
             site.stiffness = siteStiffness(point, spacing, tool);
-            if (add(site) && nearest(shape, site.rest, site.u) > near * spacing) {
+            if (add(site) && nearest(shape, site.rest, site.u) > near_) {
                 --count_;
             }
         }
@@ -134,6 +133,7 @@ private:
 
     const ElasticBody& body_;
     std::span<const Window> windows_;
+    double near_;  // [m]
     std::span<ContactSite> out_;
     std::size_t count_ = 0;
 };
@@ -180,10 +180,9 @@ void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, 
         site.energy = 0.5 * glm::dot(site.force, stretch);
         return;
     }
-    const auto& shape = shapes[site.owner];
-    const Vec3 at = site.rest + site.u;
-    site.depth = -shape.distance(at);
-    site.normal = shape.gradient(at);
+    const auto at = shapes[site.owner].sample(site.rest + site.u);
+    site.depth = -at.distance;
+    site.normal = at.gradient;
     const double push = site.stiffness * std::max(site.depth, 0.0);
     site.force = push * site.normal;
     site.energy = 0.5 * push * site.depth;
@@ -213,9 +212,9 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
 }
 
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
-                      std::span<const occupancy::ShapeDistance> shapes, std::span<ContactSite> out) noexcept
+                      std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept
 {
-    Finder finder(body, windows, out);
+    Finder finder(body, windows, near, out);
     for (std::size_t i = 0; i < load.ties.size(); ++i) {
         finder.addTie(load.ties[i], i);
     }

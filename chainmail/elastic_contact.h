@@ -50,6 +50,7 @@ struct ContactSite {
 
     Vec3 u{0.0};        // its displacement [m]
     Vec3 p{0.0};        // and that of the search direction
+    Vec3 z{0.0};        // of the part of it that is new
     double depth = 0;   // of a surface point inside the tool [m]
     Vec3 normal{0.0};   // out of the tool there; of a tie, its axis
     Vec3 force{0.0};    // on the tissue [N]
@@ -78,11 +79,11 @@ struct Along {
 /// To first order in the tool's surface: depth falls by normal . p.
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
 
-/// Fills `out` with the ties and with the surface points that a tool may touch: those within a spacing of it, as the
-/// tissue lies now.
+/// Fills `out` with the ties and with the surface points that a tool may touch: those within `near` [m] of it, as the
+/// tissue lies now or as it would lie at rest.
 /// @returns  how many; more than out holds are left out
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
-                      std::span<const occupancy::ShapeDistance> shapes, std::span<ContactSite> out) noexcept;
+                      std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

@@ -34,6 +34,14 @@ struct CellStiffness {
     const float* lambda = nullptr;  // Lame's first parameter, times h / 32 [N/m]
 };
 
+/// The fields that a step of the solver moves.
+struct StepFields {
+    float* u = nullptr;
+    float* a = nullptr;
+    float* d = nullptr;
+    float* e = nullptr;
+};
+
 /// The arithmetic of the elastic level, compiled once per instruction set. All sets do the same operations in the same
 /// order, without fused multiply-add, so that their results agree to the bit.
 ///
@@ -64,11 +72,12 @@ struct Kernels {
     double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                           float* scratch) noexcept;
 
-    double (*dot)(const float* a, const float* b, std::size_t n) noexcept;
-    /// y += a x
-    void (*add)(float a, const float* x, float* y, std::size_t n) noexcept;
-    /// y = x + a y
-    void (*scaleAdd)(const float* x, float a, float* y, std::size_t n) noexcept;
+    /// sums[0] = x . a, sums[1] = x . b
+    void (*dots)(const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept;
+    /// out = x + a y; out may be x or y
+    void (*combine)(const float* x, float a, const float* y, float* out, std::size_t n) noexcept;
+    /// u += step p,  a += step q,  d = keep d + step p,  e = keep e + step q; p may be d and q may be e
+    void (*advance)(float step, const float* p, const float* q, float keep, const StepFields& to, std::size_t n) noexcept;
     /// z = weight * diagonal r, for each of three components
     void (*smoothFirst)(float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept;
     /// z += weight * diagonal (r - q), for each of three components

@@ -342,37 +342,45 @@ double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse,
 }
 
 // Sixteen partial sums at any width, flushed into doubles, so that every instruction set adds in the same order.
-double dot(const float* a, const float* b, std::size_t n) noexcept
+void dots(const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept
 {
     constexpr std::size_t vectors = Layout::lanes / W;
     constexpr std::size_t block = 64 * Layout::lanes;
-    double sum = 0.0;
+    sums[0] = sums[1] = 0.0;
     for (std::size_t start = 0; start < n; start += block) {
-        Lanes part[vectors] = {};
+        Lanes first[vectors] = {};
+        Lanes second[vectors] = {};
         const std::size_t stop = start + block < n ? start + block : n;
         for (std::size_t i = start; i < stop; i += Layout::lanes) {
             for (std::size_t v = 0; v < vectors; ++v) {
-                part[v] += load(a + i + v * W) * load(b + i + v * W);
+                const Lanes common = load(x + i + v * W);
+                first[v] += common * load(a + i + v * W);
+                second[v] += common * load(b + i + v * W);
             }
         }
-        for (const Lanes& p : part) {
-            sum += sumOf(p);
+        for (std::size_t v = 0; v < vectors; ++v) {
+            sums[0] += sumOf(first[v]);
+            sums[1] += sumOf(second[v]);
         }
     }
-    return sum;
 }
 
-void add(float a, const float* x, float* y, std::size_t n) noexcept
+void combine(const float* x, float a, const float* y, float* out, std::size_t n) noexcept
 {
     for (std::size_t i = 0; i < n; i += W) {
-        store(y + i, load(y + i) + a * load(x + i));
+        store(out + i, load(x + i) + a * load(y + i));
     }
 }
 
-void scaleAdd(const float* x, float a, float* y, std::size_t n) noexcept
+void advance(float step, const float* p, const float* q, float keep, const StepFields& to, std::size_t n) noexcept
 {
     for (std::size_t i = 0; i < n; i += W) {
-        store(y + i, load(x + i) + a * load(y + i));
+        const Lanes dp = step * load(p + i);
+        const Lanes dq = step * load(q + i);
+        store(to.u + i, load(to.u + i) + dp);
+        store(to.a + i, load(to.a + i) + dq);
+        store(to.d + i, keep * load(to.d + i) + dp);
+        store(to.e + i, keep * load(to.e + i) + dq);
     }
 }
 
@@ -447,7 +455,7 @@ void blend(const float* border, const float* x, float* y, std::size_t count) noe
 
 constexpr Kernels table(const char* name) noexcept
 {
-    return {name,   W,        apply, applyFinite, dot,    add,     scaleAdd, smoothFirst,
+    return {name,   W,        apply, applyFinite, dots,   combine, advance, smoothFirst,
             smooth, residual, blend, addMasked,   negate, average, hat};
 }
 

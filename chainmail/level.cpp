@@ -12,6 +12,8 @@ namespace {
 
 constexpr double tieStiffness = 8.0;     // of a held point, in E h: stiff beside the tissue, soft enough to converge fast
 constexpr float leastShown = 20e-6F;     // displacements below are not carried to the outer lattice [m]
+constexpr int nearNodes = 4;             // nodes to each side of the tool that every call writes
+constexpr int layersPerCall = 4;         // of the finest window, beside those
 constexpr int turnsPerCall = 128;        // nodes of the outer lattice per call and window
 constexpr std::size_t windowsShown = 3;  // the finest, and two by turns
 constexpr float leastVolume = 0.05F;     // of a cell that still counts as not inverted, share of its volume at rest
@@ -94,7 +96,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     const bool wasAtRest = elastic_.atRest();
     last_ = elastic_.relax(load(grip));
     if (!wasAtRest || !elastic_.atRest()) {
-        writeFinest();
+        writeFinest(grip.proxy);
     }
     for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
         writeByTurns(l);
@@ -121,12 +123,26 @@ Vec3f ElasticLevel::cellMean(const Window& window, Index3 cell) const noexcept
     return mean;
 }
 
-void ElasticLevel::writeFinest() noexcept
+// The finest window: around the tool in every call, elsewhere a few layers of nodes at a time.
+void ElasticLevel::writeFinest(Vec3 around) noexcept
 {
     const Window& window = elastic_.stack().windows().front();
     const auto& grid = shape_.lattice().grid;
     const Index3 low = glm::max(window.low, Index3(1));
     const Index3 high = glm::min(window.low + window.size() - 2, grid.size - 2);
+    const Index3 middle(glm::round((around - grid.origin) / grid.spacing));
+    writeBox(glm::clamp(middle - nearNodes, low, high), glm::clamp(middle + nearNodes, low, high));
+    int& layer = turns_.front().z;
+    layer = layer < low.z || layer > high.z ? low.z : layer;
+    const int last = std::min(layer + layersPerCall - 1, high.z);
+    writeBox({low.x, low.y, layer}, {high.x, high.y, last});
+    layer = last + 1;
+}
+
+void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
+{
+    const Window& window = elastic_.stack().windows().front();
+    const auto& grid = shape_.lattice().grid;
     const auto u = shape_.raw();
     std::size_t i = 0;
     volume::forEachIndex(low, high, [&](Index3 at) {
@@ -141,7 +157,7 @@ void ElasticLevel::writeFinest() noexcept
             u[grid.offset(at)] = old + share * (now_[i] - old);
             ++i;
         });
-        if (keepsOrientation(low, high)) {
+        if (keepsOrientation(glm::max(low - 1, Index3(1)), glm::min(high + 1, grid.size - 2))) {
             break;
         }
     }

@@ -60,8 +60,8 @@ private:
 
 /// Level 2: elastic equilibrium on nested windows; forces of a pressing tool come from its energy.
 ///
-/// The lattice gets the windows' displacement at the middles of their cells: in every call where the finest window is, and
-/// by turns, a fixed number of nodes per call, further out. Tissue that would turn inside out keeps the shape it had:
+/// The lattice gets the windows' displacement at the middles of their cells: around the tool in every call, further out by
+/// turns, a fixed number of nodes per call. Tissue that would turn inside out keeps the shape it had:
 /// the lattice goes towards the windows' shape only as far as every cell keeps its orientation.
 class ElasticLevel {
 public:
@@ -74,7 +74,8 @@ public:
 private:
     ElasticLoad load(const Grip& grip) noexcept;
     Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
-    void writeFinest() noexcept;
+    void writeFinest(Vec3 around) noexcept;
+    void writeBox(Index3 low, Index3 high) noexcept;
     void write(Node n) noexcept;
     void writeByTurns(std::size_t level) noexcept;
     void revisitMoved() noexcept;
@@ -87,7 +88,7 @@ private:
     Elastic elastic_;
     ElasticTool tool_;
     Tie tie_;
-    std::vector<Vec3f> before_;  // the finest window's nodes in the last call, and now
+    std::vector<Vec3f> before_;  // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;
     std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
     std::vector<Index3> turns_;           // by level: where its turn is

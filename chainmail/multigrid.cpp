@@ -100,13 +100,13 @@ void Multigrid::operate(std::size_t level) noexcept
     }
 }
 
-// The smoother's step at nodes with contacts: z += (D / weight + B)^-1 (f - t), t = 0 in the first.
+// The smoother's step at nodes with contacts: z += (D / weight + B)^-1 (r - t), t = 0 in the first.
 void Multigrid::smoothContacts(std::size_t level, bool first) noexcept
 {
     Window& w = stack_[level];
     for (const Block& b : blocks_[level]) {
         if (b.diagonal > 0.0F) {
-            const Vec3 off = valueAt(w, b.node, Field::f) - (first ? Vec3(0.0) : valueAt(w, b.node, Field::t));
+            const Vec3 off = valueAt(w, b.node, Field::r) - (first ? Vec3(0.0) : valueAt(w, b.node, Field::t));
             addAt(w, b.node, Field::z, b.inverse * off);
         }
     }
@@ -124,10 +124,10 @@ void Multigrid::solveCoarsest() noexcept
         const double angle = std::numbers::pi * (order[static_cast<std::size_t>(s)] + 0.5) / coarsestSteps;
         const float weight = static_cast<float>(1.0 / (0.5 * (high + low) + 0.5 * (high - low) * std::cos(angle)));
         if (s == 0) {
-            k.smoothFirst(weight, w.diagonal.data(), w.field(Field::f), w.field(Field::z), w.layout.count);
+            k.smoothFirst(weight, w.diagonal.data(), w.field(Field::r), w.field(Field::z), w.layout.count);
         } else {
             operate(stack_.size() - 1);
-            k.smooth(weight, w.diagonal.data(), w.field(Field::f), w.field(Field::t), w.field(Field::z), w.layout.count);
+            k.smooth(weight, w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::z), w.layout.count);
         }
         smoothContacts(stack_.size() - 1, s == 0);
     }
@@ -137,27 +137,23 @@ void Multigrid::cycle(std::size_t level) noexcept
 {
     Window& w = stack_[level];
     const Kernels& k = stack_.kernels();
-    if (level == 0) {
-        k.smoothFirst(1.0F, w.dof.data(), w.field(Field::r), w.field(Field::f), w.layout.count);
-    }
     if (level + 1 == stack_.size()) {
         solveCoarsest();
         return;
     }
-    k.smoothFirst(w.weight, w.diagonal.data(), w.field(Field::f), w.field(Field::z), w.layout.count);
+    k.smoothFirst(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::z), w.layout.count);
     smoothContacts(level, true);
     operate(level);
-    k.residual(w.open.data(), w.field(Field::f), w.field(Field::t), w.field(Field::t), w.layout.count);
+    k.residual(w.open.data(), w.field(Field::r), w.field(Field::t), w.field(Field::t), w.layout.count);
 
     Window& coarse = stack_[level + 1];
-    k.smoothFirst(1.0F, coarse.dof.data(), coarse.field(Field::r), coarse.field(Field::f), coarse.layout.count);
-    restrictAdd(k, w, w.field(Field::t), coarse, coarse.field(Field::f), stack_.scratch());
+    restrictAdd(k, w, w.field(Field::t), coarse, coarse.field(Field::r), stack_.scratch());
     cycle(level + 1);
 
     prolong(k, coarse, coarse.field(Field::z), w, w.field(Field::t));
     k.addMasked(w.open.data(), w.field(Field::t), w.field(Field::z), w.layout.count);
     operate(level);
-    k.smooth(w.weight, w.diagonal.data(), w.field(Field::f), w.field(Field::t), w.field(Field::z), w.layout.count);
+    k.smooth(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::z), w.layout.count);
     smoothContacts(level, false);
 }
 

@@ -24,7 +24,7 @@ public:
     /// Takes the contacts to the coarser levels and prepares their smoothers: after the last addContact().
     void prepare() noexcept;
 
-    /// z = M^-1 r.
+    /// z = M^-1 r. What r holds on the coarser windows is used up.
     void solve() noexcept { cycle(0); }
 
 private:

@@ -182,26 +182,31 @@ void WindowStack::addForce(std::size_t level, std::size_t node, Vec3 force) noex
     volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { addForce(level + 1, coarse.at(parent), share * force); });
 }
 
-double WindowStack::dot(Field a, Field b) const noexcept
+std::array<double, 2> WindowStack::dots(Field x, Field a, Field b) const noexcept
 {
-    double sum = 0.0;
+    std::array<double, 2> sum{};
     for (const Window& w : windows_) {
-        sum += kernels_->dot(w.field(a), w.field(b), 3 * w.layout.count);
+        std::array<double, 2> part{};
+        kernels_->dots(w.field(x), w.field(a), w.field(b), 3 * w.layout.count, part.data());
+        sum[0] += part[0];
+        sum[1] += part[1];
     }
     return sum;
 }
 
-void WindowStack::add(double a, Field x, Field y) noexcept
+void WindowStack::combine(Field x, double a, Field y, Field out) noexcept
 {
     for (Window& w : windows_) {
-        kernels_->add(static_cast<float>(a), w.field(x), w.field(y), 3 * w.layout.count);
+        kernels_->combine(w.field(x), static_cast<float>(a), w.field(y), w.field(out), 3 * w.layout.count);
     }
 }
 
-void WindowStack::scaleAdd(Field x, double a, Field y) noexcept
+void WindowStack::advance(double step, Field p, Field q, double keep) noexcept
 {
     for (Window& w : windows_) {
-        kernels_->scaleAdd(w.field(x), static_cast<float>(a), w.field(y), 3 * w.layout.count);
+        const StepFields to{w.field(Field::u), w.field(Field::a), w.field(Field::d), w.field(Field::e)};
+        kernels_->advance(static_cast<float>(step), w.field(p), w.field(q), static_cast<float>(keep), to,
+                          3 * w.layout.count);
     }
 }
 

@@ -2,6 +2,7 @@
 
 #include <chainmail/window.h>
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -50,12 +51,13 @@ public:
     /// Adds a force at a node: to the residual of a degree of freedom; at a border node, to those it follows.
     void addForce(std::size_t level, std::size_t node, Vec3 force) noexcept;
 
-    /// Over the degrees of freedom, where one of both is zero elsewhere.
-    double dot(Field a, Field b) const noexcept;
-    /// y += a x
-    void add(double a, Field x, Field y) noexcept;
-    /// y = x + a y
-    void scaleAdd(Field x, double a, Field y) noexcept;
+    /// { x . a, x . b }, over the degrees of freedom where a and b are zero elsewhere.
+    std::array<double, 2> dots(Field x, Field a, Field b) const noexcept;
+    double dot(Field x, Field a) const noexcept { return dots(x, a, a)[0]; }
+    /// out = x + a y
+    void combine(Field x, double a, Field y, Field out) noexcept;
+    /// u += step p and a += step q; d = keep d + step p and e = keep e + step q.
+    void advance(double step, Field p, Field q, double keep) noexcept;
     void copy(Field x, Field y) noexcept;
     void clear(Field field) noexcept;
 

@@ -88,13 +88,15 @@ TrialResult chainMailTrial(const Lattice& lattice, const TrialPath& path, double
 
 std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volume::DistanceField& surface,
                                        const TrialBody& fine, const TrialPath& path, double speed,
-                                       const Reference& reference, double poissonCap, int mostCycles)
+                                       const Reference& reference, const datasets::ElasticSettings& settings,
+                                       int mostCycles)
 {
     constexpr int coarsest = 4;
     constexpr int mostFineCycles = 2;
+    const bool finite = settings.strain == datasets::Strain::finite;
     std::vector<RivalRun> runs;
     const auto run = [&](const ElasticBody& body, int coarsening, int cycles) {
-        Elastic elastic(body, wholeGrid(cycles, false), TrialLoad(path).load().focus);
+        Elastic elastic(body, wholeGrid(cycles, finite), TrialLoad(path).load().focus);
         runs.push_back({coarsening, cycles, elastic.nodes(), runTrial(elasticModel(elastic), path, speed, reference)});
     };
     for (int cycles = 1; cycles <= std::min(mostCycles, mostFineCycles); ++cycles) {
@@ -102,7 +104,7 @@ std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volum
     }
     for (int coarsening = 2; coarsening <= coarsest; ++coarsening) {
         const TrialBody coarse =
-            trialBody(tissue, surface, coarsening * fine.cells.spacing, poissonCap, fine.cells.count());
+            trialBody(tissue, surface, coarsening * fine.cells.spacing, settings.poissonCap, fine.cells.count());
         for (int cycles = 1; cycles <= mostCycles; ++cycles) {
             run(coarse.body, coarsening, cycles);
         }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chainmail/deformation.h>
+#include <datasets/scene.h>
 #include <experiments/kernel_trial.h>
 
 namespace palpate::experiments {
@@ -32,10 +33,11 @@ struct RivalRun {
 };
 
 /// Whole grids of 2, 3 and 4 times the spacing, 1 to `mostCycles` cycles per tick, against the reference on the fine one;
-/// and the fine one itself, with 1 and 2 cycles.
+/// and the fine one itself, with 1 and 2 cycles. Strain and the bound of Poisson's ratio are those of `settings`.
 std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volume::DistanceField& surface,
                                        const TrialBody& fine, const TrialPath& path, double speed,
-                                       const Reference& reference, double poissonCap, int mostCycles);
+                                       const Reference& reference, const datasets::ElasticSettings& settings,
+                                       int mostCycles);
 
 /// Time of the fastest run whose median error in `figure` is not over `error`, in units of `seconds`; 0 when none is.
 double ratioAtEqualError(std::span<const RivalRun> runs, double TrialErrors::*figure, double error, double seconds);

@@ -17,7 +17,7 @@ using namespace chainmail;
 
 namespace {
 
-constexpr int wholeWindow = 1023;   // nodes along each side: more than any level has
+constexpr int wholeWindow = 1023;        // nodes along each side: more than any level has
 constexpr double tolerance = 3e-5;       // of a reference, share of the contacts' forces
 constexpr int mostCycles = 200;          // of a reference
 constexpr double nearField = 30e-3;      // [m]
@@ -109,7 +109,9 @@ double shareLeft(const Elastic& elastic, const ElasticResult& result)
 double converge(Elastic& elastic, const ElasticLoad& load, bool fromRest, ElasticResult& result)
 {
     if (fromRest) {
-        elastic.relax({.focus = load.focus}, 0, 0.0);
+        ElasticLoad none;
+        none.focus = load.focus;
+        elastic.relax(none, 0, 0.0);
     }
     result = elastic.relax(load, mostCycles, tolerance);
     return shareLeft(elastic, result);

@@ -39,7 +39,8 @@ MachineRates machineRates(const char* name)
 {
     constexpr int passes = 20;
     static constexpr std::array<const RateLoops*, 3> sets{&ratesV2, &ratesAvx2, &ratesAvx512};
-    const auto* const found = std::ranges::find_if(sets, [&](const RateLoops* s) { return std::string_view(s->name) == name; });
+    const auto* const found =
+        std::ranges::find_if(sets, [&](const RateLoops* s) { return std::string_view(s->name) == name; });
     if (found == sets.end()) {
         throw std::runtime_error(fmt::format("instruction set '{}': its rates cannot be measured", name));
     }

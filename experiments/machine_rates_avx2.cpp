@@ -5,6 +5,6 @@
 
 namespace palpate::experiments {
 
-const RateLoops ratesavx2 = table("AVX2");
+const RateLoops ratesAvx2 = table("AVX2");
 
 }  // namespace palpate::experiments

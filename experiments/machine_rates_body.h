@@ -4,13 +4,15 @@
 #include <experiments/machine_rates.h>
 
 #include <cstring>
+#include <utility>
 
 namespace palpate::experiments {
 
 namespace {
 
 constexpr int W = PALPATE_LANES;
-constexpr int chains = 12;  // independent of each other: more than latency times units of any machine, fewer than registers
+constexpr std::size_t chains =
+    12;  // independent of each other: more than latency times units of any machine, fewer than registers
 using Lanes = float __attribute__((vector_size(4 * W)));
 
 // Keeps the compiler from knowing the value.
@@ -19,23 +21,26 @@ inline void hide(Lanes& v) noexcept
     asm volatile("" : "+x"(v));
 }
 
-template <int Additions>
+// The first `Additions` chains add, the others multiply.
+template <std::size_t Additions, std::size_t... Chain>
+double arithmeticOf(int rounds, std::index_sequence<Chain...>) noexcept
+{
+    Lanes one = Lanes{} + 1.0F;
+    hide(one);
+    // The compiler must not see that the chains are alike.
+    Lanes value[] = {(static_cast<void>(Chain), one)...};
+    (hide(value[Chain]), ...);
+    for (int i = 0; i < rounds; ++i) {
+        ((value[Chain] = Chain < Additions ? value[Chain] + one : value[Chain] * one), ...);
+    }
+    (hide(value[Chain]), ...);
+    return static_cast<double>(rounds) * sizeof...(Chain) * W;
+}
+
+template <std::size_t Additions>
 double arithmetic(int rounds) noexcept
 {
-    Lanes value[chains];
-    Lanes one = Lanes{} + 1.0F;
-    for (Lanes& v : value) {
-        v = one;
-    }
-    hide(one);
-    for (int i = 0; i < rounds; ++i) {
-#pragma GCC unroll 12
-        for (int c = 0; c < chains; ++c) {
-            value[c] = c < Additions ? value[c] + one : value[c] * one;
-            hide(value[c]);
-        }
-    }
-    return static_cast<double>(rounds) * chains * W;
+    return arithmeticOf<Additions>(rounds, std::make_index_sequence<chains>());
 }
 
 double copy(const float* from, float* to, std::size_t n) noexcept

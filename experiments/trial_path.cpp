@@ -148,7 +148,7 @@ void TrialLoad::set(TrialPose pose) noexcept
         tie.u = way;
     }
     if (!ties_.empty()) {
-        load_.focus = 0.5 * (ties_.front().rest + ties_.back().rest);
+        load_.focus = chainmail::focusAt(*path_.surface, 0.5 * (ties_.front().rest + ties_.back().rest));
         return;
     }
     const Vec3 at = path_.start + way;
@@ -157,7 +157,8 @@ void TrialLoad::set(TrialPose pose) noexcept
     tool_.carried = way;
     // The point of the surface at rest that is nearest to the tool's foremost one.
     const Vec3 foremost = at + radius * path_.inward;
-    load_.focus = chainmail::focusAt(*path_.surface, foremost - path_.surface->distance(foremost) * path_.surface->normal(foremost));
+    load_.focus =
+        chainmail::focusAt(*path_.surface, foremost - path_.surface->distance(foremost) * path_.surface->normal(foremost));
 }
 
 }  // namespace palpate::experiments

@@ -65,15 +65,23 @@ public:
     }
 
     /// Unit vector along which distance() grows by 1 per metre. Where many do, on the axis, it is one of them.
-    Vec3 gradient(Vec3 p) const noexcept
+    Vec3 gradient(Vec3 p) const noexcept { return sample(p).gradient; }
+
+    /// Both at once.
+    struct Sample {
+        double distance = 0;  // [m]
+        Vec3 gradient{0.0};
+    };
+    Sample sample(Vec3 p) const noexcept
     {
-        const Vec3 away = nearest(p).away;
-        const double length = glm::length(away);
-        constexpr double onAxis = 1e-12;  // nearer, rounding gives the direction [m]
-        return length > onAxis ? away / length : fromAxis();
+        const Nearest n = nearest(p);
+        const double length = glm::length(n.away);
+        return {length - n.radius, length > onAxis ? n.away / length : fromAxis()};
     }
 
 private:
+    static constexpr double onAxis = 1e-12;  // nearer, rounding gives the direction [m]
+
     // The sphere that comes nearest, and the way from its middle to the point.
     struct Nearest {
         Vec3 away;

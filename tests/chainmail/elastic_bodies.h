@@ -37,12 +37,10 @@ inline ElasticBlock heldBlock(Index3 cells, double spacing, double youngsModulus
     return {cells, spacing, [=](Index3 c) { return tissue(youngsModulus, poissonRatio, c.y == last); }, 1, Vec3(0.0)};
 }
 
-/// The same material everywhere; a layer of cells all around is fixed.
-inline ElasticBlock shell(int cells, double spacing, double youngsModulus, double poissonRatio, int air)
+/// The same material everywhere; `layer` cells all around are fixed.
+inline ElasticBlock shell(int cells, int layer, double spacing, double youngsModulus, double poissonRatio, int air)
 {
-    const auto inside = [=](Index3 c) {
-        return c.x > 0 && c.y > 0 && c.z > 0 && c.x + 1 < cells && c.y + 1 < cells && c.z + 1 < cells;
-    };
+    const auto inside = [=](Index3 c) { return c == glm::clamp(c, Index3(layer), Index3(cells - 1 - layer)); };
     return {Index3(cells), spacing, [=](Index3 c) { return tissue(youngsModulus, poissonRatio, !inside(c)); }, air,
             Vec3(0.0)};
 }
@@ -77,10 +75,16 @@ inline chainmail::ElasticBody bodyOf(const ElasticBlock& block, double poissonCa
     return chainmail::elasticBody(grid, std::move(materials), surface, poissonCap);
 }
 
-/// The windows' middle at a point [m].
-inline Vec3 focusAt(Vec3 point)
+/// Windows around a point [m].
+inline chainmail::Focus focusAt(Vec3 point)
 {
-    return point;
+    return {point};
+}
+
+/// Windows around a point near the top of a block: y is the way in.
+inline chainmail::Focus focusUnder(Vec3 point)
+{
+    return {point, Vec3(0.0, 1.0, 0.0), std::max(0.0, point.y)};
 }
 
 /// Displacement of a node in a window, and where it is at rest.
@@ -127,29 +131,32 @@ inline void randomise(chainmail::WindowStack& stack, chainmail::Field field, std
     });
 }
 
-/// Conjugate gradients with one multigrid cycle each: adds A^-1 r to u, r as it lies in Field::r.
+/// Conjugate gradients with one multigrid cycle each: adds A^-1 r to u, r as it lies in Field::r. The cycle spoils r: the
+/// residual is kept in Field::a.
 /// @returns  cycles until the residual has fallen to `tolerance` of what it was, at most `most`
 inline int solve(chainmail::WindowStack& stack, chainmail::Multigrid& multigrid, double tolerance, int most)
 {
     using chainmail::Field;
-    const double first = stack.dot(Field::r, Field::r);
+    stack.copy(Field::r, Field::a);
+    const double first = stack.dot(Field::a, Field::a);
     double before = 1.0;
     for (int i = 0; i < most; ++i) {
-        if (stack.dot(Field::r, Field::r) <= tolerance * tolerance * first) {
+        if (stack.dot(Field::a, Field::a) <= tolerance * tolerance * first) {
             return i;
         }
+        stack.copy(Field::a, Field::r);
         multigrid.solve();
-        const double now = stack.dot(Field::r, Field::z);
+        const double now = stack.dot(Field::z, Field::a);
         if (i == 0) {
             stack.copy(Field::z, Field::p);
         } else {
-            stack.scaleAdd(Field::z, now / before, Field::p);
+            stack.combine(Field::z, now / before, Field::p, Field::p);
         }
         before = now;
         stack.apply(Field::p, Field::q);
         const double alpha = -now / stack.dot(Field::p, Field::q);
-        stack.add(alpha, Field::p, Field::u);
-        stack.add(alpha, Field::q, Field::r);
+        stack.combine(Field::u, alpha, Field::p, Field::u);
+        stack.combine(Field::a, alpha, Field::q, Field::a);
     }
     return most;
 }
@@ -176,7 +183,7 @@ inline chainmail::ElasticResult settle(chainmail::Elastic& elastic, const chainm
 inline chainmail::ElasticLoad loadOf(std::span<const chainmail::ElasticTool> tools, std::span<const chainmail::Tie> ties,
                                      Vec3 focus)
 {
-    return {tools, ties, focusAt(focus)};
+    return {tools, ties, focusUnder(focus)};
 }
 
 }  // namespace palpate::tests

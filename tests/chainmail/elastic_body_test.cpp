@@ -74,7 +74,7 @@ TEST(ElasticBody, CoarseCellsLieBetweenTheBoundsOfReussAndVoigt)
 // Where all is the same, it stays the same at every level.
 TEST(ElasticBody, HomogeneousTissueIsTheSameAtEveryLevel)
 {
-    const ElasticBody body = tests::bodyOf(tests::shell(32, 1e-3, 1e4, 0.45, 8));
+    const ElasticBody body = tests::bodyOf(tests::shell(32, 1, 1e-3, 1e4, 0.45, 8));
     for (const CellLevel& level : body.levels) {
         const Index3 middle = level.nodes.size / 2;
         const std::size_t at = level.nodes.offset(middle);

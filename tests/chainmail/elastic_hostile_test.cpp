@@ -100,11 +100,13 @@ void push(const ElasticBody& body, Vec3 size, bool finiteStrain, int pushes)
     Elastic elastic(body, options, tests::focusAt(0.5 * size));
     HostileHand hand(size);
     int contacts = 0;
+    double peak = 0.0;  // of the energy since the body was at rest: its sums are rounded to that
     for (int i = 0; i < pushes; ++i) {
         hand.next();
         const auto load = hand.load();
         auto result = elastic.relax(load);
         contacts += result.contacts > 0 ? 1 : 0;
+        peak = elastic.atRest() ? 0.0 : std::max(peak, result.energy);
         ASSERT_TRUE(std::isfinite(result.energy) && std::isfinite(result.depth)) << "push " << i;
         for (std::size_t t = 0; t < hand.tools(); ++t) {
             ASSERT_TRUE(isFinite(elastic.toolForce(t))) << "push " << i;
@@ -113,11 +115,10 @@ void push(const ElasticBody& body, Vec3 size, bool finiteStrain, int pushes)
             ASSERT_TRUE(isFinite(elastic.tieForce(t))) << "push " << i;
         }
         const int repeats = hand.random() % 10 == 0 ? 4 : 0;
-        const double first = result.energy;
         for (int again = 0; again < repeats; ++again) {
             const double before = result.energy;
             result = elastic.relax(load);
-            ASSERT_LE(result.energy, before + 1e-5 * (first + before)) << "push " << i << ", again " << again;
+            ASSERT_LE(result.energy, before + 1e-5 * peak) << "push " << i << ", again " << again;
         }
         if (i % 100 == 0) {
             ASSERT_TRUE(allFinite(elastic)) << "push " << i;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cstring>
 #include <vector>
 
@@ -87,21 +88,28 @@ TEST(ElasticSets, ApplyFiniteGivesTheSameEnergy)
     }
 }
 
-// And it is the sum, to the rounding of products in single precision.
-TEST(ElasticSets, DotGivesTheSameBits)
+// Two sums at a time, each to the rounding of products in single precision.
+TEST(ElasticSets, DotsGiveTheSameBits)
 {
     std::minstd_rand random(4);
     for (std::size_t n = Layout::lanes; n < 20000; n = 3 * n + Layout::lanes) {
-        const Floats a = randomFloats(n, random);
-        const Floats b = randomFloats(n, random);
-        const double first = supportedKernels().front()->dot(a.data(), b.data(), n);
-        double sum = 0.0;
-        for (std::size_t i = 0; i < n; ++i) {
-            sum += static_cast<double>(a[i]) * static_cast<double>(b[i]);
+        const Floats x = randomFloats(n, random);
+        const std::array both{randomFloats(n, random), randomFloats(n, random)};
+        const auto dots = [&](const Kernels& k) {
+            std::array<double, 2> sums{};
+            k.dots(x.data(), both[0].data(), both[1].data(), n, sums.data());
+            return sums;
+        };
+        const auto first = dots(*supportedKernels().front());
+        for (std::size_t s = 0; s < 2; ++s) {
+            double sum = 0.0;
+            for (std::size_t i = 0; i < n; ++i) {
+                sum += static_cast<double>(x[i]) * static_cast<double>(both[s][i]);
+            }
+            EXPECT_NEAR(first[s], sum, 1e-6 * static_cast<double>(n));
         }
-        EXPECT_NEAR(first, sum, 1e-6 * static_cast<double>(n));
         for (const Kernels* k : supportedKernels()) {
-            EXPECT_EQ(k->dot(a.data(), b.data(), n), first) << k->name;
+            EXPECT_EQ(dots(*k), first) << k->name;
         }
     }
 }
@@ -148,14 +156,46 @@ TEST(ElasticSets, VectorSumsAreElementByElement)
     Entry e;
     const std::size_t n = 3 * Entry::count;
     const float s = 0.37F;
-    e.expect([&](const Kernels& k, float* y) { k.add(s, e.a(), y, n); },
-             [&](std::size_t i, float y) { return y + s * e.a()[i]; });
-    e.expect([&](const Kernels& k, float* y) { k.scaleAdd(e.a(), s, y, n); },
+    e.expect([&](const Kernels& k, float* y) { k.combine(e.a(), s, y, y, n); },
              [&](std::size_t i, float y) { return e.a()[i] + s * y; });
+    e.expect([&](const Kernels& k, float* y) { k.combine(y, s, e.a(), y, n); },
+             [&](std::size_t i, float y) { return y + s * e.a()[i]; });
     e.expect([&](const Kernels& k, float* y) { k.average(e.a(), e.b(), y, n); },
              [&](std::size_t i, float) { return 0.5F * (e.a()[i] + e.b()[i]); });
     e.expect([&](const Kernels& k, float* y) { k.hat(e.a(), e.b(), e.c(), y, n); },
              [&](std::size_t i, float) { return e.b()[i] + 0.5F * (e.a()[i] + e.c()[i]); });
+}
+
+// The four fields of a step, each in turn as the one looked at; p may be d itself, and q may be e.
+TEST(ElasticSets, AdvanceMovesFourFieldsElementByElement)
+{
+    Entry e;
+    const std::size_t n = 3 * Entry::count;
+    const float step = 0.37F;
+    const float keep = -0.8F;
+    for (int looked = 0; looked < 4; ++looked) {
+        e.expect(
+            [&](const Kernels& k, float* y) {
+                std::array<Floats, 4> own;
+                StepFields to;
+                const std::array<float**, 4> slots{&to.u, &to.a, &to.d, &to.e};
+                for (std::size_t f = 0; f < 4; ++f) {
+                    own[f] = Floats(n);
+                    *slots[f] = static_cast<int>(f) == looked ? y : own[f].data();
+                }
+                k.advance(step, e.a(), e.b(), keep, to, n);
+            },
+            [&](std::size_t i, float y) {
+                const float by = step * (looked % 2 == 0 ? e.a()[i] : e.b()[i]);
+                return (looked < 2 ? y : keep * y) + by;
+            });
+    }
+    e.expect(
+        [&](const Kernels& k, float* y) {
+            Floats u(n), a(n), last(e.b(), e.b() + n);
+            k.advance(step, y, last.data(), keep, {u.data(), a.data(), y, last.data()}, n);
+        },
+        [&](std::size_t, float y) { return keep * y + step * y; });
 }
 
 TEST(ElasticSets, SmoothersAreElementByElement)

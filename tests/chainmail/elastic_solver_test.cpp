@@ -39,7 +39,7 @@ TEST(Elastic, LoadsOfTiesSuperpose)
     const Vec3 b(17.5e-3, 6e-3, 15.1e-3);
     const std::array<Vec3, 3> probes{a, b, {14e-3, 9e-3, 13e-3}};
     const auto solved = [&](Vec3 ua, Vec3 ub) {
-        Elastic elastic(block, {}, tests::focusAt(top));
+        Elastic elastic(block, {}, tests::focusUnder(top));
         const std::array<Tie, 2> ties{tieAt(a, ua), tieAt(b, ub)};
         tests::settle(elastic, tests::loadOf({}, ties, top), 1e-6);
         std::array<Vec3, 5> out;
@@ -70,7 +70,7 @@ TEST(Elastic, EnergyNeverRisesWhileTheLoadStays)
     for (const bool finite : {false, true}) {
         ElasticOptions options;
         options.finiteStrain = finite;
-        Elastic elastic(block, options, tests::focusAt(top));
+        Elastic elastic(block, options, tests::focusUnder(top));
         for (int load = 0; load < 12; ++load) {
             const std::array tools{pressed(2.5e-3 + 2e-3 * unit(random), 5e-3 * Vec3(unit(random), 0.0, unit(random)))};
             const std::array ties{tieAt(top + 4e-3 * Vec3(unit(random), 1.2, unit(random)),
@@ -92,7 +92,7 @@ TEST(Elastic, EnergyNeverRisesWhileTheLoadStays)
 TEST(Elastic, UnloadedBodyIsExactlyAtRest)
 {
     const ElasticBody block = body();
-    Elastic elastic(block, {}, tests::focusAt(top));
+    Elastic elastic(block, {}, tests::focusUnder(top));
     const std::array ties{tieAt(top + Vec3(0.0, 4e-3, 0.0), Vec3(1e-3))};
     for (int i = 0; i < 20; ++i) {
         const std::array tools{pressed(0.2e-3 * i, Vec3(0.3e-3 * i, 0.0, 0.0))};
@@ -124,7 +124,7 @@ TEST(Elastic, ReactionIsTheDerivativeOfTheConvergedEnergy)
         Vec3 way(0.0);
         way[axis] = step;
         const auto solved = [&](Vec3 ball, Vec3 tie) {
-            Elastic elastic(block, {}, tests::focusAt(top));
+            Elastic elastic(block, {}, tests::focusUnder(top));
             const std::array tools{pressed(2.5e-3, Vec3(-2e-3, 0.0, 1e-3) + ball)};
             const std::array ties{tieAt(top + Vec3(4e-3, 3.5e-3, 2e-3), Vec3(1e-3, -0.5e-3, 2e-3) + tie)};
             const auto result = tests::settle(elastic, tests::loadOf(tools, ties, top), 1e-6);
@@ -144,7 +144,7 @@ TEST(Elastic, ActionEqualsReaction)
     const ElasticBody block = body();
     ElasticOptions whole;
     whole.window = 65;
-    Elastic elastic(block, whole, tests::focusAt(top));
+    Elastic elastic(block, whole, tests::focusUnder(top));
     const std::array tools{pressed(2.5e-3, Vec3(-3e-3, 0.0, 0.0)), pressed(1.5e-3, Vec3(6e-3, 0.0, 2e-3))};
     const std::array ties{tieAt(top + Vec3(0.0, 5e-3, -5e-3), Vec3(2e-3, 1e-3, 0.0))};
     tests::settle(elastic, tests::loadOf(tools, ties, top), 1e-6);
@@ -167,7 +167,7 @@ TEST(Elastic, ActionEqualsReaction)
 TEST(Elastic, WorkOfAllToolsAndTiesIsTheEnergy)
 {
     const ElasticBody block = body();
-    Elastic elastic(block, {}, tests::focusAt(top));
+    Elastic elastic(block, {}, tests::focusUnder(top));
     const Vec3 wayA(0.0, 2e-3, 0.0);
     const Vec3 wayB(1e-3, 1.5e-3, 0.5e-3);
     const Vec3 wayTie(1e-3, -1e-3, 2e-3);
@@ -200,7 +200,7 @@ TEST(Elastic, RelaxAllocatesNothing)
         ElasticOptions options;
         options.window = 11;
         options.finiteStrain = finite;
-        Elastic elastic(block, options, tests::focusAt(top));
+        Elastic elastic(block, options, tests::focusUnder(top));
         std::array tools{pressed(1e-3), pressed(0.5e-3)};
         const std::array ties{tieAt(top + Vec3(0.0, 4e-3, 0.0), Vec3(1e-3))};
         bool moved = false;

@@ -1,0 +1,244 @@
+#include <experiments/planner.h>
+
+#include <experiments/kernel_rivals.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <map>
+
+namespace palpate::experiments {
+
+using datasets::ElasticSettings;
+using datasets::ModelLevel;
+using datasets::Strain;
+
+namespace {
+
+// The ladder. Windows fill whole vectors: a row of 15 or 31 nodes takes as long as one of 16 or 32.
+constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
+constexpr std::array windows{9, 15, 21, 31};
+constexpr std::array cycles{1, 2, 3};
+constexpr std::size_t mostNodes = 1U << 20;      // of the reference: half a minute
+constexpr std::size_t mostWindowNodes = 300000;  // no budget under 5 ms pays for more
+constexpr double typicalTouched = 300;           // contact points, before they are counted
+constexpr double typicalMoved = 500;
+
+TrialTool sceneTool(const datasets::ToolSpec& tool)
+{
+    switch (tool.kind) {
+        case datasets::ToolKind::sphere:
+            return {"sphere", TrialKind::sphere, tool.radius, 0.0};
+        case datasets::ToolKind::capsule:
+            return {"capsule", TrialKind::capsule, tool.radius, tool.length};
+        default:
+            return {"needle", TrialKind::needle, 0.0, 0.0};
+    }
+}
+
+class Planner {
+public:
+    Planner(const haptics::SessionModel& model, const PlanRequest& request,
+            const std::function<void(const std::string&)>& progress)
+        : model_(model),
+          request_(request),
+          progress_(progress),
+          place_(trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim))
+    {
+    }
+
+    Plan run()
+    {
+        solve();
+        collect();
+        std::ranges::stable_sort(plan_.candidates, {}, &PlanCandidate::microseconds);
+        for (std::size_t i = 0; i < plan_.candidates.size() && !plan_.choice; ++i) {
+            PlanCandidate& c = plan_.candidates[i];
+            progress_(fmt::format("{} of {}: {}", i + 1, plan_.candidates.size(), c.name()));
+            attempt(c);
+            if (c.holdsError && c.holdsBudget) {
+                plan_.choice = i;
+            }
+        }
+        // The counts of a push may have moved one behind another; the order that is shown is that of the time.
+        findNearest();
+        return std::move(plan_);
+    }
+
+private:
+    const TrialBody& bodyAt(double spacing)
+    {
+        const auto found = bodies_.find(spacing);
+        return found != bodies_.end()
+                   ? found->second
+                   : bodies_.emplace(spacing, trialBody(*model_.tissue, model_.surface, spacing, poissonCap(), mostNodes))
+                         .first->second;
+    }
+
+    double poissonCap() const { return model_.scene.model.elastic.poissonCap; }
+
+    void solve()
+    {
+        progress_("the converged solution");
+        const TrialBody& finest = bodyAt(spacings.back());
+        path_ = trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
+        const std::array speeds{request_.speed};
+        reference_ = solveReference(finest.body, path_, speeds, false);
+        plan_.strain = reference_.strain;
+        plan_.finiteReference = reference_.strain > largeStrain;
+        if (plan_.finiteReference) {
+            progress_("the converged solution at finite strain");
+            reference_ = solveReference(finest.body, path_, speeds, true);
+        }
+        plan_.referenceSpacing = finest.cells.spacing;
+        plan_.referenceNodes = reference_.nodes;
+    }
+
+    void collect()
+    {
+        add({});
+        for (const double spacing : {spacings[2], spacings[0]}) {
+            PlanCandidate c;
+            c.level = ModelLevel::chainmail;
+            c.spacing = spacing;
+            c.touched = typicalMoved;
+            add(c);
+        }
+        for (const double spacing : spacings) {
+            for (const int window : windows) {
+                addElastic(spacing, window);
+            }
+        }
+    }
+
+    void addElastic(double spacing, int window)
+    {
+        const TrialBody& body = bodyAt(spacing);
+        // A body that affords no such spacing has been listed with the one it affords.
+        if (body.cells.spacing > 1.01 * spacing) {
+            return;
+        }
+        PlanCandidate c;
+        c.level = ModelLevel::elastic;
+        c.elastic = model_.scene.model.elastic;
+        c.elastic.spacing = spacing;
+        c.elastic.window = window;
+        c.touched = typicalTouched;
+        c.nodes = chainmail::Elastic(body.body, {.window = window}, TrialLoad(path_).load().focus).nodes();
+        if (c.nodes > mostWindowNodes) {
+            return;
+        }
+        for (const int n : cycles) {
+            c.elastic.cycles = n;
+            c.elastic.strain = Strain::small;
+            add(c);
+            if (plan_.finiteReference) {
+                c.elastic.strain = Strain::finite;
+                add(c);
+            }
+        }
+    }
+
+    void add(PlanCandidate c)
+    {
+        c.microseconds = predictedTime(c, request_.costs);
+        c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
+        plan_.candidates.push_back(std::move(c));
+    }
+
+    TrialResult push(const PlanCandidate& c)
+    {
+        if (c.level == ModelLevel::spring) {
+            return runTrial(nothingModel(), path_, request_.speed, reference_);
+        }
+        if (c.level == ModelLevel::chainmail) {
+            const auto cells = volume::coveringGrid(model_.tissue->box(), c.spacing, 2.0 * c.spacing);
+            const chainmail::Lattice lattice(cells, model_.tissue->tissueOn(cells), model_.tissue->table());
+            return chainMailTrial(lattice, path_, request_.speed, reference_, model_.scene.model.maxMoves);
+        }
+        return elasticTrial(
+            bodyAt(c.elastic.spacing).body, path_, request_.speed, reference_,
+            {.window = c.elastic.window, .cycles = c.elastic.cycles, .finiteStrain = c.elastic.strain == Strain::finite});
+    }
+
+    void attempt(PlanCandidate& c)
+    {
+        const TrialResult result = push(c);
+        c.tried = true;
+        c.touched = c.level == ModelLevel::spring ? 0.0 : result.meanTouched;
+        c.microseconds = predictedTime(c, request_.costs);
+        c.rms = spreadOf(result.looks, &TrialErrors::rms).worst;
+        c.near = spreadOf(result.looks, &TrialErrors::near).worst;
+        if (c.level == ModelLevel::elastic) {
+            c.force = spreadOf(result.looks, &TrialErrors::force).worst;
+        }
+        c.holdsError = c.error() <= 100.0 * request_.error;
+        c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
+    }
+
+    void findNearest()
+    {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+            const PlanCandidate& c = plan_.candidates[i];
+            const double over = std::max(c.error() / (100.0 * request_.error), c.microseconds / (1e6 * request_.budget));
+            if (c.tried && over < least) {
+                least = over;
+                plan_.nearest = i;
+            }
+        }
+    }
+
+    const haptics::SessionModel& model_;
+    const PlanRequest& request_;
+    const std::function<void(const std::string&)>& progress_;
+    TrialPlace place_;
+    TrialPath path_;
+    Reference reference_;
+    std::map<double, TrialBody> bodies_;
+    Plan plan_;
+};
+
+}  // namespace
+
+std::string PlanCandidate::name() const
+{
+    switch (level) {
+        case ModelLevel::spring:
+            return "spring";
+        case ModelLevel::chainmail:
+            return fmt::format("chainmail, {:g} mm", 1e3 * spacing);
+        default:
+            return fmt::format("elastic, {:g} mm, window {}, {} cycle{}{}", 1e3 * elastic.spacing, elastic.window,
+                               elastic.cycles, elastic.cycles == 1 ? "" : "s",
+                               elastic.strain == Strain::finite ? ", finite strain" : "");
+    }
+}
+
+double predictedTime(const PlanCandidate& c, const PlanCosts& costs) noexcept
+{
+    constexpr double microsecond = 1e-3;  // in nanoseconds
+    switch (c.level) {
+        case ModelLevel::spring:
+            return costs.usPerTick;
+        case ModelLevel::chainmail:
+            return costs.usPerTick + microsecond * costs.nsPerMove * c.touched;
+        default:
+            break;
+    }
+    const double passes = costs.passesPerTick + costs.passesPerCycle * c.elastic.cycles;
+    const double factor = c.elastic.strain == Strain::finite ? costs.finiteFactor : 1.0;
+    const double nodes = costs.nsPerNode * factor * passes * static_cast<double>(c.nodes);
+    const double contacts = costs.nsPerContact * (1.0 + c.elastic.cycles) * c.touched;
+    return costs.usPerTick + microsecond * (nodes + contacts);
+}
+
+Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
+               const std::function<void(const std::string&)>& progress)
+{
+    return Planner(model, request, progress).run();
+}
+
+}  // namespace palpate::experiments

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <datasets/scene.h>
+#include <haptics/session_model.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::experiments {
+
+/// What a tick costs, by counts. Measured on one core of an x86-64 server of 2024 (Zen 5, AVX-512).
+struct PlanCosts {
+    double nsPerNode = 0.95;     // per window node and pass over it, small strain
+    double finiteFactor = 1.25;  // the same for finite strain, times this
+    double passesPerTick = 6;    // over all nodes, whatever the cycles
+    double passesPerCycle = 14;  // of one relaxation cycle
+    double nsPerContact = 110;   // per contact point and cycle, the tick's own look counted as one
+    double nsPerMove = 230;      // per node that ChainMail moves
+    double usPerTick = 20;       // collision, distances, forces and the rest of a tick [us]
+};
+
+struct PlanRequest {
+    double error = 0.03;   // share that may not be passed
+    double budget = 4e-4;  // of a tick [s]
+    double speed = 0.02;   // of the test pushes [m/s]
+    PlanCosts costs;
+};
+
+/// One model that may be chosen. Errors are worst over the looks of the test push.
+struct PlanCandidate {
+    datasets::ModelLevel level = datasets::ModelLevel::spring;
+    datasets::ElasticSettings elastic;  // of level `elastic`
+    double spacing = 0;                 // of level `chainmail` [m]
+    std::size_t nodes = 0;              // of the windows
+    double touched = 0;                 // contact points, or moved nodes, per tick
+    double microseconds = 0;            // predicted per tick
+    bool tried = false;                 // false: dearer than the choice
+    double rms = 0, near = 0;           // [%], see TrialErrors
+    std::optional<double> force;        // [%]; nothing: the level's force does not come from its shape
+    bool holdsError = false;
+    bool holdsBudget = false;
+
+    /// What decides: the shape's error, or the force's where it is worse [%].
+    double error() const noexcept { return std::max(rms, force.value_or(0.0)); }
+    /// "elastic, 2 mm, window 15, 2 cycles"
+    std::string name() const;
+};
+
+struct Plan {
+    std::vector<PlanCandidate> candidates;  // in order of predicted time
+    std::optional<std::size_t> choice;
+    std::size_t nearest = 0;      // of those that were tried: over error and budget by the least factor
+    double referenceSpacing = 0;  // [m]
+    std::size_t referenceNodes = 0;
+    double strain = 0;             // local, of the reference [-]
+    bool finiteReference = false;  // errors are against finite strain
+};
+
+/// Strain beyond which small strain is no reference any more [-].
+inline constexpr double largeStrain = 0.15;
+
+/// Predicted time of a tick [us]: counts times costs, never a clock.
+double predictedTime(const PlanCandidate& candidate, const PlanCosts& costs) noexcept;
+
+/// Pushes the scene's own tool a short way into the tissue with one model after the other, cheapest first, against the
+/// converged solution on the finest grid of the ladder, until one holds both error and budget. Deterministic.
+/// Throws std::runtime_error when there is no tissue under the entry. Cost: seconds to minutes.
+Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
+               const std::function<void(const std::string& what)>& progress);
+
+}  // namespace palpate::experiments
