@@ -1,5 +1,6 @@
 #include <apps/command.h>
 
+#include <apps/cmd_bench_kernel.h>
 #include <apps/figures.h>
 #include <apps/outputs.h>
 #include <apps/session.h>
@@ -179,6 +180,7 @@ void addBench(CLI::App& app)
     tick->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     tick->final_callback([o] { benchTick(*o); });
     addBenchQuery(*bench);
+    addBenchKernel(*bench);
 }
 
 }  // namespace palpate::apps

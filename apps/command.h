@@ -17,6 +17,7 @@ void addInfo(CLI::App& app);
 void addPhantom(CLI::App& app);
 void addReplay(CLI::App& app);
 void addScore(CLI::App& app);
+void addPlan(CLI::App& app);
 void addBench(CLI::App& app);
 
 /// Writes figures where `--json FILE` asked for them ("-" = standard output). Throws std::runtime_error.

@@ -27,6 +27,7 @@ int main(int argc, char** argv)
     addPhantom(app);
     addReplay(app);
     addScore(app);
+    addPlan(app);
     addBench(app);
 
     try {

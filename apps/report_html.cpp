@@ -285,6 +285,8 @@ std::string eventLabel(const haptics::Event& e, const haptics::SessionInfo& info
             return "fired";
         case EventKind::fault:
             return "fault";
+        case EventKind::stepDown:
+            return "simpler model: ticks came late";
     }
     return {};
 }

@@ -12,12 +12,13 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t mostTools = 16;
-constexpr double reach = 0.6;       // spacings from a tool within which surface points are looked at
-constexpr double drift = 0.25;      // spacings that a tool may move until they are looked for again
-constexpr int newtonSteps = 3;      // of a line search: contacts open and close along it
-constexpr int mostHalvings = 8;     // of a step that raises the energy
-constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
-constexpr double rounding = 1e-6;   // relative: sums of single-precision products are no better
+constexpr double reach = 0.6;          // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
+constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
+constexpr int newtonSteps = 3;         // of a line search: contacts open and close along it
+constexpr int mostHalvings = 8;        // of a step that raises the energy
+constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew
+constexpr double rounding = 1e-6;      // relative: sums of single-precision products are no better
 
 std::size_t cornerNode(const Layout& l, std::size_t node, int c) noexcept
 {
@@ -33,8 +34,12 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
       multigrid_(stack_, 8 * options.maxSites),
       sites_(options.maxSites)
 {
+    memory_ = options.viscosity / (1.0 + options.viscosity);
     shapes_.reserve(mostTools);
     foundFor_.reserve(mostTools);
+    friction_.reserve(mostTools);
+    toolAt_.reserve(mostTools);
+    slip_.assign(body.points.size(), Vec3f(0.0F));
 }
 
 std::size_t Elastic::nodes() const noexcept
@@ -60,10 +65,11 @@ void Elastic::settle() noexcept
     if (atRest_) {
         return;
     }
-    for (const Field f : {Field::u, Field::a, Field::d, Field::e, Field::r}) {
+    for (const Field f : {Field::u, Field::a, Field::d, Field::e, Field::r, Field::v}) {
         stack_.clear(f);
     }
     energy_ = 0.0;
+    toolAt_.clear();
     atRest_ = true;
     hasIncrement_ = false;
 }
@@ -96,21 +102,32 @@ bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
 void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 {
     shapes_.clear();
+    friction_.clear();
     for (const ElasticTool& tool : load.tools) {
         shapes_.emplace_back(tool.shape);
+        friction_.push_back(tool.friction);
     }
     ties_ = load.ties;
     if (!sitesHold(load, moved)) {
         const double near = reach * stack_.body().levels.front().nodes.spacing;
+        for (const ContactSite& s : sites()) {
+            if (!s.isTie) {
+                slip_[s.point] = Vec3f(s.slip);
+            }
+        }
         siteCount_ = findSites(stack_.body(), stack_.windows(), load, shapes_, near, sites_);
         foundFor_.clear();
         for (const ElasticTool& tool : load.tools) {
             foundFor_.push_back(tool.shape);
         }
         tiesFound_ = load.ties.size();
+        for (ContactSite& s : active()) {
+            s.slip = s.isTie ? Vec3(0.0) : Vec3(slip_[s.point]);
+        }
     }
+    drag(load);
     for (ContactSite& s : active()) {
-        touch(s, shapes_, ties_);
+        touch(s, shapes_, ties_, frictionOf(s));
     }
 }
 
@@ -139,7 +156,11 @@ void Elastic::refreshForces() noexcept
 // r = forces of the tissue and of the contacts.
 void Elastic::refreshResidual() noexcept
 {
-    stack_.copy(Field::a, Field::r);
+    if (memory_ > 0.0) {
+        stack_.combine(Field::a, -memory_, Field::v, Field::r);
+    } else {
+        stack_.copy(Field::a, Field::r);
+    }
     for (const ContactSite& s : sites()) {
         if (!s.active()) {
             continue;
@@ -147,7 +168,7 @@ void Elastic::refreshResidual() noexcept
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             stack_.addForce(s.level, cornerNode(l, s.node, c),
-                            static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
+                            (1.0 - memory_) * static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
         }
     }
 }
@@ -164,7 +185,7 @@ void Elastic::prepareContacts() noexcept
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             const double share = static_cast<double>(s.share[static_cast<std::size_t>(c)]);
-            multigrid_.addContact(s.level, cornerNode(l, s.node, c), share * tangent);
+            multigrid_.addContact(s.level, cornerNode(l, s.node, c), (1.0 - memory_) * share * tangent);
         }
     }
     multigrid_.prepare();
@@ -183,8 +204,8 @@ double Elastic::lineSearch(double slope, double curvature) const noexcept
     double alpha = 0.0;
     for (int i = 0; i < newtonSteps; ++i) {
         const Along at = contactsAlong(sites(), alpha);
-        const double stiffness = curvature + at.curvature;
-        const double change = -(slope + alpha * curvature + at.slope) / stiffness;
+        const double stiffness = curvature + (1.0 - memory_) * at.curvature;
+        const double change = -(slope + alpha * curvature + (1.0 - memory_) * at.slope) / stiffness;
         if (!(stiffness > 0.0) || !std::isfinite(change)) {
             return 0.0;
         }
@@ -199,15 +220,45 @@ double Elastic::contactEnergy() const noexcept
     for (const ContactSite& s : sites()) {
         sum += s.energy;
     }
-    return sum;
+    return (1.0 - memory_) * sum;
 }
 
 void Elastic::moveSites(double alpha) noexcept
 {
     for (ContactSite& s : active()) {
         s.u += alpha * s.p;
-        touch(s, shapes_, ties_);
+        s.slip -= alpha * s.p;
+        touch(s, shapes_, ties_, frictionOf(s));
     }
+}
+
+// Tools that moved on take the points that they hold along.
+void Elastic::drag(const ElasticLoad& load) noexcept
+{
+    if (toolAt_.size() == load.tools.size()) {
+        for (ContactSite& s : active()) {
+            s.slip += s.isTie ? Vec3(0.0) : load.tools[s.owner].shape.a - toolAt_[s.owner];
+        }
+    }
+    toolAt_.clear();
+    for (const ElasticTool& tool : load.tools) {
+        toolAt_.push_back(tool.shape.a);
+    }
+}
+
+// Beyond what friction holds the tool has slipped, for good.
+void Elastic::letSlip() noexcept
+{
+    for (ContactSite& s : active()) {
+        const Vec3 along = s.along();
+        const double length = glm::length(along);
+        s.slip = length > s.limit ? s.limit / length * along : along;
+    }
+}
+
+double Elastic::frictionOf(const ContactSite& site) const noexcept
+{
+    return site.isTie ? 0.0 : friction_[site.owner];
 }
 
 // Goes along the direction that look() saw, whose image under -A is known, as far as lowers the energy. A step after which
@@ -216,8 +267,9 @@ void Elastic::moveSites(double alpha) noexcept
 bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noexcept
 {
     const auto product = stack_.dots(direction, Field::a, image);
-    const double slope = -product[0];
     const double curvature = -product[1];
+    const double viscous = memory_ > 0.0 ? memory_ * stack_.dot(direction, Field::v) : 0.0;
+    const double slope = viscous - product[0];
     const double tissue = energy_;
     const double before = tissue + contactEnergy();
     double alpha = lineSearch(slope, curvature);
@@ -228,11 +280,11 @@ bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noex
             stack_.combine(Field::u, alpha - gone, direction, Field::u);
             energy_ = stack_.applyFinite(Field::u, Field::f);
         } else {
-            energy_ = tissue + (slope + 0.5 * curvature * alpha) * alpha;
+            energy_ = tissue + (0.5 * curvature * alpha - product[0]) * alpha;
         }
         gone = alpha;
         const double scale = std::abs(before) + std::abs(slope * alpha);
-        if (energy_ + contactEnergy() <= before + rounding * scale) {
+        if (energy_ + viscous * alpha + contactEnergy() <= before + rounding * scale) {
             break;
         }
         alpha = i < mostHalvings ? 0.5 * alpha : 0.0;
@@ -277,7 +329,7 @@ bool Elastic::oneCycle(Before before, ElasticResult& result) noexcept
         double own = -product[0];
         double mixed = -product[1];
         for (ContactSite& s : active()) {
-            const Vec3 resisted = s.resist(s.p);
+            const Vec3 resisted = (1.0 - memory_) * s.resist(s.p);
             s.z = gather(stack_.windows(), s, Field::z);
             own += glm::dot(s.p, resisted);
             mixed += glm::dot(s.z, resisted);
@@ -302,7 +354,7 @@ ElasticResult Elastic::relax(const ElasticLoad& all, int cycles, double toleranc
     multigrid_.clearContacts();
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
-    if (!touched()) {
+    if (!touched() && (memory_ == 0.0 || energy_ < leastEnergy)) {
         settle();
         return result;
     }
@@ -310,6 +362,9 @@ ElasticResult Elastic::relax(const ElasticLoad& all, int cycles, double toleranc
     if (result.moved || ++sinceRefresh_ >= refreshPeriod) {
         refreshForces();
         sinceRefresh_ = 0;
+    }
+    if (memory_ > 0.0) {
+        stack_.copy(Field::a, Field::v);
     }
     Before before = Before::none;
     if (hasIncrement_) {
@@ -333,13 +388,14 @@ ElasticResult Elastic::relax(const ElasticLoad& all, int cycles, double toleranc
         ++result.cycles;
         before = oneCycle(before, result) ? Before::direction : Before::none;
     }
+    letSlip();
     measure(result);
     return result;
 }
 
 void Elastic::measure(ElasticResult& result) const noexcept
 {
-    result.energy = energy_ + contactEnergy();
+    result.energy = energy_ + contactEnergy() / (1.0 - memory_);
     for (const ContactSite& s : sites()) {
         if (!s.isTie && s.active()) {
             ++result.contacts;

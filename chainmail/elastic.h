@@ -13,6 +13,7 @@ struct ElasticOptions {
     int window = 15;            // nodes of a window along the way in, odd; see WindowStack
     int cycles = 1;             // per call of relax()
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
+    double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
     std::size_t maxSites = 4096;
 };
 
@@ -34,9 +35,13 @@ struct ElasticResult {
 /// over the windows and conjugate to the step before, the last call's increment included. Every step has a line search on
 /// the energy with the contacts as they are along it, so that none raises the energy: one that would is shortened, and
 /// dropped at last.
-/// Sources: S. F. McCormick, "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids);
-/// A. V. Knyazev, "Toward the optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps).
-/// Mathematics, pictures and figures: docs/kernel.md.
+///
+/// Viscosity (Kelvin-Voigt, one time for all tissue) is integrated by implicit Euler: the tissue's force is
+/// a + c (a - v), v the force after the call before and c the viscous time in calls. Divided by 1 + c this is the same
+/// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node. Sources: S. F. McCormick,
+/// "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids); A. V. Knyazev, "Toward the
+/// optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps). Mathematics, pictures and
+/// figures: docs/kernel.md.
 class Elastic {
 public:
     /// @param focus  where the windows start
@@ -77,6 +82,9 @@ private:
     double contactEnergy() const noexcept;
     bool sitesHold(const ElasticLoad& load, bool moved) noexcept;
     void moveSites(double alpha) noexcept;
+    void drag(const ElasticLoad& load) noexcept;
+    void letSlip() noexcept;
+    double frictionOf(const ContactSite& site) const noexcept;
     bool takeStep(Field direction, Field image, ElasticResult& result) noexcept;
     void keepStep(Field direction, Field image, double alpha) noexcept;
     bool oneCycle(Before before, ElasticResult& result) noexcept;
@@ -92,7 +100,11 @@ private:
     std::vector<occupancy::ShapeDistance> shapes_;
     std::vector<occupancy::RoundCone> foundFor_;  // the tools when the sites were looked for
     std::size_t tiesFound_ = 0;
+    std::vector<double> friction_;  // of each tool
+    std::vector<Vec3> toolAt_;      // in the last call [m]
+    std::vector<Vec3f> slip_;       // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
+    double memory_ = 0;  // share of the last call's stress that viscosity holds against this one's
     double energy_ = 0;  // of the tissue [J]
     int sinceRefresh_ = 0;
     bool atRest_ = true;

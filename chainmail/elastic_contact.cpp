@@ -107,6 +107,7 @@ private:
             ContactSite site;
             site.rest = Vec3(point.position);
             site.owner = static_cast<std::uint16_t>(index);
+            site.point = i;
             site.stiffness = siteStiffness(point, spacing, tool);
             if (add(site) && nearest(shape, site.rest, site.u) > near_) {
                 --count_;
@@ -172,7 +173,30 @@ Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field fiel
     return sum;
 }
 
-void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept
+namespace {
+
+// Of a spring that gives way at `limit`.
+double frictionEnergy(double stiffness, double stretch, double limit) noexcept
+{
+    const double held = std::min(stretch, limit);
+    return stiffness * held * (stretch - 0.5 * held);
+}
+
+void addFriction(const ContactSite& s, double alpha, Along& sum) noexcept
+{
+    const Vec3 side = s.p - glm::dot(s.p, s.normal) * s.normal;
+    const Vec3 stretch = s.along() - alpha * side;
+    const double length = glm::length(stretch);
+    const double held = std::min(length, s.limit);
+    sum.energy += frictionEnergy(s.stiffness, length, s.limit);
+    sum.slope -= length > 0.0 ? s.stiffness * held / length * glm::dot(stretch, side) : 0.0;
+    sum.curvature += length < s.limit ? s.stiffness * glm::dot(side, side) : 0.0;
+}
+
+}  // namespace
+
+void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties,
+           double friction) noexcept
 {
     if (site.isTie) {
         const Vec3 stretch = ties[site.owner].u - site.u;
@@ -186,6 +210,15 @@ void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, 
     const double push = site.stiffness * std::max(site.depth, 0.0);
     site.force = push * site.normal;
     site.energy = 0.5 * push * site.depth;
+    site.limit = friction * std::max(site.depth, 0.0);
+    if (site.limit <= 0.0) {
+        site.slip = Vec3(0.0);
+        return;
+    }
+    const Vec3 along = site.along();
+    const double held = std::min(glm::length(along), site.limit);
+    site.force += held > 0.0 ? site.stiffness * held / glm::length(along) * along : Vec3(0.0);
+    site.energy += frictionEnergy(site.stiffness, glm::length(along), site.limit);
 }
 
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
@@ -207,6 +240,9 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
         sum.energy += 0.5 * push * depth;
         sum.slope += push * rate;
         sum.curvature += depth > 0.0 ? s.stiffness * rate * rate : 0.0;
+        if (s.limit > 0.0) {
+            addFriction(s, alpha, sum);
+        }
     }
     return sum;
 }

@@ -15,6 +15,7 @@ struct ElasticTool {
     occupancy::RoundCone shape;  // where it is now [m]
     Vec3 carried{0.0};           // about how far it has carried the tissue that it touches [m]: where to look for contacts
     double stiffest = 1000;      // of the whole contact [N/m]: a rigid body is not rendered stiffer
+    double friction = 0;         // Coulomb [-]
 };
 
 /// A material point that is held by springs: by a needle's tip, or along its shaft.
@@ -43,6 +44,7 @@ struct ContactSite {
     std::uint16_t level = 0;
     std::uint16_t owner = 0;  // index of tool or tie
     bool isTie = false;
+    std::uint32_t point = 0;       // index of the surface point
     std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
     Vec3 rest{0.0};
     double stiffness = 0;  // of a surface point; of a tie along its axis [N/m]
@@ -54,21 +56,28 @@ struct ContactSite {
     double depth = 0;   // of a surface point inside the tool [m]
     Vec3 normal{0.0};   // out of the tool there; of a tie, its axis
     Vec3 force{0.0};    // on the tissue [N]
+    Vec3 slip{0.0};     // how far the tool went on since it took hold of the point, while they touch [m]
+    double limit = 0;   // of the slip along the surface that friction holds [m]
     double energy = 0;  // [J]
 
     bool active() const noexcept { return isTie || depth > 0.0; }
+    Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
     /// By how much the force falls when the point moves by v [N].
     Vec3 resist(Vec3 v) const noexcept
     {
-        if (!isTie && depth <= 0.0) {
+        if (!active()) {
             return Vec3(0.0);
         }
-        return across * v + (stiffness - across) * glm::dot(normal, v) * normal;
+        const bool sticks = limit > 0.0 && glm::length(along()) < limit;
+        const double side = sticks ? stiffness : across;
+        return side * v + (stiffness - side) * glm::dot(normal, v) * normal;
     }
 };
 
-/// Depth, normal, force and energy of a site where it is now.
-void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept;
+/// Depth, normal, force and energy of a site where it is now. Friction holds a point with the stiffness of the contact up
+/// to the limit of Coulomb; beyond, its force stays. `friction`: of the site's tool.
+void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties,
+           double friction) noexcept;
 
 /// The energy of the contacts along the direction p, and its derivatives by the way.
 struct Along {

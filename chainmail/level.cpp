@@ -73,6 +73,7 @@ ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
     if (grip.kind == Grip::Kind::press) {
         tool_.shape = grip.shape;
         tool_.carried = pushed;
+        tool_.friction = grip.friction;
         const Vec3 under = grip.proxy - surface_.distance(grip.proxy) * surface_.normal(grip.proxy);
         return {{&tool_, 1}, {}, focusAt(surface_, under)};
     }

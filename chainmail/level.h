@@ -22,6 +22,7 @@ struct Grip {
     Vec3 position{0.0};          // where the tool has it now [m]
     double radius = 0;           // of a tip that holds a point [m]
     bool inside = false;         // that point is inside the tissue
+    double friction = 0;         // of a tool that presses (Coulomb) [-]
 };
 
 struct Reaction {

@@ -36,6 +36,7 @@ enum class Field : std::uint8_t {
     r,  // residual: force of the contacts less a, where the node is a degree of freedom [N]
     f,  // right side of the cycle
     z,  // its answer
+    v,  // a at the end of the last call: what viscosity remembers [N]
     t,  // working memory
     count
 };

@@ -79,7 +79,7 @@ std::vector<std::string> elasticSettings();  // "fast", "default", "fine"
 ElasticSettings elasticSetting(const std::string& name, const ElasticSettings& base = {});
 
 struct ModelSettings {
-    ModelLevel level = ModelLevel::chainmail;
+    ModelLevel level = ModelLevel::elastic;
     double spacing = 2e-3;            // of the ChainMail lattice [m]; widened when the body would need over maxNodes
     std::uint32_t maxMoves = 5000;    // node moves per tick; what is left over is reported as residual
     double stiffness = 0;             // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact

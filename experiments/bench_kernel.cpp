@@ -43,7 +43,14 @@ private:
         const ElasticOptions options{.window = elastic.window, .cycles = elastic.cycles, .finiteStrain = finite};
         for (const double speed : request_.speeds) {
             progress_(fmt::format("{}: {}, {}: {:g} mm/s", model_.scene.name, tool.name, setting, 1e3 * speed));
-            KernelCase c{model_.scene.name, tool.name, setting, speed, body.cells.spacing, elastic.window, elastic.cycles};
+            KernelCase c;
+            c.scene = model_.scene.name;
+            c.tool = tool.name;
+            c.setting = setting;
+            c.speed = speed;
+            c.spacing = body.cells.spacing;
+            c.window = elastic.window;
+            c.cycles = elastic.cycles;
             c.nodes = Elastic(body.body, options, TrialLoad(path).load().focus).nodes();
             c.fullNodes = reference.nodes;
             c.strain = reference.strain;

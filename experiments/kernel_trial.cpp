@@ -193,12 +193,16 @@ ElasticOptions wholeGrid(int cycles, bool finiteStrain)
     return {.window = wholeWindow, .cycles = cycles, .finiteStrain = finiteStrain};
 }
 
-Reference solveReference(const ElasticBody& body, const TrialPath& path, std::span<const double> speeds, bool finiteStrain)
+Reference solveReference(const ElasticBody& body, const TrialPath& path, std::span<const double> speeds, bool finiteStrain,
+                         std::size_t mostPoints)
 {
     Reference reference;
     const auto& level = body.levels.front();
-    for (const Index3 n : freeNodes(level)) {
-        reference.position.emplace_back(level.nodes.position(n));
+    const std::vector<Index3> nodes = freeNodes(level);
+    const std::size_t stride =
+        std::max<std::size_t>(1, nodes.size() / mostPoints + (nodes.size() % mostPoints != 0 ? 1 : 0));
+    for (std::size_t i = 0; i < nodes.size(); i += stride) {
+        reference.position.emplace_back(level.nodes.position(nodes[i]));
     }
     TrialLoad load(path);
     Elastic elastic(body, wholeGrid(1, finiteStrain), load.load().focus);

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -25,7 +26,7 @@ struct ReferenceState {
 
 /// Every look of a path, solved to convergence on the whole grid: what errors are measured against.
 struct Reference {
-    std::vector<Vec3f> position;  // of the tissue nodes that are free, at rest [m] (count x 3)
+    std::vector<Vec3f> position;  // of tissue nodes that are free, at rest [m] (count x 3)
     std::vector<ReferenceState> states;
     std::size_t nodes = 0;  // of the grid
     double peakForce = 0;   // [N]
@@ -39,8 +40,10 @@ chainmail::ElasticOptions wholeGrid(int cycles, bool finiteStrain);
 /// Solves the looks of the path at all these speeds, one from the other. The body must outlive the call only.
 /// Small strain is solved from rest at every look, so that no rounding is carried along. Cost: some 60 cycles over all
 /// nodes per look.
+///
+/// @param mostPoints  of Reference::position: every n-th free node, so that there are no more
 Reference solveReference(const chainmail::ElasticBody& body, const TrialPath& path, std::span<const double> speeds,
-                         bool finiteStrain);
+                         bool finiteStrain, std::size_t mostPoints = std::numeric_limits<std::size_t>::max());
 
 /// What a trial drives: anything that follows a load tick by tick.
 struct TrialModel {

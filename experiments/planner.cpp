@@ -20,9 +20,11 @@ namespace {
 // The ladder. Windows fill whole vectors: a row of 15 or 31 nodes takes as long as one of 16 or 32.
 constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
 constexpr std::array windows{9, 15, 21, 31};
-constexpr std::array cycles{1, 2, 3};
-constexpr std::size_t mostNodes = 1U << 20;      // of the reference: half a minute
+constexpr std::array cycles{1, 2};
+constexpr std::size_t mostNodes = 640000;        // of a grid: a reference takes half a minute
 constexpr std::size_t mostWindowNodes = 300000;  // no budget under 5 ms pays for more
+constexpr std::size_t mostPoints = 60000;        // at which errors are looked at
+constexpr double farOver = 2.0;                  // budgets: a candidate that costs more is not tried
 constexpr double typicalTouched = 300;           // contact points, before they are counted
 constexpr double typicalMoved = 500;
 
@@ -56,13 +58,15 @@ public:
         std::ranges::stable_sort(plan_.candidates, {}, &PlanCandidate::microseconds);
         for (std::size_t i = 0; i < plan_.candidates.size() && !plan_.choice; ++i) {
             PlanCandidate& c = plan_.candidates[i];
+            if (c.microseconds > farOver * 1e6 * request_.budget) {
+                break;
+            }
             progress_(fmt::format("{} of {}: {}", i + 1, plan_.candidates.size(), c.name()));
             attempt(c);
             if (c.holdsError && c.holdsBudget) {
                 plan_.choice = i;
             }
         }
-        // The counts of a push may have moved one behind another; the order that is shown is that of the time.
         findNearest();
         return std::move(plan_);
     }
@@ -85,12 +89,12 @@ private:
         const TrialBody& finest = bodyAt(spacings.back());
         path_ = trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
         const std::array speeds{request_.speed};
-        reference_ = solveReference(finest.body, path_, speeds, false);
+        reference_ = solveReference(finest.body, path_, speeds, false, mostPoints);
         plan_.strain = reference_.strain;
         plan_.finiteReference = reference_.strain > largeStrain;
         if (plan_.finiteReference) {
             progress_("the converged solution at finite strain");
-            reference_ = solveReference(finest.body, path_, speeds, true);
+            reference_ = solveReference(finest.body, path_, speeds, true, mostPoints);
         }
         plan_.referenceSpacing = finest.cells.spacing;
         plan_.referenceNodes = reference_.nodes;
@@ -116,7 +120,7 @@ private:
     void addElastic(double spacing, int window)
     {
         const TrialBody& body = bodyAt(spacing);
-        // A body that affords no such spacing has been listed with the one it affords.
+        // Finer than the reference there is nothing to be told about errors.
         if (body.cells.spacing > 1.01 * spacing) {
             return;
         }
@@ -174,8 +178,15 @@ private:
         if (c.level == ModelLevel::elastic) {
             c.force = spreadOf(result.looks, &TrialErrors::force).worst;
         }
-        c.holdsError = c.error() <= 100.0 * request_.error;
+        c.holdsError = overError(c) <= 1.0;
         c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
+    }
+
+    // By what factor the worse of both errors is over what may be.
+    double overError(const PlanCandidate& c) const
+    {
+        const double force = request_.forceError ? c.force.value_or(0.0) / (100.0 * *request_.forceError) : 0.0;
+        return std::max(c.rms / (100.0 * request_.error), force);
     }
 
     void findNearest()
@@ -183,7 +194,7 @@ private:
         double least = std::numeric_limits<double>::infinity();
         for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
             const PlanCandidate& c = plan_.candidates[i];
-            const double over = std::max(c.error() / (100.0 * request_.error), c.microseconds / (1e6 * request_.budget));
+            const double over = std::max(overError(c), c.microseconds / (1e6 * request_.budget));
             if (c.tried && over < least) {
                 least = over;
                 plan_.nearest = i;

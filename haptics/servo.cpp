@@ -41,10 +41,32 @@ void sleepUntil(Clock::time_point due) noexcept
     }
 }
 
-TickRecord oneTick(Device& device, Simulation& simulation, bool late) noexcept
+// Watches a thousand ticks at a time.
+class Overload {
+public:
+    explicit Overload(std::uint64_t allowed) : allowed_(allowed) {}
+
+    bool askStepDown(const ServoTiming& timing) noexcept
+    {
+        const bool late = allowed_ > 0 && timing.missed - missedBefore_ > allowed_;
+        if (late || timing.ticks - since_ >= 1000) {
+            missedBefore_ = timing.missed;
+            since_ = timing.ticks;
+        }
+        return late;
+    }
+
+private:
+    std::uint64_t allowed_;
+    std::uint64_t missedBefore_ = 0;
+    std::uint64_t since_ = 0;
+};
+
+TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overloaded) noexcept
 {
     const auto start = Clock::now();
     DeviceSample sample = device.read();
+    sample.buttons |= overloaded ? modelTooSlow : 0U;
     sample.fresh = sample.fresh && !late;
     const auto read = Clock::now();
     TickRecord record = simulation.tick(sample);
@@ -61,6 +83,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
                      const std::atomic<bool>& stop)
 {
     ServoTiming timing;
+    Overload overload(options.missedAllowed);
     auto due = Clock::now() + period;
     int stale = 0;  // ticks that the force still fades, after a gap
     while (!device.finished() && !stop.load(std::memory_order_relaxed)) {
@@ -71,7 +94,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
             sleepUntil(due);
         }
         const auto start = Clock::now();
-        const TickRecord record = oneTick(device, simulation, stale > 0);
+        const TickRecord record = oneTick(device, simulation, stale > 0, options.paced && overload.askStepDown(timing));
         stale = std::max(0, stale - 1);
         const auto sent = Clock::now();
         timing.work.add(seconds(sent - start));

@@ -15,6 +15,7 @@ namespace {
 
 // The part of a needle's shaft that collision looks at, from the tip [m].
 constexpr double shaftQueried = 6e-3;
+constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
 
 // How much of the tool behind its tip collision looks at [m].
 double queriedLength(const datasets::ToolSpec& tool) noexcept
@@ -47,6 +48,18 @@ private:
     std::chrono::steady_clock::time_point last_;
 };
 
+std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model, chainmail::DisplacedLattice& shape,
+                                                      int window)
+{
+    const auto& settings = model.scene.model.elastic;
+    chainmail::ElasticOptions options;
+    options.window = window;
+    options.cycles = settings.cycles;
+    options.finiteStrain = settings.strain == datasets::Strain::finite;
+    options.viscosity = settings.viscosity / tickSeconds;
+    return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
+}
+
 // A tip within ten metres of the patient's origin and a unit vector: anything else is no pose, and NaN fails both.
 bool isPose(const DeviceSample& device) noexcept
 {
@@ -66,13 +79,8 @@ Simulation::Simulation(const SessionModel& model)
       contacts_(std::make_unique<occupancy::ContactSet>())
 {
     if (level_ == datasets::ModelLevel::elastic) {
-        const auto& settings = model.scene.model.elastic;
-        chainmail::ElasticOptions options;
-        options.window = settings.window;
-        options.cycles = settings.cycles;
-        options.finiteStrain = settings.strain == datasets::Strain::finite;
-        elastic_ = std::make_unique<chainmail::ElasticLevel>(deformation_.shape(), *model.elastic, model.surface, options,
-                                                             model.approach.entry);
+        elastic_[0] = elasticLevel(model, deformation_.shape(), model.scene.model.elastic.window);
+        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow);
     }
 }
 
@@ -84,6 +92,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     record_.tick = ticks_;
     TaskClock clock(record_);
     accept(device);
+    stepDownIfAsked();
     const Vec3 position = record_.device.position;
 
     const auto way = collide();
@@ -135,6 +144,21 @@ void Simulation::accept(const DeviceSample& device) noexcept
     }
 }
 
+// The request is part of the sample, so that a replay steps down at the same tick.
+void Simulation::stepDownIfAsked() noexcept
+{
+    if ((record_.device.buttons & modelTooSlow) == 0 || level_ == datasets::ModelLevel::spring) {
+        return;
+    }
+    if (level_ == datasets::ModelLevel::chainmail) {
+        level_ = datasets::ModelLevel::spring;
+    } else if (stepsDown_ + 1 == static_cast<int>(elastic_.size())) {
+        level_ = datasets::ModelLevel::chainmail;
+    }
+    ++stepsDown_;
+    addEvent(record_, {EventKind::stepDown, 0xFF, 0, static_cast<double>(stepsDown_)});
+}
+
 occupancy::Sweep Simulation::collide() noexcept
 {
     const auto& tool = model_.scene.tool;
@@ -165,6 +189,7 @@ chainmail::Grip Simulation::grip() const noexcept
     grip.proxy = tip_.proxy;
     grip.position = tip;
     grip.radius = tool.radius;
+    grip.friction = model_.scene.model.elastic.friction;
     if (tip_.phase == Phase::free) {
         return grip;
     }
@@ -186,7 +211,7 @@ chainmail::Reaction Simulation::deform() noexcept
             reaction = chainmail_.deform(grip());
             break;
         case datasets::ModelLevel::elastic:
-            reaction = elastic_->deform(grip());
+            reaction = elastic_[static_cast<std::size_t>(stepsDown_)]->deform(grip());
             break;
     }
     record_.moved = reaction.moved;

@@ -9,6 +9,7 @@
 #include <haptics/tip.h>
 #include <occupancy/query.h>
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -31,10 +32,13 @@ public:
     const chainmail::DisplacedLattice& shape() const noexcept { return deformation_.shape(); }
     /// The level in use: the scene's, or a lower one that it stepped down to.
     datasets::ModelLevel level() const noexcept { return level_; }
+    /// How often it stepped down: elastic, elastic on small windows, chainmail, spring.
+    int stepsDown() const noexcept { return stepsDown_; }
     const SessionModel& model() const noexcept { return model_; }
 
 private:
     void accept(const DeviceSample& device) noexcept;
+    void stepDownIfAsked() noexcept;
     occupancy::Sweep collide() noexcept;
     chainmail::Grip grip() const noexcept;
     chainmail::Reaction deform() noexcept;
@@ -45,8 +49,10 @@ private:
     chainmail::Deformation deformation_;
     chainmail::SpringLevel spring_;
     chainmail::ChainMailLevel chainmail_;
-    std::unique_ptr<chainmail::ElasticLevel> elastic_;  // where the scene's level is `elastic`
+    // Where the scene's level is `elastic`: its own, and one on small windows, the step below it.
+    std::array<std::unique_ptr<chainmail::ElasticLevel>, 2> elastic_;
     datasets::ModelLevel level_;
+    int stepsDown_ = 0;
     occupancy::Body body_;
     std::unique_ptr<occupancy::ContactSet> contacts_;
     TipState tip_;

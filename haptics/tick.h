@@ -15,6 +15,7 @@ inline constexpr std::size_t maxEventsPerTick = 16;
 
 inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
 inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
+inline constexpr std::uint32_t modelTooSlow = 1U << 30;  // the loop cannot keep up: use a cheaper model from now on
 inline constexpr std::uint32_t poseInvalid = 1U
                                              << 31;  // the pose was none (not finite, out of bounds); records keep the last
 
@@ -46,9 +47,10 @@ enum class EventKind : std::uint8_t {
     vitalTouch,  // structure: was touched; value: depth [m]
     fire,        // the gun; value: distance from the notch's middle to the target's surface [m]
     fault,       // a force was not finite; the output is zero from now on
+    stepDown,    // ticks came late: a cheaper model from now on; value: how many steps down from the scene's
 };
-inline constexpr std::array<std::string_view, 7> eventNames{"contact",     "release", "puncture", "warning",
-                                                            "vital touch", "fire",    "fault"};
+inline constexpr std::array<std::string_view, 8> eventNames{"contact",     "release", "puncture", "warning",
+                                                            "vital touch", "fire",    "fault",    "step down"};
 constexpr std::string_view name(EventKind kind) noexcept
 {
     return eventNames[static_cast<std::size_t>(kind)];

@@ -87,7 +87,7 @@ inline chainmail::Focus focusUnder(Vec3 point)
     return {point, Vec3(0.0, 1.0, 0.0), std::max(0.0, point.y)};
 }
 
-/// Displacement of a node in a window, and where it is at rest.
+/// Value of a field at a node of a window.
 inline Vec3 valueAt(const chainmail::Window& w, std::size_t node, chainmail::Field field)
 {
     const float* f = w.field(field) + node;
@@ -161,9 +161,13 @@ inline int solve(chainmail::WindowStack& stack, chainmail::Multigrid& multigrid,
     return most;
 }
 
+/// A tool that is a ball [m].
 inline chainmail::ElasticTool ball(Vec3 centre, double radius, double stiffest = 1e6)
 {
-    return {{centre, centre, radius, radius}, Vec3(0.0), stiffest};
+    chainmail::ElasticTool tool;
+    tool.shape = {centre, centre, radius, radius};
+    tool.stiffest = stiffest;
+    return tool;
 }
 
 /// Relaxes until the residual is under `tolerance` of the contacts' forces.
@@ -180,6 +184,7 @@ inline chainmail::ElasticResult settle(chainmail::Elastic& elastic, const chainm
     return result;
 }
 
+/// With the windows around a point near the top of a block.
 inline chainmail::ElasticLoad loadOf(std::span<const chainmail::ElasticTool> tools, std::span<const chainmail::Tie> ties,
                                      Vec3 focus)
 {

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cmath>
+#include <vector>
 
 namespace palpate::chainmail {
 namespace {
@@ -190,6 +191,23 @@ TEST(Elastic, WorkOfAllToolsAndTiesIsTheEnergy)
     }
     EXPECT_GT(energy, 1e-4);
     EXPECT_NEAR(work, energy, 0.01 * energy);
+}
+
+// Sixteen tools are the most that one body feels; those behind have no force, and change nothing.
+TEST(Elastic, ToolsBeyondTheSixteenthAreLeftOut)
+{
+    const ElasticBody block = body();
+    std::vector<ElasticTool> tools;
+    for (int i = 0; i < 40; ++i) {
+        tools.push_back(pressed(1e-3, 2.5e-3 * Vec3(i % 4 - 1.5, 0.0, i / 4 - 1.5)));
+    }
+    Elastic some(block, {}, tests::focusUnder(top));
+    Elastic all(block, {}, tests::focusUnder(top));
+    const auto sixteen = some.relax(tests::loadOf(std::span(tools).first(16), {}, top));
+    const auto forty = all.relax(tests::loadOf(tools, {}, top));
+    EXPECT_GT(sixteen.contacts, 16U);
+    EXPECT_EQ(sixteen.energy, forty.energy);
+    EXPECT_EQ(all.toolForce(16), Vec3(0.0));
 }
 
 // Touching, sliding, moving windows, letting go: nothing comes from the heap.

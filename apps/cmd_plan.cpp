@@ -1,0 +1,219 @@
+#include <apps/command.h>
+
+#include <apps/outputs.h>
+#include <apps/progress.h>
+#include <apps/quantities.h>
+#include <apps/session.h>
+#include <experiments/planner.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+using datasets::ModelLevel;
+using datasets::Strain;
+using experiments::Plan;
+using experiments::PlanCandidate;
+
+struct Options {
+    std::string scene;
+    std::string error = "3%", forceError, budget = "400us";
+    double speed = 20;  // [mm/s]
+    experiments::PlanCosts costs;
+    std::string json;
+};
+
+double spacingOf(const PlanCandidate& c)
+{
+    return c.level == ModelLevel::elastic ? c.elastic.spacing : c.spacing;
+}
+
+nlohmann::json candidateFigures(const PlanCandidate& c)
+{
+    const bool elastic = c.level == ModelLevel::elastic;
+    nlohmann::json out{{"level", datasets::modelLevels[static_cast<std::size_t>(c.level)]},
+                       {"spacing_mm", 1e3 * spacingOf(c)},
+                       {"windows", nlohmann::json::array()},
+                       {"sweeps", elastic ? c.elastic.cycles : 0},
+                       {"strain", elastic && c.elastic.strain == Strain::finite ? "finite" : "small"},
+                       {"nodes", c.nodes},
+                       {"touched", c.touched},
+                       {"tried", c.tried},
+                       {"predicted_us", c.microseconds},
+                       {"holds_budget", c.holdsBudget}};
+    if (elastic) {
+        out["windows"].push_back(c.elastic.window);
+    }
+    if (c.tried) {
+        out["predicted_error_pct"] = c.rms;
+        out["rms_pct"] = c.rms;
+        out["near_pct"] = c.near;
+        out["force_pct"] = nullptr;
+        out["holds_error"] = c.holdsError;
+    }
+    if (c.force) {
+        out["force_pct"] = *c.force;
+    }
+    return out;
+}
+
+nlohmann::json planFigures(const Options& o, const Plan& plan, const experiments::PlanRequest& request)
+{
+    auto candidates = nlohmann::json::array();
+    for (const PlanCandidate& c : plan.candidates) {
+        candidates.push_back(candidateFigures(c));
+    }
+    nlohmann::json out = plan.choice ? candidateFigures(plan.candidates[*plan.choice]) : nlohmann::json::object();
+    out["scene"] = o.scene;
+    out["found"] = plan.choice.has_value();
+    out["error_pct"] = 100.0 * request.error;
+    out["budget_us"] = 1e6 * request.budget;
+    out["ns_per_node"] = request.costs.nsPerNode;
+    out["reference_spacing_mm"] = 1e3 * plan.referenceSpacing;
+    out["reference_nodes"] = plan.referenceNodes;
+    out["reference_strain"] = plan.finiteReference ? "finite" : "small";
+    out["local_strain"] = plan.strain;
+    out["candidates"] = candidates;
+    return out;
+}
+
+std::string verdict(const PlanCandidate& c, bool chosen)
+{
+    if (chosen) {
+        return "chosen: the cheapest that holds both";
+    }
+    if (!c.tried) {
+        return c.holdsBudget ? "not tried: dearer than the choice" : "not tried: over the budget";
+    }
+    if (!c.holdsError && !c.holdsBudget) {
+        return "over error and budget";
+    }
+    return c.holdsError ? "over the budget" : "over the error";
+}
+
+void printCandidates(const Plan& plan)
+{
+    fmt::print("{:<52} {:>9} {:>8} {:>8} {:>8} {:>10}\n", "candidate", "nodes", "rms", "near", "force", "predicted");
+    for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
+        const PlanCandidate& c = plan.candidates[i];
+        const auto percent = [&](double value) { return c.tried ? fmt::format("{:.2f}%", value) : std::string("-"); };
+        fmt::print("{:<52} {:>9} {:>8} {:>8} {:>8} {:>7.0f} us  {}\n", c.name(), c.nodes, percent(c.rms), percent(c.near),
+                   c.force ? percent(*c.force) : "-", c.microseconds, verdict(c, plan.choice == i));
+    }
+}
+
+// What a better one would cost, and what the choice does not do.
+void printGivenUp(const Plan& plan, const PlanCandidate& c)
+{
+    fmt::print("gives up: {:.2f} % of the largest displacement (rms over the tissue), {:.2f} % near the tool", c.rms,
+               c.near);
+    if (c.force) {
+        fmt::print(", {:.2f} % of the force", *c.force);
+    }
+    fmt::print("\n");
+    if (c.level != ModelLevel::elastic) {
+        fmt::print("gives up: forces from the tissue's energy: they come from the contact laws alone\n");
+    } else if (c.elastic.strain == Strain::small && plan.finiteReference) {
+        fmt::print("gives up: finite strain, though {:.0f} % of local strain are reached: its errors above hold that in\n",
+                   100.0 * plan.strain);
+    }
+}
+
+void printToml(const PlanCandidate& c)
+{
+    fmt::print("\n[model]\nlevel = \"{}\"\n", datasets::modelLevels[static_cast<std::size_t>(c.level)]);
+    if (c.level == ModelLevel::chainmail) {
+        fmt::print("spacing_mm = {:g}\n", 1e3 * c.spacing);
+    }
+    if (c.level == ModelLevel::elastic) {
+        fmt::print("\n[model.elastic]\nspacing_mm = {:g}\nwindow = {}\ncycles = {}\nstrain = \"{}\"\n",
+                   1e3 * c.elastic.spacing, c.elastic.window, c.elastic.cycles,
+                   c.elastic.strain == Strain::finite ? "finite" : "small");
+    }
+}
+
+void printReference(const Plan& plan, const experiments::PlanCosts& costs)
+{
+    fmt::print(
+        "errors are worst values over a push and a drag, against {} strain solved on {} nodes of {:g} mm; local strain "
+        "reaches {:.0f} %\n",
+        plan.finiteReference ? "finite" : "small", plan.referenceNodes, 1e3 * plan.referenceSpacing, 100.0 * plan.strain);
+    fmt::print(
+        "time is counted: nodes x ({:g} + {:g} per cycle) x {:g} ns ({:g} x for finite strain), contact points x (1 + "
+        "cycles) x {:g} ns, ChainMail's nodes x {:g} ns, {:g} us for the rest of a tick; measured on a Zen 5 server "
+        "core with AVX-512 (--ns-per-node changes the first)\n",
+        costs.passesPerTick, costs.passesPerCycle, costs.nsPerNode, costs.finiteFactor, costs.nsPerContact, costs.nsPerMove,
+        costs.usPerTick);
+}
+
+void planScene(const Options& o)
+{
+    checkOutput(o.json);
+    experiments::PlanRequest request;
+    request.error = parseShare("--error", o.error);
+    if (!o.forceError.empty()) {
+        request.forceError = parseShare("--force-error", o.forceError);
+    }
+    request.budget = parseTime("--budget", o.budget);
+    request.speed = 1e-3 * o.speed;
+    request.costs = o.costs;
+
+    Progress progress;
+    progress.show(o.scene + ": volume");
+    SceneChanges changes;
+    changes.model = "spring";  // the bodies are made here, one per spacing
+    const auto model = openSession(o.scene, changes);
+    const Plan plan = experiments::planModel(model, request, [&](const std::string& what) { progress.show(what); });
+    progress.clear();
+    if (!o.json.empty()) {
+        writeJson(o.json, planFigures(o, plan, request));
+    }
+    const bool tell = o.json != "-";
+    if (tell) {
+        printReference(plan, request.costs);
+        printCandidates(plan);
+    }
+    if (!plan.choice) {
+        const PlanCandidate& c = plan.candidates[plan.nearest];
+        throw std::runtime_error(
+            fmt::format("{}: no model holds {:g} % in {:g} us; the nearest is {}: {:.2f} % in {:.0f} us", o.scene,
+                        100.0 * request.error, 1e6 * request.budget, c.name(), c.rms, c.microseconds));
+    }
+    if (tell) {
+        const PlanCandidate& c = plan.candidates[*plan.choice];
+        fmt::print("\n{}: error {:.2f} %, {:.0f} us per tick\n", c.name(), c.rms, c.microseconds);
+        printGivenUp(plan, c);
+        printToml(c);
+    }
+}
+
+}  // namespace
+
+void addPlan(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    auto* command = app.add_subcommand("plan", "Pick the cheapest tissue model that holds an error and a time per tick");
+    command->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
+    command->add_option("--error", o->error, "Error of the shape (rms) that may not be passed: 3% or 0.03")
+        ->capture_default_str();
+    command->add_option("--force-error", o->forceError, "Error of the force that may not be passed either: 5% or 0.05");
+    command->add_option("--budget", o->budget, "Time per tick: 400us or 0.4ms")->capture_default_str();
+    command->add_option("--speed", o->speed, "Speed of the test push [mm/s]")
+        ->check(CLI::Range(1.0, 1000.0))
+        ->capture_default_str();
+    command->add_option("--ns-per-node", o->costs.nsPerNode, "Time per node and pass of this machine [ns]")
+        ->check(CLI::Range(0.01, 1000.0))
+        ->capture_default_str();
+    command->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    command->final_callback([o] { planScene(*o); });
+}
+
+}  // namespace palpate::apps

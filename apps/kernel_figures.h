@@ -1,0 +1,33 @@
+#pragma once
+
+#include <experiments/bench_kernel.h>
+#include <experiments/bench_operator.h>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::apps {
+
+/// Nodes along the windows of these settings, each once.
+std::vector<int> operatorWindows(const std::vector<std::string>& settings);
+
+/// How much longer than the windows the fastest single grid takes whose error in `figure` is no larger; 0 when there is
+/// none, or the case has no rivals.
+double singleGridRatio(const experiments::KernelCase& c, double experiments::TrialErrors::*figure);
+
+/// What `bench kernel --json` writes. The single figures are those of setting `headline`.
+nlohmann::json kernelFigures(const std::vector<experiments::KernelCase>& cases, const experiments::OperatorBench& operators,
+                             const std::string& headline);
+
+/// The single figures, for people.
+void printSummary(const nlohmann::json& figures);
+
+/// Writes kernel.json, kernel.png and kernel.html: error against time, one series per setting and rival. Throws
+/// std::runtime_error.
+void writeKernelFolder(const std::filesystem::path& folder, const nlohmann::json& figures,
+                       const std::vector<experiments::KernelCase>& cases);
+
+}  // namespace palpate::apps
