@@ -158,6 +158,18 @@ void layOnItsBack(CellLevel& level)
     volume::forEachIndex({0, first, 0}, level.nodes.size - 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
 }
 
+// A surface that runs along the border of two cells may lie in the empty one, whose nodes have nothing to hold them.
+Vec3 anchorOf(const CellLevel& level, Vec3 on, Index3 under)
+{
+    const auto& g = level.nodes;
+    const Index3 cell(glm::floor((on - g.origin) / g.spacing));
+    if (g.contains(cell) && level.mu[g.offset(cell)] > 0.0F) {
+        return on;
+    }
+    const Vec3 edge(1e-3 * g.spacing);
+    return glm::clamp(on, g.position(under) + edge, g.position(under + 1) - edge);
+}
+
 // The surface as points with areas: in every sub-cell near it the distance field gives the nearest point, and a hat as wide
 // as the sub-cell looks along the normal shares the area among the sub-cells that see the same piece.
 // Source: B. Engquist, A.-K. Tornberg, R. Tsai, "Discretization of Dirac delta functions in level set methods", J. Comput.
@@ -185,7 +197,8 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             }
             const float mu = finest.mu[finest.nodes.offset(under)];
             if (mu > 0.0F) {
-                body.points.push_back({Vec3f(on), static_cast<float>(sub * sub * sub * hat / width), mu});
+                body.points.push_back(
+                    {Vec3f(on), Vec3f(anchorOf(finest, on, under)), static_cast<float>(sub * sub * sub * hat / width), mu});
                 ++run.count;
             }
         });

@@ -21,6 +21,7 @@ struct CellLevel {
 /// A piece of the body's surface at rest.
 struct SurfacePoint {
     Vec3f position{0.0F};  // [m]
+    Vec3f anchor{0.0F};    // the nearest point in a cell that has tissue: what it moves with [m]
     float area = 0;        // [m^2]
     float mu = 0;          // of the tissue under it [Pa]
 };

@@ -45,7 +45,7 @@ public:
     void addTie(const Tie& tie, std::size_t index) noexcept
     {
         ContactSite site;
-        site.rest = tie.rest;
+        site.rest = site.anchor = tie.rest;
         site.owner = static_cast<std::uint16_t>(index);
         site.isTie = true;
         site.stiffness = tie.along;
@@ -106,6 +106,7 @@ private:
             const SurfacePoint& point = body_.points[i];
             ContactSite site;
             site.rest = Vec3(point.position);
+            site.anchor = Vec3(point.anchor);
             site.owner = static_cast<std::uint16_t>(index);
             site.point = i;
             site.stiffness = siteStiffness(point, spacing, tool);
@@ -123,7 +124,7 @@ private:
 
     bool add(ContactSite& site) noexcept
     {
-        locate(body_, windows_, site.rest, site);
+        locate(body_, windows_, site.anchor, site);
         if (site.level >= windows_.size() || count_ == out_.size()) {
             return false;
         }

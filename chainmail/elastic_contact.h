@@ -47,6 +47,7 @@ struct ContactSite {
     std::uint32_t point = 0;       // index of the surface point
     std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
     Vec3 rest{0.0};
+    Vec3 anchor{0.0};      // the point in a cell that it moves with [m]
     double stiffness = 0;  // of a surface point; of a tie along its axis [N/m]
     double across = 0;     // of a tie, across its axis [N/m]
 

@@ -136,16 +136,18 @@ struct Linear {
 // Finite strain: stable neo-Hookean on the mean deformation gradient. With modes eight times their size F = I + m / (4 h),
 // and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h times the scaled stiffness.
 struct NeoHookean {
-    float inverse;  // 1 / h
-    Lanes energy{};
+    float inverse;                         // 1 / h
+    Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
+    std::size_t turn = 0;
 
+    // With G = F - I:  J - 1 = tr G + (tr^2 - G : G^T) / 2 + det G, so that no small difference of large numbers is taken.
     void operator()(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
     {
         const float q = 0.25F * inverse;
         const float h8 = 8.0F / inverse;
-        Lanes f[3][3] = {{q * m[0].x + 1.0F, q * m[0].y, q * m[0].z},
-                         {q * m[1].x, q * m[1].y + 1.0F, q * m[1].z},
-                         {q * m[2].x, q * m[2].y, q * m[2].z + 1.0F}};
+        const Lanes f[3][3] = {{q * m[0].x, q * m[0].y, q * m[0].z},
+                               {q * m[1].x, q * m[1].y, q * m[1].z},
+                               {q * m[2].x, q * m[2].y, q * m[2].z}};
         Lanes c[3][3];
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
@@ -155,17 +157,21 @@ struct NeoHookean {
                 c[i][j] = f[i1][j1] * f[i2][j2] - f[i1][j2] * f[i2][j1];
             }
         }
-        const Lanes volume = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2] - 1.0F;
-        const Lanes bulk = lambda + mu;
-        const Lanes pressure = bulk * volume - mu;
+        const Lanes trace = f[0][0] + f[1][1] + f[2][2];
+        const Lanes minors = c[0][0] + c[1][1] + c[2][2];
+        const Lanes determinant = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2];
+        const Lanes volume = trace + minors + determinant;
+        const Lanes pressure = (lambda + mu) * volume;
         Lanes p[3][3];
-        Lanes stretch = Lanes{} - 3.0F;
+        Lanes square{};
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
 #pragma GCC unroll 3
             for (int j = 0; j < 3; ++j) {
-                p[i][j] = h8 * (mu * f[i][j] + pressure * c[i][j]);
-                stretch += f[i][j] * f[i][j];
+                // Cofactor of F, less I: tr G I - G^T + cof G.
+                const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
+                p[i][j] = h8 * (mu * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor));
+                square += f[i][j] * f[i][j];
             }
         }
         g[0].x = p[0][0];
@@ -185,7 +191,8 @@ struct NeoHookean {
             bend += g[i].xy * m[i].xy + g[i].yz * m[i].yz + g[i].zx * m[i].zx + g[i].xyz * m[i].xyz;
         }
         const float h2 = 32.0F / (inverse * inverse);
-        energy += h2 * (0.5F * mu * stretch + (0.5F * bulk * volume - mu) * volume) + 0.5F * bend;
+        energy[turn] += h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume) + 0.5F * bend;
+        turn = (turn + 1) % (Layout::lanes / W);
     }
 };
 
@@ -338,7 +345,11 @@ double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse,
 {
     NeoHookean law{inverse};
     sweepCells(layout, stiffness, u, out, scratch, law);
-    return sumOf(law.energy);
+    double sum = 0.0;
+    for (const Lanes& part : law.energy) {
+        sum += sumOf(part);
+    }
+    return sum;
 }
 
 // Sixteen partial sums at any width, flushed into doubles, so that every instruction set adds in the same order.

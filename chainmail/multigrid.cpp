@@ -3,17 +3,16 @@
 #include <glm/matrix.hpp>
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <cstring>
 
 namespace palpate::chainmail {
 
 namespace {
 
-constexpr double margin = 1.05;        // on the estimate of the largest eigenvalue
-constexpr double smoothed = 4.0;       // the smoother takes the upper three quarters of the spectrum
-constexpr int coarsestSteps = 8;       // Chebyshev steps on the coarsest level
-constexpr double coarsestSpread = 40;  // largest to smallest eigenvalue there
+constexpr double margin = 1.05;         // on the estimate of the largest eigenvalue
+constexpr double smoothed = 4.0;        // the smoother takes the upper three quarters of the spectrum
+constexpr int coarsestSteps = 14;       // Chebyshev steps on the coarsest level
+constexpr double coarsestSpread = 160;  // largest to smallest eigenvalue there
 
 Vec3 valueAt(const Window& w, std::size_t node, Field field) noexcept
 {
@@ -75,7 +74,9 @@ void Multigrid::prepare() noexcept
             b.diagonal = w.diagonal[b.node];
             w.diagonal[b.node] = 0.0F;
             if (b.diagonal > 0.0F) {
-                b.inverse = glm::inverse(glm::dmat3(1.0 / static_cast<double>(w.weight * b.diagonal)) + b.stiffness);
+                // On the coarsest level the weight comes with the step.
+                const double weight = l + 1 < blocks_.size() ? static_cast<double>(w.weight) : 1.0;
+                b.inverse = glm::inverse(glm::dmat3(1.0 / (weight * static_cast<double>(b.diagonal))) + b.stiffness);
             }
             if (l + 1 < blocks_.size()) {
                 const auto at = static_cast<std::size_t>(b.node);
@@ -101,35 +102,43 @@ void Multigrid::operate(std::size_t level) noexcept
 }
 
 // The smoother's step at nodes with contacts: z += (D / weight + B)^-1 (r - t), t = 0 in the first.
-void Multigrid::smoothContacts(std::size_t level, bool first) noexcept
+void Multigrid::smoothContacts(std::size_t level, Field field, bool first, double weight) noexcept
 {
     Window& w = stack_[level];
     for (const Block& b : blocks_[level]) {
         if (b.diagonal > 0.0F) {
             const Vec3 off = valueAt(w, b.node, Field::r) - (first ? Vec3(0.0) : valueAt(w, b.node, Field::t));
-            addAt(w, b.node, Field::z, b.inverse * off);
+            addAt(w, b.node, field, weight * (b.inverse * off));
         }
     }
 }
 
+// Chebyshev's three-term recurrence on [high / spread, high]; the steps add up in f, which is free until the cycle is done.
+// Source: Y. Saad, "Iterative Methods for Sparse Linear Systems", 2nd ed., algorithm 12.1.
 void Multigrid::solveCoarsest() noexcept
 {
-    Window& w = stack_[stack_.size() - 1];
+    const std::size_t level = stack_.size() - 1;
+    Window& w = stack_[level];
     const Kernels& k = stack_.kernels();
-    // Roots of the Chebyshev polynomial on the operator's spectrum, largest weights spread between small ones.
-    const double high = 2.0 / static_cast<double>(w.weight) / (1.0 + 1.0 / smoothed);
+    const std::size_t n = w.layout.count;
+    const double high = margin * stack_.body().levels[level].radius;
     const double low = high / coarsestSpread;
-    constexpr std::array<int, coarsestSteps> order{0, 7, 3, 4, 1, 6, 2, 5};
-    for (int s = 0; s < coarsestSteps; ++s) {
-        const double angle = std::numbers::pi * (order[static_cast<std::size_t>(s)] + 0.5) / coarsestSteps;
-        const float weight = static_cast<float>(1.0 / (0.5 * (high + low) + 0.5 * (high - low) * std::cos(angle)));
-        if (s == 0) {
-            k.smoothFirst(weight, w.diagonal.data(), w.field(Field::r), w.field(Field::z), w.layout.count);
-        } else {
-            operate(stack_.size() - 1);
-            k.smooth(weight, w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::z), w.layout.count);
-        }
-        smoothContacts(stack_.size() - 1, s == 0);
+    const double middle = 0.5 * (high + low);
+    const double half = 0.5 * (high - low);
+    double rho = half / middle;
+    k.smoothFirst(static_cast<float>(1.0 / middle), w.diagonal.data(), w.field(Field::r), w.field(Field::f), n);
+    smoothContacts(level, Field::f, true, 1.0 / middle);
+    std::memcpy(w.field(Field::z), w.field(Field::f), 3 * n * sizeof(float));
+    for (int s = 1; s < coarsestSteps; ++s) {
+        operate(level);
+        const double next = 1.0 / (2.0 * middle / half - rho);
+        const double weight = 2.0 * next / half;
+        const auto shrink = static_cast<float>(next * rho - 1.0);
+        k.combine(w.field(Field::f), shrink, w.field(Field::f), w.field(Field::f), 3 * n);
+        k.smooth(static_cast<float>(weight), w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::f), n);
+        smoothContacts(level, Field::f, false, weight);
+        k.combine(w.field(Field::z), 1.0F, w.field(Field::f), w.field(Field::z), 3 * n);
+        rho = next;
     }
 }
 
@@ -142,7 +151,7 @@ void Multigrid::cycle(std::size_t level) noexcept
         return;
     }
     k.smoothFirst(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::z), w.layout.count);
-    smoothContacts(level, true);
+    smoothContacts(level, Field::z, true, 1.0);
     operate(level);
     k.residual(w.open.data(), w.field(Field::r), w.field(Field::t), w.field(Field::t), w.layout.count);
 
@@ -154,7 +163,7 @@ void Multigrid::cycle(std::size_t level) noexcept
     k.addMasked(w.open.data(), w.field(Field::t), w.field(Field::z), w.layout.count);
     operate(level);
     k.smooth(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::z), w.layout.count);
-    smoothContacts(level, false);
+    smoothContacts(level, Field::z, false, 1.0);
 }
 
 }  // namespace palpate::chainmail

@@ -24,7 +24,7 @@ public:
     /// Takes the contacts to the coarser levels and prepares their smoothers: after the last addContact().
     void prepare() noexcept;
 
-    /// z = M^-1 r. What r holds on the coarser windows is used up.
+    /// z = M^-1 r; r is zero but at degrees of freedom. What it holds on the coarser windows is used up.
     void solve() noexcept { cycle(0); }
 
 private:
@@ -37,7 +37,7 @@ private:
 
     void cycle(std::size_t level) noexcept;
     void operate(std::size_t level) noexcept;
-    void smoothContacts(std::size_t level, bool first) noexcept;
+    void smoothContacts(std::size_t level, Field field, bool first, double weight) noexcept;
     void solveCoarsest() noexcept;
 
     WindowStack& stack_;

@@ -14,6 +14,15 @@ bool onFace(const Layout& l, Index3 n) noexcept
     return n.x == 0 || n.y == 0 || n.z == 0 || n.x == l.nx - 1 || n.y == l.ny - 1 || n.z == l.nz - 1;
 }
 
+// True when one of the cells from `first` to `last` is not empty.
+bool anyTissue(const Layout& l, const Floats& mu, Index3 first, Index3 last) noexcept
+{
+    bool any = false;
+    volume::forEachIndex(glm::max(first, Index3(0)), glm::min(last, Index3(l.nx - 2, l.ny - 2, l.nz - 2)),
+                         [&](Index3 c) { any = any || mu[l.at(c.x, c.y, c.z)] > 0.0F; });
+    return any;
+}
+
 Index3 offsetIn(const Window& fine, const Window& coarse) noexcept
 {
     return fine.low / 2 - coarse.low;
@@ -90,6 +99,20 @@ void Window::cover(const Window& finer) noexcept
         uncoveredLambda[layout.at(c.x, c.y, c.z)] = 0.0F;
     });
     volume::forEachIndex(o + 1, o + cells - 1, [&](Index3 n) { dof[layout.at(n.x, n.y, n.z)] = 0.0F; });
+    // A node on the finer window's border may be left with nothing but empty cells around it.
+    const auto pulled = [&](Index3 n) {
+        bool any = anyTissue(layout, uncoveredMu, n - 1, n);
+        const Index3 fine = 2 * (n - o);
+        volume::forEachIndex(glm::max(fine - 1, Index3(0)), glm::min(fine + 1, finer.size() - 1), [&](Index3 m) {
+            any =
+                any || (finer.border[finer.layout.at(m.x, m.y, m.z)] > 0.0F && anyTissue(finer.layout, finer.mu, m - 1, m));
+        });
+        return any;
+    };
+    volume::forEachIndex(o, o + cells, [&](Index3 n) {
+        float& free = dof[layout.at(n.x, n.y, n.z)];
+        free = free > 0.0F && pulled(n) ? 1.0F : 0.0F;
+    });
 }
 
 void prolong(const Kernels& k, const Window& coarse, const float* from, const Window& fine, float* to) noexcept

@@ -1,6 +1,7 @@
 #include <chainmail/window_stack.h>
 
 #include <glm/common.hpp>
+#include <glm/vector_relational.hpp>
 
 #include <algorithm>
 #include <cstring>
@@ -73,10 +74,13 @@ void WindowStack::place() noexcept
         const Index3 size = windows_[l].size();
         const Index3 coarse = windows_[l + 1].size();
         const Index3 last = body_->levels[l + 1].nodes.size - coarse;
-        const Index3 need = low_[l] / 2 + (size - 1) / 2 - coarse + 1;
-        low_[l + 1] = glm::clamp(low_[l + 1], glm::max(need, Index3(0)), glm::min(low_[l] / 2, last));
+        const Index3 need = glm::max(low_[l] / 2 + (size - 1) / 2 - coarse + 1, Index3(0));
+        const Index3 most = glm::min(low_[l] / 2, last);
+        low_[l + 1] = glm::clamp(low_[l + 1], need, most);
         if (l + 2 < windows_.size()) {
-            low_[l + 1] -= low_[l + 1] % 2;
+            // Even, so that it has nodes in common with the next: up, or down where up is too far.
+            low_[l + 1] += low_[l + 1] % 2;
+            low_[l + 1] -= 2 * Index3(glm::greaterThan(low_[l + 1], most));
         }
     }
     for (std::size_t l = 0; l < windows_.size(); ++l) {
