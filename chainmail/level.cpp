@@ -15,6 +15,7 @@ constexpr float leastShown = 20e-6F;     // displacements below are not carried 
 constexpr int nearNodes = 4;             // nodes to each side of the tool that every call writes
 constexpr int layersPerCall = 4;         // of the finest window, beside those
 constexpr int turnsPerCall = 128;        // nodes of the outer lattice per call and window
+constexpr int turnsAtRest = 512;         // the same, when all go back to rest
 constexpr std::size_t windowsShown = 3;  // the finest, and two by turns
 constexpr float leastVolume = 0.05F;     // of a cell that still counts as not inverted, share of its volume at rest
 constexpr std::array<float, 4> shares{1.0F, 0.5F, 0.25F, 0.0F};
@@ -275,7 +276,8 @@ void ElasticLevel::writeByTurns(std::size_t level) noexcept
 // What moved once is looked at again, also where no window is any more.
 void ElasticLevel::revisitMoved() noexcept
 {
-    for (int i = 0; i < turnsPerCall && !shape_.moved().empty(); ++i) {
+    const int turns = elastic_.atRest() ? turnsAtRest : turnsPerCall;
+    for (int i = 0; i < turns && !shape_.moved().empty(); ++i) {
         revisited_ = revisited_ + 1 < shape_.moved().size() ? revisited_ + 1 : 0;
         write(shape_.moved()[revisited_]);
     }

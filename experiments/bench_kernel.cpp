@@ -39,7 +39,7 @@ private:
         const bool finite = elastic.strain == datasets::Strain::finite;
         const TrialPath path = trialPath(*model_.tissue, model_.surface, place_, tool, body.cells.spacing);
         progress_(fmt::format("{}: {}, {}: reference", model_.scene.name, tool.name, setting));
-        const Reference reference = solveReference(body.body, path, request_.speeds, finite);
+        const Reference reference = solveReference(body.body, path, request_.speeds, {.finiteStrain = finite});
         const ElasticOptions options{.window = elastic.window, .cycles = elastic.cycles, .finiteStrain = finite};
         for (const double speed : request_.speeds) {
             progress_(fmt::format("{}: {}, {}: {:g} mm/s", model_.scene.name, tool.name, setting, 1e3 * speed));

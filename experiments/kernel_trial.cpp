@@ -18,8 +18,6 @@ using namespace chainmail;
 namespace {
 
 constexpr int wholeWindow = 1023;        // nodes along each side: more than any level has
-constexpr double tolerance = 3e-5;       // of a reference, share of the contacts' forces
-constexpr int mostCycles = 200;          // of a reference
 constexpr double nearField = 30e-3;      // [m]
 constexpr double leastForce = 0.05;      // share of the path's peak
 constexpr double strainedVolume = 1e-7;  // [m^3]
@@ -106,14 +104,14 @@ double shareLeft(const Elastic& elastic, const ElasticResult& result)
 }
 
 // From rest, or, where the energy may have more than one minimum, from the state before.
-double converge(Elastic& elastic, const ElasticLoad& load, bool fromRest, ElasticResult& result)
+double converge(Elastic& elastic, const ElasticLoad& load, const ReferenceOptions& options, ElasticResult& result)
 {
-    if (fromRest) {
+    if (!options.finiteStrain) {
         ElasticLoad none;
         none.focus = load.focus;
         elastic.relax(none, 0, 0.0);
     }
-    result = elastic.relax(load, mostCycles, tolerance);
+    result = elastic.relax(load, options.mostCycles, options.tolerance);
     return shareLeft(elastic, result);
 }
 
@@ -193,24 +191,23 @@ ElasticOptions wholeGrid(int cycles, bool finiteStrain)
     return {.window = wholeWindow, .cycles = cycles, .finiteStrain = finiteStrain};
 }
 
-Reference solveReference(const ElasticBody& body, const TrialPath& path, std::span<const double> speeds, bool finiteStrain,
-                         std::size_t mostPoints)
+Reference solveReference(const ElasticBody& body, const TrialPath& path, std::span<const double> speeds,
+                         const ReferenceOptions& options)
 {
     Reference reference;
     const auto& level = body.levels.front();
     const std::vector<Index3> nodes = freeNodes(level);
-    const std::size_t stride =
-        std::max<std::size_t>(1, nodes.size() / mostPoints + (nodes.size() % mostPoints != 0 ? 1 : 0));
+    const std::size_t stride = nodes.size() / options.mostPoints + 1;
     for (std::size_t i = 0; i < nodes.size(); i += stride) {
         reference.position.emplace_back(level.nodes.position(nodes[i]));
     }
     TrialLoad load(path);
-    Elastic elastic(body, wholeGrid(1, finiteStrain), load.load().focus);
+    Elastic elastic(body, wholeGrid(1, options.finiteStrain), load.load().focus);
     reference.nodes = elastic.nodes();
     for (const TrialPose& pose : looksOf(path, speeds)) {
         load.set(pose);
         ElasticResult result;
-        const double residual = converge(elastic, load.load(), !finiteStrain, result);
+        const double residual = converge(elastic, load.load(), options, result);
         reference.states.push_back(stateOf(elastic, load, reference.position));
         ReferenceState& state = reference.states.back();
         state.energy = result.energy;
@@ -311,13 +308,14 @@ FullSolve fullSolve(const ElasticBody& body, const TrialPath& path, double speed
     using Clock = std::chrono::steady_clock;
     constexpr int few = 5;
     constexpr double thousandth = 1e-3;
+    constexpr int enough = 200;
     TrialLoad load(path);
     Elastic elastic(body, wholeGrid(1, finiteStrain), load.load().focus);
     const double step = speed * 1e-3;
     const auto solve = [&](int tick) {
         load.set({0.6 * path.press + tick * step, 0.0});
         const auto start = Clock::now();
-        elastic.relax(load.load(), mostCycles, thousandth);
+        elastic.relax(load.load(), enough, thousandth);
         return std::chrono::duration<double>(Clock::now() - start).count();
     };
     FullSolve times;

@@ -37,13 +37,18 @@ struct Reference {
 /// A whole body in one window: every level covers all of it.
 chainmail::ElasticOptions wholeGrid(int cycles, bool finiteStrain);
 
-/// Solves the looks of the path at all these speeds, one from the other. The body must outlive the call only.
-/// Small strain is solved from rest at every look, so that no rounding is carried along. Cost: some 60 cycles over all
+struct ReferenceOptions {
+    bool finiteStrain = false;
+    double tolerance = 3e-5;                                           // residual, share of the contacts' forces
+    int mostCycles = 200;                                              // per look
+    std::size_t mostPoints = std::numeric_limits<std::size_t>::max();  // of Reference::position: every n-th free node
+};
+
+/// Solves the looks of the path at all these speeds. Small strain is solved from rest at every look, so that no rounding is
+/// carried along; finite strain from the look before. The body must outlive the call only. Cost: some 60 cycles over all
 /// nodes per look.
-///
-/// @param mostPoints  of Reference::position: every n-th free node, so that there are no more
 Reference solveReference(const chainmail::ElasticBody& body, const TrialPath& path, std::span<const double> speeds,
-                         bool finiteStrain, std::size_t mostPoints = std::numeric_limits<std::size_t>::max());
+                         const ReferenceOptions& options);
 
 /// What a trial drives: anything that follows a load tick by tick.
 struct TrialModel {

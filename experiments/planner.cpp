@@ -21,11 +21,12 @@ namespace {
 constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
 constexpr std::array windows{9, 15, 21, 31};
 constexpr std::array cycles{1, 2};
-constexpr std::size_t mostNodes = 640000;        // of a grid: a reference takes half a minute
-constexpr std::size_t mostWindowNodes = 300000;  // no budget under 5 ms pays for more
-constexpr std::size_t mostPoints = 60000;        // at which errors are looked at
-constexpr double farOver = 2.0;                  // budgets: a candidate that costs more is not tried
-constexpr double typicalTouched = 300;           // contact points, before they are counted
+constexpr std::size_t mostReferenceCells = 400000;  // both references take some seconds
+constexpr std::size_t mostCells = 4U << 20;         // of any other grid
+constexpr std::size_t mostWindowNodes = 300000;     // no budget under 5 ms pays for more
+constexpr std::size_t mostPoints = 60000;           // at which errors are looked at
+constexpr double farOver = 2.0;                     // budgets: a candidate that costs more is not tried
+constexpr double typicalTouched = 300;              // contact points, before they are counted
 constexpr double typicalMoved = 500;
 
 TrialTool sceneTool(const datasets::ToolSpec& tool)
@@ -38,6 +39,12 @@ TrialTool sceneTool(const datasets::ToolSpec& tool)
         default:
             return {"needle", TrialKind::needle, 0.0, 0.0};
     }
+}
+
+// A twentieth of the least error that is asked for in earnest.
+ReferenceOptions optionsOf(bool finiteStrain)
+{
+    return {.finiteStrain = finiteStrain, .tolerance = 5e-4, .mostCycles = 60, .mostPoints = mostPoints};
 }
 
 class Planner {
@@ -77,7 +84,7 @@ private:
         const auto found = bodies_.find(spacing);
         return found != bodies_.end()
                    ? found->second
-                   : bodies_.emplace(spacing, trialBody(*model_.tissue, model_.surface, spacing, poissonCap(), mostNodes))
+                   : bodies_.emplace(spacing, trialBody(*model_.tissue, model_.surface, spacing, poissonCap(), mostCells))
                          .first->second;
     }
 
@@ -86,15 +93,16 @@ private:
     void solve()
     {
         progress_("the converged solution");
-        const TrialBody& finest = bodyAt(spacings.back());
+        const TrialBody finest =
+            trialBody(*model_.tissue, model_.surface, spacings.back(), poissonCap(), mostReferenceCells);
         path_ = trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
         const std::array speeds{request_.speed};
-        reference_ = solveReference(finest.body, path_, speeds, false, mostPoints);
+        reference_ = solveReference(finest.body, path_, speeds, optionsOf(false));
         plan_.strain = reference_.strain;
         plan_.finiteReference = reference_.strain > largeStrain;
         if (plan_.finiteReference) {
             progress_("the converged solution at finite strain");
-            reference_ = solveReference(finest.body, path_, speeds, true, mostPoints);
+            reference_ = solveReference(finest.body, path_, speeds, optionsOf(true));
         }
         plan_.referenceSpacing = finest.cells.spacing;
         plan_.referenceNodes = reference_.nodes;
@@ -119,11 +127,11 @@ private:
 
     void addElastic(double spacing, int window)
     {
-        const TrialBody& body = bodyAt(spacing);
         // Finer than the reference there is nothing to be told about errors.
-        if (body.cells.spacing > 1.01 * spacing) {
+        if (spacing < 0.99 * plan_.referenceSpacing) {
             return;
         }
+        const TrialBody& body = bodyAt(spacing);
         PlanCandidate c;
         c.level = ModelLevel::elastic;
         c.elastic = model_.scene.model.elastic;
