@@ -133,6 +133,7 @@ experiments::KernelRequest requestOf(const Options& o)
     }
     const bool standard = std::ranges::find(o.settings, "default") != o.settings.end();
     request.rivalsOf = standard ? "default" : o.settings.back();
+    request.rivalCycles = o.quick ? 1 : 4;
     return request;
 }
 
@@ -193,7 +194,8 @@ void benchKernelCommand(Options o)
             });
     }
     progress.show("operator");
-    const auto operators = experiments::benchOperator(operatorWindows(request.settings));
+    const auto operators =
+        experiments::benchOperator(operatorWindows(o.quick ? std::vector<std::string>{} : request.settings));
     progress.clear();
     if (tell) {
         printRivals(cases);

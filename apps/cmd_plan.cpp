@@ -180,6 +180,7 @@ void planScene(const Options& o)
     if (tell) {
         printReference(plan, request.costs);
         printCandidates(plan);
+        std::fflush(stdout);
     }
     if (!plan.choice) {
         const PlanCandidate& c = plan.candidates[plan.nearest];

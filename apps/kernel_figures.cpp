@@ -215,7 +215,9 @@ std::vector<int> operatorWindows(const std::vector<std::string>& settings)
         windows.push_back(datasets::elasticSetting(setting).window);
     }
     windows.push_back(datasets::elasticSetting("default").window);
-    windows.push_back(31);
+    if (!settings.empty()) {
+        windows.push_back(31);  // fills its rows, and leaves the first-level cache
+    }
     std::ranges::sort(windows);
     windows.erase(std::unique(windows.begin(), windows.end()), windows.end());
     return windows;

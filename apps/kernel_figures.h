@@ -11,7 +11,7 @@
 
 namespace palpate::apps {
 
-/// Nodes along the windows of these settings, each once.
+/// Nodes along the windows of these settings and of the default one, each once; with settings, a larger window, too.
 std::vector<int> operatorWindows(const std::vector<std::string>& settings);
 
 /// How much longer than the windows the fastest single grid takes whose error in `figure` is no larger; 0 when there is

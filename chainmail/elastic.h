@@ -15,6 +15,7 @@ struct ElasticOptions {
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
     double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
     std::size_t maxSites = 4096;
+    bool goOn = true;  // begin with the last call's increment; without, a call begins where the tissue lies
 };
 
 struct ElasticResult {

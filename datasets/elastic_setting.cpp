@@ -18,9 +18,9 @@ struct Setting {
 
 constexpr ElasticSettings standard;
 constexpr std::array<Setting, 3> settings{{
-    {"fast", 3e-3, 13, 1},
+    {"fast", 4e-3, 9, 1},
     {"default", standard.spacing, standard.window, standard.cycles},
-    {"fine", 1e-3, 25, 2},
+    {"fine", 1.5e-3, 19, 1},
 }};
 
 }  // namespace

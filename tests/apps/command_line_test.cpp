@@ -9,8 +9,9 @@ using Words = std::vector<std::string>;
 
 TEST(CommandLine, EveryCommandExplainsItself)
 {
-    const std::vector<Words> commands{{},         {"train"}, {"import"}, {"info"},          {"phantom"},
-                                      {"replay"}, {"score"}, {"bench"},  {"bench", "tick"}, {"bench", "query"}};
+    const std::vector<Words> commands{
+        {},        {"train"}, {"import"},        {"info"},           {"phantom"},         {"replay"},
+        {"score"}, {"bench"}, {"bench", "tick"}, {"bench", "query"}, {"bench", "kernel"}, {"plan"}};
     for (Words words : commands) {
         words.push_back("--help");
         const Outcome outcome = palpate(words);
@@ -24,7 +25,7 @@ TEST(CommandLine, EveryCommandExplainsItself)
 TEST(CommandLine, TheHelpListsEveryCommand)
 {
     const std::string help = palpate({"--help"}).out;
-    for (const std::string command : {"train", "import", "info", "phantom", "replay", "score", "bench"}) {
+    for (const std::string command : {"train", "import", "info", "phantom", "replay", "score", "plan", "bench"}) {
         EXPECT_NE(help.find("\n  " + command + " "), std::string::npos) << command;
     }
 }

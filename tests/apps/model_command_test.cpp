@@ -1,0 +1,147 @@
+#include <tests/apps/program.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+
+namespace palpate::apps {
+namespace {
+
+// A block of fat that is small enough to be solved in no time, pressed by a sphere.
+std::string smallScene(const Folder& folder)
+{
+    const std::string file = folder / "small.toml";
+    writeText(
+        file,
+        "[volume]\nphantom = \"block\"\n[volume.parameters]\nwidth_mm = 30\nthickness_mm = 16\ntumours = 0\n[tool]\nkind "
+        "= \"sphere\"\nradius_mm = 5\n[dffb]\nmode = \"off\"\n[target]\nstructure = \"base\"\naim_mm = [0, 16, "
+        "0]\nentry_mm = [0, 0, 0]\n");
+    return file;
+}
+
+TEST(BenchKernel, WritesItsFiguresAndTheChart)
+{
+    const Folder folder;
+    const std::string out = folder / "kernel";
+    const auto figures = apps::figures({"bench", "kernel", "--quick", "--scenes", smallScene(folder), "-o", out});
+    for (const char* key :
+         {"cases", "operator_ns_per_node", "bound_fraction", "full_solve_ratio", "coarse_grid_ratio", "machine"}) {
+        EXPECT_TRUE(figures.contains(key)) << key;
+    }
+    ASSERT_EQ(figures["cases"].size(), 2U);
+    std::set<std::string> settings;
+    for (const auto& c : figures["cases"]) {
+        settings.insert(c["setting"]);
+        EXPECT_EQ(c["tool"], "sphere_5mm");
+        EXPECT_NEAR(c["speed_mm_s"].get<double>(), 20.0, 1e-9);
+        for (const char* key : {"tick_us_p50", "tick_us_p99", "nodes", "rms_pct", "near_pct", "max_pct", "force_pct"}) {
+            EXPECT_GT(c.at(key).get<double>(), 0.0) << key;
+        }
+        EXPECT_LT(c["rms_pct"].get<double>(), 10.0);
+        EXPECT_LE(c["rms_pct"].get<double>(), c["rms_worst_pct"].get<double>());
+        EXPECT_LE(c["tick_us_p50"].get<double>(), c["tick_us_p99"].get<double>());
+    }
+    EXPECT_EQ(settings, (std::set<std::string>{"default", "fast"}));
+    EXPECT_GT(figures["operator_ns_per_node"].get<double>(), 0.0);
+    EXPECT_GT(figures["bound_fraction"].get<double>(), 0.0);
+    EXPECT_LT(figures["bound_fraction"].get<double>(), 1.0);
+    EXPECT_GT(figures["full_solve_ratio"].get<double>(), 1.0);
+    for (const char* file : {"kernel.json", "kernel.png", "kernel.html"}) {
+        EXPECT_GT(std::filesystem::file_size(out + "/" + file), 1000U) << file;
+    }
+}
+
+TEST(BenchKernel, WhatIsNotThereIsRefusedOnOneLine)
+{
+    const Folder folder;
+    expectRefusal({"bench", "kernel", "--settings", "nosuch"}, "nosuch");
+    expectRefusal({"bench", "kernel", "--tools", "nosuch"}, "sphere_5mm, sphere_10mm, needle, shaft");
+    expectRefusal({"bench", "kernel", "--speeds", "0"}, "--speeds 0: must be 1 to 1000 mm/s");
+    expectRefusal({"bench", "kernel", "--scenes", "nosuch"}, "nosuch");
+    writeText(folder / "file", "no folder");
+    expectRefusal({"bench", "kernel", "-o", folder / "file"}, "is no folder");
+}
+
+TEST(Plan, PicksAModelAndSaysWhy)
+{
+    const Folder folder;
+    const std::string scene = smallScene(folder);
+    const auto plan = figures({"plan", scene, "--error", "5%", "--budget", "1ms", "--speed", "50"});
+    EXPECT_EQ(plan["level"], "elastic");
+    EXPECT_GT(plan["spacing_mm"].get<double>(), 0.0);
+    EXPECT_EQ(plan["windows"].size(), 1U);
+    EXPECT_GE(plan["sweeps"].get<int>(), 1);
+    EXPECT_LE(plan["predicted_error_pct"].get<double>(), 5.0);
+    EXPECT_LE(plan["predicted_us"].get<double>(), 1000.0);
+    EXPECT_DOUBLE_EQ(plan["error_pct"].get<double>(), 5.0);
+    EXPECT_DOUBLE_EQ(plan["budget_us"].get<double>(), 1000.0);
+    EXPECT_GT(plan["candidates"].size(), 10U);
+
+    const Outcome told = palpate({"plan", scene, "--error", "0.05", "--budget", "1000us", "--speed", "50"});
+    EXPECT_EQ(told.status, 0);
+    EXPECT_NE(told.out.find("chosen"), std::string::npos);
+    EXPECT_NE(told.out.find("over the error"), std::string::npos);
+    EXPECT_NE(told.out.find("gives up"), std::string::npos);
+}
+
+// The lines to paste are a model: the scene with them is one that trains.
+TEST(Plan, ItsLinesMakeAScene)
+{
+    const Folder folder;
+    const std::string scene = smallScene(folder);
+    const Outcome told = palpate({"plan", scene, "--error", "5%", "--budget", "1ms", "--speed", "50"});
+    const std::size_t begin = told.out.find("\n[model]\n");
+    ASSERT_NE(begin, std::string::npos) << told.out << told.err;
+    writeText(scene, readText(scene) + told.out.substr(begin));
+    const auto trained = figures({"train", scene, "--headless", "--unpaced", "--seconds", "0.02"});
+    EXPECT_EQ(trained.at("model"), "elastic");
+}
+
+// A machine ten times as slow gets a cheaper model, or none.
+TEST(Plan, TimeFollowsTheMachineAndNotTheClock)
+{
+    const Folder folder;
+    const std::vector<std::string> asked{"plan",  smallScene(folder), "--error", "80%", "--budget",
+                                         "100us", "--speed",          "50"};
+    const auto here = figures(asked);
+    auto slow = asked;
+    slow.insert(slow.end(), {"--ns-per-node", "8"});
+    const auto there = figures(slow);
+    EXPECT_EQ(here["level"], "spring");
+    EXPECT_EQ(there["ns_per_node"], 8);
+    for (std::size_t i = 0; i < here["candidates"].size(); ++i) {
+        for (const auto& other : there["candidates"]) {
+            const auto& c = here["candidates"][i];
+            const bool same = c["level"] == "elastic" && other["level"] == "elastic" && c["windows"] == other["windows"] &&
+                              c["spacing_mm"] == other["spacing_mm"] && c["sweeps"] == other["sweeps"] &&
+                              c["strain"] == other["strain"];
+            EXPECT_TRUE(!same || other["predicted_us"] > c["predicted_us"]);
+        }
+    }
+}
+
+TEST(Plan, WhatNothingHoldsEndsOnOneLine)
+{
+    const Folder folder;
+    const std::string scene = smallScene(folder);
+    const Outcome outcome = palpate({"plan", scene, "--error", "0.01%", "--budget", "30us", "--speed", "50"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("the nearest is"), std::string::npos) << outcome.err;
+}
+
+TEST(Plan, WrongQuantitiesAreRefused)
+{
+    for (const std::string error : {"0", "0%", "100%", "3", "-1%", "much", "nan", "3 percent"}) {
+        expectRefusal({"plan", "block", "--error", error}, "--error: " + error);
+    }
+    for (const std::string budget : {"0us", "400", "2s", "-1ms", "soon", "400 ns"}) {
+        expectRefusal({"plan", "block", "--budget", budget}, "--budget: " + budget);
+    }
+    expectRefusal({"plan"}, "SCENE");
+    expectRefusal({"plan", "nosuch"}, "nosuch");
+}
+
+}  // namespace
+}  // namespace palpate::apps

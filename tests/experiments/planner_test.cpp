@@ -1,0 +1,94 @@
+#include <experiments/planner.h>
+
+#include <tests/experiments/small_block.h>
+
+#include <gtest/gtest.h>
+
+namespace palpate::experiments {
+namespace {
+
+using datasets::ModelLevel;
+using datasets::Strain;
+
+Plan planned(double error, double budget)
+{
+    static const haptics::SessionModel model = smallBlock();
+    PlanRequest request;
+    request.error = error;
+    request.budget = budget;
+    request.speed = 0.05;
+    return planModel(model, request, [](const std::string&) {});
+}
+
+// 1000 nodes x (1.5 + 10 x 2) passes x 0.8 ns + 100 points x (1 + 2) x 90 ns + 20 us.
+TEST(Planner, TimeIsCountedAndNotMeasured)
+{
+    PlanCandidate c;
+    EXPECT_DOUBLE_EQ(predictedTime(c, {}), 20.0);
+    c.level = ModelLevel::elastic;
+    c.nodes = 1000;
+    c.touched = 100;
+    c.elastic.cycles = 2;
+    const PlanCosts costs{.nsPerNode = 0.8,
+                          .finiteFactor = 2.0,
+                          .passesPerTick = 1.5,
+                          .passesPerCycle = 10,
+                          .nsPerContact = 90,
+                          .nsPerMove = 200,
+                          .usPerTick = 20};
+    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 17.2 + 27.0, 1e-9);
+    c.elastic.strain = Strain::finite;
+    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 34.4 + 27.0, 1e-9);
+    c.level = ModelLevel::chainmail;
+    EXPECT_NEAR(predictedTime(c, costs), 40.0, 1e-9);
+}
+
+// Whoever asks for little gets the rigid body; the tighter the error, the dearer the model.
+TEST(Planner, PicksTheCheapestThatHoldsBoth)
+{
+    const Plan loose = planned(0.9, 1e-3);
+    ASSERT_TRUE(loose.choice);
+    EXPECT_EQ(loose.candidates[*loose.choice].level, ModelLevel::spring);
+    const Plan tight = planned(0.04, 1e-3);
+    ASSERT_TRUE(tight.choice);
+    const PlanCandidate& c = tight.candidates[*tight.choice];
+    EXPECT_EQ(c.level, ModelLevel::elastic);
+    EXPECT_LE(c.rms, 4.0);
+    EXPECT_LE(c.microseconds, 1e3);
+    for (std::size_t i = 0; i < *tight.choice; ++i) {
+        EXPECT_TRUE(tight.candidates[i].tried);
+        EXPECT_FALSE(tight.candidates[i].holdsError && tight.candidates[i].holdsBudget);
+    }
+}
+
+// A 4 mm deep dent of a 5 mm sphere strains fat by far more than small strain is for: both laws are candidates then.
+TEST(Planner, LargeStrainIsHeldAgainstFiniteStrain)
+{
+    const Plan plan = planned(0.9, 1e-3);
+    EXPECT_GT(plan.strain, largeStrain);
+    EXPECT_TRUE(plan.finiteReference);
+    EXPECT_TRUE(std::ranges::any_of(plan.candidates, [](const PlanCandidate& c) {
+        return c.level == ModelLevel::elastic && c.elastic.strain == Strain::finite;
+    }));
+}
+
+TEST(Planner, SaysTheNearestWhenNothingHoldsBoth)
+{
+    const Plan plan = planned(1e-5, 3e-5);
+    EXPECT_FALSE(plan.choice);
+    EXPECT_TRUE(plan.candidates[plan.nearest].tried);
+}
+
+TEST(Planner, TheSameSceneGetsTheSamePlan)
+{
+    const Plan a = planned(0.04, 5e-4), b = planned(0.04, 5e-4);
+    ASSERT_EQ(a.candidates.size(), b.candidates.size());
+    EXPECT_EQ(a.choice, b.choice);
+    for (std::size_t i = 0; i < a.candidates.size(); ++i) {
+        EXPECT_EQ(a.candidates[i].rms, b.candidates[i].rms);
+        EXPECT_EQ(a.candidates[i].microseconds, b.candidates[i].microseconds);
+    }
+}
+
+}  // namespace
+}  // namespace palpate::experiments
