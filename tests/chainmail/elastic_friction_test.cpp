@@ -1,0 +1,265 @@
+#include "elastic_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+namespace palpate::chainmail {
+namespace {
+
+constexpr double spacing = 1e-3;
+constexpr double radius = 5e-3;
+constexpr double depth = 1.5e-3;
+const Vec3 top(15e-3, 0.0, 13e-3);
+
+const ElasticBody& block()
+{
+    static const ElasticBody body = tests::bodyOf(tests::heldBlock({30, 18, 26}, spacing, 1e4, 0.45));
+    return body;
+}
+
+Vec3 alongTop(double degrees)
+{
+    const double angle = degrees * std::acos(-1.0) / 180.0;
+    return {std::cos(angle), 0.0, std::sin(angle)};
+}
+
+// A ball on the block that presses, and is led along a path at equilibrium.
+class Drag {
+public:
+    explicit Drag(double friction) : elastic_(block(), {}, tests::focusUnder(top)), friction_(friction) {}
+
+    // To `deep` under the top and `aside` of its middle, in steps of 0.1 mm.
+    void go(double deep, Vec3 aside)
+    {
+        const Vec3 to = top + Vec3(0.0, deep - radius, 0.0) + aside;
+        const int steps = std::max(1, static_cast<int>(std::ceil(glm::distance(at_, to) / 0.1e-3)));
+        const Vec3 from = at_;
+        for (int i = 1; i <= steps; ++i) {
+            const Vec3 before = force_;
+            at_ = glm::mix(from, to, static_cast<double>(i) / steps);
+            std::array tools{tests::ball(at_, radius)};
+            tools[0].friction = friction_;
+            energy_ = tests::settle(elastic_, tests::loadOf(tools, {}, top), 1e-4, 100).energy;
+            force_ = elastic_.toolForce(0);
+            work_ -= 0.5 * glm::dot(force_ + before, to - from) / steps;
+        }
+    }
+    double normal() const { return -force_.y; }
+    double along(Vec3 way) const { return -glm::dot(force_, way); }
+    double across() const { return std::hypot(force_.x, force_.z); }
+    double energy() const { return energy_; }
+    // That the hand has done so far, by the trapezoidal rule [J].
+    double work() const { return work_; }
+
+private:
+    Elastic elastic_;
+    double friction_;
+    Vec3 at_ = top - Vec3(0.0, radius, 0.0);
+    Vec3 force_{0.0};
+    double energy_ = 0.0;
+    double work_ = 0.0;
+};
+
+// Without friction a flat homogeneous block has nothing to hold a ball with: what the grid adds is under 3 %.
+TEST(ElasticFriction, NoneHasNoForceAlongAFlatSurface)
+{
+    for (const double degrees : {0.0, 30.0, 90.0}) {
+        Drag drag(0.0);
+        drag.go(depth, Vec3(0.0));
+        for (int i = 1; i <= 12; ++i) {
+            drag.go(depth, 0.25e-3 * i * alongTop(degrees));
+            ASSERT_LT(drag.across(), 0.03 * drag.normal()) << degrees << " degrees, " << 0.25 * i << " mm";
+        }
+    }
+}
+
+// Coulomb: sideways never more than mu times the normal force, but for the 3 % of the grid; and a ball that slips feels
+// that much, 15 % less at most for the slope of its surface at the contact's edge. Against the way it goes.
+TEST(ElasticFriction, BallThatIsDraggedFeelsCoulombsForce)
+{
+    for (const double mu : {0.15, 0.4}) {
+        const Vec3 way = alongTop(20.0);
+        Drag drag(mu);
+        drag.go(depth, Vec3(0.0));
+        for (int i = 1; i <= 12; ++i) {
+            drag.go(depth, 0.25e-3 * i * way);
+            ASSERT_LT(drag.across(), (mu + 0.03) * drag.normal()) << "mu " << mu << ", " << 0.25 * i << " mm";
+        }
+        EXPECT_GT(drag.along(way), 0.85 * mu * drag.normal()) << "mu " << mu;
+    }
+}
+
+// Under Coulomb's limit the ball sticks: the force along is a stiffness times the way, a spring's energy
+// E(s) = E(0) + k s^2 / 2 comes with it, and it turns with the way. With mu = 3 all of the contact but its rim holds.
+TEST(ElasticFriction, BallThatSticksIsASpring)
+{
+    const Vec3 way = alongTop(35.0);
+    Drag drag(3.0);
+    drag.go(depth, Vec3(0.0));
+    const double atRest = drag.energy();
+    drag.go(depth, 0.1e-3 * way);
+    const double stiffness = drag.along(way) / 0.1e-3;
+    // A flat punch of the contact's radius that sticks is about as stiff along the surface as 8 G a / (2 - nu).
+    const double contact = std::sqrt(radius * depth);
+    EXPECT_NEAR(stiffness, 8.0 * 1e4 / 2.9 * contact / 1.55, 0.25 * stiffness);
+    for (const double s : {0.2e-3, 0.3e-3, 0.4e-3}) {
+        drag.go(depth, s * way);
+        EXPECT_NEAR(drag.along(way), stiffness * s, 0.05 * stiffness * s) << s;
+        EXPECT_NEAR(drag.energy() - atRest, 0.5 * stiffness * s * s, 0.06 * 0.5 * stiffness * s * s) << s;
+        EXPECT_LT(drag.across(), 1.02 * drag.along(way)) << s;
+    }
+    drag.go(depth, -0.3e-3 * way);
+    EXPECT_NEAR(drag.along(way), -stiffness * 0.3e-3, 0.05 * stiffness * 0.3e-3);
+}
+
+// Press, drag, back, off: the hand never gets work out of friction. A drag that slips costs mu N times its way there and
+// back; one without friction gives everything back.
+TEST(ElasticFriction, ClosedPathsTakeEnergyOut)
+{
+    const auto loop = [](double mu, double way) {
+        Drag drag(mu);
+        drag.go(depth, Vec3(0.0));
+        const double stored = drag.energy();
+        drag.go(depth, way * alongTop(0.0));
+        const double normal = drag.normal();
+        drag.go(depth, Vec3(0.0));
+        drag.go(0.0, Vec3(0.0));
+        return std::array{drag.work() / stored, 2.0 * mu * normal * way / stored};
+    };
+    EXPECT_NEAR(loop(0.0, 2e-3)[0], 0.0, 0.02);
+    double before = 0.0;
+    for (const double way : {0.2e-3, 1e-3, 3e-3}) {
+        const auto [work, most] = loop(0.3, way);
+        EXPECT_GT(work, before) << way;
+        EXPECT_LT(work, most) << way;
+        before = work;
+    }
+    EXPECT_GT(before, 0.5);
+}
+
+// One time step of relax() under a tie that pulls a point of the block straight down by `u`.
+class Creep {
+public:
+    explicit Creep(double viscosity) : elastic_(block(), options(viscosity), tests::focusUnder(top)) {}
+
+    double step(double stiffness, double u)
+    {
+        const std::array ties{Tie{top + Vec3(0.0, 4e-3, 0.0), {0.0, u, 0.0}, {0.0, 1.0, 0.0}, stiffness, stiffness}};
+        result_ = elastic_.relax(tests::loadOf({}, ties, top), 40, 1e-6);
+        return elastic_.displacement(ties[0].rest).y;
+    }
+    void release() { result_ = elastic_.relax(tests::loadOf({}, {}, top), 40, 1e-6); }
+    const ElasticResult& result() const { return result_; }
+    Elastic& elastic() { return elastic_; }
+
+private:
+    static ElasticOptions options(double viscosity)
+    {
+        ElasticOptions o;
+        o.viscosity = viscosity;
+        return o;
+    }
+    Elastic elastic_;
+    ElasticResult result_;
+};
+
+constexpr double pulled = 2e-3;
+
+// The tie's end without viscosity, and with it the stiffness K of the tissue there: k (U - x) = K x.
+double equilibrium(double stiffness)
+{
+    Creep creep(0.0);
+    double x = 0.0;
+    for (int i = 0; i < 4; ++i) {
+        x = creep.step(stiffness, pulled);
+    }
+    return x;
+}
+
+// A tie on a body at rest is one mode: all displacements are multiples of the point's own answer, and x, that of the
+// point, follows from K x_n + c K (x_n - x_n-1) = k (U - x_n). So the way that is left falls by gamma in every call,
+//
+//     x_n = (1 - gamma^n) x_end,   gamma = c K / ((1 + c) K + k),
+//
+// which is c / (1 + c) for a tie that is soft beside the tissue. It ends where it would without viscosity.
+TEST(ElasticViscosity, TieCreepsAsImplicitEulerDoes)
+{
+    for (const double stiffness : {1.0, 100.0}) {
+        for (const double c : {3.0, 15.0}) {
+            const double end = equilibrium(stiffness);
+            const double tissue = stiffness * (pulled - end) / end;
+            const double gamma = c * tissue / ((1.0 + c) * tissue + stiffness);
+            EXPECT_EQ(stiffness < 10.0, std::abs(gamma - c / (1.0 + c)) < 0.01);
+            Creep creep(c);
+            double x = 0.0;
+            for (int n = 1; n <= 120; ++n) {
+                x = creep.step(stiffness, pulled);
+                ASSERT_NEAR(x, (1.0 - std::pow(gamma, n)) * end, 0.005 * end)
+                    << "k " << stiffness << ", c " << c << ", " << n;
+            }
+            EXPECT_NEAR(x, end, 0.002 * end) << "k " << stiffness << ", c " << c;
+        }
+    }
+}
+
+// Let go, the tissue springs back by c / (1 + c) in every call, and when next to nothing is left of its energy it is at
+// rest to the bit. Its energy falls all the way.
+TEST(ElasticViscosity, TissueSpringsBackToExactRest)
+{
+    const double c = 8.0;
+    const double gamma = c / (1.0 + c);
+    Creep creep(c);
+    for (int i = 0; i < 60; ++i) {
+        creep.step(100.0, pulled);
+    }
+    const Vec3 point = top + Vec3(0.0, 4e-3, 0.0);
+    const double start = creep.elastic().displacement(point).y;
+    const double tissue = 100.0 * (pulled - start) * start / 2.0;  // energy at equilibrium [J]
+    double before = creep.result().energy;
+    int calls = 0;
+    while (!creep.elastic().atRest() && calls < 1000) {
+        creep.release();
+        ++calls;
+        ASSERT_TRUE(std::isfinite(creep.result().energy));
+        ASSERT_LE(creep.result().energy, before) << calls;
+        before = creep.result().energy;
+        if (calls <= 20) {
+            ASSERT_NEAR(creep.elastic().displacement(point).y, std::pow(gamma, calls) * start, 0.01 * start) << calls;
+        }
+    }
+    // Energy falls by gamma^2 per call, down to 1e-12 J.
+    EXPECT_NEAR(calls, std::log(1e-12 / tissue) / (2.0 * std::log(gamma)), 4.0);
+    EXPECT_EQ(creep.elastic().displacement(point), Vec3(0.0));
+    EXPECT_EQ(creep.result().energy, 0.0);
+}
+
+// A ball that hits viscous tissue is held off harder than by elastic tissue, and ends at the same force.
+TEST(ElasticViscosity, BallIsHeldOffHarderFirstAndTheSameInTheEnd)
+{
+    const auto forces = [](double viscosity) {
+        ElasticOptions options;
+        options.viscosity = viscosity;
+        Elastic elastic(block(), options, tests::focusUnder(top));
+        std::vector<double> out;
+        const std::array tools{tests::ball(top + Vec3(0.0, depth - radius, 0.0), radius, 2000.0)};
+        for (int i = 0; i < 150; ++i) {
+            const auto result = elastic.relax(tests::loadOf(tools, {}, top), 20, 1e-5);
+            EXPECT_TRUE(std::isfinite(result.energy));
+            out.push_back(-elastic.toolForce(0).y);
+        }
+        return out;
+    };
+    const auto viscous = forces(5.0);
+    const auto elastic = forces(0.0);
+    EXPECT_GT(viscous.front(), 1.5 * elastic.front());
+    for (std::size_t i = 1; i < viscous.size(); ++i) {
+        ASSERT_LT(viscous[i], viscous[i - 1] * (1.0 + 1e-4)) << i;
+    }
+    EXPECT_NEAR(viscous.back(), elastic.back(), 0.01 * elastic.back());
+}
+
+}  // namespace
+}  // namespace palpate::chainmail

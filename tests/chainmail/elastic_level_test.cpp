@@ -1,0 +1,333 @@
+#include "blocks.h"
+#include "elastic_bodies.h"
+
+#include <tests/allocations.h>
+
+#include <chainmail/level.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <random>
+
+namespace palpate::chainmail {
+namespace {
+
+constexpr double spacing = 2e-3;
+constexpr double radius = 5e-3;  // of the ball that presses
+const Vec3 size = spacing * Vec3(26, 15, 22);
+const Vec3 top(0.5 * size.x, 0.0, 0.5 * size.z);
+
+// A homogeneous block of tissue, its far side held, as a session has it: lattice, elastic body and surface on one grid.
+struct Bench {
+    Bench()
+        : grid{Index3(30, 19, 26), Vec3(-1.5 * spacing), spacing},
+          surface(tests::distanceOn(grid, [](Vec3 p) { return tests::boxDistance(p, Vec3(0.0), size); })),
+          body(bodyOn(grid, surface)),
+          lattice(grid, rows(grid), tests::tableOf({})),
+          shape(lattice)
+    {
+    }
+
+    static bool inside(Vec3 p) { return tests::boxDistance(p, Vec3(0.0), size) < 0.0; }
+    static bool held(Vec3 p) { return p.y > size.y - spacing; }
+    static std::vector<std::uint8_t> rows(const volume::NodeGrid& grid)
+    {
+        std::vector<std::uint8_t> rows(grid.count(), 0);
+        for (std::size_t i = 0; i < rows.size(); ++i) {
+            const Vec3 p = grid.position(grid.node(i));
+            rows[i] = !inside(p) ? 0 : held(p) ? 3 : 1;
+        }
+        return rows;
+    }
+    static ElasticBody bodyOn(const volume::NodeGrid& grid, const volume::DistanceField& surface)
+    {
+        std::vector<volume::CellMaterial> materials(grid.count());
+        for (std::size_t i = 0; i < materials.size(); ++i) {
+            const Vec3 p = grid.position(grid.node(i));
+            materials[i] = inside(p) ? tests::tissue(5e3, 0.45, held(p)) : volume::CellMaterial{};
+        }
+        return elasticBody(grid, std::move(materials), surface, 0.49);
+    }
+
+    volume::NodeGrid grid;
+    volume::DistanceField surface;
+    ElasticBody body;
+    Lattice lattice;
+    DisplacedLattice shape;
+};
+
+ElasticOptions smallWindows()
+{
+    ElasticOptions options;
+    options.window = 9;
+    return options;
+}
+
+Grip away()
+{
+    Grip grip;
+    grip.proxy = grip.position = top - Vec3(0.0, 50e-3, 0.0);
+    return grip;
+}
+
+// A ball that would touch the surface with its centre at `proxy`, at `position`.
+Grip pressed(Vec3 proxy, Vec3 position)
+{
+    Grip grip = away();
+    grip.kind = Grip::Kind::press;
+    grip.shape = {position, position, radius, radius};
+    grip.proxy = proxy;
+    grip.position = position;
+    grip.radius = radius;
+    return grip;
+}
+
+Grip pressedBy(double depth, Vec3 aside = Vec3(0.0))
+{
+    const Vec3 proxy = top + aside - Vec3(0.0, radius, 0.0);
+    return pressed(proxy, proxy + Vec3(0.0, depth, 0.0));
+}
+
+Grip held(Vec3 rest, Vec3 pushed, bool inside)
+{
+    Grip grip = away();
+    grip.kind = Grip::Kind::point;
+    grip.proxy = rest;
+    grip.position = rest + pushed;
+    grip.radius = 1e-3;
+    grip.inside = inside;
+    return grip;
+}
+
+// Smallest of the eight corners' determinants of the cell above node n, in volumes at rest; 1 for a cell with a corner
+// that is no node.
+double worstCorner(const DisplacedLattice& shape, Node n)
+{
+    const Lattice& lattice = shape.lattice();
+    std::array<Vec3, 8> at{};
+    for (std::size_t c = 0; c < 8; ++c) {
+        Node corner = n;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            corner = (c >> axis & 1) != 0 ? lattice.beside(corner, static_cast<int>(2 * axis + 1)) : corner;
+        }
+        if (!lattice.isNode(corner)) {
+            return 1.0;
+        }
+        at[c] = Vec3(c & 1, c >> 1 & 1, c >> 2) + Vec3(shape.u()[corner]) / lattice.grid.spacing;
+    }
+    double worst = 1.0;
+    for (std::size_t c = 0; c < 8; ++c) {
+        std::array<Vec3, 3> edge;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const std::size_t low = c & ~(std::size_t{1} << axis);
+            edge[axis] = at[low | std::size_t{1} << axis] - at[low];
+        }
+        worst = std::min(worst, glm::dot(edge[0], glm::cross(edge[1], edge[2])));
+    }
+    return worst;
+}
+
+// The same over the whole lattice; nothing when a displacement is not finite.
+std::optional<double> worstCorner(const DisplacedLattice& shape)
+{
+    double worst = 1.0;
+    for (Node n = 0; n < shape.u().size(); ++n) {
+        const Vec3f u = shape.u()[n];
+        if (!std::isfinite(u.x + u.y + u.z)) {
+            return std::nullopt;
+        }
+        worst = shape.lattice().isNode(n) ? std::min(worst, worstCorner(shape, n)) : worst;
+    }
+    return worst;
+}
+
+// A hand that wants to turn tissue inside out: it jumps, pushes 30 mm deep, drags aside, takes hold of points inside and
+// at the surface, and lets go.
+class HostileHand {
+public:
+    Grip next()
+    {
+        const Vec3 jump = 2.0 * Vec3(unit(), unit(), unit()) - 1.0;
+        switch (random_() % 8) {
+            case 0:
+                grip_ = away();
+                break;
+            case 1:  // somewhere else, deep at once
+                grip_ = pressed(onTop(), Vec3(0.0));
+                grip_.position = grip_.proxy + Vec3(3e-3 * jump.x, 30e-3 * unit(), 3e-3 * jump.z);
+                break;
+            case 2:
+                grip_ = held(0.98 * size * Vec3(unit(), unit(), unit()) + 0.01 * size, 30e-3 * jump, true);
+                break;
+            case 3:
+                grip_ = held(onTop() + Vec3(0.0, radius, 0.0), 15e-3 * jump + Vec3(0.0, 15e-3, 0.0), false);
+                break;
+            case 4:  // a jump
+                grip_.position += 20e-3 * jump;
+                break;
+            case 5:  // aside
+                grip_.position += 4e-3 * Vec3(jump.x, 0.0, jump.z);
+                break;
+            default:
+                grip_.position += 1e-3 * jump;
+        }
+        grip_.shape = {grip_.position, grip_.position, radius, radius};
+        return grip_;
+    }
+    int calls() { return 1 + static_cast<int>(random_() % 4); }
+
+private:
+    double unit() { return value_(random_); }
+    Vec3 onTop() { return {size.x * unit(), -radius, size.z * unit()}; }
+
+    Grip grip_ = away();
+    std::minstd_rand random_{17};
+    std::uniform_real_distribution<double> value_{0.0, 1.0};
+};
+
+// Whatever the hand does, what collision and viewer see is tissue: finite, and no cell turned over at any corner.
+TEST(ElasticLevel, NoCellOfTheLatticeEverTurnsOver)
+{
+    Bench bench;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    HostileHand hand;
+    double furthest = 0.0;
+    for (int i = 0; i < 2000; ++i) {
+        const Grip grip = hand.next();
+        for (int call = hand.calls(); call > 0; --call) {
+            level.deform(grip);
+            const auto worst = worstCorner(bench.shape);
+            ASSERT_TRUE(worst) << "grip " << i;
+            ASSERT_GT(*worst, 0.0) << "grip " << i << ", " << call << " calls before the next";
+        }
+        for (const Node n : bench.shape.moved()) {
+            furthest = std::max(furthest, static_cast<double>(glm::length(bench.shape.u()[n])));
+        }
+    }
+    // Hostile it was: tissue went further than a cell is wide.
+    EXPECT_GT(furthest, 2.0 * spacing);
+}
+
+// After a release of anything the lattice is at rest to the bit, within twice the calls that it takes to look at every
+// node of it once, 512 per call.
+TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterRelease)
+{
+    Bench bench;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    HostileHand hand;
+    const int most = 2 * static_cast<int>(bench.shape.u().size() / 512);
+    int releases = 0;
+    for (int i = 0; i < 600; ++i) {
+        const Grip grip = hand.next();
+        for (int call = hand.calls(); call > 0; --call) {
+            level.deform(grip);
+        }
+        if (i % 10 != 0 || bench.shape.moved().empty()) {
+            continue;
+        }
+        ++releases;
+        int calls = 0;
+        while (!bench.shape.moved().empty() && calls <= most) {
+            const auto reaction = level.deform(away());
+            EXPECT_FALSE(reaction.force);
+            ++calls;
+        }
+        ASSERT_LE(calls, most) << "grip " << i << ": " << bench.shape.moved().size() << " nodes are not at rest";
+        for (const Vec3f u : bench.shape.u()) {
+            ASSERT_EQ(u, Vec3f(0.0F));
+        }
+    }
+    EXPECT_GT(releases, 30);
+}
+
+// A tool that stands still: the lattice comes to the windows' displacement at the middles of its cells, but for what is
+// under the 20 um that are cut. Of the finest three windows, which are those that the lattice shows.
+TEST(ElasticLevel, LatticeComesToTheShapeOfTheWindows)
+{
+    Bench bench;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    for (int i = 0; i < 20; ++i) {
+        level.deform(pressedBy(0.2e-3 * i, Vec3(-1e-3 * i, 0.0, 0.0)));
+    }
+    const Grip last = pressedBy(4e-3, Vec3(-18e-3, 0.0, 0.0));
+    for (int i = 0; i < 400; ++i) {
+        level.deform(last);
+    }
+    std::array<int, 3> seen{};
+    for (Node n = 0; n < bench.shape.u().size(); ++n) {
+        if (!bench.lattice.isNode(n)) {
+            continue;
+        }
+        const Vec3 rest = bench.grid.position(bench.grid.node(n));
+        ContactSite site;
+        locate(bench.body, level.elastic().stack().windows(), rest, site);
+        if (site.level >= seen.size()) {
+            continue;
+        }
+        const Vec3 shown(bench.shape.u()[n]);
+        ASSERT_LT(glm::distance(shown, level.elastic().displacement(rest)), 21e-6)
+            << "at " << rest.x << " " << rest.y << " " << rest.z << " m, window " << site.level;
+        seen[site.level] += glm::length(shown) > 100e-6 ? 1 : 0;
+    }
+    EXPECT_GT(seen[0], 100);
+    EXPECT_GT(seen[1], 20);
+}
+
+// Only a tool that presses has its force from the tissue's energy; away from the tissue it is exactly zero, at once.
+TEST(ElasticLevel, ForceIsThereForAToolThatPressesAndGoneWithIt)
+{
+    Bench bench;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    Vec3 force(0.0);
+    for (int i = 0; i <= 30; ++i) {
+        const auto reaction = level.deform(pressedBy(0.1e-3 * i));
+        ASSERT_TRUE(reaction.force);
+        EXPECT_LE(reaction.force->y, force.y + 1e-9) << i;
+        force = *reaction.force;
+    }
+    EXPECT_LT(force.y, -0.02);
+    const auto gone = level.deform(pressedBy(-1e-3));
+    ASSERT_TRUE(gone.force);
+    EXPECT_EQ(*gone.force, Vec3(0.0));
+    EXPECT_FALSE(level.deform(held(top + Vec3(0.0, 2e-3, 0.0), Vec3(0.0, 2e-3, 0.0), true)).force);
+    EXPECT_FALSE(level.deform(away()).force);
+}
+
+// A held point takes the tissue along: the nodes beside it go where it goes, to within a third of the way.
+TEST(ElasticLevel, PointThatIsHeldTakesTheTissueAlong)
+{
+    for (const bool inside : {true, false}) {
+        Bench bench;
+        ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+        const Vec3 pushed(1e-3, 2e-3, 0.0);
+        const Vec3 rest = top + Vec3(0.0, inside ? 7e-3 : 0.0, 0.0);
+        for (int i = 1; i <= 40; ++i) {
+            level.deform(held(rest, std::min(1.0, i / 20.0) * pushed, inside));
+        }
+        Vec3 mean(0.0);
+        const Index3 low(glm::floor((rest + Vec3(0.0, inside ? 0.0 : 1e-3, 0.0) - bench.grid.origin) / spacing));
+        volume::forEachIndex(low, low + 1,
+                             [&](Index3 at) { mean += 0.125 * Vec3(bench.shape.u()[bench.grid.offset(at)]); });
+        EXPECT_LT(glm::distance(mean, pushed), 0.34 * glm::length(pushed)) << "inside " << inside;
+    }
+}
+
+TEST(ElasticLevel, DeformTouchesNoHeap)
+{
+    Bench bench;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    HostileHand hand;
+    const auto calls = tests::heapCallsIn([&] {
+        for (int i = 0; i < 300; ++i) {
+            level.deform(hand.next());
+        }
+    });
+    EXPECT_EQ(calls, 0U);
+}
+
+}  // namespace
+}  // namespace palpate::chainmail
