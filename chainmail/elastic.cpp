@@ -135,7 +135,9 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
     drag(load);
     for (ContactSite& s : active()) {
-        touch(s, shapes_, ties_, frictionOf(s));
+        touch(s, shapes_, ties_);
+        s.limit = frictionOf(s) * std::max(s.depth, 0.0);
+        touch(s, shapes_, ties_);
     }
 }
 
@@ -236,7 +238,7 @@ void Elastic::moveSites(double alpha) noexcept
     for (ContactSite& s : active()) {
         s.u += alpha * s.p;
         s.slip -= alpha * s.p;
-        touch(s, shapes_, ties_, frictionOf(s));
+        touch(s, shapes_, ties_);
     }
 }
 
@@ -254,13 +256,19 @@ void Elastic::drag(const ElasticLoad& load) noexcept
     }
 }
 
-// Beyond what friction holds the tool has slipped, for good.
+// Beyond what friction holds by the contact's own force the tool has slipped, for good.
 void Elastic::letSlip() noexcept
 {
     for (ContactSite& s : active()) {
+        const double friction = frictionOf(s);
+        if (friction <= 0.0) {
+            continue;
+        }
+        s.limit = friction * std::max(s.depth, 0.0);
         const Vec3 along = s.along();
         const double length = glm::length(along);
         s.slip = length > s.limit ? s.limit / length * along : along;
+        touch(s, shapes_, ties_);
     }
 }
 

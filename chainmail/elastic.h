@@ -11,16 +11,17 @@ namespace palpate::chainmail {
 
 struct ElasticOptions {
     int window = 15;            // nodes of a window along the way in, odd; see WindowStack
-    int cycles = 1;             // per call of relax()
+    int cycles = 2;             // at most, per call of relax()
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
     double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
     std::size_t maxSites = 4096;
-    bool goOn = true;  // begin with the last call's increment; without, a call begins where the tissue lies
+    double tolerance = 0.01;  // no more once the forces out of balance are this share of the contacts' [-]
+    bool goOn = true;         // begin with the last call's increment; without, a call begins where the tissue lies
 };
 
 struct ElasticResult {
     double energy = 0;           // of tissue and contacts [J]
-    double residual = 0;         // forces that are not in balance, Euclidean norm over the degrees of freedom [N]
+    double residual = 0;         // forces out of balance before the last step, Euclidean norm over degrees of freedom [N]
     double depth = 0;            // of the deepest point of tissue inside a tool [m]
     std::uint32_t contacts = 0;  // points that a tool presses
     std::uint32_t cycles = 0;
@@ -51,7 +52,7 @@ public:
 
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
-    ElasticResult relax(const ElasticLoad& load) noexcept { return relax(load, options_.cycles, 0.0); }
+    ElasticResult relax(const ElasticLoad& load) noexcept { return relax(load, options_.cycles, options_.tolerance); }
     /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces.
     ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept;
 

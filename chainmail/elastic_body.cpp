@@ -23,6 +23,7 @@ constexpr int pointsPerEdge = 2;    // surface points sit in sub-cells of half t
 struct Moduli {
     double mu = 0;
     double bulk = 0;
+    double stiffening = 0;
 };
 
 int coarseNodes(int fine)
@@ -67,12 +68,14 @@ public:
         const std::size_t count = coarse.nodes.count();
         coarse.mu.assign(count, 0.0F);
         coarse.lambda.assign(count, 0.0F);
+        coarse.stiffening.assign(count, 0.0F);
         coarse.fixed.assign(count, 0);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 2, [&](Index3 c) {
             const Moduli m = upscaled(2 * c);
             const std::size_t at = coarse.nodes.offset(c);
             coarse.mu[at] = static_cast<float>(m.mu);
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
+            coarse.stiffening[at] = static_cast<float>(m.stiffening);
         });
         volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
                              [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = mostlyFixed(2 * n) ? 1 : 0; });
@@ -100,6 +103,7 @@ private:
     Moduli upscaled(Index3 low) const
     {
         double mu = 0.0, inverseMu = 0.0, bulk = 0.0, inverseBulk = 0.0;
+        double stiffening = 0.0;
         int filled = 0;
         volume::forEachIndex(low, low + 1, [&](Index3 c) {
             const std::size_t at = fine_.nodes.offset(c);
@@ -110,10 +114,11 @@ private:
                 inverseMu += 1.0 / m;
                 bulk += k;
                 inverseBulk += 1.0 / k;
+                stiffening += static_cast<double>(fine_.stiffening[at]);
                 ++filled;
             }
         });
-        return {between(mu, inverseMu, filled), between(bulk, inverseBulk, filled)};
+        return {between(mu, inverseMu, filled), between(bulk, inverseBulk, filled), stiffening / std::max(filled, 1)};
     }
 
     const CellLevel& fine_;
@@ -126,6 +131,7 @@ CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMa
     level.nodes = {size, cells.origin - 0.5 * cells.spacing, cells.spacing};
     level.mu.assign(level.nodes.count(), 0.0F);
     level.lambda.assign(level.nodes.count(), 0.0F);
+    level.stiffening.assign(level.nodes.count(), 0.0F);
     level.fixed.assign(level.nodes.count(), 0);
     volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
         const auto& m = materials[cells.offset(c)];
@@ -137,6 +143,7 @@ CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMa
         const std::size_t at = level.nodes.offset(c);
         level.mu[at] = static_cast<float>(e / (2.0 * (1.0 + nu)));
         level.lambda[at] = static_cast<float>(e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
+        level.stiffening[at] = m.stiffening;
         if (m.fixed >= 0.5F) {
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
         }

@@ -13,6 +13,7 @@ struct CellLevel {
     volume::NodeGrid nodes;           // cell (i, j, k) lies between nodes (i, j, k) and (i + 1, j + 1, k + 1)
     std::vector<float> mu;            // Lame's second parameter of each cell, by its lowest node [Pa]  (count x 1)
     std::vector<float> lambda;        // Lame's first parameter                                    [Pa] (count x 1)
+    std::vector<float> stiffening;    // with finite strain, see TissueRow                        [-]    (count x 1)
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
     std::vector<float> diagonal;      // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
     double radius = 1;  // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger

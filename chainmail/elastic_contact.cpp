@@ -196,8 +196,7 @@ void addFriction(const ContactSite& s, double alpha, Along& sum) noexcept
 
 }  // namespace
 
-void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties,
-           double friction) noexcept
+void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept
 {
     if (site.isTie) {
         const Vec3 stretch = ties[site.owner].u - site.u;
@@ -211,9 +210,7 @@ void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, 
     const double push = site.stiffness * std::max(site.depth, 0.0);
     site.force = push * site.normal;
     site.energy = 0.5 * push * site.depth;
-    site.limit = friction * std::max(site.depth, 0.0);
     if (site.limit <= 0.0) {
-        site.slip = Vec3(0.0);
         return;
     }
     const Vec3 along = site.along();

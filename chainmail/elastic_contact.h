@@ -76,9 +76,9 @@ struct ContactSite {
 };
 
 /// Depth, normal, force and energy of a site where it is now. Friction holds a point with the stiffness of the contact up
-/// to the limit of Coulomb; beyond, its force stays. `friction`: of the site's tool.
-void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties,
-           double friction) noexcept;
+/// to the slip `limit`; beyond, its force stays. The limit is Coulomb's, but kept while a call solves: so friction has an
+/// energy, and the contact stays a convex problem.
+void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept;
 
 /// The energy of the contacts along the direction p, and its derivatives by the way.
 struct Along {

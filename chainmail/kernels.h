@@ -30,8 +30,9 @@ struct Layout {
 
 /// Stiffness of each cell (count x 1), both scaled by spacing / 32; zero where there is no tissue.
 struct CellStiffness {
-    const float* mu = nullptr;      // Lame's second parameter, times h / 32 [N/m]
-    const float* lambda = nullptr;  // Lame's first parameter, times h / 32 [N/m]
+    const float* mu = nullptr;          // Lame's second parameter, times h / 32 [N/m]
+    const float* lambda = nullptr;      // Lame's first parameter, times h / 32 [N/m]
+    const float* stiffening = nullptr;  // b of finite strain [-]; none: 0
 };
 
 /// The fields that a step of the solver moves.
@@ -67,7 +68,8 @@ struct Kernels {
     /// As apply(), for finite strain: the mean deformation gradient F of each cell goes through the stable neo-Hookean
     /// energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim, "Stable
     /// Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite when a
-    /// cell inverts; the other modes keep their linear stiffness. `inverse` is 1 / spacing [1/m].
+    /// cell inverts; the other modes keep their linear stiffness. Tissue that stiffens adds  mu/4 b (I_C - 3)^2  where I_C
+    /// > 3. `inverse` is 1 / spacing [1/m].
     /// @returns  the energy [J]
     double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                           float* scratch) noexcept;

@@ -118,7 +118,7 @@ inline void hourglass(Lanes mu, const Modes (&m)[3], Modes (&g)[3]) noexcept
 
 // Small strain: the law of kernels.h.
 struct Linear {
-    void operator()(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    void operator()(Lanes mu, Lanes lambda, std::size_t, const Modes (&m)[3], Modes (&g)[3]) noexcept
     {
         const Lanes two = 2.0F * mu;
         const Lanes four = 4.0F * mu;
@@ -137,11 +137,12 @@ struct Linear {
 // and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h times the scaled stiffness.
 struct NeoHookean {
     float inverse;                         // 1 / h
+    const float* stiffening;               // of each cell, or none
     Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
     std::size_t turn = 0;
 
     // With G = F - I:  J - 1 = tr G + (tr^2 - G : G^T) / 2 + det G, so that no small difference of large numbers is taken.
-    void operator()(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    void operator()(Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3], Modes (&g)[3]) noexcept
     {
         const float q = 0.25F * inverse;
         const float h8 = 8.0F / inverse;
@@ -162,16 +163,25 @@ struct NeoHookean {
         const Lanes determinant = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2];
         const Lanes volume = trace + minors + determinant;
         const Lanes pressure = (lambda + mu) * volume;
-        Lanes p[3][3];
         Lanes square{};
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+            square += f[i][0] * f[i][0] + f[i][1] * f[i][1] + f[i][2] * f[i][2];
+        }
+        // I_C - 3, where it is more than 0, and what the tissue stiffens by it.
+        const Lanes stretch = 2.0F * trace + square;
+        const Lanes more = stretch > 0.0F ? stretch : Lanes{};
+        const Lanes b = stiffening != nullptr ? load(stiffening + cell) * mu : Lanes{};
+        const Lanes extra = b * more;
+        Lanes p[3][3];
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
 #pragma GCC unroll 3
             for (int j = 0; j < 3; ++j) {
                 // Cofactor of F, less I: tr G I - G^T + cof G.
                 const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
-                p[i][j] = h8 * (mu * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor));
-                square += f[i][j] * f[i][j];
+                p[i][j] = h8 * (mu * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor) +
+                                extra * (i == j ? f[i][j] + 1.0F : f[i][j]));
             }
         }
         g[0].x = p[0][0];
@@ -191,7 +201,9 @@ struct NeoHookean {
             bend += g[i].xy * m[i].xy + g[i].yz * m[i].yz + g[i].zx * m[i].zx + g[i].xyz * m[i].xyz;
         }
         const float h2 = 32.0F / (inverse * inverse);
-        energy[turn] += h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume) + 0.5F * bend;
+        energy[turn] +=
+            h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume + 0.25F * extra * more) +
+            0.5F * bend;
         turn = (turn + 1) % (Layout::lanes / W);
     }
 };
@@ -284,7 +296,7 @@ struct Sweep {
                     m[c] = modesOf(loadPlane(component(planes, c) + inPlane + i, layout.plane), high);
                     storePlane(component(planes, c) + inPlane + i, layout.plane, high);
                 }
-                law(load(stiffness.mu + at + i), load(stiffness.lambda + at + i), m, g);
+                law(load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
 #pragma GCC unroll 3
                 for (int c = 0; c < 3; ++c) {
                     float* wait = component(pending, c) + inPlane + i;
@@ -343,7 +355,7 @@ double sumOf(Lanes v) noexcept
 double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                    float* scratch) noexcept
 {
-    NeoHookean law{inverse};
+    NeoHookean law{inverse, stiffness.stiffening};
     sweepCells(layout, stiffness, u, out, scratch, law);
     double sum = 0.0;
     for (const Lanes& part : law.energy) {

@@ -10,6 +10,7 @@ namespace palpate::chainmail {
 
 namespace {
 
+constexpr double shaftPiece = 4e-3;      // of the shaft that one tie stands for, at least [m]
 constexpr double tieStiffness = 8.0;     // of a held point, in E h: stiff beside the tissue, soft enough to converge fast
 constexpr float leastShown = 20e-6F;     // displacements below are not carried to the outer lattice [m]
 constexpr int nearNodes = 4;             // nodes to each side of the tool that every call writes
@@ -26,6 +27,14 @@ float largest(Vec3f v) noexcept
 }
 
 }  // namespace
+
+Reaction SpringLevel::deform(const Grip&) noexcept
+{
+    for (int i = 0; i < turnsAtRest && !shape_.moved().empty(); ++i) {
+        shape_.set(shape_.moved().back(), Vec3f(0.0F));
+    }
+    return {static_cast<std::uint32_t>(shape_.moved().size()), 0.0, std::nullopt};
+}
 
 ChainMailLevel::ChainMailLevel(Deformation& deformation, double toolRadius)
     : deformation_(deformation), seeds_(mostPressSeeds(deformation.shape().lattice(), toolRadius))
@@ -78,19 +87,36 @@ ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
         const Vec3 under = grip.proxy - surface_.distance(grip.proxy) * surface_.normal(grip.proxy);
         return {{&tool_, 1}, {}, focusAt(surface_, under)};
     }
-    if (grip.kind == Grip::Kind::point) {
-        // At the surface the cell around the point may be half empty: the tie holds the tissue just under it.
-        const auto& level = elastic_.body().levels.front();
-        const double h = level.nodes.spacing;
-        const double under = std::max(0.0, 0.5 * h + surface_.distance(grip.proxy));
-        tie_.rest = grip.proxy - under * surface_.normal(grip.proxy);
-        tie_.u = pushed;
-        const Index3 cell(glm::floor((tie_.rest - level.nodes.origin) / h));
-        const double mu = level.nodes.contains(cell) ? static_cast<double>(level.mu[level.nodes.offset(cell)]) : 0.0;
-        tie_.along = tie_.across = tieStiffness * 2.9 * mu * h;
-        return {{}, {&tie_, 1}, focusAt(surface_, grip.proxy)};
+    return grip.kind == Grip::Kind::point ? tie(grip) : ElasticLoad{{}, {}, focusAt(surface_, grip.position)};
+}
+
+double ElasticLevel::tieStiffnessAt(Vec3 rest) const noexcept
+{
+    const auto& level = elastic_.body().levels.front();
+    const Index3 cell(glm::floor((rest - level.nodes.origin) / level.nodes.spacing));
+    const double mu = level.nodes.contains(cell) ? static_cast<double>(level.mu[level.nodes.offset(cell)]) : 0.0;
+    return tieStiffness * 2.9 * mu * level.nodes.spacing;
+}
+
+// The tip holds its point in all directions, the shaft the tissue around it sideways only.
+ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
+{
+    // At the surface the cell around the point may be half empty: the tie holds the tissue just under it.
+    const double h = elastic_.body().levels.front().nodes.spacing;
+    const double under = std::max(0.0, 0.5 * h + surface_.distance(grip.proxy));
+    const Vec3 rest = grip.proxy - under * surface_.normal(grip.proxy);
+    const double stiffness = tieStiffnessAt(rest);
+    ties_[0] = {rest, grip.position - grip.proxy, grip.axis, stiffness, stiffness};
+    std::size_t count = 1;
+    const double inserted = glm::distance(grip.entry, grip.proxy);
+    const auto pieces = static_cast<std::size_t>(std::min(inserted / shaftPiece, static_cast<double>(mostShaftTies)));
+    for (std::size_t i = 0; grip.inside && i < pieces; ++i) {
+        const double back = inserted * (static_cast<double>(i) + 1.0) / (static_cast<double>(pieces) + 1.0);
+        const Vec3 at = glm::mix(grip.proxy, grip.entry, back / inserted);
+        const Vec3 way = grip.position - back * grip.axis - at;
+        ties_[count++] = {at, way - glm::dot(way, grip.axis) * grip.axis, grip.axis, 0.0, tieStiffnessAt(at)};
     }
-    return {{}, {}, focusAt(surface_, grip.position)};
+    return {{}, std::span(ties_).first(count), focusAt(surface_, grip.proxy)};
 }
 
 Reaction ElasticLevel::deform(const Grip& grip) noexcept
@@ -105,8 +131,10 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     }
     revisitMoved();
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
-    if (grip.kind == Grip::Kind::press) {
-        reaction.force = elastic_.atRest() ? Vec3(0.0) : elastic_.toolForce(0);
+    // A tool so deep that the surface has slipped around it touches nothing any more: then the level does not know the
+    // force.
+    if (grip.kind == Grip::Kind::press && last_.contacts > 0) {
+        reaction.force = elastic_.toolForce(0);
     }
     return reaction;
 }
@@ -237,13 +265,23 @@ void ElasticLevel::write(Node n) noexcept
         return;
     }
     all[n] = u;
+    const bool was = strained_[n] != 0;
     markStrained(n);
     bool keeps = strained_[n] == 0 || upright(n);
     for (int side = 0; side < 6 && keeps; ++side) {
         const Node other = lattice.beside(n, side);
+        if (lattice.isNode(other) && (was || strained_[n] != 0)) {
+            markStrained(other);
+        }
         keeps = strained_[other] == 0 || upright(other);
     }
-    all[n] = keeps ? u : old;
+    if (!keeps) {
+        all[n] = old;
+        markStrained(n);
+        for (int side = 0; side < 6; ++side) {
+            markStrained(lattice.beside(n, side));
+        }
+    }
     shape_.place(n);
 }
 
@@ -278,8 +316,11 @@ void ElasticLevel::revisitMoved() noexcept
 {
     const int turns = elastic_.atRest() ? turnsAtRest : turnsPerCall;
     for (int i = 0; i < turns && !shape_.moved().empty(); ++i) {
-        revisited_ = revisited_ + 1 < shape_.moved().size() ? revisited_ + 1 : 0;
+        revisited_ = revisited_ < shape_.moved().size() ? revisited_ : 0;
+        const std::size_t before = shape_.moved().size();
         write(shape_.moved()[revisited_]);
+        // A node that is at rest now left its place to another.
+        revisited_ += shape_.moved().size() == before ? 1 : 0;
     }
 }
 

@@ -3,6 +3,7 @@
 #include <chainmail/deformation.h>
 #include <chainmail/elastic.h>
 
+#include <array>
 #include <concepts>
 #include <cstdint>
 #include <optional>
@@ -22,13 +23,15 @@ struct Grip {
     Vec3 position{0.0};          // where the tool has it now [m]
     double radius = 0;           // of a tip that holds a point [m]
     bool inside = false;         // that point is inside the tissue
+    Vec3 entry{0.0};             // where the shaft went in, at rest [m]
+    Vec3 axis{0, 1, 0};          // along the tool, towards its tip
     double friction = 0;         // of a tool that presses (Coulomb) [-]
 };
 
 struct Reaction {
     std::uint32_t moved = 0;    // nodes that are not at rest
     double residual = 0;        // of the level's own: largest violated link [m]
-    std::optional<Vec3> force;  // of the tissue on the tool, where the level knows it [N]
+    std::optional<Vec3> force;  // of the tissue on the tool; none where the level does not know it [N]
 };
 
 /// A level of the model ladder: leaves the displaced lattice behind for collision, distances and the viewer. Bounded work,
@@ -42,9 +45,14 @@ concept Level = requires(L& level, const Grip& grip)
     noexcept->std::same_as<Reaction>;
 };
 
-/// Level 0: rigid tissue.
-struct SpringLevel {
-    Reaction deform(const Grip&) noexcept { return {}; }
+/// Level 0: rigid tissue. What a level above has left goes back to rest, some nodes per call.
+class SpringLevel {
+public:
+    explicit SpringLevel(DisplacedLattice& shape) : shape_(shape) {}
+    Reaction deform(const Grip& grip) noexcept;
+
+private:
+    DisplacedLattice& shape_;
 };
 
 /// Level 1: ChainMail from rest.
@@ -73,7 +81,11 @@ public:
     const Elastic& elastic() const noexcept { return elastic_; }
 
 private:
+    static constexpr std::size_t mostShaftTies = 8;
+
     ElasticLoad load(const Grip& grip) noexcept;
+    ElasticLoad tie(const Grip& grip) noexcept;
+    double tieStiffnessAt(Vec3 rest) const noexcept;
     Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
     void writeFinest(Vec3 around) noexcept;
     void writeBox(Index3 low, Index3 high) noexcept;
@@ -88,8 +100,8 @@ private:
     const volume::DistanceField& surface_;
     Elastic elastic_;
     ElasticTool tool_;
-    Tie tie_;
-    std::vector<Vec3f> before_;  // nodes of a box as they were, and as the windows have them
+    std::array<Tie, 1 + mostShaftTies> ties_;  // the tip's, then the shaft's
+    std::vector<Vec3f> before_;                // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;
     std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
     std::vector<Index3> turns_;           // by level: where its turn is

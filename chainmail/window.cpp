@@ -52,7 +52,7 @@ void gatherAdd(const float* from, int fineNodes, float* to) noexcept
 
 Window::Window(Index3 size) : layout(Layout::of(size.x, size.y, size.z))
 {
-    for (Floats* cells : {&mu, &lambda, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof}) {
+    for (Floats* cells : {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof}) {
         cells->assign(layout.count + Layout::lanes, 0.0F);
     }
     for (Floats& f : fields) {
@@ -71,6 +71,7 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
             for (std::size_t i = 0; i + 1 < static_cast<std::size_t>(layout.nx); ++i) {
                 mu[to + i] = scale * level.mu[from + i];
                 lambda[to + i] = scale * level.lambda[from + i];
+                stiffening[to + i] = level.stiffening[from + i];
             }
         }
     }

@@ -59,6 +59,7 @@ struct Window {
     Layout layout;
     Index3 low{0};                        // index of node (0, 0, 0) in the level; even but in the coarsest window
     Floats mu, lambda;                    // of each cell, times spacing / 32 [N/m]
+    Floats stiffening;                    // of each cell [-]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
     Floats diagonal;                      // reciprocal of the operator's diagonal, zero where the node is not free
     Floats border;                        // nodes that follow the next coarser window
@@ -69,8 +70,8 @@ struct Window {
 
     float* field(Field f) noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
-    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data()}; }
-    CellStiffness uncovered() const noexcept { return {uncoveredMu.data(), uncoveredLambda.data()}; }
+    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data(), stiffening.data()}; }
+    CellStiffness uncovered() const noexcept { return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data()}; }
     Index3 size() const noexcept { return {layout.nx, layout.ny, layout.nz}; }
     bool contains(Index3 node) const noexcept  // in the level's indices
     {

@@ -20,7 +20,7 @@ constexpr ElasticSettings standard;
 constexpr std::array<Setting, 3> settings{{
     {"fast", 4e-3, 9, 1},
     {"default", standard.spacing, standard.window, standard.cycles},
-    {"fine", 1.5e-3, 19, 1},
+    {"fine", 1.5e-3, 19, 2},
 }};
 
 }  // namespace

@@ -64,7 +64,7 @@ enum class Strain : std::uint8_t { small, finite };
 struct ElasticSettings {
     double spacing = 2e-3;  // of the finest window [m]; each window further out is twice as coarse
     int window = 15;        // nodes along each side of a window: odd, 9 to 41
-    int cycles = 1;         // relaxation cycles per tick
+    int cycles = 2;         // relaxation cycles per tick, at most
     Strain strain = Strain::small;
     double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-], 0 to 0.499
     double viscosity = 0;      // Kelvin-Voigt: time that a strain lags behind its stress [s]; 0 = none

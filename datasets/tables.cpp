@@ -19,6 +19,9 @@ using volume::TissueTable;
 constexpr std::size_t mostTissues = 64;  // what a sample of tissue has room for
 constexpr double softest = 0.01;         // [kPa]; anything that is not air resists
 
+// The only one that may be left out: tissue stiffens where somebody measured it.
+constexpr std::array<Field<TissueRow>, 1> stiffeningField{{{"stiffening", "", 0, 1000, 1, &TissueRow::stiffening}}};
+
 constexpr std::array<Field<TissueRow>, 12> tissueFields{{
     {"youngs_kpa", "kPa", 0, 2e7, 1e3, &TissueRow::youngsModulus},
     {"poisson", "", 0, 0.4999, 1, &TissueRow::poissonRatio},
@@ -75,6 +78,7 @@ TissueRow readTissue(Section& section)
     row.role = readRole(section);
     row.colour = readColour(section);
     readFields<TissueRow>(section, tissueFields, row, Need::all);
+    readFields<TissueRow>(section, stiffeningField, row, Need::some);
     section.finish();
     if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
         section.refuse("youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest), "kPa");

@@ -73,6 +73,7 @@ Simulation::Simulation(const SessionModel& model)
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
                    chainmail::mostPressSeeds(model.lattice, model.scene.tool.radius)),
+      spring_(deformation_.shape()),
       chainmail_(deformation_, model.scene.tool.radius),
       level_(model.scene.model.level),
       body_(deformation_.shape().body(model.surface)),
@@ -195,6 +196,8 @@ chainmail::Grip Simulation::grip() const noexcept
     }
     grip.kind = needle ? Kind::point : Kind::press;
     grip.inside = tip_.phase == Phase::inserted;
+    grip.entry = tip_.entry;
+    grip.axis = record_.device.axis;
     const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * record_.device.axis : tip;
     grip.shape = {tip, back, tool.radius, tool.radius};
     return grip;

@@ -40,6 +40,7 @@ struct CellMaterial {
     float youngsModulus = 0;  // root of arithmetic times harmonic mean, times the share of the cell that is tissue [Pa]
     float poissonRatio = 0;   // mean over the tissue [-]
     float fixed = 0;          // share of the cell that is tissue held in space [-]
+    float stiffening = 0;     // mean over the tissue [-]
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.

@@ -117,6 +117,7 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
     double stiffness = 0.0;
     double compliance = 0.0;
     double poisson = 0.0;
+    double stiffening = 0.0;
     double fixed = 0.0;
     sampler.visit(n, [&](std::uint16_t label, double weight) {
         if (const TissueRow* row = rows[label]) {
@@ -124,6 +125,7 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
             stiffness += weight * row->youngsModulus;
             compliance += weight / row->youngsModulus;
             poisson += weight * row->poissonRatio;
+            stiffening += weight * row->stiffening;
             fixed += row->fixed ? weight : 0.0;
         }
     });
@@ -131,7 +133,7 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
         return {};
     }
     return {static_cast<float>(tissue * std::sqrt(stiffness / compliance)), static_cast<float>(poisson / tissue),
-            static_cast<float>(fixed)};
+            static_cast<float>(fixed), static_cast<float>(stiffening / tissue)};
 }
 
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)

@@ -54,6 +54,7 @@ json toJson(const TissueRow& row)
             {"role", std::string(name(row.role))},
             {"youngs_pa", row.youngsModulus},
             {"poisson", row.poissonRatio},
+            {"stiffening", row.stiffening},
             {"density_kg_m3", row.density},
             {"compress", row.compress},
             {"stretch", row.stretch},
@@ -79,6 +80,7 @@ TissueRow rowFrom(const json& j)
     row.role = *role;
     row.youngsModulus = j.at("youngs_pa").get<double>();
     row.poissonRatio = j.at("poisson").get<double>();
+    row.stiffening = j.value("stiffening", 0.0);
     row.density = j.at("density_kg_m3").get<double>();
     row.compress = j.at("compress").get<double>();
     row.stretch = j.at("stretch").get<double>();

@@ -22,6 +22,7 @@ struct TissueRow {
     Role role = Role::plain;
     double youngsModulus = 0;     // small strain [Pa]
     double poissonRatio = 0;      // [-]
+    double stiffening = 0;        // b: the shear modulus grows as 1 + b (I_C - 3) with finite strain [-]
     double density = 0;           // [kg/m^3]
     double compress = 0;          // ChainMail: shortest link, share of its rest length, in (0, 1]
     double stretch = 0;           // ChainMail: longest link, share of its rest length, >= 1

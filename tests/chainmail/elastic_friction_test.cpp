@@ -10,8 +10,8 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr double spacing = 1e-3;
-constexpr double radius = 5e-3;
-constexpr double depth = 1.5e-3;
+constexpr double radius = 10e-3;
+constexpr double depth = 0.8e-3;
 const Vec3 top(15e-3, 0.0, 13e-3);
 
 const ElasticBody& block()
@@ -50,6 +50,16 @@ public:
     double normal() const { return -force_.y; }
     double along(Vec3 way) const { return -glm::dot(force_, way); }
     double across() const { return std::hypot(force_.x, force_.z); }
+    // Largest force along the surface over push, of any point.
+    double mostFriction() const
+    {
+        double most = 0.0;
+        for (const ContactSite& s : elastic_.sites()) {
+            const double push = glm::dot(s.force, s.normal);
+            most = std::max(most, push > 0.0 ? glm::length(s.force - push * s.normal) / push : 0.0);
+        }
+        return most;
+    }
     double energy() const { return energy_; }
     // That the hand has done so far, by the trapezoidal rule [J].
     double work() const { return work_; }
@@ -76,19 +86,41 @@ TEST(ElasticFriction, NoneHasNoForceAlongAFlatSurface)
     }
 }
 
-// Coulomb: sideways never more than mu times the normal force, but for the 3 % of the grid; and a ball that slips feels
-// that much, 15 % less at most for the slope of its surface at the contact's edge. Against the way it goes.
+// Coulomb, point by point: along its surface a ball never holds a point of tissue with more than mu times what it pushes it
+// with. So a ball that slips feels mu times its normal force against the way it goes, 15 % more at most for the slope of
+// the dent that it is in; and steadily: a step of 0.25 mm on never changes that by over 5 %.
 TEST(ElasticFriction, BallThatIsDraggedFeelsCoulombsForce)
 {
     for (const double mu : {0.15, 0.4}) {
         const Vec3 way = alongTop(20.0);
         Drag drag(mu);
         drag.go(depth, Vec3(0.0));
-        for (int i = 1; i <= 12; ++i) {
+        double before = 0.0;
+        for (int i = 1; i <= 14; ++i) {
             drag.go(depth, 0.25e-3 * i * way);
-            ASSERT_LT(drag.across(), (mu + 0.03) * drag.normal()) << "mu " << mu << ", " << 0.25 * i << " mm";
+            const double along = drag.along(way);
+            ASSERT_LT(drag.mostFriction(), mu * (1.0 + 1e-9)) << "mu " << mu << ", " << 0.25 * i << " mm";
+            ASSERT_LT(along, 1.15 * mu * drag.normal()) << "mu " << mu << ", " << 0.25 * i << " mm";
+            if (i > 8) {
+                EXPECT_NEAR(along, before, 0.05 * before) << "mu " << mu << ", " << 0.25 * i << " mm";
+            }
+            before = along;
         }
-        EXPECT_GT(drag.along(way), 0.85 * mu * drag.normal()) << "mu " << mu;
+        EXPECT_GT(before, 0.95 * mu * drag.normal()) << "mu " << mu;
+        EXPECT_LT(drag.across(), 1.02 * before) << "mu " << mu;
+    }
+}
+
+// Pressed straight down in the middle of a block that is the same on both sides, the ball goes on feeling straight forces,
+// however much the tissue slips under it.
+TEST(ElasticFriction, StraightPressHasAStraightForce)
+{
+    for (const double mu : {0.15, 0.4, 3.0}) {
+        Drag drag(mu);
+        for (int i = 1; i <= 12; ++i) {
+            drag.go(0.2e-3 * i, Vec3(0.0));
+            ASSERT_LT(drag.across(), 0.01 * drag.normal()) << "mu " << mu << ", " << 0.2 * i << " mm";
+        }
     }
 }
 
@@ -187,7 +219,7 @@ double equilibrium(double stiffness)
 // which is c / (1 + c) for a tie that is soft beside the tissue. It ends where it would without viscosity.
 TEST(ElasticViscosity, TieCreepsAsImplicitEulerDoes)
 {
-    for (const double stiffness : {1.0, 100.0}) {
+    for (const double stiffness : {0.2, 100.0}) {
         for (const double c : {3.0, 15.0}) {
             const double end = equilibrium(stiffness);
             const double tissue = stiffness * (pulled - end) / end;
@@ -231,7 +263,10 @@ TEST(ElasticViscosity, TissueSpringsBackToExactRest)
         }
     }
     // Energy falls by gamma^2 per call, down to 1e-12 J.
-    EXPECT_NEAR(calls, std::log(1e-12 / tissue) / (2.0 * std::log(gamma)), 4.0);
+    // and what is next to nothing is known to the rounding of the energy that was there: sooner by a third at most.
+    const double expected = std::log(1e-12 / tissue) / (2.0 * std::log(gamma));
+    EXPECT_LT(calls, expected + 4.0);
+    EXPECT_GT(calls, 0.67 * expected);
     EXPECT_EQ(creep.elastic().displacement(point), Vec3(0.0));
     EXPECT_EQ(creep.result().energy, 0.0);
 }
@@ -256,7 +291,7 @@ TEST(ElasticViscosity, BallIsHeldOffHarderFirstAndTheSameInTheEnd)
     const auto elastic = forces(0.0);
     EXPECT_GT(viscous.front(), 1.5 * elastic.front());
     for (std::size_t i = 1; i < viscous.size(); ++i) {
-        ASSERT_LT(viscous[i], viscous[i - 1] * (1.0 + 1e-4)) << i;
+        ASSERT_LT(viscous[i], viscous[i - 1] * (1.0 + 1e-3)) << i;
     }
     EXPECT_NEAR(viscous.back(), elastic.back(), 0.01 * elastic.back());
 }
