@@ -85,8 +85,9 @@ void printOperator(const experiments::OperatorBench& bench)
 // Each case with rivals, for people.
 void printRivals(const std::vector<experiments::KernelCase>& cases)
 {
-    fmt::print("\nthe same pushes at {} without windows\n{:<10} {:<12} {:>12} {:>12} {:>22} {:>10} {:>10}\n", "default",
-               "scene", "tool", "full, warm", "from rest", "one grid at equal rms", "chainmail", "nothing");
+    fmt::print("\nthe same pushes at {} without windows\n{:<10} {:<12} {:>12} {:>12} {:>22} {:>10} {:>10} {:>22}\n",
+               "default", "scene", "tool", "full, warm", "from rest", "one grid at equal rms", "chainmail", "nothing",
+               "force, no increment");
     for (const auto& c : cases) {
         if (!c.rivals) {
             continue;
@@ -94,10 +95,10 @@ void printRivals(const std::vector<experiments::KernelCase>& cases)
         const auto error = [](const experiments::TrialResult& r) {
             return fmt::format("{:.1f}%", experiments::spreadOf(r.looks, &experiments::TrialErrors::rms).median);
         };
-        fmt::print("{:<10} {:<12} {:>11.0f}x {:>11.0f}x {:>21.1f}x {:>10} {:>10}\n", c.scene, c.tool,
-                   c.rivals->full.warm / c.result.p50, c.rivals->full.fromRest / c.result.p50,
-                   singleGridRatio(c, &experiments::TrialErrors::rms), error(c.rivals->chainMail),
-                   error(c.rivals->nothing));
+        fmt::print("{:<10} {:<12} {:>11.0f}x {:>11.0f}x {:>21.1f}x {:>10} {:>10} {:>21.1f}%\n", c.scene, c.tool,
+                   c.rivals->full.warm / c.result.mean, c.rivals->full.fromRest / c.result.mean,
+                   singleGridRatio(c, &experiments::TrialErrors::rms), error(c.rivals->chainMail), error(c.rivals->nothing),
+                   experiments::spreadOf(c.rivals->standing.looks, &experiments::TrialErrors::force).median);
     }
 }
 

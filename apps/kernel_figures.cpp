@@ -34,6 +34,7 @@ void addErrors(nlohmann::json& out, const TrialResult& result)
         out[fmt::format("{}_rest_pct", name)] = atRest(result).*figure;
     }
     out["tick_us_p50"] = 1e6 * result.p50;
+    out["tick_us_mean"] = 1e6 * result.mean;
     out["tick_us_p99"] = 1e6 * result.p99;
 }
 
@@ -64,12 +65,13 @@ nlohmann::json rivalFigures(const KernelCase& c)
     }
     nlohmann::json out{{"full_solve_us", 1e6 * r.full.warm},
                        {"full_solve_from_rest_us", 1e6 * r.full.fromRest},
-                       {"full_solve_ratio", r.full.warm / c.result.p50},
-                       {"full_solve_from_rest_ratio", r.full.fromRest / c.result.p50},
+                       {"full_solve_ratio", r.full.warm / c.result.mean},
+                       {"full_solve_from_rest_ratio", r.full.fromRest / c.result.mean},
                        {"coarse_grid_ratio", singleGridRatio(c, &TrialErrors::rms)},
                        {"coarse_grid_near_ratio", singleGridRatio(c, &TrialErrors::near)},
                        {"coarse_grid_force_ratio", singleGridRatio(c, &TrialErrors::force)},
                        {"single_grids", grids}};
+    addErrors(out["no_increment"], r.standing);
     addErrors(out["chainmail"], r.chainMail);
     addErrors(out["nothing"], r.nothing);
     for (const char* shapeOnly : {"chainmail", "nothing"}) {
@@ -190,6 +192,7 @@ Chart errorChart(const std::vector<KernelCase>& cases, const char* what, double 
                      1e6 * run.result.p50, medianOf(run.result, figure));
         }
         if (figure != &TrialErrors::force) {
+            list.add("default, no increment", false, 1e6 * c.rivals->standing.p50, medianOf(c.rivals->standing, figure));
             list.add("chainmail", false, 1e6 * c.rivals->chainMail.p50, medianOf(c.rivals->chainMail, figure));
         }
     }
@@ -225,7 +228,7 @@ std::vector<int> operatorWindows(const std::vector<std::string>& settings)
 
 double singleGridRatio(const KernelCase& c, double TrialErrors::*figure)
 {
-    return c.rivals ? ratioAtEqualError(c.rivals->singleGrids, figure, medianOf(c.result, figure), c.result.p50) : 0.0;
+    return c.rivals ? ratioAtEqualError(c.rivals->singleGrids, figure, medianOf(c.result, figure), c.result.mean) : 0.0;
 }
 
 nlohmann::json kernelFigures(const std::vector<KernelCase>& cases, const OperatorBench& operators,

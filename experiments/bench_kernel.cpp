@@ -72,6 +72,10 @@ private:
         r.full = fullSolve(body.body, path, speed, elastic.strain == datasets::Strain::finite);
         r.singleGrids =
             singleGridTrials(*model_.tissue, model_.surface, body, path, speed, reference, elastic, request_.rivalCycles);
+        ElasticOptions standing{
+            .window = elastic.window, .cycles = elastic.cycles, .finiteStrain = elastic.strain == datasets::Strain::finite};
+        standing.goOn = false;
+        r.standing = elasticTrial(body.body, path, speed, reference, standing);
         r.chainMail = chainMailTrial(lattice, path, speed, reference, model_.scene.model.maxMoves);
         r.nothing = runTrial(nothingModel(), path, speed, reference);
         return r;

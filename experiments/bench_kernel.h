@@ -15,6 +15,7 @@ struct KernelRivals {
     FullSolve full;
     std::vector<RivalRun> singleGrids;
     TrialResult chainMail, nothing;
+    TrialResult standing;  // the setting itself, but every tick begins where the tissue lies, not with the last increment
 };
 
 /// One trial of one setting.

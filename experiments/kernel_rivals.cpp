@@ -117,8 +117,8 @@ double ratioAtEqualError(std::span<const RivalRun> runs, double TrialErrors::*fi
     double best = 0.0;
     for (const RivalRun& run : runs) {
         const bool equal = spreadOf(run.result.looks, figure).median <= error;
-        if (equal && (best == 0.0 || run.result.p50 < best)) {
-            best = run.result.p50;
+        if (equal && (best == 0.0 || run.result.mean < best)) {
+            best = run.result.mean;
         }
     }
     return best / seconds;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 
 namespace palpate::experiments {
@@ -270,6 +271,7 @@ TrialResult runTrial(const TrialModel& model, const TrialPath& path, double spee
     out.meanTouched /= static_cast<double>(std::max<std::size_t>(out.ticks, 1));
     std::ranges::sort(seconds);
     if (!seconds.empty()) {
+        out.mean = std::accumulate(seconds.begin(), seconds.end(), 0.0) / static_cast<double>(seconds.size());
         out.p50 = seconds[seconds.size() / 2];
         out.p99 = seconds[seconds.size() * 99 / 100];
     }

@@ -76,6 +76,7 @@ struct TrialErrors {
 struct TrialResult {
     std::vector<TrialErrors> looks;
     double p50 = 0, p99 = 0;    // time of a tick in contact [s]
+    double mean = 0;            // the same: a tick may need no cycle at all, so ratios are of means
     std::size_t ticks = 0;      // in contact
     double meanTouched = 0;     // contact points, or moved nodes, per tick in contact
     std::size_t shortened = 0;  // steps

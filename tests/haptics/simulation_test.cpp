@@ -336,7 +336,7 @@ TEST(Simulation, SameSamplesGiveTheSameBits)
             ForceHash hash;
             std::mt19937 random(3);
             std::normal_distribution<double> tremor(0.0, 2e-4);
-            for (int i = 0; i < 3000; ++i) {
+            for (int i = 0; i < 2000; ++i) {
                 const double y = -10e-3 + (deepest + 10e-3) * std::sin(i * 1e-3);
                 auto s = at({tremor(random), y + (i == 1500 ? nudge : 0.0), tremor(random)});
                 hash.add(simulation.tick(s));
