@@ -227,6 +227,14 @@ void ElasticLevel::markStrained(Node n) noexcept
             : 0;
 }
 
+void ElasticLevel::markWithNeighbours(Node n) noexcept
+{
+    markStrained(n);
+    for (int side = 0; side < 6; ++side) {
+        markStrained(shape_.lattice().beside(n, side));
+    }
+}
+
 // True when the three edges that meet at node n keep their orientation, on all eight sides of it.
 bool ElasticLevel::upright(Node n) const noexcept
 {
@@ -277,10 +285,7 @@ void ElasticLevel::write(Node n) noexcept
     }
     if (!keeps) {
         all[n] = old;
-        markStrained(n);
-        for (int side = 0; side < 6; ++side) {
-            markStrained(lattice.beside(n, side));
-        }
+        markWithNeighbours(n);
     }
     shape_.place(n);
 }
@@ -315,6 +320,15 @@ void ElasticLevel::writeByTurns(std::size_t level) noexcept
 void ElasticLevel::revisitMoved() noexcept
 {
     const int turns = elastic_.atRest() ? turnsAtRest : turnsPerCall;
+    if (elastic_.atRest() && shape_.moved().size() <= static_cast<std::size_t>(turnsAtRest)) {
+        // The last of them together: one alone may have no way past the others, and the lattice at rest is upright.
+        while (!shape_.moved().empty()) {
+            const Node n = shape_.moved().back();
+            shape_.set(n, Vec3f(0.0F));
+            markWithNeighbours(n);
+        }
+        return;
+    }
     for (int i = 0; i < turns && !shape_.moved().empty(); ++i) {
         revisited_ = revisited_ < shape_.moved().size() ? revisited_ : 0;
         const std::size_t before = shape_.moved().size();

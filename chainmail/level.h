@@ -94,6 +94,7 @@ private:
     void revisitMoved() noexcept;
     bool keepsOrientation(Index3 low, Index3 high) noexcept;
     void markStrained(Node n) noexcept;
+    void markWithNeighbours(Node n) noexcept;
     bool upright(Node n) const noexcept;
 
     DisplacedLattice& shape_;

@@ -98,11 +98,9 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
 
     const auto way = collide();
     clock.done(Task::h3);
-    Vec3 basic = moveTip(model_, reader_, body_, record_.device, way, tip_, record_);
+    const Vec3 law = moveTip(model_, reader_, body_, record_.device, way, tip_, record_);
     clock.done(Task::h4);
-    if (const auto reaction = deform(); reaction.force) {
-        basic = *reaction.force;
-    }
+    const Vec3 basic = contactForce(law, deform());
     clock.done(Task::deform);
     const auto near = monitor(model_, body_, tip_, position, monitor_, record_);
     fire();
@@ -220,6 +218,23 @@ chainmail::Reaction Simulation::deform() noexcept
     record_.moved = reaction.moved;
     record_.residual = reaction.residual;
     return reaction;
+}
+
+// Down to its radius a sphere feels the elastic body. Deeper the surface closes over it, and what small elements then say
+// is no force for a hand: there the contact law goes on, as much stiffer or softer as the body was found to be.
+Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) noexcept
+{
+    if (tip_.phase == Phase::free || level_ != datasets::ModelLevel::elastic) {
+        trust_ = 1.0;
+        return law;
+    }
+    const double depth = glm::distance(record_.device.position, tip_.proxy);
+    if (reaction.force && depth <= model_.scene.tool.radius) {
+        const double known = glm::length(law);
+        trust_ = known > 0.0 ? glm::length(*reaction.force) / known : 1.0;
+        return *reaction.force;
+    }
+    return trust_ * law;
 }
 
 // The gun fires once per press of its button, and only a needle that is inside takes a core.

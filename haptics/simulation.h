@@ -42,6 +42,7 @@ private:
     occupancy::Sweep collide() noexcept;
     chainmail::Grip grip() const noexcept;
     chainmail::Reaction deform() noexcept;
+    Vec3 contactForce(Vec3 law, const chainmail::Reaction& reaction) noexcept;
     void fire() noexcept;
 
     const SessionModel& model_;
@@ -53,6 +54,7 @@ private:
     std::array<std::unique_ptr<chainmail::ElasticLevel>, 2> elastic_;
     datasets::ModelLevel level_;
     int stepsDown_ = 0;
+    double trust_ = 1;  // the elastic body's force over the contact law's, where both are known
     occupancy::Body body_;
     std::unique_ptr<occupancy::ContactSet> contacts_;
     TipState tip_;

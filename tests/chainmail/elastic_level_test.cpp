@@ -247,7 +247,7 @@ TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterRelease)
 }
 
 // Nodes that only go back one by one can stand in each other's way for good.
-TEST(ElasticLevel, DISABLED_EveryNodeIsAtRestSoonAfterWhateverTheHandDid)
+TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterWhateverTheHandDid)
 {
     Bench bench;
     ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);

@@ -188,7 +188,7 @@ TEST(ElasticTick, ForceRisesAsTheBallGoesDeeper)
     expectForceToRiseDownTo(9e-3);
 }
 
-TEST(ElasticTick, DISABLED_TissueNeverClosesOverTheBall)
+TEST(ElasticTick, TissueNeverClosesOverTheBall)
 {
     expectForceToRiseDownTo(20e-3);
 }
