@@ -3,6 +3,7 @@
 // Cells and fields as the kernels take them, with nothing around.
 #include <chainmail/window.h>
 
+#include <algorithm>
 #include <random>
 
 namespace palpate::tests {
@@ -13,6 +14,7 @@ struct Cells {
         : layout(chainmail::Layout::of(nodes.x, nodes.y, nodes.z)),
           mu(layout.count + chainmail::Layout::lanes, 0.0F),
           lambda(mu),
+          stiffening(mu),
           u(layout.fieldSize(), 0.0F),
           out(u),
           scratch(layout.scratchSize(), 0.0F)
@@ -20,7 +22,7 @@ struct Cells {
     }
 
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
-    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data()}; }
+    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data()}; }
 
     /// Moduli of one cell [Pa].
     void set(Index3 cell, double shear, double lame)
@@ -42,6 +44,8 @@ struct Cells {
             set(c, empty ? 0.0 : std::pow(10.0, power(random)), empty ? 0.0 : std::pow(10.0, power(random)));
         });
     }
+
+    void stiffen(double b) { std::ranges::fill(stiffening, static_cast<float>(b)); }
 
     /// u(n) = value(n) at every node n.
     template <typename Function>
@@ -80,7 +84,7 @@ struct Cells {
     }
 
     chainmail::Layout layout;
-    chainmail::Floats mu, lambda, u, out, scratch;
+    chainmail::Floats mu, lambda, stiffening, u, out, scratch;
 };
 
 /// Sum over all nodes, in double.

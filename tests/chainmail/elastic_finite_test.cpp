@@ -53,6 +53,32 @@ TEST(ElasticFinite, EnergyOfAStretchIsTheLaw)
     const double j = stretch.x * stretch.y * stretch.z - 1.0;
     const double density = 0.5 * mu * (glm::dot(stretch, stretch) - 3.0) - mu * j + 0.5 * (lambda + mu) * j * j;
     EXPECT_NEAR(cells.applyFinite(), density * 11 * 5 * 4, 1e-5 * density * 220);
+
+    const double b = 7.0;
+    const double stiffer = density + 0.25 * mu * b * std::pow(glm::dot(stretch, stretch) - 3.0, 2);
+    cells.stiffen(b);
+    EXPECT_NEAR(cells.applyFinite(), stiffer * 220, 1e-5 * stiffer * 220);
+}
+
+// Tangent modulus of a stretch e without change of volume: E (1 + 9 b e^2), what the tissue table is fitted with.
+TEST(ElasticFinite, StiffeningGivesTheTangentOfTheTissueTable)
+{
+    const double b = 4.0;
+    const auto energy = [&](double e) {
+        Cells cells({12, 6, 5});
+        cells.fill(2.0, 0.0);
+        cells.stiffen(b);
+        const Vec3 stretch(1.0 + e, 1.0 / std::sqrt(1.0 + e), 1.0 / std::sqrt(1.0 + e));
+        cells.move([&](Index3 n) { return (stretch - 1.0) * Vec3(n); });
+        return cells.applyFinite() / 220.0;
+    };
+    const double step = 0.01;
+    const auto tangent = [&](double e) { return (energy(e + step) - 2.0 * energy(e) + energy(e - step)) / (step * step); };
+    const double start = tangent(0.0);
+    EXPECT_NEAR(start, 3.0 * 2.0, 0.05 * start);
+    for (const double e : {-0.1, 0.1}) {
+        EXPECT_NEAR(0.5 * (tangent(e) + tangent(-e)) / start, 1.0 + 9.0 * b * e * e, 0.06) << e;
+    }
 }
 
 // f(s u) = s A u + O(s^2): the difference falls by four when s is halved.
@@ -100,6 +126,7 @@ TEST(ElasticFinite, ForceIsTheDerivativeOfTheEnergy)
 {
     std::minstd_rand random(3);
     Cells cells = randomCells(random);
+    cells.stiffen(3.0);
     Cells shifted = cells;
     Cells direction = cells;
     for (int i = 0; i < 5; ++i) {

@@ -151,7 +151,7 @@ TEST(KernelTrial, TheBestRunAtEqualErrorIsTheFastest)
     const auto run = [](double rms, double seconds) {
         RivalRun r;
         r.result.looks = {{TrialPhase::press, rms}};
-        r.result.p50 = seconds;
+        r.result.mean = seconds;
         return r;
     };
     const std::vector<RivalRun> runs{run(0.5, 9e-4), run(1.0, 6e-4), run(2.0, 2e-4)};
