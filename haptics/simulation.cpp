@@ -15,6 +15,8 @@ namespace {
 
 // The part of a needle's shaft that collision looks at, from the tip [m].
 constexpr double shaftQueried = 6e-3;
+// Between contact law and elastic body: neither viscosity nor a light touch is a measure of a body.
+constexpr double mostTrust = 3.0;
 constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
 
 // How much of the tool behind its tip collision looks at [m].
@@ -231,7 +233,8 @@ Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) noe
     const double depth = glm::distance(record_.device.position, tip_.proxy);
     if (reaction.force && depth <= model_.scene.tool.radius) {
         const double known = glm::length(law);
-        trust_ = known > 0.0 ? glm::length(*reaction.force) / known : 1.0;
+        const double ratio = known > 0.0 ? glm::length(*reaction.force) / known : 1.0;
+        trust_ = std::clamp(ratio, 1.0 / mostTrust, mostTrust);
         return *reaction.force;
     }
     return trust_ * law;
