@@ -180,7 +180,7 @@ Chart errorChart(const std::vector<KernelCase>& cases, const char* what, double 
 {
     SeriesList list;
     for (const KernelCase& c : cases) {
-        list.add(fmt::format("{}, {:g} mm/s", c.setting, 1e3 * c.speed), false, 1e6 * c.result.p50,
+        list.add(fmt::format("{}, {:g} mm/s", c.setting, 1e3 * c.speed), false, 1e6 * c.result.mean,
                  medianOf(c.result, figure));
     }
     for (const KernelCase& c : cases) {
@@ -189,16 +189,16 @@ Chart errorChart(const std::vector<KernelCase>& cases, const char* what, double 
         }
         for (const RivalRun& run : c.rivals->singleGrids) {
             list.add(run.coarsening == 1 ? "whole grid, per tick" : fmt::format("one grid, {} h", run.coarsening), false,
-                     1e6 * run.result.p50, medianOf(run.result, figure));
+                     1e6 * run.result.mean, medianOf(run.result, figure));
         }
         if (figure != &TrialErrors::force) {
-            list.add("default, no increment", false, 1e6 * c.rivals->standing.p50, medianOf(c.rivals->standing, figure));
-            list.add("chainmail", false, 1e6 * c.rivals->chainMail.p50, medianOf(c.rivals->chainMail, figure));
+            list.add("default, no increment", false, 1e6 * c.rivals->standing.mean, medianOf(c.rivals->standing, figure));
+            list.add("chainmail", false, 1e6 * c.rivals->chainMail.mean, medianOf(c.rivals->chainMail, figure));
         }
     }
     Chart chart;
     chart.title = fmt::format("Level elastic: {} against time", what);
-    chart.xLabel = "time per tick, p50 [us]";
+    chart.xLabel = "time per tick, mean [us]";
     chart.yLabel = fmt::format("{} [%]", what);
     chart.logX = chart.logY = true;
     chart.series = list.take();
