@@ -364,7 +364,7 @@ bool Elastic::oneCycle(Before before, ElasticResult& result) noexcept
     return takeStep(Field::p, Field::q, result);
 }
 
-ElasticResult Elastic::relax(const ElasticLoad& all, int cycles, double tolerance) noexcept
+ElasticResult Elastic::relaxWhile(const ElasticLoad& all, int cycles, double first, double further) noexcept
 {
     ElasticResult result;
     ElasticLoad load = all;
@@ -397,6 +397,7 @@ ElasticResult Elastic::relax(const ElasticLoad& all, int cycles, double toleranc
     hasIncrement_ = options_.goOn;
     for (int i = 0; i < cycles; ++i) {
         refreshResidual();
+        const double tolerance = i == 0 ? first : further;
         if (tolerance > 0.0) {
             result.residual = std::sqrt(stack_.dot(Field::r, Field::r));
             if (result.residual <= tolerance * contactForce()) {

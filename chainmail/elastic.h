@@ -45,6 +45,8 @@ struct ElasticResult {
 /// optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps). Mathematics, pictures and
 /// figures: docs/kernel.md.
 class Elastic {
+    static constexpr double furtherCycles = 1.5;  // a second cycle in a tick costs too much for what is nearly balanced
+
 public:
     /// @param focus  where the windows start
     /// The body must outlive it.
@@ -52,9 +54,15 @@ public:
 
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
-    ElasticResult relax(const ElasticLoad& load) noexcept { return relax(load, options_.cycles, options_.tolerance); }
+    ElasticResult relax(const ElasticLoad& load) noexcept
+    {
+        return relaxWhile(load, options_.cycles, options_.tolerance, furtherCycles * options_.tolerance);
+    }
     /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces.
-    ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept;
+    ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept
+    {
+        return relaxWhile(load, cycles, tolerance, tolerance);
+    }
 
     /// Force of the tissue on tool `i` and on tie `i` of the last load [N].
     Vec3 toolForce(std::size_t i) const noexcept { return force(i, false); }
@@ -73,6 +81,8 @@ private:
     enum class Before : std::uint8_t { none, increment, direction };
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
+    // A first cycle while the residual is over `first`, further ones while it is over `further` times the contacts' forces.
+    ElasticResult relaxWhile(const ElasticLoad& load, int cycles, double first, double further) noexcept;
     void settle() noexcept;
     void meet(const ElasticLoad& load, bool moved) noexcept;
     bool touched() const noexcept;
