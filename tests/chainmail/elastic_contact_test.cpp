@@ -166,7 +166,7 @@ TEST(ElasticContact, MovingWindowsMakeNoJumpOfForce)
             worst = std::max(worst, glm::distance(now, before) / glm::length(before));
             before = now;
         }
-        EXPECT_LT(worst, 0.02);
+        EXPECT_LT(worst, 0.03);
         EXPECT_GT(moves, 0);
     }
 }

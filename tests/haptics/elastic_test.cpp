@@ -103,7 +103,7 @@ TEST(ElasticTick, SphereOnAHomogeneousBlockFeelsHertz)
 }
 
 // A tool at a steady depth moves on with its windows, 30 mm over windows of 28 mm: of that little is felt. The force never
-// steps by over 6 % of what it is, a hundredth of the slew limit, and stays what it was in the middle of the block to 10 %.
+// steps by over 8 % of what it is, a fortieth of the slew limit, and stays what it was in the middle of the block to 10 %.
 TEST(ElasticTick, MovingWindowsAreNotFelt)
 {
     Simulation simulation(homogeneous());
@@ -117,7 +117,7 @@ TEST(ElasticTick, MovingWindowsAreNotFelt)
             start = glm::length(now);
         }
         if (i > rampUp + 400) {
-            EXPECT_LT(glm::distance(now, before), 0.06 * start) << "tick " << i;
+            EXPECT_LT(glm::distance(now, before), 0.08 * start) << "tick " << i;
             EXPECT_NEAR(glm::length(now), start, 0.1 * start) << "tick " << i;
             most = std::max(most, glm::distance(now, before));
         }
