@@ -20,12 +20,6 @@ constexpr int mostShortenings = 8;     // of a step that raises the energy
 constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew
 constexpr double rounding = 1e-6;      // relative: sums of single-precision products are no better
 
-std::size_t cornerNode(const Layout& l, std::size_t node, int c) noexcept
-{
-    return node + static_cast<std::size_t>(c & 1) + (static_cast<std::size_t>(c >> 1) & 1) * l.row +
-           (static_cast<std::size_t>(c >> 2) & 1) * l.plane;
-}
-
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
 // half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
 double shorter(double alpha, double slope, double change) noexcept
@@ -136,8 +130,10 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     drag(load);
     for (ContactSite& s : active()) {
         touch(s, shapes_, ties_);
-        s.limit = frictionOf(s) * std::max(s.depth, 0.0);
-        touch(s, shapes_, ties_);
+        if (const double friction = frictionOf(s); friction > 0.0) {
+            s.limit = friction * std::max(s.depth, 0.0);
+            touch(s, shapes_, ties_);
+        }
     }
 }
 
@@ -177,7 +173,7 @@ void Elastic::refreshResidual() noexcept
         }
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
-            stack_.addForce(s.level, cornerNode(l, s.node, c),
+            stack_.addForce(s.level, l.corner(s.node, c),
                             (1.0 - memory_) * static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
         }
     }
@@ -195,7 +191,7 @@ void Elastic::prepareContacts() noexcept
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             const double share = static_cast<double>(s.share[static_cast<std::size_t>(c)]);
-            multigrid_.addContact(s.level, cornerNode(l, s.node, c), (1.0 - memory_) * share * tangent);
+            multigrid_.addContact(s.level, l.corner(s.node, c), (1.0 - memory_) * share * tangent);
         }
     }
     multigrid_.prepare();
@@ -209,11 +205,11 @@ void Elastic::look(Field direction) noexcept
 }
 
 // How far to go: Newton on the slope of the energy, the tissue's part a parabola, contacts opening and closing on the way.
-double Elastic::lineSearch(double slope, double curvature) const noexcept
+double Elastic::lineSearch(double slope, double curvature, Along at) const noexcept
 {
     double alpha = 0.0;
     for (int i = 0; i < newtonSteps; ++i) {
-        const Along at = contactsAlong(sites(), alpha);
+        at = i > 0 ? contactsAlong(sites(), alpha) : at;
         const double stiffness = curvature + (1.0 - memory_) * at.curvature;
         const double change = -(slope + alpha * curvature + (1.0 - memory_) * at.slope) / stiffness;
         if (!(stiffness > 0.0) || !std::isfinite(change)) {
@@ -278,8 +274,8 @@ double Elastic::frictionOf(const ContactSite& site) const noexcept
 }
 
 // Goes along the direction that look() saw, whose image under -A is known, as far as lowers the energy. A step after which
-// the energy is higher (the contacts' line search is of first order, and finite strain has no parabola) is halved, and
-// taken back at last. False: nowhere.
+// the energy is higher (the contacts' line search is of first order, and finite strain has no parabola) is shortened,
+// and taken back at last. False: nowhere.
 bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noexcept
 {
     const auto product = stack_.dots(direction, Field::a, image);
@@ -288,8 +284,9 @@ bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noex
     const double slope = viscous - product[0];
     const double tissue = energy_;
     const double before = tissue + contactEnergy();
-    const double steepness = slope + (1.0 - memory_) * contactsAlong(sites(), 0.0).slope;
-    double alpha = lineSearch(slope, curvature);
+    const Along start = contactsAlong(sites(), 0.0);
+    const double steepness = slope + (1.0 - memory_) * start.slope;
+    double alpha = lineSearch(slope, curvature, start);
     double gone = 0.0;
     for (int i = 0; alpha != gone; ++i) {
         moveSites(alpha - gone);
@@ -308,8 +305,11 @@ bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noex
         alpha = i < mostShortenings ? shorter(alpha, steepness, change) : 0.0;
         ++result.shortened;
     }
+    if (alpha == 0.0) {
+        return false;
+    }
     keepStep(direction, image, alpha);
-    return alpha != 0.0;
+    return true;
 }
 
 // d and e become the increment of this call so far: of the last call's what was taken again, and the steps since.

@@ -40,10 +40,11 @@ struct ElasticResult {
 ///
 /// Viscosity (Kelvin-Voigt, one time for all tissue) is integrated by implicit Euler: the tissue's force is
 /// a + c (a - v), v the force after the call before and c the viscous time in calls. Divided by 1 + c this is the same
-/// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node. Sources: S. F. McCormick,
-/// "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids); A. V. Knyazev, "Toward the
-/// optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps). Mathematics, pictures and
-/// figures: docs/kernel.md.
+/// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node.
+///
+/// Sources: S. F. McCormick, "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids);
+/// A. V. Knyazev, "Toward the optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps).
+/// Mathematics, pictures and figures: docs/kernel.md.
 class Elastic {
     static constexpr double furtherCycles = 1.5;  // a second cycle in a tick costs too much for what is nearly balanced
 
@@ -90,7 +91,7 @@ private:
     void refreshResidual() noexcept;
     void prepareContacts() noexcept;
     void look(Field direction) noexcept;
-    double lineSearch(double slope, double curvature) const noexcept;
+    double lineSearch(double slope, double curvature, Along start) const noexcept;
     double contactEnergy() const noexcept;
     bool sitesHold(const ElasticLoad& load, bool moved) noexcept;
     void moveSites(double alpha) noexcept;

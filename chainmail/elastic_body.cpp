@@ -281,7 +281,7 @@ void indexRows(ElasticBody& body)
 
 }  // namespace
 
-ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellMaterial> materials,
+ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap)
 {
     ElasticBody body;

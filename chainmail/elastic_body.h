@@ -34,6 +34,12 @@ struct SurfaceCell {
     std::uint32_t count = 0;
 };
 
+/// Young's modulus of soft tissue with this shear modulus [Pa]: E = 2 mu (1 + nu) at nu = 0.45.
+inline double youngsModulusOf(float mu) noexcept
+{
+    return 2.9 * static_cast<double>(mu);
+}
+
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
 /// before, and its nodes are every second node of it.
 struct ElasticBody {
@@ -52,7 +58,7 @@ struct ElasticBody {
 /// the rear 5 % are fixed (frame LPS: y to the back).
 ///
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
-ElasticBody elasticBody(const volume::NodeGrid& cells, std::vector<volume::CellMaterial> materials,
+ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap);
 
 }  // namespace palpate::chainmail

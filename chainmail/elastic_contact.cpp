@@ -13,26 +13,13 @@ namespace {
 
 constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
 
-Vec3 componentsAt(const Window& w, std::size_t node, Field field) noexcept
-{
-    const float* f = w.field(field) + node;
-    return {f[0], f[w.layout.count], f[2 * w.layout.count]};
-}
-
-std::size_t corner(const Layout& l, std::size_t node, int c) noexcept
-{
-    return node + static_cast<std::size_t>(c & 1) + (static_cast<std::size_t>(c >> 1) & 1) * l.row +
-           (static_cast<std::size_t>(c >> 2) & 1) * l.plane;
-}
-
 // Stiffness of a surface point. A whole contact must not be stiffer than `stiffest`: spread over a quarter of the tool's
 // cross-section, what a shallow press touches.
 double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
 {
     const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
     const double cap = tool.stiffest / (0.25 * std::numbers::pi * radius * radius);
-    const double e = 2.0 * static_cast<double>(p.mu) * 1.45;
-    return std::min(penalty * e / spacing, cap) * static_cast<double>(p.area);
+    return std::min(penalty * youngsModulusOf(p.mu) / spacing, cap) * static_cast<double>(p.area);
 }
 
 class Finder {
@@ -168,8 +155,7 @@ Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field fiel
     const Window& w = windows[site.level];
     Vec3 sum(0.0);
     for (int c = 0; c < 8; ++c) {
-        sum += static_cast<double>(site.share[static_cast<std::size_t>(c)]) *
-               componentsAt(w, corner(w.layout, site.node, c), field);
+        sum += static_cast<double>(site.share[static_cast<std::size_t>(c)]) * w.value(field, w.layout.corner(site.node, c));
     }
     return sum;
 }

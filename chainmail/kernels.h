@@ -22,6 +22,8 @@ struct Layout {
     {
         return static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
     }
+    /// Corner `c` (x fastest) of the cell whose lowest node is at `node`.
+    std::size_t corner(std::size_t node, int c) const noexcept { return node + at(c & 1, (c >> 1) & 1, c >> 2); }
     /// Floats that a field of three components takes.
     std::size_t fieldSize() const noexcept { return 3 * count + lanes; }
     /// Floats of working memory that apply() needs.

@@ -94,8 +94,8 @@ double ElasticLevel::tieStiffnessAt(Vec3 rest) const noexcept
 {
     const auto& level = elastic_.body().levels.front();
     const Index3 cell(glm::floor((rest - level.nodes.origin) / level.nodes.spacing));
-    const double mu = level.nodes.contains(cell) ? static_cast<double>(level.mu[level.nodes.offset(cell)]) : 0.0;
-    return tieStiffness * 2.9 * mu * level.nodes.spacing;
+    const float mu = level.nodes.contains(cell) ? level.mu[level.nodes.offset(cell)] : 0.0F;
+    return tieStiffness * youngsModulusOf(mu) * level.nodes.spacing;
 }
 
 // The tip holds its point in all directions, the shaft the tissue around it sideways only.

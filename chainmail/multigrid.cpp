@@ -14,27 +14,14 @@ constexpr double smoothed = 4.0;        // the smoother takes the upper three qu
 constexpr int coarsestSteps = 14;       // Chebyshev steps on the coarsest level
 constexpr double coarsestSpread = 160;  // largest to smallest eigenvalue there
 
-Vec3 valueAt(const Window& w, std::size_t node, Field field) noexcept
-{
-    const float* f = w.field(field) + node;
-    return {f[0], f[w.layout.count], f[2 * w.layout.count]};
-}
-
-void addAt(Window& w, std::size_t node, Field field, Vec3 v) noexcept
-{
-    float* f = w.field(field) + node;
-    for (int c = 0; c < 3; ++c, f += w.layout.count) {
-        *f += static_cast<float>(v[c]);
-    }
-}
-
 }  // namespace
 
 Multigrid::Multigrid(WindowStack& stack, std::size_t maxBlocks) : stack_(stack)
 {
     for (std::size_t l = 0; l < stack_.size(); ++l) {
-        blocks_.emplace_back().reserve(maxBlocks);
-        blockOf_.emplace_back(stack_[l].layout.count, 0U);
+        const std::size_t nodes = stack_[l].layout.count;
+        blocks_.emplace_back().reserve(std::min(maxBlocks, nodes));
+        blockOf_.emplace_back(nodes, 0U);
     }
     for (std::size_t l = 0; l < stack_.size(); ++l) {
         const double largest = margin * stack_.body().levels[l].radius;
@@ -79,13 +66,8 @@ void Multigrid::prepare() noexcept
                 b.inverse = glm::inverse(glm::dmat3(1.0 / (weight * static_cast<double>(b.diagonal))) + b.stiffness);
             }
             if (l + 1 < blocks_.size()) {
-                const auto at = static_cast<std::size_t>(b.node);
-                const Index3 n = w.low + Index3(at % w.layout.row, at % w.layout.plane / w.layout.row, at / w.layout.plane);
-                const Index3 odd = n % 2;
-                const double share = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
-                volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) {
-                    addContact(l + 1, stack_[l + 1].at(parent), share * b.stiffness);
-                });
+                w.visitParents(b.node, stack_[l + 1],
+                               [&](std::size_t parent, double share) { addContact(l + 1, parent, share * b.stiffness); });
             }
         }
     }
@@ -97,7 +79,7 @@ void Multigrid::operate(std::size_t level) noexcept
     Window& w = stack_[level];
     stack_.kernels().apply(w.layout, w.stiffness(), w.field(Field::z), w.field(Field::t), stack_.scratch());
     for (const Block& b : blocks_[level]) {
-        addAt(w, b.node, Field::t, b.stiffness * valueAt(w, b.node, Field::z));
+        w.add(Field::t, b.node, b.stiffness * w.value(Field::z, b.node));
     }
 }
 
@@ -107,8 +89,8 @@ void Multigrid::smoothContacts(std::size_t level, Field field, bool first, doubl
     Window& w = stack_[level];
     for (const Block& b : blocks_[level]) {
         if (b.diagonal > 0.0F) {
-            const Vec3 off = valueAt(w, b.node, Field::r) - (first ? Vec3(0.0) : valueAt(w, b.node, Field::t));
-            addAt(w, b.node, field, weight * (b.inverse * off));
+            const Vec3 off = w.value(Field::r, b.node) - (first ? Vec3(0.0) : w.value(Field::t, b.node));
+            w.add(field, b.node, weight * (b.inverse * off));
         }
     }
 }

@@ -84,6 +84,28 @@ struct Window {
         return layout.at(n.x, n.y, n.z);
     }
 
+    Vec3 value(Field f, std::size_t node) const noexcept
+    {
+        const float* v = field(f) + node;
+        return {v[0], v[layout.count], v[2 * layout.count]};
+    }
+    void add(Field f, std::size_t node, Vec3 value) noexcept
+    {
+        float* v = field(f) + node;
+        for (int c = 0; c < 3; ++c, v += layout.count) {
+            *v += static_cast<float>(value[c]);
+        }
+    }
+    /// Calls visit(parent, share) for the nodes of the next coarser window that interpolate to this one.
+    template <typename Visit>
+    void visitParents(std::size_t node, const Window& coarse, Visit&& visit) const noexcept
+    {
+        const Index3 n = low + Index3(node % layout.row, node % layout.plane / layout.row, node / layout.plane);
+        const Index3 odd = n % 2;
+        const double share = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
+        volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { visit(coarse.at(parent), share); });
+    }
+
     explicit Window(Index3 size);
 
     /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.

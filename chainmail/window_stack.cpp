@@ -25,11 +25,6 @@ Index3 windowSize(int depth, const Focus& focus) noexcept
     return size;
 }
 
-Index3 nodeOf(const Layout& l, std::size_t at) noexcept
-{
-    return {static_cast<int>(at % l.row), static_cast<int>(at % l.plane / l.row), static_cast<int>(at / l.plane)};
-}
-
 }  // namespace
 
 Focus focusAt(const volume::DistanceField& surface, Vec3 point) noexcept
@@ -170,20 +165,14 @@ void WindowStack::addForce(std::size_t level, std::size_t node, Vec3 force) noex
 {
     Window& w = windows_[level];
     if (w.dof[node] != 0.0F) {
-        float* r = w.field(Field::r) + node;
-        for (int c = 0; c < 3; ++c, r += w.layout.count) {
-            *r += static_cast<float>(force[c]);
-        }
+        w.add(Field::r, node, force);
         return;
     }
     if (w.border[node] == 0.0F) {
         return;
     }
-    const Window& coarse = windows_[level + 1];
-    const Index3 n = w.low + nodeOf(w.layout, node);
-    const Index3 odd = n % 2;
-    const double share = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
-    volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { addForce(level + 1, coarse.at(parent), share * force); });
+    w.visitParents(node, windows_[level + 1],
+                   [&](std::size_t parent, double share) { addForce(level + 1, parent, share * force); });
 }
 
 std::array<double, 2> WindowStack::dots(Field x, Field a, Field b) const noexcept

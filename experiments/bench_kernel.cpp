@@ -57,14 +57,14 @@ private:
             c.residual = reference.residual;
             c.result = elasticTrial(body.body, path, speed, reference, options);
             if (setting == request_.rivalsOf && speed == request_.speeds.front()) {
-                c.rivals = rivals(body, path, speed, reference, elastic);
+                c.rivals = rivals(body, path, speed, reference, elastic, options);
             }
             sink_(c);
         }
     }
 
     KernelRivals rivals(const TrialBody& body, const TrialPath& path, double speed, const Reference& reference,
-                        const datasets::ElasticSettings& elastic)
+                        const datasets::ElasticSettings& elastic, const ElasticOptions& options)
     {
         progress_(fmt::format("{}: {}: rivals", model_.scene.name, path.tool.name));
         const Lattice lattice(body.cells, model_.tissue->tissueOn(body.cells), model_.tissue->table());
@@ -72,8 +72,7 @@ private:
         r.full = fullSolve(body.body, path, speed, elastic.strain == datasets::Strain::finite);
         r.singleGrids =
             singleGridTrials(*model_.tissue, model_.surface, body, path, speed, reference, elastic, request_.rivalCycles);
-        ElasticOptions standing{
-            .window = elastic.window, .cycles = elastic.cycles, .finiteStrain = elastic.strain == datasets::Strain::finite};
+        ElasticOptions standing = options;
         standing.goOn = false;
         r.standing = elasticTrial(body.body, path, speed, reference, standing);
         r.chainMail = chainMailTrial(lattice, path, speed, reference, model_.scene.model.maxMoves);

@@ -1,7 +1,7 @@
 #include <experiments/kernel_rivals.h>
 
-#include <glm/common.hpp>
-#include <glm/geometric.hpp>
+#include <chainmail/level.h>
+#include <occupancy/body.h>
 
 #include <algorithm>
 
@@ -13,42 +13,25 @@ namespace {
 
 constexpr double widestTip = 1.05e-3;  // a needle's tip as ChainMail holds it: a 14 G needle [m]
 
-// Displacement between the nodes of a lattice: trilinear over those that are tissue.
-Vec3 between(const Lattice& lattice, std::span<const Vec3f> u, Vec3 rest)
-{
-    const auto& grid = lattice.grid;
-    const Vec3 at = glm::clamp((rest - grid.origin) / grid.spacing, Vec3(0.0), Vec3(grid.size - 1));
-    const Index3 low = glm::min(Index3(at), grid.size - 2);
-    const Vec3 t = at - Vec3(low);
-    Vec3 sum(0.0);
-    double weights = 0.0;
-    for (int c = 0; c < 8; ++c) {
-        const Index3 corner(c & 1, (c >> 1) & 1, c >> 2);
-        const auto n = static_cast<Node>(grid.offset(low + corner));
-        if (lattice.isNode(n)) {
-            const Vec3 w = glm::mix(1.0 - t, t, Vec3(corner));
-            sum += w.x * w.y * w.z * Vec3(u[n]);
-            weights += w.x * w.y * w.z;
-        }
-    }
-    return weights > 0.0 ? sum / weights : Vec3(0.0);
-}
-
-// What holds the lattice in a pose, as in haptics/.
-std::size_t seedsOf(const Lattice& lattice, const TrialLoad& load, std::span<Seed> seeds, Yield& yield)
+// How the tool holds the lattice in a pose, as in haptics/.
+Grip gripOf(const TrialLoad& load)
 {
     const TrialPath& path = load.path();
     const Vec3 way = path.way(load.pose());
+    Grip grip;
+    grip.radius = path.tool.radius;
     if (!path.ties.empty()) {
-        return dragSeeds(lattice, path.ties.front().rest, way, seeds);
+        grip.kind = Grip::Kind::point;
+        grip.inside = true;
+        grip.proxy = path.ties.front().rest;
+        grip.position = grip.proxy + way;
+    } else if (load.pose().pressed > path.gap) {
+        grip.kind = Grip::Kind::press;
+        grip.proxy = path.start + path.gap * path.inward;
+        grip.position = path.start + way;
+        grip.shape = {grip.position, grip.position, grip.radius, grip.radius};
     }
-    const Vec3 first = path.start + path.gap * path.inward;
-    const Vec3 now = path.start + way;
-    if (load.pose().pressed <= path.gap) {
-        return 0;
-    }
-    yield = Yield(glm::normalize(now - first));
-    return pressSeeds(lattice, first, now, path.tool.radius, seeds);
+    return grip;
 }
 
 }  // namespace
@@ -56,8 +39,7 @@ std::size_t seedsOf(const Lattice& lattice, const TrialLoad& load, std::span<See
 TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& surface, double wanted, double poissonCap,
                     std::size_t mostNodes)
 {
-    const double spacing = volume::affordableSpacing(tissue.box(), wanted, 2.0 * wanted, mostNodes);
-    const auto cells = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
+    const auto cells = volume::affordableGrid(tissue.box(), wanted, mostNodes);
     return {cells, elasticBody(cells, tissue.materialOn(cells), surface, poissonCap)};
 }
 
@@ -71,16 +53,15 @@ TrialResult elasticTrial(const ElasticBody& body, const TrialPath& path, double 
 TrialResult chainMailTrial(const Lattice& lattice, const TrialPath& path, double speed, const Reference& reference,
                            std::uint32_t maxMoves)
 {
-    const std::size_t most = mostPressSeeds(lattice, std::max(path.tool.radius, widestTip));
-    Deformation deformation(lattice, maxMoves, most);
-    std::vector<Seed> seeds(most);
+    const double radius = std::max(path.tool.radius, widestTip);
+    Deformation deformation(lattice, maxMoves, mostPressSeeds(lattice, radius));
+    ChainMailLevel level(deformation, radius);
+    const auto body = deformation.shape().body(*path.surface);
     const TrialModel model{[&](const TrialLoad& load) {
-                               Yield yield(0.0F);
-                               const std::size_t count = seedsOf(lattice, load, seeds, yield);
-                               deformation.deform(std::span(seeds).first(count), yield);
+                               level.deform(gripOf(load));
                                return ElasticResult{};
                            },
-                           [&](Vec3 rest) { return between(lattice, deformation.u(), rest); },
+                           [&](Vec3 rest) { return occupancy::displacementAt(body, rest); },
                            {},
                            [&] { return deformation.moved().size(); }};
     return runTrial(model, path, speed, reference);

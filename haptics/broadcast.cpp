@@ -33,8 +33,7 @@ volume::NodeGrid displayGrid(const volume::Tissue& tissue)
 {
     const Vec3 voxel = tissue.affine().spacing();
     const double finest = std::min({voxel.x, voxel.y, voxel.z});
-    const double spacing = volume::affordableSpacing(tissue.box(), finest, 2.0 * finest, displayNodes);
-    return volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
+    return volume::affordableGrid(tissue.box(), finest, displayNodes);
 }
 
 channel::ToolKind shown(datasets::ToolKind kind)

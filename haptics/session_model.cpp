@@ -30,8 +30,7 @@ chainmail::Lattice latticeOf(const datasets::Scene& scene, const volume::Tissue&
 {
     const bool elastic = scene.model.level == datasets::ModelLevel::elastic;
     const double wanted = elastic ? scene.model.elastic.spacing : scene.model.spacing;
-    const double spacing = volume::affordableSpacing(tissue.box(), wanted, 2.0 * wanted, latticeNodes);
-    const auto grid = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
+    const auto grid = volume::affordableGrid(tissue.box(), wanted, latticeNodes);
     return {grid, tissue.tissueOn(grid), tissue.table()};
 }
 

@@ -45,4 +45,10 @@ double affordableSpacing(const Box& box, double wanted, double margin, std::size
     return spacing;
 }
 
+NodeGrid affordableGrid(const Box& box, double wanted, std::size_t maxNodes)
+{
+    const double spacing = affordableSpacing(box, wanted, 2.0 * wanted, maxNodes);
+    return coveringGrid(box, spacing, 2.0 * spacing);
+}
+
 }  // namespace palpate::volume

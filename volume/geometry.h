@@ -84,5 +84,8 @@ NodeGrid coveringGrid(const Box& box, double spacing, double margin);
 /// The smallest spacing, not under `wanted` [m], with which a covering grid of `box` has at most `maxNodes` nodes.
 double affordableSpacing(const Box& box, double wanted, double margin, std::size_t maxNodes);
 
+/// The covering grid of `box` with that spacing and two of them around it.
+NodeGrid affordableGrid(const Box& box, double wanted, std::size_t maxNodes);
+
 }  // namespace volume
 }  // namespace palpate

@@ -26,22 +26,8 @@ constexpr double ballRadius = 10e-3;
 constexpr double thickness = 60e-3;  // of the block
 constexpr int rampUp = 500;          // ticks of the stabiliser's ramp, and more
 
-const std::string homogeneousScene = R"(name = "homogeneous"
-[volume]
-phantom = "block"
-voxel_mm = 2.0
-[volume.parameters]
-tumours = 0
-[tool]
-kind = "sphere"
-radius_mm = 10
-[dffb]
-mode = "off"
-[target]
-structure = "base"
-aim_mm = [0, 55, 0]
-entry_mm = [0, 0, 0]
-)";
+const std::string homogeneousScene =
+    tests::sphereOnBlock("structure = \"base\"\naim_mm = [0, 55, 0]\n[volume.parameters]\ntumours = 0\n");
 
 const SessionModel& homogeneous()
 {

@@ -37,8 +37,11 @@ inline const haptics::SessionModel& layeredNeedle()
     return model;
 }
 
-/// The block of fat with a stiff inclusion under a 10 mm sphere; surface y = 0, body behind it.
-inline const std::string blockScene = R"(name = "block"
+/// A block of fat under a 10 mm sphere; surface y = 0, body behind it. `rest` is what [target] has beside the entry, and
+/// further sections.
+inline std::string sphereOnBlock(const std::string& rest)
+{
+    return R"(name = "block"
 [volume]
 phantom = "block"
 voxel_mm = 2.0
@@ -48,10 +51,12 @@ radius_mm = 10
 [dffb]
 mode = "off"
 [target]
-structure = "tumour"
-aim_mm = [0, 25, 0]
 entry_mm = [0, 0, 0]
-)";
+)" + rest;
+}
+
+/// With a stiff inclusion.
+inline const std::string blockScene = sphereOnBlock("structure = \"tumour\"\naim_mm = [0, 25, 0]\n");
 
 inline const haptics::SessionModel& blockSphere()
 {
