@@ -11,7 +11,10 @@ namespace palpate::apps {
 struct ChartSeries {
     std::string name;
     std::vector<double> x, y;
-    bool line = false;  // joined in their order; separate points otherwise
+    bool line = false;                   // joined in their order; separate points otherwise
+    bool markers = true;                 // false: a line alone
+    std::vector<std::string> label{};    // what each point is, for who points at it; empty, or as long as x
+    std::vector<std::string> written{};  // text beside each point in the PNG; empty, or as long as x
 };
 
 /// A horizontal line, for a bound.

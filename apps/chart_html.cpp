@@ -33,7 +33,12 @@ json chartData(const DrawableChart& drawn)
     const Chart& c = drawn.chart;
     json series = json::array(), lines = json::array();
     for (const ChartSeries& s : c.series) {
-        series.push_back({{"label", s.name}, {"line", s.line}, {"x", column(s.x)}, {"y", column(s.y)}});
+        series.push_back({{"label", s.name},
+                          {"line", s.line},
+                          {"markers", s.markers},
+                          {"points", s.label},
+                          {"x", column(s.x)},
+                          {"y", column(s.y)}});
     }
     for (const ChartLine& b : c.bounds) {
         lines.push_back({{"at", b.y}, {"label", b.name}, {"colour", "soft"}});

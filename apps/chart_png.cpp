@@ -37,7 +37,7 @@ constexpr int left = 130, right = 24, top = 66, bottom = 96;  // around the plot
 constexpr int plotWidth = 1100, plotHeight = 720;             // [px]
 constexpr int letter = 11, noteLetter = 10, noteLine = 26;    // typical sizes of the fonts below [px]
 constexpr std::size_t legendRows = 22;                        // as many as fit beside the plot
-constexpr std::size_t longestName = 60, longestTitle = 84, longestLabel = 70;
+constexpr std::size_t longestName = 60, longestTitle = 84, longestLabel = 70, longestPointLabel = 30;
 
 // Text as UTF-8 on one line, at most `most` letters.
 std::string tidy(std::string_view text, std::size_t most)
@@ -131,20 +131,43 @@ std::string axisCommands(char name, const std::string& label, bool log, AxisRang
     return out + fmt::format("set logscale {0} 10\nset {0}tics ({1})\n", name, ticks);
 }
 
+// A text in a block of data, where gnuplot knows no escapes.
+std::string dataText(std::string_view text)
+{
+    std::string out = tidy(text, longestPointLabel);
+    std::ranges::replace(out, '"', '\'');
+    return "\"" + out + "\"";
+}
+
+std::string dataBlock(const ChartSeries& s, std::size_t index)
+{
+    std::string out = fmt::format("$s{} << END\n", index);
+    for (std::size_t k = 0; k < s.x.size(); ++k) {
+        const std::string text = s.written.empty() ? "" : " " + dataText(s.written[k]);
+        out += std::isnan(s.x[k]) ? "NaN NaN\n" : fmt::format("{} {}{}\n", s.x[k], s.y[k], text);
+    }
+    return out + "END\n";
+}
+
 std::string dataCommands(const Chart& chart)
 {
     std::string data, plots;
+    int plain = 0;  // lines without markers: told apart by their dashes
     for (std::size_t i = 0; i < chart.series.size(); ++i) {
         const ChartSeries& s = chart.series[i];
-        data += fmt::format("$s{} << END\n", i);
-        for (std::size_t k = 0; k < s.x.size(); ++k) {
-            data += std::isnan(s.x[k]) ? "NaN NaN\n" : fmt::format("{} {}\n", s.x[k], s.y[k]);
+        data += dataBlock(s, i);
+        const std::string marks = fmt::format("pt {} ps 1.7", markers[i % markers.size()]);
+        const std::string style = s.line && s.markers
+                                      ? fmt::format("linespoints lw 2.2 pi {} {}", s.x.size() / markersOnLine + 1, marks)
+                                  : s.line ? fmt::format("lines lw 2.2 dt {}", ++plain)
+                                           : "points lw 1.6 " + marks;
+        plots += fmt::format("{}$s{} using 1:2 with {} lc rgb '{}' title {}", plots.empty() ? "" : ", ", i, style,
+                             s.markers ? colours[i % colours.size()] : "#999999", quoted(s.name, longestName));
+        if (!s.written.empty()) {
+            plots +=
+                fmt::format(", $s{} using 1:2:3 with labels left offset 0.9,0.55 font 'Sans,11' textcolor rgb '{}' notitle",
+                            i, colours[i % colours.size()]);
         }
-        data += "END\n";
-        const std::string style =
-            s.line ? fmt::format("linespoints lw 2.2 pi {}", s.x.size() / markersOnLine + 1) : std::string("points lw 1.6");
-        plots += fmt::format("{}$s{} using 1:2 with {} pt {} ps 1.7 lc rgb '{}' title {}", plots.empty() ? "" : ", ", i,
-                             style, markers[i % markers.size()], colours[i % colours.size()], quoted(s.name, longestName));
     }
     for (std::size_t i = 0; i < chart.bounds.size(); ++i) {
         plots += fmt::format(", {} with lines lw 1.8 dt {} lc rgb '#444444' title {}", chart.bounds[i].y, i % 4 + 2,

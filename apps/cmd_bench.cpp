@@ -1,5 +1,6 @@
 #include <apps/command.h>
 
+#include <apps/cmd_bench_costs.h>
 #include <apps/cmd_bench_kernel.h>
 #include <apps/figures.h>
 #include <apps/outputs.h>
@@ -181,6 +182,7 @@ void addBench(CLI::App& app)
     tick->final_callback([o] { benchTick(*o); });
     addBenchQuery(*bench);
     addBenchKernel(*bench);
+    addBenchCosts(*bench);
 }
 
 }  // namespace palpate::apps

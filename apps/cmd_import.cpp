@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <apps/volume_report.h>
 #include <datasets/tables.h>
+#include <volume/fnv.h>
 #include <volume/import.h>
 
 #include <fmt/chrono.h>
@@ -134,24 +135,14 @@ std::vector<LabelName> nameLabels(const ImportOptions& options, const volume::Im
     return named;
 }
 
-// FNV-1a over the label values, x fastest: the same voxels give the same hash whatever file they came in.
-// Source: G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV Non-Cryptographic Hash Algorithm", IETF draft.
-std::uint64_t hashOf(const std::vector<std::uint16_t>& values)
-{
-    std::uint64_t hash = 14695981039346656037ULL;
-    for (const std::uint16_t value : values) {
-        hash = (hash ^ (value & 0xffU)) * 1099511628211ULL;
-        hash = (hash ^ (value >> 8U)) * 1099511628211ULL;
-    }
-    return hash;
-}
-
 volume::Provenance provenanceOf(const ImportOptions& options, const volume::ImportedLabels& labels,
                                 const std::vector<std::string>& notes)
 {
+    volume::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
+    hash.addAll(labels.image.values);
     volume::Provenance provenance = {{"source", options.labels.filename().string()},
                                      {"bytes", std::to_string(std::filesystem::file_size(options.labels))},
-                                     {"label hash", fmt::format("{:016x}", hashOf(labels.image.values))},
+                                     {"label hash", fmt::format("{:016x}", hash.value)},
                                      {"imported", fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr)))},
                                      {"program", PALPATE_BUILD}};
     for (const std::string& note : notes) {

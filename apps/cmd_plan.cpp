@@ -1,5 +1,6 @@
 #include <apps/command.h>
 
+#include <apps/cmd_bench_costs.h>
 #include <apps/outputs.h>
 #include <apps/progress.h>
 #include <apps/quantities.h>
@@ -27,7 +28,7 @@ struct Options {
     std::string scene;
     std::string error = "3%", forceError, budget = "400us";
     double speed = 20;  // [mm/s]
-    experiments::PlanCosts costs;
+    std::string costs;
     std::string json;
 };
 
@@ -45,6 +46,8 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
                        {"sweeps", elastic ? c.elastic.cycles : 0},
                        {"strain", elastic && c.elastic.strain == Strain::finite ? "finite" : "small"},
                        {"nodes", c.nodes},
+                       {"slots", c.slots},
+                       {"cycles", c.meanCycles},
                        {"touched", c.touched},
                        {"tried", c.tried},
                        {"predicted_us", c.microseconds},
@@ -76,7 +79,7 @@ nlohmann::json planFigures(const Options& o, const Plan& plan, const experiments
     out["found"] = plan.choice.has_value();
     out["error_pct"] = 100.0 * request.error;
     out["budget_us"] = 1e6 * request.budget;
-    out["ns_per_node"] = request.costs.nsPerNode;
+    out["costs"] = o.costs.empty() ? "built in" : o.costs;
     out["reference_spacing_mm"] = 1e3 * plan.referenceSpacing;
     out["reference_nodes"] = plan.referenceNodes;
     out["reference_strain"] = plan.finiteReference ? "finite" : "small";
@@ -91,7 +94,7 @@ std::string verdict(const PlanCandidate& c, bool chosen)
         return "chosen: the cheapest that holds both";
     }
     if (!c.tried) {
-        return c.holdsBudget ? "not tried: dearer than the choice" : "not tried: over the budget";
+        return c.holdsBudget ? "not tried: no cheaper than the choice" : "not tried: over the budget";
     }
     if (!c.holdsError && !c.holdsBudget) {
         return "over error and budget";
@@ -149,18 +152,20 @@ void printToml(const PlanCandidate& c)
     }
 }
 
-void printReference(const Plan& plan, const experiments::PlanCosts& costs)
+void printReference(const Plan& plan, const experiments::PlanCosts& costs, const std::string& origin)
 {
     fmt::print(
         "errors are worst values over a push and a drag, against {} strain solved on {} nodes of {:g} mm; local strain "
         "reaches {:.0f} %\n",
         plan.finiteReference ? "finite" : "small", plan.referenceNodes, 1e3 * plan.referenceSpacing, 100.0 * plan.strain);
+    const auto& [small, finite, move, rest] = costs;
     fmt::print(
-        "time is counted: nodes x ({:g} + {:g} per cycle) x {:g} ns ({:g} x for finite strain), contact points x (1 + "
-        "cycles) x {:g} ns, ChainMail's nodes x {:g} ns, {:g} us for the rest of a tick; measured on a Zen 5 server "
-        "core with AVX-512 (--ns-per-node changes the first)\n",
-        costs.passesPerTick, costs.passesPerCycle, costs.nsPerNode, costs.finiteFactor, costs.nsPerContact, costs.nsPerMove,
-        costs.usPerTick);
+        "time is counted: {:g} ns per node and {:g} per node and cycle ({:g} and {:g} with finite strain), {:g} and {:g} "
+        "per "
+        "contact point ({:g} and {:g}), {:g} per node that ChainMail moves, {:g} us for the rest of a tick; {}\n",
+        small.perSlot, small.perSlotCycle, finite.perSlot, finite.perSlotCycle, small.perContact, small.perContactCycle,
+        finite.perContact, finite.perContactCycle, move, rest,
+        origin.empty() ? "measured on a Zen 5 server core with AVX-512; 'palpate bench costs' measures yours" : origin);
 }
 
 void planScene(const Options& o)
@@ -173,7 +178,9 @@ void planScene(const Options& o)
     }
     request.budget = parseTime("--budget", o.budget);
     request.speed = 1e-3 * o.speed;
-    request.costs = o.costs;
+    if (!o.costs.empty()) {
+        request.costs = loadCosts(o.costs);
+    }
 
     Progress progress;
     progress.show(o.scene + ": volume");
@@ -187,7 +194,7 @@ void planScene(const Options& o)
     }
     const bool tell = o.json != "-";
     if (tell) {
-        printReference(plan, request.costs);
+        printReference(plan, request.costs, o.costs);
         printCandidates(plan);
         std::fflush(stdout);
     }
@@ -219,9 +226,8 @@ void addPlan(CLI::App& app)
     command->add_option("--speed", o->speed, "Speed of the test push [mm/s]")
         ->check(CLI::Range(1.0, 1000.0))
         ->capture_default_str();
-    command->add_option("--ns-per-node", o->costs.nsPerNode, "Time per node and pass of this machine [ns]")
-        ->check(CLI::Range(0.01, 1000.0))
-        ->capture_default_str();
+    command->add_option("--costs", o->costs, "Costs of a tick on this machine: a file of palpate bench costs --json")
+        ->check(CLI::ExistingFile);
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     command->final_callback([o] { planScene(*o); });
 }

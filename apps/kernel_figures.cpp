@@ -17,20 +17,19 @@ using namespace experiments;
 
 namespace {
 
-constexpr std::array<std::pair<const char*, double TrialErrors::*>, 5> errorNames{{{"rms", &TrialErrors::rms},
+constexpr std::array<std::pair<const char*, double TrialErrors::*>, 6> errorNames{{{"rms", &TrialErrors::rms},
                                                                                    {"near", &TrialErrors::near},
                                                                                    {"max", &TrialErrors::max},
                                                                                    {"force", &TrialErrors::force},
-                                                                                   {"energy", &TrialErrors::energy}}};
+                                                                                   {"energy", &TrialErrors::energy},
+                                                                                   {"volume", &TrialErrors::volume}}};
 constexpr std::array<const char*, 4> phaseNames{"press", "turn", "drag", "rest"};
 
-// Medians as NAME_pct, worst values as NAME_worst_pct, and the state at rest.
+// Those of all looks, and of the state at rest.
 void addErrors(nlohmann::json& out, const TrialResult& result)
 {
+    out.update(errorFigures(result.looks));
     for (const auto& [name, figure] : errorNames) {
-        const Spread spread = spreadOf(result.looks, figure);
-        out[fmt::format("{}_pct", name)] = spread.median;
-        out[fmt::format("{}_worst_pct", name)] = spread.worst;
         out[fmt::format("{}_rest_pct", name)] = atRest(result).*figure;
     }
     out["tick_us_p50"] = 1e6 * result.p50;
@@ -224,6 +223,17 @@ std::vector<int> operatorWindows(const std::vector<std::string>& settings)
     std::ranges::sort(windows);
     windows.erase(std::unique(windows.begin(), windows.end()), windows.end());
     return windows;
+}
+
+nlohmann::json errorFigures(std::span<const TrialErrors> looks)
+{
+    nlohmann::json out;
+    for (const auto& [name, figure] : errorNames) {
+        const Spread spread = spreadOf(looks, figure);
+        out[fmt::format("{}_pct", name)] = spread.median;
+        out[fmt::format("{}_worst_pct", name)] = spread.worst;
+    }
+    return out;
 }
 
 double singleGridRatio(const KernelCase& c, double TrialErrors::*figure)

@@ -6,6 +6,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,10 @@ namespace palpate::apps {
 
 /// Nodes along the windows of these settings and of the default one, each once; with settings, a larger window, too.
 std::vector<int> operatorWindows(const std::vector<std::string>& settings);
+
+/// Medians of the looks' errors as NAME_pct and worst values as NAME_worst_pct; NAME is rms, near, max, force, energy or
+/// volume.
+nlohmann::json errorFigures(std::span<const experiments::TrialErrors> looks);
 
 /// How much longer than the windows the fastest single grid takes whose error in `figure` is no larger; 0 when there is
 /// none, or the case has no rivals.

@@ -1,3 +1,4 @@
+#include <apps/cmd_accuracy.h>
 #include <apps/command.h>
 
 #include <CLI/CLI.hpp>
@@ -29,6 +30,7 @@ int main(int argc, char** argv)
     addScore(app);
     addPlan(app);
     addBench(app);
+    addAccuracy(app);
 
     try {
         app.parse(argc, argv);

@@ -16,6 +16,7 @@ find_package(tomlplusplus CONFIG REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(Boost 1.74 REQUIRED)
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 
 find_package(ITK 5.2 REQUIRED COMPONENTS
   ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta)
@@ -27,6 +28,13 @@ if(PALPATE_VIEWER)
     CommonCore CommonDataModel CommonExecutionModel CommonTransforms FiltersCore FiltersGeneral FiltersSources ImagingCore
     InteractionStyle IOImage RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
     RenderingVolume RenderingVolumeOpenGL2)
+endif()
+
+if(PALPATE_REFERENCE)
+  find_package(CGAL 5.5 CONFIG REQUIRED)
+  find_package(GetFEM REQUIRED)
+  # Once more where the viewer found VTK already: targets add up.
+  find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOXML)
 endif()
 
 if(BUILD_TESTING)

@@ -8,8 +8,9 @@
 #
 # gives palpate::chainmail with its headers as <chainmail/lattice.h>, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
+# UNINSTALLED: for a program of ours only.
 function(palpate_library name)
-  cmake_parse_arguments(arg "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
+  cmake_parse_arguments(arg "UNINSTALLED" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
   set(target palpate_${name})
   add_library(${target} STATIC ${arg_SOURCES})
   add_library(palpate::${name} ALIAS ${target})
@@ -24,8 +25,10 @@ function(palpate_library name)
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
     VERIFY_INTERFACE_HEADER_SETS ${PALPATE_VERIFY_HEADERS})
-  install(TARGETS ${target} EXPORT palpateTargets
-    FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/palpate)
+  if(NOT arg_UNINSTALLED)
+    install(TARGETS ${target} EXPORT palpateTargets
+      FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/palpate)
+  endif()
 endfunction()
 
 # A program in apps/ with its own install rule.

@@ -63,9 +63,9 @@ enum class Strain : std::uint8_t { small, finite };
 /// Level `elastic`: relaxation on nested windows around the tool.
 struct ElasticSettings {
     double spacing = 2e-3;  // of the finest window [m]; each window further out is twice as coarse
-    int window = 15;        // nodes along each side of a window: odd, 9 to 41
+    int window = 13;        // nodes along each side of a window: odd, 9 to 41
     int cycles = 2;         // relaxation cycles per tick, at most
-    Strain strain = Strain::small;
+    Strain strain = Strain::finite;
     double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-], 0 to 0.499
     double viscosity = 0;      // Kelvin-Voigt: time that a strain lags behind its stress [s]; 0 = none
     double friction = 0;       // of sphere and capsule on tissue (Coulomb) [-]

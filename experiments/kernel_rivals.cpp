@@ -4,6 +4,7 @@
 #include <occupancy/body.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace palpate::experiments {
 
@@ -50,21 +51,36 @@ TrialResult elasticTrial(const ElasticBody& body, const TrialPath& path, double 
     return runTrial(elasticModel(elastic), path, speed, reference);
 }
 
+TrialModel chainMailModel(std::shared_ptr<const Lattice> lattice, const TrialPath& path, std::uint32_t maxMoves)
+{
+    struct Mail {
+        Mail(std::shared_ptr<const Lattice> nodes, double radius, std::uint32_t maxMoves)
+            : lattice(std::move(nodes)),
+              deformation(*lattice, maxMoves, mostPressSeeds(*lattice, radius)),
+              level(deformation, radius)
+        {
+        }
+        std::shared_ptr<const Lattice> lattice;
+        Deformation deformation;
+        ChainMailLevel level;
+    };
+    auto mail = std::make_shared<Mail>(std::move(lattice), std::max(path.tool.radius, widestTip), maxMoves);
+    const volume::DistanceField& surface = *path.surface;
+    return {
+        [mail](const TrialLoad& load) {
+            mail->level.deform(gripOf(load));
+            return ElasticResult{};
+        },
+        [mail, &surface](Vec3 rest) { return occupancy::displacementAt(mail->deformation.shape().body(surface), rest); },
+        {},
+        [mail] { return mail->deformation.moved().size(); }};
+}
+
 TrialResult chainMailTrial(const Lattice& lattice, const TrialPath& path, double speed, const Reference& reference,
                            std::uint32_t maxMoves)
 {
-    const double radius = std::max(path.tool.radius, widestTip);
-    Deformation deformation(lattice, maxMoves, mostPressSeeds(lattice, radius));
-    ChainMailLevel level(deformation, radius);
-    const auto body = deformation.shape().body(*path.surface);
-    const TrialModel model{[&](const TrialLoad& load) {
-                               level.deform(gripOf(load));
-                               return ElasticResult{};
-                           },
-                           [&](Vec3 rest) { return occupancy::displacementAt(body, rest); },
-                           {},
-                           [&] { return deformation.moved().size(); }};
-    return runTrial(model, path, speed, reference);
+    const std::shared_ptr<const Lattice> notOurs(&lattice, [](const Lattice*) {});
+    return runTrial(chainMailModel(notOurs, path, maxMoves), path, speed, reference);
 }
 
 std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volume::DistanceField& surface,

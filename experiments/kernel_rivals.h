@@ -4,6 +4,8 @@
 #include <datasets/scene.h>
 #include <experiments/kernel_trial.h>
 
+#include <memory>
+
 namespace palpate::experiments {
 
 /// An elastic body for trials, with the grid of its cells.
@@ -20,7 +22,10 @@ TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& s
 TrialResult elasticTrial(const chainmail::ElasticBody& body, const TrialPath& path, double speed,
                          const Reference& reference, const chainmail::ElasticOptions& options);
 
-/// Plain ChainMail in one lattice, held as in a session: level 1 of the ladder. `touched` counts moved nodes.
+/// Plain ChainMail in one lattice, held as in a session: level 1 of the ladder. `touched` counts moved nodes. The surface
+/// of the path must outlive the model.
+TrialModel chainMailModel(std::shared_ptr<const chainmail::Lattice> lattice, const TrialPath& path, std::uint32_t maxMoves);
+/// The trial of that model.
 TrialResult chainMailTrial(const chainmail::Lattice& lattice, const TrialPath& path, double speed,
                            const Reference& reference, std::uint32_t maxMoves);
 

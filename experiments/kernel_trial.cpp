@@ -1,16 +1,22 @@
 #include <experiments/kernel_trial.h>
 
+#include <experiments/trial_errors.h>
+
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include <time.h>
+
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <functional>
 #include <memory>
 #include <numeric>
-#include <stdexcept>
+#include <optional>
+#include <utility>
 
 namespace palpate::experiments {
 
@@ -20,7 +26,6 @@ namespace {
 
 constexpr int wholeWindow = 1023;        // nodes along each side: more than any level has
 constexpr double nearField = 30e-3;      // [m]
-constexpr double leastForce = 0.05;      // share of the path's peak
 constexpr double strainedVolume = 1e-7;  // [m^3]
 
 // Nodes of the finest level that are tissue and free, by z, then y, then x.
@@ -148,41 +153,86 @@ ReferenceState stateOf(const Elastic& elastic, const TrialLoad& load, std::span<
     return state;
 }
 
-TrialErrors errorsOf(const TrialModel& model, const Reference& reference, const ReferenceState& state)
+double threadSeconds()
 {
-    TrialErrors errors;
-    double all = 0.0, near = 0.0, worst = 0.0;
-    std::size_t nearCount = 0;
-    for (std::size_t i = 0; i < state.u.size(); ++i) {
-        const Vec3 at(reference.position[i]);
-        const Vec3 off = model.displacement(at) - Vec3(state.u[i]);
-        const double square = glm::dot(off, off);
-        all += square;
-        worst = std::max(worst, square);
-        if (glm::distance(at, state.focus) < nearField) {
-            near += square;
-            ++nearCount;
-        }
-    }
-    const double percent = state.largest > 0.0 ? 100.0 / state.largest : 0.0;
-    errors.rms = percent * std::sqrt(all / static_cast<double>(std::max<std::size_t>(state.u.size(), 1)));
-    errors.near = percent * std::sqrt(near / static_cast<double>(std::max<std::size_t>(nearCount, 1)));
-    errors.max = percent * std::sqrt(worst);
-    const double force = std::max(glm::length(state.force), leastForce * reference.peakForce);
-    if (model.force && force > 0.0) {
-        errors.force = 100.0 * glm::distance(model.force(), state.force) / force;
-    }
-    return errors;
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-const ReferenceState& stateAt(const Reference& reference, TrialPose pose)
+double meanOf(std::span<const double> values)
 {
-    for (const ReferenceState& s : reference.states) {
-        if (s.pose == pose) {
-            return s;
+    return std::accumulate(values.begin(), values.end(), 0.0) /
+           static_cast<double>(std::max<std::size_t>(values.size(), 1));
+}
+
+// Follows a path with a model, and counts and times its ticks in contact.
+class TrialRun {
+public:
+    TrialRun(const TrialModel& model, const TrialPath& path) : model_(model), load_(path) {}
+
+    ElasticResult tick(const TrialTick& t)
+    {
+        using Clock = std::chrono::steady_clock;
+        load_.set(t.pose);
+        const auto start = Clock::now();
+        const double cpuStart = threadSeconds();
+        const ElasticResult result = model_.tick(load_);
+        const double cpu = threadSeconds() - cpuStart;
+        const double took = std::chrono::duration<double>(Clock::now() - start).count();
+        const std::size_t touched = model_.touched();
+        if (touched > 0) {
+            ++out_.ticks;
+            out_.meanTouched += static_cast<double>(touched);
+            out_.meanCycles += result.cycles;
+            out_.shortened += result.shortened;
+            out_.windowMoves += result.moved ? 1 : 0;
         }
+        if (touched > 0 && !cold_) {
+            seconds_.push_back(took);
+            cpuSeconds_.push_back(cpu);
+        }
+        cold_ = t.look;
+        return result;
     }
-    throw std::logic_error("trial: the reference was solved for other speeds");
+
+    TrialResult finish()
+    {
+        const auto ticks = static_cast<double>(std::max<std::size_t>(out_.ticks, 1));
+        out_.meanTouched /= ticks;
+        out_.meanCycles /= ticks;
+        std::ranges::sort(seconds_);
+        out_.mean = meanOf(seconds_);
+        out_.cpu = meanOf(cpuSeconds_);
+        if (!seconds_.empty()) {
+            out_.p50 = seconds_[seconds_.size() / 2];
+            out_.p99 = seconds_[seconds_.size() * 99 / 100];
+        }
+        return std::move(out_);
+    }
+
+private:
+    const TrialModel& model_;
+    TrialLoad load_;
+    TrialResult out_;
+    std::vector<double> seconds_, cpuSeconds_;
+    bool cold_ = true;  // a look at the errors leaves other things in the caches
+};
+
+TrialErrors look(const TrialModel& model, const Reference& reference, const PositionCells& cells, const TrialTick& t,
+                 const ElasticResult& result)
+{
+    const ReferenceState& state = stateAt(reference, t.pose);
+    std::vector<Vec3> u;
+    u.reserve(reference.position.size());
+    for (const Vec3f& p : reference.position) {
+        u.push_back(model.displacement(Vec3(p)));
+    }
+    const auto force = model.force ? std::optional(model.force()) : std::nullopt;
+    TrialErrors errors = errorsOf(u, force, reference, cells, state);
+    errors.phase = t.phase;
+    errors.energy = state.energy > 0.0 ? 100.0 * (result.energy / state.energy - 1.0) : 0.0;
+    return errors;
 }
 
 }  // namespace
@@ -238,44 +288,41 @@ TrialModel nothingModel()
     return {[](const TrialLoad&) { return ElasticResult{}; }, [](Vec3) { return Vec3(0.0); }, {}, [] { return 1; }};
 }
 
-TrialResult runTrial(const TrialModel& model, const TrialPath& path, double speed, const Reference& reference)
+std::vector<TrialResult> runTrials(const TrialModel& model, const TrialPath& path, double speed,
+                                   std::span<const Reference* const> references)
 {
-    using Clock = std::chrono::steady_clock;
-    TrialResult out;
-    TrialLoad load(path);
-    std::vector<double> seconds;
-    bool cold = true;  // a look at the errors leaves other things in the caches
+    std::vector<PositionCells> cells;
+    for (const Reference* reference : references) {
+        cells.push_back(positionCells(reference->position));
+    }
+    std::vector<std::vector<TrialErrors>> looks(references.size());
+    TrialRun run(model, path);
     for (const TrialTick& t : schedule(path, speed)) {
-        load.set(t.pose);
-        const auto start = Clock::now();
-        const ElasticResult result = model.tick(load);
-        const double took = std::chrono::duration<double>(Clock::now() - start).count();
-        const std::size_t touched = model.touched();
-        if (touched > 0) {
-            ++out.ticks;
-            out.meanTouched += static_cast<double>(touched);
-            out.shortened += result.shortened;
-            out.windowMoves += result.moved ? 1 : 0;
-        }
-        if (touched > 0 && !cold) {
-            seconds.push_back(took);
-        }
-        cold = t.look;
-        if (t.look) {
-            const ReferenceState& state = stateAt(reference, t.pose);
-            out.looks.push_back(errorsOf(model, reference, state));
-            out.looks.back().phase = t.phase;
-            out.looks.back().energy = state.energy > 0.0 ? 100.0 * (result.energy / state.energy - 1.0) : 0.0;
+        const ElasticResult result = run.tick(t);
+        for (std::size_t i = 0; t.look && i < references.size(); ++i) {
+            looks[i].push_back(look(model, *references[i], cells[i], t, result));
         }
     }
-    out.meanTouched /= static_cast<double>(std::max<std::size_t>(out.ticks, 1));
-    std::ranges::sort(seconds);
-    if (!seconds.empty()) {
-        out.mean = std::accumulate(seconds.begin(), seconds.end(), 0.0) / static_cast<double>(seconds.size());
-        out.p50 = seconds[seconds.size() / 2];
-        out.p99 = seconds[seconds.size() * 99 / 100];
+    std::vector<TrialResult> out(references.size(), run.finish());
+    for (std::size_t i = 0; i < out.size(); ++i) {
+        out[i].looks = std::move(looks[i]);
     }
     return out;
+}
+
+TrialResult runTrial(const TrialModel& model, const TrialPath& path, double speed, const Reference& reference)
+{
+    const std::array references{&reference};
+    return std::move(runTrials(model, path, speed, references).front());
+}
+
+TrialResult timeTrial(const TrialModel& model, const TrialPath& path, double speed)
+{
+    TrialRun run(model, path);
+    for (const TrialTick& t : schedule(path, speed)) {
+        run.tick(t);
+    }
+    return run.finish();
 }
 
 Spread spreadOf(std::span<const TrialErrors> looks, double TrialErrors::*figure)

@@ -71,14 +71,17 @@ struct TrialErrors {
     double max = 0;     // worst node
     double force = 0;   // vector; where the force is under 5 % of the path's peak, of those 5 %
     double energy = 0;  // by how much it is above the reference's
+    double volume = 0;  // |J - J of the reference|, J = det(I + grad u), mean within 30 mm; not of a displacement but of 1
 };
 
 struct TrialResult {
     std::vector<TrialErrors> looks;
     double p50 = 0, p99 = 0;    // time of a tick in contact [s]
     double mean = 0;            // the same: a tick may need no cycle at all, so ratios are of means
+    double cpu = 0;             // the same in this thread's processor time, which other programs do not lengthen [s]
     std::size_t ticks = 0;      // in contact
     double meanTouched = 0;     // contact points, or moved nodes, per tick in contact
+    double meanCycles = 0;      // of relaxation, per tick in contact
     std::size_t shortened = 0;  // steps
     std::size_t windowMoves = 0;
 };
@@ -86,6 +89,12 @@ struct TrialResult {
 /// Drives a model along the path, and measures its errors at the looks and its time in all other ticks. Throws
 /// std::logic_error when the reference was not solved for this speed.
 TrialResult runTrial(const TrialModel& model, const TrialPath& path, double speed, const Reference& reference);
+/// The same against several references of one path, in one run: one result each, which differ in their looks only.
+std::vector<TrialResult> runTrials(const TrialModel& model, const TrialPath& path, double speed,
+                                   std::span<const Reference* const> references);
+
+/// The times and counts alone.
+TrialResult timeTrial(const TrialModel& model, const TrialPath& path, double speed);
 
 /// Median and worst over looks of one figure.
 struct Spread {

@@ -19,15 +19,16 @@ namespace {
 
 // The ladder. Windows fill whole vectors: a row of 15 or 31 nodes takes as long as one of 16 or 32.
 constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
-constexpr std::array windows{9, 15, 21, 31};
+constexpr std::array windows{9, 13, 15, 21, 31};
 constexpr std::array cycles{1, 2};
 constexpr std::size_t mostReferenceCells = 400000;  // both references take some seconds
 constexpr std::size_t mostCells = 4U << 20;         // of any other grid
 constexpr std::size_t mostWindowNodes = 300000;     // no budget under 5 ms pays for more
 constexpr std::size_t mostPoints = 60000;           // at which errors are looked at
-constexpr double farOver = 2.0;                     // budgets: a candidate that costs more is not tried
-constexpr double typicalTouched = 300;              // contact points, before they are counted
-constexpr double typicalMoved = 500;
+// What a candidate is taken to need before it is tried: less than it will, so that none is passed over.
+constexpr double leastCycles = 0.8;  // many ticks need none
+constexpr double leastTouched = 50;
+constexpr double leastMoved = 200;
 
 TrialTool sceneTool(const datasets::ToolSpec& tool)
 {
@@ -62,23 +63,48 @@ public:
     {
         solve();
         collect();
-        std::ranges::stable_sort(plan_.candidates, {}, &PlanCandidate::microseconds);
-        for (std::size_t i = 0; i < plan_.candidates.size() && !plan_.choice; ++i) {
-            PlanCandidate& c = plan_.candidates[i];
-            if (c.microseconds > farOver * 1e6 * request_.budget) {
-                break;
-            }
-            progress_(fmt::format("{} of {}: {}", i + 1, plan_.candidates.size(), c.name()));
+        std::size_t tried = 0;
+        while (const auto next = mayBeCheapest()) {
+            PlanCandidate& c = plan_.candidates[*next];
+            progress_(fmt::format("{} of {}: {}", ++tried, plan_.candidates.size(), c.name()));
             attempt(c);
-            if (c.holdsError && c.holdsBudget) {
-                plan_.choice = i;
-            }
         }
+        std::ranges::stable_sort(plan_.candidates, {}, &PlanCandidate::microseconds);
+        plan_.choice = cheapest();
         findNearest();
         return std::move(plan_);
     }
 
 private:
+    // The cheapest that holds both.
+    std::optional<std::size_t> cheapest() const
+    {
+        std::optional<std::size_t> best;
+        for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+            const PlanCandidate& c = plan_.candidates[i];
+            if (c.holdsError && c.holdsBudget && (!best || c.microseconds < plan_.candidates[*best].microseconds)) {
+                best = i;
+            }
+        }
+        return best;
+    }
+
+    // The one to try next; nothing when the rest cannot be cheaper than the best so far, or is over the budget for certain.
+    std::optional<std::size_t> mayBeCheapest() const
+    {
+        const auto best = cheapest();
+        double bound = best ? plan_.candidates[*best].microseconds : 1e6 * request_.budget;
+        std::optional<std::size_t> next;
+        for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+            const PlanCandidate& c = plan_.candidates[i];
+            if (!c.tried && c.microseconds <= bound) {
+                bound = c.microseconds;
+                next = i;
+            }
+        }
+        return next;
+    }
+
     const TrialBody& bodyAt(double spacing)
     {
         const auto found = bodies_.find(spacing);
@@ -115,7 +141,7 @@ private:
             PlanCandidate c;
             c.level = ModelLevel::chainmail;
             c.spacing = spacing;
-            c.touched = typicalMoved;
+            c.touched = leastMoved;
             add(c);
         }
         for (const double spacing : spacings) {
@@ -137,8 +163,11 @@ private:
         c.elastic = model_.scene.model.elastic;
         c.elastic.spacing = spacing;
         c.elastic.window = window;
-        c.touched = typicalTouched;
-        c.nodes = chainmail::Elastic(body.body, {.window = window}, TrialLoad(path_).load().focus).nodes();
+        c.touched = leastTouched;
+        c.meanCycles = leastCycles;
+        const chainmail::Elastic elastic(body.body, {.window = window}, TrialLoad(path_).load().focus);
+        c.nodes = elastic.nodes();
+        c.slots = slotsOf(elastic.stack());
         if (c.nodes > mostWindowNodes) {
             return;
         }
@@ -180,6 +209,7 @@ private:
         const TrialResult result = push(c);
         c.tried = true;
         c.touched = c.level == ModelLevel::spring ? 0.0 : result.meanTouched;
+        c.meanCycles = result.meanCycles;
         c.microseconds = predictedTime(c, request_.costs);
         c.rms = spreadOf(result.looks, &TrialErrors::rms).worst;
         c.near = spreadOf(result.looks, &TrialErrors::near).worst;
@@ -247,11 +277,8 @@ double predictedTime(const PlanCandidate& c, const PlanCosts& costs) noexcept
         default:
             break;
     }
-    const double passes = costs.passesPerTick + costs.passesPerCycle * c.elastic.cycles;
-    const double factor = c.elastic.strain == Strain::finite ? costs.finiteFactor : 1.0;
-    const double nodes = costs.nsPerNode * factor * passes * static_cast<double>(c.nodes);
-    const double contacts = costs.nsPerContact * (1.0 + c.elastic.cycles) * c.touched;
-    return costs.usPerTick + microsecond * (nodes + contacts);
+    const LawCosts& law = c.elastic.strain == Strain::finite ? costs.finite : costs.small;
+    return costs.usPerTick + tickTime(law, {static_cast<double>(c.slots), c.meanCycles, c.touched});
 }
 
 Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,

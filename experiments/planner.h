@@ -1,6 +1,7 @@
 #pragma once
 
 #include <datasets/scene.h>
+#include <experiments/tick_costs.h>
 #include <haptics/session_model.h>
 
 #include <algorithm>
@@ -11,15 +12,13 @@
 
 namespace palpate::experiments {
 
-/// What a tick costs, by counts. Measured on one core of an x86-64 server of 2024 (Zen 5, AVX-512).
+/// What a tick costs, by counts: measured, see docs/accuracy.md; `palpate bench costs` measures a machine's own. These are
+/// of one core of an x86-64 server of 2024 (Zen 5, AVX-512).
 struct PlanCosts {
-    double nsPerNode = 0.8;      // per window node and pass over it, small strain
-    double finiteFactor = 1.8;   // the same for finite strain, times this
-    double passesPerTick = 1.5;  // over all nodes, whatever the cycles
-    double passesPerCycle = 10;  // of one relaxation cycle
-    double nsPerContact = 90;    // per contact point and cycle, the tick's own look counted as one
-    double nsPerMove = 230;      // per node that ChainMail moves
-    double usPerTick = 20;       // collision, distances, forces and the rest of a tick [us]
+    LawCosts small{1.6, 8.8, 60, 105};
+    LawCosts finite{7.0, 10.7, 43, 118};
+    double nsPerMove = 230;  // per node that ChainMail moves
+    double usPerTick = 20;   // collision, distances, forces and the rest of a tick [us]
 };
 
 struct PlanRequest {
@@ -36,9 +35,11 @@ struct PlanCandidate {
     datasets::ElasticSettings elastic;  // of level `elastic`
     double spacing = 0;                 // of level `chainmail` [m]
     std::size_t nodes = 0;              // of the windows
-    double touched = 0;                 // contact points, or moved nodes, per tick
+    std::size_t slots = 0;              // the same, rows filled up to whole vectors
+    double meanCycles = 0;              // that a tick took; before it is tried, fewer than any took
+    double touched = 0;                 // contact points, or moved nodes, per tick; before it is tried, fewer than any
     double microseconds = 0;            // predicted per tick
-    bool tried = false;                 // false: dearer than the choice, or far over the budget
+    bool tried = false;                 // false: no cheaper than the choice, or over the budget
     double rms = 0, near = 0;           // [%], see TrialErrors
     std::optional<double> force;        // [%]; nothing: the level's force does not come from its shape
     bool holdsError = false;
@@ -49,7 +50,7 @@ struct PlanCandidate {
 };
 
 struct Plan {
-    std::vector<PlanCandidate> candidates;  // in order of predicted time
+    std::vector<PlanCandidate> candidates;  // by predicted time
     std::optional<std::size_t> choice;
     std::size_t nearest = 0;      // of those that were tried: over error and budget by the least factor
     double referenceSpacing = 0;  // [m]
@@ -64,8 +65,9 @@ inline constexpr double largeStrain = 0.15;
 /// Predicted time of a tick [us]: counts times costs, never a clock.
 double predictedTime(const PlanCandidate& candidate, const PlanCosts& costs) noexcept;
 
-/// Pushes the scene's own tool a short way into the tissue with one model after the other, cheapest first, against the
-/// converged solution on the finest grid of the ladder, until one holds both error and budget. Deterministic.
+/// Pushes the scene's own tool a short way into the tissue with one model after the other, against the converged solution
+/// on the finest grid of the ladder. The next is always the one that may be the cheapest; it ends when none that is left
+/// can be cheaper than the best that holds both error and budget. Deterministic.
 /// Throws std::runtime_error when there is no tissue under the entry. Cost: seconds to minutes.
 Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
                const std::function<void(const std::string& what)>& progress);

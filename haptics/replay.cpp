@@ -1,6 +1,7 @@
 #include <haptics/replay.h>
 
 #include <haptics/simulation.h>
+#include <volume/fnv.h>
 
 #include <fmt/format.h>
 
@@ -9,35 +10,11 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <span>
 #include <stdexcept>
 
 namespace palpate::haptics {
 
 namespace {
-
-// 64-bit FNV-1a over plain data.
-struct Fnv {
-    std::uint64_t value = 0xcbf29ce484222325;
-
-    template <typename T>
-    void addAll(std::span<const T> data) noexcept
-    {
-        for (const std::byte b : std::as_bytes(data)) {
-            value = (value ^ static_cast<std::uint64_t>(b)) * 0x100000001b3;
-        }
-    }
-    template <typename T>
-    void addAll(const std::vector<T>& data) noexcept
-    {
-        addAll(std::span<const T>(data));
-    }
-    template <typename T>
-    void add(const T& one) noexcept
-    {
-        addAll(std::span<const T>(&one, 1));
-    }
-};
 
 bool sameBits(Vec3 a, Vec3 b) noexcept
 {
@@ -48,7 +25,7 @@ bool sameBits(Vec3 a, Vec3 b) noexcept
 
 void ForceHash::add(const TickRecord& record) noexcept
 {
-    Fnv hash{hash_};
+    volume::Fnv hash{hash_};
     for (const Vec3& f : {record.basic, record.additional, record.total}) {
         hash.add(f);
     }
@@ -100,7 +77,7 @@ ReplayResult replay(const Record& record, const SessionModel& model)
 
 std::string modelHash(const SessionModel& model)
 {
-    Fnv hash;
+    volume::Fnv hash;
     for (const auto& row : model.tissue->table().rows) {
         hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
                             row.cuttingForce, row.frictionPerMetre, row.fixed ? 1.0 : 0.0, row.stiffening});

@@ -17,10 +17,21 @@ ARROWS = {
     "render": {"render/channel"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "render/channel"},
     "experiments": {"volume", "occupancy", "chainmail", "datasets", "haptics"},
-    "apps": {"volume", "datasets", "haptics", "render", "render/channel", "experiments"},
+    "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "experiments"},
+    "apps": {"volume", "datasets", "haptics", "render", "render/channel", "experiments", "reference"},
 }
 # Third-party headers that stay in one folder.
-OWNERS = {"openvdb/": {"volume"}, "itk": {"volume"}, "vtk": {"render"}, "GLFW/": {"render"}, "sqlite3": {"haptics"}}
+OWNERS = {
+    "openvdb/": {"volume"},
+    "itk": {"volume"},
+    "vtk": {"render", "reference"},
+    "GLFW/": {"render"},
+    "sqlite3": {"haptics"},
+    "CGAL/": {"reference"},
+    "getfem/": {"reference"},
+    "gmm/": {"reference"},
+    "dmumps_c": {"reference"},
+}
 MOST_LINES = 520
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^">]+)[">]')
 

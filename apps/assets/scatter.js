@@ -45,7 +45,7 @@ function marker(ctx, shape, x, y, size) {
   ctx.stroke();
 }
 
-function drawSeries(u, index, line) {
+function drawSeries(u, index, line, markers) {
   const [xs, ys] = u.data[index];
   const { ctx, bbox } = u;
   const every = line ? Math.ceil(xs.length / 14) : 1;
@@ -61,21 +61,21 @@ function drawSeries(u, index, line) {
     at.forEach((p, i) => p && (i > 0 && at[i - 1] ? ctx.lineTo(...p) : ctx.moveTo(...p)));
     ctx.stroke();
   }
-  at.forEach((p, i) => p && i % every === 0 && marker(ctx, (index - 1) % 10, ...p, 4 * devicePixelRatio));
+  if (markers) at.forEach((p, i) => p && i % every === 0 && marker(ctx, (index - 1) % 10, ...p, 4 * devicePixelRatio));
   ctx.restore();
 }
 
 // The point below the pointer, or nothing when none is within 24 pixels.
-function nearest(u) {
+function nearest(u, chart) {
   let best = null, least = 24 ** 2;
   for (let index = 1; index < u.data.length; ++index) {
-    if (!u.series[index].show) continue;
+    if (!u.series[index].show || !chart.series[index - 1].markers) continue;
     const [xs, ys] = u.data[index];
     for (let i = 0; i < xs.length; ++i) {
       if (xs[i] == null) continue;
       const left = u.valToPos(xs[i], "x"), top = u.valToPos(ys[i], "y");
       const distance = (left - u.cursor.left) ** 2 + (top - u.cursor.top) ** 2;
-      if (distance < least) [best, least] = [{ index, left, top, x: xs[i], y: ys[i] }, distance];
+      if (distance < least) [best, least] = [{ index, left, top, x: xs[i], y: ys[i], point: i }, distance];
     }
   }
   return best;
@@ -86,10 +86,11 @@ function tooltip(chart) {
   box.className = "tip";
   ring.className = "ring";
   const show = (u) => {
-    const hit = u.cursor.left >= 0 ? nearest(u) : null;
+    const hit = u.cursor.left >= 0 ? nearest(u, chart) : null;
     box.hidden = ring.hidden = !hit;
     if (!hit) return;
-    const lines = [chart.series[hit.index - 1].label, `${chart.x.label}: ${number(hit.x)}`, `${chart.y.label}: ${number(hit.y)}`];
+    const { label, points } = chart.series[hit.index - 1];
+    const lines = [points.length ? `${label}: ${points[hit.point]}` : label, `${chart.x.label}: ${number(hit.x)}`, `${chart.y.label}: ${number(hit.y)}`];
     box.textContent = lines.join("\n");
     const right = hit.left > u.over.clientWidth / 2, below = hit.top < u.over.clientHeight / 2;
     box.style.transform = `translate(${right ? "calc(-100% - 12px)" : "12px"}, ${below ? "12px" : "calc(-100% - 12px)"})`;
@@ -132,8 +133,8 @@ function scatter(place, chart, axis) {
     },
     legend: { live: false },
     series: [{}].concat(chart.series.map((s, i) => ({
-      label: s.label, stroke: () => colour("c" + (i % 8)),
-      paths: (u, index) => { drawSeries(u, index, s.line); return null; },
+      label: s.label, stroke: () => colour(s.markers ? "c" + (i % 8) : "soft"),
+      paths: (u, index) => { drawSeries(u, index, s.line, s.markers); return null; },
     }))),
     hooks: {
       init: [tip.init], setCursor: [tip.show], setSelect: [enlarge], draw: [(u) => horizontal(u, chart.lines)],
@@ -141,8 +142,9 @@ function scatter(place, chart, axis) {
   };
   const plot = new uPlot(options, [null].concat(chart.series.map((s) => [s.x, s.y])), place);
   [...plot.root.querySelectorAll(".u-legend .u-marker")].slice(-chart.series.length).forEach((mark, i) => {
-    mark.textContent = shapes[i % shapes.length];
-    mark.style.cssText = `border: 0; background: none; color: ${colour("c" + (i % 8))}; line-height: 10px; width: 14px`;
+    const { markers } = chart.series[i];
+    mark.textContent = markers ? shapes[i % shapes.length] : "—";
+    mark.style.cssText = `border: 0; background: none; color: ${colour(markers ? "c" + (i % 8) : "soft")}; line-height: 10px; width: 14px`;
   });
   return plot;
 }

@@ -108,6 +108,20 @@ TEST(ChartPng, EachSeriesEachBoundAndTheNoteAreInThePicture)
     EXPECT_FALSE(std::filesystem::exists(folder / "a.png.part"));
 }
 
+TEST(ChartPng, WordsBesidePointsAndLinesWithoutMarkersAreDrawn)
+{
+    const Folder folder;
+    Chart chart = sample();
+    writeChartPng(chart, folder / "plain.png");
+    chart.series[0].written = {"fast", "", "fine"};
+    writeChartPng(chart, folder / "words.png");
+    EXPECT_NE(bytesOf(folder / "words.png"), bytesOf(folder / "plain.png"));
+    chart.series[0].written = {"", "", ""};
+    chart.series[0].markers = false;
+    writeChartPng(chart, folder / "line.png");
+    EXPECT_NE(bytesOf(folder / "line.png"), bytesOf(folder / "plain.png"));
+}
+
 // Nothing of a text is run: neither by gnuplot nor by a shell. The same chart draws the same bytes.
 TEST(ChartPng, AnyTextIsOnlyText)
 {
@@ -118,6 +132,7 @@ TEST(ChartPng, AnyTextIsOnlyText)
     Chart chart = sample();
     chart.title = chart.xLabel = chart.yLabel = chart.note = chart.bounds[0].name = hostile;
     chart.series[0].name = hostile;
+    chart.series[0].written = {hostile.substr(0, 8), hostile.substr(8), "\nEND\nset output"};
     chart.series[1].name = "not UTF-8: \xff\xfe\x80, " + std::string(5000, 'w');
     for (const char* name : {"it's $HOME 'a'.png", "b.png"}) {
         writeChartPng(chart, folder / name);
@@ -244,6 +259,7 @@ TEST(ChartHtml, HoldsTheDataAndNeedsNoNetwork)
     std::vector<Chart> charts{sample(), sample()};
     charts[0].series[0].name = "</script><script>alert(1)</script> \xff";
     charts[0].series[1].y[1] = 0;
+    charts[0].series[1].label = {"fast", "default", "fine"};
     charts[1].title = charts[1].note = "<b>bold</b>";
     charts[1].logX = false;
     writeChartHtml(charts, "A & B <i>", folder / "a.html");
@@ -255,6 +271,9 @@ TEST(ChartHtml, HoldsTheDataAndNeedsNoNetwork)
     EXPECT_EQ(first["series"][0]["x"].get<std::vector<double>>(), charts[0].series[0].x);
     EXPECT_EQ(first["series"][0]["y"].get<std::vector<double>>(), charts[0].series[0].y);
     EXPECT_TRUE(first["series"][1]["y"][1].is_null());
+    EXPECT_EQ(first["series"][1]["points"][2], "fine");
+    EXPECT_EQ(first["series"][1]["markers"], true);
+    EXPECT_TRUE(first["series"][0]["points"].empty());
     EXPECT_EQ(first["lines"][0]["at"], 3);
     EXPECT_EQ(first["x"]["log"], true);
     EXPECT_EQ(data.at("chart1")["x"]["log"], false);

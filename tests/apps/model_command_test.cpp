@@ -106,10 +106,13 @@ TEST(Plan, TimeFollowsTheMachineAndNotTheClock)
                                          "100us", "--speed",          "50"};
     const auto here = figures(asked);
     auto slow = asked;
-    slow.insert(slow.end(), {"--ns-per-node", "8"});
+    const std::string law = R"({"slot_ns": 20, "slot_cycle_ns": 90, "contact_ns": 600, "contact_cycle_ns": 1500})";
+    const std::string costs = folder / "costs.json";
+    writeText(costs, R"({"small": )" + law + R"(, "finite": )" + law + "}");
+    slow.insert(slow.end(), {"--costs", costs});
     const auto there = figures(slow);
     EXPECT_EQ(here["level"], "spring");
-    EXPECT_EQ(there["ns_per_node"], 8);
+    EXPECT_EQ(there["costs"], costs);
     for (std::size_t i = 0; i < here["candidates"].size(); ++i) {
         for (const auto& other : there["candidates"]) {
             const auto& c = here["candidates"][i];
@@ -119,6 +122,23 @@ TEST(Plan, TimeFollowsTheMachineAndNotTheClock)
             EXPECT_TRUE(!same || other["predicted_us"] > c["predicted_us"]);
         }
     }
+}
+
+// What the benchmark measures, the planner reads; and what is no such file is refused.
+TEST(BenchCosts, FeedsThePlanner)
+{
+    const Folder folder;
+    const std::string scene = smallScene(folder), costs = folder / "costs.json";
+    const auto measured = figures({"bench", "costs", scene, "--quick"});
+    for (const char* law : {"small", "finite"}) {
+        EXPECT_GT(measured[law]["slot_cycle_ns"].get<double>(), 0.0);
+        EXPECT_LT(measured[law]["fit_rms_pct"].get<double>(), 50.0);
+    }
+    writeText(costs, measured.dump());
+    const auto plan = figures({"plan", scene, "--error", "80%", "--budget", "900us", "--speed", "50", "--costs", costs});
+    EXPECT_EQ(plan["costs"], costs);
+    writeText(costs, R"({"small": {"slot_ns": -1}})");
+    expectRefusal({"plan", scene, "--costs", costs}, "no number at /small/slot_ns");
 }
 
 TEST(Plan, WhatNothingHoldsEndsOnOneLine)

@@ -20,27 +20,43 @@ Plan planned(double error, double budget)
     return planModel(model, request, [](const std::string&) {});
 }
 
-// 1000 nodes x (1.5 + 10 x 2) passes x 0.8 ns + 100 points x (1 + 2) x 90 ns + 20 us.
+// 1000 slots x (2 + 1.5 x 10) ns + 100 points x (50 + 1.5 x 100) ns + 20 us.
 TEST(Planner, TimeIsCountedAndNotMeasured)
 {
     PlanCandidate c;
     EXPECT_DOUBLE_EQ(predictedTime(c, {}), 20.0);
     c.level = ModelLevel::elastic;
-    c.nodes = 1000;
+    c.slots = 1000;
     c.touched = 100;
-    c.elastic.cycles = 2;
-    const PlanCosts costs{.nsPerNode = 0.8,
-                          .finiteFactor = 2.0,
-                          .passesPerTick = 1.5,
-                          .passesPerCycle = 10,
-                          .nsPerContact = 90,
-                          .nsPerMove = 200,
-                          .usPerTick = 20};
-    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 17.2 + 27.0, 1e-9);
+    c.meanCycles = 1.5;
+    c.elastic.strain = Strain::small;
+    const PlanCosts costs{.small = {2, 10, 50, 100}, .finite = {4, 20, 50, 100}, .nsPerMove = 200, .usPerTick = 20};
+    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 17.0 + 20.0, 1e-9);
     c.elastic.strain = Strain::finite;
-    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 34.4 + 27.0, 1e-9);
+    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 34.0 + 20.0, 1e-9);
     c.level = ModelLevel::chainmail;
     EXPECT_NEAR(predictedTime(c, costs), 40.0, 1e-9);
+}
+
+// Times that follow the law are explained by it, whatever mixture of models they come from; a cost that is nowhere is zero.
+TEST(TickCosts, TheFitFindsTheCostsThatMadeTheTimes)
+{
+    const LawCosts made{1.5, 9.0, 60.0, 0.0};
+    std::vector<TickSample> samples;
+    for (const double slots : {4000.0, 9000.0, 30000.0}) {
+        for (const double cycles : {0.7, 1.3, 2.0}) {
+            for (const double contacts : {40.0, 300.0}) {
+                samples.push_back({"", {slots, cycles, contacts}, false, 0.0});
+                samples.back().microseconds = tickTime(made, samples.back().work);
+            }
+        }
+    }
+    const LawCosts found = fitCosts(samples);
+    EXPECT_NEAR(found.perSlot, made.perSlot, 0.02);
+    EXPECT_NEAR(found.perSlotCycle, made.perSlotCycle, 0.02);
+    EXPECT_NEAR(found.perContact, made.perContact, 1.0);
+    EXPECT_NEAR(found.perContactCycle, 0.0, 1.0);
+    EXPECT_THROW(fitCosts(std::span(samples).first(3)), std::runtime_error);
 }
 
 // Whoever asks for little gets the rigid body; the tighter the error, the dearer the model.

@@ -1,0 +1,152 @@
+#include <experiments/accuracy.h>
+#include <experiments/kernel_rivals.h>
+#include <experiments/reference_file.h>
+
+#include <tests/apps/program.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <sstream>
+
+namespace palpate::apps {
+namespace {
+
+using namespace experiments;
+using nlohmann::json;
+
+const char* const sceneText =
+    "name = \"small\"\n[volume]\nphantom = \"block\"\nvoxel_mm = 1\n[volume.parameters]\nwidth_mm = 30\n"
+    "thickness_mm = 16\ntumours = 0\n[dffb]\nmode = \"off\"\n[target]\nstructure = \"base\"\naim_mm = [0, 16, 0]\n"
+    "entry_mm = [0, 0, 0]\n[tool]\nkind = \"sphere\"\nradius_mm = 5\n";
+
+// A folder with a scene, and with stand-ins for its references: the body on a grid of 4 mm, converged.
+struct Place {
+    Folder folder;
+    std::string scene = folder / "small.toml";
+    std::string references = folder / "references";
+
+    Place()
+    {
+        writeText(scene, sceneText);
+        std::filesystem::create_directory(references);
+        auto parsed = datasets::parseScene(std::string(sceneText) + "[model]\nlevel = \"spring\"\n", "small.toml");
+        auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(parsed));
+        const AccuracySubject subject =
+            accuracySubject(std::make_shared<const haptics::SessionModel>(haptics::buildModel(std::move(parsed), tissue)));
+        const TrialBody body = trialBody(*tissue, subject.model->surface, 4e-3, 0.49, 1U << 20);
+        for (const char* law : {"linear", "neo-hookean"}) {
+            const std::string key = referenceKey(*tissue, subject.path, subject.speed, law);
+            const std::array speeds{subject.speed};
+            const auto solved = solveReference(body.body, subject.path, speeds,
+                                               {.finiteStrain = law[0] == 'n', .tolerance = 1e-3, .mostCycles = 50});
+            saveReference(std::filesystem::path(references) / (std::string(law) + "-" + key + ".ref"), solved,
+                          {key, "small", "sphere_10mm", law, "P2", subject.speed, 1, 2, 3.0, "stand-in"});
+        }
+    }
+    std::vector<std::string> command(const std::string& output) const
+    {
+        return {"accuracy",  "--scenes",        scene,     "--references", references,
+                "--methods", "nothing,elastic", "--quick", "-o",           output};
+    }
+};
+
+const json& entryOf(const json& figures, const std::string& law, const std::string& method)
+{
+    for (const json& e : figures["chart"]) {
+        if (e["law"] == law && e["method"] == method) {
+            return e;
+        }
+    }
+    throw std::runtime_error("no entry of " + method);
+}
+
+std::vector<std::string> linesOf(const std::filesystem::path& file)
+{
+    std::vector<std::string> lines;
+    std::istringstream in(readText(file));
+    for (std::string line; std::getline(in, line);) {
+        lines.push_back(line);
+    }
+    return lines;
+}
+
+TEST(AccuracyCommand, ChartsErrorAgainstTimeAndGoesOnWhereItStopped)
+{
+    const Place place;
+    const std::string out = place.folder / "out";
+    const json first = figures(place.command(out));
+    // Nothing, fast and default, against two laws.
+    ASSERT_EQ(first["chart"].size(), 6U);
+    EXPECT_EQ(first["cases_run"], 6);
+    for (const json& e : first["chart"]) {
+        for (const char* key : {"method", "setting", "scene", "law", "us_per_update", "rms_pct", "near_pct", "force_pct",
+                                "volume_pct", "press", "drag", "on_front"}) {
+            EXPECT_TRUE(e.contains(key)) << key;
+        }
+        EXPECT_EQ(e["method"] == "nothing", e["force_pct"].is_null());
+        EXPECT_FALSE(e["method"] == "nothing" && e["on_front"].get<bool>());
+    }
+    EXPECT_GT(entryOf(first, "linear", "nothing")["near_pct"], entryOf(first, "linear", "elastic")["near_pct"]);
+    ASSERT_EQ(first["floors"].size(), 1U);
+    EXPECT_GT(first["floors"][0]["near_pct"], 0.0);
+    EXPECT_EQ(first["references"].size(), 2U);
+
+    const std::filesystem::path folder(out);
+    EXPECT_EQ(linesOf(folder / "accuracy.csv").size(), 7U);
+    EXPECT_EQ(linesOf(folder / "cases.jsonl").size(), 6U);
+    EXPECT_NE(readText(folder / "accuracy.html").find("Palpate, small strain"), std::string::npos);
+    for (const char* picture : {"small-linear.png", "small-neo-hookean.png"}) {
+        EXPECT_TRUE(readText(folder / picture).starts_with("\x89PNG")) << picture;
+    }
+
+    const json again = figures(place.command(out));
+    EXPECT_EQ(again["cases_run"], 0);
+    EXPECT_EQ(again["chart"], first["chart"]);
+
+    // A last line that was cut short is a case that was not finished; the others stand.
+    auto lines = linesOf(folder / "cases.jsonl");
+    std::string text;
+    for (std::size_t i = 0; i + 1 < lines.size(); ++i) {
+        text += lines[i] + "\n";
+    }
+    writeText(folder / "cases.jsonl", text + lines.back().substr(0, lines.back().size() / 2));
+    const json mended = figures(place.command(out));
+    EXPECT_EQ(mended["cases_run"], 1);
+    EXPECT_EQ(mended["chart"].size(), 6U);
+    EXPECT_EQ(figures(place.command(out))["cases_run"], 0);
+}
+
+// A copy of the program has no palpate-reference beside it.
+TEST(AccuracyCommand, WithoutAReferenceItSaysWhatToDo)
+{
+    const Folder folder;
+    std::filesystem::copy_file(std::filesystem::path(PALPATE_BIN_DIR) / "palpate", folder / "palpate");
+    writeText(folder / "small.toml", sceneText);
+    const Outcome outcome = Program(folder / "palpate", {"accuracy", "--scenes", folder / "small.toml", "--references",
+                                                         folder / "none", "--quick"})
+                                .wait();
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("-DPALPATE_REFERENCE=ON"), std::string::npos) << outcome.err;
+}
+
+TEST(AccuracyCommand, RefusesWhatThereIsNot)
+{
+    const Place place;
+    expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--methods", "magic"},
+                  "there are chainmail");
+    expectRefusal({"accuracy", "--law", "hooke"}, "there are linear, neo-hookean");
+    expectRefusal({"accuracy", "--scenes", "nowhere"}, "no such scene");
+    expectRefusal({"accuracy", "--scenes", place.scene + "," + place.scene, "--references", place.references},
+                  "another scene called small");
+    const std::filesystem::path damaged = *std::filesystem::directory_iterator(place.references);
+    writeText(damaged, "no reference");
+    expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--quick"},
+                  damaged.filename().string());
+}
+
+}  // namespace
+}  // namespace palpate::apps
