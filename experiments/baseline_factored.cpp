@@ -1,6 +1,6 @@
 #include <experiments/baseline_factored.h>
 
-#include <experiments/lattice_cholesky.h>
+#include <experiments/tet_factor.h>
 
 #include <Eigen/Dense>
 #include <glm/geometric.hpp>
@@ -29,25 +29,6 @@ double distanceToSegment(Vec3 p, Vec3 a, Vec3 b)
     return glm::distance(p, a + t * way);
 }
 
-LatticeMatrix matrixOf(const LatticeTets& mesh, const std::vector<std::uint32_t>& unknown, std::vector<Index3>& corner)
-{
-    for (std::size_t p = 0; p < unknown.size(); ++p) {
-        if (unknown[p] != LatticeMatrix::held) {
-            corner.push_back(mesh.corner[p]);
-        }
-    }
-    LatticeMatrix matrix;
-    matrix.corner = corner;
-    for (const auto& tet : mesh.tets) {
-        auto& element = matrix.elements.emplace_back();
-        for (std::size_t i = 0; i < 4; ++i) {
-            element[i] = unknown[tet[i]];
-        }
-    }
-    matrix.stiffness = [&mesh](std::size_t t) { return stiffnessOf(mesh, t); };
-    return matrix;
-}
-
 }  // namespace
 
 FactoredTets::FactoredTets(LatticeTets mesh, const TrialPath& path) : mesh_(std::move(mesh))
@@ -56,7 +37,7 @@ FactoredTets::FactoredTets(LatticeTets mesh, const TrialPath& path) : mesh_(std:
         throw std::runtime_error("prefactored tetrahedra: " + path.tool.name + " is no sphere; press with a sphere");
     }
     for (const std::uint8_t held : mesh_.held) {
-        unknown_.push_back(held != 0 ? LatticeMatrix::held : static_cast<std::uint32_t>(unknowns_++));
+        unknown_.push_back(held != 0 ? TetFactor::held : static_cast<std::uint32_t>(unknowns_++));
     }
     findContacts(path);
     if (contacts_.empty()) {
@@ -81,9 +62,7 @@ void FactoredTets::findContacts(const TrialPath& path)
 
 void FactoredTets::solveColumns()
 {
-    std::vector<Index3> corner;
-    const LatticeMatrix matrix = matrixOf(mesh_, unknown_, corner);
-    const LatticeCholesky factors(matrix);
+    const TetFactor factors(mesh_, unknown_, unknowns_);
     const std::size_t rows = 3 * unknowns_, count = 3 * contacts_.size();
     columns_.resize(rows * count);
     compliance_.resize(contacts_.size() * contacts_.size());
@@ -95,7 +74,7 @@ void FactoredTets::solveColumns()
             const std::size_t j = first + k;
             right[k * rows + 3 * unknown_[contacts_[j / 3].point] + j % 3] = 1.0;
         }
-        factors.solve(right, some);
+        factors.solve(right);
         std::ranges::transform(right, columns_.begin() + static_cast<std::ptrdiff_t>(first * rows),
                                [](double v) { return static_cast<float>(v); });
         for (std::size_t k = 0; k < some; ++k) {
@@ -221,7 +200,7 @@ void FactoredTets::addColumns()
 Vec3 FactoredTets::pointAt(std::uint32_t p) const noexcept
 {
     const std::uint32_t n = unknown_[p];
-    if (n == LatticeMatrix::held) {
+    if (n == TetFactor::held) {
         return Vec3(0.0);
     }
     const std::size_t at = 3 * static_cast<std::size_t>(n);

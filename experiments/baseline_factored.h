@@ -29,7 +29,7 @@ public:
         Vec3 force{0.0};  // of the tool on the tissue [N]
     };
 
-    /// Throws std::runtime_error when the path's tool is no sphere or meets no point, and what LatticeCholesky throws.
+    /// Throws std::runtime_error when the path's tool is no sphere or meets no point, and what TetFactor throws.
     FactoredTets(LatticeTets mesh, const TrialPath& path);
 
     chainmail::ElasticResult press(Vec3 centre, double radius);
@@ -56,7 +56,7 @@ private:
     Vec3 pointAt(std::uint32_t p) const noexcept;
 
     LatticeTets mesh_;
-    std::vector<std::uint32_t> unknown_;  // of each point, LatticeMatrix::held for held ones
+    std::vector<std::uint32_t> unknown_;  // of each point, TetFactor::held for held ones
     std::size_t unknowns_ = 0;            // points
     std::vector<Contact> contacts_;
     std::vector<Active> active_;

@@ -133,7 +133,6 @@ private:
                 return;
             }
             number_[mesh_.corners.offset(n)] = static_cast<std::uint32_t>(mesh_.points.size());
-            mesh_.corner.push_back(n);
             mesh_.points.push_back(mesh_.corners.position(n));
             mesh_.held.push_back(held_[mesh_.corners.offset(n)]);
             mesh_.outer.push_back(around < 8 ? 1 : 0);

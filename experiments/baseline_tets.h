@@ -16,7 +16,6 @@ namespace palpate::experiments {
 /// dihedral angles", ACM Trans. Graphics 26, 2007.
 struct LatticeTets {
     volume::NodeGrid corners;                        // of the cells; cell n lies between corners n and n + 1
-    std::vector<Index3> corner;                      // that a point was                                  (points x 3)
     std::vector<Vec3> points;                        // at rest [m]                                       (points x 3)
     std::vector<std::uint8_t> held;                  // not 0 for points that do not move                 (points x 1)
     std::vector<std::uint8_t> outer;                 // not 0 for points of the surface                   (points x 1)

@@ -2,7 +2,7 @@
 #include <experiments/baseline_factored.h>
 #include <experiments/baseline_xpbd.h>
 #include <experiments/kernel_rivals.h>
-#include <experiments/lattice_cholesky.h>
+#include <experiments/tet_factor.h>
 
 #include <tests/experiments/small_block.h>
 
@@ -166,14 +166,12 @@ LatticeTets shaken(LatticeTets mesh)
 }
 
 // Which unknown each point is.
-std::vector<std::uint32_t> unknownsOf(const LatticeTets& mesh, std::vector<Index3>& corner)
+std::vector<std::uint32_t> unknownsOf(const LatticeTets& mesh, std::size_t& count)
 {
     std::vector<std::uint32_t> unknown;
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-        unknown.push_back(mesh.held[i] != 0 ? LatticeMatrix::held : static_cast<std::uint32_t>(corner.size()));
-        if (mesh.held[i] == 0) {
-            corner.push_back(mesh.corner[i]);
-        }
+        unknown.push_back(mesh.held[i] != 0 ? TetFactor::held : static_cast<std::uint32_t>(count));
+        count += mesh.held[i] == 0 ? 1 : 0;
     }
     return unknown;
 }
@@ -202,33 +200,27 @@ std::vector<double> loadsBy(const Mat3& gradient, const LatticeTets& mesh, const
 
 // A linear field on the surface of one material goes on linearly inside, whatever the tetrahedra: the patch test. It needs
 // the gradients, the stiffness and the solver to be right, for several right sides at once.
-TEST(LatticeCholesky, PassesThePatchTest)
+TEST(TetFactor, PassesThePatchTest)
 {
     const LatticeTets mesh = shaken(pressed().mesh(2e-3, 0.45));
     const std::array<Mat3, 2> gradients{Mat3(1e-3, 2e-3, -3e-3, 4e-3, 5e-3, 6e-3, -7e-3, 8e-3, 9e-3), Mat3(0.01)};
-    std::vector<Index3> corner;
-    const std::vector<std::uint32_t> unknown = unknownsOf(mesh, corner);
-    LatticeMatrix matrix;
-    matrix.corner = corner;
-    matrix.stiffness = [&](std::size_t t) { return stiffnessOf(mesh, t); };
-    for (const auto& tet : mesh.tets) {
-        matrix.elements.push_back({unknown[tet[0]], unknown[tet[1]], unknown[tet[2]], unknown[tet[3]]});
-    }
-    const std::size_t rows = 3 * corner.size();
+    std::size_t count = 0;
+    const std::vector<std::uint32_t> unknown = unknownsOf(mesh, count);
+    const std::size_t rows = 3 * count;
     ASSERT_GT(rows, 1000U);
     std::vector<double> u = loadsBy(gradients[0], mesh, unknown, rows);
     const std::vector<double> second = loadsBy(gradients[1], mesh, unknown, rows);
     u.insert(u.end(), second.begin(), second.end());
-    LatticeCholesky(matrix).solve(u, 2);
+    TetFactor(mesh, unknown, count).solve(u);
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
-        for (std::size_t k = 0; unknown[i] != LatticeMatrix::held && k < 2; ++k) {
+        for (std::size_t k = 0; unknown[i] != TetFactor::held && k < 2; ++k) {
             const double* at = &u[k * rows + 3 * unknown[i]];
             EXPECT_LT(glm::distance(Vec3(at[0], at[1], at[2]), gradients[k] * mesh.points[i]), 1e-14);
         }
     }
 }
 
-TEST(LatticeCholesky, WhatNothingHoldsIsRefused)
+TEST(TetFactor, WhatNothingHoldsIsRefused)
 {
     LatticeTets mesh = pressed().mesh(3e-3, 0.45);
     std::ranges::fill(mesh.held, std::uint8_t{0});
