@@ -1,6 +1,6 @@
 #pragma once
 
-#include <experiments/baseline.h>
+#include <experiments/baselines/baseline.h>
 #include <haptics/session_model.h>
 
 #include <cstddef>

@@ -36,6 +36,11 @@ double bondedLayerFactor(double poisson, double chi) noexcept
            16.0 * a / std::pow(pi, 4) * (std::pow(a, 3) + 3.0 * pi * pi / 5.0 * b) * std::pow(chi, 4);
 }
 
+double incompressibleLayerFactor(double chi) noexcept
+{
+    return 1.0 + chi * (1.133 + chi * (1.497 + chi * (1.469 + chi * 0.755)));
+}
+
 double flatPunchForce(double youngsModulus, double poisson, double radius, double depth) noexcept
 {
     return 2.0 * youngsModulus * radius * depth / (1.0 - poisson * poisson);

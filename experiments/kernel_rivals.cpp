@@ -1,5 +1,7 @@
 #include <experiments/kernel_rivals.h>
 
+#include <experiments/node_values.h>
+
 #include <chainmail/level.h>
 #include <occupancy/body.h>
 
@@ -65,15 +67,19 @@ TrialModel chainMailModel(std::shared_ptr<const Lattice> lattice, const TrialPat
         ChainMailLevel level;
     };
     auto mail = std::make_shared<Mail>(std::move(lattice), std::max(path.tool.radius, widestTip), maxMoves);
-    const volume::DistanceField& surface = *path.surface;
-    return {
-        [mail](const TrialLoad& load) {
-            mail->level.deform(gripOf(load));
-            return ElasticResult{};
-        },
-        [mail, &surface](Vec3 rest) { return occupancy::displacementAt(mail->deformation.shape().body(surface), rest); },
-        {},
-        [mail] { return mail->deformation.moved().size(); }};
+    return {[mail](const TrialLoad& load) {
+                mail->level.deform(gripOf(load));
+                return ElasticResult{};
+            },
+            [mail](Vec3 rest) {
+                const Lattice& l = *mail->lattice;
+                const auto u = mail->deformation.shape().u();
+                return valueAt(
+                    l.grid, rest, [&](Index3 n) { return l.tissue[l.grid.offset(n)] != 0; },
+                    [&](Index3 n) { return Vec3(u[l.grid.offset(n)]); });
+            },
+            {},
+            [mail] { return mail->deformation.moved().size(); }};
 }
 
 TrialResult chainMailTrial(const Lattice& lattice, const TrialPath& path, double speed, const Reference& reference,

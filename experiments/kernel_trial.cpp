@@ -2,6 +2,7 @@
 
 #include <experiments/trial_errors.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -13,6 +14,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -100,6 +102,28 @@ double contactForces(const Elastic& elastic)
         sum += glm::length(s.force);
     }
     return sum;
+}
+
+// The point itself, or where it lies outside the cells' staircase, the nearest one in a cell beside it.
+Vec3 nearestTissue(const CellLevel& level, Vec3 rest)
+{
+    const auto& grid = level.nodes;
+    const Vec3 at = (rest - grid.origin) / grid.spacing;
+    const Index3 own(glm::floor(at));
+    const auto isTissue = [&](Index3 c) { return grid.contains(c) && level.mu[grid.offset(c)] > 0.0F; };
+    if (isTissue(own)) {
+        return rest;
+    }
+    Vec3 nearest = at;
+    double least = std::numeric_limits<double>::max();
+    volume::forEachIndex(own - 1, own + 1, [&](Index3 c) {
+        const Vec3 p = glm::clamp(at, Vec3(c), Vec3(c + 1));
+        if (const double d = glm::distance(p, at); d < least && isTissue(c)) {
+            least = d;
+            nearest = p;
+        }
+    });
+    return grid.origin + grid.spacing * nearest;
 }
 
 // What is left of the residual, as a share of the contacts' forces.
@@ -278,7 +302,7 @@ TrialModel elasticModel(Elastic& elastic)
                 *path = &load.path();
                 return elastic.relax(load.load());
             },
-            [&elastic](Vec3 rest) { return elastic.displacement(rest); },
+            [&elastic](Vec3 rest) { return elastic.displacement(nearestTissue(elastic.body().levels.front(), rest)); },
             [&elastic, path] { return *path != nullptr ? forceOn(elastic, **path) : Vec3(0.0); },
             [&elastic] { return elastic.sites().size(); }};
 }

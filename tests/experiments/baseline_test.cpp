@@ -1,9 +1,9 @@
-#include <experiments/baseline_lattice.h>
-#include <experiments/fifo_mail.h>
+#include <experiments/baselines/fifo_mail.h>
+#include <experiments/baselines/lattice.h>
+#include <experiments/baselines/mean_sweeps.h>
+#include <experiments/baselines/relaxed_grid.h>
 #include <experiments/kernel_rivals.h>
-#include <experiments/mean_sweeps.h>
 #include <experiments/node_values.h>
-#include <experiments/relaxed_grid.h>
 
 #include <tests/experiments/small_block.h>
 

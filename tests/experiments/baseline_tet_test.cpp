@@ -1,8 +1,8 @@
-#include <experiments/baseline.h>
-#include <experiments/baseline_factored.h>
-#include <experiments/baseline_xpbd.h>
+#include <experiments/baselines/baseline.h>
+#include <experiments/baselines/factored.h>
+#include <experiments/baselines/tet_factor.h>
+#include <experiments/baselines/xpbd.h>
 #include <experiments/kernel_rivals.h>
-#include <experiments/tet_factor.h>
 
 #include <tests/experiments/small_block.h>
 

@@ -1,4 +1,4 @@
-#include <experiments/mean_sweeps.h>
+#include <experiments/baselines/mean_sweeps.h>
 
 #include <glm/common.hpp>
 

@@ -1,4 +1,4 @@
-#include <experiments/fifo_mail.h>
+#include <experiments/baselines/fifo_mail.h>
 
 #include <glm/geometric.hpp>
 

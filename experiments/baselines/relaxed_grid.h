@@ -1,7 +1,7 @@
 #pragma once
 
 #include <chainmail/window.h>
-#include <experiments/fifo_mail.h>
+#include <experiments/baselines/fifo_mail.h>
 
 #include <span>
 #include <vector>

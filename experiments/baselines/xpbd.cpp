@@ -1,4 +1,4 @@
-#include <experiments/baseline_xpbd.h>
+#include <experiments/baselines/xpbd.h>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>

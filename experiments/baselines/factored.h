@@ -1,6 +1,6 @@
 #pragma once
 
-#include <experiments/baseline_tets.h>
+#include <experiments/baselines/tets.h>
 #include <experiments/kernel_trial.h>
 
 #include <span>

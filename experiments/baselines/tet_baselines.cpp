@@ -1,6 +1,6 @@
-#include <experiments/baseline.h>
-#include <experiments/baseline_factored.h>
-#include <experiments/baseline_xpbd.h>
+#include <experiments/baselines/baseline.h>
+#include <experiments/baselines/factored.h>
+#include <experiments/baselines/xpbd.h>
 
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
-#include <experiments/baseline_factored.h>
+#include <experiments/baselines/factored.h>
 
-#include <experiments/tet_factor.h>
+#include <experiments/baselines/tet_factor.h>
 
 #include <Eigen/Dense>
 #include <glm/geometric.hpp>

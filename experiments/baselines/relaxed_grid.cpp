@@ -1,4 +1,4 @@
-#include <experiments/relaxed_grid.h>
+#include <experiments/baselines/relaxed_grid.h>
 
 #include <experiments/node_values.h>
 

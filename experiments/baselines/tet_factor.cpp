@@ -1,4 +1,4 @@
-#include <experiments/tet_factor.h>
+#include <experiments/baselines/tet_factor.h>
 
 #include <Eigen/SparseCholesky>
 

@@ -1,4 +1,4 @@
-#include <experiments/baseline_tets.h>
+#include <experiments/baselines/tets.h>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>

@@ -1,0 +1,296 @@
+// palpate-reference: the finite-element reference of one scene. A program of its own: what it links is under the GPL, see
+// reference/NOTICE.
+#include <apps/command.h>
+#include <apps/outputs.h>
+#include <apps/session.h>
+#include <experiments/reference_file.h>
+#include <reference/ccx.h>
+#include <reference/press_path.h>
+#include <reference/verification.h>
+#include <reference/vtu.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::apps {
+
+namespace {
+
+using nlohmann::json;
+
+struct Options {
+    std::string scene;
+    std::string vtu, json, save, ccx;
+    std::string tool = "sphere_10mm";
+    std::string law = "linear";
+    std::string elements = "P2/P1";
+    double speed = 20;  // [mm/s]
+    double size = 2.5;  // [mm]
+    double press = 0;   // [mm]; 0 = as far as the trial goes
+    bool all = false;
+    bool verify = false;
+};
+
+double cpuSeconds()
+{
+    return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+template <typename... Args>
+void say(fmt::format_string<Args...> format, Args&&... args)
+{
+    fmt::print(stderr, format, std::forward<Args>(args)...);
+    std::fflush(stderr);
+}
+
+experiments::TrialTool toolNamed(const std::string& name)
+{
+    std::vector<std::string> names;
+    for (const auto& tool : experiments::trialTools()) {
+        if (tool.kind == experiments::TrialKind::sphere && tool.name == name) {
+            return tool;
+        }
+        if (tool.kind == experiments::TrialKind::sphere) {
+            names.push_back(tool.name);
+        }
+    }
+    throw std::runtime_error(
+        fmt::format("--tool {}: the reference is pressed by a sphere: {}", name, fmt::join(names, ", ")));
+}
+
+// F.vtu with a look's number before its ending.
+std::string numbered(const std::string& file, std::size_t look)
+{
+    const std::filesystem::path path(file);
+    return path.parent_path() / fmt::format("{}-{:02}{}", path.stem().string(), look + 1, path.extension().string());
+}
+
+json lookFigures(const reference::Solver& solver, const experiments::ReferenceState& state)
+{
+    return {{"pressed_mm", 1e3 * state.pose.pressed},
+            {"dragged_mm", 1e3 * state.pose.dragged},
+            {"force_n", {state.force.x, state.force.y, state.force.z}},
+            {"energy_j", state.energy},
+            {"strain", state.strain},
+            {"largest_mm", 1e3 * state.largest},
+            {"newton_steps", solver.newtonSteps()}};
+}
+
+json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& table)
+{
+    json regions = json::array();
+    for (std::size_t r = 0; r < body.rows.size(); ++r) {
+        regions.push_back({{"tissue", table.rows[body.rows[r]].name},
+                           {"voxels_ml", 1e6 * body.voxels[r]},
+                           {"mesh_ml", 1e6 * body.volume[r]}});
+    }
+    return regions;
+}
+
+// The last state as a problem that CalculiX can solve: what touches the sphere goes where it is, the rest follows.
+void exportLast(const std::string& file, const reference::PressProblem& problem, const reference::BodyMesh& body,
+                const reference::Solver& solver, experiments::TrialPose pose)
+{
+    constexpr double touching = 2e-5;  // [m]
+    const Vec3 centre = problem.path.start + problem.path.way(pose);
+    const auto at = [&](Vec3 rest) { return solver.displacement(std::span(&rest, 1)).front(); };
+    const auto touches = [&](Vec3 rest) {
+        return glm::distance(rest + at(rest), centre) - problem.path.tool.radius < touching;
+    };
+    exportCcx(body.mesh, materialsOf(problem, body), problem.solve, {touches, at}, file);
+}
+
+// What a run leaves: written when all of it is there.
+struct Results {
+    std::vector<std::pair<std::string, std::string>> files;  // name, text
+    json looks = json::array();
+    experiments::Reference reference;
+    experiments::ReferenceInfo info;
+};
+
+Results solveScene(const Options& o, const haptics::SessionModel& model, const experiments::TrialPath& path, json& figures)
+{
+    const reference::PressProblem problem{
+        *model.tissue,
+        model.surface,
+        path,
+        1e-3 * o.speed,
+        model.scene.model.elastic.poissonCap,
+        {.law = o.law == "linear" ? reference::Law::linear : reference::Law::neoHookean,
+         .elements = o.elements == "P2" ? reference::Elements::p2 : reference::Elements::p2p1}};
+    const reference::BodyMesh body = reference::meshBody(*model.tissue, reference::meshOptions(problem, 1e-3 * o.size));
+    const double meshed = cpuSeconds();
+    say("{}: {} tetrahedra, {} mixtures, smallest angle {:.1f} degrees, {:.1f} s\n", model.scene.name,
+        body.mesh.tets.size(), body.mixtures.size(), body.sharpest, meshed);
+
+    Results out;
+    const auto sink = [&](const reference::Solver& solver, std::size_t look, std::size_t looks,
+                          const experiments::ReferenceState& state) {
+        say("{}: look {} of {}: {:.2f} mm in, {:.2f} mm along: {:.4f} N, {} Newton steps, {:.0f} s\n", model.scene.name,
+            look + 1, looks, 1e3 * state.pose.pressed, 1e3 * state.pose.dragged, glm::length(state.force),
+            solver.newtonSteps(), cpuSeconds() - meshed);
+        out.looks.push_back(lookFigures(solver, state));
+        out.info.unknowns = solver.unknowns();
+        if (!o.vtu.empty() && (o.all || look + 1 == looks)) {
+            out.files.emplace_back(o.all ? numbered(o.vtu, look) : o.vtu, reference::vtuText(body.mesh, solver));
+        }
+        if (!o.ccx.empty() && look + 1 == looks) {
+            exportLast(o.ccx, problem, body, solver, state.pose);
+        }
+    };
+    out.reference = reference::solvePath(problem, body, sink);
+    out.info.tets = body.mesh.tets.size();
+    out.info.seconds = cpuSeconds() - meshed;
+    figures["mesh_seconds"] = meshed;
+    figures["smallest_angle_deg"] = body.sharpest;
+    figures["regions"] = regionFigures(body, model.tissue->table());
+    return out;
+}
+
+// Figures beside closed forms; throws when one is off by more than its bound.
+void verify(const Options& o)
+{
+    checkOutput(o.json);
+    json rows = json::array();
+    std::size_t over = 0;
+    for (const auto& row :
+         reference::verifyReference(reference::Fineness::full, [](const std::string& what) { say("{}\n", what); })) {
+        const bool holds = row.errorPercent <= row.bound;
+        over += holds ? 0 : 1;
+        say("{:<38} {:<26} {:>10.5g} {:>10.5g} {:>8.3f} % of {:g} %{}  {}\n", row.problem, row.quantity, row.ours,
+            row.reference, row.errorPercent, row.bound, holds ? "" : " OVER", row.setting);
+        rows.push_back({{"problem", row.problem},
+                        {"quantity", row.quantity},
+                        {"setting", row.setting},
+                        {"ours", row.ours},
+                        {"reference", row.reference},
+                        {"error_pct", row.errorPercent},
+                        {"bound_pct", row.bound},
+                        {"source", row.source}});
+    }
+    if (!o.json.empty()) {
+        writeJson(o.json, {{"verification", rows}});
+    }
+    if (over > 0) {
+        throw std::runtime_error(fmt::format("{} of {} figures are off by more than their bounds", over, rows.size()));
+    }
+}
+
+void run(const Options& o)
+{
+    if (o.verify) {
+        verify(o);
+        return;
+    }
+    if (o.scene.empty()) {
+        throw std::runtime_error("no scene: name one, or --verify");
+    }
+    checkOutput(o.vtu);
+    checkOutput(o.json);
+    checkOutput(o.save);
+    checkOutput(o.ccx);
+    if (o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty()) {
+        throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
+    }
+    const auto tool = toolNamed(o.tool);
+    SceneChanges changes;
+    changes.model = "spring";  // the kernel's own body is not needed
+    const auto model = openSession(o.scene, changes);
+    const auto place = experiments::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
+    auto path = experiments::trialPath(*model.tissue, model.surface, place, tool, 1e-3 * o.size);
+    if (o.press > 0.0) {
+        path.press = path.gap + 1e-3 * o.press;
+    }
+    json figures;
+    Results results = solveScene(o, model, path, figures);
+    auto& info = results.info;
+    info.key = experiments::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, model.scene.model.elastic.poissonCap);
+    info.scene = model.scene.name;
+    info.tool = tool.name;
+    info.law = o.law;
+    info.elements = o.elements;
+    info.speed = 1e-3 * o.speed;
+    info.program = PALPATE_BUILD;
+    for (const auto& [file, text] : results.files) {
+        writeWhole(file, text);
+    }
+    if (!o.save.empty()) {
+        experiments::saveReference(o.save, results.reference, info);
+    }
+    if (!o.json.empty()) {
+        figures.update({{"scene", info.scene},
+                        {"tool", info.tool},
+                        {"law", info.law},
+                        {"elements", info.elements},
+                        {"key", info.key},
+                        {"tets", info.tets},
+                        {"unknowns", info.unknowns},
+                        {"points", results.reference.position.size()},
+                        {"seconds", info.seconds},
+                        {"looks", results.looks}});
+        writeJson(o.json, figures);
+    }
+}
+
+void addOptions(CLI::App& app, Options& o)
+{
+    app.add_option("scene", o.scene, "Scene: a built-in name, a file (.toml), or a volume (.vdb)");
+    app.add_option("-o,--output", o.vtu, "Write the last state for ParaView (.vtu)");
+    app.add_flag("--all", o.all, "A .vtu for every look, numbered");
+    app.add_option("--tool", o.tool, "Sphere that presses")->capture_default_str();
+    app.add_option("--law", o.law, "linear (small strain) or neo-hookean")
+        ->check(CLI::IsMember({"linear", "neo-hookean"}))
+        ->capture_default_str();
+    app.add_option("--elements", o.elements,
+                   "P2, or P2/P1 (Taylor-Hood): right with fewer tetrahedra where tissue hardly changes its volume")
+        ->check(CLI::IsMember({"P2", "P2/P1"}))
+        ->capture_default_str();
+    app.add_option("--speed", o.speed, "Speed whose looks are solved [mm/s]")
+        ->check(CLI::Range(1.0, 1000.0))
+        ->capture_default_str();
+    app.add_option("--size", o.size, "Edges of tetrahedra at the contact [mm]")
+        ->check(CLI::Range(0.3, 10.0))
+        ->capture_default_str();
+    app.add_option("--press", o.press, "How deep the sphere presses [mm] (default: as the trial)")
+        ->check(CLI::Range(0.1, 50.0));
+    app.add_flag("--verify", o.verify, "No scene: solve problems that have a closed form (minutes)");
+    app.add_option("--json", o.json, "Write figures to this file (- = standard output)");
+    app.add_option("--export-ccx", o.ccx, "Write the last state as input of CalculiX (.inp)");
+    app.add_option("--save", o.save, "Write the reference that `palpate accuracy` reads (.ref)");
+}
+
+}  // namespace
+
+}  // namespace palpate::apps
+
+int main(int argc, char** argv)
+{
+    CLI::App app("The finite-element reference of a scene: mesh, solution, and files of both", "palpate-reference");
+    app.set_version_flag("--version", PALPATE_BUILD);
+    app.failure_message([](const CLI::App*, const CLI::Error& e) {
+        return std::string("palpate-reference: ") + e.what() + " (palpate-reference --help lists what there is)\n";
+    });
+    palpate::apps::Options options;
+    palpate::apps::addOptions(app, options);
+    try {
+        app.parse(argc, argv);
+        palpate::apps::run(options);
+        return 0;
+    } catch (const CLI::ParseError& e) {
+        const int status = app.exit(e);
+        return status == 0 ? 0 : 2;
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "palpate-reference: %s\n", e.what());
+        return 1;
+    }
+}

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <reference/solve.h>
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+namespace palpate::reference {
+
+/// Corners of the tetrahedra, then the middles of their edges [m]: nodes of quadratic elements as exportCcx() numbers them,
+/// from 1.
+std::vector<Vec3> quadraticNodes(const TetMesh& mesh);
+
+/// Writes what Solver::prescribe() solves with P2 elements as input of CalculiX: C3D10, mm and kPa, `*ELASTIC`, or
+/// `*HYPERELASTIC, NEO HOOKE` with `NLGEOM`, whose energy is ours where nothing stiffens: C10 = mu/2, D1 = 2/K. Throws
+/// std::runtime_error for tissue that stiffens with finite strain, or a file that cannot be written.
+/// Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
+void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
+               const std::filesystem::path& file);
+
+struct CcxSolution {
+    std::vector<Vec3> u;  // at quadraticNodes() [m]
+    Vec3 force{0.0};      // on what prescribes, as Solver::force() [N]
+};
+
+/// Whether the program `ccx` is there.
+bool hasCcx();
+/// Runs it on an exported file, in that file's folder. Throws std::runtime_error when it fails.
+CcxSolution runCcx(const std::filesystem::path& file);
+
+}  // namespace palpate::reference

@@ -1,0 +1,235 @@
+#include <reference/equilibrium.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <optional>
+
+namespace palpate::reference {
+
+namespace {
+
+constexpr double onPlane = 1e-6;      // mm
+constexpr int mostSteps = 30;         // of Newton's method to one load
+constexpr int mostLooks = 10;         // along one of them,
+constexpr double goodSlope = 0.3;     // until the energy's slope is that share of the first
+constexpr double mostGrowth = 1.5;    // of the residual
+constexpr int mostNearby = 50;        // iterations with an old factor: a new one costs about as much
+constexpr double linearBest = 1e-4;   // residual of a linear system at last,
+constexpr double linearWorst = 1e-2;  // and at first
+
+// The columns and rows of `free`, by number.
+SymmetricMatrix reduced(const SymmetricMatrix& all, std::span<const std::uint32_t> free, std::span<const int> number,
+                        std::span<const int> blocks)
+{
+    SymmetricMatrix part;
+    part.start.push_back(0);
+    for (const std::uint32_t c : free) {
+        for (std::size_t k = all.start[c]; k < all.start[c + 1]; ++k) {
+            const int r = number[static_cast<std::size_t>(all.row[k])];
+            if (r >= 0) {
+                part.row.push_back(r);
+                part.value.push_back(all.value[k]);
+            }
+        }
+        part.start.push_back(part.row.size());
+    }
+    part.blocks.assign(blocks.begin(), blocks.end());
+    return part;
+}
+
+}  // namespace
+
+Equilibrium::Equilibrium(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& o)
+    : options(o), fem(mesh, materials, o), state(fem.size()), held(fem.size())
+{
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+        for (const std::uint32_t n : fem.faceNodes()[f]) {
+            for (std::size_t c = 0; c < 3 && mesh.faces[f].held; ++c) {
+                held[3 * n + c] = 1;
+            }
+        }
+    }
+    for (std::size_t n = 0; n < fem.nodes().size(); ++n) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            if (options.mirrored[c] && std::abs(fem.nodes()[n][static_cast<int>(c)]) < onPlane) {
+                held[3 * n + c] = 1;
+            }
+        }
+    }
+    drive(std::vector<char>(fem.size()));
+}
+
+void Equilibrium::drive(const std::vector<char>& prescribed)
+{
+    free.clear();
+    driven.clear();
+    blocks.clear();
+    number.assign(fem.size(), -1);
+    for (std::uint32_t i = 0; i < fem.size(); ++i) {
+        if (prescribed[i] != 0 && held[i] == 0) {
+            driven.push_back(i);
+        } else if (held[i] == 0) {
+            const bool sameNode = !free.empty() && i < fem.displacements() && free.back() / 3 == i / 3;
+            number[i] = static_cast<int>(free.size());
+            if (!sameNode) {
+                blocks.push_back(number[i]);
+            }
+            free.push_back(i);
+        }
+    }
+    blocks.push_back(static_cast<int>(free.size()));
+    factor.reset();
+}
+
+void Equilibrium::evaluate()
+{
+    residual = fem.tissueForces(state);
+    const std::vector<double> contact = fem.contactForces(state);
+    std::transform(residual.begin(), residual.end(), contact.begin(), residual.begin(), std::plus<>());
+}
+
+// Of the part that ought to vanish.
+double Equilibrium::unbalanced() const noexcept
+{
+    double sum = 0.0;
+    for (const std::uint32_t i : free) {
+        sum += residual[i] * residual[i];
+    }
+    return std::sqrt(sum);
+}
+
+// Of the forces that hold the body.
+double Equilibrium::holding() const noexcept
+{
+    double sum = 0.0;
+    for (std::size_t i = 0; i < fem.displacements(); ++i) {
+        sum += number[i] < 0 ? residual[i] * residual[i] : 0.0;
+    }
+    return std::sqrt(sum);
+}
+
+bool Equilibrium::finite() const noexcept
+{
+    return std::isfinite(unbalanced()) && std::isfinite(holding());
+}
+
+// Newton's step, which also takes what is prescribed all the way.
+std::vector<double> Equilibrium::direction()
+{
+    const SymmetricMatrix all = fem.tangent(state);
+    std::vector<double> step(state.size());
+    for (std::size_t i = 0; i < driven.size(); ++i) {
+        step[driven[i]] = goal[i] - state[driven[i]];
+    }
+    std::vector<double> image(state.size());
+    all.multiply(step, image);
+    std::vector<double> right(free.size());
+    std::vector<double> x(free.size());
+    for (std::size_t i = 0; i < free.size(); ++i) {
+        right[i] = -residual[free[i]] - image[free[i]];
+    }
+    const SymmetricMatrix matrix = reduced(all, free, number, blocks);
+    // As exact as the last step was good.
+    const double fall = unbalanced() / std::max(lastUnbalanced_, 1e-300);
+    const double share = std::clamp(fall * fall, linearBest, linearWorst);
+    lastUnbalanced_ = unbalanced();
+    if (!factor || !solveNearby(matrix, *factor, right, x, share, mostNearby)) {
+        factor.reset();
+        factor = std::make_unique<Factor>(matrix);
+        solveNearby(matrix, *factor, right, x, share, mostNearby);
+    }
+    for (std::size_t i = 0; i < free.size(); ++i) {
+        step[free[i]] = x[i];
+    }
+    return step;
+}
+
+// Slope of the energy along `step` [uJ].
+double Equilibrium::slope(const std::vector<double>& step) const noexcept
+{
+    double sum = 0.0;
+    for (const std::uint32_t i : free) {
+        sum += residual[i] * step[i];
+    }
+    return sum;
+}
+
+// Goes along Newton's step to about where the energy is least: contact opens and closes along it. With pressures there is
+// no energy to look at, but a residual that must not grow much.
+bool Equilibrium::advance(const std::vector<double>& step)
+{
+    const bool minimum = options.elements == Elements::p2;
+    const bool drives = std::any_of(driven.begin(), driven.end(), [&](std::uint32_t i) { return step[i] != 0.0; });
+    const std::vector<double> start = state;
+    const double before = minimum ? slope(step) : unbalanced();
+    double low = 0.0;
+    double slopeLow = before;
+    double high = 1.0;
+    double share = 1.0;
+    for (int look = 0; look <= mostLooks; ++look) {
+        for (std::size_t i = 0; i < state.size(); ++i) {
+            state[i] = start[i] + share * step[i];
+        }
+        evaluate();
+        if (!finite()) {
+            high = share;
+            share = 0.5 * (low + high);
+            continue;
+        }
+        const double now = minimum ? slope(step) : unbalanced();
+        if (drives || (minimum ? std::abs(now) <= goodSlope * std::abs(before) || (now < 0.0 && share == 1.0)
+                               : now < mostGrowth * before)) {
+            return true;
+        }
+        if (!minimum) {
+            share *= 0.5;
+        } else if (now > 0.0) {
+            high = share;
+            share = low + (high - low) * std::clamp(slopeLow / (slopeLow - now), 0.1, 0.9);
+        } else {
+            low = share;
+            slopeLow = now;
+            share = 0.5 * (low + high);
+        }
+    }
+    if (minimum && low > 0.0) {
+        return true;
+    }
+    state = start;
+    evaluate();
+    return false;
+}
+
+bool Equilibrium::find(double tolerance)
+{
+    fem.findContact(state);
+    evaluate();
+    for (int step = 0; finite(); ++step) {
+        const auto there = [&](std::size_t i) { return state[driven[i]] == goal[i]; };
+        std::size_t arrived = 0;
+        while (arrived < driven.size() && there(arrived)) {
+            ++arrived;
+        }
+        if (arrived == driven.size() && unbalanced() <= tolerance * holding()) {
+            return true;
+        }
+        if (step == mostSteps) {
+            return false;
+        }
+        ++steps;
+        // A step from an old factor may be too rough to go down at all.
+        if (!advance(direction())) {
+            factor.reset();
+            lastUnbalanced_ = std::numeric_limits<double>::max();
+            if (!advance(direction())) {
+                return false;
+            }
+        }
+        fem.findContact(state);
+    }
+    return false;
+}
+
+}  // namespace palpate::reference

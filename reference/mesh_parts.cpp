@@ -1,0 +1,227 @@
+#include <reference/mesh_parts.h>
+
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+namespace palpate::reference {
+
+namespace {
+
+constexpr double onSide = 1e-3;    // nearer to a flat side means on it [voxels]
+constexpr double lookFrom = 0.25;  // how far before a face what lies behind it is looked for,
+constexpr double lookUntil = 2.5;  // and where that ends [voxels]
+constexpr double flat = 1e-5;      // six volumes of a tetrahedron by the cube of an edge: less is none
+constexpr std::uint32_t none = ~0U;
+
+// Corners of the face across from each corner, counterclockwise seen from outside.
+constexpr std::array<std::array<std::size_t, 3>, 4> faceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+
+struct SortedFace {
+    std::array<std::uint32_t, 3> key{};  // points in order
+    std::uint32_t tet = 0;
+    std::uint8_t side = 0;
+};
+
+std::vector<SortedFace> sortedFaces(const TetMesh& mesh)
+{
+    std::vector<SortedFace> faces;
+    faces.reserve(4 * mesh.tets.size());
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        for (std::uint8_t side = 0; side < 4; ++side) {
+            SortedFace f{{}, static_cast<std::uint32_t>(t), side};
+            for (std::size_t i = 0; i < 3; ++i) {
+                f.key[i] = mesh.tets[t][faceCorners[side][i]];
+            }
+            std::ranges::sort(f.key);
+            faces.push_back(f);
+        }
+    }
+    std::ranges::sort(
+        faces, [](const SortedFace& a, const SortedFace& b) { return std::tie(a.key, a.tet) < std::tie(b.key, b.tet); });
+    return faces;
+}
+
+std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i)
+{
+    while (parent[i] != i) {
+        parent[i] = parent[parent[i]];
+        i = parent[i];
+    }
+    return i;
+}
+
+void dropUnusedPoints(TetMesh& mesh)
+{
+    std::vector<std::uint32_t> to(mesh.points.size(), none);
+    std::vector<Vec3> points;
+    for (auto& tet : mesh.tets) {
+        for (auto& p : tet) {
+            if (to[p] == none) {
+                to[p] = static_cast<std::uint32_t>(points.size());
+                points.push_back(mesh.points[p]);
+            }
+            p = to[p];
+        }
+    }
+    mesh.points = std::move(points);
+}
+
+// Whether the first that is not soft before a face holds the body.
+bool looksAtHeld(const volume::Tissue& tissue, const volume::Tissue::Reader& reader, Vec3 centre, Vec3 step)
+{
+    const auto& rows = tissue.table().rows;
+    for (double t = lookFrom; t <= lookUntil; t += lookFrom) {
+        const auto& row = rows[reader.tissue(centre + t * step)];
+        if (isHeld(row)) {
+            return true;
+        }
+        if (row.role == volume::Role::air) {
+            return false;
+        }
+    }
+    return false;
+}
+
+// Place of a side along its axis [voxels].
+double placeOf(const SmoothLabels& labels, int side)
+{
+    return labels.low[side / 2] - 0.5 + (side % 2 == 0 ? 0 : labels.size[side / 2]);
+}
+
+bool liesOnHeldSide(const SmoothLabels& labels, Vec3 p)
+{
+    const int side = labels.heldSide;
+    return side >= 0 && std::abs(labels.affine.toIndex(p)[side / 2] - placeOf(labels, side)) < onSide;
+}
+
+}  // namespace
+
+double sixVolumes(const TetMesh& mesh, std::size_t tet) noexcept
+{
+    const auto& t = mesh.tets[tet];
+    const Vec3 a = mesh.points[t[0]];
+    return glm::determinant(Mat3(mesh.points[t[1]] - a, mesh.points[t[2]] - a, mesh.points[t[3]] - a));
+}
+
+std::vector<double> volumesOf(const TetMesh& mesh, std::span<const std::uint8_t> rows)
+{
+    std::array<double, 256> volume{};
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        volume[mesh.tissue[t]] += sixVolumes(mesh, t) / 6.0;
+    }
+    std::vector<double> out;
+    for (const std::uint8_t row : rows) {
+        out.push_back(volume[row]);
+    }
+    return out;
+}
+
+double smallestDihedral(const TetMesh& mesh) noexcept
+{
+    double largestCosine = -1.0;
+    for (const auto& tet : mesh.tets) {
+        std::array<Vec3, 4> normals;
+        for (std::size_t side = 0; side < 4; ++side) {
+            const auto& c = faceCorners[side];
+            const Vec3 a = mesh.points[tet[c[0]]];
+            normals[side] = glm::normalize(glm::cross(mesh.points[tet[c[1]]] - a, mesh.points[tet[c[2]]] - a));
+        }
+        for (std::size_t i = 0; i < 4; ++i) {
+            for (std::size_t j = 0; j < i; ++j) {
+                largestCosine = std::max(largestCosine, -glm::dot(normals[i], normals[j]));
+            }
+        }
+    }
+    return std::acos(std::clamp(largestCosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+}
+
+double keepLargestPiece(TetMesh& mesh)
+{
+    std::vector<std::uint32_t> parent(mesh.tets.size());
+    std::iota(parent.begin(), parent.end(), 0U);
+    const auto faces = sortedFaces(mesh);
+    for (std::size_t i = 1; i < faces.size(); ++i) {
+        if (faces[i].key == faces[i - 1].key) {
+            parent[rootOf(parent, faces[i].tet)] = rootOf(parent, faces[i - 1].tet);
+        }
+    }
+    std::vector<double> volume(mesh.tets.size(), 0.0);
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        volume[rootOf(parent, static_cast<std::uint32_t>(t))] += sixVolumes(mesh, t) / 6.0;
+    }
+    const auto largest = static_cast<std::uint32_t>(std::max_element(volume.begin(), volume.end()) - volume.begin());
+    TetMesh kept;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        if (rootOf(parent, static_cast<std::uint32_t>(t)) == largest) {
+            kept.tets.push_back(mesh.tets[t]);
+            kept.tissue.push_back(mesh.tissue[t]);
+        }
+    }
+    kept.points = std::move(mesh.points);
+    mesh = std::move(kept);
+    dropUnusedPoints(mesh);
+    return std::accumulate(volume.begin(), volume.end(), 0.0) - volume[largest];
+}
+
+void snapToSides(const SmoothLabels& labels, TetMesh& mesh)
+{
+    for (Vec3& p : mesh.points) {
+        Vec3 index = labels.affine.toIndex(p);
+        bool moved = false;
+        for (int side = 0; side < 6; ++side) {
+            const int axis = side / 2;
+            const double at = placeOf(labels, side);
+            if (labels.flat[static_cast<std::size_t>(side)] && std::abs(index[axis] - at) < onSide) {
+                index[axis] = at;
+                moved = true;
+            }
+        }
+        p = moved ? labels.affine.toPatient(index) : p;
+    }
+    // What had all four corners on a side is flat now.
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        const double edge = glm::distance(mesh.points[mesh.tets[t][0]], mesh.points[mesh.tets[t][1]]);
+        if (sixVolumes(mesh, t) > flat * edge * edge * edge) {
+            mesh.tets[kept] = mesh.tets[t];
+            mesh.tissue[kept++] = mesh.tissue[t];
+        }
+    }
+    mesh.tets.resize(kept);
+    mesh.tissue.resize(kept);
+}
+
+void addFaces(const volume::Tissue& tissue, const SmoothLabels& labels, TetMesh& mesh)
+{
+    const volume::Tissue::Reader reader(tissue);
+    const Vec3 spacing = labels.affine.spacing();
+    const double voxel = std::max({spacing.x, spacing.y, spacing.z});
+    const auto faces = sortedFaces(mesh);
+    mesh.faces.clear();
+    for (std::size_t i = 0; i < faces.size(); ++i) {
+        const bool shared =
+            (i > 0 && faces[i].key == faces[i - 1].key) || (i + 1 < faces.size() && faces[i].key == faces[i + 1].key);
+        if (shared) {
+            continue;
+        }
+        TetMesh::Face face;
+        face.tet = faces[i].tet;
+        std::array<Vec3, 3> p;
+        for (std::size_t c = 0; c < 3; ++c) {
+            face.points[c] = mesh.tets[face.tet][faceCorners[faces[i].side][c]];
+            p[c] = mesh.points[face.points[c]];
+        }
+        const Vec3 centre = (p[0] + p[1] + p[2]) / 3.0;
+        const Vec3 normal = glm::normalize(glm::cross(p[1] - p[0], p[2] - p[0]));
+        face.held = liesOnHeldSide(labels, centre) || looksAtHeld(tissue, reader, centre, voxel * normal);
+        mesh.faces.push_back(face);
+    }
+}
+
+}  // namespace palpate::reference

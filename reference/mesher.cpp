@@ -1,0 +1,152 @@
+#include <reference/mesher.h>
+
+#include <reference/mesh_domain.h>
+#include <reference/mesh_parts.h>
+#include <reference/mixtures.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+
+namespace palpate::reference {
+
+namespace {
+
+constexpr double volumeTolerance = 2e-3;  // of a region, below which it is not corrected
+constexpr double leastSeed = 0.5;         // volume of a piece worth a seed, in cubes of the edge length there
+
+// How many times as long as a tissue is thick the edges around it may become, before it is left out: tried in turn.
+constexpr std::array<double, 5> resolutions{12.0, 6.0, 4.0, 3.0, 2.0};
+
+// Of a facet's middle from the surface, share of the thickness of what it bounds, times the resolution: facets get coarser
+// where thin tissues are left out sooner.
+constexpr double layerDistance = 1.2;
+
+// Where each region is thick enough for the edges around it.
+std::vector<double> reachOf(const std::vector<double>& thickness, double resolution, const MeshOptions& options)
+{
+    std::vector<double> within;
+    for (const double t : thickness) {
+        const double edge = resolution * t;
+        const double reach = options.radius + (edge - options.size) / options.growth;
+        within.push_back(edge >= options.largest ? std::numeric_limits<double>::infinity() : std::max(reach, 0.0));
+    }
+    return within;
+}
+
+// Volumes that the regions have by the labels, at eight points of every voxel [m^3].
+std::vector<double> volumesIn(const SmoothLabels& labels)
+{
+    const double share = labels.affine.voxelVolume() / 8.0;
+    std::vector<double> volume(labels.rows.size(), 0.0);
+    volume::forEachIndex(Index3(0), 2 * labels.size - 1, [&](Index3 n) {
+        const Vec3 index = Vec3(labels.low) + 0.5 * Vec3(n) - 0.25;
+        if (const int region = regionAt(labels, labels.affine.toPatient(index)); region >= 0) {
+            volume[static_cast<std::size_t>(region)] += share;
+        }
+    });
+    return volume;
+}
+
+class BodyMesher {
+public:
+    BodyMesher(SmoothLabels& labels, const MeshOptions& options)
+        : labels_(labels), options_(options), thickness_(thicknesses(labels))
+    {
+        std::ranges::transform(thickness_, std::back_inserter(bounds_.edge), [&](double t) { return options.layer * t; });
+        labels_.from = options.from;
+        labels_.to = options.to;
+    }
+
+    // Resolves thin tissues as far from the contact as the number of tetrahedra allows.
+    TetMesh mesh()
+    {
+        std::optional<TetMesh> out;
+        for (const double resolution : resolutions) {
+            labels_.within = reachOf(thickness_, resolution, options_);
+            bounds_.distance.clear();
+            std::ranges::transform(thickness_, std::back_inserter(bounds_.distance),
+                                   [&](double t) { return layerDistance / resolution * t; });
+            out = once(resolution == resolutions.back() ? 0 : options_.most);
+            if (out && out->tets.size() <= options_.most) {
+                break;
+            }
+        }
+        return corrected(*std::move(out));
+    }
+
+private:
+    std::optional<TetMesh> once(std::size_t mostPoints)
+    {
+        std::vector<RegionSeed> seeds = regionSeeds(labels_, 0.0);
+        std::erase_if(seeds, [&](const RegionSeed& s) {
+            return s.volume < leastSeed * std::pow(edgeLength(options_, s.point), 3.0);
+        });
+        return meshRegions(labels_, seeds, options_, bounds_, mostPoints);
+    }
+
+    // Chords make regions that bulge too small: asks for as much more, and meshes again. Not for those that are left out
+    // somewhere.
+    TetMesh corrected(TetMesh mesh)
+    {
+        const std::vector<double> target = volumesIn(labels_);
+        std::vector<double> wanted = labels_.volume;
+        for (int pass = 0; pass < options_.volumePasses; ++pass) {
+            const auto volume = volumesOf(mesh, labels_.rows);
+            bool off = false;
+            for (std::size_t r = 0; r < wanted.size(); ++r) {
+                if (std::isinf(labels_.within[r]) && volume[r] > 0.0 &&
+                    std::abs(volume[r] / target[r] - 1.0) > volumeTolerance) {
+                    wanted[r] *= std::clamp(target[r] / volume[r], 0.8, 1.25);
+                    off = true;
+                }
+            }
+            if (!off) {
+                break;
+            }
+            fitVolumes(labels_, wanted);
+            mesh = *once(0);
+        }
+        return mesh;
+    }
+
+    SmoothLabels& labels_;
+    const MeshOptions& options_;
+    std::vector<double> thickness_;  // [m] (regions x 1)
+    RegionBounds bounds_;
+};
+
+}  // namespace
+
+double edgeLength(const MeshOptions& options, Vec3 p) noexcept
+{
+    const double beyond = std::max(0.0, distanceToLine(p, options.from, options.to) - options.radius);
+    return std::min(options.largest, options.size + options.growth * beyond);
+}
+
+BodyMesh meshBody(const volume::Tissue& tissue, const MeshOptions& options)
+{
+    SmoothLabels labels = smoothLabels(tissue);
+    BodyMesh body;
+    body.rows = labels.rows;
+    body.voxels = labels.volume;
+    const std::vector<double> bias = labels.bias;
+    body.mesh = BodyMesher(labels, options).mesh();
+    snapToSides(labels, body.mesh);
+    body.dropped = keepLargestPiece(body.mesh);
+    body.sharpest = smallestDihedral(body.mesh);
+    labels.bias = bias;  // chords are no matter to a mixture
+    Mixtures mixtures = mixTissues(labels, tissue.table(), body.mesh);
+    body.mixtures = std::move(mixtures.materials);
+    body.volume = std::move(mixtures.volume);
+    addFaces(tissue, labels, body.mesh);
+    if (std::ranges::none_of(body.mesh.faces, &TetMesh::Face::held)) {
+        throw std::runtime_error("volume: no tissue that holds the body touches it: mark bone or chest wall as fixed");
+    }
+    return body;
+}
+
+}  // namespace palpate::reference

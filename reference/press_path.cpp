@@ -1,0 +1,166 @@
+#include <reference/press_path.h>
+
+#include <experiments/trial_errors.h>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace palpate::reference {
+
+using experiments::ReferenceState;
+using experiments::TrialPose;
+
+namespace {
+
+constexpr double nearField = 30e-3;      // around the contact's path [m]
+constexpr double nearSpacing = 2e-3;     // of the points in it [m]
+constexpr int coarser = 3;               // how much wider they lie beyond
+constexpr double depth = 0.5e-3;         // of the points under the surface, at least [m]
+constexpr double strainedVolume = 1e-7;  // [m^3]
+
+// Poses at which errors are measured, in the order in which the tool takes them.
+std::vector<TrialPose> looksOf(const PressProblem& problem)
+{
+    std::vector<TrialPose> poses;
+    for (const auto& tick : schedule(problem.path, problem.speed)) {
+        if (tick.look && (poses.empty() || poses.back() != tick.pose)) {
+            poses.push_back(tick.pose);
+        }
+    }
+    return poses;
+}
+
+// First and last point of the surface that the tool presses on.
+std::pair<Vec3, Vec3> contactEnds(const PressProblem& problem)
+{
+    experiments::TrialLoad load(problem.path);
+    load.set({problem.path.gap, 0.0});
+    const Vec3 first = load.load().focus.point;
+    load.set({problem.path.press, problem.path.drag});
+    return {first, load.load().focus.point};
+}
+
+// |e| sqrt(2/3) of the strain e of the mean deformation in a cube of the lattice.
+double equivalentStrain(const std::vector<Vec3f>& u, const std::array<std::uint32_t, 8>& corners, double side)
+{
+    Mat3 gradient(0.0);
+    for (int c = 0; c < 8; ++c) {
+        const Vec3 corner(c & 1, (c >> 1) & 1, c >> 2);
+        gradient += glm::outerProduct(Vec3(u[corners[static_cast<std::size_t>(c)]]), (2.0 * corner - 1.0) / (4.0 * side));
+    }
+    double sum = 0.0;
+    const Mat3 strain = 0.5 * (gradient + glm::transpose(gradient));
+    for (int i = 0; i < 3; ++i) {
+        sum += glm::dot(strain[i], strain[i]);
+    }
+    return std::sqrt(2.0 / 3.0 * sum);
+}
+
+// The strain that strainedVolume of tissue exceeds, among the cubes of the fine lattice.
+double localStrain(const std::vector<Vec3f>& u, const experiments::PositionCells& cells)
+{
+    std::vector<double> strains;
+    for (const auto& corners : cells.corners) {
+        strains.push_back(equivalentStrain(u, corners, cells.side));
+    }
+    const auto beyond = static_cast<std::size_t>(strainedVolume / std::pow(cells.side, 3.0));
+    if (strains.size() <= beyond) {
+        return 0.0;
+    }
+    const auto at = strains.begin() + static_cast<std::ptrdiff_t>(beyond);
+    std::nth_element(strains.begin(), at, strains.end(), std::greater<>());
+    return *at;
+}
+
+ReferenceState stateOf(const Solver& solver, const experiments::TrialLoad& load, const std::vector<Vec3>& points,
+                       const experiments::PositionCells& cells)
+{
+    ReferenceState state;
+    state.pose = load.pose();
+    state.focus = load.load().focus.point;
+    for (const Vec3 u : solver.displacement(points)) {
+        state.u.emplace_back(u);
+        state.largest = std::max(state.largest, glm::length(u));
+    }
+    state.force = solver.force();
+    state.energy = solver.energy();
+    state.strain = localStrain(state.u, cells);
+    return state;
+}
+
+}  // namespace
+
+std::vector<Material> materialsOf(const PressProblem& problem, const BodyMesh& body)
+{
+    std::vector<Material> materials;
+    for (const auto& row : problem.tissue.table().rows) {
+        materials.push_back({row.youngsModulus, row.poissonRatio, row.stiffening});
+    }
+    materials.insert(materials.end(), body.mixtures.begin(), body.mixtures.end());
+    for (Material& m : materials) {
+        m.poisson = std::min(m.poisson, problem.poissonCap);
+    }
+    return materials;
+}
+
+std::vector<Vec3f> referencePoints(const PressProblem& problem)
+{
+    const auto [from, to] = contactEnds(problem);
+    const auto box = problem.tissue.box();
+    const volume::Tissue::Reader reader(problem.tissue);
+    const auto& rows = problem.tissue.table().rows;
+    std::vector<Vec3f> points;
+    const Index3 low(glm::floor(box.low / nearSpacing)), high(glm::ceil(box.high / nearSpacing));
+    volume::forEachIndex(low, high, [&](Index3 n) {
+        const Vec3 p = nearSpacing * Vec3(n);
+        const bool coarse = n.x % coarser == 0 && n.y % coarser == 0 && n.z % coarser == 0;
+        if ((!coarse && distanceToLine(p, from, to) > nearField) || problem.surface.distance(p) > -depth) {
+            return;
+        }
+        const auto& row = rows[reader.tissue(p)];
+        if (!isHeld(row) && row.role != volume::Role::air) {
+            points.emplace_back(p);
+        }
+    });
+    return points;
+}
+
+MeshOptions meshOptions(const PressProblem& problem, double size)
+{
+    MeshOptions options;
+    std::tie(options.from, options.to) = contactEnds(problem);
+    options.size = size;
+    options.radius = problem.path.tool.radius;
+    return options;
+}
+
+experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink)
+{
+    experiments::Reference out;
+    out.position = referencePoints(problem);
+    const auto cells = experiments::positionCells(out.position);
+    const std::vector<Vec3> points(out.position.begin(), out.position.end());
+    const auto materials = materialsOf(problem, body);
+    Solver solver(body.mesh, materials, problem.solve);
+    out.nodes = solver.unknowns() / 3;
+    out.residual = problem.solve.tolerance;
+    const auto poses = looksOf(problem);
+    for (std::size_t look = 0; look < poses.size(); ++look) {
+        experiments::TrialLoad load(problem.path);
+        load.set(poses[look]);
+        solver.press({problem.path.start + problem.path.way(poses[look]), problem.path.tool.radius});
+        out.states.push_back(stateOf(solver, load, points, cells));
+        const ReferenceState& state = out.states.back();
+        out.peakForce = std::max(out.peakForce, glm::length(state.force));
+        out.strain = std::max(out.strain, state.strain);
+        sink(solver, look, poses.size(), state);
+    }
+    return out;
+}
+
+}  // namespace palpate::reference

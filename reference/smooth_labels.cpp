@@ -1,0 +1,506 @@
+#include <reference/smooth_labels.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <stdexcept>
+
+namespace palpate::reference {
+
+namespace {
+
+constexpr double blur = 1.0;          // standard deviation of the Gaussian [voxels]
+constexpr int reach = 3;              // of the Gaussian [voxels]
+constexpr double sheer = 0.8;         // a side is flat when its last layer has this share of the layer two before
+constexpr double onItsBack = 0.05;    // share of the depth that is held when nothing else is, as in chainmail/elastic_body
+constexpr double full = 65535.0;      // a share of one
+constexpr double pure = 0.98;         // share from which on a voxel is one tissue throughout
+constexpr double mostBias = 0.45;     // beyond it a bias would drown the shares
+constexpr double closeEnough = 1e-3;  // of a region's volume
+constexpr int fitPasses = 6;
+
+// Row of the tissue table of every voxel in a box; 0 where it is not soft.
+struct SoftVoxels {
+    Index3 low{0}, size{0};
+    std::vector<std::uint8_t> row;
+    bool held = false;  // there is tissue that holds the body
+
+    std::size_t offset(Index3 n) const noexcept
+    {
+        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
+                   static_cast<std::size_t>(size.x) +
+               static_cast<std::size_t>(n.x);
+    }
+};
+
+// The voxels that the body's box touches.
+std::pair<Index3, Index3> voxelRange(const volume::Tissue& tissue)
+{
+    const auto box = tissue.box();
+    Vec3 low(1e30), high(-1e30);
+    for (int c = 0; c < 8; ++c) {
+        const Vec3 corner((c & 1) != 0 ? box.high.x : box.low.x, (c & 2) != 0 ? box.high.y : box.low.y,
+                          (c & 4) != 0 ? box.high.z : box.low.z);
+        const Vec3 index = tissue.affine().toIndex(corner);
+        low = glm::min(low, index);
+        high = glm::max(high, index);
+    }
+    return {glm::clamp(Index3(glm::floor(low)), Index3(0), tissue.size() - 1),
+            glm::clamp(Index3(glm::ceil(high)), Index3(0), tissue.size() - 1)};
+}
+
+// The part of `all` between two of its voxels.
+SoftVoxels cropped(const SoftVoxels& all, Index3 first, Index3 last)
+{
+    SoftVoxels part;
+    part.held = all.held;
+    part.low = all.low + first;
+    part.size = last - first + 1;
+    part.row.reserve(part.offset({0, 0, part.size.z}));
+    volume::forEachIndex(first, last, [&](Index3 n) { part.row.push_back(all.row[all.offset(n)]); });
+    return part;
+}
+
+SoftVoxels readVoxels(const volume::Tissue& tissue)
+{
+    const auto [first, last] = voxelRange(tissue);
+    SoftVoxels all;
+    all.low = first;
+    all.size = last - first + 1;
+    all.row.assign(all.offset({0, 0, all.size.z}), 0);
+    const auto& rows = tissue.table().rows;
+    const volume::Tissue::Reader reader(tissue);
+    Index3 low = all.size, high(-1);
+    volume::forEachIndex(Index3(0), all.size - 1, [&](Index3 n) {
+        const std::uint8_t row = reader.tissue(tissue.affine().toPatient(Vec3(n + all.low)));
+        if (isHeld(rows[row])) {
+            all.held = true;
+        } else if (rows[row].role != volume::Role::air) {
+            all.row[all.offset(n)] = row;
+            low = glm::min(low, n);
+            high = glm::max(high, n);
+        }
+    });
+    if (glm::any(glm::greaterThan(low, high))) {
+        throw std::runtime_error("volume: there is no soft tissue in it to mesh: all of it is air, bone or fixed");
+    }
+    return cropped(all, low, high);
+}
+
+// Leaves out the rear of a body that nothing holds. Returns the side where it ends now.
+int layOnItsBack(const volume::Affine& affine, SoftVoxels& voxels)
+{
+    int axis = 0;
+    for (int a = 1; a < 3; ++a) {
+        axis = std::abs(affine.linear[a].y) > std::abs(affine.linear[axis].y) ? a : axis;
+    }
+    const bool backIsHigh = affine.linear[axis].y > 0.0;
+    const int layers = std::max(1, static_cast<int>(std::lround(onItsBack * voxels.size[axis])));
+    Index3 first(0), last = voxels.size - 1;
+    (backIsHigh ? last : first)[axis] += backIsHigh ? -layers : layers;
+    voxels = cropped(voxels, first, glm::max(first, last));
+    return 2 * axis + (backIsHigh ? 1 : 0);
+}
+
+std::size_t softInLayer(const SoftVoxels& voxels, int axis, int layer)
+{
+    Index3 first(0), last = voxels.size - 1;
+    first[axis] = last[axis] = layer;
+    std::size_t count = 0;
+    volume::forEachIndex(first, last, [&](Index3 n) { count += voxels.row[voxels.offset(n)] != 0 ? 1U : 0U; });
+    return count;
+}
+
+// A round end has few voxels in its last layer, a plane as many as further in.
+std::array<bool, 6> flatSides(const SoftVoxels& voxels)
+{
+    std::array<bool, 6> flat{};
+    for (int side = 0; side < 6; ++side) {
+        const int axis = side / 2, end = voxels.size[axis] - 1;
+        const int layer = side % 2 == 0 ? 0 : end;
+        const int inner = side % 2 == 0 ? std::min(2, end) : std::max(end - 2, 0);
+        flat[static_cast<std::size_t>(side)] = static_cast<double>(softInLayer(voxels, axis, layer)) >=
+                                               sheer * static_cast<double>(softInLayer(voxels, axis, inner));
+    }
+    return flat;
+}
+
+std::array<float, 2 * reach + 1> gaussian()
+{
+    std::array<float, 2 * reach + 1> weights{};
+    double sum = 0.0;
+    for (int t = -reach; t <= reach; ++t) {
+        sum += std::exp(-t * t / (2.0 * blur * blur));
+    }
+    for (int t = -reach; t <= reach; ++t) {
+        weights[static_cast<std::size_t>(t + reach)] = static_cast<float>(std::exp(-t * t / (2.0 * blur * blur)) / sum);
+    }
+    return weights;
+}
+
+// One axis of the blur. Beyond a flat side lies its mirror image; beyond the others, nothing.
+void blurAxis(const SmoothLabels& labels, int axis, std::vector<float>& values)
+{
+    static const auto weights = gaussian();
+    const int count = labels.size[axis];
+    const bool mirrorLow = labels.flat[static_cast<std::size_t>(2 * axis)];
+    const bool mirrorHigh = labels.flat[static_cast<std::size_t>(2 * axis + 1)];
+    std::size_t stride = 1;
+    for (int a = 0; a < axis; ++a) {
+        stride *= static_cast<std::size_t>(labels.size[a]);
+    }
+    std::vector<float> line(static_cast<std::size_t>(count + 2 * reach));
+    Index3 last = labels.size - 1;
+    last[axis] = 0;
+    volume::forEachIndex(Index3(0), last, [&](Index3 n) {
+        float* at = values.data() + labels.offset(n) / labels.rows.size();
+        for (int i = -reach; i < count + reach; ++i) {
+            const int mirrored = i < 0 ? -1 - i : i >= count ? 2 * count - 1 - i : i;
+            const bool there = (i >= 0 || mirrorLow) && (i < count || mirrorHigh) && mirrored >= 0 && mirrored < count;
+            line[static_cast<std::size_t>(i + reach)] = there ? at[stride * static_cast<std::size_t>(mirrored)] : 0.0F;
+        }
+        for (int i = 0; i < count; ++i) {
+            const float* from = line.data() + i;
+            at[stride * static_cast<std::size_t>(i)] = std::inner_product(weights.begin(), weights.end(), from, 0.0F);
+        }
+    });
+}
+
+void addShares(const SoftVoxels& voxels, SmoothLabels& labels)
+{
+    labels.shares.assign(labels.offset({0, 0, labels.size.z}), 0);
+    std::vector<float> values(labels.shares.size() / labels.rows.size());
+    const Index3 shift = voxels.low - labels.low;
+    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
+        std::fill(values.begin(), values.end(), 0.0F);
+        volume::forEachIndex(Index3(0), voxels.size - 1, [&](Index3 n) {
+            if (voxels.row[voxels.offset(n)] == labels.rows[r]) {
+                values[labels.offset(n + shift) / labels.rows.size()] = 1.0F;
+            }
+        });
+        for (int axis = 0; axis < 3; ++axis) {
+            blurAxis(labels, axis, values);
+        }
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            labels.shares[i * labels.rows.size() + r] =
+                static_cast<std::uint16_t>(std::lround(full * static_cast<double>(values[i])));
+        }
+    }
+}
+
+// The eight samples around a place, with their weights.
+struct Corners {
+    std::array<std::size_t, 8> at{};
+    std::array<double, 8> weight{};
+};
+
+// `q`: in samples. False beyond the samples, and beyond a flat side.
+bool cornersAt(const SmoothLabels& labels, Vec3 q, Corners& c) noexcept
+{
+    Index3 base(0), next(0);
+    Vec3 f(0.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        const double end = labels.size[axis] - 1;
+        const double low = labels.flat[static_cast<std::size_t>(2 * axis)] ? -0.5 : 0.0;
+        const double high = labels.flat[static_cast<std::size_t>(2 * axis + 1)] ? end + 0.5 : end;
+        if (!(q[axis] >= low && q[axis] <= high)) {
+            return false;
+        }
+        const double inside = std::clamp(q[axis], 0.0, end);
+        base[axis] = static_cast<int>(inside);
+        next[axis] = std::min(base[axis] + 1, labels.size[axis] - 1);
+        f[axis] = inside - base[axis];
+    }
+    for (int i = 0; i < 8; ++i) {
+        const bool x = (i & 1) != 0, y = (i & 2) != 0, z = (i & 4) != 0;
+        const auto corner = static_cast<std::size_t>(i);
+        c.at[corner] = labels.offset({x ? next.x : base.x, y ? next.y : base.y, z ? next.z : base.z});
+        c.weight[corner] = (x ? f.x : 1.0 - f.x) * (y ? f.y : 1.0 - f.y) * (z ? f.z : 1.0 - f.z);
+    }
+    return true;
+}
+
+double shareAt(const SmoothLabels& labels, const Corners& c, std::size_t row) noexcept
+{
+    double sum = 0.0;
+    for (std::size_t i = 0; i < 8; ++i) {
+        sum += c.weight[i] * labels.shares[c.at[i] + row];
+    }
+    return sum / full;
+}
+
+// Shares at eight points of every voxel near a border, and how many points the others have.
+struct BorderPoints {
+    std::vector<float> shares;       // (points x rows)
+    std::vector<std::size_t> inner;  // points of voxels that are one tissue throughout (rows x 1)
+};
+
+BorderPoints borderPoints(const SmoothLabels& labels)
+{
+    const std::size_t rows = labels.rows.size();
+    BorderPoints out;
+    out.inner.assign(rows, 0);
+    volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
+        const auto* share = labels.shares.data() + labels.offset(n);
+        const auto* top = std::max_element(share, share + rows);
+        if (*top >= pure * full) {
+            out.inner[static_cast<std::size_t>(top - share)] += 8;
+            return;
+        }
+        if (std::accumulate(share, share + rows, 0.0) <= (1.0 - pure) * full) {
+            return;
+        }
+        for (int i = 0; i < 8; ++i) {
+            Corners c;
+            const Vec3 part((i & 1) != 0 ? 0.25 : -0.25, (i & 2) != 0 ? 0.25 : -0.25, (i & 4) != 0 ? 0.25 : -0.25);
+            if (cornersAt(labels, Vec3(n) + part, c)) {
+                for (std::size_t r = 0; r < rows; ++r) {
+                    out.shares.push_back(static_cast<float>(shareAt(labels, c, r)));
+                }
+            }
+        }
+    });
+    return out;
+}
+
+// What to add to a bias so that `wanted` points have a margin above nothing; 0 when about as many have it already.
+double biasStep(std::vector<double>& margins, double wanted)
+{
+    const auto now = static_cast<double>(std::ranges::count_if(margins, [](double m) { return m > 0.0; }));
+    if (margins.empty() || std::abs(now - wanted) <= closeEnough * wanted) {
+        return 0.0;
+    }
+    const double last = std::clamp(wanted, 0.0, static_cast<double>(margins.size()) - 1.0);
+    const auto at = margins.begin() + static_cast<std::ptrdiff_t>(last);
+    std::nth_element(margins.begin(), at, margins.end(), std::greater<>());
+    return -*at;
+}
+
+void fitBody(SmoothLabels& labels, const BorderPoints& points, double wanted)
+{
+    const std::size_t rows = labels.rows.size();
+    std::vector<double> margins;
+    for (std::size_t i = 0; i < points.shares.size(); i += rows) {
+        const auto from = points.shares.begin() + static_cast<std::ptrdiff_t>(i);
+        margins.push_back(std::accumulate(from, from + static_cast<std::ptrdiff_t>(rows), 0.0) - 0.5 + labels.bodyBias);
+    }
+    const double inner = std::accumulate(points.inner.begin(), points.inner.end(), 0.0);
+    labels.bodyBias = std::clamp(labels.bodyBias + biasStep(margins, wanted - inner), -mostBias, mostBias);
+}
+
+void fitRow(SmoothLabels& labels, const BorderPoints& points, std::size_t row, double wanted)
+{
+    const std::size_t rows = labels.rows.size();
+    std::vector<double> margins;
+    for (std::size_t i = 0; i < points.shares.size(); i += rows) {
+        double sum = 0.0, other = -1.0;
+        for (std::size_t r = 0; r < rows; ++r) {
+            const double share = points.shares[i + r];
+            sum += share;
+            other = r == row ? other : std::max(other, share + labels.bias[r]);
+        }
+        if (sum >= 0.5 - labels.bodyBias) {
+            margins.push_back(points.shares[i + row] + labels.bias[row] - other);
+        }
+    }
+    const double step = biasStep(margins, wanted - static_cast<double>(points.inner[row]));
+    labels.bias[row] = std::clamp(labels.bias[row] + step, -mostBias, mostBias);
+}
+
+// Pieces of one region among the samples, by flood.
+class Pieces {
+public:
+    explicit Pieces(const SmoothLabels& labels) : labels_(labels), region_(labels.shares.size() / labels.rows.size())
+    {
+        volume::forEachIndex(Index3(0), labels.size - 1,
+                             [&](Index3 n) { region_[at(n)] = static_cast<std::int8_t>(regionAt(labels, position(n))); });
+    }
+
+    std::vector<RegionSeed> seeds(double least)
+    {
+        std::vector<RegionSeed> out;
+        volume::forEachIndex(Index3(0), labels_.size - 1, [&](Index3 n) {
+            if (region_[at(n)] >= 0) {
+                const RegionSeed seed = flood(n);
+                if (seed.volume >= least) {
+                    out.push_back(seed);
+                }
+            }
+        });
+        return out;
+    }
+
+private:
+    std::size_t at(Index3 n) const noexcept { return labels_.offset(n) / labels_.rows.size(); }
+    Vec3 position(Index3 n) const noexcept { return labels_.affine.toPatient(Vec3(n + labels_.low)); }
+
+    // Empties the piece around `from`; its sample with the largest share is the seed.
+    RegionSeed flood(Index3 from)
+    {
+        const std::int8_t region = region_[at(from)];
+        std::vector<Index3> queue{from};
+        region_[at(from)] = -1;
+        Index3 best = from;
+        for (std::size_t i = 0; i < queue.size(); ++i) {
+            const Index3 n = queue[i];
+            best = share(n, region) > share(best, region) ? n : best;
+            for (int side = 0; side < 6; ++side) {
+                Index3 next = n;
+                next[side / 2] += side % 2 == 0 ? -1 : 1;
+                if (next[side / 2] >= 0 && next[side / 2] < labels_.size[side / 2] && region_[at(next)] == region) {
+                    region_[at(next)] = -1;
+                    queue.push_back(next);
+                }
+            }
+        }
+        return {region, position(best), static_cast<double>(queue.size()) * labels_.affine.voxelVolume()};
+    }
+
+    std::uint16_t share(Index3 n, int region) const noexcept
+    {
+        return labels_.shares[labels_.offset(n) + static_cast<std::size_t>(region)];
+    }
+
+    const SmoothLabels& labels_;
+    std::vector<std::int8_t> region_;  // of each sample; -1 outside, and where it was flooded
+};
+
+}  // namespace
+
+bool isHeld(const volume::TissueRow& row) noexcept
+{
+    return row.fixed || row.role == volume::Role::bone;
+}
+
+SmoothLabels smoothLabels(const volume::Tissue& tissue)
+{
+    SoftVoxels voxels = readVoxels(tissue);
+    SmoothLabels labels;
+    labels.affine = tissue.affine();
+    labels.heldSide = voxels.held ? -1 : layOnItsBack(labels.affine, voxels);
+    labels.flat = flatSides(voxels);
+    if (labels.heldSide >= 0) {
+        labels.flat[static_cast<std::size_t>(labels.heldSide)] = true;
+    }
+    labels.low = voxels.low;
+    labels.size = voxels.size;
+    for (int side = 0; side < 6; ++side) {
+        const int margin = labels.flat[static_cast<std::size_t>(side)] ? 0 : reach;
+        labels.low[side / 2] -= side % 2 == 0 ? margin : 0;
+        labels.size[side / 2] += margin;
+    }
+    std::array<std::size_t, 256> count{};
+    for (const std::uint8_t row : voxels.row) {
+        ++count[row];
+    }
+    for (std::size_t row = 1; row < count.size(); ++row) {
+        if (count[row] > 0) {
+            labels.rows.push_back(static_cast<std::uint8_t>(row));
+            labels.volume.push_back(static_cast<double>(count[row]) * labels.affine.voxelVolume());
+        }
+    }
+    labels.bias.assign(labels.rows.size(), 0.0);
+    addShares(voxels, labels);
+    fitVolumes(labels, labels.volume);
+    return labels;
+}
+
+void fitVolumes(SmoothLabels& labels, std::span<const double> wanted)
+{
+    const BorderPoints points = borderPoints(labels);
+    const double point = labels.affine.voxelVolume() / 8.0;
+    fitBody(labels, points, std::accumulate(wanted.begin(), wanted.end(), 0.0) / point);
+    // Biases mean nothing but against each other: the largest region keeps its own.
+    labels.largest = static_cast<int>(std::max_element(wanted.begin(), wanted.end()) - wanted.begin());
+    // Small ones first, which the blur took most from: what they take is then no longer the large ones' to give away.
+    std::vector<std::size_t> order;
+    for (std::size_t row = 0; row < labels.rows.size(); ++row) {
+        if (row != static_cast<std::size_t>(labels.largest)) {
+            order.push_back(row);
+        }
+    }
+    std::ranges::sort(order, {}, [&](std::size_t row) { return wanted[row]; });
+    for (int pass = 0; pass < fitPasses; ++pass) {
+        for (const std::size_t row : order) {
+            fitRow(labels, points, row, wanted[row] / point);
+        }
+    }
+}
+
+int regionAt(const SmoothLabels& labels, Vec3 p) noexcept
+{
+    Corners c;
+    if (!cornersAt(labels, labels.affine.toIndex(p) - Vec3(labels.low), c)) {
+        return -1;
+    }
+    const double distance = labels.within.empty() ? 0.0 : distanceToLine(p, labels.from, labels.to);
+    std::array<double, 256> share;
+    double sum = 0.0, competing = 0.0;
+    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
+        share[r] = shareAt(labels, c, r);
+        sum += share[r];
+        if (!labels.within.empty() && distance > labels.within[r]) {
+            share[r] = 0.0;
+        }
+        competing += share[r];
+    }
+    if (sum < 0.5 - labels.bodyBias) {
+        return -1;
+    }
+    // Where most of the shares are out of the race, the biases must not weigh more than what is left.
+    const double left = competing / sum;
+    double best = -1.0;
+    int region = labels.largest;
+    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
+        if (share[r] > 0.0 && share[r] + left * labels.bias[r] > best) {
+            best = share[r] + left * labels.bias[r];
+            region = static_cast<int>(r);
+        }
+    }
+    return region;
+}
+
+std::vector<double> thicknesses(const SmoothLabels& labels)
+{
+    std::vector<double> count(labels.rows.size(), 0.0), border(labels.rows.size(), 0.0);
+    const auto region = [&](Index3 n) { return regionAt(labels, labels.affine.toPatient(Vec3(labels.low + n))); };
+    volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
+        const int here = region(n);
+        if (here < 0) {
+            return;
+        }
+        count[static_cast<std::size_t>(here)] += 1.0;
+        for (int side = 0; side < 6; ++side) {
+            Index3 next = n;
+            next[side / 2] += side % 2 == 0 ? -1 : 1;
+            const bool inside = next[side / 2] >= 0 && next[side / 2] < labels.size[side / 2];
+            border[static_cast<std::size_t>(here)] += !inside || region(next) != here ? 1.0 : 0.0;
+        }
+    });
+    const Vec3 spacing = labels.affine.spacing();
+    const double voxel = std::min({spacing.x, spacing.y, spacing.z});
+    for (std::size_t r = 0; r < count.size(); ++r) {
+        count[r] = border[r] > 0.0 ? 2.0 * voxel * count[r] / border[r] : voxel;
+    }
+    return count;
+}
+
+double distanceToLine(Vec3 p, Vec3 from, Vec3 to) noexcept
+{
+    const Vec3 along = to - from;
+    const double square = glm::dot(along, along);
+    const double t = square > 0.0 ? std::clamp(glm::dot(p - from, along) / square, 0.0, 1.0) : 0.0;
+    return glm::distance(p, from + t * along);
+}
+
+std::vector<RegionSeed> regionSeeds(const SmoothLabels& labels, double least)
+{
+    return Pieces(labels).seeds(least);
+}
+
+}  // namespace palpate::reference

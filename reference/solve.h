@@ -1,0 +1,74 @@
+#pragma once
+
+#include <reference/tet_mesh.h>
+
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace palpate::reference {
+
+enum class Law : std::uint8_t { linear, neoHookean };
+enum class Elements : std::uint8_t { p2, p2p1 };
+
+/// One row of the tissue table, as the reference needs it.
+struct Material {
+    double youngsModulus = 0;  // [Pa]
+    double poisson = 0;        // [-]
+    double stiffening = 0;     // b, with finite strain: the shear modulus grows as 1 + b (I_C - 3) [-]
+};
+
+/// A rigid sphere that tissue cannot enter; without friction.
+struct RigidSphere {
+    Vec3 centre{0.0};   // [m]
+    double radius = 0;  // [m]
+};
+
+/// Displacements that are prescribed where `at` gives one, on free faces only: returns false where nothing is.
+struct Patch {
+    std::function<bool(Vec3 rest)> in;  // a face belongs to it when all its points do
+    std::function<Vec3(Vec3 rest)> u;   // [m]
+    std::array<bool, 3> components{true, true, true};
+};
+
+struct SolveOptions {
+    Law law = Law::linear;
+    Elements elements = Elements::p2;
+    int mostSteps = 200;             // load steps between two calls, halved ones included
+    double tolerance = 1e-8;         // residual, share of the forces
+    bool progress = false;           // a line per step on standard error
+    std::array<bool, 3> mirrored{};  // the planes x, y, z = 0 are planes of symmetry: what lies on one stays on it
+};
+
+/// Equilibrium of a body of tetrahedra by finite elements (GetFEM). SI throughout.
+class Solver {
+public:
+    /// Throws std::runtime_error for a mesh that is not one body, or has nothing held.
+    /// @param materials  by row of the tissue table
+    Solver(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options);
+    ~Solver();
+
+    /// Presses the sphere: goes there from the last state in load steps, halved where Newton's method fails. Contact by
+    /// augmented Lagrangian. Throws std::runtime_error ("does not converge at ... mm of ... mm: what to do").
+    void press(const RigidSphere& sphere);
+    /// Prescribes displacements, in load steps from rest.
+    void prescribe(const Patch& patch);
+
+    /// On the tool, or on what prescribes [N].
+    Vec3 force() const;
+    double energy() const;  // of the tissue [J]
+    /// (count x 3) [m]; points outside take the nearest tetrahedron's.
+    std::vector<Vec3> displacement(std::span<const Vec3> rest) const;
+    /// Mean over each tetrahedron of the Cauchy stress (count x 6: xx yy zz yz xz xy) [Pa].
+    std::vector<std::array<double, 6>> stress() const;
+    std::size_t unknowns() const;
+    int newtonSteps() const;  // of the last call
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::reference

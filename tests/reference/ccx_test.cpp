@@ -1,0 +1,102 @@
+#include <reference/box_mesh.h>
+#include <reference/ccx.h>
+#include <tests/folder.h>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+namespace palpate::reference {
+namespace {
+
+constexpr double side = 20e-3;  // [m]
+
+// The middle of the top is pressed in, the base held, x = 0 and y = 0 planes of symmetry.
+struct Problem {
+    TetMesh mesh;
+    std::vector<Material> materials;
+    SolveOptions options;
+    Patch patch;
+};
+
+Problem pressedBlock(Law law, double depth)
+{
+    const std::vector<double> ends{0.0, 3e-3, 6e-3, 12e-3, side};
+    BoxMeshOptions box;
+    box.held = [](Vec3 p) { return p.z < 1e-9; };
+    std::vector<double> up;
+    for (std::size_t i = ends.size(); i-- > 0;) {
+        up.push_back(side - ends[i]);
+    }
+    Problem problem{boxMesh(ends, ends, up, box), {{3e3, 0.45, 0.0}}, {}, {}};
+    problem.options.law = law;
+    problem.options.mirrored = {true, true, false};
+    problem.patch.in = [](Vec3 p) { return p.z > side - 1e-9 && std::max(p.x, p.y) < 6e-3 + 1e-9; };
+    problem.patch.u = [depth](Vec3 p) { return Vec3(0.05 * p.y, 0.0, -depth + 5.0 * p.x * p.x); };
+    return problem;
+}
+
+Problem inclusion()
+{
+    Problem problem{ballInBox(10e-3, side, 3), {{3e3, 0.45, 0.0}, {30e3, 0.3, 0.0}}, {}, {}};
+    problem.options.mirrored = {true, true, true};
+    problem.patch.in = [](Vec3 p) { return p.z > side - 1e-9; };
+    problem.patch.u = [](Vec3 p) { return Vec3(0.0, 0.1 * p.x, 1e-3); };
+    return problem;
+}
+
+// A second program, by other people, says the same of the same mesh.
+void expectAgreement(const Problem& problem)
+{
+    if (!hasCcx()) {
+        GTEST_SKIP() << "ccx is not installed (package calculix-ccx)";
+    }
+    const tests::Folder folder;
+    const auto file = folder.path() / "problem.inp";
+    exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, file);
+    const CcxSolution theirs = runCcx(file);
+
+    Solver solver(problem.mesh, problem.materials, problem.options);
+    solver.prescribe(problem.patch);
+    const std::vector<Vec3> nodes = quadraticNodes(problem.mesh);
+    const std::vector<Vec3> ours = solver.displacement(nodes);
+    ASSERT_EQ(theirs.u.size(), nodes.size());
+    double largest = 0.0, worst = 0.0;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        largest = std::max(largest, glm::length(theirs.u[n]));
+        worst = std::max(worst, glm::distance(ours[n], theirs.u[n]));
+    }
+    EXPECT_GT(largest, 0.5e-3);
+    EXPECT_LT(worst, 1e-4 * largest);
+    EXPECT_LT(glm::distance(solver.force(), theirs.force), 1e-4 * glm::length(theirs.force));
+}
+
+TEST(Ccx, AgreesOnAPressedBlock)
+{
+    expectAgreement(pressedBlock(Law::linear, 1e-3));
+}
+
+TEST(Ccx, AgreesOnAStiffBall)
+{
+    expectAgreement(inclusion());
+}
+
+TEST(Ccx, AgreesOnABlockPressedDeep)
+{
+    expectAgreement(pressedBlock(Law::neoHookean, 4e-3));
+}
+
+TEST(Ccx, TissueThatStiffensIsRefused)
+{
+    Problem problem = pressedBlock(Law::neoHookean, 1e-3);
+    problem.materials[0].stiffening = 1.0;
+    const tests::Folder folder;
+    EXPECT_THROW(exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, folder.path() / "problem.inp"),
+                 std::runtime_error);
+}
+
+}  // namespace
+}  // namespace palpate::reference
