@@ -21,6 +21,13 @@ find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(ITK 5.2 REQUIRED COMPONENTS
   ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta)
 
+if(PALPATE_REFERENCE)
+  find_package(CGAL 5.5 CONFIG REQUIRED)
+  find_package(GetFEM REQUIRED)
+  find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOXML)
+endif()
+
+# After the reference's: render/ links VTK_LIBRARIES, which are those found last.
 if(PALPATE_VIEWER)
   find_package(glfw3 3.3 CONFIG REQUIRED)
   find_package(GLEW REQUIRED)
@@ -28,13 +35,6 @@ if(PALPATE_VIEWER)
     CommonCore CommonDataModel CommonExecutionModel CommonTransforms FiltersCore FiltersGeneral FiltersSources ImagingCore
     InteractionStyle IOImage RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2
     RenderingVolume RenderingVolumeOpenGL2)
-endif()
-
-if(PALPATE_REFERENCE)
-  find_package(CGAL 5.5 CONFIG REQUIRED)
-  find_package(GetFEM REQUIRED)
-  # Once more where the viewer found VTK already: targets add up.
-  find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOXML)
 endif()
 
 if(BUILD_TESTING)
