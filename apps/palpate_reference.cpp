@@ -102,7 +102,7 @@ void exportLast(const std::string& file, const reference::PressProblem& problem,
                 const reference::Solver& solver, experiments::TrialPose pose)
 {
     constexpr double touching = 2e-5;  // [m]
-    const Vec3 centre = problem.path.start + problem.path.way(pose);
+    const Vec3 centre = problem.path.at(pose);
     const auto at = [&](Vec3 rest) { return solver.displacement(std::span(&rest, 1)).front(); };
     const auto touches = [&](Vec3 rest) {
         return glm::distance(rest + at(rest), centre) - problem.path.tool.radius < touching;

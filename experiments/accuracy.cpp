@@ -124,7 +124,7 @@ TrialModel springModel(const haptics::SessionModel& model, const TrialPath& path
     auto force = std::make_shared<Vec3>(0.0);
     TrialModel out = nothingModel();
     out.tick = [own, force, &path](const TrialLoad& load) {
-        const Vec3 at = path.start + path.way(load.pose());
+        const Vec3 at = path.at(load.pose());
         const Vec3 normal = path.surface->normal(at);
         const double depth = path.tool.radius - path.surface->distance(at);
         const auto under = haptics::tissueUnder(*own, volume::Tissue::Reader(*own->tissue), at - path.tool.radius * normal,

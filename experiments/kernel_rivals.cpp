@@ -71,13 +71,7 @@ TrialModel chainMailModel(std::shared_ptr<const Lattice> lattice, const TrialPat
                 mail->level.deform(gripOf(load));
                 return ElasticResult{};
             },
-            [mail](Vec3 rest) {
-                const Lattice& l = *mail->lattice;
-                const auto u = mail->deformation.shape().u();
-                return valueAt(
-                    l.grid, rest, [&](Index3 n) { return l.tissue[l.grid.offset(n)] != 0; },
-                    [&](Index3 n) { return Vec3(u[l.grid.offset(n)]); });
-            },
+            [mail](Vec3 rest) { return displacementIn(*mail->lattice, mail->deformation.shape().u(), rest); },
             {},
             [mail] { return mail->deformation.moved().size(); }};
 }

@@ -26,9 +26,7 @@ using namespace chainmail;
 
 namespace {
 
-constexpr int wholeWindow = 1023;        // nodes along each side: more than any level has
-constexpr double nearField = 30e-3;      // [m]
-constexpr double strainedVolume = 1e-7;  // [m^3]
+constexpr int wholeWindow = 1023;  // nodes along each side: more than any level has
 
 // Nodes of the finest level that are tissue and free, by z, then y, then x.
 std::vector<Index3> freeNodes(const CellLevel& level)
@@ -43,24 +41,16 @@ std::vector<Index3> freeNodes(const CellLevel& level)
     return out;
 }
 
-// |e| sqrt(2/3) of the strain e of the mean deformation in a cell: the stretch of an incompressible bar with as much.
-double equivalentStrain(const Elastic& elastic, const volume::NodeGrid& grid, Index3 cell)
+Mat3 gradientIn(const Elastic& elastic, const volume::NodeGrid& grid, Index3 cell)
 {
-    Mat3 gradient(0.0);
+    std::array<Vec3, 8> u;
     for (int c = 0; c < 8; ++c) {
-        const Index3 corner(c & 1, (c >> 1) & 1, c >> 2);
-        const Vec3 u = elastic.displacement(grid.position(cell + corner));
-        gradient += glm::outerProduct(u, (2.0 * Vec3(corner) - 1.0) / (4.0 * grid.spacing));
+        u[static_cast<std::size_t>(c)] = elastic.displacement(grid.position(cell + Index3(c & 1, (c >> 1) & 1, c >> 2)));
     }
-    double sum = 0.0;
-    const Mat3 strain = 0.5 * (gradient + glm::transpose(gradient));
-    for (int i = 0; i < 3; ++i) {
-        sum += glm::dot(strain[i], strain[i]);
-    }
-    return std::sqrt(2.0 / 3.0 * sum);
+    return meanGradient(u, grid.spacing);
 }
 
-// The strain that strainedVolume of tissue exceeds, in the near field.
+// ReferenceState::strain, in the near field.
 double localStrain(const Elastic& elastic, Vec3 focus)
 {
     const CellLevel& level = elastic.stack().body().levels.front();
@@ -71,16 +61,10 @@ double localStrain(const Elastic& elastic, Vec3 focus)
     std::vector<double> strains;
     volume::forEachIndex(low, high, [&](Index3 cell) {
         if (level.mu[grid.offset(cell)] > 0.0F) {
-            strains.push_back(equivalentStrain(elastic, grid, cell));
+            strains.push_back(equivalentStrain(gradientIn(elastic, grid, cell)));
         }
     });
-    const double cellVolume = grid.spacing * grid.spacing * grid.spacing;
-    const auto beyond = static_cast<std::ptrdiff_t>(strainedVolume / cellVolume);
-    if (static_cast<std::ptrdiff_t>(strains.size()) <= beyond) {
-        return 0.0;
-    }
-    std::nth_element(strains.begin(), strains.begin() + beyond, strains.end(), std::greater<>());
-    return strains[static_cast<std::size_t>(beyond)];
+    return exceededStrain(std::move(strains), grid.spacing);
 }
 
 Vec3 forceOn(const Elastic& elastic, const TrialPath& path)

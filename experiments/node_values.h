@@ -1,11 +1,12 @@
 #pragma once
 
-#include <volume/geometry.h>
+#include <chainmail/lattice.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <limits>
+#include <span>
 
 namespace palpate::experiments {
 
@@ -39,6 +40,14 @@ Vec3 valueAt(const volume::NodeGrid& grid, Vec3 rest, Has&& has, Value&& value)
         }
     });
     return nearest;
+}
+
+/// Displacement of the tissue that is at `rest` by that of a lattice's nodes [m].
+inline Vec3 displacementIn(const chainmail::Lattice& lattice, std::span<const Vec3f> u, Vec3 rest)
+{
+    return valueAt(
+        lattice.grid, rest, [&](Index3 n) { return lattice.tissue[lattice.grid.offset(n)] != 0; },
+        [&](Index3 n) { return Vec3(u[lattice.grid.offset(n)]); });
 }
 
 }  // namespace palpate::experiments

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 #include <unordered_map>
 
@@ -15,7 +16,6 @@ namespace palpate::experiments {
 
 namespace {
 
-constexpr double nearField = 30e-3;  // [m]
 constexpr double leastForce = 0.05;  // share of the path's peak
 constexpr double samePose = 1e-8;    // another machine may round the path otherwise [m]
 
@@ -39,15 +39,17 @@ std::uint64_t cellKey(Index3 n)
     return part(n.x) << 42U | part(n.y) << 21U | part(n.z);
 }
 
+std::array<Vec3, 8> atCorners(std::span<const Vec3> u, const std::array<std::uint32_t, 8>& corners)
+{
+    std::array<Vec3, 8> out;
+    std::ranges::transform(corners, out.begin(), [&](std::uint32_t c) { return u[c]; });
+    return out;
+}
+
 // How much larger a cell has become: the determinant of I + the mean gradient of u in it.
 double jacobian(std::span<const Vec3> u, const std::array<std::uint32_t, 8>& corners, double side)
 {
-    Mat3 gradient(1.0);
-    for (int c = 0; c < 8; ++c) {
-        const Vec3 sign = 2.0 * Vec3(c & 1, (c >> 1) & 1, c >> 2) - 1.0;
-        gradient += glm::outerProduct(u[corners[static_cast<std::size_t>(c)]], sign / (4.0 * side));
-    }
-    return glm::determinant(gradient);
+    return glm::determinant(Mat3(1.0) + meanGradient(atCorners(u, corners), side));
 }
 
 double volumeError(std::span<const Vec3> u, const Reference& reference, const PositionCells& cells,
@@ -67,6 +69,38 @@ double volumeError(std::span<const Vec3> u, const Reference& reference, const Po
 }
 
 }  // namespace
+
+Mat3 meanGradient(const std::array<Vec3, 8>& u, double side)
+{
+    Mat3 gradient(0.0);
+    for (int c = 0; c < 8; ++c) {
+        const Vec3 corner(c & 1, (c >> 1) & 1, c >> 2);
+        gradient += glm::outerProduct(u[static_cast<std::size_t>(c)], (2.0 * corner - 1.0) / (4.0 * side));
+    }
+    return gradient;
+}
+
+double equivalentStrain(const Mat3& gradient)
+{
+    double sum = 0.0;
+    const Mat3 strain = 0.5 * (gradient + glm::transpose(gradient));
+    for (int i = 0; i < 3; ++i) {
+        sum += glm::dot(strain[i], strain[i]);
+    }
+    return std::sqrt(2.0 / 3.0 * sum);
+}
+
+double exceededStrain(std::vector<double> strains, double side)
+{
+    constexpr double strainedVolume = 1e-7;  // [m^3]
+    const auto beyond = static_cast<std::size_t>(strainedVolume / (side * side * side));
+    if (strains.size() <= beyond) {
+        return 0.0;
+    }
+    const auto at = strains.begin() + static_cast<std::ptrdiff_t>(beyond);
+    std::nth_element(strains.begin(), at, strains.end(), std::greater<>());
+    return *at;
+}
 
 PositionCells positionCells(std::span<const Vec3f> position)
 {

@@ -10,6 +10,15 @@
 
 namespace palpate::experiments {
 
+inline constexpr double nearField = 30e-3;  // around the contact [m]
+
+/// Mean gradient of u in a cube, by u at its corners, x fastest.
+Mat3 meanGradient(const std::array<Vec3, 8>& u, double side);
+/// |e| sqrt(2/3) of the strain e: the stretch of an incompressible bar with as much.
+double equivalentStrain(const Mat3& gradient);
+/// What a tenth of a millilitre exceeds, of the strains in cubes of one size.
+double exceededStrain(std::vector<double> strains, double side);
+
 /// Cubes between eight neighbours of the lattice that a reference's positions lie on. Without a lattice there are none.
 struct PositionCells {
     double side = 0;                                    // [m]

@@ -68,6 +68,7 @@ struct TrialPath {
     const volume::DistanceField* surface = nullptr;
 
     Vec3 way(TrialPose pose) const noexcept { return pose.pressed * inward + pose.dragged * sideways; }
+    Vec3 at(TrialPose pose) const noexcept { return start + way(pose); }
 };
 
 /// @param spacing  of the finest nodes: how stiff a needle's ties are [m]

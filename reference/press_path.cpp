@@ -45,36 +45,16 @@ std::pair<Vec3, Vec3> contactEnds(const PressProblem& problem)
     return {first, load.load().focus.point};
 }
 
-// |e| sqrt(2/3) of the strain e of the mean deformation in a cube of the lattice.
-double equivalentStrain(const std::vector<Vec3f>& u, const std::array<std::uint32_t, 8>& corners, double side)
-{
-    Mat3 gradient(0.0);
-    for (int c = 0; c < 8; ++c) {
-        const Vec3 corner(c & 1, (c >> 1) & 1, c >> 2);
-        gradient += glm::outerProduct(Vec3(u[corners[static_cast<std::size_t>(c)]]), (2.0 * corner - 1.0) / (4.0 * side));
-    }
-    double sum = 0.0;
-    const Mat3 strain = 0.5 * (gradient + glm::transpose(gradient));
-    for (int i = 0; i < 3; ++i) {
-        sum += glm::dot(strain[i], strain[i]);
-    }
-    return std::sqrt(2.0 / 3.0 * sum);
-}
-
-// The strain that strainedVolume of tissue exceeds, among the cubes of the fine lattice.
+// ReferenceState::strain, among the cubes of the fine lattice.
 double localStrain(const std::vector<Vec3f>& u, const experiments::PositionCells& cells)
 {
     std::vector<double> strains;
     for (const auto& corners : cells.corners) {
-        strains.push_back(equivalentStrain(u, corners, cells.side));
+        std::array<Vec3, 8> at;
+        std::ranges::transform(corners, at.begin(), [&](std::uint32_t c) { return Vec3(u[c]); });
+        strains.push_back(experiments::equivalentStrain(experiments::meanGradient(at, cells.side)));
     }
-    const auto beyond = static_cast<std::size_t>(strainedVolume / std::pow(cells.side, 3.0));
-    if (strains.size() <= beyond) {
-        return 0.0;
-    }
-    const auto at = strains.begin() + static_cast<std::ptrdiff_t>(beyond);
-    std::nth_element(strains.begin(), at, strains.end(), std::greater<>());
-    return *at;
+    return experiments::exceededStrain(std::move(strains), cells.side);
 }
 
 ReferenceState stateOf(const Solver& solver, const experiments::TrialLoad& load, const std::vector<Vec3>& points,
@@ -153,7 +133,7 @@ experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& bo
     for (std::size_t look = 0; look < poses.size(); ++look) {
         experiments::TrialLoad load(problem.path);
         load.set(poses[look]);
-        solver.press({problem.path.start + problem.path.way(poses[look]), problem.path.tool.radius});
+        solver.press({problem.path.at(poses[look]), problem.path.tool.radius});
         out.states.push_back(stateOf(solver, load, points, cells));
         const ReferenceState& state = out.states.back();
         out.peakForce = std::max(out.peakForce, glm::length(state.force));

@@ -224,10 +224,7 @@ Vec3 FactoredTets::force() const
 TrialModel factoredModel(LatticeTets mesh, const TrialPath& path)
 {
     auto tets = std::make_shared<FactoredTets>(std::move(mesh), path);
-    return {[tets](const TrialLoad& load) {
-                const TrialPath& way = load.path();
-                return tets->press(way.start + way.way(load.pose()), way.tool.radius);
-            },
+    return {[tets](const TrialLoad& load) { return tets->press(load.path().at(load.pose()), load.path().tool.radius); },
             [tets](Vec3 rest) { return tets->displacement(rest); }, [tets] { return tets->force(); },
             [tets] { return tets->touched(); }};
 }

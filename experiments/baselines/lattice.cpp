@@ -77,7 +77,7 @@ struct FifoMail {
         // surface lies half a spacing outside its nodes.
         const TrialPath& path = load.path();
         const double depth = load.pose().pressed - path.gap;
-        const Vec3 to = path.start + path.way(load.pose());
+        const Vec3 to = path.at(load.pose());
         const double radius = path.tool.radius + 0.5 * lattice.grid.spacing;
         const std::size_t count = depth > 0.0 ? pressSeeds(lattice, to - depth * path.inward, to, radius, seeds) : 0;
         propagateFifo(lattice, u, scratch, std::span(seeds).first(count));
@@ -195,12 +195,7 @@ TrialModel fifoMailModel(const BaselineScene& scene, double spacing, double shar
                 mail->press(load);
                 return ElasticResult{};
             },
-            [mail](Vec3 rest) {
-                const Lattice& l = mail->lattice;
-                return valueAt(
-                    l.grid, rest, [&](Index3 n) { return l.tissue[l.grid.offset(n)] != 0; },
-                    [&](Index3 n) { return Vec3(mail->u[l.grid.offset(n)]); });
-            },
+            [mail](Vec3 rest) { return displacementIn(mail->lattice, mail->u, rest); },
             {},
             [mail] { return mail->scratch.moved.size(); }};
 }

@@ -261,10 +261,7 @@ Vec3 Xpbd::momentum() const
 TrialModel xpbdModel(LatticeTets mesh, const XpbdOptions& options)
 {
     auto tets = std::make_shared<Xpbd>(std::move(mesh), options);
-    return {[tets](const TrialLoad& load) {
-                const TrialPath& way = load.path();
-                return tets->step(way.start + way.way(load.pose()), way.tool.radius);
-            },
+    return {[tets](const TrialLoad& load) { return tets->step(load.path().at(load.pose()), load.path().tool.radius); },
             [tets](Vec3 rest) { return tets->displacement(rest); }, [tets] { return tets->force(); },
             [tets] { return tets->touched(); }};
 }

@@ -1,6 +1,7 @@
 #include <apps/chart.h>
 #include <apps/chart_axis.h>
 
+#include <tests/error_of.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -20,6 +21,7 @@
 namespace palpate::apps {
 namespace {
 
+using tests::errorOf;
 using tests::Folder;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -50,16 +52,6 @@ std::pair<unsigned, unsigned> sizeOf(const std::string& png)
         return n;
     };
     return {number(16), number(20)};
-}
-
-std::string errorOf(const auto& action)
-{
-    try {
-        action();
-        return "";
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
 }
 
 void expectOneLine(const std::string& error, const std::filesystem::path& file, const std::string& hint)

@@ -3,6 +3,7 @@
 #include <experiments/reference_file.h>
 #include <experiments/trial_errors.h>
 
+#include <tests/error_of.h>
 #include <tests/experiments/small_block.h>
 #include <tests/folder.h>
 
@@ -18,6 +19,8 @@
 
 namespace palpate::experiments {
 namespace {
+
+using tests::errorOf;
 
 // The block under a 10 mm sphere, and a stand-in reference: the same body on a grid of 2 mm, converged.
 struct Pressed {
@@ -65,16 +68,6 @@ TrialModel follower(const Reference& reference, double share)
     };
     model.force = [=] { return share * (*now)->force; };
     return model;
-}
-
-std::string errorOf(const auto& action)
-{
-    try {
-        action();
-        return "";
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
 }
 
 std::string bytesOf(const std::filesystem::path& file)

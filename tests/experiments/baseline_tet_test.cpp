@@ -31,7 +31,7 @@ struct Pressed {
     {
         return latticeTets(*model.tissue, model.surface, spacing, poissonCap);
     }
-    Vec3 centre(TrialPose pose) const { return path.start + path.way(pose); }
+    Vec3 centre(TrialPose pose) const { return path.at(pose); }
     Vec3 centreAt(double depth) const { return centre({path.gap + depth, 0.0}); }
     double radius() const { return path.tool.radius; }
 };
