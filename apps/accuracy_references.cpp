@@ -1,6 +1,6 @@
 #include <apps/accuracy_references.h>
 
-#include <apps/viewer_process.h>
+#include <apps/child_process.h>
 
 #include <fmt/format.h>
 

@@ -45,6 +45,9 @@ void writeChartPng(const Chart& chart, const std::filesystem::path& file);
 /// Writes charts one below the other as one HTML file that needs nothing else and no network: values under the pointer,
 /// series that can be hidden, a region that can be enlarged. Leaves out the same values as writeChartPng(), and throws as
 /// it does.
-void writeChartHtml(std::span<const Chart> charts, const std::string& title, const std::filesystem::path& file);
+///
+/// @param below  HTML below the charts, such as tables; with it there may be no charts
+void writeChartHtml(std::span<const Chart> charts, const std::string& title, const std::filesystem::path& file,
+                    const std::string& below = {});
 
 }  // namespace palpate::apps

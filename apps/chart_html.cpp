@@ -52,9 +52,10 @@ json chartData(const DrawableChart& drawn)
 
 }  // namespace
 
-void writeChartHtml(std::span<const Chart> charts, const std::string& title, const std::filesystem::path& file)
+void writeChartHtml(std::span<const Chart> charts, const std::string& title, const std::filesystem::path& file,
+                    const std::string& below)
 {
-    if (charts.empty()) {
+    if (charts.empty() && below.empty()) {
         throw std::runtime_error(file.string() + ": there is no chart to draw");
     }
     json data = {{"charts", json::object()}};
@@ -68,7 +69,7 @@ void writeChartHtml(std::span<const Chart> charts, const std::string& title, con
     body +=
         "<p class=\"note\">Drag to look closer, click twice to see all; a name in the legend hides its points. The pointer "
         "shows the values of the point below it.</p>";
-    writeWhole(file, page(title, body, data));
+    writeWhole(file, page(title, body + below, data));
 }
 
 }  // namespace palpate::apps

@@ -2,6 +2,7 @@
 
 #include <apps/cmd_bench_costs.h>
 #include <apps/cmd_bench_kernel.h>
+#include <apps/cmd_bench_load.h>
 #include <apps/figures.h>
 #include <apps/outputs.h>
 #include <apps/session.h>
@@ -183,6 +184,7 @@ void addBench(CLI::App& app)
     addBenchQuery(*bench);
     addBenchKernel(*bench);
     addBenchCosts(*bench);
+    addBenchLoad(*bench);
 }
 
 }  // namespace palpate::apps

@@ -28,6 +28,7 @@ struct Options {
     std::string scene;
     std::string error = "3%", forceError, budget = "400us";
     double speed = 20;  // [mm/s]
+    bool all = false;
     std::string costs;
     std::string json;
 };
@@ -56,7 +57,7 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
         out["windows"].push_back(c.elastic.window);
     }
     if (c.tried) {
-        out["predicted_error_pct"] = c.rms;
+        out["predicted_error_pct"] = c.error;
         out["rms_pct"] = c.rms;
         out["near_pct"] = c.near;
         out["force_pct"] = nullptr;
@@ -104,7 +105,7 @@ std::string verdict(const PlanCandidate& c, bool chosen)
 
 void printCandidates(const Plan& plan)
 {
-    fmt::print("{:<52} {:>9} {:>8} {:>8} {:>8} {:>10}\n", "candidate", "nodes", "rms", "near", "force", "predicted");
+    fmt::print("{:<52} {:>9} {:>8} {:>8} {:>10}\n", "candidate", "nodes", "error", "force", "predicted");
     constexpr std::size_t mostUntried = 4;
     std::size_t untried = 0;
     for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
@@ -114,7 +115,7 @@ void printCandidates(const Plan& plan)
             continue;
         }
         const auto percent = [&](double value) { return c.tried ? fmt::format("{:.2f}%", value) : std::string("-"); };
-        fmt::print("{:<52} {:>9} {:>8} {:>8} {:>8} {:>7.0f} us  {}\n", c.name(), c.nodes, percent(c.rms), percent(c.near),
+        fmt::print("{:<52} {:>9} {:>8} {:>8} {:>7.0f} us  {}\n", c.name(), c.nodes, percent(c.error),
                    c.force ? percent(*c.force) : "-", c.microseconds, verdict(c, plan.choice == i));
     }
     if (untried > mostUntried) {
@@ -125,8 +126,8 @@ void printCandidates(const Plan& plan)
 // What a better one would cost, and what the choice does not do.
 void printGivenUp(const Plan& plan, const PlanCandidate& c)
 {
-    fmt::print("gives up: {:.2f} % of the largest displacement (rms over the tissue), {:.2f} % near the tool", c.rms,
-               c.near);
+    fmt::print("gives up: {:.2f} % of the largest displacement near the tool, {:.2f} % over all tissue (rms)", c.error,
+               c.rms);
     if (c.force) {
         fmt::print(", {:.2f} % of the force", *c.force);
     }
@@ -178,6 +179,7 @@ void planScene(const Options& o)
     }
     request.budget = parseTime("--budget", o.budget);
     request.speed = 1e-3 * o.speed;
+    request.all = o.all;
     if (!o.costs.empty()) {
         request.costs = loadCosts(o.costs);
     }
@@ -202,11 +204,11 @@ void planScene(const Options& o)
         const PlanCandidate& c = plan.candidates[plan.nearest];
         throw std::runtime_error(
             fmt::format("{}: no model holds {:g} % in {:g} us; the nearest is {}: {:.2f} % in {:.0f} us", o.scene,
-                        100.0 * request.error, 1e6 * request.budget, c.name(), c.rms, c.microseconds));
+                        100.0 * request.error, 1e6 * request.budget, c.name(), c.error, c.microseconds));
     }
     if (tell) {
         const PlanCandidate& c = plan.candidates[*plan.choice];
-        fmt::print("\n{}: error {:.2f} %, {:.0f} us per tick\n", c.name(), c.rms, c.microseconds);
+        fmt::print("\n{}: error {:.2f} %, {:.0f} us per tick\n", c.name(), c.error, c.microseconds);
         printGivenUp(plan, c);
         printToml(c);
     }
@@ -219,13 +221,16 @@ void addPlan(CLI::App& app)
     auto o = std::make_shared<Options>();
     auto* command = app.add_subcommand("plan", "Pick the cheapest tissue model that holds an error and a time per tick");
     command->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
-    command->add_option("--error", o->error, "Error of the shape (rms) that may not be passed: 3% or 0.03")
+    command
+        ->add_option("--error", o->error,
+                     "Error of the shape within 30 mm of the tool (rms) that may not be passed: 3% or 0.03")
         ->capture_default_str();
     command->add_option("--force-error", o->forceError, "Error of the force that may not be passed either: 5% or 0.05");
     command->add_option("--budget", o->budget, "Time per tick: 400us or 0.4ms")->capture_default_str();
     command->add_option("--speed", o->speed, "Speed of the test push [mm/s]")
         ->check(CLI::Range(1.0, 1000.0))
         ->capture_default_str();
+    command->add_flag("--all", o->all, "Try every model within the budget, to see how much a better one costs");
     command->add_option("--costs", o->costs, "Costs of a tick on this machine: a file of palpate bench costs --json")
         ->check(CLI::ExistingFile);
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)");

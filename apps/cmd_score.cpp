@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <apps/measures.h>
 #include <apps/report.h>
+#include <apps/report_groups.h>
 
 #include <haptics/score.h>
 
@@ -42,27 +43,6 @@ struct Group {
     std::vector<std::size_t> sessions;  // rows of all sessions
 };
 
-// Infinity, the targeting error of a session that never fired, sorts last and is worse than any other.
-double median(std::vector<double> values)
-{
-    std::ranges::sort(values);
-    const std::size_t half = values.size() / 2;
-    return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
-}
-
-// Cliff's delta: how much more often a value of `a` is above one of `b` than below it, -1 to 1. It needs no distribution.
-// Source: N. Cliff, "Dominance statistics: ordinal analyses to answer ordinal questions", Psychological Bulletin 114, 1993.
-double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b)
-{
-    double above = 0;
-    for (const double x : a) {
-        for (const double y : b) {
-            above += x > y ? 1 : x < y ? -1 : 0;
-        }
-    }
-    return above / static_cast<double>(a.size() * b.size());
-}
-
 std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessions)
 {
     const auto known = std::ranges::find(sessions, file, &Session::file);
@@ -91,13 +71,18 @@ Group parseGroup(const std::string& text, std::vector<Session>& sessions)
     return group;
 }
 
+ScoredGroup scored(const Group& group, const std::vector<Session>& sessions)
+{
+    ScoredGroup out{group.name, {}};
+    for (const std::size_t i : group.sessions) {
+        out.scores.push_back(sessions[i].score);
+    }
+    return out;
+}
+
 std::vector<double> valuesOf(const Group& group, const std::vector<Session>& sessions, const Measure& measure)
 {
-    std::vector<double> values;
-    for (const std::size_t i : group.sessions) {
-        values.push_back(measure.value(sessions[i].score));
-    }
-    return values;
+    return apps::valuesOf(scored(group, sessions), measure);
 }
 
 json effectSize(const Group& a, const Group& b, const std::vector<Session>& sessions)
@@ -123,11 +108,18 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
     }
     out["groups"] = json::array();
     for (const Group& g : groups) {
-        json medians;
+        json medians, lower, upper;
         for (const Measure& m : measures()) {
-            medians[m.key] = median(valuesOf(g, sessions, m));
+            const auto values = valuesOf(g, sessions, m);
+            medians[m.key] = quantile(values, 0.5);
+            lower[m.key] = quantile(values, 0.25);
+            upper[m.key] = quantile(values, 0.75);
         }
-        out["groups"].push_back({{"name", g.name}, {"n", g.sessions.size()}, {"median", medians}});
+        out["groups"].push_back({{"name", g.name},
+                                 {"n", g.sessions.size()},
+                                 {"median", medians},
+                                 {"lower_quartile", lower},
+                                 {"upper_quartile", upper}});
     }
     if (groups.size() >= 2) {
         out["effect_size"] = effectSize(groups[0], groups[1], sessions);
@@ -151,14 +143,21 @@ std::string cell(double value, int decimals)
 // Measures down, columns across: one per session or group.
 void printTable(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& columns)
 {
+    std::vector<std::size_t> widths;
+    for (std::size_t c = 0; c < heads.size(); ++c) {
+        widths.push_back(std::max<std::size_t>(heads[c].size(), 8));
+        for (const std::string& value : columns[c]) {
+            widths[c] = std::max(widths[c], value.size());
+        }
+    }
     std::string text = fmt::format("{:<12}", "");
     for (std::size_t c = 0; c < heads.size(); ++c) {
-        text += fmt::format("  {:>{}}", heads[c], std::max<std::size_t>(heads[c].size(), 8));
+        text += fmt::format("  {:>{}}", heads[c], widths[c]);
     }
     for (std::size_t m = 0; m < measures().size(); ++m) {
         text += fmt::format("\n{:<12}", measures()[m].title);
         for (std::size_t c = 0; c < heads.size(); ++c) {
-            text += fmt::format("  {:>{}}", columns[c][m], std::max<std::size_t>(heads[c].size(), 8));
+            text += fmt::format("  {:>{}}", columns[c][m], widths[c]);
         }
     }
     std::printf("%s\n", text.c_str());
@@ -197,10 +196,15 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
         heads.push_back(fmt::format("{} (n={})", g.name, g.sessions.size()));
         columns.emplace_back();
         for (const Measure& m : measures()) {
-            columns.back().push_back(cell(median(valuesOf(g, sessions, m)), m.decimals + (m.decimals == 0 ? 1 : 0)));
+            const auto values = valuesOf(g, sessions, m);
+            const int decimals = m.decimals + (m.decimals == 0 ? 1 : 0);
+            columns.back().push_back(fmt::format("{} ({} to {})", cell(quantile(values, 0.5), decimals),
+                                                 cell(quantile(values, 0.25), decimals),
+                                                 cell(quantile(values, 0.75), decimals)));
         }
     }
-    std::printf("\nMedians%s\n", groups.size() > 1 ? ", and Cliff's delta of one group over another (-1 to 1)" : "");
+    std::printf("\nMedians (quartiles)%s\n",
+                groups.size() > 1 ? ", and Cliff's delta of one group over another (-1 to 1)" : "");
     for (std::size_t a = 0; a < groups.size(); ++a) {
         for (std::size_t b = a + 1; b < groups.size(); ++b) {
             heads.push_back(groups[a].name + " over " + groups[b].name);
@@ -228,10 +232,18 @@ void run(const Options& options)
         throw std::runtime_error("score: give at least one record, or --group NAME=FILE,FILE");
     }
     if (!options.report.empty()) {
-        if (sessions.size() != 1) {
-            throw std::runtime_error(options.report.string() + ": a report is of one record; give one file with --report");
+        if (!groups.empty()) {
+            std::vector<ScoredGroup> all;
+            for (const Group& g : groups) {
+                all.push_back(scored(g, sessions));
+            }
+            writeGroupReport(options.report, all);
+        } else if (sessions.size() == 1) {
+            writeReport(options.report, haptics::Record(sessions[0].file), options.pictures);
+        } else {
+            throw std::runtime_error(options.report.string() +
+                                     ": a report is of one record or of groups: give one file, or --group NAME=FILE,FILE");
         }
-        writeReport(options.report, haptics::Record(sessions[0].file), options.pictures);
     }
     if (!options.json.empty()) {
         writeJson(options.json, figures(sessions, groups));
@@ -254,7 +266,7 @@ void addScore(CLI::App& app)
     score->add_option("--group", options->groups, "a group to compare: NAME=FILE,FILE; give the option once per group")
         ->allow_extra_args(false);
     score->add_option("--json", options->json, "write the figures here (- for standard output)");
-    score->add_option("--report", options->report, "write an HTML report of the one record here");
+    score->add_option("--report", options->report, "write an HTML report of the one record, or of the groups, here");
     score->add_option("--pictures", options->pictures, "put the PNG files of this folder into the report");
     score->callback([options] { run(*options); });
 }

@@ -1,14 +1,18 @@
 #include <apps/command.h>
 
+#include <apps/child_process.h>
+#include <apps/faults.h>
 #include <apps/figures.h>
 #include <apps/measures.h>
 #include <apps/outputs.h>
 #include <apps/report.h>
 #include <apps/session.h>
 #include <apps/trainer.h>
-#include <apps/viewer_process.h>
+
+#include <haptics/trainee.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -16,11 +20,13 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace palpate::apps {
 
@@ -33,14 +39,21 @@ constexpr double picturesTimeout = 60.0;    // after the end of a session [s]
 
 struct Options {
     std::string scene = "breast";
+    bool sceneGiven = false;
     SceneChanges changes;
     std::string device = "hand";
+    std::string trainee;
+    std::string task, lesionFrom;
+    double lesionDiameter = 10;  // [mm]
+    bool sphere = false;
     bool view = false;
     bool noView = false;
     bool unpaced = false;
     double seconds = 0;
     std::string session;
     std::string record, report, json, pictures;
+    std::vector<std::string> inject;
+    Faults faults;  // what `inject` says
 };
 
 nlohmann::json coreFigures(const TrainResult& result, const haptics::SessionInfo& info)
@@ -56,6 +69,7 @@ nlohmann::json coreFigures(const TrainResult& result, const haptics::SessionInfo
         cores.push_back({{"fraction", fraction},
                          {"target_fraction", core.targetFraction},
                          {"length_in_lesion_mm", 1e3 * core.targetLength},
+                         {"fragments", core.fragments},
                          {"volume_mm3", 1e9 * core.volume}});
     }
     return cores;
@@ -72,6 +86,7 @@ nlohmann::json figuresOf(const TrainResult& result, const haptics::SessionInfo& 
     figures["punctures"] = result.punctures;
     figures["peak_force_n"] = {
         {"basic", result.peakBasic}, {"additional", result.peakAdditional}, {"total", result.peakTotal}};
+    figures["energy_mj"] = {{"made", 1e3 * result.energyMade}, {"damped", 1e3 * result.energyDamped}};
     nlohmann::json nearest = nlohmann::json::object();
     for (std::size_t i = 0; i < info.structures.size(); ++i) {
         nearest[info.structures[i]] = 1e3 * result.nearest[i];
@@ -86,19 +101,30 @@ nlohmann::json figuresOf(const TrainResult& result, const haptics::SessionInfo& 
     return figures;
 }
 
+std::string missesInWords(const haptics::ServoTiming& timing)
+{
+    if (timing.missed == 0) {
+        return "";
+    }
+    return fmt::format(" in {} gaps of up to {} ms ({} ticks took over 1 ms)", timing.gaps, timing.longestGap,
+                       timing.overruns);
+}
+
 void summarise(const TrainResult& result, const haptics::SessionInfo& info)
 {
     const auto tick = result.timing.work.percentiles();
     const auto late = result.timing.lateness.percentiles();
     fmt::print(
-        "{} ticks, {} missed; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
-        result.timing.ticks, result.timing.missed, 1e6 * tick.p50, 1e6 * tick.p99, 1e6 * late.p50, 1e6 * late.p99);
+        "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
+        result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
+        1e6 * late.p50, 1e6 * late.p99);
     fmt::print("peak force {:.2f} N (tissue {:.2f} N, guidance {:.2f} N)\n", result.peakTotal, result.peakBasic,
                result.peakAdditional);
     for (std::size_t i = 0; i < result.cores.size(); ++i) {
         const auto& core = result.cores[i];
-        fmt::print("core {}: {:.0f} % {}, {:.1f} mm of it in the {}\n", i + 1, 100.0 * core.targetFraction,
-                   info.structures[0], 1e3 * core.targetLength, info.structures[0]);
+        fmt::print("core {}: {:.0f} % {}, {:.1f} mm of it in the {}; {}\n", i + 1, 100.0 * core.targetFraction,
+                   info.structures[0], 1e3 * core.targetLength, info.structures[0],
+                   core.fragments == 1 ? "in one piece" : fmt::format("in {} pieces", core.fragments));
     }
     for (const auto& [label, value] : haptics::describe(result.score)) {
         fmt::print("  {:<28} {}\n", label, value);
@@ -124,6 +150,50 @@ fs::path recordFile(const Options& o)
     return o.report.empty() ? fs::path() : fs::path(o.report).replace_extension(".db");
 }
 
+std::string deviceInWords(const Options& o)
+{
+    return o.trainee.empty() ? o.device : fmt::format("{} (seed {})", o.trainee, o.changes.seed.value_or(1));
+}
+
+// What would strike nothing would show nothing.
+void checkFaults(const Options& o)
+{
+    const auto need = [&](std::initializer_list<FaultKind> kinds, bool there, const char* hint) {
+        for (const FaultKind kind : kinds) {
+            if (has(o.faults, kind) && !there) {
+                throw std::runtime_error(fmt::format("--inject: {}", hint));
+            }
+        }
+    };
+    need({FaultKind::gap, FaultKind::late}, !o.unpaced, "gap and late strike the clock: leave out --unpaced");
+    need({FaultKind::stallViewer}, wantsWindow(o) || !o.pictures.empty(),
+         "stall-viewer stops the viewers that the session starts: add --view or --pictures");
+    need({FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
+}
+
+// The tasks are built-in scenes; that of the scene itself goes with any.
+const std::vector<std::string> tasks{"core-biopsy", "near-vessel", "behind-rib", "find-lump"};
+
+void applyTask(Options& o)
+{
+    const bool ownScene = o.task == "near-vessel" || o.task == "behind-rib";
+    if (ownScene && o.sceneGiven) {
+        throw std::runtime_error(fmt::format("--task {}: has a scene of its own: leave out {}", o.task, o.scene));
+    }
+    if (ownScene || (o.task == "find-lump" && !o.sceneGiven)) {
+        o.scene = o.task;
+    }
+    o.changes.palpate = o.changes.palpate || (o.task == "find-lump" && o.sceneGiven);
+    o.changes.seedElsewhere = !o.trainee.empty() || o.changes.palpate || !o.lesionFrom.empty() || o.scene == "find-lump";
+    if (!o.lesionFrom.empty()) {
+        datasets::Insert lesion;
+        lesion.diameter = o.lesionDiameter * 1e-3;
+        lesion.spiculated = !o.sphere;
+        lesion.seed = o.changes.seed.value_or(1);
+        o.changes.lesion = LesionFrom{o.lesionFrom, lesion};
+    }
+}
+
 // Everything that would fail at the end of a session for a reason that is there at its beginning.
 void checkOutputs(const Options& o)
 {
@@ -142,16 +212,20 @@ void checkOutputs(const Options& o)
 }
 
 struct Viewers {
-    std::optional<ViewerProcess> window, camera;
+    std::optional<ChildProcess> window, camera;
 };
 
 void startViewers(const Options& o, const std::string& session, Viewers& viewers)
 {
+    const std::string program = programFolder() / "palpate-view";
+    const std::string remedy = "build it with -DPALPATE_VIEWER=ON, or run with --no-view";
+    std::vector<std::string> arguments{"--session", session, "--wait", "30"};
     if (wantsWindow(o)) {
-        viewers.window.emplace(std::vector<std::string>{"--session", session, "--wait", "30"});
+        viewers.window.emplace(program, arguments, remedy);
     }
     if (!o.pictures.empty()) {
-        viewers.camera.emplace(std::vector<std::string>{"--session", session, "--wait", "30", "--offscreen", o.pictures});
+        arguments.insert(arguments.end(), {"--offscreen", o.pictures});
+        viewers.camera.emplace(program, arguments, remedy);
     }
 }
 
@@ -180,16 +254,40 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& v
     }
 }
 
-void train(const Options& o)
+void train(Options o)
 {
+    for (const auto& text : o.inject) {
+        const auto faults = parseFaults(text);
+        o.faults.insert(o.faults.end(), faults.begin(), faults.end());
+    }
+    if (!o.trainee.empty() && o.device != "hand") {
+        throw std::runtime_error("--trainee " + o.trainee + ": needs --device hand; a record brings its own hand");
+    }
+    checkFaults(o);
     checkOutputs(o);
     const auto record = recordFile(o);
+    applyTask(o);
     const auto model = openSession(o.scene, o.changes);
-    const auto info = describeSession(model, o.scene, o.device);
-    const TrainOptions options{o.device, sessionName(o), record, {!o.unpaced, o.seconds}};
+    const auto info = describeSession(model, o.scene, deviceInWords(o));
+    Viewers viewers;
+    const auto stall = [&viewers](bool stopped) {
+        for (auto* viewer : {&viewers.window, &viewers.camera}) {
+            if (*viewer) {
+                (*viewer)->stall(stopped);
+            }
+        }
+    };
+    TrainOptions options;
+    options.device = o.device;
+    options.trainee = o.trainee;
+    options.seed = o.changes.seed.value_or(1);
+    options.session = sessionName(o);
+    options.record = record;
+    options.servo = {!o.unpaced, o.seconds};
+    options.faults = o.faults;
+    options.stallViewers = stall;
 
     // Before the record is made, so that a viewer that cannot be started leaves none.
-    Viewers viewers;
     startViewers(o, options.session, viewers);
     Trainer trainer(model, info, options);
     TrainResult result = trainer.run();
@@ -227,17 +325,38 @@ void addTrain(CLI::App& app)
 {
     auto o = std::make_shared<Options>();
     auto* c = app.add_subcommand("train", "Perform a procedure: a built-in scene, a scene file or a volume");
-    c->add_option("SCENE", o->scene, "breast, layered, block, plate, pair; a scene (.toml) or a volume (.vdb)")
+    auto* scene =
+        c->add_option("SCENE", o->scene,
+                      fmt::format("{}; a scene (.toml) or a volume (.vdb)", fmt::join(datasets::builtInScenes(), ", ")))
+            ->capture_default_str();
+    c->add_option(
+         "--task", o->task,
+         "core-biopsy: of the scene's target; near-vessel, behind-rib: biopsies with scenes of their own; find-lump: "
+         "palpation, where is it and how large")
+        ->check(CLI::IsMember(tasks));
+    c->add_flag("--palpate", o->changes.palpate, "Find the scene's target with a fingertip");
+    c->add_option("--lesion-from", o->lesionFrom,
+                  "Put a lesion into the volume at one of the places of this file (.loc of a VICTRE phantom), by --seed");
+    c->add_option("--lesion-mm", o->lesionDiameter, "Its diameter [mm]")
+        ->check(CLI::Range(2.0, 50.0))
         ->capture_default_str();
+    c->add_flag("--lesion-sphere", o->sphere, "A ball instead of lobes and spikes");
     c->add_option("--device", o->device, "hand (a scripted trainee), or a record (.db) whose poses are played")
         ->capture_default_str();
+    c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
+        ->check(CLI::IsMember(haptics::skillNames()));
     c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
     c->add_option("--setting", o->changes.setting, "How fine level elastic is")
         ->check(CLI::IsMember(datasets::elasticSettings()));
-    c->add_option("--dffb", o->changes.dffb, "Differential force feedback")
-        ->check(CLI::IsMember({"off", "thesis", "field"}));
+    c->add_option("--arm", o->changes.arm, "Haptic device that the stabiliser reckons with and the hand holds")
+        ->check(CLI::IsMember(haptics::deviceNames()));
+    c->add_option("--dffb", o->changes.dffb, "Differential force feedback; fade: its gain falls over the session or trials")
+        ->check(CLI::IsMember(dffbChoices));
+    c->add_option("--trial", o->changes.trial,
+                  "With --dffb fade: K/N, trial K of N; all guidance in the first, none in the last");
     c->add_option("--target", o->changes.target, "Structure to sample");
-    c->add_option("--seed", o->changes.seed, "Every random choice of a phantom")->check(CLI::NonNegativeNumber);
+    c->add_option("--seed", o->changes.seed, "Every random choice: of a phantom, and of a --trainee")
+        ->check(CLI::NonNegativeNumber);
     c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);
@@ -246,8 +365,15 @@ void addTrain(CLI::App& app)
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
     c->add_option("--report", o->report, "Write a report (HTML) to this file");
     c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder")->excludes(unpaced);
+    c->add_option("--inject", o->inject,
+                  "Let something go wrong at a session time: gap=50ms@2s, late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, "
+                  "unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s; several separated by commas")
+        ->take_all();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
-    c->final_callback([o] { train(*o); });
+    c->final_callback([o, scene] {
+        o->sceneGiven = scene->count() > 0;
+        train(*o);
+    });
 }
 
 }  // namespace palpate::apps

@@ -1,5 +1,7 @@
 #include <apps/figures.h>
 
+#include <haptics/simulation.h>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -22,6 +24,9 @@ nlohmann::json timingFigures(const haptics::ServoTiming& timing)
     }
     return {{"ticks", timing.ticks},
             {"missed_ticks", timing.missed},
+            {"overruns", timing.overruns},
+            {"gaps", timing.gaps},
+            {"longest_gap_ms", 1e3 * haptics::tickSeconds * static_cast<double>(timing.longestGap)},
             {"lateness_us", microseconds(timing.lateness.percentiles())},
             {"tick_us", microseconds(timing.work.percentiles())},
             {"tasks_us", tasks}};

@@ -1,4 +1,5 @@
 #include <apps/cmd_accuracy.h>
+#include <apps/cmd_stability.h>
 #include <apps/command.h>
 
 #include <CLI/CLI.hpp>
@@ -31,6 +32,7 @@ int main(int argc, char** argv)
     addPlan(app);
     addBench(app);
     addAccuracy(app);
+    addStability(app);
 
     try {
         app.parse(argc, argv);

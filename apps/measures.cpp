@@ -10,7 +10,7 @@ namespace {
 
 using haptics::Score;
 
-constexpr std::array<Measure, 17> all{{
+constexpr std::array<Measure, 22> all{{
     {"total", "total", 0, [](const Score& s) { return s.total; }},
     {"passes", "passes", 0, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", 1, [](const Score& s) { return s.targetingError * 1e3; }},
@@ -26,8 +26,13 @@ constexpr std::array<Measure, 17> all{{
     {"path_mm", "path mm", 0, [](const Score& s) { return s.pathLength * 1e3; }},
     {"inserted_path_mm", "inside mm", 0, [](const Score& s) { return s.insertedPath * 1e3; }},
     {"deepest_mm", "deepest mm", 1, [](const Score& s) { return s.deepest * 1e3; }},
+    {"jerk_m_s3", "jerk m/s3", 1, [](const Score& s) { return s.jerk; }},
+    {"tissue_work_mj", "work mJ", 0, [](const Score& s) { return s.tissueWork * 1e3; }},
     {"peak_force_n", "peak N", 2, [](const Score& s) { return s.peakForce; }},
     {"mean_force_n", "mean N", 2, [](const Score& s) { return s.meanForce; }},
+    {"marks", "marks", 0, [](const Score& s) { return static_cast<double>(s.marks); }},
+    {"mark_error_mm", "mark mm", 1, [](const Score& s) { return s.markError * 1e3; }},
+    {"mark_size_error_mm", "size mm", 1, [](const Score& s) { return s.markSizeError * 1e3; }},
 }};
 
 }  // namespace

@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <optional>
+#include <initializer_list>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 
 namespace palpate::apps {
@@ -27,7 +26,28 @@ std::optional<std::pair<double, std::string_view>> split(std::string_view text)
     return std::pair(number, unit);
 }
 
+std::optional<double> scaled(std::string_view text, std::initializer_list<std::pair<std::string_view, double>> units)
+{
+    const auto parts = split(text);
+    for (const auto& [unit, scale] : units) {
+        if (parts && parts->second == unit) {
+            return scale * parts->first;
+        }
+    }
+    return std::nullopt;
+}
+
 }  // namespace
+
+std::optional<double> timeOf(std::string_view text)
+{
+    return scaled(text, {{"us", 1e-6}, {"ms", 1e-3}, {"s", 1.0}});
+}
+
+std::optional<double> lengthOf(std::string_view text)
+{
+    return scaled(text, {{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}});
+}
 
 double parseShare(const std::string& option, const std::string& text)
 {
@@ -43,14 +63,9 @@ double parseShare(const std::string& option, const std::string& text)
 
 double parseTime(const std::string& option, const std::string& text)
 {
-    const auto parts = split(text);
-    double seconds = 0.0;
-    if (parts) {
-        const double scale = parts->second == "us" ? 1e-6 : parts->second == "ms" ? 1e-3 : parts->second == "s" ? 1.0 : 0.0;
-        seconds = scale * parts->first;
-    }
-    if (seconds > 0.0 && seconds <= 1.0) {
-        return seconds;
+    const auto seconds = timeOf(text);
+    if (seconds && *seconds > 0.0 && *seconds <= 1.0) {
+        return *seconds;
     }
     throw std::runtime_error(fmt::format("{}: {}: must be over 0 and up to 1 s, as 400us or 0.4ms", option, text));
 }

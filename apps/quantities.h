@@ -1,8 +1,16 @@
 #pragma once
 
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace palpate::apps {
+
+/// "400us", "0.4ms" or "0.0004s" in seconds; nothing for anything else.
+std::optional<double> timeOf(std::string_view text);
+
+/// "100mm", "10cm" or "0.1m" in metres; nothing for anything else.
+std::optional<double> lengthOf(std::string_view text);
 
 /// "3%" or "0.03" as a share, over 0 and under 1. Throws std::runtime_error that names the option.
 double parseShare(const std::string& option, const std::string& text);

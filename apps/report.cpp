@@ -3,6 +3,7 @@
 #include <apps/outputs.h>
 #include <apps/report_data.h>
 #include <apps/report_html.h>
+#include <apps/report_path.h>
 
 #include <nlohmann/json.hpp>
 
@@ -136,6 +137,19 @@ json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
             {"series", series}};
 }
 
+// As distanceChart(), by the length inside.
+json nearestChart(const ReportData& d, const haptics::SessionInfo& info)
+{
+    json chart = distanceChart(d, info);
+    chart["columns"] = columnsOf(d.nearest);
+    chart["x"] = axis("inserted", "mm");
+    chart["y"] = axis("least distance", "mm");
+    chart.erase("sync");
+    chart.erase("events");
+    chart["series"].erase(0);
+    return chart;
+}
+
 std::string base64(std::string_view bytes)
 {
     constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -204,9 +218,12 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
         events.push_back(
             {{"seconds", e.seconds}, {"kind", haptics::name(e.event.kind)}, {"label", eventLabel(e.event, info)}});
     }
-    const json data = {
-        {"events", events},
-        {"charts", {{"forces", forceChart(d, cap)}, {"depth", depthChart(d, cap)}, {"distances", distanceChart(d, info)}}}};
+    const json data = {{"events", events},
+                       {"charts",
+                        {{"forces", forceChart(d, cap)},
+                         {"depth", depthChart(d, cap)},
+                         {"distances", distanceChart(d, info)},
+                         {"nearest", nearestChart(d, info)}}}};
 
     std::string out = header(d, record) + scoreCard(d.score) + coresCard(d, info);
     out +=
@@ -220,8 +237,10 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
     if (d.profile.depth.size() > 1) {
         out += chartCard("depth", "Force against depth",
                          "Total force by the length of the shaft inside, in bins of half a millimetre.");
+        out += chartCard("nearest", "Distances against depth",
+                         "The least distance from the tip to target and vital structures at each length inside.");
     }
-    out += picturesCard(pictures) + eventsCard(d, info) + timingCard(d, record) + sessionCard(record);
+    out += pathCard(d, info) + picturesCard(pictures) + eventsCard(d, info) + timingCard(d, record) + sessionCard(record);
     return page(info.scene + " - Palpate session", out, data);
 }
 

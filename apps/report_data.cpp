@@ -13,6 +13,7 @@ namespace {
 constexpr std::size_t pointsPerChart = 4000;
 constexpr double depthBin = 0.5;          // [mm]
 constexpr double directionLength = 0.25;  // a change of direction shorter than this is noise [mm]
+constexpr double pathStep = 0.5;          // [mm]
 constexpr std::size_t markedEvents = 200;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
@@ -107,6 +108,8 @@ struct Collector {
         }
         distances.add(row);
         profile.add(r.inserted * 1e3, total);
+        addNearest(r);
+        addPath(r);
         float sum = 0;
         for (std::size_t i = 0; i < haptics::taskCount; ++i) {
             tasks[i].push_back(r.seconds[i]);
@@ -126,8 +129,51 @@ struct Collector {
         ++data.ticks;
     }
 
+    void addNearest(const haptics::TickRecord& r)
+    {
+        const double depth = r.inserted * 1e3;
+        if (!(depth > 0 && depth < 1000)) {
+            return;
+        }
+        const auto bin = static_cast<std::size_t>(depth / depthBin);
+        nearest.resize(std::max(nearest.size(), bin + 1), std::vector<double>(structures, nothing));
+        for (std::size_t i = 0; i < structures; ++i) {
+            double& least = nearest[bin][i];
+            least = least < r.distance[i] * 1e3 ? least : r.distance[i] * 1e3;
+        }
+    }
+
+    void addPath(const haptics::TickRecord& r)
+    {
+        const PathPoint point{r.device.position * 1e3, r.phase == haptics::Phase::inserted};
+        if (data.path.empty() || data.path.back().inside != point.inside ||
+            glm::distance(data.path.back().tip, point.tip) > pathStep) {
+            data.path.push_back(point);
+        }
+        const bool down = (r.device.buttons & haptics::buttonMark) != 0;
+        if (down && !markDown) {
+            data.marks.push_back(point.tip);
+        }
+        markDown = down;
+    }
+
+    // Bins as columns.
+    std::vector<std::vector<double>> nearestColumns() const
+    {
+        std::vector<std::vector<double>> columns(1 + structures);
+        for (std::size_t bin = 0; bin < nearest.size(); ++bin) {
+            columns[0].push_back((static_cast<double>(bin) + 0.5) * depthBin);
+            for (std::size_t i = 0; i < structures; ++i) {
+                columns[1 + i].push_back(nearest[bin][i]);
+            }
+        }
+        return columns;
+    }
+
     double rate;
     std::size_t structures;
+    bool markDown = false;
+    std::vector<std::vector<double>> nearest;  // by bin, then structure [mm]
     haptics::Scorer scorer;
     Decimator forces, distances;
     std::vector<double> row;
@@ -212,6 +258,7 @@ ReportData collect(const haptics::Record& record)
     c.data.forces = c.forces.finish();
     c.data.distances = c.distances.finish();
     c.data.profile = c.profile.finish();
+    c.data.nearest = c.nearestColumns();
     for (std::size_t i = 0; i < haptics::taskCount; ++i) {
         c.data.tasks[i] = percentiles(c.tasks[i]);
     }

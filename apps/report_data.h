@@ -42,6 +42,12 @@ struct DepthProfile {
     std::vector<double> in, peak, out;  // [N]
 };
 
+/// A point of the tip's path.
+struct PathPoint {
+    Vec3 tip{0.0};  // patient frame [mm]
+    bool inside = false;
+};
+
 struct MarkedEvent {
     double seconds = 0;
     haptics::Event event;
@@ -64,6 +70,10 @@ struct ReportData {
     std::vector<std::vector<double>> forces;     // seconds; basic, additional, total [N]
     std::vector<std::vector<double>> distances;  // seconds; inserted depth, then each structure [mm]
     DepthProfile profile;
+    std::vector<std::vector<double>>
+        nearest;                      // by bin of the profile: its depth, then the least distance to each structure [mm]
+    std::vector<PathPoint> path;      // thinned out to steps of half a millimetre
+    std::vector<Vec3> marks;          // where the trainee marked something [mm]
     std::vector<MarkedEvent> events;  // the first 200
     std::uint64_t eventCount = 0;
     std::vector<Core> cores;

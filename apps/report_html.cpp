@@ -66,6 +66,10 @@ std::string outcome(const ReportData& d, const haptics::Record& record)
     std::string text;
     if (s.skinContacts == 0) {
         text = "The tool never touched the body.";
+    } else if (s.marks > 0) {
+        text = fmt::format(
+            "The trainee made {}; their middle lies {:.1f} mm beside the target's, and the size is {:.1f} mm off.",
+            plural(s.marks, "mark", "marks"), s.markError * 1e3, s.markSizeError * 1e3);
     } else if (s.passes == 0) {
         text = "The gun was not fired, so there is no core to judge.";
     } else {
@@ -278,6 +282,7 @@ std::string eventLabel(const haptics::Event& e, const haptics::SessionInfo& info
         case EventKind::puncture:
             return fmt::format("{} at {:.2f} N", nameOf(info.tissues, e.tissue), e.value);
         case EventKind::warning:
+        case EventKind::veryNear:
             return fmt::format("{} {:.1f} mm", structure, e.value * 1e3);
         case EventKind::vitalTouch:
             return fmt::format("{} touched", structure);

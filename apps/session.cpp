@@ -1,13 +1,16 @@
 #include <apps/session.h>
 
+#include <datasets/insert.h>
 #include <datasets/scene_text.h>
 #include <haptics/replay.h>
+#include <haptics/score.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cassert>
+#include <cstdio>
 #include <memory>
 #include <stdexcept>
 
@@ -16,6 +19,47 @@ namespace palpate::apps {
 namespace {
 
 using datasets::Scene;
+
+// The share of guidance in trial K of N: all in the first, none in the last.
+double gainOfTrial(const std::string& trial)
+{
+    int k = 0, n = 0, read = 0;
+    const bool two = std::sscanf(trial.c_str(), "%5d/%5d%n", &k, &n, &read) == 2;
+    if (!two || static_cast<std::size_t>(read) != trial.size() || n < 2 || k < 1 || k > n) {
+        throw std::runtime_error(
+            fmt::format("--trial {}: must be K/N, trial K of N, with N 2 or more and K from 1 to N", trial));
+    }
+    return static_cast<double>(n - k) / (n - 1);
+}
+
+void changeDffb(datasets::DffbParameters& dffb, const std::string& choice, const std::optional<std::string>& trial)
+{
+    using datasets::DffbMode;
+    if (choice == "off" || choice == "thesis") {
+        dffb.mode = choice == "off" ? DffbMode::off : DffbMode::thesis;
+    } else if (choice == "field" || dffb.mode == DffbMode::off) {
+        dffb.mode = DffbMode::field;
+    }
+    if (choice == "fade" && trial) {
+        dffb.gain *= gainOfTrial(*trial);
+        dffb.fade = 0.0;
+    } else if (choice == "fade" && dffb.fade <= 0.0) {
+        dffb.fade = fadeSeconds;
+    }
+}
+
+// A fingertip looks for the target instead of a needle.
+void palpated(Scene& scene)
+{
+    scene.task = datasets::SessionTask::find;
+    scene.dffb.mode = datasets::DffbMode::off;
+    scene.script.clear();
+    if (scene.tool.kind == datasets::ToolKind::needle) {
+        scene.tool.kind = datasets::ToolKind::capsule;
+        scene.tool.radius = 6e-3;
+        scene.tool.length = 30e-3;
+    }
+}
 
 void change(Scene& scene, const SceneChanges& changes)
 {
@@ -28,10 +72,18 @@ void change(Scene& scene, const SceneChanges& changes)
         scene.model.setting = *changes.setting;
         scene.model.elastic = datasets::elasticSetting(*changes.setting, scene.model.elastic);
     }
+    if (changes.trial && changes.dffb != "fade") {
+        throw std::runtime_error("--trial: says how far a study's guidance has faded: add --dffb fade");
+    }
     if (changes.dffb) {
-        scene.dffb.mode = *changes.dffb == "off"      ? datasets::DffbMode::off
-                          : *changes.dffb == "thesis" ? datasets::DffbMode::thesis
-                                                      : datasets::DffbMode::field;
+        changeDffb(scene.dffb, *changes.dffb, changes.trial);
+    }
+    if (changes.arm) {
+        scene.device = *changes.arm;
+    }
+    scene.source.inserts.insert(scene.source.inserts.end(), changes.inserts.begin(), changes.inserts.end());
+    if (changes.palpate) {
+        palpated(scene);
     }
     if (changes.target) {
         scene.target = *changes.target;
@@ -51,7 +103,8 @@ std::string_view levelOf(const Scene& scene)
 
 bool anyOf(const SceneChanges& c)
 {
-    return c.model || c.setting || c.dffb || c.target || c.seed || c.voxelsPerSide;
+    return c.model || c.setting || c.arm || c.dffb || c.trial || c.target || c.seed || c.voxelsPerSide || c.palpate ||
+           !c.inserts.empty();
 }
 
 // The text must stay the scene: a replay is built from it.
@@ -60,9 +113,10 @@ Scene changed(Scene scene, const SceneChanges& changes, const std::string& origi
     if (!anyOf(changes)) {
         return scene;
     }
-    if (!scene.source.file.empty() && (changes.seed || changes.voxelsPerSide)) {
+    const bool idleSeed = changes.seed && !changes.seedElsewhere;
+    if (!scene.source.file.empty() && (idleSeed || changes.voxelsPerSide)) {
         throw std::runtime_error(
-            fmt::format("{}: the volume is no phantom: {} changes nothing", origin, changes.seed ? "--seed" : "--voxels"));
+            fmt::format("{}: the volume is no phantom: {} changes nothing", origin, idleSeed ? "--seed" : "--voxels"));
     }
     change(scene, changes);
     if (changes.setting && scene.model.level != datasets::ModelLevel::elastic) {
@@ -87,13 +141,34 @@ volume::Tissue loadVolume(const std::filesystem::path& file)
     return volume::Tissue::load(file);
 }
 
-haptics::SessionModel openSession(const std::string& what, const SceneChanges& changes)
+namespace {
+
+// The volume with the lesion of --lesion-from in it, which becomes the target where no other is asked for.
+volume::Tissue withLesion(volume::Tissue tissue, SceneChanges& changes)
+{
+    if (!changes.lesion) {
+        return tissue;
+    }
+    changes.inserts.push_back(datasets::placeLesion(tissue, changes.lesion->from, changes.lesion->shape));
+    changes.target = changes.target.value_or(changes.lesion->shape.name);
+    return datasets::withInserts(tissue, changes.inserts);
+}
+
+}  // namespace
+
+haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
 {
     const std::filesystem::path path(what);
     if (path.extension() == ".vdb") {
-        auto tissue = std::make_shared<const volume::Tissue>(loadVolume(path));
+        auto alone = loadVolume(path);
+        auto tissue = std::make_shared<const volume::Tissue>(withLesion(std::move(alone), changes));
         auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
         return haptics::buildModel(std::move(scene), std::move(tissue));
+    }
+    if (changes.lesion) {
+        throw std::runtime_error(
+            fmt::format("{}: --lesion-from {}: needs the phantom's volume (.vdb) for SCENE; `palpate import` makes it",
+                        what, changes.lesion->from.string()));
     }
     auto builtIn = datasets::builtInScene(what);
     if (!builtIn && std::filesystem::is_directory(path)) {
@@ -133,6 +208,7 @@ haptics::SessionInfo describeSession(const haptics::SessionModel& model, const s
     info.device = device;
     info.build = PALPATE_BUILD;
     info.seed = model.scene.source.phantom.seed;
+    info.extra.emplace_back(haptics::targetShapeKey, haptics::toText(haptics::shapeOfTarget(model)));
     for (const auto& s : model.structures) {
         info.structures.push_back(s.name);
         info.warnDistances.push_back(s.warnDistance);

@@ -2,7 +2,9 @@
 
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
+#include <haptics/palpator.h>
 #include <haptics/simulation.h>
+#include <haptics/trainee.h>
 #include <render/channel/channel.h>
 
 #include <fmt/format.h>
@@ -18,6 +20,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 
 namespace palpate::apps {
@@ -60,12 +63,42 @@ private:
     }, terminate_{};
 };
 
-std::unique_ptr<Device> openDevice(const std::string& name, const SessionModel& model)
+void checkTool(const TrainOptions& options, const datasets::Scene& scene)
 {
-    if (name != "hand") {
-        return std::make_unique<ReplayDevice>(Record(name));
+    const bool needle = scene.tool.kind == datasets::ToolKind::needle;
+    if (needle && scene.task == datasets::SessionTask::find) {
+        throw std::runtime_error(scene.name +
+                                 ": task \"find\" with a needle: give [tool] kind = \"capsule\" or \"sphere\"");
     }
-    return std::make_unique<HandDevice>(handBefore(model, startDistance));
+    if (!needle && scene.task == datasets::SessionTask::biopsy && !options.trainee.empty()) {
+        throw std::runtime_error(
+            fmt::format("{}: --trainee {} takes a biopsy and the tool is no needle: choose another scene, or add --palpate",
+                        scene.name, options.trainee));
+    }
+}
+
+std::unique_ptr<Device> openDevice(const TrainOptions& options, const SessionModel& model)
+{
+    checkTool(options, model.scene);
+    std::unique_ptr<Device> device;
+    if (options.device != "hand") {
+        device = std::make_unique<ReplayDevice>(Record(options.device));
+    } else if (model.scene.task == datasets::SessionTask::find) {
+        const std::string& who = options.trainee.empty() ? "expert" : options.trainee;
+        device = std::make_unique<Palpator>(model, skillCalled(who), options.seed, startDistance);
+    } else if (!options.trainee.empty()) {
+        device = std::make_unique<Trainee>(model, skillCalled(options.trainee), options.seed, startDistance);
+    } else {
+        device = std::make_unique<HandDevice>(handBefore(model, startDistance));
+    }
+    return options.faults.empty() ? std::move(device) : std::make_unique<FaultyDevice>(std::move(device), options.faults);
+}
+
+void sleepThroughGap(const Faults& faults, std::uint64_t tick) noexcept
+{
+    if (const double seconds = gapAfter(faults, tick); seconds > 0.0) {
+        std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    }
 }
 
 // One line on the terminal that tells how the session goes, read as a viewer reads it.
@@ -100,6 +133,8 @@ struct Tally {
         result.peakBasic = std::max(result.peakBasic, glm::length(r.basic));
         result.peakAdditional = std::max(result.peakAdditional, glm::length(r.additional));
         result.peakTotal = std::max(result.peakTotal, glm::length(r.total));
+        result.energyMade = std::max(result.energyMade, r.energy);
+        result.energyDamped = r.damped;
         for (std::size_t i = 0; i < maxStructures; ++i) {
             result.nearest[i] = std::min(result.nearest[i], r.distance[i]);
         }
@@ -123,10 +158,13 @@ struct Tally {
 
 struct Trainer::Impl {
     Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
-        : options(o), device(openDevice(o.device, model)), simulation(model), broadcast(o.session, model), tally(info)
+        : options(o), device(openDevice(o, model)), simulation(model), broadcast(o.session, model), tally(info)
     {
         if (!o.record.empty()) {
             recorder.emplace(o.record, info);
+        }
+        if (has(o.faults, FaultKind::stallViewer) || has(o.faults, FaultKind::diskFull)) {
+            around.emplace(o.faults, o.record, o.stallViewers);
         }
     }
 
@@ -146,6 +184,10 @@ struct Trainer::Impl {
                 }
             }
             broadcast.publish(record, timing, simulation);
+            if (around) {
+                around->tell(record.tick);
+            }
+            sleepThroughGap(options.faults, record.tick);
         };
         tally.result.timing = runServo(*device, simulation, options.servo, sink, interrupted);
         broadcast.finish();
@@ -158,7 +200,11 @@ struct Trainer::Impl {
         if (recorder) {
             const auto late = result.timing.lateness.percentiles();
             const auto work = result.timing.work.percentiles();
-            recorder->finish({{"missed_ticks", fmt::format("{}", result.timing.missed)},
+            const auto& timing = result.timing;
+            recorder->finish({{"missed_ticks", fmt::format("{}", timing.missed)},
+                              {"overruns", fmt::format("{}", timing.overruns)},
+                              {"gaps", fmt::format("{}", timing.gaps)},
+                              {"longest_gap_ms", fmt::format("{}", timing.longestGap)},
                               {"tick_us_p50", fmt::format("{:.2f}", 1e6 * work.p50)},
                               {"tick_us_p99", fmt::format("{:.2f}", 1e6 * work.p99)},
                               {"lateness_us_p50", fmt::format("{:.2f}", 1e6 * late.p50)},
@@ -182,6 +228,7 @@ struct Trainer::Impl {
     Simulation simulation;
     Broadcast broadcast;
     std::optional<Recorder> recorder;
+    std::optional<FaultsAround> around;
     Tally tally;
 };
 
@@ -211,6 +258,9 @@ TrainResult Trainer::run()
     TrainResult result = std::move(impl_->tally.result);
     result.warnings = warnings;
     impl_->conclude(result);
+    // The record is closed before a disk that is full on purpose has room again.
+    impl_->recorder.reset();
+    impl_->around.reset();
     return result;
 }
 

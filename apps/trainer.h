@@ -1,5 +1,6 @@
 #pragma once
 
+#include <apps/faults.h>
 #include <haptics/recorder.h>
 #include <haptics/replay.h>
 #include <haptics/score.h>
@@ -8,6 +9,7 @@
 
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -16,9 +18,13 @@ namespace palpate::apps {
 
 struct TrainOptions {
     std::string device = "hand";   // or the file of a record
+    std::string trainee;           // whose hand it is, see haptics/trainee.h; empty: one that follows the scene's script
+    std::uint64_t seed = 1;        // of the trainee's errors
     std::string session;           // name for viewers
     std::filesystem::path record;  // empty: none
     haptics::ServoOptions servo;
+    Faults faults;                           // on purpose
+    std::function<void(bool)> stallViewers;  // stops them (true) or lets them go on; called from a thread of its own
 };
 
 /// What a session came to.
@@ -29,6 +35,7 @@ struct TrainResult {
     std::array<double, haptics::maxStructures> nearest{};  // least distance to each structure [m]
     std::uint64_t contacts = 0, punctures = 0;
     double peakBasic = 0, peakAdditional = 0, peakTotal = 0;  // [N]
+    double energyMade = 0, energyDamped = 0;  // most that the hand was ever given net; taken by the controller [J]
     std::uint64_t forceHash = 0;
     std::uint64_t lostRecords = 0;
     std::vector<std::string> warnings;

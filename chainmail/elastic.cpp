@@ -17,6 +17,7 @@ constexpr double drift = 0.25;         // spacings that a tool may move until th
 constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
 constexpr int newtonSteps = 3;         // of a line search: contacts open and close along it
 constexpr int mostShortenings = 8;     // of a step that raises the energy
+constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
 constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew
 constexpr double rounding = 1e-6;      // relative: sums of single-precision products are no better
 
@@ -395,7 +396,8 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, int cycles, double fir
         stack_.clear(Field::e);
     }
     hasIncrement_ = options_.goOn;
-    for (int i = 0; i < cycles; ++i) {
+    const int most = cycles + (result.moved ? moreAfterMove : 0);
+    for (int i = 0; i < most; ++i) {
         refreshResidual();
         const double tolerance = i == 0 ? first : further;
         if (tolerance > 0.0) {

@@ -16,6 +16,7 @@ namespace {
 
 constexpr int fewestNodes = 9;        // the coarsest level has at most as many along each side
 constexpr float leastTissue = 0.01F;  // cells with less of a typical stiffness are empty
+constexpr float wholly = 0.98F;       // share of a cell that is held: bone, but for the rounding of samples
 constexpr int powerSteps = 30;
 constexpr double onItsBack = 0.05;  // share of the body's depth that is fixed when nothing else is
 constexpr int pointsPerEdge = 2;    // surface points sit in sub-cells of half the spacing
@@ -24,6 +25,7 @@ struct Moduli {
     double mu = 0;
     double bulk = 0;
     double stiffening = 0;
+    double held = 0;  // share of the tissue
 };
 
 int coarseNodes(int fine)
@@ -45,22 +47,46 @@ Index3 paddedNodes(Index3 cells, int& levels)
 
 // Energy and not volume decides: under the same strain cells side by side add their stiffness, under the same stress they
 // add their compliance, and a block of eight is between the two. The geometric mean of both bounds keeps thin stiff layers
-// stiff and thin gaps soft. Sources: W. Voigt 1889 and A. Reuss 1929 (bounds); the mean as in docs/decisions.md, 8.
-double between(double sum, double inverse, int filled)
-{
-    if (filled == 0) {
-        return 0.0;
+// stiff and thin gaps soft. What is held in space gives way in neither: it leaves less of the block to be strained, and the
+// rest of it by as much more. Sources: W. Voigt 1889 and A. Reuss 1929 (bounds); the mean as in docs/decisions.md, 8.
+class BlockMean {
+public:
+    /// @param held  share of the cell's tissue that is held
+    void add(double modulus, double held)
+    {
+        ++filled_;
+        whole_ += modulus;
+        const double free = 1.0 - held;
+        if (free > 1.0 - static_cast<double>(wholly)) {
+            free_ += free;
+            sum_ += free * free * modulus;
+            inverse_ += 1.0 / modulus;
+        }
     }
-    const double arithmetic = sum / filled;
-    const double harmonic = filled / inverse;
-    return std::sqrt(arithmetic * harmonic) * filled / 8.0;
-}
+    double modulus() const
+    {
+        if (filled_ == 0) {
+            return 0.0;
+        }
+        const double share = filled_ / 8.0;
+        return free_ > 0.0 ? std::sqrt(sum_ / inverse_) * filled_ / free_ * share : whole_ / filled_ * share;
+    }
+
+private:
+    int filled_ = 0;
+    double whole_ = 0.0;
+    double free_ = 0.0;  // cells
+    double sum_ = 0.0;   // of moduli without what is held, by share
+    double inverse_ = 0.0;
+};
 
 class Coarsening {
 public:
-    explicit Coarsening(const CellLevel& fine) : fine_(fine) {}
+    /// @param held  share of each cell's tissue that is held
+    Coarsening(const CellLevel& fine, const std::vector<float>& held) : fine_(fine), held_(held) {}
 
-    CellLevel level() const
+    /// And the shares of its own cells.
+    CellLevel level(std::vector<float>& held) const
     {
         CellLevel coarse;
         const auto& g = fine_.nodes;
@@ -70,12 +96,14 @@ public:
         coarse.lambda.assign(count, 0.0F);
         coarse.stiffening.assign(count, 0.0F);
         coarse.fixed.assign(count, 0);
+        held.assign(count, 0.0F);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 2, [&](Index3 c) {
             const Moduli m = upscaled(2 * c);
             const std::size_t at = coarse.nodes.offset(c);
             coarse.mu[at] = static_cast<float>(m.mu);
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
             coarse.stiffening[at] = static_cast<float>(m.stiffening);
+            held[at] = static_cast<float>(m.held);
         });
         volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
                              [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = mostlyFixed(2 * n) ? 1 : 0; });
@@ -102,27 +130,45 @@ private:
 
     Moduli upscaled(Index3 low) const
     {
-        double mu = 0.0, inverseMu = 0.0, bulk = 0.0, inverseBulk = 0.0;
-        double stiffening = 0.0;
+        BlockMean mu, bulk;
+        Moduli mean;
         int filled = 0;
         volume::forEachIndex(low, low + 1, [&](Index3 c) {
             const std::size_t at = fine_.nodes.offset(c);
             const double m = static_cast<double>(fine_.mu[at]);
             if (m > 0.0) {
-                const double k = static_cast<double>(fine_.lambda[at]) + 2.0 / 3.0 * m;
-                mu += m;
-                inverseMu += 1.0 / m;
-                bulk += k;
-                inverseBulk += 1.0 / k;
-                stiffening += static_cast<double>(fine_.stiffening[at]);
+                const double held = static_cast<double>(held_[at]);
+                mu.add(m, held);
+                bulk.add(static_cast<double>(fine_.lambda[at]) + 2.0 / 3.0 * m, held);
+                mean.stiffening += static_cast<double>(fine_.stiffening[at]);
+                mean.held += held;
                 ++filled;
             }
         });
-        return {between(mu, inverseMu, filled), between(bulk, inverseBulk, filled), stiffening / std::max(filled, 1)};
+        const int cells = std::max(filled, 1);
+        return {mu.modulus(), bulk.modulus(), mean.stiffening / cells, mean.held / cells};
     }
 
     const CellLevel& fine_;
+    const std::vector<float>& held_;
 };
+
+// Nodes around which half of the tissue is held: where the surface of bone runs through cells, those on its side of it.
+void fixMostlyHeld(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, CellLevel& level)
+{
+    volume::forEachIndex(Index3(0), cells.size, [&](Index3 n) {
+        float held = 0.0F;
+        float filled = 0.0F;
+        volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, cells.size - 1), [&](Index3 c) {
+            const auto& m = materials[cells.offset(c)];
+            held += m.fixed;
+            filled += m.youngsModulus > leastTissue ? 1.0F : 0.0F;
+        });
+        if (held > 0.0F && held >= 0.5F * wholly * filled) {
+            level.fixed[level.nodes.offset(n)] = 1;
+        }
+    });
+}
 
 CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, double poissonCap,
                  Index3 size)
@@ -144,11 +190,22 @@ CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMa
         level.mu[at] = static_cast<float>(e / (2.0 * (1.0 + nu)));
         level.lambda[at] = static_cast<float>(e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
         level.stiffening[at] = m.stiffening;
-        if (m.fixed >= 0.5F) {
+        if (m.fixed >= wholly) {
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
         }
     });
+    fixMostlyHeld(cells, materials, level);
     return level;
+}
+
+// Share of each cell's tissue that is held.
+std::vector<float> heldShares(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
+                              const CellLevel& level)
+{
+    std::vector<float> held(level.nodes.count(), 0.0F);
+    volume::forEachIndex(Index3(0), cells.size - 1,
+                         [&](Index3 c) { held[level.nodes.offset(c)] = materials[cells.offset(c)].fixed; });
+    return held;
 }
 
 void layOnItsBack(CellLevel& level)
@@ -295,8 +352,11 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     }
     addSurface(cells, surface, body);
     addDiagonal(body.levels.front());
+    std::vector<float> held = heldShares(cells, materials, body.levels.front());
     while (static_cast<int>(body.levels.size()) < levels) {
-        body.levels.push_back(Coarsening(body.levels.back()).level());
+        std::vector<float> coarser;
+        body.levels.push_back(Coarsening(body.levels.back(), held).level(coarser));
+        held = std::move(coarser);
         addDiagonal(body.levels.back());
     }
     for (auto& level : body.levels) {

@@ -14,8 +14,8 @@ namespace palpate::chainmail {
 struct ElasticTool {
     occupancy::RoundCone shape;  // where it is now [m]
     Vec3 carried{0.0};           // about how far it has carried the tissue that it touches [m]: where to look for contacts
-    double stiffest = 1000;      // of the whole contact [N/m]: a rigid body is not rendered stiffer
-    double friction = 0;         // Coulomb [-]
+    double stiffest = 1e4;  // of the whole contact [N/m], bone is no stiffer: the force on a hand is held by the stabiliser
+    double friction = 0;    // Coulomb [-]
 };
 
 /// A material point that is held by springs: by a needle's tip, or along its shaft.

@@ -98,7 +98,7 @@ double ElasticLevel::tieStiffnessAt(Vec3 rest) const noexcept
     return tieStiffness * youngsModulusOf(mu) * level.nodes.spacing;
 }
 
-// The tip holds its point in all directions, the shaft the tissue around it sideways only.
+// The tip holds its point in all directions, and so does the shaft the tissue that it carries along.
 ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
 {
     // At the surface the cell around the point may be half empty: the tie holds the tissue just under it.
@@ -114,7 +114,8 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
         const double back = inserted * (static_cast<double>(i) + 1.0) / (static_cast<double>(pieces) + 1.0);
         const Vec3 at = glm::mix(grip.proxy, grip.entry, back / inserted);
         const Vec3 way = grip.position - back * grip.axis - at;
-        ties_[count++] = {at, way - glm::dot(way, grip.axis) * grip.axis, grip.axis, 0.0, tieStiffnessAt(at)};
+        const double held = tieStiffnessAt(at);
+        ties_[count++] = {at, way + (grip.drag - glm::dot(way, grip.axis)) * grip.axis, grip.axis, held, held};
     }
     return {{}, std::span(ties_).first(count), focusAt(surface_, grip.proxy)};
 }

@@ -25,6 +25,7 @@ struct Grip {
     bool inside = false;         // that point is inside the tissue
     Vec3 entry{0.0};             // where the shaft went in, at rest [m]
     Vec3 axis{0, 1, 0};          // along the tool, towards its tip
+    double drag = 0;             // how far a shaft carries the tissue around it along `axis` [m]
     double friction = 0;         // of a tool that presses (Coulomb) [-]
 };
 

@@ -10,7 +10,8 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr int slack = 4;  // nodes that a window may be off before it moves; even, so that coarse nodes stay nodes
+constexpr double leastRoom = 1.5;  // cells between focus and border, under which a window moves sooner
+constexpr int slack = 4;           // nodes that a window may be off before it moves; even, so that coarse nodes stay nodes
 
 // A window is as deep as asked for and half as wide again: what a tool moves spreads along the surface. Along x it is as
 // wide as whole vectors allow at about the same cost.
@@ -86,14 +87,26 @@ void WindowStack::place() noexcept
     }
 }
 
+double WindowStack::roomAround(std::size_t level, Index3 low, const Focus& focus) const noexcept
+{
+    const auto& grid = body_->levels[level].nodes;
+    const Vec3 at = (focus.point - grid.origin) / grid.spacing - Vec3(low);
+    const Vec3 room = glm::min(at, Vec3(windows_[level].size() - 1) - at);
+    return std::min({room.x, room.y, room.z});
+}
+
 bool WindowStack::follow(const Focus& focus, bool carry) noexcept
 {
     bool moves = false;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         oldLow_[l] = low_[l];
-        const Index3 off = glm::abs(wantedLow(l, focus) - low_[l]);
-        if (std::max({off.x, off.y, off.z}) > slack) {
-            low_[l] = wantedLow(l, focus);
+        const Index3 wanted = wantedLow(l, focus);
+        const Index3 off = glm::abs(wanted - low_[l]);
+        // Little lies outside of the surface: along a slope a contact would soon leave through that side.
+        const double room = roomAround(l, low_[l], focus);
+        const bool leaves = room < leastRoom && roomAround(l, wanted, focus) > room + 0.5;
+        if (leaves || std::max({off.x, off.y, off.z}) > slack) {
+            low_[l] = wanted;
             moves = true;
         }
     }

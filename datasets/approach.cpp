@@ -286,14 +286,6 @@ double halfNotch(const ToolSpec& tool)
     return tool.kind == ToolKind::needle ? tool.notchLength / 2 : 0.0;
 }
 
-// How deep the tip goes by hand, so that the fired notch's middle is at the aim, `length` deep: the tip then stands half a
-// notch beyond it. A shallow aim is missed rather than fired at from outside.
-double tipDepth(const ToolSpec& tool, double length)
-{
-    const double depth = length + halfNotch(tool) - throwOf(tool);
-    return tool.kind == ToolKind::needle ? std::max(leastInside, depth) : depth;
-}
-
 // The way into `aim` along -`direction`, if there is one.
 std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const Tissue::Reader& reader, Vec3 aim,
                               Vec3 direction)
@@ -306,7 +298,7 @@ std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const T
         return std::nullopt;
     }
     const double length = glm::length(*entry - aim);
-    const double fired = tipDepth(scene.tool, length) + throwOf(scene.tool);
+    const double fired = firingDepth(scene.tool, length) + throwOf(scene.tool);
     const double room = clearance(s, reader, *entry, *entry - (fired + beyondTip) * direction) - scene.tool.radius;
     const double offCentre = std::max(0.0, fired - (length + halfNotch(scene.tool)));
     return Line{{*entry, aim}, room, length + 3.0 * (std::max(0.0, comfort - room) + offCentre)};
@@ -363,6 +355,13 @@ Approach planApproach(const Scene& scene, const Tissue& tissue)
         scene.name, scene.target, clearances[std::size(clearances) - 1] * 1e3, lines.size()));
 }
 
+// The tip then stands half a notch beyond the aim. A shallow aim is missed rather than fired at from outside.
+double firingDepth(const ToolSpec& tool, double length) noexcept
+{
+    const double depth = length + halfNotch(tool) - throwOf(tool);
+    return tool.kind == ToolKind::needle ? std::max(leastInside, depth) : depth;
+}
+
 std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach)
 {
     if (!scene.script.empty()) {
@@ -371,7 +370,7 @@ std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& appro
     using Kind = TraineeStep::Kind;
     const double length = glm::length(approach.aim - approach.entry);
     const Vec3 inward = length > 0 ? (approach.aim - approach.entry) / length : Vec3(0, 1, 0);
-    const double depth = tipDepth(scene.tool, length);
+    const double depth = firingDepth(scene.tool, length);
     const Vec3 away = approach.entry - startDistance * inward;
     std::vector<TraineeStep> script{
         {.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 4, .tolerance = 1e-3},

@@ -26,6 +26,8 @@ struct ToolSpec {
     double notchLength = 0.020;   // [m]
     double notchRadius = 0.8e-3;  // inner radius of the notch [m]
     double tipLength = 4e-3;      // of the needle's conical tip [m]
+    double bevel = 0;             // angle of a bevelled tip that bends the needle [rad]; 0 = symmetric, stays straight
+    double bevelTurn = 0;         // about the needle: which way it bends [rad]
 };
 
 /// A mass, damper and spring with a magnitude: one term of equation 3 of the thesis and its share of equations 6-8.
@@ -45,6 +47,8 @@ struct DffbParameters {
     double floorDistance = 2e-3;                 // distance in equation 4 never falls below this [m]
     double range = 15e-3;                        // `field`: no proximity force beyond this distance [m]
     double budget = 3.0;                         // `field`: most additional force in all [N]
+    double gain = 1.0;                           // of all of it
+    double fade = 0;                             // over which the gain falls to 0 from the session's start [s]; 0 = never
 };
 
 /// One row of the lookup table of vital structures, in the order of the procedure.
@@ -97,11 +101,26 @@ struct TraineeStep {
     double tolerance = 1e-3;  // the step is done when the tip is this near [m]
 };
 
+/// Something put into a volume, over what was there: a lesion, a vessel, a rib.
+struct Insert {
+    std::string name = "lesion";            // of the structure
+    std::string tissue = "idc_high_grade";  // a row of the volume's tissue table
+    Vec3 centre{0.0};                       // patient frame [m]
+    std::optional<Vec3> to;                 // the other end of a rod with round ends [m]; nothing: a ball
+    double diameter = 8e-3;                 // [m]
+    bool spiculated = false;                // a ball with lobes and thin spikes, of the same volume
+    std::uint64_t seed = 1;                 // of lobes and spikes
+};
+
 /// Where the volume of a scene comes from: a file, or a phantom when `file` is empty.
 struct VolumeSource {
     std::filesystem::path file;
     PhantomSpec phantom;
+    std::vector<Insert> inserts;  // one after the other
 };
+
+/// What the trainee is asked for: a core of the target, or where it is and how large (palpation).
+enum class SessionTask : std::uint8_t { biopsy, find };
 
 /// Everything that a session needs, checked. Lengths in the patient frame, SI.
 struct Scene {
@@ -109,6 +128,7 @@ struct Scene {
     std::string text;  // the TOML it was read from; parsing it again gives this scene (replay relies on it)
     VolumeSource source;
     std::string tissues;  // tissue table file; empty = built-in
+    SessionTask task = SessionTask::biopsy;
     ToolSpec tool;
     ModelSettings model;
     DffbParameters dffb;
@@ -117,6 +137,7 @@ struct Scene {
     std::optional<Vec3> entry;        // where the needle shall enter [m]; nothing = chosen by planApproach()
     std::optional<Vec3> aim;          // the point to reach [m]; nothing = inside the target structure
     double forceCap = 8.5;            // [N]
+    std::string device = "premium";   // the haptic device that the stabiliser reckons with, see haptics/arm.h
     std::vector<TraineeStep> script;  // empty = the standard biopsy along entry and aim
 };
 
@@ -145,6 +166,9 @@ struct Approach {
 /// keeps away from vital structures, bone and fixed tissue, and is long enough for the notch to be centred on the aim.
 /// The surface near the image's border is a cut and no place to enter. Throws std::runtime_error when there is none.
 Approach planApproach(const Scene& scene, const volume::Tissue& tissue);
+
+/// How deep the tip goes by hand, so that the fired notch's middle is at an aim `length` deep [m].
+double firingDepth(const ToolSpec& tool, double length) noexcept;
 
 /// The scene's script, or the standard biopsy: approach, press, puncture, advance short of the target, fire, withdraw.
 std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach);

@@ -5,27 +5,33 @@
 
 #include <array>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 
 namespace palpate::datasets {
 
 namespace {
 
-constexpr double farthest = 5000;        // of a coordinate from the origin [mm]
+constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
+constexpr double degree = std::numbers::pi / 180.0;
 constexpr std::size_t mostSteps = 1000;  // of a script
 
 constexpr std::array<std::string_view, 3> toolKinds{"sphere", "needle", "capsule"};
+constexpr std::array<std::string_view, 2> taskNames{"biopsy", "find"};
+constexpr std::size_t mostInserts = 32;
 constexpr std::array<std::string_view, 3> dffbModes{"off", "thesis", "field"};
 constexpr std::array<std::string_view, 2> strains{"small", "finite"};
 constexpr std::array<std::string_view, 5> stepKinds{"move", "press", "fire", "wait", "pierce"};
 
-constexpr std::array<Field<ToolSpec>, 6> toolFields{{
+constexpr std::array<Field<ToolSpec>, 8> toolFields{{
     {"radius_mm", "mm", 0.1, 30, 1e-3, &ToolSpec::radius},
     {"length_mm", "mm", 10, 500, 1e-3, &ToolSpec::length},
     {"throw_mm", "mm", 0, 50, 1e-3, &ToolSpec::throwLength},
     {"notch_mm", "mm", 1, 50, 1e-3, &ToolSpec::notchLength},
     {"notch_radius_mm", "mm", 0.05, 10, 1e-3, &ToolSpec::notchRadius},
     {"tip_mm", "mm", 0.1, 50, 1e-3, &ToolSpec::tipLength},
+    {"bevel_deg", "deg", 0, 80, degree, &ToolSpec::bevel},
+    {"bevel_turn_deg", "deg", -360, 360, degree, &ToolSpec::bevelTurn},
 }};
 
 constexpr std::array<Field<ModelSettings>, 3> modelFields{{
@@ -43,10 +49,12 @@ constexpr std::array<Field<ElasticSettings>, 6> elasticFields{{
     {"friction", "", 0, 5, 1, &ElasticSettings::friction},
 }};
 
-constexpr std::array<Field<DffbParameters>, 3> dffbFields{{
+constexpr std::array<Field<DffbParameters>, 5> dffbFields{{
     {"floor_mm", "mm", 0.1, 50, 1e-3, &DffbParameters::floorDistance},
     {"range_mm", "mm", 0, 100, 1e-3, &DffbParameters::range},
     {"budget_n", "N", 0, 50, 1, &DffbParameters::budget},
+    {"gain", "", 0, 1, 1, &DffbParameters::gain},
+    {"fade_s", "s", 0, 86400, 1, &DffbParameters::fade},
 }};
 
 constexpr std::array<Field<ForceTerm>, 4> termFields{{
@@ -69,6 +77,13 @@ constexpr std::array<Field<VitalStructure>, 3> vitalFields{{
     {"name", "", 0, 0, 1, &VitalStructure::name},
     {"gain", "", 0, 100, 1, &VitalStructure::gain},
     {"warn_mm", "mm", 0, 100, 1e-3, &VitalStructure::warnDistance},
+}};
+
+constexpr std::array<Field<Insert>, 4> insertFields{{
+    {"name", "", 0, 0, 1, &Insert::name},
+    {"tissue", "", 0, 0, 1, &Insert::tissue},
+    {"diameter_mm", "mm", 0.2, 100, 1e-3, &Insert::diameter},
+    {"spiculated", "", 0, 0, 1, &Insert::spiculated},
 }};
 
 constexpr std::array<Field<TraineeStep>, 3> stepFields{{
@@ -225,6 +240,31 @@ void readVital(Section& top, std::vector<VitalStructure>& vital)
     }
 }
 
+void readInserts(Section& top, std::vector<Insert>& inserts)
+{
+    for (Section& section : top.sections("insert")) {
+        Insert insert;
+        readFields<Insert>(section, insertFields, insert, Need::some);
+        if (const auto centre = section.point("centre_mm", farthest)) {
+            insert.centre = *centre;
+        } else {
+            section.missing("centre_mm", "where it is: [x, y, z] in mm");
+        }
+        insert.to = section.point("to_mm", farthest);
+        if (insert.spiculated && insert.to) {
+            section.refuse("spiculated", "a rod has no spikes: leave out to_mm");
+        }
+        if (const auto seed = section.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max())) {
+            insert.seed = static_cast<std::uint64_t>(*seed);
+        }
+        section.finish();
+        inserts.push_back(std::move(insert));
+        if (inserts.size() > mostInserts) {
+            section.refuse("name", fmt::format("over {} inserts", mostInserts));
+        }
+    }
+}
+
 void readScript(Section& top, std::vector<TraineeStep>& script)
 {
     for (Section& section : top.sections("script")) {
@@ -299,6 +339,13 @@ std::string modelText(const ModelSettings& model)
     return out;
 }
 
+std::string insertText(const Insert& insert)
+{
+    return fmt::format("\n[[insert]]\n{}centre_mm = {}\n{}seed = {}\n", writeFields<Insert>(insertFields, insert),
+                       millimetres(insert.centre), insert.to ? "to_mm = " + millimetres(*insert.to) + "\n" : "",
+                       insert.seed);
+}
+
 std::string stepText(const TraineeStep& step)
 {
     const bool moves = step.kind != TraineeStep::Kind::fire && step.kind != TraineeStep::Kind::wait;
@@ -316,6 +363,8 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     scene.text = text;
     scene.name = top.word("name").value_or(origin.stem().string());
     readVolume(top, origin, scene.source);
+    readInserts(top, scene.source.inserts);
+    readChoice(top, "task", taskNames, scene.task);
     const auto tissues = top.word("tissues");
     if (tissues && !scene.source.file.empty()) {
         top.refuse("tissues", "a volume file holds its tissues; give the table to `palpate import --tissues`");
@@ -327,6 +376,7 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     readTarget(top, scene);
     if (std::optional<Section> safety = top.section("safety")) {
         scene.forceCap = safety->number("cap_n", "N", 0.1, 50).value_or(scene.forceCap);
+        scene.device = safety->word("device").value_or(scene.device);
         safety->finish();
     }
     readScript(top, scene.script);
@@ -351,7 +401,7 @@ Scene loadScene(const std::filesystem::path& file)
 
 std::vector<std::string> builtInScenes()
 {
-    return {"breast", "layered", "block", "plate", "pair"};
+    return {"breast", "near-vessel", "behind-rib", "find-lump", "layered", "block", "plate", "pair"};
 }
 
 std::optional<Scene> builtInScene(const std::string& name)
@@ -366,9 +416,13 @@ std::string sceneText(const Scene& scene)
     if (!scene.tissues.empty()) {
         out += fmt::format("tissues = {}\n", tomlString(scene.tissues));
     }
+    out += fmt::format("task = \"{}\"\n", taskNames[static_cast<std::size_t>(scene.task)]);
     out += "\n[volume]\n";
     out += scene.source.file.empty() ? phantomText(scene.source.phantom)
                                      : fmt::format("file = {}\n", tomlString(scene.source.file.string()));
+    for (const Insert& insert : scene.source.inserts) {
+        out += insertText(insert);
+    }
     out += fmt::format("\n[tool]\nkind = \"{}\"\n{}", toolKinds[static_cast<std::size_t>(scene.tool.kind)],
                        writeFields<ToolSpec>(toolFields, scene.tool));
     out += modelText(scene.model);
@@ -384,7 +438,7 @@ std::string sceneText(const Scene& scene)
     out += scene.target.empty() ? "" : fmt::format("structure = {}\n", tomlString(scene.target));
     out += scene.entry ? fmt::format("entry_mm = {}\n", millimetres(*scene.entry)) : "";
     out += scene.aim ? fmt::format("aim_mm = {}\n", millimetres(*scene.aim)) : "";
-    out += fmt::format("\n[safety]\ncap_n = {:.12g}\n", scene.forceCap);
+    out += fmt::format("\n[safety]\ncap_n = {:.12g}\ndevice = {}\n", scene.forceCap, tomlString(scene.device));
     for (const TraineeStep& step : scene.script) {
         out += stepText(step);
     }

@@ -1,3 +1,4 @@
+#include <datasets/insert.h>
 #include <datasets/scene.h>
 #include <datasets/scene_text.h>
 #include <datasets/tables.h>
@@ -9,6 +10,7 @@
 #include <array>
 #include <cctype>
 #include <stdexcept>
+#include <utility>
 
 namespace palpate::datasets {
 
@@ -107,7 +109,9 @@ Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, co
     return parseScene(sceneText(scene), file);
 }
 
-Tissue sceneVolume(const Scene& scene)
+namespace {
+
+Tissue volumeAlone(const Scene& scene)
 {
     if (scene.source.file.empty()) {
         return makePhantom(scene.source.phantom, scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues));
@@ -116,6 +120,14 @@ Tissue sceneVolume(const Scene& scene)
         throw std::runtime_error(scene.source.file.string() + ": not a .vdb volume: convert it with `palpate import`");
     }
     return Tissue::load(scene.source.file);
+}
+
+}  // namespace
+
+Tissue sceneVolume(const Scene& scene)
+{
+    Tissue tissue = volumeAlone(scene);
+    return scene.source.inserts.empty() ? std::move(tissue) : withInserts(tissue, scene.source.inserts);
 }
 
 }  // namespace palpate::datasets

@@ -19,8 +19,12 @@ using volume::TissueTable;
 constexpr std::size_t mostTissues = 64;  // what a sample of tissue has room for
 constexpr double softest = 0.01;         // [kPa]; anything that is not air resists
 
-// The only one that may be left out: tissue stiffens where somebody measured it.
-constexpr std::array<Field<TissueRow>, 1> stiffeningField{{{"stiffening", "", 0, 1000, 1, &TissueRow::stiffening}}};
+// These may be left out: they are there where somebody measured them.
+constexpr std::array<Field<TissueRow>, 3> measuredFields{{
+    {"stiffening", "", 0, 1000, 1, &TissueRow::stiffening},
+    {"stiction_n_per_m", "N/m", 0, 10000, 1, &TissueRow::stictionPerMetre},
+    {"friction_ns_m2", "N s/m2", 0, 10000, 1, &TissueRow::frictionDamping},
+}};
 
 constexpr std::array<Field<TissueRow>, 12> tissueFields{{
     {"youngs_kpa", "kPa", 0, 2e7, 1e3, &TissueRow::youngsModulus},
@@ -78,7 +82,7 @@ TissueRow readTissue(Section& section)
     row.role = readRole(section);
     row.colour = readColour(section);
     readFields<TissueRow>(section, tissueFields, row, Need::all);
-    readFields<TissueRow>(section, stiffeningField, row, Need::some);
+    readFields<TissueRow>(section, measuredFields, row, Need::some);
     section.finish();
     if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
         section.refuse("youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest), "kPa");

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <map>
 
@@ -92,7 +93,7 @@ private:
     // The one to try next; nothing when the rest cannot be cheaper than the best so far, or is over the budget for certain.
     std::optional<std::size_t> mayBeCheapest() const
     {
-        const auto best = cheapest();
+        const auto best = request_.all ? std::nullopt : cheapest();
         double bound = best ? plan_.candidates[*best].microseconds : 1e6 * request_.budget;
         std::optional<std::size_t> next;
         for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
@@ -213,6 +214,7 @@ private:
         c.microseconds = predictedTime(c, request_.costs);
         c.rms = spreadOf(result.looks, &TrialErrors::rms).worst;
         c.near = spreadOf(result.looks, &TrialErrors::near).worst;
+        c.error = std::hypot(c.near, referenceError);
         if (c.level == ModelLevel::elastic) {
             c.force = spreadOf(result.looks, &TrialErrors::force).worst;
         }
@@ -224,7 +226,7 @@ private:
     double overError(const PlanCandidate& c) const
     {
         const double force = request_.forceError ? c.force.value_or(0.0) / (100.0 * *request_.forceError) : 0.0;
-        return std::max(c.rms / (100.0 * request_.error), force);
+        return std::max(c.error / (100.0 * request_.error), force);
     }
 
     void findNearest()

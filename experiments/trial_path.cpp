@@ -21,7 +21,6 @@ constexpr double tipDepth = 1e-3;   // of a needle's tip at the start [m]
 constexpr double shaftLength = 20e-3;
 constexpr double tieSpacing = 4e-3;   // along the shaft [m]
 constexpr double tieStiffness = 8.0;  // in E h
-constexpr double stiffest = 1000.0;   // of a rendered contact [N/m]
 constexpr int looks = 4;              // in press and drag each
 constexpr int turnLooks[] = {5, 20};  // ticks after the turn
 constexpr int restTicks = 50;
@@ -132,7 +131,6 @@ std::vector<TrialTick> schedule(const TrialPath& path, double speed)
 
 TrialLoad::TrialLoad(const TrialPath& path) : path_(path), ties_(path.ties)
 {
-    tool_.stiffest = stiffest;
     if (ties_.empty()) {
         load_.tools = {&tool_, 1};
     }

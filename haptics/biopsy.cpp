@@ -1,5 +1,6 @@
 #include <haptics/biopsy.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -21,10 +22,59 @@ Frame frameAcross(Vec3 axis) noexcept
     return {right, glm::cross(axis, right)};
 }
 
+// The holes around one slice of the notch, so that its samples need not look at all.
+struct HolesNear {
+    static constexpr std::size_t most = 32;
+    std::array<const Channel*, most> hole{};
+    std::size_t count = 0;
+
+    HolesNear(const Cuts& cuts, Vec3 middle, double radius) noexcept
+    {
+        for (const Channel& c : cuts.cores.all()) {
+            const Vec3 w = middle - c.from;
+            const double place = glm::dot(w, c.along), reach = radius + c.radius;
+            const bool near = place > -reach && place < c.length + reach && glm::dot(w, w) - place * place < reach * reach;
+            if (near && count < most) {
+                hole[count++] = &c;
+            }
+        }
+    }
+    bool contain(Vec3 p) const noexcept
+    {
+        return std::any_of(hole.begin(), hole.begin() + static_cast<std::ptrdiff_t>(count),
+                           [&](const Channel* c) { return c->contains(p); });
+    }
+};
+
+// Counts the pieces of a core, slice by slice along its axis.
+struct Pieces {
+    double slice = 0;  // length [m]
+    double modulus = 0;
+    double run = 0;  // of the piece so far [m]
+    std::uint32_t count = 0;
+
+    void add(double youngsModulus) noexcept
+    {
+        const bool gap = youngsModulus <= 0.0;
+        const bool contrast = !gap && modulus > 0.0 &&
+                              std::max(youngsModulus, modulus) >= breakingContrast * std::min(youngsModulus, modulus);
+        if (gap || contrast) {
+            end();
+        }
+        run += gap ? 0.0 : slice;
+        modulus = youngsModulus;
+    }
+    void end() noexcept
+    {
+        count += run >= leastPiece ? 1U : 0U;
+        run = 0.0;
+    }
+};
+
 }  // namespace
 
-CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body, Vec3 tip,
-                    Vec3 axis) noexcept
+CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
+                    const Cuts& cuts, Vec3 tip, Vec3 axis) noexcept
 {
     const auto& tool = model.scene.tool;
     const auto& target = model.structures[0].labels;
@@ -36,21 +86,26 @@ CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& rea
         return std::find(target.begin(), target.end(), reader.label(rest)) != target.end();
     };
 
-    constexpr int points = coreSlices * coreRings * coreSectors;
     int filled = 0;
     int hits = 0;
     int slicesInTarget = 0;
+    Pieces pieces{tool.notchLength / coreSlices};
     for (int i = 0; i < coreSlices; ++i) {
         const Vec3 middle = core.notchStart + (i + 0.5) / coreSlices * tool.notchLength * axis;
         // The displacement varies over the lattice's spacing, far more slowly than over the notch's width.
         const Vec3 rest = occupancy::restPoint(body, middle);
-        slicesInTarget += inTarget(rest) ? 1 : 0;
+        const HolesNear holes(cuts, rest, tool.notchRadius);
+        const bool there = !holes.contain(rest);
+        slicesInTarget += there && inTarget(rest) ? 1 : 0;
+        pieces.add(there ? model.tissue->table().rows[reader.tissue(rest)].youngsModulus : 0.0);
         for (int n = 0; n < coreRings * coreSectors; ++n) {
             const int r = n / coreSectors;
             const double radius = tool.notchRadius * std::sqrt((r + 0.5) / coreRings);  // rings of equal area
-            const double turn = 2.0 * std::numbers::pi * (n % coreSectors + 0.5 * (r % 2)) / coreSectors;
+            // Each slice is turned by the golden ratio of a sector, so that slices do not repeat each other's error.
+            const double sector = n % coreSectors + 0.5 * (r % 2) + i / std::numbers::phi;
+            const double turn = 2.0 * std::numbers::pi * sector / coreSectors;
             const Vec3 p = rest + radius * (std::cos(turn) * right + std::sin(turn) * up);
-            const auto row = reader.tissue(p);
+            const auto row = holes.contain(p) ? std::uint8_t{0} : reader.tissue(p);
             if (row != 0) {
                 ++filled;
                 core.fraction[row] += 1.0;
@@ -58,14 +113,39 @@ CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& rea
             }
         }
     }
+    pieces.end();
     for (double& f : core.fraction) {
         f /= std::max(filled, 1);
     }
     const double notch = std::numbers::pi * tool.notchRadius * tool.notchRadius * tool.notchLength;
-    core.volume = notch * filled / points;
+    core.volume = notch * filled / coreSamples;
     core.targetFraction = static_cast<double>(hits) / std::max(filled, 1);
     core.targetLength = tool.notchLength * slicesInTarget / coreSlices;
+    core.fragments = pieces.count;
     return core;
+}
+
+void removeCore(const SessionModel& model, const occupancy::Body& body, const CoreSample& core, Vec3 tip,
+                Cuts& cuts) noexcept
+{
+    const auto& tool = model.scene.tool;
+    const auto between = [&](Vec3 from, Vec3 to, double share) {
+        return occupancy::restPoint(body, glm::mix(from, to, share));
+    };
+    for (int i = 0; i < coreChannels; ++i) {
+        const Vec3 from = between(core.notchStart, core.notchEnd, static_cast<double>(i) / coreChannels);
+        const Vec3 to = between(core.notchStart, core.notchEnd, (i + 1.0) / coreChannels);
+        const double length = glm::distance(from, to);
+        if (length > 0.0) {
+            cuts.cores.add({from, (to - from) / length, length, tool.notchRadius});
+        }
+    }
+    Vec3 before = between(tip, core.notchEnd, 0.0);
+    for (int i = 1; i <= coreChannels; ++i) {
+        const Vec3 next = between(tip, core.notchEnd, static_cast<double>(i) / coreChannels);
+        cutPath(cuts, before, next, tool.radius);
+        before = next;
+    }
 }
 
 }  // namespace palpate::haptics

@@ -91,7 +91,7 @@ void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Si
 {
     state_.tick = r.tick;
     state_.time = static_cast<double>(r.tick) * tickSeconds;
-    state_.tip = triple(r.device.position);
+    state_.tip = triple(r.device.position + r.deflection);
     state_.axis = triple(r.device.axis);
     state_.proxy = triple(r.proxy);
     state_.basic = triple(r.basic);
@@ -102,15 +102,12 @@ void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Si
     state_.tissue = r.tissue;
     state_.inserted = r.inserted;
     state_.distance = r.distance;
-    state_.warning = channel::Warning::none;
-    const SessionModel& model = simulation.model();
-    if (r.nearestVital < model.structures.size()) {
-        const double d = r.distance[r.nearestVital];
-        state_.warned = r.nearestVital;
-        state_.warning = d <= model.scene.tool.radius                        ? channel::Warning::touching
-                         : d < model.structures[r.nearestVital].warnDistance ? channel::Warning::near
-                                                                             : channel::Warning::none;
-    }
+    state_.warning = static_cast<channel::Warning>(r.warning);
+    state_.warned = r.warned != 0xFF ? r.warned : r.nearestVital != 0xFF ? r.nearestVital : 0;
+    state_.ahead = r.ahead.structure;
+    state_.aheadTissueDistance = r.ahead.tissueDistance;
+    state_.aheadTissue = r.ahead.tissue;
+    state_.aheadSpeed = r.ahead.speed;
     if (r.fired) {
         ++state_.cores;
         state_.coreTarget = r.core.targetFraction;

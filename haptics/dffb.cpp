@@ -40,7 +40,8 @@ double fade(const DffbParameters& p, double distance) noexcept
     return t * t * (3.0 - 2.0 * t);
 }
 
-// Equation 5: the mass hangs on the tip. Implicit in the spring and damper, so that no choice of M, C, K blows up.
+// Equation 5: the mass hangs on the tip. Implicit in the spring and damper, so that no choice of M, C, K blows up. Force
+// and counterforce are bounded together.
 Vec3 inertiaEffect(const ForceTerm& sum, Vec3 tip, double dt, DffbState& s) noexcept
 {
     if (sum.mass <= 0.0) {
@@ -51,10 +52,9 @@ Vec3 inertiaEffect(const ForceTerm& sum, Vec3 tip, double dt, DffbState& s) noex
     const Vec3 stretch = tip - s.mass;
     const double implicit = sum.mass + dt * sum.damping + dt * dt * sum.stiffness;
     const Vec3 drive = dt * (sum.stiffness * stretch + sum.damping * s.velocity) + sum.mass * s.massVelocity;
-    const Vec3 velocity = drive / implicit;
-    const Vec3 onMass = sum.mass * (velocity - s.massVelocity) / dt;
-    s.massVelocity = velocity;
-    s.mass += dt * velocity;
+    const Vec3 onMass = bounded(sum.mass * (drive / implicit - s.massVelocity) / dt, sum.force);
+    s.massVelocity += dt / sum.mass * onMass;
+    s.mass += dt * s.massVelocity;
     return -onMass;
 }
 
@@ -68,7 +68,7 @@ Vec3 thesisForce(const DffbParameters& p, std::size_t count, const std::array<Pr
             ++s.cursor;
         }
     }
-    return bounded(inertiaEffect(sum, tip, dt, s), sum.force);
+    return inertiaEffect(sum, tip, dt, s);
 }
 
 Vec3 fieldForce(const DffbParameters& p, std::size_t count, const std::array<Proximity, maxStructures>& structures,
@@ -89,6 +89,12 @@ Vec3 fieldForce(const DffbParameters& p, std::size_t count, const std::array<Pro
     return bounded(push - near * sum.damping * s.velocity, p.budget);
 }
 
+// A constant, or a line down to zero.
+double sessionGain(const DffbParameters& p, double time) noexcept
+{
+    return p.gain * (p.fade > 0.0 ? std::max(1.0 - time / p.fade, 0.0) : 1.0);
+}
+
 }  // namespace
 
 Vec3 additionalForce(const DffbParameters& p, std::size_t count, const std::array<Proximity, maxStructures>& structures,
@@ -101,13 +107,16 @@ Vec3 additionalForce(const DffbParameters& p, std::size_t count, const std::arra
     const double blend = 1.0 - 1.0 / (1.0 + 2.0 * std::numbers::pi * velocityBand * dt);
     s.velocity += blend * ((tip - s.last) / dt - s.velocity);
     s.last = tip;
-    if (p.mode == datasets::DffbMode::off || !touching) {
+    s.time += dt;
+    s.presence = std::clamp(s.presence + (touching ? dt : -dt) / contactFade, 0.0, 1.0);
+    if (p.mode == datasets::DffbMode::off || s.presence <= 0.0) {
         s.mass = tip;
         s.massVelocity = s.velocity;
         return Vec3(0.0);
     }
-    return p.mode == datasets::DffbMode::thesis ? thesisForce(p, count, structures, tip, dt, s)
-                                                : fieldForce(p, count, structures, s);
+    const Vec3 force = p.mode == datasets::DffbMode::thesis ? thesisForce(p, count, structures, tip, dt, s)
+                                                            : fieldForce(p, count, structures, s);
+    return s.presence * sessionGain(p, s.time) * force;
 }
 
 }  // namespace palpate::haptics

@@ -25,6 +25,8 @@ struct DffbState {
     Vec3 last{0.0};           // tip in the tick before [m]
     Vec3 velocity{0.0};       // of the tip, low-passed [m/s]
     std::uint8_t cursor = 1;  // `thesis`: row of the lookup table that is the nearest vital structure now
+    double presence = 0;      // share of the force that contact has brought in
+    double time = 0;          // of the session [s]
     bool started = false;
 };
 
@@ -35,13 +37,19 @@ struct DffbState {
 ///
 /// `thesis`: the lookup table in order: the next vital structure is taken on contact with the present one. A virtual
 /// mass hangs on the tip by spring and damper (equation 5; GHOST's inertia effect) with the summed parameters of
-/// equations 6-8; the sum of magnitudes in equation 3 bounds the force.
+/// equations 6-8; the sum of magnitudes in equation 3 bounds the force, on mass and tip alike, so that the bound makes no
+/// energy.
 /// `field`: every vital structure pushes away with its gain times equation 4, faded to zero at `range`; the nearer the
 /// tip is to a vital structure or to the target, the more the damping of equation 8 slows it. At most `budget` in all.
 ///
-/// @param structures  target first    @param touching  the tool touches tissue: without contact there is no such force
+/// All of it is scaled by the scene's gain, which in a study may fade to nothing over the session.
+///
+/// @param structures  target first
+/// @param touching    the tool touches tissue: without contact there is no such force; it comes and goes within contactFade
 Vec3 additionalForce(const datasets::DffbParameters& p, std::size_t count,
                      const std::array<Proximity, maxStructures>& structures, Vec3 tip, bool touching, double dt,
                      DffbState& state) noexcept;
+
+inline constexpr double contactFade = 0.05;  // [s]
 
 }  // namespace palpate::haptics

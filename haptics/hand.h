@@ -1,6 +1,7 @@
 #pragma once
 
 #include <datasets/scene.h>
+#include <haptics/arm.h>
 #include <haptics/device.h>
 #include <haptics/session_model.h>
 
@@ -8,13 +9,10 @@
 
 namespace palpate::haptics {
 
-/// Device and hand as one mass on a grip. Defaults: PHANToM Premium 1.0 in a firm stylus grip (docs and tissue tables give
-/// the ranges).
+/// How the hand holds the device and what it feels. Default: a firm stylus grip (docs and tissue tables give the ranges).
 struct HandParameters {
-    double mass = 0.172;          // device 0.072, hand and stylus 0.1 [kg]
-    double damping = 3.0;         // of the hand [N s/m]
-    double grip = 400.0;          // stiffness between the hand's goal and the stylus [N/m]
-    double encoder = 0.03e-3;     // step of the position that is read [m]
+    DeviceParameters device = deviceParameters("premium");
+    Grip grip;
     double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
     double dropFelt = 0.4;        // share of the force that must go for the hand to feel that tissue gave way
     double leastFelt = 0.3;       // forces below are not noticed [N]
@@ -25,7 +23,8 @@ struct HandParameters {
 class HandDevice final : public Device {
 public:
     /// @param axis  of the tool, towards its tip (unit vector)    @param start  of the tip [m]
-    HandDevice(const HandParameters& parameters, std::vector<datasets::TraineeStep> script, Vec3 start, Vec3 axis);
+    HandDevice(const HandParameters& parameters, std::vector<datasets::TraineeStep> script, Vec3 start, Vec3 axis,
+               double period = tickSeconds);
 
     DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override;
@@ -38,20 +37,21 @@ private:
     void nextStep() noexcept;
 
     HandParameters parameters_;
+    double period_;
     std::vector<datasets::TraineeStep> script_;
     std::size_t step_ = 0;
     double inStep_ = 0;     // time since the step began [s]
     Vec3 from_{0.0};        // goal when the step began
     double travelled_ = 0;  // of the goal, along the step's line [m]
     Vec3 goal_{0.0};
-    Vec3 position_{0.0};
-    Vec3 velocity_{0.0};
+    Arm arm_;
     Vec3 force_{0.0};
     double peak_ = 0;  // largest force felt in this step [N]
     Vec3 axis_{0.0};
 };
 
-/// The scripted trainee of a session, its tip `distance` [m] outside the body on the planned line.
+/// The scripted trainee of a session with the scene's device in the hand, its tip `distance` [m] outside the body on the
+/// planned line.
 HandDevice handBefore(const SessionModel& model, double distance);
 
 }  // namespace palpate::haptics

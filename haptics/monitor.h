@@ -9,22 +9,37 @@
 
 namespace palpate::haptics {
 
-/// State of the warnings between ticks.
+/// State of the warnings and of the look-ahead between ticks.
 struct MonitorState {
     std::array<bool, maxStructures> near{};
+    std::array<bool, maxStructures> veryNear{};
     std::array<bool, maxStructures> touching{};
+    Vec3 last{0.0};    // tip in the tick before [m]
+    double speed = 0;  // of the tip along the needle, low-passed [m/s]
+    bool started = false;
 };
 
 /// Task H6: distance and direction from the tip to the target and to every vital structure, in the deformed tissue, and
-/// the events that follow from them.
+/// the warnings that follow from them. Each begins with an event; it ends a tenth of its distance later than it began, so
+/// that it cannot flicker.
 ///
 /// The nearest point of a structure at rest is Y = X - d grad d, X being the tissue at the tip and d the distance field;
-/// now it is at Y + u(Y). Fills record.distance and record.nearestVital.
+/// now it is at Y + u(Y). Fills distance, nearestVital, warning and warned of the record.
 std::array<Proximity, maxStructures> monitor(const SessionModel& model, const occupancy::Body& body, const TipState& tip,
                                              Vec3 position, MonitorState& state, TickRecord& record) noexcept;
+
+/// What is ahead of a needle at `tool` on its own line: marches through the deformed tissue in steps of lookAheadStep, as
+/// it is deformed now. A structure is touched within the needle's radius. Of other tools: nothing is ahead.
+/// @param dt  period of the loop [s]
+LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
+                    const TipState& tip, const DeviceSample& tool, double dt, MonitorState& state) noexcept;
 
 /// Looks along a needle's throw: which vital structures lie within the needle's radius of the way from `from` to `to` [m],
 /// in the deformed tissue. Adds an event for each.
 void monitorThrow(const SessionModel& model, const occupancy::Body& body, Vec3 from, Vec3 to, TickRecord& record) noexcept;
+
+inline constexpr double lookAheadStep = 1e-3;  // [m]
+inline constexpr int lookAheadSteps = 40;
+inline constexpr double veryNearShare = 0.4;  // of the warning distance
 
 }  // namespace palpate::haptics

@@ -44,6 +44,7 @@ struct Reader {
         v = static_cast<Integer>(row.integer(++column));
     }
     void operator()(const char*, Phase& v) { v = fromName<Phase>(row.text(++column), phaseNames); }
+    void operator()(const char*, WarningLevel& v) { v = fromName<WarningLevel>(row.text(++column), warningNames); }
     void operator()(const char*, format::Microseconds<float> v) { v.value = static_cast<float>(row.real(++column) / 1e6); }
     void operator()(const char*, format::OptionalIndex<std::uint8_t> v) { v.value = optionalIndex(row, ++column); }
 };
@@ -87,6 +88,7 @@ void readCore(const Statement& row, CoreSample& core)
     core.targetLength = row.real(3);
     core.notchStart = {row.real(4), row.real(5), row.real(6)};
     core.notchEnd = {row.real(7), row.real(8), row.real(9)};
+    core.fragments = static_cast<std::uint32_t>(row.integer(10));
 }
 
 void readFraction(const Statement& row, CoreSample& core)

@@ -15,7 +15,7 @@
 namespace palpate::haptics::format {
 
 inline constexpr int applicationId = 0x50414C50;  // "PALP", in the file's header
-inline constexpr int version = 1;                 // user_version; raise it when a table changes
+inline constexpr int version = 2;                 // user_version; raise it when a table changes
 
 inline constexpr std::uint8_t none = 0xFF;  // a structure that is not there; NULL in the file
 
@@ -23,6 +23,9 @@ inline constexpr std::array<const char*, maxStructures> distanceColumns{
     "distance_0_m",  "distance_1_m",  "distance_2_m",  "distance_3_m", "distance_4_m",  "distance_5_m",
     "distance_6_m",  "distance_7_m",  "distance_8_m",  "distance_9_m", "distance_10_m", "distance_11_m",
     "distance_12_m", "distance_13_m", "distance_14_m", "distance_15_m"};
+inline constexpr std::array<const char*, maxStructures> aheadColumns{
+    "ahead_0_m", "ahead_1_m", "ahead_2_m",  "ahead_3_m",  "ahead_4_m",  "ahead_5_m",  "ahead_6_m",  "ahead_7_m",
+    "ahead_8_m", "ahead_9_m", "ahead_10_m", "ahead_11_m", "ahead_12_m", "ahead_13_m", "ahead_14_m", "ahead_15_m"};
 inline constexpr std::array<const char*, taskCount> taskColumns{"h2_us", "h3_us", "h4_us", "deform_us",
                                                                 "h6_us", "h7_us", "h5_us"};
 
@@ -57,6 +60,8 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
     vector("basic_x_n", "basic_y_n", "basic_z_n", t.basic);
     vector("additional_x_n", "additional_y_n", "additional_z_n", t.additional);
     vector("total_x_n", "total_y_n", "total_z_n", t.total);
+    visit("energy_j", t.energy);
+    visit("damped_j", t.damped);
     visit("phase", t.phase);
     visit("tissue", t.tissue);
     visit("inserted_m", t.inserted);
@@ -65,10 +70,17 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
     visit("moved", t.moved);
     visit("residual_m", t.residual);
     visit("nearest_vital", OptionalIndex{t.nearestVital});
+    visit("warning", t.warning);
+    visit("warned", OptionalIndex{t.warned});
+    vector("deflection_x_m", "deflection_y_m", "deflection_z_m", t.deflection);
+    visit("ahead_m", t.ahead.tissueDistance);
+    visit("ahead_tissue", t.ahead.tissue);
+    visit("ahead_m_s", t.ahead.speed);
     visit("fired", t.fired);
     visit("faulted", t.faulted);
     for (std::size_t i = 0; i < structures && i < maxStructures; ++i) {
         visit(distanceColumns[i], t.distance[i]);
+        visit(aheadColumns[i], t.ahead.structure[i]);
     }
     for (std::size_t i = 0; i < taskCount; ++i) {
         visit(taskColumns[i], Microseconds{t.seconds[i]});

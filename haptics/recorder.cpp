@@ -58,7 +58,7 @@ std::string schema(const SessionInfo& info)
         << ") VIRTUAL);"
            "CREATE TABLE events (tick INTEGER, position INTEGER, kind TEXT, structure INTEGER, tissue INTEGER, value);"
            "CREATE TABLE cores (tick INTEGER PRIMARY KEY, volume_m3, target_fraction, target_length_m,"
-           " notch_start_x_m, notch_start_y_m, notch_start_z_m, notch_end_x_m, notch_end_y_m, notch_end_z_m);"
+           " notch_start_x_m, notch_start_y_m, notch_start_z_m, notch_end_x_m, notch_end_y_m, notch_end_z_m, fragments);"
            "CREATE TABLE core_fractions (tick INTEGER, tissue INTEGER, fraction);";
     return sql.str();
 }
@@ -161,6 +161,7 @@ struct Binder {
         row.bind(++position, static_cast<std::int64_t>(v));
     }
     void operator()(const char*, const Phase& v) { row.bind(++position, phaseNames[static_cast<std::size_t>(v)]); }
+    void operator()(const char*, const WarningLevel& v) { row.bind(++position, warningNames[static_cast<std::size_t>(v)]); }
     void operator()(const char*, const format::Microseconds<const float>& v)
     {
         row.bind(++position, static_cast<double>(v.value) * 1e6);
@@ -192,7 +193,7 @@ public:
         : structures_(structures),
           tick_(database, tickInsert(structures)),
           event_(database, "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)"),
-          core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
+          core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
           fraction_(database, "INSERT INTO core_fractions VALUES (?, ?, ?)")
     {
     }
@@ -227,6 +228,7 @@ private:
               core.notchEnd.x, core.notchEnd.y, core.notchEnd.z}) {
             bind("", value);
         }
+        bind("", core.fragments);
         core_.run();
         for (std::size_t i = 0; i < maxTissues; ++i) {
             if (core.fraction[i] != 0) {

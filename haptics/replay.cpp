@@ -80,7 +80,8 @@ std::string modelHash(const SessionModel& model)
     volume::Fnv hash;
     for (const auto& row : model.tissue->table().rows) {
         hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
-                            row.cuttingForce, row.frictionPerMetre, row.fixed ? 1.0 : 0.0, row.stiffening});
+                            row.cuttingForce, row.frictionPerMetre, row.stictionPerMetre, row.frictionDamping,
+                            row.fixed ? 1.0 : 0.0, row.stiffening});
     }
     hash.add(model.tissue->affine());
     for (const auto& s : model.tissue->structures()) {

@@ -6,6 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <locale>
+#include <numbers>
+#include <sstream>
 
 namespace palpate::haptics {
 
@@ -13,6 +16,7 @@ namespace {
 
 constexpr double pathStep = 0.2e-3;      // [m]
 constexpr double redirectLength = 5e-3;  // [m]
+constexpr double jerkBlock = 25e-3;      // means over so long [s]
 constexpr double contactPause = 0.1;     // off the body, before a touch counts as another one [s]
 
 // 1 at `full` or before it, 0 at `none` or beyond it, straight between them. The two may lie either way round.
@@ -23,6 +27,48 @@ double ramp(double value, double full, double none) noexcept
 
 }  // namespace
 
+TargetShape shapeOfTarget(const SessionModel& model)
+{
+    TargetShape shape;
+    shape.axis = glm::normalize(model.approach.aim - model.approach.entry);
+    const auto& field = model.structures[0].distance;
+    std::size_t inside = 0;
+    for (std::size_t i = 0; i < field.values.size(); ++i) {
+        if (field.values[i] < 0.0F) {
+            shape.middle += field.grid.position(field.grid.node(i));
+            ++inside;
+        }
+    }
+    shape.middle /= static_cast<double>(std::max<std::size_t>(inside, 1));
+    double volume = 0;
+    for (const auto& s : model.tissue->structures()) {
+        const auto& labels = model.structures[0].labels;
+        volume += std::find(labels.begin(), labels.end(), s.value) != labels.end() ? s.volume : 0.0;
+    }
+    shape.diameter = std::cbrt(6.0 * volume / std::numbers::pi);
+    return shape;
+}
+
+std::string toText(const TargetShape& s)
+{
+    return fmt::format("{:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}", s.middle.x, s.middle.y, s.middle.z, s.axis.x,
+                       s.axis.y, s.axis.z, s.diameter);
+}
+
+std::optional<TargetShape> targetShapeOf(const SessionInfo& info)
+{
+    for (const auto& [key, value] : info.extra) {
+        std::istringstream in(value);
+        in.imbue(std::locale::classic());
+        TargetShape s;
+        if (key == targetShapeKey &&
+            in >> s.middle.x >> s.middle.y >> s.middle.z >> s.axis.x >> s.axis.y >> s.axis.z >> s.diameter) {
+            return s;
+        }
+    }
+    return std::nullopt;
+}
+
 // Weights: the list of measures is of Johnson 2012 and tissue.md's summary of published simulators; the points and the
 // limits are ours, and docs/score.md states them.
 ScoreParts parts(const Score& s) noexcept
@@ -32,6 +78,11 @@ ScoreParts parts(const Score& s) noexcept
         return p;
     }
     p.vital = 25 * std::max(0.0, 1 - 0.4 * s.vitalContacts - 0.1 * s.vitalSeconds - 0.1 * s.vitalDepth * 1e3);
+    if (s.marks > 0) {
+        p.core = 30 * ramp(s.markError, 2e-3, 20e-3) + 20 * ramp(s.markSizeError, 2e-3, 15e-3);
+        p.technique = 25 * ramp(s.peakForce, 4, 8.5);
+        return p;
+    }
     if (s.passes == 0) {
         return p;
     }
@@ -41,6 +92,38 @@ ScoreParts parts(const Score& s) noexcept
     p.technique = 5 * (ramp(s.passes, 1, 5) + ramp(s.skinContacts, 1, 5) + ramp(s.redirects, 0, 4) + economy +
                        ramp(s.peakForce, 4, 8.5));
     return p;
+}
+
+void JerkMeter::add(Vec3 tip, double rate) noexcept
+{
+    const int block = std::max(1, static_cast<int>(std::lround(jerkBlock * rate)));
+    sum += tip;
+    if (++ticks < block) {
+        return;
+    }
+    std::shift_left(means.begin(), means.end(), 1);
+    means.back() = sum / static_cast<double>(ticks);
+    sum = Vec3(0.0);
+    ticks = 0;
+    blocks = std::min(blocks + 1, 4);
+    if (blocks == 4) {
+        const double dt = block / rate;
+        const Vec3 jerk = (means[3] - 3.0 * means[2] + 3.0 * means[1] - means[0]) / (dt * dt * dt);
+        squares += glm::dot(jerk, jerk);
+        ++count;
+    }
+}
+
+void JerkMeter::pause() noexcept
+{
+    sum = Vec3(0.0);
+    ticks = 0;
+    blocks = 0;
+}
+
+double JerkMeter::rms() const noexcept
+{
+    return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
 }
 
 void PathMeter::add(Vec3 tip) noexcept
@@ -68,7 +151,9 @@ double PathMeter::length(Vec3 tip) const noexcept
 }
 
 Scorer::Scorer(const SessionInfo& info)
-    : rate_(info.rate), structures_(std::min<std::size_t>(info.structures.size(), maxStructures))
+    : rate_(info.rate),
+      structures_(std::min<std::size_t>(info.structures.size(), maxStructures)),
+      target_(targetShapeOf(info))
 {
 }
 
@@ -76,6 +161,15 @@ void Scorer::add(const TickRecord& record) noexcept
 {
     const Vec3 tip = record.device.position;
     path_.add(tip);
+    if (record.phase == Phase::free) {
+        jerk_.pause();
+    } else {
+        jerk_.add(tip, rate_);
+        // The force on the hand is what the tissue pushes back with.
+        score_.tissueWork -= ticks_ > 0 ? glm::dot(record.basic, tip - tip_) : 0.0;
+    }
+    ++ticks_;
+    addMark(record);
     score_.peakForce = std::max(score_.peakForce, glm::length(record.total));
     addContact(record);
     addDepth(record);
@@ -170,6 +264,33 @@ void Scorer::addFiring(const TickRecord& record) noexcept
     }
 }
 
+void Scorer::addMark(const TickRecord& record) noexcept
+{
+    const bool down = (record.device.buttons & buttonMark) != 0;
+    if (down && !markDown_ && score_.marks < marks_.size()) {
+        marks_[score_.marks++] = record.device.position;
+    }
+    markDown_ = down;
+}
+
+void Scorer::judgeMarks(Score& s) const noexcept
+{
+    if (s.marks == 0 || !target_) {
+        return;
+    }
+    const auto across = [&](Vec3 v) { return v - glm::dot(v, target_->axis) * target_->axis; };
+    Vec3 middle(0.0);
+    double widest = 0;
+    for (std::size_t i = 0; i < s.marks; ++i) {
+        middle += marks_[i] / static_cast<double>(s.marks);
+        for (std::size_t k = 0; k < i; ++k) {
+            widest = std::max(widest, glm::length(across(marks_[i] - marks_[k])));
+        }
+    }
+    s.markError = glm::length(across(middle - target_->middle));
+    s.markSizeError = std::abs(widest - target_->diameter);
+}
+
 Score Scorer::score() const noexcept
 {
     Score s = score_;
@@ -177,6 +298,8 @@ Score Scorer::score() const noexcept
     s.pathLength = path_.length(tip_);
     s.insertedPath = insidePath_.length(tip_);
     s.meanForce = contactTicks_ > 0 ? forceSum_ / static_cast<double>(contactTicks_) : 0;
+    s.jerk = jerk_.rms();
+    judgeMarks(s);
     s.vitalSeconds = static_cast<double>(vitalTicks_) / rate_;
     const ScoreParts p = parts(s);
     s.total = p.core + p.vital + p.technique;
@@ -194,7 +317,7 @@ std::vector<std::pair<std::string, std::string>> describe(const Score& s)
 {
     const ScoreParts p = parts(s);
     const bool fired = s.passes > 0;
-    return {
+    std::vector<std::pair<std::string, std::string>> lines{
         {"Total", fmt::format("{:.0f} of 100", s.total)},
         {"Core", fmt::format("{:.0f} of 50", p.core)},
         {"Vital structures", fmt::format("{:.0f} of 25", p.vital)},
@@ -214,9 +337,16 @@ std::vector<std::pair<std::string, std::string>> describe(const Score& s)
         {"Path of the tip", fmt::format("{:.0f} mm", s.pathLength * 1e3)},
         {"Path inside", fmt::format("{:.0f} mm", s.insertedPath * 1e3)},
         {"Deepest insertion", fmt::format("{:.1f} mm", s.deepest * 1e3)},
+        {"Jerk (root mean square)", fmt::format("{:.1f} m/s3", s.jerk)},
+        {"Work on the tissue", fmt::format("{:.0f} mJ", s.tissueWork * 1e3)},
         {"Peak force", fmt::format("{:.2f} N", s.peakForce)},
         {"Mean force in contact", fmt::format("{:.2f} N", s.meanForce)},
     };
+    if (s.marks > 0) {
+        lines.emplace_back("Marked beside the middle by", fmt::format("{:.1f} mm", s.markError * 1e3));
+        lines.emplace_back("Size marked wrong by", fmt::format("{:.1f} mm", s.markSizeError * 1e3));
+    }
+    return lines;
 }
 
 }  // namespace palpate::haptics

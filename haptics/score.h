@@ -1,10 +1,13 @@
 #pragma once
 
 #include <haptics/recorder.h>
+#include <haptics/session_model.h>
 #include <haptics/tick.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,7 +34,13 @@ struct Score {
     double vitalSeconds = 0;  // time with the tip in contact with a vital structure
     double vitalDepth = 0;    // deepest [m]
     std::uint32_t warnings = 0;
-    double total = 0;  // 0-100; the formula is in score.cpp and docs/score.md
+    double jerk = 0;        // root mean square of the tip's, below 20 Hz, while in contact [m/s^3]
+    double tissueWork = 0;  // that the tool did on the tissue: cutting, rubbing and what is still bent [J]
+    // Palpation: the middle of the places that the trainee marked, and the largest distance between two of them.
+    std::uint32_t marks = 0;
+    double markError = std::numeric_limits<double>::infinity();      // from the target's middle, across the tool [m]
+    double markSizeError = std::numeric_limits<double>::infinity();  // of the diameter, without its sign [m]
+    double total = 0;                                                // 0-100; the formula is in score.cpp and docs/score.md
 };
 
 /// Where the points of a total come from.
@@ -56,6 +65,33 @@ struct PathMeter {
     double length(Vec3 tip) const noexcept;
 };
 
+/// Root mean square jerk of a path, from means over 25 ms: what an encoder's steps add stays below what a tremor has.
+struct JerkMeter {
+    std::array<Vec3, 4> means{};  // of the last blocks, newest last [m]
+    Vec3 sum{0.0};
+    int ticks = 0;   // in the block that fills
+    int blocks = 0;  // whole ones so far, at most 4
+    double squares = 0;
+    std::uint64_t count = 0;
+
+    void add(Vec3 tip, double rate) noexcept;
+    /// The next add() starts another stretch.
+    void pause() noexcept;
+    double rms() const noexcept;  // [m/s^3]
+};
+
+/// The target at rest: what a palpation is judged by, and what a report draws. SessionInfo::extra keeps it.
+struct TargetShape {
+    Vec3 middle{0.0};     // patient frame [m]
+    Vec3 axis{0, 1, 0};   // of the tool: places are compared across it
+    double diameter = 0;  // of the sphere of its volume [m]
+};
+TargetShape shapeOfTarget(const SessionModel& model);
+inline constexpr const char* targetShapeKey = "target_shape";
+std::string toText(const TargetShape& shape);
+/// What the record of a session says; nothing where it does not.
+std::optional<TargetShape> targetShapeOf(const SessionInfo& info);
+
 /// Feeds on ticks, in a live session and from a record alike.
 class Scorer {
 public:
@@ -68,17 +104,23 @@ private:
     void addDepth(const TickRecord& record) noexcept;
     void addFiring(const TickRecord& record) noexcept;
     void addVital(const TickRecord& record) noexcept;
+    void addMark(const TickRecord& record) noexcept;
+    void judgeMarks(Score& score) const noexcept;
 
     double rate_ = 1000;  // [Hz]
     std::size_t structures_ = 0;
     Score score_;
     PathMeter path_, insidePath_;
     Vec3 tip_{0.0};  // of the last tick [m]
-    std::uint64_t lastTick_ = 0, firstContact_ = 0, lastTouch_ = 0;
+    std::uint64_t ticks_ = 0, lastTick_ = 0, firstContact_ = 0, lastTouch_ = 0;
     std::uint64_t contactTicks_ = 0, vitalTicks_ = 0;
     double forceSum_ = 0;                     // [N]
     double depthPeak_ = 0, depthValley_ = 0;  // of the shaft inside [m]
     bool withdrawing_ = false, touched_ = false;
+    JerkMeter jerk_;
+    std::array<Vec3, 32> marks_{};  // [m]
+    bool markDown_ = false;
+    std::optional<TargetShape> target_;
 };
 
 /// Scores a whole record.

@@ -62,6 +62,36 @@ private:
     std::uint64_t since_ = 0;
 };
 
+// Counts one period after the other.
+class Punctuality {
+public:
+    explicit Punctuality(ServoTiming& timing) : timing_(timing) {}
+
+    void add(bool missed) noexcept
+    {
+        if (!missed) {
+            run_ = 0;
+            return;
+        }
+        ++timing_.missed;
+        timing_.gaps += run_ == 0 ? 1 : 0;
+        timing_.longestGap = std::max(timing_.longestGap, ++run_);
+    }
+
+private:
+    ServoTiming& timing_;
+    std::uint64_t run_ = 0;  // missed ticks up to now
+};
+
+void addWork(ServoTiming& timing, const TickRecord& record, Clock::duration work) noexcept
+{
+    ++timing.ticks;
+    timing.work.add(seconds(work));
+    for (std::size_t i = 0; i < taskCount; ++i) {
+        timing.tasks[i].add(static_cast<double>(record.seconds[i]));
+    }
+}
+
 TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overloaded) noexcept
 {
     const auto start = Clock::now();
@@ -72,6 +102,7 @@ TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overl
     TickRecord record = simulation.tick(sample);
     const auto computed = Clock::now();
     device.write(record.total);
+    device.observe(record);
     record.seconds[static_cast<std::size_t>(Task::h2)] = static_cast<float>(seconds(read - start));
     record.seconds[static_cast<std::size_t>(Task::h5)] = static_cast<float>(seconds(Clock::now() - computed));
     return record;
@@ -83,6 +114,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
                      const std::atomic<bool>& stop)
 {
     ServoTiming timing;
+    Punctuality periods(timing);
     Overload overload(options.missedAllowed);
     auto due = Clock::now() + period;
     int stale = 0;  // ticks that the force still fades, after a gap
@@ -97,21 +129,18 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
         const TickRecord record = oneTick(device, simulation, stale > 0, options.paced && overload.askStepDown(timing));
         stale = std::max(0, stale - 1);
         const auto sent = Clock::now();
-        timing.work.add(seconds(sent - start));
-        for (std::size_t i = 0; i < taskCount; ++i) {
-            timing.tasks[i].add(static_cast<double>(record.seconds[i]));
-        }
-        ++timing.ticks;
+        addWork(timing, record, sent - start);
         if (options.paced) {
             timing.lateness.add(seconds(start - due));
             due += period;
-            timing.missed += sent > due ? 1 : 0;
+            timing.overruns += sent - start > period ? 1 : 0;
+            periods.add(sent > due);
         }
         sink(record, timing);
         const auto now = Clock::now();
         while (options.paced && now > due + period) {
             due += period;
-            ++timing.missed;
+            periods.add(true);
             stale = std::min(stale + 1, longestStale);
         }
     }

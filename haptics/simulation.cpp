@@ -3,6 +3,7 @@
 #include <haptics/biopsy.h>
 #include <haptics/events.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -17,7 +18,8 @@ namespace {
 constexpr double shaftQueried = 6e-3;
 // Between contact law and elastic body: neither viscosity nor a light touch is a measure of a body.
 constexpr double mostTrust = 3.0;
-constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
+constexpr double closing = 0.25;  // depth beyond a sphere's radius over which the surface closes, in radii
+constexpr int smallWindow = 9;    // nodes deep: of the elastic level's step down
 
 // How much of the tool behind its tip collision looks at [m].
 double queriedLength(const datasets::ToolSpec& tool) noexcept
@@ -51,14 +53,14 @@ private:
 };
 
 std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model, chainmail::DisplacedLattice& shape,
-                                                      int window)
+                                                      int window, double period)
 {
     const auto& settings = model.scene.model.elastic;
     chainmail::ElasticOptions options;
     options.window = window;
     options.cycles = settings.cycles;
     options.finiteStrain = settings.strain == datasets::Strain::finite;
-    options.viscosity = settings.viscosity / tickSeconds;
+    options.viscosity = settings.viscosity / period;
     return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
 }
 
@@ -70,7 +72,7 @@ bool isPose(const DeviceSample& device) noexcept
 
 }  // namespace
 
-Simulation::Simulation(const SessionModel& model)
+Simulation::Simulation(const SessionModel& model, const SimulationOptions& options)
     : model_(model),
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
@@ -79,11 +81,13 @@ Simulation::Simulation(const SessionModel& model)
       chainmail_(deformation_, model.scene.tool.radius),
       level_(model.scene.model.level),
       body_(deformation_.shape().body(model.surface)),
-      contacts_(std::make_unique<occupancy::ContactSet>())
+      contacts_(std::make_unique<occupancy::ContactSet>()),
+      stabiliserOptions_{options.device ? *options.device : deviceParameters(model.scene.device), options.period,
+                         model.scene.forceCap}
 {
     if (level_ == datasets::ModelLevel::elastic) {
-        elastic_[0] = elasticLevel(model, deformation_.shape(), model.scene.model.elastic.window);
-        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow);
+        elastic_[0] = elasticLevel(model, deformation_.shape(), model.scene.model.elastic.window, options.period);
+        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, options.period);
     }
 }
 
@@ -96,31 +100,36 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     TaskClock clock(record_);
     accept(device);
     stepDownIfAsked();
-    const Vec3 position = record_.device.position;
+    tool_ = bentTool(record_.device, tip_.needle);
+    const Vec3 position = tool_.position;
 
     const auto way = collide();
     clock.done(Task::h3);
-    const Vec3 law = moveTip(model_, reader_, body_, record_.device, way, tip_, record_);
+    const Vec3 law = moveTip(model_, reader_, body_, tool_, way, stabiliserOptions_.period, tip_, record_);
     clock.done(Task::h4);
     const Vec3 basic = contactForce(law, deform());
     clock.done(Task::deform);
     const auto near = monitor(model_, body_, tip_, position, monitor_, record_);
+    record_.ahead = lookAhead(model_, reader_, body_, tip_, tool_, stabiliserOptions_.period, monitor_);
     fire();
     clock.done(Task::h6);
     const Vec3 additional = additionalForce(model_.scene.dffb, model_.structures.size(), near, position,
-                                            tip_.phase != Phase::free, tickSeconds, dffb_);
+                                            tip_.phase != Phase::free, stabiliserOptions_.period, dffb_);
     const bool wasFaulted = stabiliser_.faulted;
-    const auto sent = stabilise(basic, additional, record_.device, model_.scene.forceCap, tickSeconds, stabiliser_);
+    const auto sent = stabilise(basic, additional, record_.device, stabiliserOptions_, stabiliser_);
     if (sent.faulted && !wasFaulted) {
         addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
     }
     record_.proxy = tip_.proxy;
     record_.phase = tip_.phase;
     record_.tissue = tip_.tissue;
-    record_.inserted = tip_.inserted;
+    record_.inserted = tip_.needle.inserted;
+    record_.deflection = tool_.position - record_.device.position;
     record_.basic = sent.basic;
     record_.additional = sent.additional;
-    record_.total = sent.basic + sent.additional;
+    record_.total = sent.total();
+    record_.energy = stabiliser_.ledger.given;
+    record_.damped = stabiliser_.ledger.damped;
     record_.faulted = sent.faulted;
     clock.done(Task::h7);
     ++ticks_;
@@ -163,10 +172,9 @@ void Simulation::stepDownIfAsked() noexcept
 occupancy::Sweep Simulation::collide() noexcept
 {
     const auto& tool = model_.scene.tool;
-    const auto& device = record_.device;
     const bool needle = tool.kind == datasets::ToolKind::needle;
-    const Vec3 back = device.position - queriedLength(tool) * device.axis;
-    occupancy::touch(body_, {back, device.position, tool.radius}, *contacts_);
+    const Vec3 back = tool_.position - queriedLength(tool) * tool_.axis;
+    occupancy::touch(body_, {back, tool_.position, tool.radius}, *contacts_);
     record_.contacts = static_cast<std::uint32_t>(contacts_->count);
     if (tip_.phase == Phase::contact) {
         // A needle touches with the point on its axis, a sphere with its whole surface.
@@ -177,14 +185,14 @@ occupancy::Sweep Simulation::collide() noexcept
     }
     // The force laws know one proxy, that of the tip: a capsule's is the middle of its front end.
     const double radius = needle ? 0.0 : tool.radius;
-    return occupancy::sweep(body_, {last_, last_, radius}, {device.position, device.position, radius});
+    return occupancy::sweep(body_, {last_, last_, radius}, {tool_.position, tool_.position, radius});
 }
 
 chainmail::Grip Simulation::grip() const noexcept
 {
     using Kind = chainmail::Grip::Kind;
     const auto& tool = model_.scene.tool;
-    const Vec3 tip = record_.device.position;
+    const Vec3 tip = tool_.position;
     const bool needle = tool.kind == datasets::ToolKind::needle;
     chainmail::Grip grip;
     grip.proxy = tip_.proxy;
@@ -196,9 +204,10 @@ chainmail::Grip Simulation::grip() const noexcept
     }
     grip.kind = needle ? Kind::point : Kind::press;
     grip.inside = tip_.phase == Phase::inserted;
-    grip.entry = tip_.entry;
-    grip.axis = record_.device.axis;
-    const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * record_.device.axis : tip;
+    grip.entry = tip_.needle.entry;
+    grip.drag = tip_.phase == Phase::inserted ? tip_.needle.drag() : 0.0;
+    grip.axis = tool_.axis;
+    const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * tool_.axis : tip;
     grip.shape = {tip, back, tool.radius, tool.radius};
     return grip;
 }
@@ -223,39 +232,43 @@ chainmail::Reaction Simulation::deform() noexcept
 }
 
 // Down to its radius a sphere feels the elastic body. Deeper the surface closes over it, and what small elements then say
-// is no force for a hand: there the contact law goes on, as much stiffer or softer as the body was found to be.
+// is no force for a hand: there the contact law goes on, as much stiffer or softer as the body was found to be. Over a part
+// of the radius one goes over into the other: a hand that hovers about that depth feels no step.
 Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) noexcept
 {
     if (tip_.phase == Phase::free || level_ != datasets::ModelLevel::elastic) {
         trust_ = 1.0;
         return law;
     }
-    const double depth = glm::distance(record_.device.position, tip_.proxy);
-    if (reaction.force && depth <= model_.scene.tool.radius) {
+    const double depth = glm::distance(tool_.position, tip_.proxy) / model_.scene.tool.radius;
+    if (!reaction.force) {
+        return trust_ * law;
+    }
+    if (depth <= 1.0) {
         const double known = glm::length(law);
         const double ratio = known > 0.0 ? glm::length(*reaction.force) / known : 1.0;
         trust_ = std::clamp(ratio, 1.0 / mostTrust, mostTrust);
         return *reaction.force;
     }
-    return trust_ * law;
+    return glm::mix(*reaction.force, trust_ * law, std::min((depth - 1.0) / closing, 1.0));
 }
 
 // The gun fires once per press of its button, and only a needle that is inside takes a core.
 void Simulation::fire() noexcept
 {
-    const auto& device = record_.device;
-    const bool down = (device.buttons & buttonFire) != 0;
+    const bool down = (record_.device.buttons & buttonFire) != 0;
     const bool pressed = down && !triggerWasDown_;
     triggerWasDown_ = down;
     if (!pressed || tip_.phase != Phase::inserted) {
         return;
     }
     record_.fired = true;
-    record_.core = takeCore(model_, reader_, body_, device.position, device.axis);
+    record_.core = takeCore(model_, reader_, body_, tip_.needle.cuts, tool_.position, tool_.axis);
+    removeCore(model_, body_, record_.core, tool_.position, tip_.needle.cuts);
     const Vec3 middle = 0.5 * (record_.core.notchStart + record_.core.notchEnd);
     const double miss = model_.structures[0].distance.distance(occupancy::restPoint(body_, middle));
     addEvent(record_, {EventKind::fire, 0, tip_.tissue, miss});
-    monitorThrow(model_, body_, device.position, record_.core.notchEnd, record_);
+    monitorThrow(model_, body_, tool_.position, record_.core.notchEnd, record_);
 }
 
 }  // namespace palpate::haptics

@@ -11,19 +11,23 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 namespace palpate::haptics {
 
-inline constexpr double tickSeconds = 1e-3;
+struct SimulationOptions {
+    double period = tickSeconds;             // between samples [s]
+    std::optional<DeviceParameters> device;  // that the stabiliser keeps stable; none: the scene's
+};
 
 /// The mutable half of a session. tick() is a pure function of the model and of the samples so far: the same samples give
 /// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
 class Simulation {
 public:
-    /// The model must outlive it.
-    explicit Simulation(const SessionModel& model);
+    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known.
+    explicit Simulation(const SessionModel& model, const SimulationOptions& options = {});
 
     /// H3 collide, H4 basic force, deform, H6 monitor, H7 additional force, stabilise. H2 and H5 are the servo loop's.
     const TickRecord& tick(const DeviceSample& device) noexcept;
@@ -57,9 +61,11 @@ private:
     double trust_ = 1;  // the elastic body's force over the contact law's, where both are known
     occupancy::Body body_;
     std::unique_ptr<occupancy::ContactSet> contacts_;
+    DeviceSample tool_;  // the device's pose, a bent needle's tip where it is
     TipState tip_;
     MonitorState monitor_;
     DffbState dffb_;
+    StabiliserOptions stabiliserOptions_;
     StabiliserState stabiliser_;
     std::uint64_t ticks_ = 0;
     Vec3 last_{0.0};  // tip in the tick before [m]

@@ -2,50 +2,279 @@
 
 #include <haptics/bounded.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace palpate::haptics {
 
 namespace {
 
-constexpr double rampTime = 0.5;    // [s]
-constexpr double fadeTime = 0.05;   // [s]
-constexpr double slewShare = 0.05;  // of the cap, per tick
+constexpr double rampTime = 0.5;        // [s]
+constexpr double fadeTime = 0.05;       // [s]
+constexpr double slewRate = 50.0;       // of the cap, per second
+constexpr double riseShare = 0.9;       // of the slew for the tissue, the rest for ramp and damping
+constexpr double fastestMotion = 10.0;  // of a hand [m/s]
+constexpr double slowMotion = 0.03;     // [m/s]
+constexpr double settledMotion = 1.0;   // of a pose that can be believed again after a jump [m/s]
+constexpr double settlingTime = 0.02;   // [s]
+constexpr double longestWindow = 4e-3;  // [s]
+constexpr double stiffnessShare = 0.5;  // of the stable limit
+constexpr double dampingShare = 0.35;   // of the mass over the time that the damping is late
+constexpr double margin = 1.2;          // of damping over the leak
+constexpr double frictionShare = 0.5;   // of the device's Coulomb friction is counted on
+constexpr double catchUpTime = 0.1;     // of the coupling, standing still [s]
+constexpr double restTime = 0.03;       // after which the hand stands still [s]
+constexpr double mostTissue = 100.0;    // of the cap: larger forces of tissue are that large
+constexpr double noForce = 1e-9;        // what rounding leaves [N]
+constexpr double energyAllowed = 1e-3;  // that tissue may give beyond what it got [J]
+constexpr double roundingOff = 1e-9;    // of positions [m]
+constexpr double guardTime = 0.02;      // from full force to none, and back [s]
 
 bool finite(Vec3 v) noexcept
 {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-Vec3 towards(Vec3 from, Vec3 to, double most) noexcept
+// From the moment of a sample to the middle of the force that answers it.
+double lateness(const StabiliserOptions& o) noexcept
 {
-    const Vec3 step = to - from;
-    return glm::length(step) > most ? from + bounded(step, most) : to;
+    const double lag = o.device.bandwidth > 0.0 ? 1.0 / (2.0 * std::numbers::pi * o.device.bandwidth) : 0.0;
+    return 0.5 * o.period + o.device.delay + lag;
+}
+
+// The way since the last sample; none for a pose that is not to be believed.
+Vec3 wayOf(const DeviceSample& device, const StabiliserOptions& o, StabiliserState& s, bool& believed) noexcept
+{
+    const Vec3 way = s.started ? device.position - s.position : Vec3(0.0);
+    s.position = device.position;
+    s.started = true;
+    const double speed = glm::length(way) / o.period;
+    if (speed > fastestMotion || (s.unsettled > 0.0 && speed > settledMotion)) {
+        s.unsettled = settlingTime;
+    } else {
+        s.unsettled = std::max(0.0, s.unsettled - o.period);
+    }
+    believed = s.unsettled <= 0.0;
+    return believed ? way : Vec3(0.0);
+}
+
+// The force that was in the motors between the last two samples, as a mean over that time.
+RenderedForce heldForce(const EnergyLedger& l, const StabiliserOptions& o) noexcept
+{
+    const double periods = std::min(o.device.delay / o.period, static_cast<double>(EnergyLedger::longest - 3));
+    const auto whole = static_cast<std::size_t>(periods);
+    const double later = periods - static_cast<double>(whole);
+    const auto ago = [&](std::size_t n) { return n <= l.ticks ? l.sent[(l.ticks - n) % l.longest] : RenderedForce{}; };
+    const RenderedForce newer = ago(whole + 1), older = ago(whole + 2);
+    const auto mean = [&](Vec3 a, Vec3 b) { return (1.0 - later) * a + later * b; };
+    return {mean(newer.basic, older.basic), mean(newer.additional, older.additional), mean(newer.damping, older.damping)};
+}
+
+void account(Vec3 way, const StabiliserOptions& o, EnergyLedger& l) noexcept
+{
+    const RenderedForce held = heldForce(l, o);
+    l.given += glm::dot(held.total(), way);
+    l.tissue += glm::dot(held.basic + held.damping, way);
+    l.damped -= glm::dot(held.damping, way);
+}
+
+// The nearest change of force that a tissue of stiffness 0 to `stiffest` could answer the way with.
+Vec3 answerable(Vec3 change, Vec3 way, double stiffest) noexcept
+{
+    const Vec3 middle = -0.5 * stiffest * way;
+    return middle + bounded(change - middle, 0.5 * stiffest * glm::length(way));
+}
+
+// Time that the position has stayed within an encoder step or two of one place.
+void watchRest(Vec3 position, const StabiliserOptions& o, StabiliserState& s) noexcept
+{
+    const bool rests = glm::distance(position, s.resting) <= 1.5 * o.device.encoder + roundingOff;
+    s.rest = rests ? s.rest + o.period : 0.0;
+    s.resting = rests ? s.resting : position;
+}
+
+// `rise` is how much the force may grow in this tick: pressed faster than that it falls behind here, and not in a limit
+// behind, so that on the way out it is already on its way down. The tissue's own change is that without the cap, for
+// the same reason.
+Vec3 couple(Vec3 tissue, Vec3 way, double cap, double rise, const StabiliserOptions& o, StabiliserState& s) noexcept
+{
+    const Vec3 wanted = bounded(tissue, cap);
+    const double length = glm::length(way);
+    const double limit = stableLimits(o).stiffness;
+    const bool pressing = glm::dot(s.coupled + wanted, way) <= 0.0;
+    const double stiffest = pressing && limit * length > rise ? rise / length : limit;
+    // What has fallen behind catches up where that costs less than friction takes: pressed less on the way in than on the
+    // way out a hand is given energy.
+    const bool slow = glm::length(motionIn(s.window, o.device.encoder, o.period).velocity) < slowMotion;
+    const Vec3 change = pressing && slow ? wanted - s.coupled : tissue - s.tissue;
+    Vec3 next = bounded(s.coupled + answerable(change, way, stiffest), cap);
+    const Vec3 behind = wanted - next;
+    if (glm::length(wanted) <= glm::length(next) || glm::length(behind) < noForce) {
+        next = wanted;
+    } else if (glm::dot(next, wanted) < 0.0) {
+        next = Vec3(0.0);
+    } else if (s.rest >= restTime) {
+        next += o.period / catchUpTime * behind;
+    }
+    s.tissue = tissue;
+    s.coupled = next;
+    return next;
+}
+
+// What the held, late force gives too much, less what the device's friction takes.
+Vec3 leakDamping(const Motion& motion, double stiffness, const StabiliserOptions& o, double strongest) noexcept
+{
+    const double speed = glm::length(motion.velocity);
+    if (speed <= 0.0) {
+        return Vec3(0.0);
+    }
+    const double needed = (margin * stiffness * lateness(o) - o.device.viscous) * speed - frictionShare * o.device.coulomb;
+    return -std::clamp(needed, 0.0, strongest * speed) / speed * motion.velocity;
+}
+
+double guardGain(Vec3 basic, Vec3 velocity, double dt, StabiliserState& s) noexcept
+{
+    const bool outwards = glm::dot(basic, velocity) > 0.0;
+    const double allowed = outwards ? std::clamp(2.0 - s.ledger.tissue / energyAllowed, 0.0, 1.0) : 1.0;
+    const double most = dt / guardTime;
+    s.guard += std::clamp(allowed - s.guard, -most, most);
+    return s.guard;
+}
+
+RenderedForce scaled(double by, const RenderedForce& f) noexcept
+{
+    return {by * f.basic, by * f.additional, by * f.damping};
+}
+
+// The largest share of `step` that keeps |from + share step| at `most` or below, where |from| is.
+double shareWithin(Vec3 from, Vec3 step, double most) noexcept
+{
+    if (glm::length(from + step) <= most) {
+        return 1.0;
+    }
+    const double a = glm::dot(step, step), b = glm::dot(from, step);
+    const double c = std::max(0.0, most * most - glm::dot(from, from));
+    return std::clamp((std::sqrt(b * b + a * c) - b) / a, 0.0, 1.0);
+}
+
+// The basic force and its damping go their way whatever the additional force does; that follows as far as the sum may
+// change.
+RenderedForce towards(const RenderedForce& from, const RenderedForce& to, double most, double cap) noexcept
+{
+    RenderedForce next = to;
+    const Vec3 way = to.basic - from.basic;
+    next.basic = glm::length(way) > most ? from.basic + bounded(way, most) : to.basic;
+    const Vec3 additional = to.additional - from.additional, damping = to.damping - from.damping;
+    if (const double share = shareWithin(next.basic - from.basic, damping, most); share < 1.0) {
+        next.damping = from.damping + share * damping;
+    }
+    const Vec3 changed = next.basic - from.basic + next.damping - from.damping;
+    const double share = std::min(shareWithin(changed, additional, most), shareWithin(Vec3(0.0), additional, most));
+    if (share < 1.0) {
+        next.additional = from.additional + share * additional;
+    }
+    // To the nearest sum within the cap: no further from the last than before.
+    const double size = glm::length(next.total());
+    return size > cap ? scaled(cap / size, next) : next;
+}
+
+void remember(Vec3 position, const RenderedForce& rendered, bool believed, MotionWindow& w) noexcept
+{
+    if (!believed) {
+        w.count = 0;
+        return;
+    }
+    w.newest = (w.newest + 1) % w.longest;
+    w.position[w.newest] = position;
+    w.force[w.newest] = rendered.basic + rendered.additional;
+    w.basic[w.newest] = rendered.basic;
+    w.count = std::min(w.count + 1, w.longest);
 }
 
 }  // namespace
 
-SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, double cap, double dt,
+StableLimits stableLimits(const StabiliserOptions& o) noexcept
+{
+    StableLimits limits;
+    limits.damping = dampingShare * o.device.mass / (lateness(o) + 0.5 * longestWindow);
+    limits.stiffness = stiffnessShare * (o.device.viscous + limits.damping) / lateness(o);
+    return limits;
+}
+
+Motion motionIn(const MotionWindow& w, double encoder, double period) noexcept
+{
+    const auto back = [&](const auto& of, std::size_t n) { return of[(w.newest + w.longest - n) % w.longest]; };
+    const auto most = std::min(w.count, static_cast<std::size_t>(longestWindow / period + 1.5));
+    std::size_t length = 0;
+    for (std::size_t n = 1; n < most; ++n) {
+        const Vec3 slope = (back(w.position, n) - back(w.position, 0)) / static_cast<double>(n);
+        bool straight = true;
+        for (std::size_t i = 1; i < n && straight; ++i) {
+            const Vec3 off = glm::abs(back(w.position, i) - back(w.position, 0) - static_cast<double>(i) * slope);
+            straight = std::max({off.x, off.y, off.z}) <= encoder + roundingOff;
+        }
+        if (!straight) {
+            break;
+        }
+        length = n;
+    }
+    if (length == 0) {
+        return {};
+    }
+    const Vec3 way = back(w.position, 0) - back(w.position, length);
+    const double square = glm::dot(way, way);
+    const auto stiffness = [&](const auto& of) {
+        return square > 0.0 ? std::max(0.0, -glm::dot(back(of, 0) - back(of, length), way) / square) : 0.0;
+    };
+    return {way / (static_cast<double>(length) * period), stiffness(w.force), stiffness(w.basic)};
+}
+
+SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& o,
                     StabiliserState& s) noexcept
 {
     s.faulted = s.faulted || !finite(basic) || !finite(additional) || (device.buttons & poseInvalid) != 0;
+    bool believed = true;
+    const Vec3 way = wayOf(device, o, s, believed);
+    account(way, o, s.ledger);
     const bool held = (device.buttons & buttonDeadMan) != 0;
+    const double cap = std::min(o.cap, o.device.peakForce);
+    RenderedForce sent;
     if (s.faulted || !held) {
         s.gain = 0.0;
-        s.basic = s.additional = Vec3(0.0);
-        return {Vec3(0.0), Vec3(0.0), s.faulted};
+        s.window.count = 0;
+    } else {
+        const StableLimits limits = stableLimits(o);
+        const double slew = slewRate * o.period * cap;
+        // What is over the cap is no force to return from later; and the ramp alone brings in what is there at the start.
+        const Vec3 tissue = bounded(basic, mostTissue * cap);
+        if (s.gain <= 0.0) {
+            s.tissue = tissue;
+            s.coupled = bounded(tissue, cap);
+        }
+        watchRest(device.position, o, s);
+        sent.basic = couple(tissue, way, cap, riseShare * slew, o, s);
+        sent.additional = bounded(additional, cap);
+        remember(device.position, sent, believed, s.window);
+        const Motion motion = motionIn(s.window, o.device.encoder, o.period);
+        // So that without additional force the basic one is the same: what that alone asks for, and the rest.
+        sent.damping = leakDamping(motion, motion.basic, o, limits.damping);
+        sent.additional += leakDamping(motion, motion.stiffness, o, limits.damping) - sent.damping;
+        sent.basic *= guardGain(sent.basic, motion.velocity, o.period, s);
+        s.gain = std::clamp(s.gain + (device.fresh && believed ? o.period / rampTime : -o.period / fadeTime), 0.0, 1.0);
+        const double size = glm::length(sent.total());
+        sent = scaled(s.gain * (size > cap ? cap / size : 1.0), sent);
+        // A spring that is let go gives energy where its force does not fall with the motion.
+        const bool falls = glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
+        sent = towards(s.sent, sent, slew + (falls ? limits.stiffness * glm::length(way) : 0.0), cap);
     }
-    s.gain = std::clamp(s.gain + (device.fresh ? dt / rampTime : -dt / fadeTime), 0.0, 1.0);
-    // What is over the cap is no force to return from later.
-    s.basic = towards(s.basic, bounded(basic, cap), slewShare * cap);
-    s.additional = towards(s.additional, bounded(additional, cap), slewShare * cap);
-    const double size = glm::length(s.basic + s.additional);
-    const double scale = s.gain * (size > cap ? cap / size : 1.0);
+    s.sent = sent;
+    s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = sent;
     // One zero and not two: without a force the hash of all forces must not tell from which side it came.
-    return {scale * s.basic + 0.0, scale * s.additional + 0.0, false};
+    return {sent.basic + sent.damping + 0.0, sent.additional + 0.0, s.faulted};
 }
 
 }  // namespace palpate::haptics

@@ -1,32 +1,114 @@
 #pragma once
 
+#include <haptics/arm.h>
 #include <haptics/tick.h>
+
+#include <array>
+#include <cstddef>
 
 namespace palpate::haptics {
 
-/// Both channels of the force as they are sent; their sum is the total of equation 1.
+/// What the stabiliser knows of the loop that it stands in.
+struct StabiliserOptions {
+    DeviceParameters device = deviceParameters("premium");
+    double period = tickSeconds;  // between samples [s]
+    double cap = 8.5;             // on the force [N]; the device's peak where that is lower
+};
+
+/// Largest stiffness [N/m] that is passed on unchanged, and the largest damping [N s/m] that is added for it.
+struct StableLimits {
+    double stiffness = 0;
+    double damping = 0;
+};
+
+/// Half of (b + B) / (T / 2 + t_d) (Gil et al., "Stability analysis of a 1 DOF haptic interface using the Routh-Hurwitz
+/// criterion", 2004), t_d with the lag of the amplifier. B is about a third of m over the time that the damping comes late.
+StableLimits stableLimits(const StabiliserOptions& options) noexcept;
+
+/// The force as it is sent: equation 1. The controller's damping is in the channels, in each what its own stiffness asks
+/// for.
 struct SentForce {
     Vec3 basic{0.0};       // [N]
     Vec3 additional{0.0};  // [N]
     bool faulted = false;
+
+    Vec3 total() const noexcept { return basic + additional; }
+};
+
+/// The same with the damping of the basic force apart.
+struct RenderedForce {
+    Vec3 basic{0.0};       // [N]
+    Vec3 additional{0.0};  // [N]
+    Vec3 damping{0.0};     // [N]
+
+    Vec3 total() const noexcept { return basic + additional + damping; }
+};
+
+/// The last positions and forces.
+struct MotionWindow {
+    static constexpr std::size_t longest = 32;
+    std::array<Vec3, longest> position{};  // as read [m], newest at `newest`
+    std::array<Vec3, longest> force{};     // as rendered in answer [N]
+    std::array<Vec3, longest> basic{};     // the tissue's part of it [N]
+    std::size_t newest = 0, count = 0;
+};
+
+/// What the window says of the motion.
+struct Motion {
+    Vec3 velocity{0.0};    // [m/s]
+    double stiffness = 0;  // what the force fell by along the way, over the way [N/m]
+    double basic = 0;      // the same of the tissue's part [N/m]
+};
+
+/// By adaptive windowing: over the longest window in which no position is off the straight line between its ends by more
+/// than an encoder step, and that is 4 ms at most. (Janabi-Sharifi, Hayward and Chen, "Discrete-time adaptive windowing
+/// for velocity estimation", IEEE Trans. Control Systems Technology 8, 2000.)
+Motion motionIn(const MotionWindow& window, double encoder, double period) noexcept;
+
+/// The energy that went through the port.
+struct EnergyLedger {
+    static constexpr std::size_t longest = 256;  // periods of delay
+    std::array<RenderedForce, longest> sent{};   // by tick, modulo
+    std::size_t ticks = 0;
+    double given = 0;   // net, to the hand [J]
+    double tissue = 0;  // the part of it that tissue and controller gave [J]
+    double damped = 0;  // taken by the controller for the basic force [J]
 };
 
 /// State of stabilise() between ticks.
 struct StabiliserState {
-    Vec3 basic{0.0};
-    Vec3 additional{0.0};
-    double gain = 0;       // start-up ramp, dead-man switch, watchdog
+    Vec3 position{0.0};  // in the tick before [m]
+    bool started = false;
+    double unsettled = 0;  // time that a pose that jumped still has to hold still [s]
+    Vec3 resting{0.0};     // where the hand stands still [m], and since when [s]
+    double rest = 0;
+    Vec3 tissue{0.0};   // basic force of the tick before, as computed [N]
+    Vec3 coupled{0.0};  // what the virtual coupling made of it [N]
+    MotionWindow window;
+    EnergyLedger ledger;
+    double guard = 1;  // share of the basic force that the ledger allows
+    double gain = 0;   // start-up ramp, dead-man switch, watchdog
+    RenderedForce sent;
     bool faulted = false;  // latched: the output is zero until the session ends
 };
 
-/// What stands between computed forces and a hand.
+/// What stands between computed forces and a hand; in this order:
 ///
-/// - After a force or a pose that is not finite nothing is sent any more: the fault is latched.
-/// - Slew: each channel changes by at most 5 % of the cap per tick.
-/// - Gain: rises to 1 in half a second; falls to zero in 50 ms when poses stop being fresh; is zero while the dead-man
-///   switch is up.
-/// - Cap: both channels are scaled together, so that |basic + additional| <= cap (equation 1).
-SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, double cap, double dt,
+/// - Fault: after a force or a pose that is not finite nothing is sent any more.
+/// - Virtual coupling: while the force rises faster along the motion than the stable stiffness, it rises at that, as
+///   through a spring in series, and catches up when the hand is slow or stands still. Below it the force passes unchanged.
+/// - Passivity: a force that is held for a period and comes late gives K v^2 (T / 2 + t_d) more than the tissue would
+///   (measured against the trapezoid rule; Ryu, Preusche, Hannaford and Hirzinger, "Time domain passivity control with
+///   reference energy following", 2005). What the device's friction does not take of it, a damping force takes. It
+///   looks at the last milliseconds alone, so it neither saves credit nor acts late. As the last guard, where the tissue
+///   has given 1 mJ more than it ever got, its force on the way out is scaled down until that is paid back.
+/// - Gain: rises to 1 in half a second; falls to zero in 50 ms when poses stop being fresh or jump (over 10 m/s); is zero
+///   while the dead-man switch is up.
+/// - Cap: all parts are scaled together, so that their sum is at most the cap (equation 1).
+/// - Slew: neither the sum nor a channel changes by more than 5 % of the cap per millisecond. Only on the way out a force
+///   may also fall by the stable stiffness times the motion: a spring that unloads late kicks. A fault and the dead-man
+///   switch end the force at once.
+SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& options,
                     StabiliserState& state) noexcept;
 
 }  // namespace palpate::haptics

@@ -5,9 +5,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string_view>
 
 namespace palpate::haptics {
+
+inline constexpr double tickSeconds = 1e-3;  // the usual period of the loop [s]
 
 inline constexpr std::size_t maxStructures = 16;  // target first, then the lookup table of vital structures
 inline constexpr std::size_t maxTissues = 64;
@@ -15,6 +18,7 @@ inline constexpr std::size_t maxEventsPerTick = 16;
 
 inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
 inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
+inline constexpr std::uint32_t buttonMark = 1U << 2;     // "here": the trainee marks the place of the tool
 inline constexpr std::uint32_t modelTooSlow = 1U << 30;  // the loop cannot keep up: use a cheaper model from now on
 inline constexpr std::uint32_t poseInvalid = 1U
                                              << 31;  // the pose was none (not finite, out of bounds); records keep the last
@@ -48,13 +52,37 @@ enum class EventKind : std::uint8_t {
     fire,        // the gun; value: distance from the notch's middle to the target's surface [m]
     fault,       // a force was not finite; the output is zero from now on
     stepDown,    // ticks came late: a cheaper model from now on; value: how many steps down from the scene's
+    veryNear,    // structure: came nearer than 0.4 of its warning distance; value: distance [m]
 };
-inline constexpr std::array<std::string_view, 8> eventNames{"contact",     "release", "puncture", "warning",
-                                                            "vital touch", "fire",    "fault",    "step down"};
+inline constexpr std::array<std::string_view, 9> eventNames{"contact", "release", "puncture",  "warning",  "vital touch",
+                                                            "fire",    "fault",   "step down", "very near"};
 constexpr std::string_view name(EventKind kind) noexcept
 {
     return eventNames[static_cast<std::size_t>(kind)];
 }
+
+/// How urgent the warning of a vital structure is (task H8). Each level starts with an event: warning, veryNear,
+/// vitalTouch.
+enum class WarningLevel : std::uint8_t { none, near, veryNear, touch };
+inline constexpr std::array<std::string_view, 4> warningNames{"none", "near", "very near", "touch"};
+
+/// What lies ahead on the needle's line, in the deformed tissue; infinite where nothing does within reach.
+struct LookAhead {
+    double tissueDistance = std::numeric_limits<double>::infinity();  // from the tip to the next tissue [m]
+    std::uint8_t tissue = 0;                                          // its row
+    std::array<double, maxStructures> structure = [] {
+        std::array<double, maxStructures> none{};
+        none.fill(std::numeric_limits<double>::infinity());
+        return none;
+    }();               // from the tip to where the needle would touch each structure [m]
+    double speed = 0;  // of the tip along the needle, low-passed [m/s]
+
+    /// When the needle is there at this speed [s]; infinite while it does not come nearer.
+    double seconds(double distance) const noexcept
+    {
+        return speed > 1e-3 ? distance / speed : std::numeric_limits<double>::infinity();
+    }
+};
 
 struct Event {
     EventKind kind = EventKind::contact;
@@ -69,6 +97,7 @@ struct CoreSample {
     double volume = 0;                          // of tissue [m^3]
     double targetFraction = 0;                  // share of the target structure
     double targetLength = 0;                    // length of the notch's axis inside the target [m]
+    std::uint32_t fragments = 0;                // pieces that the core comes out in
     Vec3 notchStart{0.0}, notchEnd{0.0};        // patient frame [m]
 };
 
@@ -79,19 +108,25 @@ struct TickRecord {
     Vec3 proxy{0.0};       // where the tip would be without penetration [m]
     Vec3 basic{0.0};       // F_BFFB, equation 2 [N]
     Vec3 additional{0.0};  // F_AFFB, equations 3-8 [N]
-    Vec3 total{0.0};       // F_DFFB as sent: stabilised and capped [N]
+    Vec3 total{0.0};       // F_DFFB as sent: with the controller's damping [N]
+    double energy = 0;     // net, that all forces so far gave to the hand [J]
+    double damped = 0;     // that the controller's damping took from it so far [J]
     Phase phase = Phase::free;
     std::uint8_t tissue = 0;           // row of the tissue table at the tip
     std::uint8_t nearestVital = 0xFF;  // index of a structure
+    WarningLevel warning = WarningLevel::none;
+    std::uint8_t warned = 0xFF;  // index of the structure that the warning is about
     bool fired = false;
     bool faulted = false;
     double inserted = 0;                           // length of the shaft inside [m]
+    Vec3 deflection{0.0};                          // of a bent needle's tip from the device's position [m]
     std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
-    std::uint32_t contacts = 0;                    // elements of tissue that the tool touches
-    double penetration = 0;   // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
-    std::uint32_t moved = 0;  // nodes that the deformation moved
-    double residual = 0;      // largest violated link that the work cap left over [m]
-    CoreSample core;          // when fired
+    LookAhead ahead;
+    std::uint32_t contacts = 0;  // elements of tissue that the tool touches
+    double penetration = 0;      // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
+    std::uint32_t moved = 0;     // nodes that the deformation moved
+    double residual = 0;         // largest violated link that the work cap left over [m]
+    CoreSample core;             // when fired
     std::array<Event, maxEventsPerTick> events{};
     std::uint32_t eventCount = 0;
     std::array<float, taskCount> seconds{};  // by task, wall time [s]

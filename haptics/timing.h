@@ -38,7 +38,10 @@ struct ServoTiming {
     Histogram work;      // a tick, H2 to H5
     std::array<Histogram, taskCount> tasks;
     std::uint64_t ticks = 0;
-    std::uint64_t missed = 0;  // force sent after the next tick was due, and ticks skipped to catch up
+    std::uint64_t missed = 0;      // force sent after the next tick was due, and ticks skipped to catch up
+    std::uint64_t overruns = 0;    // ticks whose own work took over a period
+    std::uint64_t gaps = 0;        // runs of missed ticks, one after the other without one in time between
+    std::uint64_t longestGap = 0;  // [ticks]
 };
 
 }  // namespace palpate::haptics

@@ -1,8 +1,8 @@
 #include <haptics/tip.h>
 
+#include <haptics/contact_law.h>
 #include <haptics/events.h>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -16,20 +16,7 @@ namespace {
 constexpr double tipFriction = 2.0;
 constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
 constexpr int slipSteps = 8;
-constexpr double sidewaysLimit = 3.0;     // sideways the tissue gives way at this many cutting forces
-constexpr double sidewaysDepth = 10e-3;   // inserted length that doubles the sideways stiffness [m]
-constexpr double embedding = 10e-3;       // inserted length at which the tip is surrounded [m]
-constexpr double shaftStiffness = 200.0;  // of the tissue that sticks to the shaft [N/m]
-constexpr int shaftSamples = 16;
-
-// Inside, tissue resists on all sides: a rigid disc in an infinite medium is twice as stiff as a punch on its surface
-// (Selvadurai, "The displacement of a rigid disc inclusion embedded in an infinite elastic medium", 1979; nu = 0.5). It
-// comes in over `embedding`: sooner, the force would rise while a pierced skin springs back over the needle.
-DepthLaw embedded(DepthLaw surface, double inserted) noexcept
-{
-    const double share = 1.0 + std::clamp(inserted / embedding, 0.0, 1.0);
-    return {share * surface.linear, share * surface.quadratic, surface.stiffest};
-}
+constexpr double mouth = 1e-3;  // a path that is open this deep is one to go in by [m]
 
 struct Tip {
     const SessionModel& model;
@@ -48,7 +35,7 @@ struct Tip {
     {
         state.phase = Phase::free;
         state.proxy = device.position;
-        state.inserted = state.anchor = 0.0;
+        state.needle = NeedleState{.cuts = state.needle.cuts};
         addEvent(record, {EventKind::release, 0xFF, 0, 0.0});
     }
 
@@ -106,121 +93,28 @@ struct Tip {
         const Vec3 push = -force / way * away;
         state.tissue = reader.tissue(under - 0.5e-3 * state.normal);
         const double along = -glm::dot(push, device.axis);
-        if (needle() && along >= row(state.tissue).punctureForce && glm::dot(device.axis, state.normal) < -0.2) {
-            pierce(along);
+        if (!needle() || along <= 0.0 || glm::dot(device.axis, state.normal) > -0.2) {
+            return push;
+        }
+        const bool open = opensHere();
+        if (open || along >= row(state.tissue).punctureForce) {
+            enterNeedle(model, device, state);
+        }
+        if (!open && state.phase == Phase::inserted) {
+            addEvent(record, {EventKind::puncture, 0xFF, state.tissue, along});
         }
         return push;
     }
 
-    void pierce(double force) noexcept
-    {
-        state.phase = Phase::inserted;
-        state.entry = state.proxy;
-        state.deepest = state.proxy;
-        state.inserted = 0.0;
-        state.anchor = glm::dot(device.position - state.entry, device.axis);
-        addEvent(record, {EventKind::puncture, 0xFF, state.tissue, force});
-    }
-
-    // How far the path is cut ahead of the proxy; a needle that was turned or shifted by over its radius is off that path.
-    double openAhead(Vec3 axis) const noexcept
-    {
-        const Vec3 rest = state.deepest - state.proxy;
-        const double along = glm::dot(rest, axis);
-        const bool onPath = glm::length(rest - along * axis) <= model.scene.tool.radius;
-        return onPath ? std::max(along, 0.0) : 0.0;
-    }
-
-    // Follows the needle along its axis: back freely, forward through what is cut already, and on by cutting.
-    double cut(const DepthLaw& law) noexcept
-    {
-        const Vec3 axis = device.axis;
-        double ahead = glm::dot(device.position - state.proxy, axis);
-        const double free = ahead < 0.0 ? ahead : std::min(openAhead(axis), ahead);
-        state.proxy += free * axis;
-        ahead -= free;
-        const auto passed = reader.tissue(state.proxy);
-        if (free != 0.0 && passed != 0) {
-            state.tissue = passed;
-        }
-        for (int i = 0; i < cutSteps && ahead > 0.0; ++i) {
-            const double force = law.force(ahead);
-            const auto next = reader.tissue(state.proxy + cutStep * axis);
-            const bool boundary = next != state.tissue && next != 0;
-            const double cutting = row(state.tissue).cuttingForce;
-            const double holds = boundary ? std::max(cutting, row(next).punctureForce) : cutting;
-            if (force <= holds) {
-                break;
-            }
-            const double step = boundary ? cutStep : std::min(cutStep, ahead - law.depth(holds));
-            state.proxy += step * axis;
-            ahead -= step;
-            if (boundary) {
-                state.tissue = next;
-                addEvent(record, {EventKind::puncture, 0xFF, next, force});
-            }
-        }
-        if (openAhead(axis) <= 0.0) {
-            state.deepest = state.proxy;
-        }
-        return std::max(ahead, 0.0);
-    }
-
-    // Sideways the shaft is held by all the tissue around it.
-    Vec3 holdSideways(const DepthLaw& law) noexcept
-    {
-        const Vec3 away = device.position - state.proxy;
-        const Vec3 across = away - glm::dot(away, device.axis) * device.axis;
-        const double way = glm::length(across);
-        if (way <= 0.0) {
-            return Vec3(0.0);
-        }
-        const double k = std::min(stiffestContact, law.linear * (1.0 + state.inserted / sidewaysDepth));
-        const double limit = sidewaysLimit * row(state.tissue).cuttingForce;
-        const double force = std::min(k * way, limit);
-        if (k * way > limit) {
-            state.proxy += (1.0 - limit / (k * way)) * across;
-        }
-        return -force / way * across;
-    }
-
-    // Stick and slip along the shaft: the tissue holds on to it as far as friction reaches, then lets it slide.
-    double shaftFriction(double depth) noexcept
-    {
-        double perMetre = 0.0;
-        for (int i = 0; i < shaftSamples; ++i) {
-            const double t = (i + 0.5) / shaftSamples;
-            perMetre += row(reader.tissue(glm::mix(state.entry, state.proxy, t))).frictionPerMetre / shaftSamples;
-        }
-        const double limit = perMetre * state.inserted;
-        const double stretch = depth - state.anchor;
-        const double force = std::clamp(shaftStiffness * stretch, -limit, limit);
-        state.anchor = depth - force / shaftStiffness;
-        return -force;
-    }
-
-    Vec3 insert() noexcept
-    {
-        const auto local = tissueUnder(model, reader, state.proxy, device.axis, model.scene.tool.radius);
-        const auto law = embedded(needleLaw(model, local), state.inserted);
-        const double ahead = cut(law);
-        const Vec3 sideways = holdSideways(law);
-        state.inserted = glm::dot(state.proxy - state.entry, device.axis);
-        if (state.inserted < 0.0) {
-            release();
-            return Vec3(0.0);
-        }
-        const double friction = shaftFriction(glm::dot(device.position - state.entry, device.axis));
-        return (friction - law.force(ahead)) * device.axis + sideways;
-    }
+    bool opensHere() const noexcept { return openAhead(state.needle.cuts, state.proxy, device.axis) > mouth; }
 };
 
 }  // namespace
 
 Vec3 moveTip(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
-             const DeviceSample& device, const occupancy::Sweep& way, TipState& state, TickRecord& record) noexcept
+             const DeviceSample& tool, const occupancy::Sweep& way, double dt, TipState& state, TickRecord& record) noexcept
 {
-    Tip tip{model, reader, body, device, state, record};
+    Tip tip{model, reader, body, tool, state, record};
     if (state.phase == Phase::free) {
         tip.seekContact(way);
     }
@@ -228,7 +122,10 @@ Vec3 moveTip(const SessionModel& model, const volume::Tissue::Reader& reader, co
     if (state.phase == Phase::contact) {
         force = tip.press();
     } else if (state.phase == Phase::inserted) {
-        force = tip.insert();
+        force = moveNeedle(model, reader, tool, dt, state, record);
+        if (state.needle.inserted < 0.0) {
+            tip.release();
+        }
     }
     if (state.phase == Phase::free) {
         state.tissue = 0;

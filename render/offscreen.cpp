@@ -39,7 +39,10 @@ std::vector<std::string> eventsBetween(const channel::State& before, const chann
     if (now.phase != before.phase && now.phase != channel::Phase::free)
         events.emplace_back(now.phase == channel::Phase::contact ? "contact" : "inserted");
     if (now.warning != before.warning && now.warning != channel::Warning::none)
-        events.push_back((now.warning == channel::Warning::near ? "warning_" : "touching_") + fileWord(warnedName));
+        events.push_back(std::string(now.warning == channel::Warning::near       ? "warning_"
+                                     : now.warning == channel::Warning::veryNear ? "very_near_"
+                                                                                 : "touching_") +
+                         fileWord(warnedName));
     if (now.cores > before.cores)
         events.emplace_back("fired");
     if (now.status != before.status && now.status != channel::Status::running)

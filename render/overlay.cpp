@@ -121,6 +121,8 @@ void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::Stat
     pen.heading("NEEDLE");
     const bool known = state.tissue > 0 && state.tissue < scenery.tissues;
     pen.pair(phaseWords(state), known ? "tip in " + text(scenery.tissue[state.tissue].name) : std::string(), white);
+    if (state.aheadTissue > 0 && state.aheadTissue < scenery.tissues)
+        pen.pair("ahead: " + text(scenery.tissue[state.aheadTissue].name), millimetres(state.aheadTissueDistance), grey);
     if (state.cores > 0)
         pen.pair(fmt::format("core {}: {:.0f} % target", state.cores, 100 * state.coreTarget),
                  fmt::format("{:.1f} mm of it", state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);
@@ -139,8 +141,9 @@ void drawWarning(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     } else if (state.warning == channel::Warning::touching) {
         words = "STOP: touching " + text(scenery.structure[s]);
         colour = red;
-    } else if (state.warning == channel::Warning::near) {
-        words = fmt::format("CAREFUL: {} at {}", text(scenery.structure[s]), millimetres(state.distance[s]));
+    } else if (state.warning != channel::Warning::none) {
+        words = fmt::format("{}: {} at {}", state.warning == channel::Warning::near ? "CAREFUL" : "VERY NEAR",
+                            text(scenery.structure[s]), millimetres(state.distance[s]));
     } else {
         return;
     }

@@ -37,10 +37,12 @@ struct MemoryUse {
 
 /// The tissue in a cell as one elastic material.
 struct CellMaterial {
-    float youngsModulus = 0;  // root of arithmetic times harmonic mean, times the share of the cell that is tissue [Pa]
-    float poissonRatio = 0;   // mean over the tissue [-]
-    float fixed = 0;          // share of the cell that is tissue held in space [-]
-    float stiffening = 0;     // mean over the tissue [-]
+    // Root of arithmetic times harmonic mean, times the share of the cell that is tissue; where some of it is held in
+    // space, that of the rest, stiffer by as much as it is thinner [Pa].
+    float youngsModulus = 0;
+    float poissonRatio = 0;  // mean over the tissue [-]
+    float fixed = 0;         // share of the tissue that is held in space [-]
+    float stiffening = 0;    // mean over the tissue [-]
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace palpate::volume {
@@ -111,29 +112,37 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
     });
 }
 
+// What is held in space does not give way: the rest of its cell is a layer on it, as much thinner than the cell as its
+// share is, and as much stiffer. A cell of nothing else has the stiffness of what it is made of.
 CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vector<const TissueRow*>& rows)
 {
-    double tissue = 0.0;
-    double stiffness = 0.0;
-    double compliance = 0.0;
+    struct Sums {
+        double share = 0.0, stiffness = 0.0, compliance = 0.0;
+        void add(double weight, double modulus)
+        {
+            share += weight;
+            stiffness += weight * modulus;
+            compliance += weight / modulus;
+        }
+        double mean() const { return std::sqrt(stiffness / compliance); }
+    } free, held;
     double poisson = 0.0;
     double stiffening = 0.0;
-    double fixed = 0.0;
     sampler.visit(n, [&](std::uint16_t label, double weight) {
         if (const TissueRow* row = rows[label]) {
-            tissue += weight;
-            stiffness += weight * row->youngsModulus;
-            compliance += weight / row->youngsModulus;
+            (row->fixed ? held : free).add(weight, row->youngsModulus);
             poisson += weight * row->poissonRatio;
             stiffening += weight * row->stiffening;
-            fixed += row->fixed ? weight : 0.0;
         }
     });
+    const double tissue = free.share + held.share;
     if (tissue <= 0.0) {
         return {};
     }
-    return {static_cast<float>(tissue * std::sqrt(stiffness / compliance)), static_cast<float>(poisson / tissue),
-            static_cast<float>(fixed), static_cast<float>(stiffening / tissue)};
+    const double rigid = held.share > 0.0 ? held.mean() : std::numeric_limits<double>::infinity();
+    const double modulus = free.share > 0.0 ? std::min(free.mean() * tissue / free.share, rigid) : rigid;
+    return {static_cast<float>(tissue * modulus), static_cast<float>(poisson / tissue),
+            static_cast<float>(held.share / tissue), static_cast<float>(stiffening / tissue)};
 }
 
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)

@@ -62,6 +62,8 @@ json toJson(const TissueRow& row)
             {"puncture_n", row.punctureForce},
             {"cutting_n", row.cuttingForce},
             {"friction_n_m", row.frictionPerMetre},
+            {"stiction_n_m", row.stictionPerMetre},
+            {"friction_ns_m2", row.frictionDamping},
             {"fixed", row.fixed},
             {"colour", json::array({row.colour.r, row.colour.g, row.colour.b})},
             {"opacity", row.opacity},
@@ -88,6 +90,8 @@ TissueRow rowFrom(const json& j)
     row.punctureForce = j.at("puncture_n").get<double>();
     row.cuttingForce = j.at("cutting_n").get<double>();
     row.frictionPerMetre = j.at("friction_n_m").get<double>();
+    row.stictionPerMetre = j.value("stiction_n_m", 0.0);
+    row.frictionDamping = j.value("friction_ns_m2", 0.0);
     row.fixed = j.at("fixed").get<bool>();
     row.colour = {colour.at(0).get<float>(), colour.at(1).get<float>(), colour.at(2).get<float>()};
     row.opacity = j.at("opacity").get<float>();

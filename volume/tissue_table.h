@@ -29,11 +29,14 @@ struct TissueRow {
     double shear = 0;             // ChainMail: largest shift across a link, share of its rest length, >= 0
     double punctureForce = 0;     // tip force at which a 14 G needle enters [N]
     double cuttingForce = 0;      // tip force while it cuts on [N]
-    double frictionPerMetre = 0;  // on the shaft, per metre inside [N/m]
-    bool fixed = false;           // held in space: bone, chest wall
-    glm::vec3 colour{1.0F};       // display, RGB in [0, 1]
-    float opacity = 0;            // display, in [0, 1]
-    std::string source;           // where the numbers come from
+    double frictionPerMetre = 0;  // on a sliding shaft, per metre inside [N/m]
+    double stictionPerMetre =
+        0;                       // at which a shaft that sticks breaks loose, per metre inside; less than friction: as that
+    double frictionDamping = 0;  // grows the friction with the shaft's speed, per metre inside [N s/m^2]
+    bool fixed = false;          // held in space: bone, chest wall
+    glm::vec3 colour{1.0F};      // display, RGB in [0, 1]
+    float opacity = 0;           // display, in [0, 1]
+    std::string source;          // where the numbers come from
 };
 
 /// Rows in order; row 0 is always "air", the outside.

@@ -15,7 +15,6 @@ namespace palpate::experiments {
 
 namespace {
 
-constexpr double fullEnough = 0.5;    // share of a cell
 constexpr double onItsBack = 0.05;    // share of the body's depth that is held when nothing else is
 constexpr double farthestMove = 0.9;  // of a corner to the surface, in spacings
 constexpr double thinnest = 0.2;      // volume of a tetrahedron, as a share of that in a whole cell
@@ -48,10 +47,8 @@ public:
         held_.assign(mesh_.corners.count(), 0);
         full_.assign(cells.count(), 0);
         modulus_ = tissue.youngsModulusOn(cells).values;
-        for (std::size_t i = 0; i < full_.size(); ++i) {
-            const double whole = static_cast<double>(modulus_[i]);
-            full_[i] = whole > 0.0 && static_cast<double>(materials_[i].youngsModulus) >= fullEnough * whole ? 1 : 0;
-        }
+        const auto rows = tissue.tissueOn(cells);
+        std::ranges::transform(rows, full_.begin(), [](std::uint8_t row) { return row != 0 ? 1 : 0; });
     }
 
     LatticeTets cut(const volume::DistanceField& surface)

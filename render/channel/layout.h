@@ -61,7 +61,7 @@ struct Scenery {
 };
 
 enum class Phase : std::uint32_t { free, contact, inserted };
-enum class Warning : std::uint32_t { none, near, touching };
+enum class Warning : std::uint32_t { none, near, veryNear, touching };
 enum class Status : std::uint32_t { running, finished, faulted };
 
 /// The state of one tick.
@@ -80,11 +80,16 @@ struct State {
     std::uint32_t cores = 0;                       // samples taken
     double inserted = 0;                           // length of the shaft inside [m]
     std::array<double, maxStructures> distance{};  // tip to structure, in the deformed tissue [m]
-    double coreTarget = 0;                         // share of target tissue in the last core
-    double coreLength = 0;                         // length in the target of the last core [m]
-    std::uint64_t missed = 0;                      // ticks
-    double tickP99 = 0;                            // [s]
-    std::uint64_t published = 0;                   // CLOCK_MONOTONIC when written [ns]
+    std::array<double, maxStructures> ahead{};     // tip to where the needle's line touches it; infinite: nowhere near [m]
+    double aheadTissueDistance = 0;                // tip to the next tissue on that line; infinite: nowhere near [m]
+    double aheadSpeed = 0;                         // of the tip along it [m/s]
+    std::uint32_t aheadTissue = 0;                 // row of the tissue table
+    std::uint32_t padding = 0;
+    double coreTarget = 0;        // share of target tissue in the last core
+    double coreLength = 0;        // length in the target of the last core [m]
+    std::uint64_t missed = 0;     // ticks
+    double tickP99 = 0;           // [s]
+    std::uint64_t published = 0;  // CLOCK_MONOTONIC when written [ns]
 };
 
 /// One displaced node of the lattice.

@@ -96,6 +96,8 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(State, tissue),
                                     offsetof(State, inserted),
                                     offsetof(State, distance),
+                                    offsetof(State, ahead),
+                                    offsetof(State, aheadTissue),
                                     offsetof(State, coreTarget),
                                     offsetof(State, missed),
                                     offsetof(State, published),

@@ -45,7 +45,7 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
         expectRefusal({"train", "--seconds", seconds}, "--seconds: " + seconds + ": must be 0 to 86400 s");
     }
     expectRefusal({"bench"}, "--help");
-    expectRefusal({"train", "nosuch"}, "breast, layered, block, plate, pair");
+    expectRefusal({"train", "nosuch"}, "layered, block, plate, pair");
     expectRefusal({"phantom", "nosuch", "-o", "never.vdb"}, "breast, layered, block");
     expectRefusal({"train", "layered", "--headless", "--target", "nosuch"}, "nosuch");
 }
@@ -150,6 +150,29 @@ TEST(CommandLine, FiguresOnStandardOutputStandAlone)
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         EXPECT_TRUE(nlohmann::json::accept(outcome.out)) << words[0] << " printed:\n" << outcome.out;
     }
+}
+
+// A study's guidance: whole in the first trial, none in the last, and nothing else changes what is felt of the tissue.
+TEST(CommandLine, GuidanceFadesOverTheTrialsOfAStudy)
+{
+    const auto peaks = [](const Words& more) {
+        Words words{"train", "layered", "--headless", "--unpaced", "--seconds",
+                    "1.2",   "--model", "chainmail",  "--json",    "-"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = palpate(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return nlohmann::json::parse(outcome.out).at("peak_force_n");
+    };
+    const auto whole = peaks({"--dffb", "on"}), first = peaks({"--dffb", "fade", "--trial", "1/5"});
+    const auto last = peaks({"--dffb", "fade", "--trial", "5/5"});
+    EXPECT_GT(whole.at("additional"), 0.0);
+    EXPECT_EQ(first.at("additional"), whole.at("additional"));
+    EXPECT_EQ(last.at("additional"), 0.0);
+    for (const char* trial : {"6/5", "0/5", "1/1", "2", "2/5x"}) {
+        expectRefusal({"train", "layered", "--headless", "--dffb", "fade", "--trial", trial},
+                      std::string("--trial ") + trial + ": must be K/N");
+    }
+    expectRefusal({"train", "layered", "--headless", "--trial", "1/5"}, "--trial: ");
 }
 
 TEST(CommandLine, AWrongValueInASceneIsNamedByFileAndLine)

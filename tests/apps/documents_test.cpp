@@ -50,6 +50,7 @@ std::string sceneWith(const std::string& section, const std::string& line)
                                              {"[dffb]", ""},
                                              {"[dffb.surgery]", ""},
                                              {"[[vital]]", "name = \"bone\""},
+                                             {"[[insert]]", "centre_mm = [0, 0, 0]"},
                                              {"[target]", "structure = \"tumour\""},
                                              {"[safety]", ""},
                                              {"[[script]]", "kind = \"fire\""}};

@@ -79,8 +79,8 @@ TEST(ScoreCommand, ANameThatIsNotUtf8IsReplacedAndTheFileIsWhole)
     EXPECT_TRUE(file.ends_with("a\xef\xbf\xbd")) << file;
 }
 
-// Depths 10, 20, 60 against 30, 40: of six pairs two are above and four below, delta = -1/3; medians 20 and 35. Forces 1,
-// 1, 1 against 1, 1 are ties.
+// Depths 10, 20, 60 against 30, 40: of six pairs two are above and four below, delta = -1/3; medians 20 and 35, quartiles
+// 15 and 40 of the first. Forces 1, 1, 1 against 1, 1 are ties.
 TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)
 {
     const synthetic::Folder folder;
@@ -88,8 +88,14 @@ TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)
                       c = session(folder, "c", 0.060, 1);
     const std::string d = session(folder, "d", 0.030, 1), e = session(folder, "e", 0.040, 1);
     score({"--group", "new=" + a + "," + b + "," + c, "--group", "old=" + d + "," + e, "--json",
-           (folder / "f.json").string()});
+           (folder / "f.json").string(), "--report", (folder / "f.html").string()});
     const auto f = readJson(folder / "f.json");
+    EXPECT_NEAR(f["groups"][0]["lower_quartile"]["deepest_mm"].get<double>(), 15, 1e-9);
+    EXPECT_NEAR(f["groups"][0]["upper_quartile"]["deepest_mm"].get<double>(), 40, 1e-9);
+    std::ifstream in(folder / "f.html");
+    const std::string page((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+    EXPECT_NE(page.find("20.0 (15.0 to 40.0)"), std::string::npos);
+    EXPECT_NE(page.find("-0.33"), std::string::npos);
     EXPECT_EQ(f["sessions"].size(), 5U);
     EXPECT_EQ(f["groups"][0]["name"], "new");
     EXPECT_EQ(f["groups"][0]["n"], 3);

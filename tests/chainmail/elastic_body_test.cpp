@@ -83,6 +83,47 @@ TEST(ElasticBody, HomogeneousTissueIsTheSameAtEveryLevel)
     }
 }
 
+// A layer on a base that ends inside of coarse cells: what is left of a cell is as much stiffer as it is thinner, so that
+// the layer's compliance is that of its thickness at every level.
+TEST(ElasticBody, WhatIsHeldLeavesLessOfACoarseCellToGiveWay)
+{
+    for (const int layer : {25, 26, 27}) {
+        const auto material = [=](Index3 c) { return tests::tissue(1e4, 0.45, c.y >= layer); };
+        const ElasticBody body = tests::bodyOf(ElasticBlock{Index3(32), 1e-3, material, 8, Vec3(0.0)});
+        ASSERT_GE(body.levels.size(), 4U);
+        for (int l = 0; l < 4; ++l) {
+            const CellLevel& level = body.levels[static_cast<std::size_t>(l)];
+            const Index3 middle = level.nodes.size / 2;
+            double compliance = 0.0;
+            for (int y = 8 >> l; y < (8 + 32) >> l; ++y) {
+                const std::size_t below = level.nodes.offset({middle.x, y + 1, middle.z});
+                const std::size_t at = level.nodes.offset({middle.x, y, middle.z});
+                const bool gives = level.fixed[at] == 0 || level.fixed[below] == 0;
+                compliance += gives ? level.nodes.spacing / static_cast<double>(level.mu[at]) : 0.0;
+            }
+            EXPECT_NEAR(compliance * 1e4 / 2.9, layer * 1e-3, 1e-6) << "layer " << layer << ", level " << l;
+        }
+    }
+}
+
+// A base that ends inside of a cell of the finest level holds the nodes on its side, and no others.
+TEST(ElasticBody, NodesAreHeldWhereHalfOfTheTissueAroundThemIs)
+{
+    for (const float share : {0.0F, 0.3F, 0.7F, 1.0F}) {
+        const auto material = [=](Index3 c) {
+            volume::CellMaterial m = tests::tissue(1e4, 0.45);
+            m.fixed = c.y < 4 ? 0.0F : c.y == 4 ? share : 1.0F;
+            return m;
+        };
+        const ElasticBody body = tests::bodyOf(ElasticBlock{Index3(8), 1e-3, material, 1, Vec3(0.0)});
+        const CellLevel& level = body.levels.front();
+        const auto held = [&](int y) { return level.fixed[level.nodes.offset({4, y + 1, 4})] != 0; };
+        EXPECT_EQ(held(4), share == 1.0F) << share;
+        EXPECT_TRUE(held(5)) << share;
+        EXPECT_FALSE(held(3)) << share;
+    }
+}
+
 // Poisson's ratio is lowered to the cap.
 TEST(ElasticBody, PoissonsRatioIsCapped)
 {

@@ -262,10 +262,10 @@ TEST(ElasticViscosity, TissueSpringsBackToExactRest)
             ASSERT_NEAR(creep.elastic().displacement(point).y, std::pow(gamma, calls) * start, 0.01 * start) << calls;
         }
     }
-    // Energy falls by gamma^2 per call, down to 1e-12 J.
-    // and what is next to nothing is known to the rounding of the energy that was there: sooner by a third at most.
+    // Energy falls by gamma^2 per call, down to 1e-12 J; next to nothing is known to the rounding of the energy that was
+    // there: a third sooner, a fifth later.
     const double expected = std::log(1e-12 / tissue) / (2.0 * std::log(gamma));
-    EXPECT_LT(calls, expected + 4.0);
+    EXPECT_LT(calls, 1.2 * expected);
     EXPECT_GT(calls, 0.67 * expected);
     EXPECT_EQ(creep.elastic().displacement(point), Vec3(0.0));
     EXPECT_EQ(creep.result().energy, 0.0);

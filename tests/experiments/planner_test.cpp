@@ -1,4 +1,7 @@
+#include <experiments/accuracy.h>
+#include <experiments/kernel_rivals.h>
 #include <experiments/planner.h>
+#include <experiments/reference_file.h>
 
 #include <tests/experiments/small_block.h>
 
@@ -10,13 +13,14 @@ namespace {
 using datasets::ModelLevel;
 using datasets::Strain;
 
-Plan planned(double error, double budget)
+Plan planned(double error, double budget, bool all = false)
 {
     static const haptics::SessionModel model = smallBlock();
     PlanRequest request;
     request.error = error;
     request.budget = budget;
     request.speed = 0.05;
+    request.all = all;
     return planModel(model, request, [](const std::string&) {});
 }
 
@@ -69,11 +73,59 @@ TEST(Planner, PicksTheCheapestThatHoldsBoth)
     ASSERT_TRUE(tight.choice);
     const PlanCandidate& c = tight.candidates[*tight.choice];
     EXPECT_EQ(c.level, ModelLevel::elastic);
-    EXPECT_LE(c.rms, 4.0);
+    EXPECT_LE(c.error, 4.0);
     EXPECT_LE(c.microseconds, 1e3);
     for (std::size_t i = 0; i < *tight.choice; ++i) {
         EXPECT_TRUE(tight.candidates[i].tried);
         EXPECT_FALSE(tight.candidates[i].holdsError && tight.candidates[i].holdsBudget);
+    }
+}
+
+// The search leaves most candidates out, and finds what trying every one of them finds.
+TEST(Planner, ChoosesWhatAnExhaustiveSearchChooses)
+{
+    const Plan whole = planned(0.01, 3e-4, true);
+    for (const double error : {0.02, 0.04, 0.08, 0.2}) {
+        const Plan quick = planned(error, 3e-4);
+        const auto cheapest = std::ranges::find_if(whole.candidates, [&](const PlanCandidate& c) {
+            return c.tried && c.error <= 100.0 * error && c.microseconds <= 300.0;
+        });
+        ASSERT_EQ(quick.choice.has_value(), cheapest != whole.candidates.end());
+        if (quick.choice) {
+            EXPECT_LE(quick.candidates[*quick.choice].microseconds, 1.1 * cheapest->microseconds);
+        }
+        const auto tried = [](const Plan& plan) { return std::ranges::count_if(plan.candidates, &PlanCandidate::tried); };
+        EXPECT_LE(tried(quick), tried(whole));
+    }
+}
+
+// What the planner predicts from test pushes against its own solution, outside finite elements find too: within a
+// factor 1.5.
+TEST(Planner, PredictsTheErrorAgainstOutsideFiniteElements)
+{
+    auto scene = *datasets::builtInScene("plate");
+    scene.model.level = ModelLevel::spring;
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    const auto model = std::make_shared<const haptics::SessionModel>(haptics::buildModel(scene, tissue));
+    const AccuracySubject subject = accuracySubject(model);
+    const std::string key = referenceKey(*tissue, subject.path, subject.speed, "neo-hookean");
+    const auto [outside, info] =
+        loadReference(std::filesystem::path(PALPATE_REFERENCES) / ("plate-neo-hookean-" + key + ".ref"));
+    for (const double error : {0.015}) {
+        PlanRequest request;
+        request.error = error;
+        request.speed = subject.speed;
+        const Plan plan = planModel(*model, request, [](const std::string&) {});
+        ASSERT_TRUE(plan.choice);
+        const PlanCandidate& c = plan.candidates[*plan.choice];
+        ASSERT_EQ(c.level, ModelLevel::elastic);
+        const TrialBody body = trialBody(*tissue, model->surface, c.elastic.spacing, subject.poissonCap(), 4U << 20);
+        const TrialResult found = elasticTrial(
+            body.body, subject.path, subject.speed, outside,
+            {.window = c.elastic.window, .cycles = c.elastic.cycles, .finiteStrain = c.elastic.strain == Strain::finite});
+        const double ratio = spreadOf(found.looks, &TrialErrors::near).worst / c.error;
+        EXPECT_GT(ratio, 1.0 / 1.5) << c.name();
+        EXPECT_LT(ratio, 1.5) << c.name();
     }
 }
 

@@ -74,13 +74,13 @@ TEST(TrialPath, ANeedlesTiesAreEightModuliTimesSpacing)
     EXPECT_GE(trialPath(*p.model.tissue, p.model.surface, p.place, trialTools()[3], spacing).ties.size(), 4U);
 }
 
-// The whole grid with many cycles per tick is the reference: its errors are those of rounding.
+// The whole grid with many cycles per tick is the reference, to the tolerance at which a tick ends.
 TEST(KernelTrial, TheReferenceHasNoErrorAgainstItself)
 {
     const auto& p = pressed();
     EXPECT_LT(p.reference.residual, 1e-4);
     const TrialResult result = elasticTrial(p.body.body, p.path, speed, p.reference, wholeGrid(8, false));
-    EXPECT_LT(spreadOf(result.looks, &TrialErrors::rms).worst, 0.5);
+    EXPECT_LT(spreadOf(result.looks, &TrialErrors::rms).worst, 1.0);
     EXPECT_LT(spreadOf(result.looks, &TrialErrors::force).worst, 1.5);
     EXPECT_GT(result.meanTouched, 10.0);
     EXPECT_GT(result.p50, 0.0);

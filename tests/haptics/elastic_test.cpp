@@ -89,7 +89,8 @@ TEST(ElasticTick, SphereOnAHomogeneousBlockFeelsHertz)
 }
 
 // A tool at a steady depth moves on with its windows, 30 mm over windows of 28 mm: of that little is felt. The force never
-// steps by over 8 % of what it is, a fortieth of the slew limit, and stays what it was in the middle of the block to 10 %.
+// steps by over 11 % of what it is, a thirtieth of the slew limit, and stays what it was in the middle of the block to 10
+// %.
 TEST(ElasticTick, MovingWindowsAreNotFelt)
 {
     Simulation simulation(homogeneous());
@@ -103,7 +104,7 @@ TEST(ElasticTick, MovingWindowsAreNotFelt)
             start = glm::length(now);
         }
         if (i > rampUp + 400) {
-            EXPECT_LT(glm::distance(now, before), 0.08 * start) << "tick " << i;
+            EXPECT_LT(glm::distance(now, before), 0.11 * start) << "tick " << i;
             EXPECT_NEAR(glm::length(now), start, 0.1 * start) << "tick " << i;
             most = std::max(most, glm::distance(now, before));
         }
@@ -281,7 +282,7 @@ TEST(StepDown, StartsFromTheScenesLevel)
 }
 
 // While the model changes under it the hand feels no step beyond the stabiliser's slew, which is 5 % of the cap per tick,
-// and the heap is left alone. On small windows it feels nearly the same force: 15 %.
+// and the heap is left alone. On small windows it feels nearly the same force: 20 %.
 TEST(StepDown, IsSmoothAndTouchesNoHeap)
 {
     auto model = tests::modelOf(homogeneousScene);
@@ -304,7 +305,7 @@ TEST(StepDown, IsSmoothAndTouchesNoHeap)
         ASSERT_LE(glm::distance(forces[i], forces[i - 1]), 0.05 * model.scene.forceCap * (1.0 + 1e-9)) << i;
     }
     for (std::size_t i = requests[0] + 20; i < requests[1]; ++i) {
-        ASSERT_NEAR(glm::length(forces[i]), glm::length(expected[i]), 0.15 * glm::length(expected[i])) << i;
+        ASSERT_NEAR(glm::length(forces[i]), glm::length(expected[i]), 0.2 * glm::length(expected[i])) << i;
     }
     EXPECT_EQ(forces[requests[0] - 1], expected[requests[0] - 1]);
     EXPECT_NE(forces[requests[1] - 1], expected[requests[1] - 1]);

@@ -48,7 +48,7 @@ TEST(Hand, GripYieldsByForceOverStiffness)
         s = hand.read();
         hand.write(Vec3(0, -2.0, 0));
     }
-    EXPECT_NEAR(s.position.y, -2.0 / p.grip, p.encoder);
+    EXPECT_NEAR(s.position.y, -2.0 / p.grip.stiffness, p.device.encoder + p.device.coulomb / p.grip.stiffness);
 }
 
 TEST(Hand, PositionsAreWholeEncoderSteps)
@@ -57,7 +57,7 @@ TEST(Hand, PositionsAreWholeEncoderSteps)
     HandDevice hand(p, {moveTo({0.03, 0.01, 0})}, Vec3(0.0), {0, 1, 0});
     for (int i = 0; i < 300; ++i) {
         const auto s = hand.read();
-        const double steps = s.position.x / p.encoder;
+        const double steps = s.position.x / p.device.encoder;
         EXPECT_NEAR(steps, std::round(steps), 1e-6);
     }
 }

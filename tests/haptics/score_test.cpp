@@ -52,6 +52,54 @@ TEST(Score, StraightLineHasItsLength)
     EXPECT_NEAR(s.deepest, 40 * millimetre, 1e-9);
 }
 
+// The third difference of block means of x = c t^3 / 6 is c exactly. At rest and at constant speed there is none.
+TEST(Score, JerkOfACubicIsItsThirdDerivative)
+{
+    constexpr double c = 12.0;  // [m/s^3]
+    JerkMeter cubic, straight;
+    for (int i = 0; i < 2000; ++i) {
+        const double t = i * 1e-3;
+        cubic.add({0, c * t * t * t / 6, 0}, 1000);
+        straight.add({0.02 * t, 0, 0}, 1000);
+    }
+    EXPECT_NEAR(cubic.rms(), c, 1e-6);
+    EXPECT_NEAR(straight.rms(), 0, 1e-6);
+}
+
+// 2 N held against over 40 mm are 80 mJ; on the way back with the force the tissue gives them again.
+TEST(Score, WorkOnTheTissueIsForceTimesWay)
+{
+    auto ticks = along({{0, 0.001}, {1, 0.041}});
+    for (TickRecord& tick : ticks) {
+        tick.basic = {0, -2, 0};
+    }
+    EXPECT_NEAR(scoreTicks(ticks).tissueWork, 0.08, 1e-9);
+    ticks = along({{0, 0.001}, {1, 0.041}, {2, 0.001}});
+    for (TickRecord& tick : ticks) {
+        tick.basic = {0, -2, 0};
+    }
+    EXPECT_NEAR(scoreTicks(ticks).tissueWork, 0.0, 1e-9);
+}
+
+// Two marks 12 mm apart across the finger, their middle 5 mm beside the target's; how deep a mark is does not count.
+TEST(Score, MarksAreJudgedAcrossTheTool)
+{
+    SessionInfo info = synthetic::info();
+    info.extra.emplace_back(targetShapeKey, toText({{0.01, 0.02, 0}, {0, 1, 0}, 0.010}));
+    Scorer scorer(info);
+    auto ticks = along({{0, -0.03}, {1, -0.01}});
+    ticks[100].device = {.position = {0.009, -0.01, 0}, .buttons = buttonMark};
+    ticks[200].device = {.position = {0.021, -0.03, 0}, .buttons = buttonMark};
+    ticks[201].device = ticks[200].device;  // still pressed
+    for (const TickRecord& tick : ticks) {
+        scorer.add(tick);
+    }
+    const Score s = scorer.score();
+    EXPECT_EQ(s.marks, 2U);
+    EXPECT_NEAR(s.markError, 5e-3, 1e-9);
+    EXPECT_NEAR(s.markSizeError, 2e-3, 1e-9);
+}
+
 // Back out again it is 40 mm more; a turn costs at most two steps of 0.2 mm, on leaving at most a tick.
 TEST(Score, PathInsideIsInAndOut)
 {

@@ -68,6 +68,44 @@ TEST(Servo, GapIsCountedAndNotMadeUp)
     EXPECT_LE(timing.lateness.quantile(0.5), 1e-3);
 }
 
+// Two gaps of 20 and 40 ms, far from each other, and three ticks that take 3 ms each.
+TEST(Servo, GapsAndOverrunsAreCounted)
+{
+    struct Slow final : Device {
+        DeviceSample read() noexcept override { return {}; }
+        void write(Vec3) noexcept override
+        {
+            const bool slow = ++tick == 200 || tick == 220 || tick == 240;
+            std::this_thread::sleep_for(std::chrono::milliseconds(slow ? 3 : 0));
+        }
+        bool finished() const noexcept override { return tick >= 300; }
+        int tick = 0;
+    } device;
+    Simulation simulation(tests::blockSphere());
+    const auto sink = [&](const TickRecord& r, const ServoTiming&) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(r.tick == 50 ? 20 : r.tick == 120 ? 40 : 0));
+    };
+    const std::atomic<bool> stop{false};
+    const auto timing = runServo(device, simulation, {true, 0.0}, sink, stop);
+    EXPECT_GE(timing.overruns, 3U);
+    EXPECT_GE(timing.gaps, 5U);
+    EXPECT_GE(timing.longestGap, 39U);
+    EXPECT_GE(timing.missed, 19U + 39U + 3U * 3U);
+    EXPECT_LE(timing.gaps, timing.missed);
+    EXPECT_LE(timing.longestGap, timing.missed);
+}
+
+// Faster than real time there is no clock to miss.
+TEST(Servo, AnUnpacedLoopMissesNothing)
+{
+    Rig rig;
+    const auto sink = [](const TickRecord& r, const ServoTiming&) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(r.tick == 50 ? 5 : 0));
+    };
+    const auto timing = runServo(rig.hand, rig.simulation, {false, 0.1}, sink, rig.stop);
+    EXPECT_EQ(timing.missed + timing.overruns + timing.gaps + timing.longestGap, 0U);
+}
+
 TEST(Servo, StopsWhenAskedAndWhenTheDeviceHasFinished)
 {
     Rig rig(0.1);

@@ -1,40 +1,70 @@
+#include <tests/allocations.h>
+
 #include <haptics/stabiliser.h>
 
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 
 namespace palpate::haptics {
 namespace {
 
-constexpr double dt = 1e-3;
-constexpr double cap = 8.5;
+const StabiliserOptions premium;
 
-DeviceSample held()
+DeviceSample heldAt(Vec3 position)
 {
     DeviceSample s;
+    s.position = position;
     s.buttons = buttonDeadMan;
     return s;
 }
 
-// Whatever is asked for: never over the cap, never a larger step than both channels' slew, and the sum is the sum.
-TEST(Stabiliser, RandomForcesStayUnderCapAndSlew)
+SentForce sendFor(double seconds, Vec3 basic, const DeviceSample& sample, const StabiliserOptions& o, StabiliserState& s)
+{
+    SentForce sent;
+    for (int i = 0; i < static_cast<int>(std::lround(seconds / o.period)); ++i) {
+        sent = stabilise(basic, Vec3(0.0), sample, o, s);
+    }
+    return sent;
+}
+
+// Whatever is asked for and however the pose moves: never over the cap, and never a larger change than the slew, save that
+// a force may fall by the stable stiffness times the motion and ends at once with the dead-man switch.
+TEST(Stabiliser, HostileInputStaysUnderCapAndSlew)
 {
     std::mt19937 random(11);
-    std::normal_distribution<double> size(0.0, 20.0);
-    StabiliserState state;
-    Vec3 before(0.0);
-    for (int i = 0; i < 20000; ++i) {
-        const auto pick = [&] { return Vec3(size(random), size(random), size(random)); };
-        const auto sent = stabilise(pick(), pick(), held(), cap, dt, state);
-        const Vec3 total = sent.basic + sent.additional;
-        ASSERT_LE(glm::length(total), cap * (1 + 1e-12));
-        ASSERT_LE(glm::length(total - before), 2 * 0.05 * cap + dt / 0.5 * cap + 1e-9);
-        before = total;
+    std::normal_distribution<double> normal(0.0, 1.0);
+    std::uniform_real_distribution<double> chance(0.0, 1.0);
+    for (const auto& name : deviceNames()) {
+        for (const double rate : {500.0, 1000.0, 4000.0}) {
+            const StabiliserOptions o{deviceParameters(name), 1.0 / rate, 8.5};
+            const double cap = std::min(8.5, o.device.peakForce);
+            StabiliserState state;
+            DeviceSample sample = heldAt(Vec3(0.0));
+            Vec3 before(0.0), velocity(0.0);
+            for (int i = 0; i < 10000; ++i) {
+                const auto pick = [&] { return Vec3(normal(random), normal(random), normal(random)); };
+                velocity = 0.9 * velocity + 0.1 * pick();
+                const Vec3 way = chance(random) < 1e-3 ? 0.05 * pick() : velocity * o.period;
+                sample.position += way;
+                sample.fresh = chance(random) > 0.02;
+                sample.buttons = chance(random) > 1e-3 ? buttonDeadMan : 0U;
+                const Vec3 total = stabilise(10.0 * pick(), 3.0 * pick(), sample, o, state).total();
+                ASSERT_LE(glm::length(total), cap * (1 + 1e-12));
+                const bool falls = glm::length(total) < glm::length(before);
+                const double fall = falls ? stableLimits(o).stiffness * glm::length(way) : 0.0;
+                if (sample.buttons != 0) {
+                    ASSERT_LE(glm::length(total - before), 50.0 * cap * o.period + fall + 1e-9);
+                }
+                before = total;
+            }
+        }
     }
 }
 
@@ -42,14 +72,9 @@ TEST(Stabiliser, RandomForcesStayUnderCapAndSlew)
 TEST(Stabiliser, OverloadDoesNotWindUp)
 {
     StabiliserState state;
-    for (int i = 0; i < 2000; ++i) {
-        stabilise(Vec3(0, 1000, 0), Vec3(30, 0, 0), held(), cap, dt, state);
-    }
-    SentForce sent;
-    for (int i = 0; i < 20; ++i) {
-        sent = stabilise(Vec3(0.0), Vec3(0.0), held(), cap, dt, state);
-    }
-    EXPECT_LT(glm::length(sent.basic + sent.additional), 1e-12);
+    sendFor(2, {0, 1000, 0}, heldAt(Vec3(0.0)), premium, state);
+    const auto sent = sendFor(0.021, Vec3(0.0), heldAt(Vec3(0.0)), premium, state);
+    EXPECT_LT(glm::length(sent.total()), 1e-12);
 }
 
 // Below the limits, and once the ramp is up, the force passes unchanged.
@@ -58,51 +83,243 @@ TEST(Stabiliser, SteadyForcePassesUnchanged)
     StabiliserState state;
     SentForce sent;
     for (int i = 0; i < 1000; ++i) {
-        sent = stabilise(Vec3(1.5, -2.0, 0.25), Vec3(0.5, 0, 0), held(), cap, dt, state);
+        sent = stabilise(Vec3(1.5, -2.0, 0.25), Vec3(0.5, 0, 0), heldAt(Vec3(0.0)), premium, state);
     }
     EXPECT_EQ(sent.basic, Vec3(1.5, -2.0, 0.25));
     EXPECT_EQ(sent.additional, Vec3(0.5, 0, 0));
 }
 
+// A slow press of 20 mm/s into tissue and out again passes within 1 % of the force, tick by tick.
+TEST(Stabiliser, SlowPressIsNotDulled)
+{
+    for (const auto& name : deviceNames()) {
+        for (const double rate : {1000.0, 4000.0}) {
+            const StabiliserOptions o{deviceParameters(name), 1.0 / rate, 8.5};
+            for (const double stiffness : {100.0, 300.0, 600.0, 800.0}) {
+                if (stiffness * o.device.encoder > 0.9 * 50.0 * o.period * std::min(8.5, o.device.peakForce)) {
+                    continue;  // one step of the encoder is more than the slew
+                }
+                StabiliserState state;
+                sendFor(0.6, Vec3(0.0), heldAt(Vec3(0.0)), o, state);
+                const double deepest = 0.9 * std::min(8.5, o.device.peakForce) / stiffness;
+                for (double way = 0.0; way < 2 * deepest; way += 0.02 * o.period) {
+                    const double x = way < deepest ? way : 2 * deepest - way;
+                    const double read = std::round(x / o.device.encoder) * o.device.encoder;
+                    const double force = -stiffness * read;
+                    const auto sent = stabilise({force, 0, 0}, Vec3(0.0), heldAt({read, 0, 0}), o, state);
+                    ASSERT_LE(std::abs(sent.total().x - force), 0.01 * std::abs(force)) << name << rate << " " << stiffness;
+                }
+            }
+        }
+    }
+}
+
+// The ramp: g(t) = t / 0.5 s, whatever the rate.
+TEST(Stabiliser, RampRisesInHalfASecond)
+{
+    for (const double rate : {500.0, 1000.0, 4000.0}) {
+        const StabiliserOptions o{deviceParameters("premium"), 1.0 / rate, 8.5};
+        StabiliserState state;
+        EXPECT_NEAR(sendFor(0.25, {4, 0, 0}, heldAt(Vec3(0.0)), o, state).total().x, 2.0, 1e-6);
+        EXPECT_NEAR(sendFor(0.25, {4, 0, 0}, heldAt(Vec3(0.0)), o, state).total().x, 4.0, 1e-6);
+    }
+}
+
 TEST(Stabiliser, LiftedDeadManSwitchZeroesTheForceAtOnce)
 {
     StabiliserState state;
-    for (int i = 0; i < 1000; ++i) {
-        stabilise(Vec3(5, 0, 0), Vec3(0.0), held(), cap, dt, state);
-    }
-    const auto sent = stabilise(Vec3(5, 0, 0), Vec3(0.0), DeviceSample{}, cap, dt, state);
-    EXPECT_EQ(sent.basic, Vec3(0.0));
+    sendFor(1, {5, 0, 0}, heldAt(Vec3(0.0)), premium, state);
+    EXPECT_EQ(stabilise(Vec3(5, 0, 0), Vec3(0.0), DeviceSample{}, premium, state).total(), Vec3(0.0));
+    // And back it ramps.
+    EXPECT_NEAR(sendFor(0.1, {5, 0, 0}, heldAt(Vec3(0.0)), premium, state).total().x, 5 * 0.1 / 0.5, 1e-6);
 }
 
+// The watchdog: g falls by t / 50 ms while poses are stale, and rises by t / 0.5 s when they are back.
 TEST(Stabiliser, StalePosesFadeTheForceInFiftyMilliseconds)
 {
+    for (const double rate : {500.0, 1000.0, 4000.0}) {
+        const StabiliserOptions o{deviceParameters("premium"), 1.0 / rate, 8.5};
+        StabiliserState state;
+        sendFor(1, {5, 0, 0}, heldAt(Vec3(0.0)), o, state);
+        auto stale = heldAt(Vec3(0.0));
+        stale.fresh = false;
+        EXPECT_NEAR(sendFor(0.02, {5, 0, 0}, stale, o, state).total().x, 5 * (1 - 0.02 / 0.05), 1e-6);
+        EXPECT_NEAR(sendFor(0.03, {5, 0, 0}, stale, o, state).total().x, 0.0, 1e-6);
+        EXPECT_NEAR(sendFor(0.1, {5, 0, 0}, heldAt(Vec3(0.0)), o, state).total().x, 5 * 0.1 / 0.5, 1e-6);
+    }
+}
+
+// No hand moves at 10 m/s: such a pose is stale until it has held still for 20 ms.
+TEST(Stabiliser, PoseThatJumpsIsStaleUntilItHoldsStill)
+{
     StabiliserState state;
-    for (int i = 0; i < 1000; ++i) {
-        stabilise(Vec3(5, 0, 0), Vec3(0.0), held(), cap, dt, state);
-    }
-    auto stale = held();
-    stale.fresh = false;
-    SentForce sent;
-    double before = 5.0;
-    for (int i = 0; i < 51; ++i) {
-        sent = stabilise(Vec3(5, 0, 0), Vec3(0.0), stale, cap, dt, state);
-        EXPECT_LE(sent.basic.x, before);
-        EXPECT_GT(sent.basic.x, before - 0.2);
-        before = sent.basic.x;
-    }
-    EXPECT_NEAR(sent.basic.x, 0.0, 1e-9);
+    sendFor(1, {5, 0, 0}, heldAt(Vec3(0.0)), premium, state);
+    EXPECT_NEAR(sendFor(0.001, {5, 0, 0}, heldAt({0.011, 0, 0}), premium, state).total().x, 5 * (1 - 0.02), 1e-6);
+    EXPECT_NEAR(sendFor(0.019, {5, 0, 0}, heldAt({0.011, 0, 0}), premium, state).total().x, 5 * (1 - 0.4), 1e-6);
+    EXPECT_NEAR(sendFor(0.02, {5, 0, 0}, heldAt({0.011, 0, 0}), premium, state).total().x, 5 * (1 - 0.4 + 0.04), 0.02);
 }
 
 TEST(Stabiliser, NonFiniteForceIsNeverSentAndLatches)
 {
     for (const double bad : {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
         StabiliserState state;
-        stabilise(Vec3(1, 0, 0), Vec3(0.0), held(), cap, dt, state);
-        EXPECT_TRUE(stabilise(Vec3(0, bad, 0), Vec3(0.0), held(), cap, dt, state).faulted);
-        const auto later = stabilise(Vec3(1, 0, 0), Vec3(0.0), held(), cap, dt, state);
+        stabilise(Vec3(1, 0, 0), Vec3(0.0), heldAt(Vec3(0.0)), premium, state);
+        EXPECT_TRUE(stabilise(Vec3(0, bad, 0), Vec3(0.0), heldAt(Vec3(0.0)), premium, state).faulted);
+        const auto later = stabilise(Vec3(1, 0, 0), Vec3(0.0), heldAt(Vec3(0.0)), premium, state);
         EXPECT_TRUE(later.faulted);
-        EXPECT_EQ(later.basic + later.additional, Vec3(0.0));
+        EXPECT_EQ(later.total(), Vec3(0.0));
     }
+}
+
+// With an ideal device the ledger is the work of its motors, to the last bit of rounding, whole periods of delay or none.
+TEST(Stabiliser, LedgerIsTheWorkOfTheMotors)
+{
+    for (const double delay : {0.0, 3e-3}) {
+        DeviceParameters device;
+        device.delay = delay;
+        const StabiliserOptions o{device, tickSeconds, 8.5};
+        StabiliserState state;
+        Arm arm(device, Grip{}, Vec3(0.0));
+        for (int i = 0; i < 3000; ++i) {
+            arm.pull({0.03 * std::sin(0.004 * i), 0.02 * std::sin(0.007 * i), 0});
+            const Vec3 x = arm.read();
+            const auto sent = stabilise(-150.0 * x, {0, 0.2, 0}, heldAt(x), o, state);
+            ASSERT_NEAR(state.ledger.given, arm.work(), 1e-9);
+            arm.write(sent.total());
+        }
+        EXPECT_GT(std::abs(arm.work()), 1e-3);
+    }
+}
+
+// A steady motion read in encoder steps: the window gives its speed within a step over its own length, and the stiffness.
+TEST(Stabiliser, WindowFindsSpeedAndStiffness)
+{
+    constexpr double encoder = 0.03e-3;
+    for (const double speed : {0.02, 0.1, 0.5}) {
+        MotionWindow window;
+        for (int i = 0; i < 40; ++i) {
+            const double x = std::round(speed * 1e-3 * i / encoder) * encoder;
+            window.newest = (window.newest + 1) % window.longest;
+            window.count = std::min(window.count + 1, window.longest);
+            window.position[window.newest] = {x, 0, 0};
+            window.force[window.newest] = {-700 * x, 0, 0};
+        }
+        const auto motion = motionIn(window, encoder, 1e-3);
+        EXPECT_NEAR(motion.velocity.x, speed, encoder / 4e-3);
+        EXPECT_NEAR(motion.stiffness, 700, 1e-6);
+    }
+}
+
+// A wall at x = 0 (or a spring about it), pressed by the hand with up to 4 N, and held or let go after two seconds.
+struct Loop {
+    std::string device;
+    double rate;
+    double stiffness;
+    bool letGo;
+    bool bothWays;
+};
+
+struct Course {
+    double made = 0;   // most that the loop ever gave beyond what it got and its friction took [J]
+    double early = 0;  // peak to peak, just after two seconds [m]
+    double late = 0;   // and in the last half second [m]
+};
+
+Course run(const Loop& loop, bool stabilised)
+{
+    const auto& device = deviceParameters(loop.device);
+    const StabiliserOptions o{device, 1.0 / loop.rate, 8.5};
+    StabiliserState state;
+    const double start = loop.bothWays ? 0.0 : -2e-3;
+    Arm arm(device, Grip{}, {start, 0, 0}, o.period);
+    Course course;
+    double low[2] = {1, 1}, high[2] = {-1, -1};
+    const int ticks = static_cast<int>(4 * loop.rate);
+    for (int i = 0; i < ticks; ++i) {
+        const double t = i * o.period;
+        arm.pull({std::clamp(start + 0.05 * (t - 0.6), start, 10e-3), 0, 0});
+        if (loop.letGo && 2 * i == ticks) {
+            arm.letGo();
+        }
+        const Vec3 x = arm.read();
+        const Vec3 wall = {-loop.stiffness * (loop.bothWays ? x.x : std::max(0.0, x.x)), 0, 0};
+        arm.write(stabilised ? stabilise(wall, Vec3(0.0), heldAt(x), o, state).total() : wall);
+        course.made = std::max(course.made, arm.work() - arm.friction());
+        const int part = t > 3.5 ? 1 : 0;
+        if (t > 3.5 || (t > 2.05 && t < 2.3)) {
+            low[part] = std::min(low[part], arm.position().x);
+            high[part] = std::max(high[part], arm.position().x);
+        }
+    }
+    course.early = high[0] - low[0];
+    course.late = high[1] - low[1];
+    return course;
+}
+
+// Walls of 100 to 5000 N/m, gripped and let go at full load, on every device and at every rate: what moves decays, and no
+// energy comes out of the loop.
+TEST(Stabiliser, NoWallGivesEnergy)
+{
+    for (const auto& device : deviceNames()) {
+        for (const double rate : {500.0, 1000.0, 4000.0}) {
+            for (const double stiffness : {100.0, 600.0, 1000.0, 2000.0, 5000.0}) {
+                for (const bool letGo : {false, true}) {
+                    const auto course = run({device, rate, stiffness, letGo, false}, true);
+                    const auto what = device + " " + std::to_string(rate) + " " + std::to_string(stiffness) +
+                                      (letGo ? " let go" : " gripped");
+                    EXPECT_LT(course.made, 1e-3) << what;
+                    EXPECT_LT(course.late, std::max(0.1e-3, 0.5 * course.early)) << what;
+                }
+            }
+        }
+    }
+}
+
+// A spring that nobody holds has nothing but the controller to calm it.
+TEST(Stabiliser, SpringsLetGoAtFullLoadDecay)
+{
+    for (const auto& device : deviceNames()) {
+        for (const double rate : {1000.0, 4000.0}) {
+            for (const double stiffness : {100.0, 600.0, 1000.0, 2000.0, 5000.0}) {
+                const auto course = run({device, rate, stiffness, true, true}, true);
+                EXPECT_LT(course.made, 1e-3) << device << rate << " " << stiffness;
+                EXPECT_LT(course.late, std::max(0.05e-3, 0.5 * course.early)) << device << rate << " " << stiffness;
+            }
+        }
+    }
+}
+
+// The same loops without the stabiliser give energy by the joule: the tests above can fail.
+TEST(Stabiliser, WithoutItTheSameLoopsGrow)
+{
+    EXPECT_GT(run({"premium", 1000, 600, true, true}, false).made, 0.1);
+    EXPECT_GT(run({"premium", 500, 5000, false, false}, false).made, 0.1);
+    EXPECT_GT(run({"falcon", 1000, 5000, true, false}, false).made, 0.05);
+    EXPECT_GT(run({"falcon", 500, 5000, false, false}, false).made, 0.1);
+    EXPECT_GT(run({"touch", 500, 1000, true, true}, false).made, 0.03);
+}
+
+// Tissue that pushes out harder than it was pressed in gives energy in every stroke. The guard stops it near 1 mJ.
+TEST(Stabiliser, GuardStopsTissueThatGivesEnergy)
+{
+    StabiliserState state;
+    sendFor(0.6, Vec3(0.0), heldAt(Vec3(0.0)), premium, state);
+    double most = 0.0;
+    for (int i = 0; i < 20000; ++i) {
+        const double phase = 2 * 3.14159265358979 * 1e-3 * i;
+        const double x = 5e-3 * (1 - std::cos(phase));
+        const double force = -(std::sin(phase) > 0.0 ? 100.0 : 200.0) * x;
+        stabilise({force, 0, 0}, Vec3(0.0), heldAt({x, 0, 0}), premium, state);
+        most = std::max(most, state.ledger.given);
+    }
+    // Unguarded it would be 20 strokes of 5 mJ.
+    EXPECT_LT(most, 3e-3);
+}
+
+TEST(Stabiliser, AllocatesNothing)
+{
+    StabiliserState state;
+    EXPECT_EQ(tests::heapCallsIn([&] { sendFor(1, {1, 2, 3}, heldAt(Vec3(0.0)), premium, state); }), 0U);
 }
 
 }  // namespace

@@ -192,6 +192,25 @@ TEST(Modulus, OfAHalfAndHalfCellIsTheRootOfArithmeticTimesHarmonicMean)
     EXPECT_NEAR(at(1, 3), std::sqrt(3.25e3 * 43.7e3), 1e-1) << "half of the cell is air";
 }
 
+// A cell with bone is a layer of what is not bone, as much stiffer as it is thinner.
+TEST(Material, OfACellThatIsPartlyHeldIsAThinnerLayer)
+{
+    std::vector<LabelName> labels = names();
+    labels.push_back({9, "rib", "bone"});
+    const LabelImage image = voxelise({8, 8, 8}, straight(Vec3(1e-3)), [](Vec3 p) {
+        return p.x < 2.5e-3 ? 1 : p.x < 4.5e-3 ? 9 : 0;
+    });
+    const Tissue tissue = Tissue::fromLabels(image, table(), labels, {});
+    const NodeGrid grid{{3, 3, 3}, Vec3(0.5e-3, 1.5e-3, 1.5e-3), 2e-3};  // cells of two voxels
+    const auto cells = tissue.materialOn(grid);
+    const auto at = [&](int x) { return cells[grid.offset({x, 1, 1})]; };
+    EXPECT_NEAR(at(0).youngsModulus, 3.25e3, 1e-2);
+    EXPECT_EQ(at(0).fixed, 0.0F);
+    EXPECT_NEAR(at(1).youngsModulus, 2.0 * 3.25e3, 1e-2);
+    EXPECT_NEAR(at(1).fixed, 0.5, 1e-6);
+    EXPECT_EQ(at(2).fixed, 1.0F) << "half of the cell is air, and all of its tissue is held";
+}
+
 TEST(Modulus, CellsWithoutTissueTakeTheNearestTissue)
 {
     const LabelImage image = voxelise({20, 20, 20}, straight(Vec3(1e-3)), [](Vec3 p) {

@@ -1,4 +1,4 @@
-#include <apps/viewer_process.h>
+#include <apps/child_process.h>
 
 #include <signal.h>
 #include <spawn.h>
@@ -20,37 +20,43 @@ std::filesystem::path programFolder()
     return std::filesystem::read_symlink("/proc/self/exe").parent_path();
 }
 
-ViewerProcess::ViewerProcess(const std::vector<std::string>& arguments)
+ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy)
 {
-    const std::string program = (programFolder() / "palpate-view").string();
     std::vector<char*> argv{const_cast<char*>(program.c_str())};
     for (const auto& a : arguments) {
         argv.push_back(const_cast<char*>(a.c_str()));
     }
     argv.push_back(nullptr);
 
-    // A group of its own: Ctrl-C ends the session, and the viewer then ends with it.
+    // A group of its own: Ctrl-C ends this program, and the other then ends with it.
     posix_spawnattr_t attributes;
     posix_spawnattr_init(&attributes);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    const int error = posix_spawn(&pid_, program.c_str(), nullptr, &attributes, argv.data(), environ);
+    const int error = posix_spawnp(&pid_, program.c_str(), nullptr, &attributes, argv.data(), environ);
     posix_spawnattr_destroy(&attributes);
     if (error != 0) {
         pid_ = -1;
-        throw std::runtime_error(program + ": the viewer cannot be started (" + std::strerror(error) +
-                                 "); build it with -DPALPATE_VIEWER=ON, or run with --no-view");
+        throw std::runtime_error(program + ": cannot be started (" + std::strerror(error) + "); " + remedy);
     }
 }
 
-ViewerProcess::~ViewerProcess()
+ChildProcess::~ChildProcess()
 {
     if (pid_ > 0) {
         kill(pid_, SIGTERM);
+        kill(pid_, SIGCONT);  // what is stopped takes no other signal
         wait(2.0);
     }
 }
 
-int ViewerProcess::wait(double seconds)
+void ChildProcess::stall(bool stopped) noexcept
+{
+    if (pid_ > 0) {
+        kill(pid_, stopped ? SIGSTOP : SIGCONT);
+    }
+}
+
+int ChildProcess::wait(double seconds)
 {
     using Clock = std::chrono::steady_clock;
     const auto end = Clock::now() + std::chrono::duration<double>(seconds);

@@ -1,0 +1,214 @@
+#include <datasets/insert.h>
+
+#include <datasets/phantom_parts.h>
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+namespace palpate::datasets {
+
+namespace {
+
+using volume::LabelImage;
+using volume::Role;
+using volume::Tissue;
+
+constexpr double farthest = 5000.0;  // a coordinate from the origin [mm]
+constexpr int surfaceSamples = 200;  // of a lesion that looks for room
+
+LabelImage labelsOf(const Tissue& tissue)
+{
+    LabelImage image;
+    image.size = tissue.size();
+    image.affine = tissue.affine();
+    image.values.resize(static_cast<std::size_t>(image.size.x) * static_cast<std::size_t>(image.size.y) *
+                        static_cast<std::size_t>(image.size.z));
+    tbb::parallel_for(tbb::blocked_range<int>(0, image.size.z, 4), [&](const tbb::blocked_range<int>& slab) {
+        const Tissue::Reader reader(tissue);
+        for (int k = slab.begin(); k < slab.end(); ++k) {
+            for (int j = 0; j < image.size.y; ++j) {
+                for (int i = 0; i < image.size.x; ++i) {
+                    image.values[image.offset({i, j, k})] = reader.label(image.affine.toPatient(Vec3(i, j, k)));
+                }
+            }
+        }
+    });
+    return image;
+}
+
+// Whether a point [m] lies in an insert.
+class Shape {
+public:
+    explicit Shape(const Insert& insert) : insert_(insert), end_(insert.to.value_or(insert.centre))
+    {
+        if (insert.spiculated) {
+            Random random(insert.seed);
+            lump_ = makeLump(insert.tissue, insert.diameter * 1e3, random);
+        }
+    }
+
+    double bound() const noexcept { return insert_.spiculated ? lump_.bound * 1e-3 : insert_.diameter / 2; }
+    Vec3 low() const noexcept { return glm::min(insert_.centre, end_) - bound(); }
+    Vec3 high() const noexcept { return glm::max(insert_.centre, end_) + bound(); }
+
+    bool holds(Vec3 p) const noexcept
+    {
+        const Vec3 along = end_ - insert_.centre;
+        const double length2 = glm::dot(along, along);
+        const double t = length2 > 0.0 ? std::clamp(glm::dot(p - insert_.centre, along) / length2, 0.0, 1.0) : 0.0;
+        const Vec3 away = p - (insert_.centre + t * along);
+        const double distance = glm::length(away);
+        if (!insert_.spiculated || distance <= 0.0) {
+            return distance <= insert_.diameter / 2;
+        }
+        return distance * 1e3 < lump_.reach(away / distance);
+    }
+
+private:
+    const Insert& insert_;
+    Vec3 end_;
+    Lump lump_;
+};
+
+// Gives the voxels of the shape that hold tissue a new label; returns how many. `inside` says by label what holds tissue.
+std::size_t draw(LabelImage& image, const Shape& shape, const std::vector<char>& inside, std::uint16_t label)
+{
+    const Vec3 low = shape.low(), high = shape.high();
+    Vec3 first(1e9), last(-1e9);
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 p((corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y,
+                     (corner & 4) != 0 ? high.z : low.z);
+        const Vec3 index = image.affine.toIndex(p);
+        first = glm::min(first, index);
+        last = glm::max(last, index);
+    }
+    const Index3 from = glm::clamp(Index3(glm::floor(first)), Index3(0), image.size - 1);
+    const Index3 to = glm::clamp(Index3(glm::ceil(last)), Index3(0), image.size - 1);
+    std::size_t count = 0;
+    volume::forEachIndex(from, to, [&](Index3 n) {
+        std::uint16_t& value = image.values[image.offset(n)];
+        if (inside[value] != 0 && shape.holds(image.affine.toPatient(Vec3(n)))) {
+            value = label;
+            ++count;
+        }
+    });
+    return count;
+}
+
+bool roomFor(const Tissue& tissue, const Tissue::Reader& reader, const Insert& lesion)
+{
+    const double radius = Shape(lesion).bound();
+    Random random(1);
+    for (int i = 0; i < surfaceSamples; ++i) {
+        const Vec3 d = random.direction();
+        for (const double share : {0.5, 1.0}) {
+            const auto& row = tissue.table().rows[reader.tissue(lesion.centre + share * radius * d)];
+            if (row.role == Role::air || row.role == Role::skin || row.role == Role::bone || row.fixed) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+Vec3 parsePoint(const std::string& line, const std::string& where)
+{
+    Vec3 p(0.0);
+    const char* at = line.data();
+    const char* const end = line.data() + line.find_last_not_of(" \t\r") + 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto [rest, error] = std::from_chars(at, end, p[axis]);
+        const bool separated = axis == 2 ? rest == end : rest != end && *rest == ',';
+        if (error != std::errc() || !separated || !(std::abs(p[axis]) <= farthest)) {
+            throw std::runtime_error(fmt::format("{}: '{}': must be three numbers x,y,z [mm], each -{:g} to {:g}", where,
+                                                 line, farthest, farthest));
+        }
+        at = rest + 1;
+    }
+    return p * 1e-3;
+}
+
+}  // namespace
+
+Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
+{
+    LabelImage image = labelsOf(tissue);
+    std::vector<volume::LabelName> names;
+    std::vector<char> inside(65536, 0);
+    std::uint16_t next = 1;
+    for (const volume::Structure& s : tissue.structures()) {
+        names.push_back({s.value, s.name, tissue.table().rows[s.tissue].name});
+        inside[s.value] = tissue.table().rows[s.tissue].role == Role::air ? 0 : 1;
+        next = std::max<std::uint16_t>(next, static_cast<std::uint16_t>(s.value + 1));
+    }
+    auto provenance = tissue.provenance();
+    for (const Insert& insert : inserts) {
+        if (!tissue.table().find(insert.tissue)) {
+            throw std::runtime_error(
+                fmt::format("insert '{}': tissue '{}' is not in the volume's tissue table", insert.name, insert.tissue));
+        }
+        const bool known = std::any_of(names.begin(), names.end(), [&](const auto& n) { return n.name == insert.name; });
+        if (known) {
+            throw std::runtime_error(
+                fmt::format("insert '{}': the volume has a structure of this name: choose another name", insert.name));
+        }
+        if (draw(image, Shape(insert), inside, next) == 0) {
+            const Vec3 c = insert.centre * 1e3;
+            throw std::runtime_error(fmt::format("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume",
+                                                 insert.name, c.x, c.y, c.z));
+        }
+        names.push_back({next, insert.name, insert.tissue});
+        inside[next++] = 1;
+        provenance.emplace_back("insert", insert.name);
+    }
+    return Tissue::fromLabels(image, tissue.table(), names, std::move(provenance));
+}
+
+std::vector<Vec3> loadLocations(const std::filesystem::path& file)
+{
+    std::ifstream in(file);
+    if (!in) {
+        throw std::runtime_error(file.string() + ": locations cannot be read: give the .loc file of the phantom");
+    }
+    std::vector<Vec3> places;
+    std::string line;
+    for (int number = 1; std::getline(in, line); ++number) {
+        if (line.find_first_not_of(" \t\r") != std::string::npos) {
+            places.push_back(parsePoint(line, fmt::format("{}:{}", file.string(), number)));
+        }
+    }
+    if (places.empty()) {
+        throw std::runtime_error(file.string() + ": holds no locations, one x,y,z [mm] per line");
+    }
+    return places;
+}
+
+Insert placeLesion(const Tissue& tissue, const std::filesystem::path& locations, Insert lesion)
+{
+    const std::vector<Vec3> places = loadLocations(locations);
+    const Tissue::Reader reader(tissue);
+    const std::size_t first = Random(lesion.seed).bits() % places.size();
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        lesion.centre = places[(first + i) % places.size()];
+        if (roomFor(tissue, reader, lesion)) {
+            return lesion;
+        }
+    }
+    throw std::runtime_error(fmt::format(
+        "{}: at none of its {} places does a lesion of {:g} mm lie wholly in the volume's tissue: is it of this "
+        "volume? else choose a smaller one",
+        locations.string(), places.size(), lesion.diameter * 1e3));
+}
+
+}  // namespace palpate::datasets

@@ -1,0 +1,180 @@
+#include <experiments/stability/fuzz.h>
+
+#include <datasets/phantom_random.h>
+#include <haptics/stabiliser.h>
+#include <haptics/tick.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <limits>
+
+namespace palpate::experiments {
+
+namespace {
+
+using datasets::Random;
+
+constexpr double rounding = 1e-9;  // of the cap
+// Of the stabiliser, in caps [1/s]; beside it, on the way out the force may fall with the motion.
+constexpr double slewPerSecond = 50.0;
+constexpr std::array<int, 4> rates{500, 1000, 2000, 4000};
+// A body of each sort: all others are these again, turned or thicker.
+constexpr std::array<const char*, 8> scenes{"plate-1mm",   "outer-60deg",     "inner-60deg", "slide-30deg-20mm_s",
+                                            "tumour-step", "puncture-energy", "wall-rest",   "let-go"};
+
+struct Session {
+    Cell cell;
+    int ticks = 0;
+};
+
+Session sessionOf(Random& random)
+{
+    static constexpr std::array<const char*, 3> levels{"elastic", "chainmail", "spring"};
+    const auto devices = haptics::deviceNames();
+    const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random.bits() % n); };
+    Session s;
+    s.cell = {scenes[pick(scenes.size())], levels[pick(levels.size())], devices[pick(devices.size())], true,
+              rates[pick(rates.size())]};
+    s.ticks = static_cast<int>(random.between(0.2, 0.5) * s.cell.rate);
+    return s;
+}
+
+// A hand that does what no hand does.
+class Hostile {
+public:
+    Hostile(Random& random, double period) : random_(random), period_(period)
+    {
+        position_ = Vec3(random_.between(-12, 12), random_.between(-6, 6), random_.between(-6, 6)) * 1e-3;
+        sample_.axis = Vec3(0, 1, 0);
+        sample_.buttons = haptics::buttonDeadMan;
+    }
+
+    haptics::DeviceSample next()
+    {
+        velocity_ += random_.between(0.0, 2.0) * std::sqrt(period_) * random_.direction();
+        velocity_ -= 40.0 * period_ * position_ + 2.0 * period_ * velocity_;
+        position_ += period_ * velocity_;
+        if (chance(0.01)) {
+            position_ = random_.between(0.0, 0.04) * random_.direction();
+        }
+        sample_.fresh = true;
+        if (stale_ > 0 || chance(0.01)) {
+            stale_ = stale_ > 0 ? stale_ - 1 : static_cast<int>(random_.between(1, 60));
+            sample_.fresh = false;
+            return sample_;
+        }
+        sample_.position = position_ + (chance(0.2) ? 5e-4 * random_.direction() : Vec3(0.0));
+        if (chance(0.02)) {
+            sample_.axis = random_.direction();
+        }
+        flicker(haptics::buttonDeadMan, 0.01, 0.2);
+        flicker(haptics::buttonFire, 0.1, 0.02);
+        flicker(haptics::modelTooSlow, 1.0, 0.002);
+        haptics::DeviceSample given = sample_;
+        if (chance(0.0005)) {
+            spoil(given);
+        }
+        return given;
+    }
+
+private:
+    bool chance(double share) { return random_.between(0, 1) < share; }
+
+    void flicker(std::uint32_t button, double off, double on)
+    {
+        const bool down = (sample_.buttons & button) != 0;
+        if (chance(down ? off : on)) {
+            sample_.buttons ^= button;
+        }
+    }
+
+    void spoil(haptics::DeviceSample& given)
+    {
+        constexpr double infinity = std::numeric_limits<double>::infinity();
+        const std::array<double, 4> bad{std::numeric_limits<double>::quiet_NaN(), infinity, -infinity, 1e300};
+        Vec3& which = chance(0.5) ? given.position : given.axis;
+        which[static_cast<int>(random_.bits() % 3)] = bad[random_.bits() % bad.size()];
+    }
+
+    Random& random_;
+    double period_;
+    Vec3 position_{0.0}, velocity_{0.0};
+    haptics::DeviceSample sample_;
+    int stale_ = 0;
+};
+
+FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
+{
+    Random random(seed);
+    const Session session = sessionOf(random);
+    const auto& scene = models.scene(session.cell.scene);
+    const auto& method = models.method(session.cell.method);
+    const MethodScene at{models.model(scene, method.level), haptics::deviceParameters(session.cell.device),
+                         1.0 / session.cell.rate};
+    FuzzResult r;
+    r.runs = 1;
+    try {
+        const RunningMethod running = method.start(at);
+        Hostile hand(random, at.period);
+        const double cap = capOf(at);
+        const double mostStep = slewPerSecond * cap * at.period;
+        const double stiffest = haptics::stableLimits({at.device, at.period, cap}).stiffness;
+        Vec3 before(0.0), position(0.0);
+        for (int i = 0; i < session.ticks; ++i) {
+            const haptics::DeviceSample sample = hand.next();
+            const Vec3 force = running.tick(sample);
+            const bool finite = std::isfinite(force.x + force.y + force.z);
+            const double size = glm::length(force);
+            r.nonFinite += finite ? 0 : 1;
+            r.overCap += size > cap * (1.0 + rounding) ? 1 : 0;
+            // Switched off is switched off at once, and a spring that is let go may fall with the motion.
+            const double fall = size < glm::length(before) ? stiffest * glm::distance(sample.position, position) : 0.0;
+            r.overSlew += size > 0.0 && glm::distance(force, before) > mostStep + fall + rounding * cap ? 1 : 0;
+            before = finite ? force : Vec3(0.0);
+            position = sample.position;
+            ++r.ticks;
+        }
+    } catch (const std::exception&) {
+        r.crashes = 1;
+    }
+    if (r.crashes + r.overCap + r.overSlew + r.nonFinite > 0) {
+        r.failed.push_back(seed);
+    }
+    return r;
+}
+
+}  // namespace
+
+FuzzResult fuzz(StabilityModels& models, std::uint64_t seed, std::uint64_t runs, int jobs,
+                const std::function<void(std::size_t)>& told)
+{
+    std::vector<Cell> all;
+    for (const char* const scene : scenes) {
+        for (const char* const level : {"elastic", "chainmail", "spring"}) {
+            all.push_back({scene, level, "premium", true, 1000});
+        }
+    }
+    models.prepare(all);
+    std::vector<FuzzResult> results(runs);
+    onThreads(
+        runs, jobs, [&](std::size_t i) { results[i] = runHostile(models, seed + i); }, told);
+    FuzzResult sum;
+    for (const FuzzResult& r : results) {
+        sum.runs += r.runs;
+        sum.ticks += r.ticks;
+        sum.crashes += r.crashes;
+        sum.overCap += r.overCap;
+        sum.overSlew += r.overSlew;
+        sum.nonFinite += r.nonFinite;
+        if (!r.failed.empty() && sum.failed.size() < 10) {
+            sum.failed.push_back(r.failed.front());
+        }
+    }
+    return sum;
+}
+
+}  // namespace palpate::experiments

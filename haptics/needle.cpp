@@ -1,0 +1,254 @@
+#include <haptics/needle.h>
+
+#include <haptics/contact_law.h>
+#include <haptics/events.h>
+#include <haptics/tip.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace palpate::haptics {
+
+namespace {
+
+constexpr double sidewaysLimit = 3.0;    // sideways the tissue gives way at this many cutting forces
+constexpr double sidewaysDepth = 10e-3;  // inserted length that doubles the sideways stiffness [m]
+constexpr double embedding = 10e-3;      // inserted length at which the tip is surrounded [m]
+constexpr int shaftSamples = 16;
+constexpr double leastShaftStiffness = 20.0;  // [N/m]
+constexpr double speedBand = 30.0;            // the shaft's speed passes a low-pass at this frequency [Hz]
+constexpr double steel = 200e9;               // Young's modulus [Pa]
+
+// Inside, tissue resists on all sides: a rigid disc in an infinite medium is twice as stiff as a punch on its surface
+// (Selvadurai, "The displacement of a rigid disc inclusion embedded in an infinite elastic medium", 1979; nu = 0.5). It
+// comes in over `embedding`: sooner, the force would rise while a pierced skin springs back over the needle.
+DepthLaw embedded(DepthLaw surface, double inserted) noexcept
+{
+    const double share = 1.0 + std::clamp(inserted / embedding, 0.0, 1.0);
+    return {share * surface.linear, share * surface.quadratic, surface.stiffest};
+}
+
+// What holds the whole of a shaft.
+struct ShaftHold {
+    double sliding = 0;    // friction [N]
+    double stiction = 0;   // [N]
+    double damping = 0;    // [N s/m]
+    double stiffness = 0;  // [N/m]
+};
+
+struct Needle {
+    const SessionModel& model;
+    const volume::Tissue::Reader& reader;
+    const DeviceSample& tool;
+    double dt;
+    TipState& tip;
+    NeedleState& state;
+    TickRecord& record;
+
+    const volume::TissueRow& row(std::uint8_t r) const noexcept { return model.tissue->table().rows[r]; }
+
+    std::uint8_t tissueLeft(Vec3 rest) const noexcept { return taken(state.cuts, rest) ? 0 : reader.tissue(rest); }
+
+    void moveProxy(double way) noexcept
+    {
+        tip.proxy += way * tool.axis;
+        const auto here = tissueLeft(tip.proxy);
+        tip.tissue = here != 0 ? here : tip.tissue;
+    }
+
+    // Follows the tool along its axis: back as far as the tissue does not come along with the shaft, forward through what
+    // is open, and on by cutting. Returns how far the tissue ahead is pushed in.
+    double cut(const DepthLaw& law) noexcept
+    {
+        double ahead = glm::dot(tool.position - tip.proxy, tool.axis);
+        const double carried = std::min(state.drag(), 0.0);
+        if (ahead <= 0.0) {
+            moveProxy(std::min(ahead - carried, 0.0));
+            return 0.0;
+        }
+        for (int i = 0; i < cutSteps; ++i) {
+            const double open = std::min(openAhead(state.cuts, tip.proxy, tool.axis), ahead);
+            moveProxy(open);
+            ahead -= open;
+            const double step = ahead > 0.0 ? cutOn(law, ahead) : 0.0;
+            ahead -= step;
+            if (step <= 0.0) {
+                break;
+            }
+        }
+        return std::max(ahead, 0.0);
+    }
+
+    double cutOn(const DepthLaw& law, double ahead) noexcept
+    {
+        const double force = law.force(ahead);
+        const auto next = tissueLeft(tip.proxy + cutStep * tool.axis);
+        const bool boundary = next != tip.tissue && next != 0;
+        const double cutting = row(tip.tissue).cuttingForce;
+        const double holds = boundary ? std::max(cutting, row(next).punctureForce) : cutting;
+        if (force <= holds) {
+            return 0.0;
+        }
+        const double step = boundary ? std::min(cutStep, ahead) : std::min(cutStep, ahead - law.depth(holds));
+        const Vec3 from = tip.proxy;
+        tip.proxy += step * tool.axis;
+        cutPath(state.cuts, from, tip.proxy, model.scene.tool.radius);
+        if (boundary) {
+            tip.tissue = next;
+            addEvent(record, {EventKind::puncture, 0xFF, next, force});
+        }
+        bend(step);
+        return step;
+    }
+
+    // A path goes on with the curvature of the tissue that is cut now; the whole is taken as one arc.
+    void bend(double step) noexcept
+    {
+        if (model.scene.tool.bevel > 0.0) {
+            const double before = std::max(state.inserted, 0.0);
+            const double here = bendCurvature(model.scene.tool, row(tip.tissue));
+            state.curvature = (state.curvature * before + here * step) / (before + step);
+            state.inserted = before + step;
+        }
+    }
+
+    // Sideways the shaft is held by all the tissue around it. Where more of it holds, it does so from where it is: what is
+    // stored never grows by itself.
+    Vec3 holdSideways(const DepthLaw& law) noexcept
+    {
+        const double k = std::min(stiffestContact, law.linear * (1.0 + std::max(state.inserted, 0.0) / sidewaysDepth));
+        const double before = std::exchange(state.sideStiffness, k);
+        Vec3 away = tool.position - tip.proxy;
+        Vec3 across = away - glm::dot(away, tool.axis) * tool.axis;
+        if (k > before && before > 0.0) {
+            tip.proxy += (1.0 - before / k) * across;
+            across *= before / k;
+        }
+        const double way = glm::length(across);
+        if (way <= 0.0) {
+            return Vec3(0.0);
+        }
+        const double limit = sidewaysLimit * row(tip.tissue).cuttingForce;
+        const double force = std::min(k * way, limit);
+        if (k * way > limit) {
+            tip.proxy += (1.0 - limit / (k * way)) * across;
+        }
+        return -force / way * across;
+    }
+
+    ShaftHold shaftHold() const noexcept
+    {
+        ShaftHold hold;
+        double modulus = 0.0;
+        const double piece = std::max(state.inserted, 0.0) / shaftSamples;
+        for (int i = 0; i < shaftSamples; ++i) {
+            const Vec3 at = glm::mix(state.entry, tip.proxy, (i + 0.5) / shaftSamples);
+            const auto& tissue = row(tissueLeft(at));
+            hold.sliding += piece * tissue.frictionPerMetre;
+            hold.stiction += piece * std::max(tissue.frictionPerMetre, tissue.stictionPerMetre);
+            hold.damping += piece * tissue.frictionDamping;
+            modulus += model.youngsModulus.at(at) / shaftSamples;
+        }
+        constexpr double nu = 0.49;
+        const double length = shaftSamples * piece;
+        const double spread = std::max(std::log(2.5 * length * (1.0 - nu) / model.scene.tool.radius), 1.0);
+        const double stiffness = 2.0 * std::numbers::pi * modulus / (2.0 * (1.0 + nu)) * length / spread;
+        hold.stiffness = std::clamp(stiffness, leastShaftStiffness, stiffestContact);
+        return hold;
+    }
+
+    // @param advance  of the proxy along the needle in this tick [m]
+    double shaftFriction(double advance) noexcept
+    {
+        const double depth = glm::dot(tool.position - state.entry, tool.axis);
+        const double way = depth - std::exchange(state.depth, depth);
+        const double blend = 1.0 - 1.0 / (1.0 + 2.0 * std::numbers::pi * speedBand * dt);
+        state.speed += blend * (way / dt - state.speed);
+        const ShaftHold hold = shaftHold();
+        // Tissue that lets go takes its share of the force along; tissue that comes to it holds from where it is.
+        if (hold.stiffness < state.shaftStiffness) {
+            state.shaftForce *= hold.stiffness / state.shaftStiffness;
+        }
+        state.shaftStiffness = hold.stiffness;
+        // A rupture drives the tissue back along the shaft, however slow the hand is.
+        const bool ruptures = advance > std::max(way, 0.0) + stickWindow * dt;
+        const bool slow = std::abs(state.speed) < stickWindow;
+        if (ruptures) {
+            state.sliding = 1;
+        } else if (slow || state.speed * state.sliding < 0.0) {
+            state.sliding = 0;
+        }
+        if (state.sliding == 0) {
+            state.shaftForce += hold.stiffness * way;
+            if (std::abs(state.shaftForce) > hold.stiction) {
+                state.sliding = state.shaftForce > 0.0 ? 1 : -1;
+            }
+        }
+        if (state.sliding != 0) {
+            state.shaftForce = state.sliding * hold.sliding + hold.damping * state.speed;
+        }
+        return -state.shaftForce;
+    }
+};
+
+}  // namespace
+
+void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& tip) noexcept
+{
+    NeedleState& needle = tip.needle;
+    tip.phase = Phase::inserted;
+    needle = NeedleState{.entry = tip.proxy, .cuts = needle.cuts};
+    needle.depth = glm::dot(tool.position - tip.proxy, tool.axis);
+    const Vec3 other = std::abs(tool.axis.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
+    const Vec3 right = glm::normalize(glm::cross(tool.axis, other));
+    const double turn = model.scene.tool.bevelTurn;
+    needle.bendsTo = std::cos(turn) * right + std::sin(turn) * glm::cross(tool.axis, right);
+}
+
+Vec3 moveNeedle(const SessionModel& model, const volume::Tissue::Reader& reader, const DeviceSample& tool, double dt,
+                TipState& tip, TickRecord& record) noexcept
+{
+    Needle needle{model, reader, tool, dt, tip, tip.needle, record};
+    NeedleState& state = tip.needle;
+    const auto local = tissueUnder(model, reader, tip.proxy, tool.axis, model.scene.tool.radius);
+    const auto law = embedded(needleLaw(model, local), state.inserted);
+    const double before = glm::dot(tip.proxy, tool.axis);
+    const double ahead = needle.cut(law);
+    const double advance = glm::dot(tip.proxy, tool.axis) - before;
+    const Vec3 sideways = needle.holdSideways(law);
+    state.inserted = glm::dot(tip.proxy - state.entry, tool.axis);
+    if (state.inserted < 0.0) {
+        return Vec3(0.0);
+    }
+    return (needle.shaftFriction(advance) - law.force(ahead)) * tool.axis + sideways;
+}
+
+DeviceSample bentTool(const DeviceSample& device, const NeedleState& needle) noexcept
+{
+    if (needle.curvature == 0.0) {
+        return device;
+    }
+    DeviceSample tool = device;
+    tool.position += 0.5 * needle.curvature * needle.inserted * needle.inserted * needle.bendsTo;
+    tool.axis = glm::normalize(device.axis + needle.curvature * needle.inserted * needle.bendsTo);
+    return tool;
+}
+
+double bendCurvature(const datasets::ToolSpec& tool, const volume::TissueRow& row) noexcept
+{
+    if (tool.bevel <= 0.0) {
+        return 0.0;
+    }
+    const double push = row.cuttingForce / std::tan(tool.bevel);
+    const double bed = std::max(row.youngsModulus, 1.0) / (1.0 - row.poissonRatio * row.poissonRatio);
+    const double r2 = tool.radius * tool.radius;
+    const double beam = steel * std::numbers::pi / 4.0 * r2 * r2;
+    return 2.0 * push / bed * std::pow(bed / (4.0 * beam), 0.75);
+}
+
+}  // namespace palpate::haptics

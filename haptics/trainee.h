@@ -1,0 +1,96 @@
+#pragma once
+
+#include <haptics/arm.h>
+#include <haptics/device.h>
+#include <haptics/motor.h>
+#include <haptics/session_model.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate::haptics {
+
+/// How well a scripted trainee does it. docs/score.md has the sources; what has none there is assumed.
+struct Skill {
+    std::string_view name;
+    double tremor = 0;      // root mean square, of the vector [m]
+    double aimError = 0;    // of the aim as the trainee takes it from the picture, standard deviation per axis [m]
+    double entryError = 0;  // of the place where the needle is set on the skin, likewise [m]
+    double speed = 0;       // mean over a movement [m/s]
+    double stroke = 0;      // longest movement without a look at the picture [m]
+    double overshoot = 0;   // of a movement's length, standard deviation as a share of it
+    double reaction = 0;    // to what is felt or seen [s]
+    double vigilance = 0;   // probability of seeing before firing that the line misses, or that a vital structure is on it
+    double content = 0;     // share of target in the cores seen that is enough
+    int passes = 1;         // at most
+    double touch = 0;       // palpation: of a stiffness that is felt, standard deviation as a share of it
+    double raster = 8e-3;   // palpation: between presses of the first search [m]
+};
+
+/// "novice", "resident", "expert". Throws std::runtime_error for another name.
+const Skill& skillCalled(std::string_view name);
+std::vector<std::string> skillNames();
+
+/// A hand with eyes: takes a biopsy under view. It sets the needle on the skin, pushes through, advances in minimum-jerk
+/// movements (Flash and Hogan, "The coordination of arm movements", J. Neuroscience 5, 1985) with a look at the picture
+/// after each, looks once more, fires, draws back and judges the core; when that is too poor it goes again. When it sees
+/// that the needle's line misses, or a vital structure is very near, it draws back inside the body and takes another line.
+///
+/// What it does follows from what it sees and feels, its skill and its seed: same seed, same session, bit for bit. In the
+/// loop it allocates nothing.
+class Trainee final : public Device {
+public:
+    /// The model must outlive it. Begins `distance` [m] outside the body on its planned line.
+    Trainee(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance,
+            double period = tickSeconds);
+
+    DeviceSample read() noexcept override;
+    void write(Vec3 force) noexcept override { arm_.write(force); }
+    void observe(const TickRecord& record) noexcept override;
+    bool finished() const noexcept override { return act_ == Act::done; }
+
+private:
+    enum class Act : std::uint8_t { approach, pierce, advance, look, check, fire, drawBack, retreat, judge, done };
+
+    Vec3 scatter(double deviation) noexcept;
+    void plan(double keep) noexcept;
+    void begin(Act act) noexcept;
+    void go(Vec3 to, Vec3 axis) noexcept;
+    void stroke() noexcept;
+    void takeAnotherLine() noexcept;
+    void followLeg() noexcept;
+    void advanceAct() noexcept;
+    void afterCheck() noexcept;
+    void afterCore() noexcept;
+    bool arrived() const noexcept;
+    bool dangerAhead() const noexcept;
+    Vec3 inward() const noexcept;
+    double depthToFire() const noexcept;
+
+    const SessionModel& model_;
+    Skill skill_;
+    double period_;
+    double distance_;  // it draws back to, outside the body [m]
+    datasets::Random random_;
+    Arm arm_;
+    Tremor tremor_;
+    Act act_ = Act::approach;
+    double inAct_ = 0;  // time since it began [s]
+    // Its plan: where it means to go in and what it takes for the middle of the target [m].
+    Vec3 entry_{0.0}, aim_{0.0}, aimError_{0.0};
+    // The movement in progress.
+    Vec3 from_{0.0}, to_{0.0}, goal_{0.0}, fromAxis_{0.0}, toAxis_{0.0}, axis_{0.0};
+    double duration_ = 0;  // [s]
+    // What it has seen.
+    double inserted_ = 0;  // [m]
+    LookAhead ahead_;
+    double insideSince_ = -1, warnedSince_ = -1;  // for so long [s]; below 0: not
+    double bestCore_ = 0;                         // share of target
+    std::uint64_t ticks_ = 0;
+    int fired_ = 0, entries_ = 0, redirects_ = 0, strokes_ = 0;
+};
+
+}  // namespace palpate::haptics
