@@ -37,8 +37,8 @@ struct ElasticLoad {
 ///
 /// The penalty grows with the square of the depth, E = k depth^2 / 2 at each surface point, so that the force is smooth
 /// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
-/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area: a tool
-/// is 2 to 4 % of its depth inside the tissue.
+/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area: under
+/// a pressure p a tool sinks in by p h / 20 E.
 struct ContactSite {
     std::uint32_t node = 0;  // lowest node of the cell that it lies in
     std::uint16_t level = 0;
