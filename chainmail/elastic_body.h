@@ -54,8 +54,8 @@ struct ElasticBody {
 /// @param surface      signed distance to the body's surface at rest [m]
 /// @param poissonCap   Poisson's ratios above are lowered to this [-], under 0.5
 ///
-/// Cells that are half or more fixed tissue fix their nodes. A body without fixed tissue lies on its back: the nodes of
-/// the rear 5 % are fixed (frame LPS: y to the back).
+/// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A body without fixed
+/// tissue lies on its back: the nodes of the rear 5 % are fixed (frame LPS: y to the back).
 ///
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,

@@ -2,6 +2,8 @@
 
 #include <haptics/bounded.h>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -47,11 +49,8 @@ const DeviceParameters& deviceParameters(std::string_view name)
 {
     const auto* found = std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return d.name == name; });
     if (found == devices.end()) {
-        std::string known;
-        for (const auto& device : devices) {
-            known += (known.empty() ? "" : ", ") + std::string(device.name);
-        }
-        throw std::runtime_error("no device '" + std::string(name) + "' is known: take one of " + known);
+        throw std::runtime_error(
+            fmt::format("no device '{}' is known: take one of {}", name, fmt::join(deviceNames(), ", ")));
     }
     return *found;
 }

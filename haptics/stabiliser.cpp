@@ -97,14 +97,14 @@ void watchRest(Vec3 position, const StabiliserOptions& o, StabiliserState& s) no
     s.resting = rests ? s.resting : position;
 }
 
-// `rise` is how much the force may grow in this tick: pressed faster than that it falls behind here, and not in a limit
-// behind, so that on the way out it is already on its way down. The tissue's own change is that without the cap, for
-// the same reason.
-Vec3 couple(Vec3 tissue, Vec3 way, double cap, double rise, const StabiliserOptions& o, StabiliserState& s) noexcept
+// `limit` is the stable stiffness, `rise` how much the force may grow in this tick: pressed faster than that it falls
+// behind here, and not in a limit behind, so that on the way out it is already on its way down. The tissue's own change is
+// that without the cap, for the same reason.
+Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const StabiliserOptions& o,
+            StabiliserState& s) noexcept
 {
     const Vec3 wanted = bounded(tissue, cap);
     const double length = glm::length(way);
-    const double limit = stableLimits(o).stiffness;
     const bool pressing = glm::dot(s.coupled + wanted, way) <= 0.0;
     const double stiffest = pressing && limit * length > rise ? rise / length : limit;
     // What has fallen behind catches up where that costs less than friction takes: pressed less on the way in than on the
@@ -256,7 +256,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, con
             s.coupled = bounded(tissue, cap);
         }
         watchRest(device.position, o, s);
-        sent.basic = couple(tissue, way, cap, riseShare * slew, o, s);
+        sent.basic = couple(tissue, way, limits.stiffness, cap, riseShare * slew, o, s);
         sent.additional = bounded(additional, cap);
         remember(device.position, sent, believed, s.window);
         const Motion motion = motionIn(s.window, o.device.encoder, o.period);
