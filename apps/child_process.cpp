@@ -56,21 +56,34 @@ void ChildProcess::stall(bool stopped) noexcept
     }
 }
 
+// Whether it has just been found to have ended.
+bool ChildProcess::look()
+{
+    int status = 0;
+    if (pid_ <= 0 || waitpid(pid_, &status, WNOHANG) != pid_) {
+        return false;
+    }
+    status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    killed_ = WIFSIGNALED(status);
+    pid_ = -1;
+    return true;
+}
+
+bool ChildProcess::killed()
+{
+    look();
+    return killed_;
+}
+
 int ChildProcess::wait(double seconds)
 {
     using Clock = std::chrono::steady_clock;
     const auto end = Clock::now() + std::chrono::duration<double>(seconds);
-    while (pid_ > 0) {
-        int status = 0;
-        const pid_t done = waitpid(pid_, &status, WNOHANG);
-        if (done == pid_) {
-            status_ = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-            pid_ = -1;
-        } else if (Clock::now() > end) {
+    while (pid_ > 0 && !look()) {
+        if (Clock::now() > end) {
             return -1;
-        } else {
-            std::this_thread::sleep_for(std::chrono::milliseconds(20));
         }
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     return status_;
 }

@@ -21,12 +21,17 @@ public:
 
     /// Waits up to `seconds` for it to end by itself. Returns its exit status; -1 when it was killed or still runs.
     int wait(double seconds);
+    /// Whether a signal has killed it.
+    bool killed();
     /// Stops it (SIGSTOP), or lets it go on (SIGCONT), if it still runs.
     void stall(bool stopped) noexcept;
 
 private:
+    bool look();
+
     pid_t pid_ = -1;
     int status_ = -1;
+    bool killed_ = false;
 };
 
 /// Folder of the running program.

@@ -1,8 +1,11 @@
 #include <apps/command.h>
 
 #include <apps/cmd_bench_costs.h>
+#include <apps/cmd_bench_ipc.h>
 #include <apps/cmd_bench_kernel.h>
 #include <apps/cmd_bench_load.h>
+#include <apps/cmd_bench_needle.h>
+#include <apps/cmd_bench_view.h>
 #include <apps/figures.h>
 #include <apps/outputs.h>
 #include <apps/session.h>
@@ -185,6 +188,10 @@ void addBench(CLI::App& app)
     addBenchKernel(*bench);
     addBenchCosts(*bench);
     addBenchLoad(*bench);
+    addBenchIpc(*bench);
+    addBenchSync(*bench);
+    addBenchNeedle(*bench);
+    addBenchView(*bench);
 }
 
 }  // namespace palpate::apps

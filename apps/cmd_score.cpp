@@ -22,6 +22,8 @@ namespace palpate::apps {
 
 namespace {
 
+constexpr std::size_t mostColumns = 12;  // sessions beside one another in a table
+
 using haptics::Score;
 using nlohmann::json;
 
@@ -165,7 +167,9 @@ void printTable(const std::vector<std::string>& heads, const std::vector<std::ve
 
 void printSessions(const std::vector<Session>& sessions)
 {
-    if (sessions.size() == 1) {
+    if (sessions.size() > mostColumns) {
+        std::printf("%zu sessions, each in --json\n", sessions.size());
+    } else if (sessions.size() == 1) {
         for (const auto& [label, value] : haptics::describe(sessions[0].score)) {
             std::printf("%-26s %s\n", label.c_str(), value.c_str());
         }

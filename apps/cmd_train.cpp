@@ -18,6 +18,7 @@
 
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <initializer_list>
@@ -46,6 +47,7 @@ struct Options {
     std::string task, lesionFrom;
     double lesionDiameter = 10;  // [mm]
     bool sphere = false;
+    std::string layout = "trainee";
     bool view = false;
     bool noView = false;
     bool unpaced = false;
@@ -171,6 +173,20 @@ void checkFaults(const Options& o)
     need({FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
 }
 
+void checkDevice(const Options& o)
+{
+    if (!o.trainee.empty() && o.device != "hand") {
+        throw std::runtime_error("--trainee " + o.trainee + ": needs --device hand; mouse and record bring their own hand");
+    }
+    if (o.device == "mouse" && o.unpaced) {
+        throw std::runtime_error("--device mouse: somebody holds it: leave out --unpaced");
+    }
+    if (o.device == "mouse" && !wantsWindow(o) && o.session.empty()) {
+        throw std::runtime_error(
+            "--device mouse: needs a window to move it in: add --view, or --session NAME and open palpate-view on it");
+    }
+}
+
 // The tasks are built-in scenes; that of the scene itself goes with any.
 const std::vector<std::string> tasks{"core-biopsy", "near-vessel", "behind-rib", "find-lump"};
 
@@ -211,23 +227,56 @@ void checkOutputs(const Options& o)
     }
 }
 
-struct Viewers {
-    std::optional<ChildProcess> window, camera;
-};
+// The viewers that a session starts.
+class Viewers {
+public:
+    Viewers(const Options& o, const std::string& session) : session_(session), layout_(o.layout)
+    {
+        if (wantsWindow(o)) {
+            openWindow();
+        }
+        if (!o.pictures.empty()) {
+            start(camera, {"--offscreen", o.pictures});
+        }
+    }
 
-void startViewers(const Options& o, const std::string& session, Viewers& viewers)
-{
-    const std::string program = programFolder() / "palpate-view";
-    const std::string remedy = "build it with -DPALPATE_VIEWER=ON, or run with --no-view";
-    std::vector<std::string> arguments{"--session", session, "--wait", "30"};
-    if (wantsWindow(o)) {
-        viewers.window.emplace(program, arguments, remedy);
+    // Opens a window that has crashed again, twice a second at most.
+    void lookAfter()
+    {
+        const auto now = std::chrono::steady_clock::now();
+        if (window && window->killed() && now - opened_ > std::chrono::milliseconds(500)) {
+            openWindow();
+        }
     }
-    if (!o.pictures.empty()) {
-        arguments.insert(arguments.end(), {"--offscreen", o.pictures});
-        viewers.camera.emplace(program, arguments, remedy);
+
+    void stall(bool stopped)
+    {
+        for (auto* viewer : {&window, &camera}) {
+            if (*viewer) {
+                (*viewer)->stall(stopped);
+            }
+        }
     }
-}
+
+    std::optional<ChildProcess> window, camera;
+
+private:
+    void openWindow()
+    {
+        start(window, {"--layout", layout_});
+        opened_ = std::chrono::steady_clock::now();
+    }
+
+    void start(std::optional<ChildProcess>& viewer, std::vector<std::string> arguments) const
+    {
+        arguments.insert(arguments.end(), {"--session", session_, "--wait", "30"});
+        viewer.emplace(programFolder() / "palpate-view", arguments,
+                       "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
+    }
+
+    std::string session_, layout_;
+    std::chrono::steady_clock::time_point opened_;
+};
 
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`.
 void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& viewers, TrainResult& result)
@@ -260,23 +309,13 @@ void train(Options o)
         const auto faults = parseFaults(text);
         o.faults.insert(o.faults.end(), faults.begin(), faults.end());
     }
-    if (!o.trainee.empty() && o.device != "hand") {
-        throw std::runtime_error("--trainee " + o.trainee + ": needs --device hand; a record brings its own hand");
-    }
+    checkDevice(o);
     checkFaults(o);
     checkOutputs(o);
     const auto record = recordFile(o);
     applyTask(o);
     const auto model = openSession(o.scene, o.changes);
     const auto info = describeSession(model, o.scene, deviceInWords(o));
-    Viewers viewers;
-    const auto stall = [&viewers](bool stopped) {
-        for (auto* viewer : {&viewers.window, &viewers.camera}) {
-            if (*viewer) {
-                (*viewer)->stall(stopped);
-            }
-        }
-    };
     TrainOptions options;
     options.device = o.device;
     options.trainee = o.trainee;
@@ -285,10 +324,13 @@ void train(Options o)
     options.record = record;
     options.servo = {!o.unpaced, o.seconds};
     options.faults = o.faults;
-    options.stallViewers = stall;
 
     // Before the record is made, so that a viewer that cannot be started leaves none.
-    startViewers(o, options.session, viewers);
+    Viewers viewers(o, options.session);
+    options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
+    if (viewers.window) {
+        options.lookAfter = [&viewers] { viewers.lookAfter(); };
+    }
     Trainer trainer(model, info, options);
     TrainResult result = trainer.run();
     writeOutputs(o, info, viewers, result);
@@ -341,7 +383,8 @@ void addTrain(CLI::App& app)
         ->check(CLI::Range(2.0, 50.0))
         ->capture_default_str();
     c->add_flag("--lesion-sphere", o->sphere, "A ball instead of lobes and spikes");
-    c->add_option("--device", o->device, "hand (a scripted trainee), or a record (.db) whose poses are played")
+    c->add_option("--device", o->device,
+                  "hand (a scripted trainee), mouse (of the viewer's window), or a record (.db) whose poses are played")
         ->capture_default_str();
     c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
         ->check(CLI::IsMember(haptics::skillNames()));
@@ -360,6 +403,9 @@ void addTrain(CLI::App& app)
     c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);
+    c->add_option("--layout", o->layout, "Of the window: trainee or instructor")
+        ->check(CLI::IsMember({"trainee", "instructor"}))
+        ->capture_default_str();
     c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
     c->add_option("--session", o->session, "Name under which viewers find the session");
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");

@@ -10,7 +10,7 @@ namespace {
 
 using haptics::Score;
 
-constexpr std::array<Measure, 22> all{{
+constexpr std::array<Measure, 23> all{{
     {"total", "total", 0, [](const Score& s) { return s.total; }},
     {"passes", "passes", 0, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", 1, [](const Score& s) { return s.targetingError * 1e3; }},
@@ -19,6 +19,7 @@ constexpr std::array<Measure, 22> all{{
     {"vital_contacts", "vital", 0, [](const Score& s) { return static_cast<double>(s.vitalContacts); }},
     {"vital_s", "vital s", 2, [](const Score& s) { return s.vitalSeconds; }},
     {"vital_depth_mm", "vital mm", 1, [](const Score& s) { return s.vitalDepth * 1e3; }},
+    {"vital_margin_mm", "margin mm", 1, [](const Score& s) { return s.vitalMargin * 1e3; }},
     {"warnings", "warnings", 0, [](const Score& s) { return static_cast<double>(s.warnings); }},
     {"skin_contacts", "skin", 0, [](const Score& s) { return static_cast<double>(s.skinContacts); }},
     {"redirects", "redirects", 0, [](const Score& s) { return static_cast<double>(s.redirects); }},

@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/replay_player.h>
 #include <render/viewer.h>
 
 #include <CLI/CLI.hpp>
@@ -7,8 +8,12 @@
 
 #include <cstdio>
 #include <exception>
+#include <fstream>
+#include <iomanip>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -33,17 +38,36 @@ void writeFigures(const std::string& file, const palpate::render::ViewerFigures&
     palpate::apps::writeJson(file, json);
 }
 
+// One line per picture, with nanoseconds.
+void writeTimeline(const std::string& file, const std::vector<palpate::render::Shown>& pictures)
+{
+    std::ofstream out(file);
+    out << "tick,published_s,read_s,done_s\n" << std::fixed << std::setprecision(9);
+    for (const auto& p : pictures)
+        out << p.tick << ',' << p.published << ',' << p.read << ',' << p.done << '\n';
+    out.close();
+    if (!out)
+        throw std::runtime_error(file + ": cannot be written");
+}
+
 }  // namespace
 
 int main(int argc, char** argv)
 {
-    CLI::App app(
-        "Shows a Palpate session that runs in another process. Mouse: left turns, middle shifts, wheel zooms; q ends.",
-        "palpate-view");
+    CLI::App app("Shows a Palpate session that runs in another process. The key ? lists keys and what the mouse does.",
+                 "palpate-view");
     palpate::render::ViewerOptions options;
-    std::string size = "1280x960", json;
+    std::string size = "1280x960", json, layout = "trainee", timeline, replay;
     app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
     app.add_option("--offscreen", options.offscreen, "Write PNG files to this folder instead of opening a window");
+    app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");
+    app.add_option("--replay", replay, "Show a record (train --record) instead of a session that runs")
+        ->excludes("--session");
+    app.add_option("--layout", layout, "trainee or instructor")
+        ->check(CLI::IsMember({"trainee", "instructor"}))
+        ->capture_default_str();
+    app.add_flag("--hidden", options.hidden, "Draw as in a window, on a display that nobody sees (Xvfb): to measure");
+    app.add_option("--timeline", timeline, "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");
     app.add_option("--size", size, "WIDTHxHEIGHT in pixels")->capture_default_str();
     app.add_option("--every", options.every, "With --offscreen: seconds of the session from one picture to the next")
         ->capture_default_str();
@@ -57,9 +81,20 @@ int main(int argc, char** argv)
     try {
         app.parse(argc, argv);
         readSize(size, options);
+        options.instructor = layout == "instructor";
+        std::optional<palpate::apps::ReplayPlayer> player;
+        if (!replay.empty()) {
+            player.emplace(replay);
+            options.session = player->session();
+            options.playback = &player->playback();
+        }
         const auto figures = palpate::render::runViewer(options);
         if (!json.empty())
             writeFigures(json, figures);
+        if (!timeline.empty())
+            writeTimeline(timeline, figures.shown);
+        if (player && !player->problem().empty())
+            throw std::runtime_error(player->problem());
         return 0;
     } catch (const CLI::ParseError& e) {
         return app.exit(e) == 0 ? 0 : 2;

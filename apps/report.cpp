@@ -59,6 +59,13 @@ double capOf(const haptics::SessionInfo& info)
     return thesisCap;
 }
 
+// The cap, where forces come anywhere near it: on a chart of small ones it would leave them no room.
+json capLine(const ReportData& d, double cap)
+{
+    const bool near = d.score.peakForce > 0.5 * cap;
+    return near ? json::array({{{"at", cap}, {"label", "cap"}, {"colour", "c4"}}}) : json::array();
+}
+
 json forceChart(const ReportData& d, double cap)
 {
     return {{"columns", columnsOf(d.forces)},
@@ -66,7 +73,7 @@ json forceChart(const ReportData& d, double cap)
             {"y", axis("force", "N")},
             {"sync", "time"},
             {"events", true},
-            {"lines", {{{"at", cap}, {"label", "cap"}, {"colour", "c4"}}}},
+            {"lines", capLine(d, cap)},
             {"series",
              {{{"label", "basic"}, {"colour", "c1"}},
               {{"label", "additional"}, {"colour", "c2"}},
@@ -78,11 +85,23 @@ json depthChart(const ReportData& d, double cap)
     return {{"columns", columnsOf({d.profile.depth, d.profile.in, d.profile.peak, d.profile.out})},
             {"x", axis("inserted", "mm")},
             {"y", axis("total force", "N")},
-            {"lines", {{{"at", cap}, {"label", "cap"}, {"colour", "c4"}}}},
+            {"lines", capLine(d, cap)},
             {"series",
              {{{"label", "going in, mean"}, {"colour", "c0"}, {"width", 2}},
               {{"label", "going in, largest"}, {"colour", "c6"}},
               {{"label", "coming out, mean"}, {"colour", "c1"}, {"width", 2}}}}};
+}
+
+json energyChart(const ReportData& d)
+{
+    return {{"columns", columnsOf(d.energy)},
+            {"x", axis("time", "s")},
+            {"y", axis("energy", "mJ")},
+            {"sync", "time"},
+            {"events", true},
+            {"series",
+             {{{"label", "given to the hand, net"}, {"colour", "c0"}, {"width", 2}},
+              {{"label", "taken by damping"}, {"colour", "c1"}}}}};
 }
 
 // The vital structures that came nearest are shown at first.
@@ -221,6 +240,7 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
     const json data = {{"events", events},
                        {"charts",
                         {{"forces", forceChart(d, cap)},
+                         {"energy", energyChart(d)},
                          {"depth", depthChart(d, cap)},
                          {"distances", distanceChart(d, info)},
                          {"nearest", nearestChart(d, info)}}}};
@@ -240,7 +260,12 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
         out += chartCard("nearest", "Distances against depth",
                          "The least distance from the tip to target and vital structures at each length inside.");
     }
-    out += pathCard(d, info) + picturesCard(pictures) + eventsCard(d, info) + timingCard(d, record) + sessionCard(record);
+    out += pathCard(d, info) + picturesCard(pictures);
+    out += chartCard(
+        "energy", "Energy",
+        "What all forces so far gave to the hand, less what it put in: below zero the tissue has taken energy, as it "
+        "should. And what the stabiliser's damping took from it.");
+    out += eventsCard(d, info) + timingCard(d, record) + sessionCard(record);
     return page(info.scene + " - Palpate session", out, data);
 }
 

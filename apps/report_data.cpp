@@ -90,6 +90,7 @@ struct Collector {
           scorer(info),
           forces(4, ticks, pointsPerChart),
           distances(2 + structures, ticks, pointsPerChart),
+          energy(3, ticks, pointsPerChart),
           row(2 + structures)
     {
         whole.reserve(ticks);
@@ -101,6 +102,7 @@ struct Collector {
         const double total = glm::length(r.total);
         scorer.add(r);
         forces.add({seconds, glm::length(r.basic), glm::length(r.additional), total});
+        energy.add({seconds, r.energy * 1e3, r.damped * 1e3});
         row[0] = seconds;
         row[1] = r.inserted * 1e3;
         for (std::size_t i = 0; i < structures; ++i) {
@@ -175,7 +177,7 @@ struct Collector {
     bool markDown = false;
     std::vector<std::vector<double>> nearest;  // by bin, then structure [mm]
     haptics::Scorer scorer;
-    Decimator forces, distances;
+    Decimator forces, distances, energy;
     std::vector<double> row;
     ProfileBuilder profile;
     std::array<std::vector<float>, haptics::taskCount> tasks;
@@ -257,6 +259,7 @@ ReportData collect(const haptics::Record& record)
     c.data.score = c.scorer.score();
     c.data.forces = c.forces.finish();
     c.data.distances = c.distances.finish();
+    c.data.energy = c.energy.finish();
     c.data.profile = c.profile.finish();
     c.data.nearest = c.nearestColumns();
     for (std::size_t i = 0; i < haptics::taskCount; ++i) {

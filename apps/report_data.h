@@ -69,6 +69,7 @@ struct ReportData {
     std::uint64_t ticks = 0;
     std::vector<std::vector<double>> forces;     // seconds; basic, additional, total [N]
     std::vector<std::vector<double>> distances;  // seconds; inserted depth, then each structure [mm]
+    std::vector<std::vector<double>> energy;     // seconds; given to the hand, taken by damping [mJ]
     DepthProfile profile;
     std::vector<std::vector<double>>
         nearest;                      // by bin of the profile: its depth, then the least distance to each structure [mm]

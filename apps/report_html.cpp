@@ -244,8 +244,8 @@ std::string timingCard(const ReportData& d, const haptics::Record& record)
     const double rate = record.info().rate;
     constexpr std::array<std::pair<const char*, const char*>, haptics::taskCount> tasks{{{"H2", "read the device"},
                                                                                          {"H3", "collide"},
-                                                                                         {"deform", "deform the tissue"},
                                                                                          {"H4", "basic force"},
+                                                                                         {"deform", "deform the tissue"},
                                                                                          {"H6", "distances and look-ahead"},
                                                                                          {"H7", "additional force"},
                                                                                          {"H5", "send the force"}}};
@@ -276,7 +276,7 @@ std::string eventLabel(const haptics::Event& e, const haptics::SessionInfo& info
     const std::string structure = e.structure == 0xFF ? "" : nameOf(info.structures, e.structure);
     switch (e.kind) {
         case EventKind::contact:
-            return fmt::format("contact at {:.0f} mm/s", e.value * 1e3);
+            return fmt::format("contact at {:.0f} mm/s", e.value * info.rate * 1e3);
         case EventKind::release:
             return "release";
         case EventKind::puncture:
@@ -327,6 +327,9 @@ std::string sessionCard(const haptics::Record& record)
     row("Seed", std::to_string(info.seed));
     row("Build", info.build);
     for (const auto& [key, value] : info.extra) {
+        if (key == haptics::targetShapeKey) {
+            continue;  // drawn with the path
+        }
         row(key, value);
     }
     out += "</tbody></table></div>";

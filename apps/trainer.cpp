@@ -2,6 +2,7 @@
 
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
+#include <haptics/mouse.h>
 #include <haptics/palpator.h>
 #include <haptics/simulation.h>
 #include <haptics/trainee.h>
@@ -77,11 +78,14 @@ void checkTool(const TrainOptions& options, const datasets::Scene& scene)
     }
 }
 
-std::unique_ptr<Device> openDevice(const TrainOptions& options, const SessionModel& model)
+std::unique_ptr<Device> openDevice(const TrainOptions& options, const SessionModel& model, const Broadcast& broadcast)
 {
     checkTool(options, model.scene);
     std::unique_ptr<Device> device;
-    if (options.device != "hand") {
+    if (options.device == "mouse") {
+        device = std::make_unique<MouseDevice>(mouseBefore(
+            model, [&] { return broadcast.input(); }, startDistance));
+    } else if (options.device != "hand") {
         device = std::make_unique<ReplayDevice>(Record(options.device));
     } else if (model.scene.task == datasets::SessionTask::find) {
         const std::string& who = options.trainee.empty() ? "expert" : options.trainee;
@@ -101,21 +105,33 @@ void sleepThroughGap(const Faults& faults, std::uint64_t tick) noexcept
     }
 }
 
-// One line on the terminal that tells how the session goes, read as a viewer reads it.
-void showProgress(const std::string& session, const std::atomic<bool>& done)
+// One line on the terminal that tells how the session goes.
+void showProgress(const channel::State& s)
 {
     constexpr std::array phases{"free", "touching", "inserted"};
-    const auto viewer = channel::Subscriber::attach(session);
-    while (viewer && !done) {
+    const Vec3 force(s.total[0], s.total[1], s.total[2]);
+    fmt::print(stderr, "\r{:6.1f} s  {:<8} {:5.1f} mm inside  {:5.2f} N  target {:5.1f} mm  ", s.time,
+               phases[static_cast<std::size_t>(s.phase)], 1e3 * s.inserted, glm::length(force), 1e3 * s.distance[0]);
+}
+
+// What there is to do outside the loop while it runs. The progress is read as a viewer reads it.
+void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
+{
+    const bool terminal = isatty(STDERR_FILENO) != 0;
+    const auto viewer = channel::Subscriber::attach(options.session);
+    while (!done) {
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        if (const auto s = viewer->state()) {
-            const Vec3 force(s->total[0], s->total[1], s->total[2]);
-            fmt::print(stderr, "\r{:6.1f} s  {:<8} {:5.1f} mm inside  {:5.2f} N  target {:5.1f} mm  ", s->time,
-                       phases[static_cast<std::size_t>(s->phase)], 1e3 * s->inserted, glm::length(force),
-                       1e3 * s->distance[0]);
+        const auto state = terminal && viewer ? viewer->state() : std::nullopt;
+        if (state) {
+            showProgress(*state);
+        }
+        if (options.lookAfter) {
+            options.lookAfter();
         }
     }
-    fmt::print(stderr, "\r{:70}\r", "");
+    if (terminal) {
+        fmt::print(stderr, "\r{:70}\r", "");
+    }
 }
 
 // Takes in what the session's figures need, tick by tick, in the servo thread.
@@ -158,7 +174,11 @@ struct Tally {
 
 struct Trainer::Impl {
     Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
-        : options(o), device(openDevice(o, model)), simulation(model), broadcast(o.session, model), tally(info)
+        : options(o),
+          broadcast(o.session, model, o.device == "mouse"),
+          device(openDevice(o, model, broadcast)),
+          simulation(model),
+          tally(info)
     {
         if (!o.record.empty()) {
             recorder.emplace(o.record, info);
@@ -224,9 +244,9 @@ struct Trainer::Impl {
     }
 
     TrainOptions options;
+    Broadcast broadcast;
     std::unique_ptr<Device> device;
     Simulation simulation;
-    Broadcast broadcast;
     std::optional<Recorder> recorder;
     std::optional<FaultsAround> around;
     Tally tally;
@@ -248,8 +268,8 @@ TrainResult Trainer::run()
         impl_->servo(warnings);
         done = true;
     });
-    if (isatty(STDERR_FILENO) != 0) {
-        showProgress(impl_->options.session, done);
+    if (isatty(STDERR_FILENO) != 0 || impl_->options.lookAfter) {
+        waitFor(impl_->options, done);
     }
     servo.join();
     for (const auto& warning : warnings) {

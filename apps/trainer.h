@@ -17,7 +17,7 @@
 namespace palpate::apps {
 
 struct TrainOptions {
-    std::string device = "hand";   // or the file of a record
+    std::string device = "hand";   // or "mouse" (of a viewer), or the file of a record
     std::string trainee;           // whose hand it is, see haptics/trainee.h; empty: one that follows the scene's script
     std::uint64_t seed = 1;        // of the trainee's errors
     std::string session;           // name for viewers
@@ -25,6 +25,7 @@ struct TrainOptions {
     haptics::ServoOptions servo;
     Faults faults;                           // on purpose
     std::function<void(bool)> stallViewers;  // stops them (true) or lets them go on; called from a thread of its own
+    std::function<void()> lookAfter;         // called ten times a second while the session runs, from the thread of run()
 };
 
 /// What a session came to.

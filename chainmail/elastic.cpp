@@ -17,6 +17,7 @@ constexpr double drift = 0.25;         // spacings that a tool may move until th
 constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
 constexpr int newtonSteps = 3;         // of a line search: contacts open and close along it
 constexpr int mostShortenings = 8;     // of a step that raises the energy
+constexpr double mostBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
 constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
 constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew
 constexpr double rounding = 1e-6;      // relative: sums of single-precision products are no better
@@ -365,7 +366,7 @@ bool Elastic::oneCycle(Before before, ElasticResult& result) noexcept
     return takeStep(Field::p, Field::q, result);
 }
 
-ElasticResult Elastic::relaxWhile(const ElasticLoad& all, int cycles, double first, double further) noexcept
+ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) noexcept
 {
     ElasticResult result;
     ElasticLoad load = all;
@@ -396,10 +397,10 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, int cycles, double fir
         stack_.clear(Field::e);
     }
     hasIncrement_ = options_.goOn;
-    const int most = cycles + (result.moved ? moreAfterMove : 0);
-    for (int i = 0; i < most; ++i) {
+    const int most = effort.cycles + (result.moved ? moreAfterMove : 0);
+    for (int i = 0; i < most + (effort.far > 0.0 ? 1 : 0); ++i) {
         refreshResidual();
-        const double tolerance = i == 0 ? first : further;
+        const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
         if (tolerance > 0.0) {
             result.residual = std::sqrt(stack_.dot(Field::r, Field::r));
             if (result.residual <= tolerance * contactForce()) {
@@ -410,8 +411,21 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, int cycles, double fir
         before = oneCycle(before, result) ? Before::direction : Before::none;
     }
     letSlip();
+    balance();
     measure(result);
     return result;
+}
+
+// Virtual work along the displacement itself: the tissue's own, over that of the contacts.
+void Elastic::balance() noexcept
+{
+    const double held = memory_ > 0.0 ? memory_ * stack_.dot(Field::v, Field::u) : 0.0;
+    const double tissue = held - stack_.dot(Field::a, Field::u);
+    double contacts = 0.0;
+    for (const ContactSite& s : sites()) {
+        contacts += (1.0 - memory_) * glm::dot(s.force, s.u);
+    }
+    balance_ = contacts > 0.0 ? std::clamp(tissue / contacts, 1.0 / mostBalance, mostBalance) : 1.0;
 }
 
 void Elastic::measure(ElasticResult& result) const noexcept
@@ -440,7 +454,7 @@ Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept
     Vec3 sum(0.0);
     for (const ContactSite& s : sites()) {
         if (s.owner == owner && s.isTie == isTie) {
-            sum -= s.force;
+            sum -= balance_ * s.force;
         }
     }
     return sum;

@@ -11,7 +11,7 @@ namespace palpate::chainmail {
 
 struct ElasticOptions {
     int window = 15;            // nodes of a window along the way in, odd; see WindowStack
-    int cycles = 2;             // at most, per call of relax()
+    int cycles = 2;             // per call of relax(); one more where that leaves much out of balance
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
     double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
     std::size_t maxSites = 4096;
@@ -47,6 +47,7 @@ struct ElasticResult {
 /// Mathematics, pictures and figures: docs/kernel.md.
 class Elastic {
     static constexpr double furtherCycles = 1.5;  // a second cycle in a tick costs too much for what is nearly balanced
+    static constexpr double farOff = 3.0;         // and one beyond the most is worth it for what is not
 
 public:
     /// @param focus  where the windows start
@@ -57,15 +58,21 @@ public:
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
     ElasticResult relax(const ElasticLoad& load) noexcept
     {
-        return relaxWhile(load, options_.cycles, options_.tolerance, furtherCycles * options_.tolerance);
+        const double t = options_.tolerance;
+        return relaxWhile(load, {options_.cycles, t, furtherCycles * t, farOff * t});
     }
     /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces.
     ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept
     {
-        return relaxWhile(load, cycles, tolerance, tolerance);
+        return relaxWhile(load, {cycles, tolerance, tolerance, 0.0});
     }
 
-    /// Force of the tissue on tool `i` and on tie `i` of the last load [N].
+    /// Force of the tissue on tool `i` and on tie `i` of the last load [N]: that of the contacts, times the ratio of the
+    /// tissue's virtual work along the displacement to theirs. Balanced the ratio is 1. Short of it contacts are out by the
+    /// error of the displacement, since they are what a tool moves first; with the ratio they are out by its square, as
+    /// far as the tissue's answer to the next push is like its answer so far. (Becker and Rannacher, "An optimal control
+    /// approach to a posteriori error estimation", Acta Numerica 10, 2001: the residual times the dual solution, for which
+    /// the displacement itself stands here.)
     Vec3 toolForce(std::size_t i) const noexcept { return force(i, false); }
     Vec3 tieForce(std::size_t i) const noexcept { return force(i, true); }
     /// Displacement of the material that is at `rest` [m].
@@ -82,8 +89,13 @@ private:
     enum class Before : std::uint8_t { none, increment, direction };
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
-    // A first cycle while the residual is over `first`, further ones while it is over `further` times the contacts' forces.
-    ElasticResult relaxWhile(const ElasticLoad& load, int cycles, double first, double further) noexcept;
+    // At most `cycles`: the first while the residual is over `first`, others while it is over `further` times the contacts'
+    // forces. One more after them while it is over `far`; 0 = none.
+    struct Effort {
+        int cycles;
+        double first, further, far;
+    };
+    ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     void settle() noexcept;
     void meet(const ElasticLoad& load, bool moved) noexcept;
     bool touched() const noexcept;
@@ -102,6 +114,7 @@ private:
     void keepStep(Field direction, Field image, double alpha) noexcept;
     bool oneCycle(Before before, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
+    void balance() noexcept;
     void measure(ElasticResult& result) const noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
 
@@ -117,8 +130,9 @@ private:
     std::vector<Vec3> toolAt_;      // in the last call [m]
     std::vector<Vec3f> slip_;       // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
-    double memory_ = 0;  // share of the last call's stress that viscosity holds against this one's
-    double energy_ = 0;  // of the tissue [J]
+    double memory_ = 0;   // share of the last call's stress that viscosity holds against this one's
+    double energy_ = 0;   // of the tissue [J]
+    double balance_ = 1;  // see toolForce()
     int sinceRefresh_ = 0;
     bool atRest_ = true;
     bool hasIncrement_ = false;

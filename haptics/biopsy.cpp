@@ -22,30 +22,6 @@ Frame frameAcross(Vec3 axis) noexcept
     return {right, glm::cross(axis, right)};
 }
 
-// The holes around one slice of the notch, so that its samples need not look at all.
-struct HolesNear {
-    static constexpr std::size_t most = 32;
-    std::array<const Channel*, most> hole{};
-    std::size_t count = 0;
-
-    HolesNear(const Cuts& cuts, Vec3 middle, double radius) noexcept
-    {
-        for (const Channel& c : cuts.cores.all()) {
-            const Vec3 w = middle - c.from;
-            const double place = glm::dot(w, c.along), reach = radius + c.radius;
-            const bool near = place > -reach && place < c.length + reach && glm::dot(w, w) - place * place < reach * reach;
-            if (near && count < most) {
-                hole[count++] = &c;
-            }
-        }
-    }
-    bool contain(Vec3 p) const noexcept
-    {
-        return std::any_of(hole.begin(), hole.begin() + static_cast<std::ptrdiff_t>(count),
-                           [&](const Channel* c) { return c->contains(p); });
-    }
-};
-
 // Counts the pieces of a core, slice by slice along its axis.
 struct Pieces {
     double slice = 0;  // length [m]

@@ -3,12 +3,13 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace palpate::haptics {
 
 namespace {
 
-constexpr std::uint64_t framePeriod = 33;  // ticks: about 30 frames/s, as in the thesis
 constexpr std::uint64_t p99Period = 1000;  // a quantile walks over all bins: once a second is enough
 constexpr std::size_t displayNodes = 160U * 160U * 160U;
 
@@ -48,7 +49,7 @@ channel::ToolKind shown(datasets::ToolKind kind)
     }
 }
 
-channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& labels)
+channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& labels, bool viewersHand)
 {
     channel::Scenery s;
     s.scene = nameOf(model.scene.name);
@@ -71,70 +72,115 @@ channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& la
     s.entry = triple(model.approach.entry);
     s.aim = triple(model.approach.aim);
     s.forceCap = model.scene.forceCap;
+    s.viewersHand = viewersHand ? 1 : 0;
     return s;
 }
 
-channel::Publisher publisherOf(const std::string& session, const SessionModel& model)
+// Marks where the warning distances of vital structures end. A block whose middle is further from there than its corners
+// are from its middle has nothing to mark.
+void markShells(const SessionModel& model, const volume::NodeGrid& grid, std::vector<std::uint8_t>& labels)
 {
-    const auto grid = displayGrid(*model.tissue);
-    return {session, sceneryOf(model, grid), model.tissue->tissueOn(grid)};
+    constexpr int side = 8;
+    const double reach = grid.spacing * (0.5 + 0.5 * side * std::sqrt(3.0));
+    for (const auto& structure : model.structures) {
+        const auto off = [&](Vec3 p) { return std::abs(structure.distance.distance(p) - structure.warnDistance); };
+        const auto mark = [&](Index3 n) {
+            if (off(grid.position(n)) < 0.5 * grid.spacing) {
+                labels[grid.offset(n)] |= channel::shellBit;
+            }
+        };
+        const auto markBlock = [&](Index3 block) {
+            const Index3 from = side * block;
+            const Index3 to = glm::min(from + (side - 1), grid.size - 1);
+            if (off(0.5 * (grid.position(from) + grid.position(to))) < reach) {
+                volume::forEachIndex(from, to, mark);
+            }
+        };
+        if (structure.warnDistance > 0.0) {
+            volume::forEachIndex(Index3(0), (grid.size - 1) / side, markBlock);
+        }
+    }
+}
+
+std::vector<std::uint8_t> labelsOn(const SessionModel& model, const volume::NodeGrid& grid)
+{
+    auto labels = model.tissue->tissueOn(grid);
+    markShells(model, grid, labels);
+    return labels;
 }
 
 }  // namespace
 
-Broadcast::Broadcast(const std::string& session, const SessionModel& model) : publisher_(publisherOf(session, model))
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand)
 {
-    static_assert(channel::maxStructures == maxStructures && channel::maxTissues == maxTissues);
+    return publisherOf(session, model, viewersHand, displayGrid(*model.tissue));
 }
 
-void Broadcast::publish(const TickRecord& r, const ServoTiming& timing, const Simulation& simulation) noexcept
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand,
+                               const volume::NodeGrid& display)
 {
-    state_.tick = r.tick;
-    state_.time = static_cast<double>(r.tick) * tickSeconds;
-    state_.tip = triple(r.device.position + r.deflection);
-    state_.axis = triple(r.device.axis);
-    state_.proxy = triple(r.proxy);
-    state_.basic = triple(r.basic);
-    state_.additional = triple(r.additional);
-    state_.total = triple(r.total);
-    state_.phase = static_cast<channel::Phase>(r.phase);
-    state_.status = r.faulted ? channel::Status::faulted : channel::Status::running;
-    state_.tissue = r.tissue;
-    state_.inserted = r.inserted;
-    state_.distance = r.distance;
-    state_.warning = static_cast<channel::Warning>(r.warning);
-    state_.warned = r.warned != 0xFF ? r.warned : r.nearestVital != 0xFF ? r.nearestVital : 0;
-    state_.ahead = r.ahead.structure;
-    state_.aheadTissueDistance = r.ahead.tissueDistance;
-    state_.aheadTissue = r.ahead.tissue;
-    state_.aheadSpeed = r.ahead.speed;
+    return {session, sceneryOf(model, display, viewersHand), labelsOn(model, display)};
+}
+
+void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& state) noexcept
+{
+    state.tick = r.tick;
+    state.time = static_cast<double>(r.tick) * tickSeconds;
+    state.tip = triple(r.device.position + r.deflection);
+    state.axis = triple(r.device.axis);
+    state.bend = triple(r.deflection);
+    state.proxy = triple(r.proxy);
+    state.basic = triple(r.basic);
+    state.additional = triple(r.additional);
+    state.total = triple(r.total);
+    state.phase = static_cast<channel::Phase>(r.phase);
+    state.status = r.faulted ? channel::Status::faulted : channel::Status::running;
+    state.tissue = r.tissue;
+    state.inserted = r.inserted;
+    state.distance = r.distance;
+    state.warning = static_cast<channel::Warning>(r.warning);
+    state.warned = r.warned != 0xFF ? r.warned : r.nearestVital != 0xFF ? r.nearestVital : 0;
+    state.ahead = r.ahead.structure;
+    state.aheadTissueDistance = r.ahead.tissueDistance;
+    state.aheadTissue = r.ahead.tissue;
+    state.aheadSpeed = r.ahead.speed;
     if (r.fired) {
-        ++state_.cores;
-        state_.coreTarget = r.core.targetFraction;
-        state_.coreLength = r.core.targetLength;
+        ++state.cores;
+        state.coreTarget = r.core.targetFraction;
+        state.coreLength = r.core.targetLength;
     }
-    state_.missed = timing.missed;
+    state.missed = timing.missed;
     if (r.tick % p99Period == p99Period - 1) {
-        state_.tickP99 = timing.work.quantile(0.99);
-    }
-    publisher_.setState(state_);
-    if (r.tick % framePeriod == 0) {
-        publishDisplaced(simulation);
+        state.tickP99 = timing.work.quantile(0.99);
     }
 }
 
-void Broadcast::publishDisplaced(const Simulation& simulation) noexcept
+void showShape(const Simulation& simulation, channel::Displaced& out) noexcept
 {
     const auto& shape = simulation.shape();
     const auto moved = shape.moved();
-    channel::Displaced& out = publisher_.backBuffer();
-    out.tick = state_.tick;
     out.count = static_cast<std::uint32_t>(std::min(moved.size(), channel::maxDisplaced));
     for (std::uint32_t i = 0; i < out.count; ++i) {
         const Vec3f u = shape.u()[moved[i]];
         out.nodes[i] = {moved[i], {u.x, u.y, u.z}};
     }
-    publisher_.publishDisplaced();
+}
+
+Broadcast::Broadcast(const std::string& session, const SessionModel& model, bool viewersHand)
+    : publisher_(publisherOf(session, model, viewersHand))
+{
+    static_assert(channel::maxStructures == maxStructures && channel::maxTissues == maxTissues);
+}
+
+void Broadcast::publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept
+{
+    showTick(record, timing, state_);
+    publisher_.setState(state_);
+    if (record.tick % channel::frameTicks == 0) {
+        showShape(simulation, publisher_.backBuffer());
+        publisher_.backBuffer().tick = record.tick;
+        publisher_.publishDisplaced();
+    }
 }
 
 void Broadcast::finish() noexcept

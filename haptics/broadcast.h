@@ -5,24 +5,38 @@
 #include <haptics/timing.h>
 #include <render/channel/channel.h>
 
+#include <optional>
 #include <string>
 
 namespace palpate::haptics {
 
+/// The segment of a session, with its scenery. Throws std::runtime_error when it cannot be made.
+/// @param viewersHand  the mouse of a viewer is the hand
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand = false);
+/// The same with the body's tissues sampled on `display`.
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand,
+                               const volume::NodeGrid& display);
+
+/// What viewers see of a tick, on top of what they have seen of those before it. Allocates nothing.
+void showTick(const TickRecord& record, const ServoTiming& timing, channel::State& state) noexcept;
+
+/// The displaced nodes after the last tick. Allocates nothing.
+void showShape(const Simulation& simulation, channel::Displaced& out) noexcept;
+
 /// Shows a session to viewers: scenery once, the state in every tick, displaced nodes at frame rate (task H9).
 class Broadcast {
 public:
-    /// Throws std::runtime_error when the session's segment cannot be made.
-    Broadcast(const std::string& session, const SessionModel& model);
+    /// As publisherOf().
+    Broadcast(const std::string& session, const SessionModel& model, bool viewersHand = false);
 
     /// Wait-free; allocates nothing.
     void publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept;
+    /// What the viewer that is the hand asks for; see channel::Publisher.
+    std::optional<channel::Input> input() const noexcept { return publisher_.input(); }
     /// The last state again, marked finished.
     void finish() noexcept;
 
 private:
-    void publishDisplaced(const Simulation& simulation) noexcept;
-
     channel::Publisher publisher_;
     channel::State state_;
 };

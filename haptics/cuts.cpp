@@ -45,6 +45,24 @@ bool Channel::contains(Vec3 p) const noexcept
     return place >= -ends && place <= length + ends && glm::dot(w, w) - place * place <= radius * radius;
 }
 
+HolesNear::HolesNear(const Cuts& cuts, Vec3 middle, double radius) noexcept
+{
+    for (const Channel& c : cuts.cores.all()) {
+        const Vec3 w = middle - c.from;
+        const double place = glm::dot(w, c.along), reach = radius + c.radius;
+        const bool near = place > -reach && place < c.length + reach && glm::dot(w, w) - place * place < reach * reach;
+        if (near && count_ < most) {
+            hole_[count_++] = &c;
+        }
+    }
+}
+
+bool HolesNear::contain(Vec3 rest) const noexcept
+{
+    return std::any_of(hole_.begin(), hole_.begin() + static_cast<std::ptrdiff_t>(count_),
+                       [&](const Channel* c) { return c->contains(rest); });
+}
+
 bool taken(const Cuts& cuts, Vec3 rest) noexcept
 {
     const auto all = cuts.cores.all();

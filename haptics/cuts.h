@@ -40,6 +40,19 @@ struct Cuts {
 
 inline constexpr int coreChannels = 8;
 
+/// The holes that reach into a ball, so that its points need not look at all of them; beyond `most` none is known. The cuts
+/// must outlive it.
+class HolesNear {
+public:
+    static constexpr std::size_t most = 64;
+    HolesNear(const Cuts& cuts, Vec3 middle, double radius) noexcept;
+    bool contain(Vec3 rest) const noexcept;
+
+private:
+    std::array<const Channel*, most> hole_{};
+    std::size_t count_ = 0;
+};
+
 /// Whether the tissue at `rest` was taken with a core.
 bool taken(const Cuts& cuts, Vec3 rest) noexcept;
 

@@ -19,6 +19,7 @@ constexpr double graspLength = 4e-3;  // distance below which a needle's tip bec
 constexpr double speedBand = 30.0;    // the tip's speed passes a low-pass at this frequency [Hz]
 constexpr int restSteps = 3;          // from one point of the line to the next
 constexpr int halvings = 5;           // of a step that ends in another tissue
+constexpr double farAway = 1.0;       // where a core was taken every structure is [m]
 
 Proximity proximityOf(const GuardedStructure& s, const occupancy::Body& body, const TipState& tip, Vec3 position) noexcept
 {
@@ -109,10 +110,15 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
 
     const double radius = model.scene.tool.radius;
     const std::uint8_t here = tip.phase == Phase::inserted ? tip.tissue : 0;
+    constexpr double reach = lookAheadSteps * lookAheadStep;
+    const HolesNear holes(tip.needle.cuts, tip.proxy + 0.5 * reach * tool.axis, reach);
+    const auto distanceTo = [&](std::size_t i, Vec3 p, bool hole) {
+        return hole ? farAway : model.structures[i].distance.distance(p);
+    };
     std::array<double, maxStructures> before{};
     Vec3 rest = tip.proxy;
     for (std::size_t i = 0; i < model.structures.size(); ++i) {
-        before[i] = model.structures[i].distance.distance(rest);
+        before[i] = distanceTo(i, rest, holes.contain(rest));
         found.structure[i] = before[i] <= radius ? 0.0 : found.structure[i];
     }
     for (int k = 1; k <= lookAheadSteps; ++k) {
@@ -122,20 +128,22 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
         for (int n = 0; n < restSteps; ++n) {
             rest = p - occupancy::displacementAt(body, rest);
         }
+        const bool hole = holes.contain(rest);
         for (std::size_t i = 0; i < model.structures.size(); ++i) {
-            const double d = model.structures[i].distance.distance(rest);
+            const double d = distanceTo(i, rest, hole);
             if (d <= radius && before[i] > radius && std::isinf(found.structure[i])) {
                 found.structure[i] = (k - 1 + (before[i] - radius) / (before[i] - d)) * lookAheadStep;
             }
             before[i] = d;
         }
-        const auto next = reader.tissue(rest);
+        const auto left = [&](Vec3 at) { return holes.contain(at) ? std::uint8_t{0} : reader.tissue(at); };
+        const auto next = hole ? std::uint8_t{0} : reader.tissue(rest);
         if (std::isinf(found.tissueDistance) && next != here && next != 0) {
             found.tissue = next;
             double low = 0.0, high = 1.0;
             for (int n = 0; n < halvings; ++n) {
                 const double middle = 0.5 * (low + high);
-                (reader.tissue(glm::mix(last, rest, middle)) == next ? high : low) = middle;
+                (left(glm::mix(last, rest, middle)) == next ? high : low) = middle;
             }
             found.tissueDistance = (k - 1 + high) * lookAheadStep;
         }

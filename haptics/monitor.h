@@ -29,7 +29,8 @@ std::array<Proximity, maxStructures> monitor(const SessionModel& model, const oc
                                              Vec3 position, MonitorState& state, TickRecord& record) noexcept;
 
 /// What is ahead of a needle at `tool` on its own line: marches through the deformed tissue in steps of lookAheadStep, as
-/// it is deformed now. A structure is touched within the needle's radius. Of other tools: nothing is ahead.
+/// it is deformed now. A structure is touched within the needle's radius; where a core was taken nothing is left of it. Of
+/// other tools: nothing is ahead.
 /// @param dt  period of the loop [s]
 LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
                     const TipState& tip, const DeviceSample& tool, double dt, MonitorState& state) noexcept;

@@ -45,7 +45,7 @@ DeviceSample ReplayDevice::read() noexcept
 
 ReplayResult replay(const Record& record, const SessionModel& model)
 {
-    Simulation simulation(model);
+    Simulation simulation(model, {1.0 / record.info().rate, {}});
     ReplayResult result;
     ForceHash hash;
     record.each([&](const TickRecord& then) {

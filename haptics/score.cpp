@@ -241,6 +241,9 @@ void Scorer::addVital(const TickRecord& record) noexcept
     for (std::size_t i = 1; i < structures_; ++i) {
         inside = inside || record.distance[i] <= 0;
         score_.vitalDepth = std::max(score_.vitalDepth, -record.distance[i]);
+        if (record.phase == Phase::inserted) {
+            score_.vitalMargin = std::min(score_.vitalMargin, record.distance[i]);
+        }
     }
     vitalTicks_ += inside ? 1 : 0;
 }
@@ -330,6 +333,8 @@ std::vector<std::pair<std::string, std::string>> describe(const Score& s)
         {"Vital contacts", fmt::format("{}", s.vitalContacts)},
         {"Time in vital structures", fmt::format("{:.2f} s", s.vitalSeconds)},
         {"Depth in vital structures", fmt::format("{:.1f} mm", s.vitalDepth * 1e3)},
+        {"Nearest to a vital structure",
+         std::isfinite(s.vitalMargin) ? fmt::format("{:.1f} mm", s.vitalMargin * 1e3) : "-"},
         {"Warnings", fmt::format("{}", s.warnings)},
         {"Time", fmt::format("{:.1f} s", s.seconds)},
         {"Skin contacts", fmt::format("{}", s.skinContacts)},

@@ -33,6 +33,9 @@ struct Score {
     std::uint32_t vitalContacts = 0;
     double vitalSeconds = 0;  // time with the tip in contact with a vital structure
     double vitalDepth = 0;    // deepest [m]
+    /// From the tip to the nearest vital structure while inside, below 0 in it [m]; infinite when never inside or without
+    /// one.
+    double vitalMargin = std::numeric_limits<double>::infinity();
     std::uint32_t warnings = 0;
     double jerk = 0;        // root mean square of the tip's, below 20 Hz, while in contact [m/s^3]
     double tissueWork = 0;  // that the tool did on the tissue: cutting, rubbing and what is still bent [J]

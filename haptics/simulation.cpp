@@ -58,7 +58,8 @@ std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model,
     const auto& settings = model.scene.model.elastic;
     chainmail::ElasticOptions options;
     options.window = window;
-    options.cycles = settings.cycles;
+    // A tick that is longer has time for more.
+    options.cycles = static_cast<int>(std::lround(settings.cycles * std::max(1.0, period / tickSeconds)));
     options.finiteStrain = settings.strain == datasets::Strain::finite;
     options.viscosity = settings.viscosity / period;
     return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
@@ -100,7 +101,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     TaskClock clock(record_);
     accept(device);
     stepDownIfAsked();
-    tool_ = bentTool(record_.device, tip_.needle);
+    tool_ = bentTool(hand_, tip_.needle);
     const Vec3 position = tool_.position;
 
     const auto way = collide();
@@ -116,7 +117,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     const Vec3 additional = additionalForce(model_.scene.dffb, model_.structures.size(), near, position,
                                             tip_.phase != Phase::free, stabiliserOptions_.period, dffb_);
     const bool wasFaulted = stabiliser_.faulted;
-    const auto sent = stabilise(basic, additional, record_.device, stabiliserOptions_, stabiliser_);
+    const auto sent = stabilise(basic, additional, hand_, stabiliserOptions_, stabiliser_);
     if (sent.faulted && !wasFaulted) {
         addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
     }
@@ -124,7 +125,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     record_.phase = tip_.phase;
     record_.tissue = tip_.tissue;
     record_.inserted = tip_.needle.inserted;
-    record_.deflection = tool_.position - record_.device.position;
+    record_.deflection = tool_.position - hand_.position;
     record_.basic = sent.basic;
     record_.additional = sent.additional;
     record_.total = sent.total();
@@ -149,8 +150,13 @@ void Simulation::accept(const DeviceSample& device) noexcept
         record_.device.buttons = (device.buttons & ~buttonFire) | poseInvalid;
         record_.device.fresh = false;
     }
+    hand_ = record_.device;
+    hand_.position =
+        record_.device.fresh || ticks_ == 0
+            ? betweenSteps(record_.device.position, stabiliserOptions_.device.encoder, stabiliserOptions_.period, encoder_)
+            : encoder_.position;
     if (ticks_ == 0) {
-        last_ = record_.device.position;
+        last_ = hand_.position;
     }
 }
 

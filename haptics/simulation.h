@@ -3,6 +3,7 @@
 #include <chainmail/level.h>
 #include <haptics/dffb.h>
 #include <haptics/monitor.h>
+#include <haptics/motion.h>
 #include <haptics/session_model.h>
 #include <haptics/stabiliser.h>
 #include <haptics/tick.h>
@@ -61,7 +62,9 @@ private:
     double trust_ = 1;  // the elastic body's force over the contact law's, where both are known
     occupancy::Body body_;
     std::unique_ptr<occupancy::ContactSet> contacts_;
-    DeviceSample tool_;  // the device's pose, a bent needle's tip where it is
+    DeviceSample hand_;  // the device's pose, between encoder steps
+    DeviceSample tool_;  // that of the tool: a bent needle's tip is elsewhere
+    EncoderState encoder_;
     TipState tip_;
     MonitorState monitor_;
     DffbState dffb_;

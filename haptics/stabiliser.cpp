@@ -13,26 +13,27 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double rampTime = 0.5;        // [s]
-constexpr double fadeTime = 0.05;       // [s]
-constexpr double slewRate = 50.0;       // of the cap, per second
-constexpr double riseShare = 0.9;       // of the slew for the tissue, the rest for ramp and damping
-constexpr double fastestMotion = 10.0;  // of a hand [m/s]
-constexpr double slowMotion = 0.03;     // [m/s]
-constexpr double settledMotion = 1.0;   // of a pose that can be believed again after a jump [m/s]
-constexpr double settlingTime = 0.02;   // [s]
-constexpr double longestWindow = 4e-3;  // [s]
-constexpr double stiffnessShare = 0.5;  // of the stable limit
-constexpr double dampingShare = 0.35;   // of the mass over the time that the damping is late
-constexpr double margin = 1.2;          // of damping over the leak
-constexpr double frictionShare = 0.5;   // of the device's Coulomb friction is counted on
-constexpr double catchUpTime = 0.1;     // of the coupling, standing still [s]
-constexpr double restTime = 0.03;       // after which the hand stands still [s]
-constexpr double mostTissue = 100.0;    // of the cap: larger forces of tissue are that large
-constexpr double noForce = 1e-9;        // what rounding leaves [N]
-constexpr double energyAllowed = 1e-3;  // that tissue may give beyond what it got [J]
-constexpr double roundingOff = 1e-9;    // of positions [m]
-constexpr double guardTime = 0.02;      // from full force to none, and back [s]
+constexpr double rampTime = 0.5;   // [s]
+constexpr double fadeTime = 0.05;  // [s]
+constexpr double slewRate = 50.0;  // of the cap, per second
+constexpr double fallShare = 0.8;  // of the slew beside what the motion asks for, where that is known to about the rest
+constexpr double riseShare = 0.9;  // of the slew for the tissue, the rest for ramp and damping
+constexpr double fastestMotion = 10.0;    // of a hand [m/s]
+constexpr double slowMotion = 0.03;       // [m/s]
+constexpr double settledMotion = 1.0;     // of a pose that can be believed again after a jump [m/s]
+constexpr double settlingTime = 0.02;     // [s]
+constexpr double stiffnessShare = 0.5;    // of the stable limit
+constexpr double stiffestPress = 7e3;     // stiffer is no device's frame [N/m]
+constexpr double dampingShare = 0.35;     // of the mass over the time that the damping is late
+constexpr double margin = 1.2;            // of damping over the leak
+constexpr double frictionShare = 0.5;     // of the device's Coulomb friction is counted on
+constexpr double catchUpTime = 0.1;       // of the coupling, standing still [s]
+constexpr double restTime = 0.03;         // after which the hand stands still [s]
+constexpr double mostTissue = 100.0;      // of the cap: larger forces of tissue are that large
+constexpr double noForce = 1e-9;          // what rounding leaves [N]
+constexpr double energyAllowed = 0.4e-3;  // that tissue may give beyond what it got [J]
+constexpr double roundingOff = 1e-9;      // of positions [m]
+constexpr double guardTime = 0.02;        // from full force to none, and back [s]
 
 bool finite(Vec3 v) noexcept
 {
@@ -78,7 +79,7 @@ void account(Vec3 way, const StabiliserOptions& o, EnergyLedger& l) noexcept
 {
     const RenderedForce held = heldForce(l, o);
     l.given += glm::dot(held.total(), way);
-    l.tissue += glm::dot(held.basic + held.damping, way);
+    l.tissue += glm::dot(held.basic + held.damping, way) - frictionShare * o.device.coulomb * glm::length(way);
     l.damped -= glm::dot(held.damping, way);
 }
 
@@ -125,6 +126,16 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
     return next;
 }
 
+// How much the force may change where it falls with the motion. In periods under a millisecond the way is one of encoder
+// steps: there the speed says what it was, nearly.
+double mostFall(Vec3 way, const Motion& motion, double slew, double stiffness, double period) noexcept
+{
+    if (period >= tickSeconds) {
+        return slew + stiffness * glm::length(way);
+    }
+    return std::max(slew, fallShare * slew + stiffness * period * glm::length(motion.velocity));
+}
+
 // What the held, late force gives too much, less what the device's friction takes.
 Vec3 leakDamping(const Motion& motion, double stiffness, const StabiliserOptions& o, double strongest) noexcept
 {
@@ -136,10 +147,22 @@ Vec3 leakDamping(const Motion& motion, double stiffness, const StabiliserOptions
     return -std::clamp(needed, 0.0, strongest * speed) / speed * motion.velocity;
 }
 
-double guardGain(Vec3 basic, Vec3 velocity, double dt, StabiliserState& s) noexcept
+// What an ideal port would have taken for the force as it is, and has yet to give back.
+void store(Vec3 before, Vec3 now, Vec3 way, EnergyLedger& l) noexcept
 {
-    const bool outwards = glm::dot(basic, velocity) > 0.0;
-    const double allowed = outwards ? std::clamp(2.0 - s.ledger.tissue / energyAllowed, 0.0, 1.0) : 1.0;
+    l.stored = glm::length(now) < noForce ? 0.0 : std::max(0.0, l.stored - 0.5 * glm::dot(before + now, way));
+}
+
+// The share of the force that, kept on all the way out, leaves no more than twice the energy allowed. Poses that do not
+// come say nothing of the energy that goes out: then the worst is presumed, a hand that goes on as fast as it did, straight
+// along the force.
+double guardGain(Vec3 basic, const DeviceSample& device, Vec3 velocity, double dt, StabiliserState& s) noexcept
+{
+    s.speed = device.fresh ? glm::length(velocity) : s.speed;
+    s.presumed = device.fresh ? 0.0 : s.presumed + dt * s.speed * glm::length(s.sent.basic + s.sent.damping);
+    const bool outwards = !device.fresh || glm::dot(basic, velocity) > 0.0;
+    const double left = 2.0 * energyAllowed - s.ledger.tissue - s.presumed;
+    const double allowed = outwards ? std::clamp(left / (energyAllowed + s.gain * s.ledger.stored), 0.0, 1.0) : 1.0;
     const double most = dt / guardTime;
     s.guard += std::clamp(allowed - s.guard, -most, most);
     return s.guard;
@@ -185,14 +208,12 @@ RenderedForce towards(const RenderedForce& from, const RenderedForce& to, double
 void remember(Vec3 position, const RenderedForce& rendered, bool believed, MotionWindow& w) noexcept
 {
     if (!believed) {
-        w.count = 0;
+        w.read.count = 0;
         return;
     }
-    w.newest = (w.newest + 1) % w.longest;
-    w.position[w.newest] = position;
-    w.force[w.newest] = rendered.basic + rendered.additional;
-    w.basic[w.newest] = rendered.basic;
-    w.count = std::min(w.count + 1, w.longest);
+    w.read.add(position);
+    w.force[w.read.newest] = rendered.basic + rendered.additional;
+    w.basic[w.read.newest] = rendered.basic;
 }
 
 }  // namespace
@@ -200,35 +221,25 @@ void remember(Vec3 position, const RenderedForce& rendered, bool believed, Motio
 StableLimits stableLimits(const StabiliserOptions& o) noexcept
 {
     StableLimits limits;
-    limits.damping = dampingShare * o.device.mass / (lateness(o) + 0.5 * longestWindow);
+    limits.damping = dampingShare * o.device.mass / (lateness(o) + 0.5 * longestStraight);
     limits.stiffness = stiffnessShare * (o.device.viscous + limits.damping) / lateness(o);
+    limits.pressed = std::min(limits.stiffness, stiffestPress);
+    const bool steps = o.device.encoder > 0.0 && o.device.coulomb > 0.0;
+    limits.resting = steps ? std::min(limits.pressed, 2.0 * o.device.coulomb / o.device.encoder) : limits.pressed;
     return limits;
 }
 
 Motion motionIn(const MotionWindow& w, double encoder, double period) noexcept
 {
-    const auto back = [&](const auto& of, std::size_t n) { return of[(w.newest + w.longest - n) % w.longest]; };
-    const auto most = std::min(w.count, static_cast<std::size_t>(longestWindow / period + 1.5));
-    std::size_t length = 0;
-    for (std::size_t n = 1; n < most; ++n) {
-        const Vec3 slope = (back(w.position, n) - back(w.position, 0)) / static_cast<double>(n);
-        bool straight = true;
-        for (std::size_t i = 1; i < n && straight; ++i) {
-            const Vec3 off = glm::abs(back(w.position, i) - back(w.position, 0) - static_cast<double>(i) * slope);
-            straight = std::max({off.x, off.y, off.z}) <= encoder + roundingOff;
-        }
-        if (!straight) {
-            break;
-        }
-        length = n;
-    }
+    const std::size_t length = straightSince(w.read, encoder, period);
     if (length == 0) {
         return {};
     }
-    const Vec3 way = back(w.position, 0) - back(w.position, length);
+    const auto change = [&](const auto& of) { return of[w.read.newest] - of[w.read.back(length)]; };
+    const Vec3 way = change(w.read.position);
     const double square = glm::dot(way, way);
     const auto stiffness = [&](const auto& of) {
-        return square > 0.0 ? std::max(0.0, -glm::dot(back(of, 0) - back(of, length), way) / square) : 0.0;
+        return square > 0.0 ? std::max(0.0, -glm::dot(change(of), way) / square) : 0.0;
     };
     return {way / (static_cast<double>(length) * period), stiffness(w.force), stiffness(w.basic)};
 }
@@ -245,7 +256,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, con
     RenderedForce sent;
     if (s.faulted || !held) {
         s.gain = 0.0;
-        s.window.count = 0;
+        s.window.read.count = 0;
     } else {
         const StableLimits limits = stableLimits(o);
         const double slew = slewRate * o.period * cap;
@@ -256,20 +267,22 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, con
             s.coupled = bounded(tissue, cap);
         }
         watchRest(device.position, o, s);
-        sent.basic = couple(tissue, way, limits.stiffness, cap, riseShare * slew, o, s);
+        const Vec3 before = s.coupled;
+        sent.basic = couple(tissue, way, s.rest >= restTime ? limits.resting : limits.pressed, cap, riseShare * slew, o, s);
+        store(before, sent.basic, way, s.ledger);
         sent.additional = bounded(additional, cap);
         remember(device.position, sent, believed, s.window);
         const Motion motion = motionIn(s.window, o.device.encoder, o.period);
         // So that without additional force the basic one is the same: what that alone asks for, and the rest.
         sent.damping = leakDamping(motion, motion.basic, o, limits.damping);
         sent.additional += leakDamping(motion, motion.stiffness, o, limits.damping) - sent.damping;
-        sent.basic *= guardGain(sent.basic, motion.velocity, o.period, s);
+        sent.basic *= guardGain(sent.basic, device, motion.velocity, o.period, s);
         s.gain = std::clamp(s.gain + (device.fresh && believed ? o.period / rampTime : -o.period / fadeTime), 0.0, 1.0);
         const double size = glm::length(sent.total());
         sent = scaled(s.gain * (size > cap ? cap / size : 1.0), sent);
         // A spring that is let go gives energy where its force does not fall with the motion.
         const bool falls = glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
-        sent = towards(s.sent, sent, slew + (falls ? limits.stiffness * glm::length(way) : 0.0), cap);
+        sent = towards(s.sent, sent, falls ? mostFall(way, motion, slew, limits.stiffness, o.period) : slew, cap);
     }
     s.sent = sent;
     s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = sent;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/arm.h>
+#include <haptics/motion.h>
 #include <haptics/tick.h>
 
 #include <array>
@@ -15,14 +16,19 @@ struct StabiliserOptions {
     double cap = 8.5;             // on the force [N]; the device's peak where that is lower
 };
 
-/// Largest stiffness [N/m] that is passed on unchanged, and the largest damping [N s/m] that is added for it.
+/// What a loop stands.
 struct StableLimits {
-    double stiffness = 0;
-    double damping = 0;
+    double stiffness = 0;  // of a spring that is stable [N/m]
+    double pressed = 0;    // up to this the force passes unchanged while the hand moves [N/m]
+    double resting = 0;    // and while it rests
+    double damping = 0;    // the most that is added [N s/m]
 };
 
-/// Half of (b + B) / (T / 2 + t_d) (Gil et al., "Stability analysis of a 1 DOF haptic interface using the Routh-Hurwitz
-/// criterion", 2004), t_d with the lag of the amplifier. B is about a third of m over the time that the damping comes late.
+/// Stable: half of (b + B) / (T / 2 + t_d) (Gil et al., "Stability analysis of a 1 DOF haptic interface using the
+/// Routh-Hurwitz criterion", 2004), t_d with the lag of the amplifier. B is about a third of m over the time that the
+/// damping comes late. Pressed: that of periods of a millisecond where they are shorter, since steps of the encoder are
+/// then felt one by one. Resting: 2 c / D at most, beyond which friction c does not end what an encoder of step D begins
+/// (Abbott and Okamura, "Effects of position quantization and sampling rate on virtual-wall passivity", 2005).
 StableLimits stableLimits(const StabiliserOptions& options) noexcept;
 
 /// The force as it is sent: equation 1. The controller's damping is in the channels, in each what its own stiffness asks
@@ -46,11 +52,9 @@ struct RenderedForce {
 
 /// The last positions and forces.
 struct MotionWindow {
-    static constexpr std::size_t longest = 32;
-    std::array<Vec3, longest> position{};  // as read [m], newest at `newest`
-    std::array<Vec3, longest> force{};     // as rendered in answer [N]
-    std::array<Vec3, longest> basic{};     // the tissue's part of it [N]
-    std::size_t newest = 0, count = 0;
+    PositionWindow read;
+    std::array<Vec3, PositionWindow::longest> force{};  // as rendered in answer [N]
+    std::array<Vec3, PositionWindow::longest> basic{};  // the tissue's part of it [N]
 };
 
 /// What the window says of the motion.
@@ -60,9 +64,7 @@ struct Motion {
     double basic = 0;      // the same of the tissue's part [N/m]
 };
 
-/// By adaptive windowing: over the longest window in which no position is off the straight line between its ends by more
-/// than an encoder step, and that is 4 ms at most. (Janabi-Sharifi, Hayward and Chen, "Discrete-time adaptive windowing
-/// for velocity estimation", IEEE Trans. Control Systems Technology 8, 2000.)
+/// Over the longest window in which the motion is straight.
 Motion motionIn(const MotionWindow& window, double encoder, double period) noexcept;
 
 /// The energy that went through the port.
@@ -71,7 +73,8 @@ struct EnergyLedger {
     std::array<RenderedForce, longest> sent{};   // by tick, modulo
     std::size_t ticks = 0;
     double given = 0;   // net, to the hand [J]
-    double tissue = 0;  // the part of it that tissue and controller gave [J]
+    double tissue = 0;  // the part of it that tissue and controller gave, less what the device's friction took for sure [J]
+    double stored = 0;  // what tissue would give back in an ideal loop [J]
     double damped = 0;  // taken by the controller for the basic force [J]
 };
 
@@ -86,8 +89,10 @@ struct StabiliserState {
     Vec3 coupled{0.0};  // what the virtual coupling made of it [N]
     MotionWindow window;
     EnergyLedger ledger;
-    double guard = 1;  // share of the basic force that the ledger allows
-    double gain = 0;   // start-up ramp, dead-man switch, watchdog
+    double speed = 0;     // when a pose was last fresh [m/s]
+    double presumed = 0;  // energy that tissue may have given since then [J]
+    double guard = 1;     // share of the basic force that the ledger allows
+    double gain = 0;      // start-up ramp, dead-man switch, watchdog
     RenderedForce sent;
     bool faulted = false;  // latched: the output is zero until the session ends
 };
@@ -101,13 +106,14 @@ struct StabiliserState {
 ///   (measured against the trapezoid rule; Ryu, Preusche, Hannaford and Hirzinger, "Time domain passivity control with
 ///   reference energy following", 2005). What the device's friction does not take of it, a damping force takes. It
 ///   looks at the last milliseconds alone, so it neither saves credit nor acts late. As the last guard, where the tissue
-///   has given 1 mJ more than it ever got, its force on the way out is scaled down until that is paid back.
+///   would end up with 0.4 mJ more than it ever got, its force on the way out is scaled down until that is paid back. While
+///   no fresh pose comes the hand is presumed to move on at its speed, along the force.
 /// - Gain: rises to 1 in half a second; falls to zero in 50 ms when poses stop being fresh or jump (over 10 m/s); is zero
 ///   while the dead-man switch is up.
 /// - Cap: all parts are scaled together, so that their sum is at most the cap (equation 1).
 /// - Slew: neither the sum nor a channel changes by more than 5 % of the cap per millisecond. Only on the way out a force
-///   may also fall by the stable stiffness times the motion: a spring that unloads late kicks. A fault and the dead-man
-///   switch end the force at once.
+///   may fall by the stable stiffness times the motion, if that is more: a spring that unloads late kicks. A fault and the
+///   dead-man switch end the force at once.
 SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& options,
                     StabiliserState& state) noexcept;
 

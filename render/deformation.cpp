@@ -59,6 +59,7 @@ VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept
 Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels)
     : labelGrid_(scenery.labels), lattice_(scenery.lattice), labels_(labels.begin(), labels.end())
 {
+    markPure();
     std::size_t nodes = 1;
     for (const std::int32_t n : lattice_.size)
         nodes *= static_cast<std::size_t>(std::max(n, 0));
@@ -67,6 +68,37 @@ Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::u
     air_.resize(nodes, 0);
     for (std::size_t i = 0; i < nodes; ++i)
         air_[i] = restTissue(position(lattice_, node(lattice_, static_cast<std::uint32_t>(i)))) == 0;
+    markNearAir();
+}
+
+// Axis after axis: of three cells that are the same within themselves and to each other.
+void Deformation::markPure()
+{
+    constexpr std::uint8_t compared = channel::rowBits | pureBit;
+    for (std::uint8_t& label : labels_)
+        label = static_cast<std::uint8_t>((label & ~compared) | (label & channel::rowBits) | pureBit);
+    std::vector<std::uint8_t> before;
+    std::size_t stride = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        before = labels_;
+        for (std::size_t i = stride; i + stride < labels_.size(); ++i)
+            if ((((before[i] ^ before[i - stride]) | (before[i] ^ before[i + stride])) & compared) != 0)
+                labels_[i] &= static_cast<std::uint8_t>(~pureBit);
+        stride *= static_cast<std::size_t>(labelGrid_.size[axis]);
+    }
+}
+
+void Deformation::markNearAir()
+{
+    nearAir_.resize(air_.size(), 0);
+    for (std::size_t i = 0; i < air_.size(); ++i) {
+        const glm::ivec3 middle = node(lattice_, static_cast<std::uint32_t>(i));
+        for (int k = 0; k < 27 && air_[i] != 0; ++k) {
+            const glm::ivec3 n = middle + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
+            if (inside(lattice_, n))
+                nearAir_[offset(lattice_, n)] = 1;
+        }
+    }
 }
 
 VoxelBox Deformation::apply(const channel::Displaced& displaced)
@@ -89,7 +121,7 @@ VoxelBox Deformation::apply(const channel::Displaced& displaced)
         largest_ = std::max(largest_, length);
     }
     carryAir();
-    const VoxelBox now = touched();
+    const VoxelBox now = boxOfMoved();
     const VoxelBox changed = enclosing(last_, now);
     last_ = now;
     return changed;
@@ -107,7 +139,8 @@ void Deformation::carryAir()
         const std::size_t end = moved_.size();
         frontier_.clear();
         for (std::size_t m = begin; m < end; ++m)
-            reachAir(node(lattice_, moved_[m]));
+            if (nearAir_[moved_[m]] != 0)
+                reachAir(node(lattice_, moved_[m]));
         for (const std::uint32_t at : frontier_) {
             const glm::vec3 mean = meanAround(node(lattice_, at));
             const float length = glm::length(mean), less = step * static_cast<float>(lattice_.spacing);
@@ -149,7 +182,7 @@ glm::vec3 Deformation::meanAround(glm::ivec3 around) const noexcept
     return neighbours > 0 ? sum / static_cast<float>(neighbours) : sum;
 }
 
-VoxelBox Deformation::touched() const
+VoxelBox Deformation::boxOfMoved() const
 {
     if (moved_.empty())
         return {};
@@ -201,6 +234,11 @@ glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
     return shift == glm::vec3(0) ? x : x + lattice_.spacing * glm::dvec3(shift);
 }
 
+glm::dvec3 Deformation::seen(glm::dvec3 p) const noexcept
+{
+    return p + glm::dvec3(displacement(glm::vec3((p - vec(lattice_.origin)) / lattice_.spacing)));
+}
+
 std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
 {
     const glm::dvec3 g = (p - vec(labelGrid_.origin)) / labelGrid_.spacing, nearest = glm::floor(g + 0.5);
@@ -209,15 +247,14 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
           nearest.z < last.z))
         return 0;
     const glm::ivec3 middle(nearest);
+    const std::uint8_t label = labels_[offset(labelGrid_, middle)];
+    if ((label & pureBit) != 0)
+        return label & channel::rowBits;
     std::array<std::uint8_t, 27> tissue{};
-    bool same = true;
     for (std::size_t k = 0; k < tissue.size(); ++k) {
         const int i = static_cast<int>(k);
-        tissue[k] = labels_[offset(labelGrid_, middle + glm::ivec3(i % 3, i / 3 % 3, i / 9) - 1)];
-        same = same && tissue[k] == tissue[0];
+        tissue[k] = labels_[offset(labelGrid_, middle + glm::ivec3(i % 3, i / 3 % 3, i / 9) - 1)] & channel::rowBits;
     }
-    if (same)
-        return tissue[0];
     std::array<std::array<double, 3>, 3> along{};
     for (int axis = 0; axis < 3; ++axis)
         for (int step = 0; step < 3; ++step)
@@ -236,6 +273,16 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
 std::uint8_t Deformation::tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept
 {
     return restTissue(rest(x, shift));
+}
+
+std::uint8_t Deformation::labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept
+{
+    const glm::dvec3 p = rest(x, shift);
+    const glm::ivec3 nearest(glm::floor((p - vec(labelGrid_.origin)) / labelGrid_.spacing + 0.5));
+    const std::uint8_t tissue = restTissue(p);
+    if (tissue == 0 || !inside(labelGrid_, nearest))
+        return tissue;
+    return tissue | (labels_[offset(labelGrid_, nearest)] & channel::shellBit);
 }
 
 }  // namespace palpate::render

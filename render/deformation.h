@@ -30,7 +30,7 @@ VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept;
 /// Rest point X lies at x = X + u(X).
 class Deformation {
 public:
-    /// `labels`: tissue row per display voxel, 0 = air; copied.
+    /// `labels`: tissue row per display voxel, 0 = air, with shellBit; copied.
     Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
 
     /// Takes over the nodes of one moment. Returns the display voxels that look different from before.
@@ -38,25 +38,38 @@ public:
     /// The rest point X that lies at `x` [m], by the fixed point X <- x - u(X).
     /// @param shift  where to start, X - x in lattice spacings, and where it ended: the next point along a row starts there
     glm::dvec3 rest(glm::dvec3 x, glm::vec3& shift) const noexcept;
+    /// Where the rest point `p` [m] lies now.
+    glm::dvec3 seen(glm::dvec3 p) const noexcept;
     /// Tissue at `x` [m] in the deformed body; `shift` as above. Around a point the tissue with the largest quadratic
     /// spline weight wins: borders are smooth, and no label turns into another one.
     std::uint8_t tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
+    /// The same with shellBit where a warning distance ends.
+    std::uint8_t labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
 
     const channel::Grid& grid() const noexcept { return labelGrid_; }
+    double latticeSpacing() const noexcept { return lattice_.spacing; }
+    /// Per display voxel at rest: tissue row (rowBits) and shellBit.
     std::span<const std::uint8_t> labels() const noexcept { return labels_; }
+    /// Display voxels that do not look as they do at rest lie in here.
+    const VoxelBox& touched() const noexcept { return last_; }
 
 private:
+    static constexpr std::uint8_t pureBit = 0x40;  // the 26 voxels around are of the same tissue
+
     /// At `g` [lattice spacings from the lattice's origin], in metres.
     glm::vec3 displacement(glm::vec3 g) const noexcept;
     std::uint8_t restTissue(glm::dvec3 p) const noexcept;
+    void markPure();
+    void markNearAir();
     void carryAir();
     void reachAir(glm::ivec3 around);
     glm::vec3 meanAround(glm::ivec3 around) const noexcept;
-    VoxelBox touched() const;
+    VoxelBox boxOfMoved() const;
 
     channel::Grid labelGrid_, lattice_;
-    std::vector<std::uint8_t> labels_;
+    std::vector<std::uint8_t> labels_;    // with pureBit
     std::vector<std::uint8_t> air_;       // per lattice node: outside the body
+    std::vector<std::uint8_t> nearAir_;   // per lattice node: that one or a neighbour is
     std::vector<glm::vec3> u_;            // per lattice node [m]
     std::vector<std::uint32_t> moved_;    // nodes with u != 0
     std::vector<std::uint32_t> visited_;  // per lattice node: last pass that gave it a value

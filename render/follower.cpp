@@ -40,6 +40,17 @@ double publishedAt(const channel::State& state)
     return 1e-9 * static_cast<double>(state.published);
 }
 
+constexpr double still = 0.05e-3;  // [m]: what moves less need not be followed at speed
+
+bool differ(const channel::Displaced& now, const std::vector<channel::Displacement>& before)
+{
+    const auto same = [](const channel::Displacement& a, const channel::Displacement& b) {
+        const glm::dvec3 way(a.u[0] - b.u[0], a.u[1] - b.u[1], a.u[2] - b.u[2]);
+        return a.node == b.node && glm::length(way) < still;
+    };
+    return !std::equal(now.nodes.begin(), now.nodes.begin() + now.count, before.begin(), before.end(), same);
+}
+
 std::string onlySession(const std::vector<std::string>& running)
 {
     if (running.empty())
@@ -63,7 +74,7 @@ bool Follower::over() const noexcept
 
 bool Follower::moving() const noexcept
 {
-    constexpr double settled = 0.4;  // [s]
+    constexpr double settled = 0.8;  // [s]: longer than a hand pauses, for a fine picture is slow to leave
     return subscriber_ && seconds(Clock::now() - moved_) < settled;
 }
 
@@ -80,10 +91,13 @@ void Follower::tryAttach(Picture& picture)
     if (!found || !found->alive())
         return;
     subscriber_ = std::move(found);
+    ++attached_;
+    silent_ = false;
     name_ = wanted_ = name;
     pid_ = subscriber_->ownerPid();
     ending_ = channel::Ending::none;
-    displaced_->tick = 0;
+    displaced_->publication = 0;
+    reshaped_ = false;
     known_ = false;
     state_ = {};
     health_ = {};
@@ -92,21 +106,49 @@ void Follower::tryAttach(Picture& picture)
     picture.setNotice("", "");
 }
 
-void Follower::read(Picture& picture)
+void Follower::read()
 {
     const auto now = subscriber_->state();
-    const bool newer = subscriber_->displaced(*displaced_);
-    if (now && (!known_ || now->tick != state_.tick)) {
-        if (known_ && now->tick > state_.tick && now->published > state_.published)
-            health_.tickRate = static_cast<double>(now->tick - state_.tick) / (publishedAt(*now) - publishedAt(state_));
-        constexpr double still = 0.05e-3;  // [m]
-        if (newer || glm::distance(vec(now->tip), vec(state_.tip)) > still)
-            moved_ = polled_;
-        state_ = *now;
-        known_ = fresh_ = true;
+    if (!now)
+        return;
+    if (known_ && now->tick == state_.tick) {
+        state_.published = now->published;  // a record that is paused
+        return;
     }
-    if (known_)
-        picture.update(state_, newer ? displaced_.get() : nullptr, health_);
+    if (!known_ || now->tick < rateFrom_.tick)
+        rateFrom_ = *now;
+    constexpr double rateOver = 0.5;  // [s]
+    if (const double span = publishedAt(*now) - publishedAt(rateFrom_); span > rateOver) {
+        health_.tickRate = static_cast<double>(now->tick - rateFrom_.tick) / span;
+        rateFrom_ = *now;
+    }
+    if (!known_ || glm::distance(vec(now->tip), restingTip_) > still) {
+        restingTip_ = vec(now->tip);
+        moved_ = polled_;
+    }
+    state_ = *now;
+    read_ = monotonic();
+    known_ = fresh_ = true;
+}
+
+void Follower::readShape()
+{
+    if (!subscriber_->displaced(*displaced_))
+        return;
+    reshaped_ = true;
+    if (differ(*displaced_, displacedBefore_)) {
+        moved_ = polled_;
+        displacedBefore_.assign(displaced_->nodes.begin(), displaced_->nodes.begin() + displaced_->count);
+    }
+}
+
+// A simulation that is stopped (SIGSTOP, a debugger) lives and publishes nothing.
+void Follower::notice(Picture& picture)
+{
+    constexpr double longest = 1.0;  // [s]
+    const bool silent = known_ && monotonic() - publishedAt(state_) > longest;
+    if (silent != std::exchange(silent_, silent))
+        picture.setNotice(silent ? "no answer from the simulation" : "", silent ? "the picture is as it was" : "");
 }
 
 void Follower::leave(Picture& picture)
@@ -114,6 +156,7 @@ void Follower::leave(Picture& picture)
     const bool finished = ending_ == channel::Ending::finished;
     picture.setNotice(finished ? "simulation ended" : "simulation stopped without ending",
                       fmt::format("closes in {:.0f} s unless session {} starts again", wait_, name_));
+    readShape();
     subscriber_.reset();
     since_ = Clock::now();
 }
@@ -142,14 +185,25 @@ void Follower::poll(Picture& picture)
         return;
     }
     // The way it ended first, the last state after it: so that the last state is the last.
-    ending_ = subscriber_->ending();
-    read(picture);
+    constexpr double again = 0.02;  // [s]: it asks the system
+    if (seconds(polled_ - checked_) > again) {
+        checked_ = polled_;
+        ending_ = subscriber_->ending();
+    }
+    read();
+    if (known_)
+        picture.note(state_);
+    notice(picture);
     if (ending_ != channel::Ending::none)
         leave(picture);
 }
 
 void Follower::draw(Picture& picture, Quality quality)
 {
+    if (subscriber_)
+        readShape();
+    if (known_)
+        picture.update(state_, std::exchange(reshaped_, false) ? displaced_.get() : nullptr, health_);
     picture.render(quality);
     const auto now = Clock::now();
     if (!known_)
@@ -157,7 +211,7 @@ void Follower::draw(Picture& picture, Quality quality)
     if (fresh_) {
         const double delay = monotonic() - publishedAt(state_);
         frameSeconds_.push_back(seconds(now - polled_));
-        delaySeconds_.push_back(delay);
+        shown_.push_back({state_.tick, publishedAt(state_), read_, monotonic()});
         health_.delay = delay;
         fresh_ = false;
     }
@@ -180,8 +234,12 @@ ViewerFigures Follower::figures() const
     figures.frames = frames_;
     figures.frameP50 = quantile(frameSeconds_, 0.5);
     figures.frameP90 = quantile(frameSeconds_, 0.9);
-    figures.delayP50 = quantile(delaySeconds_, 0.5);
-    figures.delayP99 = quantile(delaySeconds_, 0.99);
+    std::vector<double> delays;
+    for (const Shown& picture : shown_)
+        delays.push_back(picture.done - picture.published);
+    figures.delayP50 = quantile(delays, 0.5);
+    figures.delayP99 = quantile(std::move(delays), 0.99);
+    figures.shown = shown_;
     const double span = first_ ? seconds(last_ - *first_) : 0;
     figures.rate = span > 0 ? static_cast<double>(frames_ - 1) / span : 0;
     return figures;

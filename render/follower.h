@@ -23,13 +23,16 @@ public:
     /// `session` may be empty: then the only session that runs is taken.
     Follower(std::string session, double wait);
 
-    /// Looks what has come. Throws std::runtime_error when there has been no session for `wait` seconds, or the one that
-    /// there was has been killed and has not come back.
+    /// Looks what has come; to be called often. Throws std::runtime_error when there has been no session for `wait`
+    /// seconds, or the one that there was has been killed and has not come back.
     void poll(Picture& picture);
-    /// Draws and measures.
+    /// Draws what has come, and measures.
     void draw(Picture& picture, Quality quality);
 
-    bool attached() const noexcept { return subscriber_.has_value(); }
+    /// The session that is followed; null when there is none.
+    const channel::Subscriber* session() const noexcept { return subscriber_ ? &*subscriber_ : nullptr; }
+    /// How often a session has been attached to.
+    std::uint64_t attached() const noexcept { return attached_; }
     /// The last session has ended as it should, and nothing has come since for `wait` seconds.
     bool over() const noexcept;
     /// ... or just now.
@@ -41,33 +44,44 @@ public:
     bool known() const noexcept { return known_; }
     /// Tissue or tool have moved lately, so that speed counts more than detail.
     bool moving() const noexcept;
+    std::uint64_t frames() const noexcept { return frames_; }
     ViewerFigures figures() const;
 
 private:
     void tryAttach(Picture& picture);
-    void read(Picture& picture);
+    void read();
+    void readShape();
     void leave(Picture& picture);
     void giveUp() const;
+    void notice(Picture& picture);
 
     std::string wanted_, name_;
     double wait_;
     std::optional<channel::Subscriber> subscriber_;
     std::unique_ptr<channel::Displaced> displaced_ = std::make_unique<channel::Displaced>();
+    std::vector<channel::Displacement> displacedBefore_;  // when tissue moved last
     channel::State state_;
     std::array<channel::Name, channel::maxStructures> structures_{};
     bool known_ = false, fresh_ = false;
+    std::uint64_t attached_ = 0;
+    bool reshaped_ = false;       // displaced nodes have come that are not in the picture yet
+    glm::dvec3 restingTip_{0.0};  // [m]
+    channel::State rateFrom_;     // since when ticks are counted
+    bool silent_ = false;         // the simulation lives and says nothing
     channel::Ending ending_ = channel::Ending::none;
     std::uint64_t pid_ = 0;
     Clock::time_point since_ = Clock::now();  // without a session
     Clock::time_point moved_ = Clock::now();
     Clock::time_point polled_ = Clock::now();  // start of the work on the present picture
-    Clock::time_point checked_{};              // whether the session is alive
+    Clock::time_point checked_{};              // whether there is a session, or it is alive
     std::optional<Clock::time_point> first_;
     Clock::time_point last_{};
     bool flowing_ = false;  // the last picture was of something that moves
     Health health_;
     std::uint64_t frames_ = 0;
-    std::vector<double> frameSeconds_, delaySeconds_;
+    std::vector<double> frameSeconds_;
+    std::vector<Shown> shown_;
+    double read_ = 0;  // when the state was [s], as monotonic()
 };
 
 }  // namespace palpate::render

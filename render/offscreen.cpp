@@ -1,5 +1,6 @@
 #include <render/follower.h>
 #include <render/hosts.h>
+#include <render/movie.h>
 
 #include <vtkNew.h>
 #include <vtkPNGWriter.h>
@@ -11,6 +12,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -87,6 +90,53 @@ private:
     std::uint64_t frames_ = 0, events_ = 0;
 };
 
+// What the pictures of a session go to.
+class Outputs {
+public:
+    Outputs(const ViewerOptions& options, vtkRenderWindow& window) : every_(options.every)
+    {
+        if (!options.offscreen.empty())
+            files_.emplace(options.offscreen, window);
+        if (!options.movie.empty())
+            movie_.emplace(options.movie, window);
+    }
+
+    std::uint64_t written() const noexcept { return files_ ? files_->written() : frames_; }
+    /// The times [s] from `time` on.
+    void begin(double time) { fileDue_ = movieDue_ = time; }
+    double nextDue() const { return !movie_ ? fileDue_ : files_ ? std::min(fileDue_, movieDue_) : movieDue_; }
+    void write(double time, const std::vector<std::string>& events)
+    {
+        if (files_ && time >= fileDue_ - early) {
+            files_->frame();
+            fileDue_ = time + every_;
+        }
+        for (const std::string& event : events)
+            if (files_)
+                files_->event(event);
+        // A film keeps the session's time: what could not be drawn in time stands for longer.
+        if (movie_ && time >= movieDue_ - early) {
+            const int frames = 1 + static_cast<int>((time - movieDue_ + early) * MovieFile::rate);
+            movie_->add(frames);
+            movieDue_ += frames / MovieFile::rate;
+            frames_ += static_cast<std::uint64_t>(frames);
+        }
+    }
+    void finish()
+    {
+        if (movie_)
+            movie_->finish();
+    }
+
+    static constexpr double early = 0.5e-3;  // [s]: half a tick
+
+private:
+    double every_, fileDue_ = 0, movieDue_ = 0;
+    std::uint64_t frames_ = 0;
+    std::optional<PictureFiles> files_;
+    std::optional<MovieFile> movie_;
+};
+
 void makeFolder(const std::filesystem::path& folder)
 {
     std::error_code error;
@@ -97,29 +147,31 @@ void makeFolder(const std::filesystem::path& folder)
         throw std::runtime_error(folder.string() + ": this folder cannot be written to");
 }
 
-}  // namespace
-
-ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool>& stop)
+// Asks whoever plays a record for the tick at `time`; whether it is there.
+bool askFor(Playback& playback, double time, const Follower& follower)
 {
-    makeFolder(options.offscreen);
-    vtkNew<vtkRenderWindow> window;
-    window->SetShowWindow(false);
-    window->SetOffScreenRendering(1);
-    window->SetMultiSamples(0);
-    window->SetSize(options.width, options.height);
-    Picture picture(*window);
-    Follower follower(options.session, options.wait);
-    PictureFiles files(options.offscreen, *window);
+    playback.paused = true;
+    if (follower.known() && std::abs(follower.state().time - time) < Outputs::early)
+        return true;
+    if (std::isnan(playback.jump))
+        playback.jump = time;
+    return false;
+}
 
+// Follows a session that runs, or asks for one picture of a record after the other, until there is no more.
+void writeAll(const ViewerOptions& options, const std::atomic<bool>& stop, Picture& picture, Follower& follower,
+              Outputs& outputs)
+{
     channel::State before;
     bool any = false;
-    double due = 0;
     while (!stop && follower.ending() != channel::Ending::finished &&
-           (options.frames == 0 || files.written() < options.frames)) {
+           (options.frames == 0 || outputs.written() < options.frames)) {
         follower.poll(picture);
-        constexpr auto pause = std::chrono::milliseconds(4);
-        if (!follower.known() || (any && follower.state().tick == before.tick)) {
-            std::this_thread::sleep_for(pause);
+        if (options.playback != nullptr && outputs.nextDue() > options.playback->length + Outputs::early)
+            return;
+        const bool there = options.playback == nullptr || askFor(*options.playback, outputs.nextDue(), follower);
+        if (!follower.known() || !there || (any && follower.state().tick == before.tick)) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(options.playback != nullptr ? 1 : 4));
             continue;
         }
         const channel::State now = follower.state();
@@ -127,26 +179,41 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool
             // What was before the viewer came, or in the session before, is no event.
             before = now;
             before.status = channel::Status::running;
-            due = now.time;
+            outputs.begin(now.time);
         }
         const auto& names = follower.structures();
         const auto events = eventsBetween(before, now, names[std::min<std::size_t>(now.warned, names.size() - 1)]);
-        const bool time = now.time >= due;
-        if (time || !events.empty())
-            follower.draw(picture, options.every > 0 ? Quality::still : Quality::moving);
-        if (time) {
-            files.frame();
-            due = now.time + options.every;
+        if (now.time >= outputs.nextDue() - Outputs::early || !events.empty()) {
+            const bool inTime = options.playback == nullptr && (options.every <= 0 || !options.movie.empty());
+            follower.draw(picture, inTime ? Quality::moving : Quality::still);
+            outputs.write(now.time, events);
+        } else {
+            std::this_thread::sleep_for(std::chrono::milliseconds(4));
         }
-        for (const std::string& event : events)
-            files.event(event);
         before = now;
         any = true;
-        if (!time && events.empty())
-            std::this_thread::sleep_for(pause);
     }
+}
+
+}  // namespace
+
+ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool>& stop)
+{
+    if (!options.offscreen.empty())
+        makeFolder(options.offscreen);
+    vtkNew<vtkRenderWindow> window;
+    window->SetShowWindow(false);
+    window->SetOffScreenRendering(1);
+    window->SetMultiSamples(0);
+    window->SetSize(options.width, options.height);
+    Outputs outputs(options, *window);
+    Picture picture(*window);
+    picture.show(options.instructor ? Layout::instructor : Layout::trainee);
+    Follower follower(options.session, options.wait);
+    writeAll(options, stop, picture, follower, outputs);
+    outputs.finish();
     ViewerFigures figures = follower.figures();
-    figures.display = any ? picture.display() : "";
+    figures.display = figures.frames > 0 ? picture.display() : "";
     picture.close();
     return figures;
 }

@@ -2,6 +2,7 @@
 
 #include <render/deformation.h>
 #include <render/tool_picture.h>
+#include <render/volume_picture.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -10,23 +11,13 @@
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace palpate::render {
 namespace {
 
-constexpr Colour white{0.95, 0.96, 0.98}, grey{0.62, 0.66, 0.72}, dark{0.20, 0.22, 0.27};
-constexpr Colour good{0.45, 0.85, 0.50}, amber{1.0, 0.75, 0.15}, red{1.0, 0.30, 0.25};
-constexpr double lineHeight = 1.42;  // in fonts
-constexpr double margin = 0.8;       // in fonts
-
-// A name from a table, as words.
-std::string text(const channel::Name& name)
-{
-    std::string words(name.data(), std::find(name.begin(), name.end(), '\0'));
-    std::replace(words.begin(), words.end(), '_', ' ');
-    return words;
-}
+constexpr double margin = 0.8;  // in fonts
 
 std::string millimetres(double metres)
 {
@@ -69,9 +60,32 @@ void drawForces(Pen& pen, const channel::Scenery& scenery, const channel::State&
     const double total = glm::length(vec(state.total));
     const bool atCap = total > 0.95 * scenery.forceCap;
     pen.heading(fmt::format("FORCE ON THE HAND  (limit {:.1f} N)", scenery.forceCap));
-    drawBar(pen, "basic", glm::length(vec(state.basic)), scenery.forceCap, {0.35, 0.65, 1.0});
-    drawBar(pen, "additional", glm::length(vec(state.additional)), scenery.forceCap, {0.75, 0.55, 1.0});
+    drawBar(pen, "basic", glm::length(vec(state.basic)), scenery.forceCap, basicColour);
+    drawBar(pen, "additional", glm::length(vec(state.additional)), scenery.forceCap, additionalColour);
     drawBar(pen, atCap ? "total !" : "total", total, scenery.forceCap, atCap ? red : good);
+}
+
+// " in 0.8 s" when the needle's line meets structure `s` soon.
+std::string contactWords(const channel::State& state, std::size_t s)
+{
+    constexpr double slowest = 1e-3, soon = 9.95;  // [m/s], [s]
+    const double time = state.aheadSpeed > slowest ? state.ahead[s] / state.aheadSpeed : soon;
+    return std::isfinite(time) && time >= 0 && time < soon && state.distance[s] > 0 ? fmt::format("  in {:.1f} s", time)
+                                                                                    : std::string();
+}
+
+void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::State& state, std::size_t s)
+{
+    const double distance = state.distance[s];
+    const std::string name = text(scenery.structure[s]), when = contactWords(state, s);
+    if (s == 0)
+        pen.pair(name + " (target)" + when, distance <= 0 ? "INSIDE" : millimetres(distance), good);
+    else if (distance <= 0)
+        pen.pair(name + "  TOUCHED", millimetres(distance), red);
+    else if (distance < scenery.warnDistance[s])
+        pen.pair(name + "  NEAR" + when, millimetres(distance), amber);
+    else
+        pen.pair(name + when, millimetres(distance), white);
 }
 
 void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, int lines)
@@ -86,21 +100,11 @@ void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::Sta
     std::sort(order.begin() + 1, order.end(),
               [&](std::size_t a, std::size_t b) { return state.distance[a] < state.distance[b]; });
     const auto shown = std::min(count, static_cast<std::size_t>(lines));
-    for (std::size_t i = 0; i < shown; ++i) {
-        const std::size_t s = order[i];
-        const double distance = state.distance[s];
-        const std::string name = text(scenery.structure[s]);
+    for (std::size_t i = 0; i < shown; ++i)
         if (i + 1 == shown && shown < count)
-            pen.pair(fmt::format("{} and {} more", name, count - shown), millimetres(distance), grey);
-        else if (s == 0)
-            pen.pair(name + " (target)", distance <= 0 ? "INSIDE" : millimetres(distance), good);
-        else if (distance <= 0)
-            pen.pair(name + "  TOUCHED", millimetres(distance), red);
-        else if (distance < scenery.warnDistance[s])
-            pen.pair(name + "  NEAR", millimetres(distance), amber);
+            pen.pair(fmt::format("and {} more", count - i), "from " + millimetres(state.distance[order[i]]), grey);
         else
-            pen.pair(name, millimetres(distance), white);
-    }
+            drawDistance(pen, scenery, state, order[i]);
 }
 
 std::string phaseWords(const channel::State& state)
@@ -147,38 +151,76 @@ void drawWarning(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     } else {
         return;
     }
-    const double size = 1.35 * plan.font, middle = plan.view.x + 0.5 * plan.view.width;
-    const double width = std::min(0.66 * size * static_cast<double>(words.size()) + 2 * size, 0.96 * plan.view.width);
-    const double y = plan.height - 6.3 * plan.font;
+    const double size = 1.35 * plan.font, middle = plan.banner.x + 0.5 * plan.banner.width;
+    const double width = std::min(0.66 * size * static_cast<double>(words.size()) + 2 * size, 0.96 * plan.banner.width);
+    const double y = plan.banner.y;
     canvas.rectangle({middle - width / 2, y - 0.4 * size}, {width, 1.9 * size}, colour);
     canvas.text({middle, y}, words, size, {0.05, 0.05, 0.05}, Align::centre, true);
 }
 
-void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery,
-                std::span<const std::uint8_t> legend)
+struct Entry {
+    Colour colour;
+    std::string name;
+};
+
+std::vector<Entry> legendEntries(const channel::Scenery& scenery, const Legend& legend, std::size_t room)
 {
-    const double font = 0.95 * plan.font, x = margin * plan.font, bottom = 2.6 * plan.font, row = 1.35 * font;
-    struct Entry {
-        Colour colour;
-        std::string name;
-    };
     std::vector<Entry> entries{{toolColour, scenery.tool == channel::ToolKind::needle ? "needle" : "probe"},
-                               {planColour, "planned line, aim"}};
-    const auto room = std::max(3, static_cast<int>(0.45 * plan.height / row));
-    for (const std::uint8_t tissue : legend) {
-        if (static_cast<int>(entries.size()) + 1 >= room) {
+                               {planColour, "planned line, target"}};
+    for (std::size_t s = 1; s < std::min<std::size_t>(scenery.structures, channel::maxStructures); ++s)
+        if (scenery.warnDistance[s] > 0) {
+            entries.push_back({{shellColour[0], shellColour[1], shellColour[2]}, "warning distance"});
+            break;
+        }
+    for (const std::uint8_t row : legend.rows) {
+        if (entries.size() + 1 >= room) {
             entries.push_back({dark, "and more"});
             break;
         }
-        const auto& c = scenery.tissue[tissue].colour;
-        entries.push_back({{c[0], c[1], c[2]}, text(scenery.tissue[tissue].name)});
+        const auto& c = scenery.tissue[row].colour;
+        const bool chosen = row == legend.chosen;
+        entries.push_back({{c[0], c[1], c[2]},
+                           (chosen ? "> " : "") + text(scenery.tissue[row].name) +
+                               (chosen ? fmt::format("  x {:.2g}", static_cast<double>(legend.factor)) : std::string())});
     }
+    return entries;
+}
+
+void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& state, const Health& health)
+{
+    std::string simulation = fmt::format("{} ticks missed", state.missed), viewer;
+    if (health.tickRate > 0 && state.tickP99 > 0)
+        simulation = fmt::format("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed", health.tickRate, state.tickP99 * 1e6,
+                                 state.missed);
+    if (health.framesPerSecond > 0)
+        viewer = fmt::format("{:.0f} frames/s, {:.0f} ms behind", health.framesPerSecond, health.delay * 1e3);
+    const double font = 0.9 * plan.font, x = plan.health.x + margin * plan.font;
+    const bool wide = 0.5 * font * static_cast<double>(simulation.size() + viewer.size() + 7) < plan.health.width;
+    if (wide && !viewer.empty())
+        simulation += "   |   " + std::exchange(viewer, {});
+    canvas.text({x, plan.health.y + 0.6 * font}, viewer.empty() ? simulation : viewer, font, grey);
+    if (!viewer.empty())
+        canvas.text({x, plan.health.y + 2.0 * font}, simulation, font, grey);
+}
+
+}  // namespace
+
+void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const Legend& legend)
+{
+    const double font = 0.95 * plan.font, x = plan.legend.x + margin * plan.font, row = 1.35 * font;
+    const double bottom = plan.legend.y + 0.6 * font;
+    const auto room = static_cast<std::size_t>(std::max(3.0, plan.legend.height / row - 1));
+    const std::vector<Entry> entries = legendEntries(scenery, legend, room);
     std::size_t longest = 0;
     for (const Entry& entry : entries)
         longest = std::max(longest, entry.name.size());
     const double high = row * static_cast<double>(entries.size()),
                  wide = 0.6 * font * static_cast<double>(longest) + 2.2 * font;
-    canvas.rectangle({x - 0.4 * font, bottom - 0.4 * font}, {wide, high + 0.4 * font}, {0.06, 0.07, 0.10}, 0.6);
+    if (plan.events.empty())
+        canvas.rectangle({x - 0.4 * font, bottom - 0.4 * font}, {wide, high + 0.4 * font}, panelColour, 0.6);
+    else
+        canvas.rectangle({static_cast<double>(plan.legend.x), static_cast<double>(plan.legend.y)},
+                         {static_cast<double>(plan.legend.width), static_cast<double>(plan.legend.height)}, panelColour);
     double y = bottom;
     for (const Entry& entry : entries) {
         canvas.rectangle({x, y}, {font, font}, entry.colour);
@@ -187,26 +229,12 @@ void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     }
 }
 
-}  // namespace
-
-ScreenPlan::ScreenPlan(int windowWidth, int windowHeight) : width(windowWidth), height(windowHeight)
-{
-    font = std::max(10.0, std::round(13.0 * std::min(width / 800.0, height / 600.0)));
-    const int column = static_cast<int>(0.4 * width);
-    const int figures = std::min(height, static_cast<int>(16.4 * lineHeight * font));
-    view = {0, 0, width - column, height};
-    panel = {width - column, 0, column, figures};
-    slice = {width - column, figures, column, height - figures};
-    if (slice.height < 4 * lineHeight * font)
-        slice = {};
-}
-
 void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
-                 const Health& health, const std::string& session, std::span<const std::uint8_t> legend)
+                 const Health& health, const std::string& session)
 {
     const double font = plan.font, edge = margin * font;
     canvas.rectangle({static_cast<double>(plan.panel.x), 0},
-                     {static_cast<double>(plan.panel.width), static_cast<double>(plan.panel.height)}, {0.09, 0.10, 0.13});
+                     {static_cast<double>(plan.panel.width), static_cast<double>(plan.panel.height)}, panelColour);
     Pen pen{canvas, plan.panel.x + edge, plan.panel.x + plan.panel.width - edge,
             static_cast<double>(plan.panel.height) - 0.2 * font, font};
     drawForces(pen, scenery, state);
@@ -216,26 +244,64 @@ void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     constexpr int distanceLines = 7;
     drawDistances(pen, scenery, state, distanceLines);
 
-    canvas.text({edge, plan.height - 1.8 * font}, text(scenery.scene), 1.25 * font, white, Align::left, true);
-    canvas.text({edge, plan.height - 3.2 * font}, fmt::format("session {}   {:.1f} s", session, state.time), font, grey);
+    const double x = plan.view.x + edge, top = plan.view.y + plan.view.height;
+    canvas.text({x, top - 1.8 * font}, text(scenery.scene), 1.25 * font, white, Align::left, true);
+    canvas.text({x, top - 3.2 * font}, fmt::format("session {}   {:.1f} s", session, state.time), font, grey);
     drawWarning(canvas, plan, scenery, state);
-    drawLegend(canvas, plan, scenery, legend);
-    std::string line = fmt::format("{} ticks missed", state.missed);
-    if (health.tickRate > 0 && state.tickP99 > 0)
-        line = fmt::format("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed", health.tickRate, state.tickP99 * 1e6,
-                           state.missed);
-    if (health.framesPerSecond > 0)
-        line += fmt::format("   |   {:.0f} frames/s, {:.0f} ms behind", health.framesPerSecond, health.delay * 1e3);
-    canvas.text({edge, 0.6 * font}, line, 0.9 * font, grey);
+    drawHealth(canvas, plan, state, health);
+}
+
+void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const std::deque<Event>& events)
+{
+    if (plan.events.empty())
+        return;
+    const double font = plan.font, edge = margin * font, top = plan.events.y + plan.events.height;
+    canvas.rectangle({static_cast<double>(plan.events.x), static_cast<double>(plan.events.y)},
+                     {static_cast<double>(plan.events.width), static_cast<double>(plan.events.height)}, panelColour);
+    Pen pen{canvas, plan.events.x + edge, plan.events.x + plan.events.width - edge, top - 0.2 * font, font};
+    pen.heading("EVENTS");
+    const double floor = plan.events.y + lineHeight * font;
+    for (auto event = events.rbegin(); event != events.rend() && pen.y > floor; ++event) {
+        const bool bad = event->kind == EventKind::touching || event->kind == EventKind::fault;
+        const bool warning = event->kind == EventKind::near || event->kind == EventKind::veryNear;
+        const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;
+        pen.pair(words(*event, scenery), fmt::format("{:.1f} s", event->time), colour);
+    }
 }
 
 void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller)
 {
-    const double size = 1.8 * plan.font, y = 0.5 * plan.height, x = plan.view.x + 0.5 * plan.view.width;
-    const double width = std::min(0.98 * plan.view.width, 0.62 * size * static_cast<double>(words.size()) + 3 * size);
+    const double size = 1.8 * plan.font, y = 0.5 * plan.height, x = plan.banner.x + 0.5 * plan.banner.width;
+    const double width = std::min(0.98 * plan.banner.width, 0.62 * size * static_cast<double>(words.size()) + 3 * size);
     canvas.rectangle({x - width / 2, y - 1.3 * size}, {width, 3.4 * size}, {0.05, 0.06, 0.09}, 0.88);
     canvas.text({x, y + 0.4 * size}, words, size, white, Align::centre, true);
     canvas.text({x, y - 0.8 * size}, smaller, plan.font, grey, Align::centre);
+}
+
+void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys)
+{
+    const double font = plan.font, row = lineHeight * font, x = plan.banner.x + margin * font;
+    const double high = row * static_cast<double>(keys.size()) + font, y = 0.5 * (plan.height - high);
+    const double wide = std::min(0.98 * plan.banner.width, 34 * font);
+    canvas.rectangle({x, y}, {wide, high}, {0.05, 0.06, 0.09}, 0.92);
+    double line = y + high - 0.5 * font;
+    for (const KeyHelp& key : keys) {
+        line -= row;
+        canvas.text({x + font, line + 0.2 * font}, key.key, font, amber, Align::left, true);
+        canvas.text({x + 10 * font, line + 0.2 * font}, key.what, font, white);
+    }
+}
+
+void drawCaption(Canvas& canvas, const ScreenPlan& plan, const std::string& words, double timeline)
+{
+    const double font = plan.font, left = plan.banner.x + 0.25 * plan.banner.width, width = 0.5 * plan.banner.width;
+    const double y = plan.height - 1.6 * font;
+    if (!words.empty())
+        canvas.text({left + width, y}, words, 1.1 * font, amber, Align::right, true);
+    if (timeline < 0)
+        return;
+    canvas.rectangle({left, y - 0.6 * font}, {width, 0.3 * font}, dark);
+    canvas.rectangle({left, y - 0.6 * font}, {width * std::min(timeline, 1.0), 0.3 * font}, amber);
 }
 
 }  // namespace palpate::render

@@ -2,24 +2,20 @@
 
 #include <render/canvas.h>
 #include <render/channel/layout.h>
-#include <render/slice_picture.h>
+#include <render/events.h>
+#include <render/screen_plan.h>
 
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <string>
 
 namespace palpate::render {
 
-/// Where things are in a window of `width` x `height` pixels.
-struct ScreenPlan {
-    ScreenPlan(int windowWidth, int windowHeight);
-
-    int width, height;
-    double font;  // [pixels]
-    Area view;    // 3-D
-    Area slice;   // empty when the window is too small for it
-    Area panel;   // figures
-};
+inline constexpr Colour white{0.95, 0.96, 0.98}, grey{0.62, 0.66, 0.72}, dark{0.20, 0.22, 0.27};
+inline constexpr Colour good{0.45, 0.85, 0.50}, amber{1.0, 0.75, 0.15}, red{1.0, 0.30, 0.25};
+inline constexpr Colour panelColour{0.09, 0.10, 0.13};
+inline constexpr Colour basicColour{0.35, 0.65, 1.0}, additionalColour{0.75, 0.55, 1.0};
 
 /// How well viewer and simulation keep up.
 struct Health {
@@ -28,10 +24,28 @@ struct Health {
     double tickRate = 0;  // [Hz]
 };
 
-/// Forces, distances, warning, phase, core, health and the legend of the tissues whose rows are in `legend`.
+/// The tissues that there are.
+struct Legend {
+    std::span<const std::uint8_t> rows;
+    int chosen = -1;   // row whose opacity is being changed; -1: none
+    float factor = 1;  // of its opacity
+};
+
+/// A key and what it does.
+struct KeyHelp {
+    std::string key, what;
+};
+
+/// Forces, distances with times to contact, warning, phase, core, health.
 void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
-                 const Health& health, const std::string& session, std::span<const std::uint8_t> legend);
+                 const Health& health, const std::string& session);
+void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const Legend& legend);
+/// The last ones first.
+void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const std::deque<Event>& events);
 /// Words across the picture: "waiting for session x", "simulation ended".
 void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller);
+void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys);
+/// On top: a few words, and how much of a record is over, in [0, 1]; negative = no record.
+void drawCaption(Canvas& canvas, const ScreenPlan& plan, const std::string& words, double timeline);
 
 }  // namespace palpate::render

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -26,7 +27,7 @@ std::pair<glm::dvec3, glm::dvec3> bodyBox(const Deformation& deformation)
     for (int z = 0; z < grid.size[2]; ++z)
         for (int y = 0; y < grid.size[1]; ++y)
             for (int x = 0; x < grid.size[0]; ++x)
-                if (labels[at++] != 0) {
+                if ((labels[at++] & channel::rowBits) != 0) {
                     low = glm::min(low, glm::ivec3(x, y, z));
                     high = glm::max(high, glm::ivec3(x, y, z));
                 }
@@ -40,7 +41,7 @@ std::vector<std::uint8_t> tissuesIn(const channel::Scenery& scenery, std::span<c
 {
     std::array<std::size_t, 256> voxels{};
     for (const std::uint8_t label : labels)
-        ++voxels[label];
+        ++voxels[label & channel::rowBits];
     std::vector<std::uint8_t> rows;
     for (std::uint8_t row = 1; row < std::min<std::uint32_t>(scenery.tissues, channel::maxTissues); ++row)
         if (voxels[row] > 0 && scenery.tissue[row].opacity > 0)
@@ -62,7 +63,11 @@ struct Picture::Session {
           tool(shown, renderer),
           legend(tissuesIn(shown, labels))
     {
+        factor.fill(1);
     }
+
+    void repaint() { volume.paint(scenery, deformation, factor); }
+    glm::dvec3 aim() const { return deformation.seen(vec(scenery.aim)); }
 
     channel::Scenery scenery;
     std::string name;
@@ -70,14 +75,18 @@ struct Picture::Session {
     Deformation deformation;
     VolumePicture volume;
     ToolPicture tool;
-    std::vector<std::uint8_t> legend;  // rows of the tissues that there are, smallest volume first
+    std::vector<std::uint8_t> legend;                 // rows of the tissues that there are, smallest volume first
+    std::size_t chosen = 0;                           // of the legend, from 1; 0: none
+    std::array<float, channel::maxTissues> factor{};  // of the table's opacities
     channel::State state;
+    History history;
     Health health;
     bool known = false;  // a state has come
-    VoxelBox changed;    // since the last slice
+    VoxelBox changed;    // since the last slices
 };
 
-Picture::Picture(vtkRenderWindow& window) : window_(window), slice_(*flat_), canvas_(*flat_)
+Picture::Picture(vtkRenderWindow& window)
+    : window_(window), slices_{SlicePicture(*flat_), SlicePicture(*flat_), SlicePicture(*flat_)}, canvas_(*flat_)
 {
     window_.SetNumberOfLayers(2);
     view_->SetBackground(0.06, 0.07, 0.10);
@@ -94,8 +103,6 @@ void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t
 {
     close();
     session_ = std::make_unique<Session>(scenery, labels, session, *view_);
-    const glm::dvec3 line = vec(scenery.entry) != vec(scenery.aim) ? vec(scenery.aim) : session_->frame.centre;
-    session_->volume.cut(line, session_->frame.towards);
     aimCamera();
 }
 
@@ -103,7 +110,8 @@ void Picture::close()
 {
     session_.reset();
     view_->RemoveAllViewProps();
-    slice_.hide();
+    for (SlicePicture& slice : slices_)
+        slice.hide();
 }
 
 // Looks onto the plane of the slice from a little to the side and above, so that both pictures have the same directions and
@@ -119,7 +127,7 @@ void Picture::aimCamera()
     high = glm::min(high, glm::max(frame.centre + around, low));
     const glm::dvec3 from = glm::normalize(frame.towards + 0.35 * frame.up + 0.30 * frame.right);
     const glm::dvec3 right = glm::normalize(glm::cross(frame.up, from)), up = glm::cross(from, right);
-    const ScreenPlan plan(window_.GetSize()[0], window_.GetSize()[1]);
+    const ScreenPlan plan = screenPlan();
     constexpr double angle = 25.0;  // of the view, upright [degrees]
     constexpr double filled = 1.1;  // share of the view; a body hardly fills the corners of its box
     const double tall = filled * std::tan(0.5 * angle / 180.0 * std::acos(-1.0));
@@ -145,13 +153,20 @@ void Picture::update(const channel::State& state, const channel::Displaced* disp
         return;
     if (displaced != nullptr) {
         const VoxelBox changed = session_->deformation.apply(*displaced);
-        session_->volume.update(session_->deformation, changed);
+        session_->volume.update(session_->deformation);
         session_->changed = enclosing(session_->changed, changed);
     }
     session_->state = state;
     session_->health = health;
     session_->known = true;
-    session_->tool.update(state);
+    session_->tool.update(session_->scenery, state, session_->aim());
+    note(state);
+}
+
+void Picture::note(const channel::State& state)
+{
+    if (session_)
+        session_->history.add(state);
 }
 
 void Picture::setNotice(const std::string& words, const std::string& smaller)
@@ -160,32 +175,179 @@ void Picture::setNotice(const std::string& words, const std::string& smaller)
     smaller_ = smaller;
 }
 
+ScreenPlan Picture::screenPlan() const
+{
+    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_};
+}
+
 void Picture::render(Quality quality)
 {
-    const ScreenPlan plan(window_.GetSize()[0], window_.GetSize()[1]);
-    view_->SetViewport(0, 0, session_ ? static_cast<double>(plan.view.width) / plan.width : 1.0, 1);
+    const auto start = std::chrono::steady_clock::now();
+    const ScreenPlan plan = screenPlan();
+    const double w = plan.width, h = plan.height;
+    const Area all{0, 0, plan.width, plan.height}, view = session_ ? plan.view : all;
+    view_->SetViewport(view.x / w, view.y / h, (view.x + view.width) / w, (view.y + view.height) / h);
     canvas_.begin();
     if (session_) {
-        Session& s = *session_;
-        if (!software_) {
-            const std::string name = display();
-            software_ = name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos;
-        }
-        s.volume.setQuality(quality, *software_, static_cast<double>(plan.view.width) * plan.view.height);
-        if (plan.slice.height > 0) {
-            const ViewFrame frame = s.known && s.scenery.tool == channel::ToolKind::needle
-                                        ? through(s.frame, vec(s.state.tip), vec(s.state.axis))
-                                        : s.frame;
-            slice_.update(s.scenery, s.deformation, frame, plan.slice, std::exchange(s.changed, {}));
-            slice_.annotate(canvas_, s.scenery, s.state, plan.font);
-        }
-        drawFigures(canvas_, plan, s.scenery, s.state, s.health, s.name, s.legend);
+        openBody();
+        session_->volume.prepare(quality, software_.value_or(true), static_cast<double>(view.width) * view.height);
+        drawSlices(plan, quality == Quality::moving && software_.value_or(true) ? 2 : 1);
+        drawFlat(plan);
     }
     if (!words_.empty())
         drawNotice(canvas_, plan, words_, smaller_);
     canvas_.end();
     view_->ResetCameraClippingRange();
     window_.Render();
+    if (session_ && !session_->volume.shown())
+        window_.Render();
+    window_.WaitForCompletion();
+    if (!software_) {
+        // The driver is known from the first picture on.
+        const std::string name = display();
+        software_ = name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos;
+    }
+    if (session_)
+        session_->volume.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+}
+
+// The plane of the cut holds the needle (in the air the planned line) and turns with the camera, so that from wherever one
+// looks the needle lies on the face that one sees.
+void Picture::openBody()
+{
+    Session& s = *session_;
+    if (!cut_) {
+        s.volume.uncut();
+        return;
+    }
+    const double* eye = view_->GetActiveCamera()->GetDirectionOfProjection();
+    const glm::dvec3 towards(-eye[0], -eye[1], -eye[2]);
+    const bool needle = s.known && s.scenery.tool == channel::ToolKind::needle && s.state.phase != channel::Phase::free;
+    const bool planned = vec(s.scenery.entry) != vec(s.scenery.aim);
+    const glm::dvec3 point = needle ? vec(s.state.tip) : planned ? vec(s.scenery.aim) : s.frame.centre;
+    const glm::dvec3 line = needle ? vec(s.state.axis) : vec(s.scenery.aim) - vec(s.scenery.entry);
+    const double length = glm::length(line);
+    glm::dvec3 normal = s.frame.towards;
+    constexpr double endOn = 0.3;
+    if (length > 0) {
+        const glm::dvec3 across = towards - glm::dot(towards, line) / (length * length) * line;
+        if (glm::length(across) > endOn)
+            normal = glm::normalize(across);
+    }
+    s.volume.cut(point, normal);
+}
+
+void Picture::drawSlices(const ScreenPlan& plan, int step)
+{
+    Session& s = *session_;
+    std::array<ViewFrame, 3> frames{s.frame, s.frame, s.frame};
+    if (layout_ == Layout::instructor)
+        frames = orthogonalFrames(s.frame, s.known ? vec(s.state.tip) : s.frame.centre);
+    else if (s.known && s.scenery.tool == channel::ToolKind::needle)
+        frames[0] = through(s.frame, vec(s.state.tip), vec(s.state.axis));
+    for (std::size_t i = 0; i < slices_.size(); ++i) {
+        if (plan.slices[i].empty()) {
+            slices_[i].hide();
+            continue;
+        }
+        slices_[i].update(s.scenery, s.deformation, frames[i], plan.slices[i], s.changed, step);
+        slices_[i].annotate(canvas_, s.scenery, s.state, s.aim(), plan.font);
+    }
+    s.changed = {};
+}
+
+void Picture::drawFlat(const ScreenPlan& plan)
+{
+    Session& s = *session_;
+    drawFigures(canvas_, plan, s.scenery, s.state, s.health, s.name);
+    drawEvents(canvas_, plan, s.scenery, s.history.events);
+    if (!plan.forces.empty())
+        drawForceTraces(canvas_, plan.forces, plan.font, s.scenery, s.history);
+    if (!plan.distances.empty())
+        drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
+    if (help_.empty()) {
+        const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
+        drawLegend(canvas_, plan, s.scenery, {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1});
+    } else {
+        drawHelp(canvas_, plan, help_);
+    }
+    drawCaption(canvas_, plan, caption_, timeline_);
+}
+
+void Picture::show(Layout layout)
+{
+    const bool turned = std::exchange(layout_, layout) != layout;
+    if (turned && session_)
+        aimCamera();
+}
+
+void Picture::selectTissue(int step)
+{
+    if (!session_)
+        return;
+    const auto count = static_cast<int>(session_->legend.size()) + 1;
+    session_->chosen = static_cast<std::size_t>(((static_cast<int>(session_->chosen) + step) % count + count) % count);
+}
+
+void Picture::changeOpacity(double factor)
+{
+    if (!session_ || session_->chosen == 0)
+        return;
+    constexpr float least = 0.05F, most = 20.0F;
+    float& now = session_->factor[session_->legend[session_->chosen - 1]];
+    now = std::clamp(now * static_cast<float>(factor), least, most);
+    session_->repaint();
+}
+
+void Picture::setCut(bool open)
+{
+    cut_ = open;
+}
+
+void Picture::resetView()
+{
+    if (!session_)
+        return;
+    aimCamera();
+    session_->chosen = 0;
+    session_->factor.fill(1);
+    session_->repaint();
+}
+
+void Picture::setHelp(std::vector<KeyHelp> keys)
+{
+    help_ = std::move(keys);
+}
+
+void Picture::setCaption(const std::string& words)
+{
+    caption_ = words;
+}
+
+void Picture::setTimeline(double share)
+{
+    timeline_ = share;
+}
+
+void Picture::setDisplayScale(double scale)
+{
+    scale_ = std::max(scale, 1.0);
+}
+
+glm::dvec3 Picture::under(Point2 pixel, glm::dvec3 point) const
+{
+    vtkCamera& camera = *view_->GetActiveCamera();
+    const auto triple = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
+    const glm::dvec3 eye = triple(camera.GetPosition()), ahead = triple(camera.GetDirectionOfProjection());
+    const glm::dvec3 right = glm::normalize(glm::cross(ahead, triple(camera.GetViewUp()))), up = glm::cross(right, ahead);
+    const double* port = view_->GetViewport();
+    const int* size = window_.GetSize();
+    const double left = port[0] * size[0], bottom = port[1] * size[1];
+    const double width = std::max(port[2] * size[0] - left, 1.0), height = std::max(port[3] * size[1] - bottom, 1.0);
+    const double slope = std::tan(0.5 * camera.GetViewAngle() / 180.0 * std::acos(-1.0)) / (0.5 * height);
+    const glm::dvec3 ray =
+        ahead + slope * ((pixel[0] - left - 0.5 * width) * right + (pixel[1] - bottom - 0.5 * height) * up);
+    return (eye + glm::dot(point * mm - eye, ahead) * ray) / mm;
 }
 
 std::string Picture::display()

@@ -4,8 +4,10 @@
 #include <render/channel/channel.h>
 #include <render/deformation.h>
 #include <render/overlay.h>
+#include <render/screen_plan.h>
 #include <render/slice_picture.h>
 #include <render/tool_picture.h>
+#include <render/traces.h>
 #include <render/view_frame.h>
 #include <render/volume_picture.h>
 
@@ -13,14 +15,16 @@
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
 
-#include <chrono>
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace palpate::render {
 
-/// The whole picture in one render window: 3-D view, slice, figures.
+/// The whole picture in one render window: 3-D view, slices, figures.
 class Picture {
 public:
     explicit Picture(vtkRenderWindow& window);
@@ -33,23 +37,58 @@ public:
     void close();
     /// Shows what has come. `displaced` is null when there is nothing newer.
     void update(const channel::State& state, const channel::Displaced* displaced, const Health& health);
+    /// Takes a state down for traces and events, also between pictures.
+    void note(const channel::State& state);
     /// Words across the picture until the next setNotice(); empty = none.
     void setNotice(const std::string& words, const std::string& smaller);
     /// `moving`: coarser where the renderer is software.
     void render(Quality quality);
+
+    void show(Layout layout);
+    Layout layout() const noexcept { return layout_; }
+    /// Chooses the next (1) or previous (-1) tissue of the legend; the legend marks it.
+    void selectTissue(int step);
+    /// Multiplies the chosen tissue's opacity.
+    void changeOpacity(double factor);
+    /// Cuts the body open towards the needle (the default), or shows it whole.
+    void setCut(bool open);
+    bool cut() const noexcept { return cut_; }
+    /// Camera and opacities as they were when the session was opened.
+    void resetView();
+    /// Lists the keys across the picture; empty = hidden.
+    void setHelp(std::vector<KeyHelp> keys);
+    /// A few words on top, such as "PAUSED" or "REPLAY x 0.5"; empty = none.
+    void setCaption(const std::string& words);
+    /// A bar that shows which share of a record is over, in [0, 1]; negative = none.
+    void setTimeline(double share);
+    /// Pixels per point of the screen, from 1: texts are drawn so many times larger at least.
+    void setDisplayScale(double scale);
+    /// The point [m] under a pixel (from the lower left) of the 3-D view, in the plane through `point` [m] that faces the
+    /// camera.
+    glm::dvec3 under(Point2 pixel, glm::dvec3 point) const;
+
     /// The renderer's name, as the driver tells it.
     std::string display();
 
 private:
     struct Session;
     void aimCamera();
+    ScreenPlan screenPlan() const;
+    void openBody();
+    void drawSlices(const ScreenPlan& plan, int step);
+    void drawFlat(const ScreenPlan& plan);
 
     vtkRenderWindow& window_;
     vtkNew<vtkRenderer> view_, flat_;
-    SlicePicture slice_;  // before the canvas: flat things are drawn in the order in which they were added
+    // Before the canvas: flat things are drawn in the order in which they were added.
+    std::array<SlicePicture, 3> slices_;
     Canvas canvas_;
     std::unique_ptr<Session> session_;
-    std::string words_, smaller_;
+    std::string words_, smaller_, caption_;
+    std::vector<KeyHelp> help_;
+    Layout layout_ = Layout::trainee;
+    bool cut_ = true;
+    double timeline_ = -1, scale_ = 1;
     std::optional<bool> software_;
 };
 

@@ -1,6 +1,8 @@
 #include <render/slice_picture.h>
 
+#include <render/needle_shape.h>
 #include <render/tool_picture.h>
+#include <render/volume_picture.h>
 
 #include <vtkImageMapper.h>
 
@@ -16,7 +18,7 @@
 namespace palpate::render {
 namespace {
 
-constexpr Colour white{1, 1, 1};
+constexpr Colour white{1, 1, 1}, farTool{0.16, 0.55, 0.65};
 constexpr std::array<std::uint8_t, 3> airPixel{12, 13, 18};
 
 std::uint8_t byte(float value)
@@ -71,7 +73,7 @@ SlicePicture::SlicePicture(vtkRenderer& renderer)
 }
 
 void SlicePicture::update(const channel::Scenery& scenery, const Deformation& deformation, const ViewFrame& frame,
-                          const Area& area, const VoxelBox& changed)
+                          const Area& area, const VoxelBox& changed, int step)
 {
     const bool resized = area.width != area_.width || area.height != area_.height;
     // Turns and shifts too small for a pixel are not worth a new picture.
@@ -82,12 +84,12 @@ void SlicePicture::update(const channel::Scenery& scenery, const Deformation& de
     area_ = area;
     actor_->SetPosition(area.x, area.y);
     actor_->SetVisibility(1);
-    const bool all = resized || turned || !drawn_;
+    const bool all = resized || turned || step_ != step;
     if (!all && changed.empty())
         return;
     if (all)
         frame_ = frame;
-    drawn_ = true;
+    step_ = step;
     if (resized) {
         image_->SetDimensions(area.width, area.height, 1);
         image_->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
@@ -97,18 +99,21 @@ void SlicePicture::update(const channel::Scenery& scenery, const Deformation& de
     const channel::Grid& grid = deformation.grid();
     const glm::dvec3 low = vec(grid.origin) + grid.spacing * glm::dvec3(changed.low),
                      high = vec(grid.origin) + grid.spacing * glm::dvec3(changed.high);
-    for (int row = 0; row < area.height; ++row) {
+    for (int row = 0; row < area.height; row += step) {
         glm::vec3 shift(0);
-        for (int column = 0; column < area.width; ++column) {
-            const glm::dvec3 p = frame_.centre + frame_.right * ((column + 0.5 - 0.5 * area.width) * metres) +
-                                 frame_.up * ((row + 0.5 - 0.5 * area.height) * metres);
+        for (int column = 0; column < area.width; column += step) {
+            const glm::dvec3 p = frame_.centre + frame_.right * ((column + 0.5 * step - 0.5 * area.width) * metres) +
+                                 frame_.up * ((row + 0.5 * step - 0.5 * area.height) * metres);
             if (!all && (glm::any(glm::lessThan(p, low)) || glm::any(glm::greaterThan(p, high))))
                 continue;
-            const std::size_t tissue = deformation.tissueAt(p, shift);
-            auto& out = pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(area.width) +
-                               static_cast<std::size_t>(column)];
-            const auto& colour = scenery.tissue[tissue % channel::maxTissues].colour;
-            out = tissue == 0 ? airPixel : std::array{byte(colour[0]), byte(colour[1]), byte(colour[2])};
+            const std::uint8_t label = deformation.labelAt(p, shift);
+            const std::size_t tissue = label & channel::rowBits;
+            const auto& colour =
+                (label & channel::shellBit) != 0 ? shellColour : scenery.tissue[tissue % channel::maxTissues].colour;
+            const auto pixel = tissue == 0 ? airPixel : std::array{byte(colour[0]), byte(colour[1]), byte(colour[2])};
+            for (int y = row; y < std::min(row + step, area.height); ++y)
+                std::fill_n(pixels + static_cast<std::ptrdiff_t>(y) * area.width + column,
+                            std::min(step, area.width - column), pixel);
         }
     }
     image_->Modified();
@@ -117,7 +122,7 @@ void SlicePicture::update(const channel::Scenery& scenery, const Deformation& de
 void SlicePicture::hide()
 {
     actor_->SetVisibility(0);
-    drawn_ = false;
+    step_ = 0;
 }
 
 Point2 SlicePicture::pixel(glm::dvec3 p) const
@@ -138,27 +143,36 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
         }
         return;
     }
-    const auto shaft = clipped(pixel(tip - vec(state.axis) * scenery.toolLength), pixel(tip), area_);
-    if (!shaft)
-        return;
-    canvas.line(shaft->first, shaft->second, width + 2, outline);
-    canvas.line(shaft->first, shaft->second, width, toolColour);
+    constexpr double inPlane = 2e-3;  // [m]
+    const NeedleShape shape = needleShape(scenery, state);
+    const auto off = [&](glm::dvec3 p) { return std::abs(glm::dot(p - frame_.centre, frame_.towards)) > inPlane; };
+    for (const bool border : {true, false})
+        for (std::size_t i = 0; i + 1 < shape.size(); ++i) {
+            const auto part = clipped(pixel(shape[i]), pixel(shape[i + 1]), area_);
+            const bool away = off(0.5 * (shape[i] + shape[i + 1]));
+            if (part && border)
+                canvas.line(part->first, part->second, (away ? 0.6 : 1.0) * width + 2, outline);
+            else if (part)
+                canvas.line(part->first, part->second, (away ? 0.6 : 1.0) * width, away ? farTool : toolColour);
+        }
     if (inside(pixel(tip), area_))
         canvas.ring(pixel(tip), width / 2 + 2, 2, white);
 }
 
-void SlicePicture::annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const
+void SlicePicture::annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim,
+                            double font) const
 {
-    const glm::dvec3 entry = vec(scenery.entry), aim = vec(scenery.aim);
+    const glm::dvec3 entry = vec(scenery.entry);
+    const bool planned = entry != vec(scenery.aim);
     constexpr int dashes = 10;
-    for (int i = 0; i < dashes && entry != aim; ++i) {
+    for (int i = 0; i < dashes && planned; ++i) {
         const double a = static_cast<double>(i) / dashes, b = a + 0.5 / dashes;
         if (const auto dash = clipped(pixel(glm::mix(entry, aim, a)), pixel(glm::mix(entry, aim, b)), area_)) {
             canvas.line(dash->first, dash->second, 0.36 * font, {0, 0, 0});
             canvas.line(dash->first, dash->second, 0.18 * font, planColour);
         }
     }
-    if (entry != aim && inside(pixel(aim), area_)) {
+    if (planned && inside(pixel(aim), area_)) {
         canvas.ring(pixel(aim), 0.55 * font, 0.36 * font, {0, 0, 0});
         canvas.ring(pixel(aim), 0.55 * font, 0.18 * font, planColour);
     }

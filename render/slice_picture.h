@@ -3,6 +3,7 @@
 #include <render/canvas.h>
 #include <render/channel/layout.h>
 #include <render/deformation.h>
+#include <render/screen_plan.h>
 #include <render/view_frame.h>
 
 #include <vtkActor2D.h>
@@ -12,21 +13,19 @@
 
 namespace palpate::render {
 
-/// A rectangle of the window [pixels], from the lower left.
-struct Area {
-    int x = 0, y = 0, width = 0, height = 0;
-};
-
-/// The deformed anatomy in the plane through the tool, as a flat picture in the window.
+/// The deformed anatomy in a plane, as a flat picture in the window.
 class SlicePicture {
 public:
     explicit SlicePicture(vtkRenderer& renderer);
 
-    /// Computes the anatomy anew in `changed`, and everywhere after a turn of the plane or with another area.
+    /// Computes the anatomy anew in `changed`, and everywhere after a turn of the plane or with another area. `step`:
+    /// pixels from one that is computed to the next.
     void update(const channel::Scenery& scenery, const Deformation& deformation, const ViewFrame& frame, const Area& area,
-                const VoxelBox& changed);
-    /// Tool, planned line, aim, scale bar and the sides of the patient.
-    void annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const;
+                const VoxelBox& changed, int step);
+    /// Tool, planned line, `aim` where it lies now [m], scale bar and the sides of the patient. What is off the plane is
+    /// drawn thinner and darker.
+    void annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim,
+                  double font) const;
     void hide();
 
 private:
@@ -37,7 +36,7 @@ private:
     vtkNew<vtkActor2D> actor_;
     ViewFrame frame_;
     Area area_;
-    bool drawn_ = false;
+    int step_ = 0;  // of what is drawn; 0: nothing
 };
 
 }  // namespace palpate::render

@@ -1,11 +1,14 @@
 #include <render/tool_picture.h>
 
 #include <render/deformation.h>
+#include <render/needle_shape.h>
 
 #include <vtkAppendPolyData.h>
+#include <vtkCellArray.h>
 #include <vtkConeSource.h>
 #include <vtkCylinderSource.h>
 #include <vtkLineSource.h>
+#include <vtkPoints.h>
 #include <vtkPolyDataMapper.h>
 #include <vtkProperty.h>
 #include <vtkSphereSource.h>
@@ -16,6 +19,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace palpate::render {
 namespace {
@@ -31,26 +35,22 @@ void paint(vtkActor& actor, const std::array<double, 3>& colour)
     actor.GetProperty()->SetSpecular(0.3);
 }
 
-// A needle with its tip at the origin, pointing along +y: VTK's cylinders lie along y.
-vtkSmartPointer<vtkPolyData> needleShape(double radius, double length)
+double pointLength(double radius)
 {
-    const double tip = std::min(3 * radius, length / 2);
-    vtkNew<vtkCylinderSource> shaft;
-    shaft->SetRadius(radius);
-    shaft->SetHeight(length - tip);
-    shaft->SetCenter(0, -(length + tip) / 2, 0);
-    shaft->SetResolution(facets);
+    return 3 * radius;
+}
+
+// A needle's point with its end at the origin, pointing along +y: VTK's cylinders lie along y.
+vtkSmartPointer<vtkPolyData> needlePoint(double radius)
+{
     vtkNew<vtkConeSource> cone;
     cone->SetRadius(radius);
-    cone->SetHeight(tip);
+    cone->SetHeight(pointLength(radius));
     cone->SetDirection(0, 1, 0);
-    cone->SetCenter(0, -tip / 2, 0);
+    cone->SetCenter(0, -pointLength(radius) / 2, 0);
     cone->SetResolution(facets);
-    vtkNew<vtkAppendPolyData> both;
-    both->AddInputConnection(shaft->GetOutputPort());
-    both->AddInputConnection(cone->GetOutputPort());
-    both->Update();
-    return both->GetOutput();
+    cone->Update();
+    return cone->GetOutput();
 }
 
 vtkSmartPointer<vtkPolyData> ball(double radius, double y = 0)
@@ -85,7 +85,7 @@ vtkSmartPointer<vtkPolyData> toolShape(const channel::Scenery& scenery)
     const double radius = std::max(scenery.toolRadius, 0.2e-3) * mm, length = scenery.toolLength * mm;
     switch (scenery.tool) {
         case channel::ToolKind::needle:
-            return needleShape(radius, std::max(length, 4 * radius));
+            return needlePoint(radius);
         case channel::ToolKind::capsule:
             return rodShape(radius, length);
         default:
@@ -102,6 +102,56 @@ void show(vtkRenderer& renderer, vtkActor& actor, vtkPolyData* shape, const std:
     renderer.AddActor(&actor);
 }
 
+// Of the line that ends at point `last`, across points that coincide.
+glm::dvec3 endDirection(const NeedleShape& shape, std::size_t last)
+{
+    constexpr double apart = 1e-4;  // [m]
+    std::size_t before = last;
+    while (before > 0 && glm::distance(shape[before], shape.back()) < apart)
+        --before;
+    return glm::normalize(shape.back() - shape[before]);
+}
+
+// One line through points that are apart.
+void setLine(vtkPolyData& data, std::span<const glm::dvec3> points)
+{
+    constexpr double apart = 0.02;  // [mm]
+    vtkNew<vtkPoints> kept;
+    for (const glm::dvec3& p : points) {
+        const vtkIdType last = kept->GetNumberOfPoints() - 1;
+        if (last >= 0) {
+            const double* q = kept->GetPoint(last);
+            if (glm::distance(p * mm, glm::dvec3(q[0], q[1], q[2])) < apart)
+                continue;
+        }
+        kept->InsertNextPoint(p.x * mm, p.y * mm, p.z * mm);
+    }
+    vtkNew<vtkCellArray> cells;
+    if (kept->GetNumberOfPoints() > 1) {
+        cells->InsertNextCell(static_cast<int>(kept->GetNumberOfPoints()));
+        for (vtkIdType i = 0; i < kept->GetNumberOfPoints(); ++i)
+            cells->InsertCellPoint(i);
+    }
+    data.SetPoints(kept);
+    data.SetLines(cells);
+}
+
+// Draws a line as a tube that follows it.
+void showTube(vtkRenderer& renderer, vtkPolyData& line, double radius, int sides, const std::array<double, 3>& colour)
+{
+    vtkNew<vtkTubeFilter> tube;
+    tube->SetInputData(&line);
+    tube->SetRadius(radius);
+    tube->SetNumberOfSides(sides);
+    tube->CappingOn();
+    vtkNew<vtkPolyDataMapper> mapper;
+    mapper->SetInputConnection(tube->GetOutputPort());
+    vtkNew<vtkActor> actor;
+    actor->SetMapper(mapper);
+    paint(*actor, colour);
+    renderer.AddActor(actor);
+}
+
 }  // namespace
 
 ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
@@ -112,6 +162,13 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
     show(renderer, *tool, toolShape(scenery), toolColour);
     tool->SetUserTransform(pose_);
     show(renderer, *proxy_, ball(std::max(0.8 * radius, 0.8)), proxyColour);
+    if (scenery.tool == channel::ToolKind::needle) {
+        setLine(*shaft_, {});
+        showTube(renderer, *shaft_, radius, facets, toolColour);
+    }
+    constexpr double trail = 0.3;  // [mm]
+    setLine(*trail_, {});
+    showTube(renderer, *trail_, trail, 6, trailColour);
     addPlan(scenery, renderer);
 }
 
@@ -137,15 +194,47 @@ void ToolPicture::addPlan(const channel::Scenery& scenery, vtkRenderer& renderer
     tube->Update();
     vtkNew<vtkActor> line;
     show(renderer, *line, tube->GetOutput(), planColour);
-    vtkNew<vtkActor> target;
-    show(renderer, *target, ball(1.3), planColour);
-    target->SetPosition(aim.x, aim.y, aim.z);
+    show(renderer, *aim_, ball(1.3), planColour);
 }
 
-void ToolPicture::update(const channel::State& state)
+void ToolPicture::moveNeedle(const channel::Scenery& scenery, const channel::State& state)
+{
+    NeedleShape shape = needleShape(scenery, state);
+    // The point follows the shaft's end.
+    const double point = pointLength(std::max(scenery.toolRadius, 0.2e-3));
+    std::size_t last = shape.size() - 1;
+    while (last > 1 && glm::distance(shape[last - 1], vec(state.tip)) < point)
+        --last;
+    shape[last] = vec(state.tip) - point * endDirection(shape, last);
+    setLine(*shaft_, std::span(shape).first(last + 1));
+}
+
+void ToolPicture::leaveTrail(const channel::State& state)
+{
+    constexpr double step = 0.3e-3;  // [m]
+    constexpr std::size_t most = 2000;
+    if (state.phase == channel::Phase::inserted && phase_ != channel::Phase::inserted)
+        trailPoints_.clear();
+    phase_ = state.phase;
+    const glm::dvec3 tip = vec(state.tip);
+    if (phase_ != channel::Phase::inserted || trailPoints_.size() >= most ||
+        (!trailPoints_.empty() && glm::distance(trailPoints_.back(), tip) < step))
+        return;
+    trailPoints_.push_back(tip);
+    setLine(*trail_, trailPoints_);
+}
+
+void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim)
 {
     const glm::dvec3 tip = vec(state.tip) * mm, proxy = vec(state.proxy) * mm;
+    aim_->SetPosition(aim.x * mm, aim.y * mm, aim.z * mm);
+    leaveTrail(state);
     glm::dvec3 axis = vec(state.axis);
+    if (scenery.tool == channel::ToolKind::needle) {
+        moveNeedle(scenery, state);
+        const NeedleShape shape = needleShape(scenery, state);
+        axis = endDirection(shape, shape.size() - 1);
+    }
     const double length = glm::length(axis);
     axis = length > 0 && std::isfinite(length) ? axis / length : glm::dvec3(0, 1, 0);
     pose_->Identity();

@@ -4,8 +4,14 @@
 
 #include <vtkActor.h>
 #include <vtkNew.h>
+#include <vtkPolyData.h>
 #include <vtkRenderer.h>
 #include <vtkTransform.h>
+
+#include <glm/vec3.hpp>
+
+#include <array>
+#include <vector>
 
 namespace palpate::render {
 
@@ -13,19 +19,28 @@ namespace palpate::render {
 inline constexpr std::array<double, 3> toolColour{0.25, 0.85, 1.0};
 inline constexpr std::array<double, 3> planColour{1.0, 1.0, 1.0};
 inline constexpr std::array<double, 3> proxyColour{1.0, 0.9, 0.2};
+inline constexpr std::array<double, 3> trailColour{1.0, 0.45, 0.85};
 
-/// The tool, the point on the surface that it would be at without penetration, the planned line and its aim.
+/// The tool, a needle as it is bent; the way that its tip has come since it went in; the point on the surface that it would
+/// be at without penetration; the planned line and its aim.
 class ToolPicture {
 public:
     ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer);
-    void update(const channel::State& state);
+    /// `aim`: where the line's end lies now [m].
+    void update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim);
 
 private:
+    void addNeedle(const channel::Scenery& scenery, vtkRenderer& renderer);
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
+    void moveNeedle(const channel::Scenery& scenery, const channel::State& state);
+    void leaveTrail(const channel::State& state);
 
-    bool turns_ = false;  // with the axis: no sphere
-    vtkNew<vtkTransform> pose_;
-    vtkNew<vtkActor> proxy_;
+    bool turns_ = false;         // with the axis: no sphere
+    vtkNew<vtkTransform> pose_;  // of the tool; of a needle, of its point
+    vtkNew<vtkActor> proxy_, aim_;
+    vtkNew<vtkPolyData> shaft_, trail_;    // middle line of a needle, way of its tip [mm]
+    std::vector<glm::dvec3> trailPoints_;  // [m]
+    channel::Phase phase_ = channel::Phase::free;
 };
 
 }  // namespace palpate::render

@@ -54,6 +54,17 @@ ViewFrame viewFrame(const channel::Scenery& scenery)
     return frame;
 }
 
+std::array<ViewFrame, 3> orthogonalFrames(const ViewFrame& procedure, glm::dvec3 point)
+{
+    std::array<ViewFrame, 3> frames;
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const Standard& s = standards[i];
+        const glm::dvec3 centre = procedure.centre + glm::dot(point - procedure.centre, s.towards) * s.towards;
+        frames[i] = {s.right, s.up, s.towards, centre, procedure.extent};
+    }
+    return frames;
+}
+
 ViewFrame through(const ViewFrame& frame, glm::dvec3 tip, glm::dvec3 axis)
 {
     ViewFrame turned = frame;

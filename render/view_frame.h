@@ -4,6 +4,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <array>
 #include <string>
 
 namespace palpate::render {
@@ -18,6 +19,9 @@ struct ViewFrame {
 };
 
 ViewFrame viewFrame(const channel::Scenery& scenery);
+
+/// Axial, sagittal and coronal through `point` [m], as radiologists draw them, around the procedure.
+std::array<ViewFrame, 3> orthogonalFrames(const ViewFrame& procedure, glm::dvec3 point);
 
 /// `frame` turned by the least that brings `axis` into its plane, and moved along `towards` to hold `tip`.
 ViewFrame through(const ViewFrame& frame, glm::dvec3 tip, glm::dvec3 axis);

@@ -3,7 +3,7 @@
 #include <render/display.h>
 #include <render/hosts.h>
 
-#include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <csignal>
@@ -24,7 +24,7 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 void standBack()
 {
     constexpr int nicer = 5;
-    ::setpriority(PRIO_PROCESS, 0, nicer);
+    [[maybe_unused]] const int level = ::nice(nicer);
     const unsigned cores = std::thread::hardware_concurrency();
     ::setenv("LP_NUM_THREADS", std::to_string(cores > 2 ? cores / 2 : 1).c_str(), 0);
 }
@@ -48,15 +48,13 @@ ViewerFigures runViewer(const ViewerOptions& options)
     std::signal(SIGINT, [](int) { interrupted = true; });
     std::signal(SIGTERM, [](int) { interrupted = true; });
     standBack();
-    if (options.offscreen.empty()) {
-        if (!displayWorks())
-            throw std::runtime_error("no display: set DISPLAY, or use --offscreen DIR");
-        return showInWindow(options, interrupted);
-    }
+    const bool window = options.offscreen.empty() && options.movie.empty();
+    if (window && !options.hidden && !displayWorks())
+        throw std::runtime_error("no display: set DISPLAY, or use --offscreen DIR");
     std::optional<PrivateDisplay> display;
-    if (!displayWorks())
+    if (options.hidden || !displayWorks())
         display.emplace();
-    return writePictures(options, interrupted);
+    return window ? showInWindow(options, interrupted) : writePictures(options, interrupted);
 }
 
 }  // namespace palpate::render

@@ -1,19 +1,43 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
+#include <vector>
 
 namespace palpate::render {
+
+/// A record that is played: the viewer asks, whoever plays it tells how it goes.
+struct Playback {
+    std::atomic<bool> paused{false};
+    std::atomic<double> speed{1};                                        // session time over real time
+    std::atomic<double> jump{std::numeric_limits<double>::quiet_NaN()};  // to this time [s]; taken by the player
+    std::atomic<double> time{0};                                         // shown now [s]
+    std::atomic<double> ready{0};                                        // computed so far [s]
+    std::atomic<double> length{0};                                       // [s]
+};
 
 /// What a viewer shows, and where.
 struct ViewerOptions {
     std::string session;              // name; empty = the only one that runs
-    std::filesystem::path offscreen;  // folder for PNG files; empty = a window
+    std::filesystem::path offscreen;  // folder for PNG files
+    std::filesystem::path movie;      // MP4 file; neither = a window
+    bool hidden = false;              // the window is on a display of its own that nobody sees, for measurements
+    bool instructor = false;          // layout to begin with
     int width = 1280, height = 960;   // [pixels]
     double every = 0.5;               // offscreen: session time from one picture to the next [s]
     double wait = 10;                 // how long without a session before giving up [s]
     std::uint64_t frames = 0;         // end after so many pictures; 0 = no limit
+    Playback* playback = nullptr;     // of the session, when it is a record
+};
+
+/// A picture, by the clock CLOCK_MONOTONIC.
+struct Shown {
+    std::uint64_t tick = 0;     // that it shows
+    double published = 0;       // when the simulation published the tick [s]
+    double read = 0, done = 0;  // when the viewer had its state, and when the picture was finished [s]
 };
 
 /// What a viewer has measured of itself.
@@ -23,12 +47,13 @@ struct ViewerFigures {
     double delayP50 = 0, delayP99 = 0;  // from the tick to its picture [s]
     double rate = 0;                    // frames per second while it was showing
     std::string display;                // what draws: the renderer's name
+    std::vector<Shown> shown;           // each picture of a tick that was not shown before
 };
 
 /// Shows a session until it has ended, its window is closed, or SIGINT or SIGTERM comes. Attaches late, attaches again when
-/// the session is started again, and never makes the simulation wait. Where there is no display, `offscreen` starts one of
-/// its own. Throws std::runtime_error when there is no session within `wait`, the session was killed, there is no display,
-/// or the folder cannot be written.
+/// the session is started again, and never makes the simulation wait. Where there is no display, `offscreen` and `movie`
+/// start one of its own. Throws std::runtime_error when there is no session within `wait`, the session was killed, there is
+/// no display, or folder or movie cannot be written.
 ViewerFigures runViewer(const ViewerOptions& options);
 
 }  // namespace palpate::render

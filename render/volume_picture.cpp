@@ -1,32 +1,24 @@
 #include <render/volume_picture.h>
 
+#include <vtkCallbackCommand.h>
+#include <vtkCommand.h>
+#include <vtkOpenGLRenderWindow.h>
 #include <vtkPiecewiseFunction.h>
+#include <vtkPlaneCollection.h>
+#include <vtkShaderProgram.h>
+#include <vtkShaderProperty.h>
 #include <vtkVolumeProperty.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
 
 namespace palpate::render {
 namespace {
 
 constexpr double mm = 1e3;
-
-// Light on the border of a tissue, baked into its colour: shading in the ray caster would cost a software renderer three
-// times the frame. `step` is the change of opacity around the voxel, `light` the direction to the lamp.
-double lambert(glm::dvec3 step, glm::dvec3 light) noexcept
-{
-    const double length = glm::length(step);
-    if (!(length > 0))
-        return 1.0;
-    constexpr double border = 0.03;  // a change from which on it counts as one
-    const double lit = 0.72 + 0.28 * glm::dot(-step / length, light);
-    return glm::mix(1.0, lit, std::min(1.0, length / border));
-}
 
 std::uint8_t byte(float value) noexcept
 {
@@ -36,29 +28,51 @@ std::uint8_t byte(float value) noexcept
 // Binomial filter of five along one axis: the steps of voxels would show in the light as rings.
 void blur(std::vector<float>& values, std::size_t size, std::size_t stride)
 {
+    if (size < 5)
+        return;
     std::vector<float> line(size);
-    for (std::size_t start = 0; start < values.size(); ++start) {
-        if (start / stride % size != 0)
-            continue;
-        for (std::size_t n = 0; n < size; ++n)
-            line[n] = values[start + n * stride];
-        for (std::size_t n = 2; n + 2 < size; ++n)
-            values[start + n * stride] = (line[n - 2] + 4 * line[n - 1] + 6 * line[n] + 4 * line[n + 1] + line[n + 2]) / 16;
-    }
+    for (std::size_t block = 0; block < values.size(); block += size * stride)
+        for (std::size_t start = block; start < block + stride; ++start) {
+            for (std::size_t n = 0; n < size; ++n)
+                line[n] = values[start + n * stride];
+            for (std::size_t n = 2; n + 2 < size; ++n)
+                values[start + n * stride] =
+                    (line[n - 2] + 4 * line[n - 1] + 6 * line[n] + 4 * line[n + 1] + line[n + 2]) / 16;
+        }
+}
+
+// Light on the border of a tissue: `step` is the change of opacity around the voxel, `light` the direction to the lamp.
+float lambert(glm::vec3 step, glm::vec3 light) noexcept
+{
+    const float length = glm::length(step);
+    if (!(length > 0))
+        return 1;
+    constexpr float border = 0.03F;  // a change from which on it counts as one
+    const float lit = 0.72F + 0.28F * glm::dot(-step / length, light);
+    return glm::mix(1.0F, lit, std::min(1.0F, length / border));
+}
+
+// The row of a label; air for rows that the table does not have.
+std::size_t rowOf(const channel::Scenery& scenery, std::uint8_t label) noexcept
+{
+    const std::uint8_t row = label & channel::rowBits;
+    return row < scenery.tissues ? row : 0;
 }
 
 }  // namespace
 
 VolumePicture::VolumePicture(const channel::Scenery& scenery, const Deformation& deformation, vtkRenderer& renderer)
-    : grid_(scenery.labels)
+    : renderer_(renderer), grid_(scenery.labels)
 {
-    paintRest(scenery, deformation);
     const double spacing = grid_.spacing * mm;
     image_->SetDimensions(grid_.size[0], grid_.size[1], grid_.size[2]);
     image_->SetSpacing(spacing, spacing, spacing);
     image_->SetOrigin(grid_.origin[0] * mm, grid_.origin[1] * mm, grid_.origin[2] * mm);
     image_->AllocateScalars(VTK_UNSIGNED_CHAR, 4);
-    std::memcpy(image_->GetScalarPointer(), rest_.data(), rest_.size() * sizeof(Pixel));
+    computeLight(scenery, deformation);
+    std::array<float, channel::maxTissues> plain{};
+    plain.fill(1);
+    paint(scenery, deformation, plain);
 
     vtkNew<vtkPiecewiseFunction> opacity;
     opacity->AddPoint(0, 0);
@@ -74,98 +88,140 @@ VolumePicture::VolumePicture(const channel::Scenery& scenery, const Deformation&
     property.SetScalarOpacityUnitDistance(layer);
     mapper_->SetInputData(image_);
     mapper_->SetAutoAdjustSampleDistances(0);
-
     volume_->SetMapper(mapper_);
+    teachShader();
     renderer.AddVolume(volume_);
 }
 
-void VolumePicture::paintRest(const channel::Scenery& scenery, const Deformation& deformation)
+VolumePicture::~VolumePicture() = default;
+
+// Shading in the ray caster would cost a software renderer three times the frame.
+void VolumePicture::computeLight(const channel::Scenery& scenery, const Deformation& deformation)
 {
     const auto labels = deformation.labels();
-    const auto rowOf = [&](std::size_t at) { return labels[at] < scenery.tissues ? labels[at] : std::uint8_t{0}; };
     std::vector<float> body(labels.size());
     constexpr float present = 0.05F;  // so that the border of a clear tissue is lit as well
-    for (std::size_t i = 0; i < labels.size(); ++i)
-        body[i] = rowOf(i) == 0 ? 0.0F : present + scenery.tissue[rowOf(i)].opacity;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        const std::size_t row = rowOf(scenery, labels[i]);
+        body[i] = row == 0 ? 0.0F : present + scenery.tissue[row].opacity;
+    }
     const std::array<std::size_t, 3> size{static_cast<std::size_t>(grid_.size[0]), static_cast<std::size_t>(grid_.size[1]),
                                           static_cast<std::size_t>(grid_.size[2])};
     const std::array<std::size_t, 3> stride{1, size[0], size[0] * size[1]};
     constexpr int passes = 2;
     for (std::size_t pass = 0; pass < 3 * passes; ++pass)
         blur(body, size[pass % 3], stride[pass % 3]);
+    const glm::vec3 light = glm::normalize(glm::vec3(-0.4F, -0.7F, -0.6F));
+    light_.resize(labels.size());
+    std::size_t i = 0;
+    for (std::size_t z = 0; z < size[2]; ++z)
+        for (std::size_t y = 0; y < size[1]; ++y)
+            for (std::size_t x = 0; x < size[0]; ++x, ++i) {
+                const auto along = [&](std::size_t n, std::size_t last, std::size_t to) {
+                    return body[n < last ? i + to : i] - body[n > 0 ? i - to : i];
+                };
+                const glm::vec3 step(along(x, size[0] - 1, stride[0]), along(y, size[1] - 1, stride[1]),
+                                     along(z, size[2] - 1, stride[2]));
+                light_[i] = byte(lambert(step, light));
+            }
+}
 
-    const glm::dvec3 light = glm::normalize(glm::dvec3(-0.4, -0.7, -0.6));
+void VolumePicture::paint(const channel::Scenery& scenery, const Deformation& deformation,
+                          const std::array<float, channel::maxTissues>& factor)
+{
+    constexpr float shellOpacity = 0.30F;
+    const auto labels = deformation.labels();
     // The air takes the colour of the first tissue, so that blended borders stay free of dark fringes.
     const auto& fringe = scenery.tissue[1].colour;
-    rest_.resize(labels.size());
+    auto* pixels = static_cast<std::array<std::uint8_t, 4>*>(image_->GetScalarPointer());
     for (std::size_t i = 0; i < labels.size(); ++i) {
-        const std::size_t row = rowOf(i);
-        if (row == 0) {
-            rest_[i] = {byte(fringe[0]), byte(fringe[1]), byte(fringe[2]), 0};
-            continue;
-        }
-        glm::dvec3 step(0.0);
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const std::size_t n = i / stride[axis] % size[axis];
-            const float above = body[n + 1 < size[axis] ? i + stride[axis] : i], below = body[n > 0 ? i - stride[axis] : i];
-            step[static_cast<int>(axis)] = static_cast<double>(above - below);
-        }
-        const auto shade = static_cast<float>(lambert(step, light));
-        const channel::TissueLook& look = scenery.tissue[row];
-        rest_[i] = {byte(shade * look.colour[0]), byte(shade * look.colour[1]), byte(shade * look.colour[2]),
-                    byte(look.opacity)};
+        const std::size_t row = rowOf(scenery, labels[i]);
+        const bool shell = (labels[i] & channel::shellBit) != 0;
+        const float light = static_cast<float>(light_[i]) / 255;
+        const auto& colour = row == 0 ? fringe : shell ? shellColour : scenery.tissue[row].colour;
+        const float opacity = row == 0 ? 0 : std::max(factor[row] * scenery.tissue[row].opacity, shell ? shellOpacity : 0);
+        pixels[i] = {byte(light * colour[0]), byte(light * colour[1]), byte(light * colour[2]), byte(opacity)};
     }
-}
-
-VolumePicture::Pixel VolumePicture::restPixel(glm::dvec3 p) const noexcept
-{
-    const glm::dvec3 last(grid_.size[0] - 1, grid_.size[1] - 1, grid_.size[2] - 1);
-    const glm::dvec3 g = glm::clamp((p - vec(grid_.origin)) / grid_.spacing, glm::dvec3(0.0), last - 1e-6);
-    const glm::dvec3 low = glm::floor(g), part = g - low;
-    const auto nx = static_cast<std::size_t>(grid_.size[0]), ny = static_cast<std::size_t>(grid_.size[1]);
-    const std::size_t at =
-        (static_cast<std::size_t>(low.z) * ny + static_cast<std::size_t>(low.y)) * nx + static_cast<std::size_t>(low.x);
-    const std::size_t row = nx, layer = nx * ny;
-    const auto differs = [&](std::size_t other) {
-        return std::bit_cast<std::uint32_t>(rest_[at]) ^ std::bit_cast<std::uint32_t>(rest_[other]);
-    };
-    // Inside a tissue all eight are the same.
-    if ((differs(at + 1) | differs(at + row) | differs(at + row + 1) | differs(at + layer) | differs(at + layer + 1) |
-         differs(at + layer + row) | differs(at + layer + row + 1)) == 0)
-        return rest_[at];
-    std::array<float, 4> sum{};
-    for (std::size_t k = 0; k < 8; ++k) {
-        const std::size_t dx = k & 1U, dy = (k >> 1U) & 1U, dz = k >> 2U;
-        const auto w = static_cast<float>((dx != 0 ? part.x : 1 - part.x) * (dy != 0 ? part.y : 1 - part.y) *
-                                          (dz != 0 ? part.z : 1 - part.z));
-        const Pixel& pixel = rest_[at + dz * layer + dy * row + dx];
-        for (std::size_t c = 0; c < 4; ++c)
-            sum[c] += w * static_cast<float>(pixel[c]);
-    }
-    Pixel result{};
-    for (std::size_t c = 0; c < 4; ++c)
-        result[c] = static_cast<std::uint8_t>(sum[c] + 0.5F);
-    return result;
-}
-
-void VolumePicture::update(const Deformation& deformation, const VoxelBox& box)
-{
-    if (box.empty())
-        return;
-    auto* pixels = static_cast<Pixel*>(image_->GetScalarPointer());
-    const auto nx = static_cast<std::size_t>(grid_.size[0]), ny = static_cast<std::size_t>(grid_.size[1]);
-    for (int z = box.low.z; z < box.high.z; ++z)
-        for (int y = box.low.y; y < box.high.y; ++y) {
-            glm::vec3 shift(0);
-            for (int x = box.low.x; x < box.high.x; ++x) {
-                const std::size_t at =
-                    (static_cast<std::size_t>(z) * ny + static_cast<std::size_t>(y)) * nx + static_cast<std::size_t>(x);
-                const glm::dvec3 p = vec(grid_.origin) + grid_.spacing * glm::dvec3(x, y, z);
-                const glm::dvec3 rest = deformation.rest(p, shift);
-                pixels[at] = rest == p ? rest_[at] : restPixel(rest);
-            }
-        }
     image_->Modified();
+}
+
+// Every look into the volume goes through palpateRest(). Positions are texture coordinates of the volume.
+void VolumePicture::teachShader()
+{
+    vtkShaderProperty& shader = *volume_->GetShaderProperty();
+    shader.AddFragmentShaderReplacement("//VTK::CustomUniforms::Dec", true,
+                                        R"(//VTK::CustomUniforms::Dec
+uniform sampler3D palpateShift;
+uniform vec3 palpateScale;   // to texture coordinates of the shifts
+uniform vec3 palpateOffset;
+uniform vec3 palpateReach;   // shift per unit of a texel
+vec3 palpateRest(vec3 p)
+{
+    vec3 q = p * palpateScale + palpateOffset;
+    if (any(lessThan(q, vec3(0.0))) || any(greaterThan(q, vec3(1.0))))
+        return p;
+    return p + (texture(palpateShift, q).xyz - 128.0 / 255.0) * palpateReach;
+}
+)",
+                                        true);
+    shader.AddFragmentShaderReplacement("texture3D(in_volume[0], g_dataPos)", false,
+                                        "texture3D(in_volume[0], palpateRest(g_dataPos))", true);
+    vtkNew<vtkCallbackCommand> tell;
+    tell->SetClientData(this);
+    tell->SetCallback([](vtkObject*, unsigned long, void* self, void* program) {
+        static_cast<VolumePicture*>(self)->setUniforms(*static_cast<vtkShaderProgram*>(program));
+    });
+    mapper_->AddObserver(vtkCommand::UpdateShaderEvent, tell);
+}
+
+void VolumePicture::setUniforms(vtkShaderProgram& program)
+{
+    shown_ = true;
+    const glm::dvec3 count(grid_.size[0], grid_.size[1], grid_.size[2]);
+    const glm::dvec3 whole = count * grid_.spacing;  // of the texture [m]; the first voxel's middle is half a voxel inside
+    const glm::dvec3 corner = vec(grid_.origin) - 0.5 * grid_.spacing;
+    glm::dvec3 scale(0.0), offset(-1.0), reach(0.0);
+    if (field_.size.x > 0) {
+        const glm::dvec3 box = glm::dvec3(field_.size) * field_.spacing;
+        scale = whole / box;
+        offset = (corner - field_.origin + 0.5 * field_.spacing) / box;
+        reach = 255.0 / 127.0 * field_.largest / whole;
+    }
+    const auto set = [&](const char* name, glm::dvec3 v) {
+        const std::array<float, 3> value{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+        program.SetUniform3f(name, value.data());
+    };
+    set("palpateScale", scale);
+    set("palpateOffset", offset);
+    set("palpateReach", reach);
+    shifts_->Activate();
+    program.SetUniformi("palpateShift", shifts_->GetTextureUnit());
+}
+
+void VolumePicture::update(const Deformation& deformation)
+{
+    sample(deformation, field_);
+    changed_ = true;
+}
+
+// Before VTK begins a picture: in the middle of one a new texture would take the place of the volume.
+void VolumePicture::upload()
+{
+    if (!changed_)
+        return;
+    changed_ = false;
+    vtkOpenGLRenderWindow* window = vtkOpenGLRenderWindow::SafeDownCast(renderer_.GetRenderWindow());
+    window->Start();
+    shifts_->SetContext(window);
+    shifts_->SetMinificationFilter(vtkTextureObject::Linear);
+    shifts_->SetMagnificationFilter(vtkTextureObject::Linear);
+    shifts_->SetWrapS(vtkTextureObject::ClampToEdge);
+    shifts_->SetWrapT(vtkTextureObject::ClampToEdge);
+    shifts_->SetWrapR(vtkTextureObject::ClampToEdge);
+    ShiftField::Texel none{128, 128, 128, 255};
+    const bool any = field_.size.x > 0;
+    const auto along = [&](int axis) { return any ? static_cast<unsigned>(field_.size[axis]) : 1U; };
+    shifts_->Create3DFromRaw(along(0), along(1), along(2), 4, VTK_UNSIGNED_CHAR, any ? field_.texels.data() : &none);
 }
 
 void VolumePicture::cut(glm::dvec3 point, glm::dvec3 normal)
@@ -173,24 +229,40 @@ void VolumePicture::cut(glm::dvec3 point, glm::dvec3 normal)
     const glm::dvec3 at = point * mm;
     plane_->SetOrigin(at.x, at.y, at.z);
     plane_->SetNormal(-normal.x, -normal.y, -normal.z);
-    mapper_->RemoveAllClippingPlanes();
-    mapper_->AddClippingPlane(plane_);
+    if (mapper_->GetClippingPlanes() == nullptr || mapper_->GetClippingPlanes()->GetNumberOfItems() == 0)
+        mapper_->AddClippingPlane(plane_);
 }
 
-void VolumePicture::setQuality(Quality quality, bool software, double pixels)
+void VolumePicture::uncut()
 {
-    const double voxel = grid_.spacing * mm;
-    if (!software) {
+    mapper_->RemoveAllClippingPlanes();
+}
+
+void VolumePicture::prepare(Quality quality, bool software, double pixels)
+{
+    moving_ = quality == Quality::moving;
+    upload();
+    const glm::dvec3 extent = glm::dvec3(grid_.size[0], grid_.size[1], grid_.size[2]) * grid_.spacing * mm;
+    const double voxel = std::max(grid_.spacing * mm, std::max({extent.x, extent.y, extent.z}) / 128);
+    if (!software || quality == Quality::still) {
         mapper_->SetImageSampleDistance(1.0F);
-        mapper_->SetSampleDistance(static_cast<float>(0.5 * voxel));
+        mapper_->SetSampleDistance(static_cast<float>((software ? 1.0 : 0.5) * voxel));
         return;
     }
-    // What one core casts in about 15 ms [rays].
-    constexpr double affordable = 40e3, fine = 1.5, coarsest = 4.0;
-    const bool moving = quality == Quality::moving;
-    const double apart = moving ? std::clamp(std::sqrt(pixels / affordable), fine, coarsest) : fine;
-    mapper_->SetImageSampleDistance(static_cast<float>(apart));
-    mapper_->SetSampleDistance(static_cast<float>((moving ? 2.0 : 1.0) * voxel));
+    // Other rays make VTK allocate its buffers anew: only in steps, and not back and forth.
+    constexpr double steps = 4, coarsest = 4, change = 0.2;
+    const double apart = std::clamp(std::sqrt(pixels / rays_), 1.0, coarsest);
+    if (std::abs(apart - castApart_) > change)
+        castApart_ = std::round(apart * steps) / steps;
+    mapper_->SetImageSampleDistance(static_cast<float>(castApart_));
+    mapper_->SetSampleDistance(static_cast<float>(std::clamp(0.75 * castApart_, 1.0, 3.0) * voxel));
+}
+
+void VolumePicture::took(double seconds)
+{
+    constexpr double budget = 0.028, fewest = 8e3, most = 400e3;
+    if (moving_ && seconds > 0)
+        rays_ = std::clamp(rays_ * std::clamp(budget / seconds, 0.75, 1.1), fewest, most);
 }
 
 }  // namespace palpate::render

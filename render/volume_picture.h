@@ -2,12 +2,14 @@
 
 #include <render/channel/layout.h>
 #include <render/deformation.h>
+#include <render/shift_field.h>
 
 #include <vtkGPUVolumeRayCastMapper.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPlane.h>
 #include <vtkRenderer.h>
+#include <vtkTextureObject.h>
 #include <vtkVolume.h>
 
 #include <glm/vec3.hpp>
@@ -16,31 +18,57 @@
 #include <cstdint>
 #include <vector>
 
+class vtkShaderProgram;
+
 namespace palpate::render {
 
 enum class Quality : std::uint8_t { moving, still };
 
-/// The body, ray cast, cut open along a plane. World coordinates of everything drawn in 3-D are millimetres.
+/// How the warning distances of vital structures are drawn.
+inline constexpr std::array<float, 3> shellColour{1.0F, 0.72F, 0.10F};
+
+/// The body, ray cast, cut open along a plane. The volume at rest is uploaded once; the ray caster looks every sample up
+/// where it lies at rest, so that a frame costs the same however much of the body moves and however fine it is. World
+/// coordinates of everything drawn in 3-D are millimetres.
 class VolumePicture {
 public:
     VolumePicture(const channel::Scenery& scenery, const Deformation& deformation, vtkRenderer& renderer);
+    VolumePicture(const VolumePicture&) = delete;
+    VolumePicture& operator=(const VolumePicture&) = delete;
+    ~VolumePicture();
 
-    /// Draws `box` anew; all else stays as it was.
-    void update(const Deformation& deformation, const VoxelBox& box);
+    /// Shows the present deformation from the next prepare() on.
+    void update(const Deformation& deformation);
+    /// Draws the tissues anew, their opacity in the table times `factor` per row.
+    void paint(const channel::Scenery& scenery, const Deformation& deformation,
+               const std::array<float, channel::maxTissues>& factor);
     /// Shows only what lies behind the plane through `point` [m], seen from where `normal` points to.
     void cut(glm::dvec3 point, glm::dvec3 normal);
-    /// `pixels`: size of the view.
-    void setQuality(Quality quality, bool software, double pixels);
+    void uncut();
+    /// Before a picture; the context must be current. `pixels`: size of the view.
+    void prepare(Quality quality, bool software, double pixels);
+    /// False when the picture was made without a body: VTK asks for what its shader needs from the second one on.
+    bool shown() const noexcept { return shown_; }
+    /// After it: how long the whole picture took [s]. What moves is cast as finely as 30 pictures a second allow.
+    void took(double seconds);
 
 private:
-    using Pixel = std::array<std::uint8_t, 4>;  // RGB, opacity
+    void computeLight(const channel::Scenery& scenery, const Deformation& deformation);
+    void teachShader();
+    void setUniforms(vtkShaderProgram& program);
+    void upload();
 
-    void paintRest(const channel::Scenery& scenery, const Deformation& deformation);
-    Pixel restPixel(glm::dvec3 p) const noexcept;
-
+    vtkRenderer& renderer_;
     channel::Grid grid_;
-    std::vector<Pixel> rest_;  // per voxel
+    std::vector<std::uint8_t> light_;  // per voxel
+    ShiftField field_;
+    bool changed_ = true;
+    bool moving_ = false;
+    bool shown_ = false;
+    double rays_ = 30e3;    // that fit in a picture while things move
+    double castApart_ = 2;  // [pixels] from ray to ray
     vtkNew<vtkImageData> image_;
+    vtkNew<vtkTextureObject> shifts_;
     vtkNew<vtkGPUVolumeRayCastMapper> mapper_;
     vtkNew<vtkVolume> volume_;
     vtkNew<vtkPlane> plane_;

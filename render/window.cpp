@@ -4,6 +4,7 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <render/controls.h>
 #include <render/follower.h>
 #include <render/hosts.h>
 
@@ -15,6 +16,7 @@
 #include <vtkNew.h>
 #include <vtkOpenGLState.h>
 
+#include <algorithm>
 #include <memory>
 #include <stdexcept>
 #include <thread>
@@ -42,7 +44,13 @@ Window openWindow(const ViewerOptions& options)
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
     // A frame buffer with alpha would let the desktop shine through.
     glfwWindowHint(GLFW_ALPHA_BITS, 0);
-    Window window(glfwCreateWindow(options.width, options.height, "Palpate", nullptr, nullptr));
+    int x = 0, y = 0, width = options.width, height = options.height;
+    if (GLFWmonitor* screen = glfwGetPrimaryMonitor(); screen != nullptr && !options.hidden) {
+        glfwGetMonitorWorkarea(screen, &x, &y, &width, &height);
+        width = std::min(width, options.width);
+        height = std::min(height, options.height);
+    }
+    Window window(glfwCreateWindow(width, height, "Palpate", nullptr, nullptr));
     if (!window)
         throw std::runtime_error("the display has no OpenGL 3.2, which the viewer needs");
     glfwMakeContextCurrent(window.get());
@@ -82,55 +90,59 @@ void connect(vtkGenericOpenGLRenderWindow& target, GLFWwindow* window)
     target.SetFrameBlitModeToBlitToHardware();
 }
 
-// Left: turn, middle: shift, right or wheel: nearer and further.
-struct Hand {
+// What the callback for the window's size needs; the window's own pointer belongs to the controls.
+struct Target {
+    vtkGenericOpenGLRenderWindow& window;
     vtkGenericRenderWindowInteractor& interactor;
-    vtkGenericOpenGLRenderWindow& target;
-    bool used = false;  // since the last frame
 
-    void tell(unsigned long event)
+    void fit(GLFWwindow* host) const
     {
-        used = true;
-        interactor.InvokeEvent(event);
+        int width = 0, height = 0;
+        glfwGetFramebufferSize(host, &width, &height);
+        if (width < 1 || height < 1 || (window.GetSize()[0] == width && window.GetSize()[1] == height))
+            return;
+        window.SetSize(width, height);
+        interactor.SetSize(width, height);
     }
 };
 
-Hand& handOf(GLFWwindow* window)
-{
-    return *static_cast<Hand*>(glfwGetWindowUserPointer(window));
-}
+// When a picture is due. Pictures begin with the simulation's frames, so that all viewers show the same tick; one that
+// cannot keep up with that draws as fast as it can, one that is quick begins a second one half-way. A fine picture of what
+// does not move is no reason to keep a core busy.
+class FrameClock {
+public:
+    bool due(const Follower& follower, bool moving, bool used) const
+    {
+        const auto since = Clock::now() - drawn_;
+        if (!moving)
+            return !still_ || since >= stillFrame;
+        return (used && since >= frame) || slow_ || frameAt(follower) != frame_;
+    }
+    void begin(const Follower& follower, bool moving)
+    {
+        drawn_ = Clock::now();
+        frame_ = frameAt(follower);
+        still_ = !moving;
+    }
+    void end()
+    {
+        const auto took = Clock::now() - drawn_;
+        slow_ = !still_ && took > frame;
+        quick_ = took < frame / 4;
+    }
 
-void listen(GLFWwindow* window, Hand& hand)
-{
-    glfwSetWindowUserPointer(window, &hand);
-    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
-        const bool down = action == GLFW_PRESS;
-        if (button == GLFW_MOUSE_BUTTON_LEFT)
-            handOf(w).tell(down ? vtkCommand::LeftButtonPressEvent : vtkCommand::LeftButtonReleaseEvent);
-        else if (button == GLFW_MOUSE_BUTTON_MIDDLE)
-            handOf(w).tell(down ? vtkCommand::MiddleButtonPressEvent : vtkCommand::MiddleButtonReleaseEvent);
-        else if (button == GLFW_MOUSE_BUTTON_RIGHT)
-            handOf(w).tell(down ? vtkCommand::RightButtonPressEvent : vtkCommand::RightButtonReleaseEvent);
-    });
-    glfwSetCursorPosCallback(window, [](GLFWwindow* w, double x, double y) {
-        handOf(w).interactor.SetEventInformationFlipY(static_cast<int>(x), static_cast<int>(y));
-        handOf(w).tell(vtkCommand::MouseMoveEvent);
-    });
-    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double y) {
-        handOf(w).tell(y > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
-    });
-    glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int, int action, int) {
-        if (action == GLFW_PRESS && (key == GLFW_KEY_Q || key == GLFW_KEY_ESCAPE))
-            glfwSetWindowShouldClose(w, GLFW_TRUE);
-    });
-    glfwSetFramebufferSizeCallback(window, [](GLFWwindow* w, int width, int height) {
-        if (width < 1 || height < 1)
-            return;
-        handOf(w).used = true;
-        handOf(w).target.SetSize(width, height);
-        handOf(w).interactor.SetSize(width, height);
-    });
-}
+private:
+    std::uint64_t frameAt(const Follower& follower) const
+    {
+        const std::uint64_t tick = follower.state().tick, half = channel::frameTicks / 2;
+        return 2 * (tick / channel::frameTicks) + (quick_ && tick % channel::frameTicks > half ? 1 : 0);
+    }
+
+    static constexpr auto frame = std::chrono::milliseconds(channel::frameTicks), stillFrame = std::chrono::seconds(1);
+    Clock::time_point drawn_{};
+    std::uint64_t frame_ = 0;
+    bool slow_ = false, quick_ = false, still_ = false;
+};
 
 // Ends VTK's use of the context before the window goes, also when an exception passes.
 struct Finalizer {
@@ -151,38 +163,44 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     target->SetSize(width, height);
 
     Picture picture(*target);
+    picture.show(options.instructor ? Layout::instructor : Layout::trainee);
     vtkNew<vtkGenericRenderWindowInteractor> interactor;
     interactor->SetRenderWindow(target);
     vtkNew<vtkInteractorStyleTrackballCamera> style;
     interactor->SetInteractorStyle(style);
     interactor->EnableRenderOff();
     interactor->Initialize();
-    Hand hand{*interactor, *target};
-    listen(window.get(), hand);
+    const Target shown{*target, *interactor};
 
     Follower follower(options.session, options.wait);
-    // A fine picture of what does not move is no reason to keep a core busy.
-    constexpr auto frame = std::chrono::milliseconds(16), stillFrame = std::chrono::milliseconds(400);
-    Clock::time_point drawn{};
+    Controls controls(window.get(), *interactor, picture, follower, options.playback);
+    FrameClock clock;
     auto used = Clock::now();
     while (!stop && !follower.over() && glfwWindowShouldClose(window.get()) == GLFW_FALSE &&
-           (options.frames == 0 || follower.figures().frames < options.frames)) {
-        const auto start = Clock::now();
+           (options.frames == 0 || follower.frames() < options.frames)) {
         glfwPollEvents();
-        if (std::exchange(hand.used, false))
-            used = start;
+        shown.fit(window.get());
+        float scale = 1, other = 1;
+        glfwGetWindowContentScale(window.get(), &scale, &other);
+        picture.setDisplayScale(static_cast<double>(scale));
+        const bool now = controls.used();
+        if (now)
+            used = Clock::now();
         follower.poll(picture);
-        const bool moving = follower.moving() || start - used < std::chrono::milliseconds(300);
-        if (moving || start - drawn > stillFrame) {
-            // VTK takes the state of a foreign context as it finds it. With OpenGL's own default (less) flat things would
-            // hide what is drawn over them at the same depth.
-            target->GetState()->Reset();
-            target->GetState()->vtkglDepthFunc(GL_LEQUAL);
-            follower.draw(picture, moving ? Quality::moving : Quality::still);
-            glfwSwapBuffers(window.get());
-            drawn = start;
+        controls.keep();
+        const bool moving = follower.moving() || controls.holding() || Clock::now() - used < std::chrono::milliseconds(300);
+        if (!clock.due(follower, moving, now)) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            continue;
         }
-        std::this_thread::sleep_until(start + frame);
+        clock.begin(follower, moving);
+        // VTK takes the state of a foreign context as it finds it. With OpenGL's own default (less) flat things would
+        // hide what is drawn over them at the same depth.
+        target->GetState()->Reset();
+        target->GetState()->vtkglDepthFunc(GL_LEQUAL);
+        follower.draw(picture, moving ? Quality::moving : Quality::still);
+        glfwSwapBuffers(window.get());
+        clock.end();
     }
     ViewerFigures figures = follower.figures();
     figures.display = picture.display();

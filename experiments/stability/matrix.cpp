@@ -226,7 +226,7 @@ Trace runSession(const Cell& cell, const StabilityScene& scene, const StabilityM
         arm.write(force);
         trace.position.push_back(arm.position());
         trace.speed.push_back(glm::length(arm.velocity()));
-        trace.work.push_back(arm.work());
+        trace.work.push_back(arm.work() - arm.friction());
         trace.force.push_back(force);
         if (visit) {
             visit(sample, force, running);

@@ -22,7 +22,9 @@ constexpr Bounded noEnergy{Figure::energyMade, leastEnergy};
 constexpr double stepBound = 5.0;    // of the cap per ms
 constexpr double rippleBound = 5.0;  // of the force; the least that is felt is 7 to 10 %
 
-constexpr haptics::Grip firm{0.1, 3.0, 400.0};
+// The firm end of the grips of a stylus: damping and stiffness grow together (Hasser and Cutkosky, "System identification
+// of the human hand grasping a haptic knob", 2002).
+constexpr haptics::Grip firm{0.1, 5.0, 400.0};
 // Goes where it wants to, whatever resists.
 constexpr haptics::Grip rigid{0.1, 60.0, 2e4};
 
@@ -143,21 +145,22 @@ std::shared_ptr<const volume::Tissue> slope(double degrees)
     const Vec3 inward(std::sin(angle), std::cos(angle), 0);
     // At 45 degrees voxels' middles must not lie on the surface itself, where rounding would decide.
     constexpr double shift = 0.2;  // [mm]
-    return smallBody({-30, -26, -8}, {30, 36, 8}, [=](Vec3 p) {
+    return smallBody({-44, -44, -8}, {44, 50, 8}, [=](Vec3 p) {
         const double depth = glm::dot(p, inward) - shift;
-        const bool inside = depth > 0 && std::abs(p.x) < 28 && p.y < 34;
-        return !inside ? BodyLabel{} : depth < 18 && p.y < 32 ? bodySkin : bodyBase;
+        const bool inside = depth > 0 && std::abs(p.x) < 42 && p.y < 48;
+        return !inside ? BodyLabel{} : depth < 18 && p.y < 46 ? bodySkin : bodyBase;
     });
 }
 
 void addSlides(std::vector<StabilityScene>& out)
 {
-    constexpr double slid = 26;
     for (const int degrees : {10, 15, 22, 30, 45}) {
         const auto tissue = slope(degrees);
         const double angle = degrees * std::numbers::pi / 180;
         const Vec3 inward(std::sin(angle), std::cos(angle), 0), along(std::cos(angle), -std::sin(angle), 0);
         for (const int speed : {10, 20, 80}) {
+            // Far enough for the hand, which rings a few times as it starts, to come to rest beside its goal.
+            const double slid = speed == 80 ? 60 : 26;
             const Vec3 from = -0.5 * slid * along + (4.5 - ball) * inward;
             auto s = scene(fmt::format("slide-{}deg-{}mm_s", degrees, speed), "slide",
                            fmt::format("slid at {} mm/s over a staircase of voxels of {} degrees", speed, degrees), tissue,
@@ -189,9 +192,13 @@ void addTissueSteps(std::vector<StabilityScene>& out)
     auto cycle = step;
     cycle.name = cycle.session.name = "tumour-cycle";
     cycle.meaning = "slid from fat onto a tumour, and held there";
+    // Long enough for the hand to come to rest where tissue and grip are balanced.
+    cycle.hand.legs.back().wait = 1.0;
     cycle.held = {Figure::restCycle, 1.0};
     cycle.released = noEnergy;
+    cycle.to = cycle.hand.seconds();
     cycle.from = cycle.to - 0.2;
+    cycle.letGo = cycle.hand.end(1) - 0.3;
     cycle.quick = false;
     out.push_back(std::move(step));
     out.push_back(std::move(cycle));
@@ -252,7 +259,7 @@ void addLate(std::vector<StabilityScene>& out)
 void addRest(std::vector<StabilityScene>& out)
 {
     auto wall =
-        scene("wall-rest", "wall", "resting on bone", flatBody(bodyBase, 6), ball, {{0, -7, 0}, 0, {{{0, 2, 0}, 20, 0.6}}});
+        scene("wall-rest", "wall", "resting on bone", flatBody(bodyBase, 6), ball, {{0, -7, 0}, 0, {{{0, 2, 0}, 20, 1.0}}});
     wall.held = {Figure::restCycle, 1.0};
     wall.from = wall.to - 0.3;
     wall.letGo = wall.to - 0.3;

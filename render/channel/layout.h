@@ -8,19 +8,23 @@
 ///
 ///     Header      magic, version, layout hash, offsets     written once
 ///     Scenery     names, colours, grids, tool, line        written once
-///     labels      tissue row per display voxel (uint8)     written once
+///     labels      tissue row and shellBit per voxel        written once
 ///     State       sequence lock                            every tick
+///     Input       sequence lock, in a page of its own      by the viewer whose mouse is the hand
 ///     Displaced   four slots, a sequence lock each         at frame rate
 ///
 /// Lengths in metres, forces in newtons, patient frame LPS.
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 1;
+inline constexpr std::uint32_t version = 2;
+inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
 inline constexpr std::size_t maxDisplaced = 1U << 16;
 inline constexpr std::size_t nameLength = 32;
+/// Of a display voxel: the row of its tissue, and whether it lies on the border of a vital structure's warning distance.
+inline constexpr std::uint8_t rowBits = maxTissues - 1, shellBit = 0x80;
 
 using Name = std::array<char, nameLength>;  // ends with '\0'
 using Triple = std::array<double, 3>;
@@ -52,7 +56,7 @@ struct Scenery {
     std::array<Name, maxStructures> structure{};
     std::array<double, maxStructures> warnDistance{};
     ToolKind tool = ToolKind::needle;
-    std::uint32_t padding = 0;
+    std::uint32_t viewersHand = 0;  // 1: the hand is the mouse of a viewer
     double toolRadius = 0;
     double toolLength = 0;
     Triple entry{};
@@ -70,6 +74,7 @@ struct State {
     double time = 0;  // of the session [s]
     Triple tip{};     // of the tool (sphere: centre; capsule: middle of its front end)
     Triple axis{};    // unit vector, from the shaft to the tip
+    Triple bend{};    // of the tip off the line of the shaft outside, across the axis [m]
     Triple proxy{};   // where the tip would be without penetration
     Triple basic{}, additional{}, total{};
     Phase phase = Phase::free;
@@ -92,6 +97,17 @@ struct State {
     std::uint64_t published = 0;  // CLOCK_MONOTONIC when written [ns]
 };
 
+/// What the user of a viewer asks of the simulation.
+struct Input {
+    Triple target{};          // of the tool's tip [m]
+    Triple axis{0, 1, 0};     // unit vector, from the shaft to the tip
+    std::uint32_t held = 0;   // 1: the dead-man switch
+    std::uint32_t ended = 0;  // 1: the session is to end
+    std::uint32_t fires = 0;  // how often the gun was fired: counted, so that a short press is never between two looks
+    std::uint32_t marks = 0;  // how often the place of the tool was marked
+    std::uint64_t beat = 0;   // how often this was written: it stands still when the viewer is dead or stuck
+};
+
 /// One displaced node of the lattice.
 struct Displacement {
     std::uint32_t node = 0;  // offset in the lattice grid
@@ -101,12 +117,13 @@ struct Displacement {
 /// The displaced nodes of one moment; all others are at rest.
 struct Displaced {
     std::uint64_t tick = 0;
+    std::uint64_t publication = 0;  // of a viewer's copy: which one it is, from 1; 0: none yet
     std::uint32_t count = 0;
     std::uint32_t padding = 0;
     std::array<Displacement, maxDisplaced> nodes{};
 };
 
 static_assert(std::is_trivially_copyable_v<State> && std::is_trivially_copyable_v<Scenery> &&
-              std::is_trivially_copyable_v<Displaced>);
+              std::is_trivially_copyable_v<Displaced> && std::is_trivially_copyable_v<Input>);
 
 }  // namespace palpate::channel

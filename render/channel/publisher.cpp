@@ -169,8 +169,9 @@ struct Publisher::Impl {
     std::size_t bytes = 0;
     Header* header = nullptr;
     StateBlock* state = nullptr;
+    InputBlock* input = nullptr;
     DisplacedBlock* displaced = nullptr;
-    std::uint64_t sequence = 0, publication = 0;
+    std::uint64_t publication = 0;
     std::unique_ptr<Displaced> back = std::make_unique<Displaced>();
 };
 
@@ -181,7 +182,8 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
     removeLeftBehind(session, name);
     removeOthersLeftBehind();
     const std::size_t scene = aligned(sizeof(Header)), label = scene + aligned(sizeof(Scenery)),
-                      states = label + aligned(labels.size()), displacements = states + aligned(sizeof(StateBlock));
+                      states = label + aligned(labels.size()), inputs = states + aligned(sizeof(StateBlock)),
+                      displacements = inputs + aligned(sizeof(InputBlock));
     try {
         allocate(displacements + aligned(sizeof(DisplacedBlock)));
         header = new (base) Header;
@@ -189,6 +191,7 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
         header->labelsOffset = label;
         header->labelsBytes = labels.size();
         header->stateOffset = states;
+        header->inputOffset = inputs;
         header->displacedOffset = displacements;
         fill(scenery, labels);
         show();
@@ -224,6 +227,7 @@ void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t>
     new (base + header->sceneryOffset) Scenery(scenery);
     std::memcpy(base + header->labelsOffset, labels.data(), labels.size());
     state = new (base + header->stateOffset) StateBlock;
+    input = new (base + header->inputOffset) InputBlock;
     displaced = new (base + header->displacedOffset) DisplacedBlock;
     header->magic.store(magic, std::memory_order_release);
 }
@@ -270,19 +274,20 @@ Publisher::Publisher(const std::string& session, const Scenery& scenery, std::sp
 Publisher::Publisher(Publisher&&) noexcept = default;
 Publisher::~Publisher() = default;
 
-// Sequence lock without fences (H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012):
-// a reader that sees a word of this write (acquire) also sees the odd sequence before it, and throws its copy away.
 void Publisher::setState(const State& state) noexcept
 {
     auto words = std::bit_cast<std::array<std::uint64_t, stateWords>>(state);
     if (state.published == 0)
         words[offsetof(State, published) / sizeof(std::uint64_t)] = now();
-    StateBlock& block = *impl_->state;
-    block.sequence.store(impl_->sequence + 1, std::memory_order_relaxed);
-    for (std::size_t i = 0; i < stateWords; ++i)
-        block.words[i].store(words[i], std::memory_order_release);
-    impl_->sequence += 2;
-    block.sequence.store(impl_->sequence, std::memory_order_release);
+    writeLocked(*impl_->state, words);
+}
+
+// A viewer that was stopped in the middle of a write is no reason to wait.
+std::optional<Input> Publisher::input() const noexcept
+{
+    constexpr int tries = 4;
+    const auto words = readLocked<inputWords>(*impl_->input, tries);
+    return words ? std::optional(std::bit_cast<Input>(*words)) : std::nullopt;
 }
 
 Displaced& Publisher::backBuffer() noexcept
@@ -300,6 +305,7 @@ void Publisher::publishDisplaced() noexcept
 
     slot.sequence.store(sequence + 1, std::memory_order_relaxed);
     slot.tick.store(back.tick, std::memory_order_release);
+    slot.publication.store(publication, std::memory_order_release);
     slot.count.store(count, std::memory_order_release);
     for (std::size_t i = 0; i < count; ++i) {
         const auto words = std::bit_cast<std::array<std::uint64_t, displacementWords>>(back.nodes[i]);

@@ -6,9 +6,10 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
-/// The bytes of the segment, for its two ends, publisher.cpp and subscriber.cpp, and for their tests. Not part of the
+/// The bytes of the segment, for its ends, publisher.cpp, subscriber.cpp and hand.cpp, and for their tests. Not part of the
 /// interface.
 namespace palpate::channel {
 
@@ -17,9 +18,11 @@ using Word = std::atomic<std::uint64_t>;
 static_assert(Word::is_always_lock_free && sizeof(Word) == sizeof(std::uint64_t));
 
 inline constexpr std::size_t stateWords = sizeof(State) / sizeof(std::uint64_t);
+inline constexpr std::size_t inputWords = sizeof(Input) / sizeof(std::uint64_t);
 inline constexpr std::size_t displacementWords = sizeof(Displacement) / sizeof(std::uint64_t);
 inline constexpr std::size_t displacedSlots = 4;
-static_assert(sizeof(State) % sizeof(std::uint64_t) == 0 && sizeof(Displacement) % sizeof(std::uint64_t) == 0);
+static_assert(sizeof(State) % sizeof(std::uint64_t) == 0 && sizeof(Input) % sizeof(std::uint64_t) == 0 &&
+              sizeof(Displacement) % sizeof(std::uint64_t) == 0);
 
 /// `magic` is written last: who reads it (acquire) sees all that is written once.
 struct Header {
@@ -29,7 +32,8 @@ struct Header {
     std::uint64_t bytes = 0;  // of the segment
     std::uint64_t ownerPid = 0;
     std::uint64_t ownerStart = 0;  // start time of the owner [clock ticks since boot]: a recycled pid has another
-    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, stateOffset = 0, displacedOffset = 0;
+    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, stateOffset = 0, inputOffset = 0,
+                  displacedOffset = 0;
     Word closed;  // 1: the owner has ended the session itself
 };
 
@@ -39,9 +43,16 @@ struct StateBlock {
     alignas(64) std::array<Word, stateWords> words;
 };
 
+/// The only part that a viewer writes: whoever holds it maps this page for writing, and the rest for reading only.
+struct InputBlock {
+    alignas(64) Word holder;    // handOf() the viewer; 0: nobody
+    alignas(64) Word sequence;  // as StateBlock's
+    alignas(64) std::array<Word, inputWords> words;
+};
+
 struct DisplacedSlot {
     alignas(64) Word sequence;  // as StateBlock's
-    Word tick, count;
+    Word tick, publication, count;
     std::array<Word, maxDisplaced * displacementWords> words;
 };
 
@@ -61,8 +72,10 @@ constexpr std::uint64_t layoutHash() noexcept
                                     sizeof(TissueLook),
                                     sizeof(Scenery),
                                     sizeof(State),
+                                    sizeof(Input),
                                     sizeof(Displacement),
                                     sizeof(StateBlock),
+                                    sizeof(InputBlock),
                                     sizeof(DisplacedSlot),
                                     sizeof(DisplacedBlock),
                                     maxTissues,
@@ -88,6 +101,7 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(Scenery, forceCap),
                                     offsetof(State, time),
                                     offsetof(State, tip),
+                                    offsetof(State, bend),
                                     offsetof(State, proxy),
                                     offsetof(State, basic),
                                     offsetof(State, total),
@@ -101,6 +115,10 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(State, coreTarget),
                                     offsetof(State, missed),
                                     offsetof(State, published),
+                                    offsetof(Input, axis),
+                                    offsetof(Input, held),
+                                    offsetof(Input, fires),
+                                    offsetof(Input, beat),
                                     offsetof(Displacement, u)})
         for (int byte = 0; byte < 8; ++byte)
             hash = (hash ^ ((value >> (8 * byte)) & 0xFF)) * 1099511628211ULL;
@@ -115,6 +133,50 @@ inline constexpr const char* segmentFolder = "/dev/shm";
 
 /// Start time of process `pid` [clock ticks since boot]; 0 when it is not there or dead and only not yet reaped.
 std::uint64_t processStart(std::uint64_t pid) noexcept;
+
+/// Process `pid` as one word that no other process has, dead or alive (pids have 22 bits at most).
+inline std::uint64_t handOf(std::uint64_t pid) noexcept
+{
+    return pid << 42U | (processStart(pid) & ((1ULL << 42U) - 1));
+}
+
+inline bool holderLives(std::uint64_t hand) noexcept
+{
+    return hand != 0 && handOf(hand >> 42U) == hand;
+}
+
+/// A write, and the writer's half of a sequence lock without fences (H.-J. Boehm, "Can seqlocks get along with programming
+/// language memory models?", MSPC 2012): a reader that sees a word of this write (acquire) also sees the odd sequence
+/// before it, and throws its copy away. Goes on after a writer that died inside.
+template <class Block, std::size_t count>
+void writeLocked(Block& block, const std::array<std::uint64_t, count>& words) noexcept
+{
+    const std::uint64_t inside = block.sequence.load(std::memory_order_relaxed) | 1U;
+    block.sequence.store(inside, std::memory_order_relaxed);
+    for (std::size_t i = 0; i < count; ++i)
+        block.words[i].store(words[i], std::memory_order_release);
+    block.sequence.store(inside + 1, std::memory_order_release);
+}
+
+/// The reader's half: the words come before the second look at the sequence because their loads are acquires. Nothing when
+/// there has been no write, or none of `tries` copies was whole.
+template <std::size_t count, class Block>
+std::optional<std::array<std::uint64_t, count>> readLocked(const Block& block, int tries) noexcept
+{
+    std::array<std::uint64_t, count> words{};
+    for (int attempt = 0; attempt < tries; ++attempt) {
+        const std::uint64_t before = block.sequence.load(std::memory_order_acquire);
+        if (before == 0)
+            return std::nullopt;
+        if (before % 2 != 0)
+            continue;
+        for (std::size_t i = 0; i < count; ++i)
+            words[i] = block.words[i].load(std::memory_order_acquire);
+        if (block.sequence.load(std::memory_order_relaxed) == before)
+            return words;
+    }
+    return std::nullopt;
+}
 
 inline bool ownerLives(const Header& header) noexcept
 {

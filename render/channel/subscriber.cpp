@@ -40,6 +40,7 @@ void check(const std::string& session, const Header& header, std::uint64_t bytes
     const bool sound = header.bytes == bytes && within(header.sceneryOffset, sizeof(Scenery), bytes) &&
                        within(header.labelsOffset, header.labelsBytes, bytes) &&
                        within(header.stateOffset, sizeof(StateBlock), bytes) &&
+                       within(header.inputOffset, sizeof(InputBlock), bytes) &&
                        within(header.displacedOffset, sizeof(DisplacedBlock), bytes);
     if (!sound)
         refuse("its shared memory is damaged; end the simulation and start it again");
@@ -65,6 +66,7 @@ struct Subscriber::Impl {
     ino_t inode = 0;
     const Header* header = nullptr;
     const StateBlock* state = nullptr;
+    const InputBlock* input = nullptr;
     const DisplacedBlock* displaced = nullptr;
 };
 
@@ -100,6 +102,7 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
     if (!ownerLives(*impl.header))
         return std::nullopt;
     impl.state = &impl.at<StateBlock>(impl.header->stateOffset);
+    impl.input = &impl.at<InputBlock>(impl.header->inputOffset);
     impl.displaced = &impl.at<DisplacedBlock>(impl.header->displacedOffset);
     return subscriber;
 }
@@ -114,23 +117,16 @@ std::span<const std::uint8_t> Subscriber::labels() const noexcept
     return {&impl_->at<std::uint8_t>(impl_->header->labelsOffset), impl_->header->labelsBytes};
 }
 
-// The reader's half of setState(): the words come before the second look at the sequence because their loads are acquires.
 std::optional<State> Subscriber::state() const noexcept
 {
-    const StateBlock& block = *impl_->state;
-    std::array<std::uint64_t, stateWords> words{};
-    for (int attempt = 0; attempt < stateTries; ++attempt) {
-        const std::uint64_t before = block.sequence.load(std::memory_order_acquire);
-        if (before == 0)
-            return std::nullopt;
-        if (before % 2 != 0)
-            continue;
-        for (std::size_t i = 0; i < stateWords; ++i)
-            words[i] = block.words[i].load(std::memory_order_acquire);
-        if (block.sequence.load(std::memory_order_relaxed) == before)
-            return std::bit_cast<State>(words);
-    }
-    return std::nullopt;
+    const auto words = readLocked<stateWords>(*impl_->state, stateTries);
+    return words ? std::optional(std::bit_cast<State>(*words)) : std::nullopt;
+}
+
+std::optional<Input> Subscriber::input() const noexcept
+{
+    const auto words = readLocked<inputWords>(*impl_->input, stateTries);
+    return words ? std::optional(std::bit_cast<Input>(*words)) : std::nullopt;
 }
 
 bool Subscriber::displaced(Displaced& out) const noexcept
@@ -138,16 +134,15 @@ bool Subscriber::displaced(Displaced& out) const noexcept
     const DisplacedBlock& block = *impl_->displaced;
     for (int attempt = 0; attempt < displacedTries; ++attempt) {
         const std::uint64_t latest = block.latest.load(std::memory_order_acquire);
-        if (latest == 0)
+        if (latest <= out.publication)
             return false;
         const DisplacedSlot& slot = block.slot[latest % displacedSlots];
         const std::uint64_t before = slot.sequence.load(std::memory_order_acquire);
         const std::uint64_t tick = slot.tick.load(std::memory_order_acquire);
+        const std::uint64_t publication = slot.publication.load(std::memory_order_acquire);
         const std::uint64_t count = std::min<std::uint64_t>(slot.count.load(std::memory_order_acquire), maxDisplaced);
         if (before % 2 != 0)
             continue;
-        if (tick <= out.tick && slot.sequence.load(std::memory_order_relaxed) == before)
-            return false;
         for (std::size_t i = 0; i < count; ++i) {
             std::array<std::uint64_t, displacementWords> words{};
             for (std::size_t k = 0; k < displacementWords; ++k)
@@ -156,11 +151,27 @@ bool Subscriber::displaced(Displaced& out) const noexcept
         }
         if (slot.sequence.load(std::memory_order_relaxed) == before) {
             out.tick = tick;
+            out.publication = publication;
             out.count = static_cast<std::uint32_t>(count);
             return true;
         }
     }
     return false;
+}
+
+int Subscriber::openToWrite() const noexcept
+{
+    const int file = ::shm_open(impl_->name.c_str(), O_RDWR, 0);
+    struct stat named {};
+    if (file < 0 || (::fstat(file, &named) == 0 && named.st_ino == impl_->inode))
+        return file;
+    ::close(file);
+    return -1;
+}
+
+std::uint64_t Subscriber::inputOffset() const noexcept
+{
+    return impl_->header->inputOffset;
 }
 
 Ending Subscriber::ending() const noexcept

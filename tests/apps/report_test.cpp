@@ -166,6 +166,45 @@ TEST(Report, ChartsHoldTheRecord)
     EXPECT_TRUE(std::ranges::any_of(data["events"], [](const auto& e) { return e["kind"] == "fire"; }));
 }
 
+// Each task's row has its own time: task k takes k + 1 us.
+TEST(Report, TimesStandBesideTheirTasks)
+{
+    const synthetic::Folder folder;
+    std::vector<haptics::TickRecord> ticks(100);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        for (std::size_t k = 0; k < haptics::taskCount; ++k) {
+            ticks[n].seconds[k] = static_cast<float>(static_cast<double>(k + 1) * 1e-6);
+        }
+    }
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const std::string html = textOf(folder / "r.html");
+    for (std::size_t k = 0; k < haptics::taskCount; ++k) {
+        const std::string code(haptics::taskNames[k]);
+        EXPECT_EQ(between(html, "<th>" + code + "</th>", ".0</td>").back(), static_cast<char>('1' + k)) << code;
+    }
+}
+
+// Energy in mJ as recorded; a touch says how fast it was: the way of one tick times the rate.
+TEST(Report, EnergyAndSpeedOfContactAreTheRecords)
+{
+    const synthetic::Folder folder;
+    auto ticks = synthetic::procedure(10, 0.3, 1);
+    ticks[4000].energy = -0.0125;
+    ticks[4000].damped = 0.25;
+    ticks[10].eventCount = 0;
+    synthetic::addEvent(ticks[10], synthetic::event(haptics::EventKind::contact, 0xFF, 1, 40e-6));
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const std::string html = textOf(folder / "r.html");
+    const auto data = nlohmann::json::parse(between(html, "id=\"data\">", "</script>"));
+    const auto& energy = data["charts"]["energy"]["columns"];
+    EXPECT_DOUBLE_EQ(std::ranges::min(energy[1].get<std::vector<double>>()), -12.5);
+    EXPECT_DOUBLE_EQ(std::ranges::max(energy[2].get<std::vector<double>>()), 250.0);
+    EXPECT_NE(html.find("contact at 40 mm/s"), std::string::npos);
+}
+
 TEST(Report, SessionsWithoutAnythingToShowAreTold)
 {
     const synthetic::Folder folder;

@@ -59,16 +59,20 @@ TEST(StabilityCommand, OursHoldsAndEachBaselineFailsWhereItIsKnownTo)
     EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), figures["cells"].size() + 1);
 }
 
+// Also at another rate than 1 kHz: the record says which.
 TEST(StabilityCommand, ACellAgainIsARecordThatReplays)
 {
     const Folder folder;
-    const std::string id = "plate-1mm/elastic/touch/grip/1000";
-    const json once = figures({"stability", "--case", id});
-    const json recorded = figures({"stability", "--case", id, "--record", folder / "cell.db"});
-    EXPECT_EQ(once["cells"], recorded["cells"]);
-    const json replayed = figures({"replay", folder / "cell.db"});
-    EXPECT_TRUE(replayed["identical"].get<bool>());
-    EXPECT_GT(replayed["ticks"], 500);
+    for (const std::string rate : {"500", "1000"}) {
+        const std::string id = "plate-1mm/elastic/touch/grip/" + rate;
+        const std::string file = folder / ("cell-" + rate + ".db");
+        const json once = figures({"stability", "--case", id});
+        const json recorded = figures({"stability", "--case", id, "--record", file});
+        EXPECT_EQ(once["cells"], recorded["cells"]);
+        const json replayed = figures({"replay", file});
+        EXPECT_TRUE(replayed["identical"].get<bool>()) << rate;
+        EXPECT_GT(replayed["ticks"], 500);
+    }
 }
 
 TEST(StabilityCommand, RefusesWhatThereIsNot)

@@ -139,6 +139,34 @@ TEST(Elastic, ReactionIsTheDerivativeOfTheConvergedEnergy)
     }
 }
 
+// A ball that presses and slides, with one cycle a call: the force by virtual work is nearer to the converged one than the
+// contacts' own sum is, by more than a factor of two.
+TEST(Elastic, ForceOfAFewCyclesIsNearTheConverged)
+{
+    const ElasticBody block = body();
+    ElasticOptions oneCycle;
+    oneCycle.cycles = 1;
+    Elastic quick(block, oneCycle, tests::focusUnder(top));
+    Elastic exact(block, {}, tests::focusUnder(top));
+    double error = 0.0, errorOfContacts = 0.0, sum = 0.0;
+    for (int i = 0; i < 60; ++i) {
+        const std::array tools{pressed(std::min(0.1e-3 * i, 2e-3), {0.1e-3 * std::max(0, i - 20), 0, 0})};
+        quick.relax(tests::loadOf(tools, {}, tools[0].shape.a));
+        exact.relax(tests::loadOf(tools, {}, tools[0].shape.a), 30, 1e-5);
+        Vec3 contacts(0.0);
+        for (const ContactSite& site : quick.sites()) {
+            contacts -= site.force;
+        }
+        const Vec3 force = exact.toolForce(0);
+        error += glm::distance(quick.toolForce(0), force);
+        errorOfContacts += glm::distance(contacts, force);
+        sum += glm::length(force);
+    }
+    EXPECT_LT(error, 0.5 * errorOfContacts);
+    EXPECT_LT(error, 0.05 * sum);
+    EXPECT_GT(sum, 1.0);
+}
+
 // What tools and ties push in, the fixed nodes hold.
 TEST(Elastic, ActionEqualsReaction)
 {

@@ -246,7 +246,8 @@ TEST(Session, OfAnotherVersionOrLayoutIsRefusedInWords)
     auto& header = raw.at<Header>(0);
 
     header.version = version + 1;
-    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("version 2"), std::string::npos);
+    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("version " + std::to_string(version + 1)),
+              std::string::npos);
     header.version = version;
     header.layoutHash ^= 1U;
     EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("different layouts"), std::string::npos);

@@ -75,6 +75,25 @@ TEST(LookAhead, FindsTissueAndStructureOnTheLineInClosedForm)
     EXPECT_TRUE(std::isinf(inside.seconds(1e-3)));
 }
 
+// A hole that a core left from 1 mm outside gland to the middle of fat: the next tissue begins where it ends. One that
+// leads into the ball: the ball is touched at its end, inside.
+TEST(LookAhead, HolesAreNoTissue)
+{
+    const auto& table = withArtery().tissue->table();
+    for (const double end : {16e-3, 30e-3}) {
+        LoneNeedle needle(withArtery());
+        MonitorState state;
+        needle.tip.needle.cuts.cores.add({{0, -1e-3, 0}, {0, 1, 0}, end + 1e-3, 0.8e-3});
+        needle.at({0, -5e-3, 0});
+        const LookAhead found = aheadOf(needle, state);
+        EXPECT_NEAR(found.tissueDistance, end + 5e-3, 0.1e-3);
+        EXPECT_EQ(found.tissue, *table.find(end < 20e-3 ? "fat" : "artery"));
+        const double reach = radius + withArtery().scene.tool.radius;
+        const double touch = middle.y - std::sqrt(reach * reach - middle.x * middle.x);
+        EXPECT_NEAR(found.structure[1], std::max(touch, end) + 5e-3, lookAheadStep);
+    }
+}
+
 // A line that passes the ball by more than both radii never touches it.
 TEST(LookAhead, DoesNotSeeWhatTheLinePasses)
 {
@@ -201,7 +220,6 @@ TEST(Monitor, WarningMovesWithTheVessel)
         restOnset = restOnset < 0 && p.rest < 19e-3 ? p.depth : restOnset;
     }
     const Pressed& last = pressed.back();
-    // The figure that docs/architecture.md quotes.
     std::printf(
         "pressed %.1f mm: vessel moved %.2f mm; distance %.2f mm, point by point %.2f mm, at rest %.2f mm; "
         "19 mm reached %.2f mm deep, at rest %.2f mm\n",

@@ -52,6 +52,18 @@ TEST(Score, StraightLineHasItsLength)
     EXPECT_NEAR(s.deepest, 40 * millimetre, 1e-9);
 }
 
+// The margin is the least distance to a vital structure, the target left out, of ticks inside.
+TEST(Score, MarginIsTheLeastDistanceToAVitalStructureInside)
+{
+    auto ticks = along({{0, -0.03}, {1, 0}, {2, 0.04}});
+    EXPECT_NEAR(scoreTicks(ticks).vitalMargin, 0.1, 1e-12);
+    ticks[500].distance[1] = 1e-3;  // outside
+    ticks[1500].distance[0] = 2e-3;
+    ticks[1500].distance[2] = 3e-3;
+    EXPECT_NEAR(scoreTicks(ticks).vitalMargin, 3e-3, 1e-12);
+    EXPECT_TRUE(std::isinf(scoreTicks(along({{0, -0.03}, {1, -0.01}})).vitalMargin));
+}
+
 // The third difference of block means of x = c t^3 / 6 is c exactly. At rest and at constant speed there is none.
 TEST(Score, JerkOfACubicIsItsThirdDerivative)
 {

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace palpate::render {
 namespace {
@@ -97,12 +98,14 @@ std::vector<std::uint8_t> bodyLabels(const channel::Scenery& scenery)
             for (int x = 0; x < grid.size[0]; ++x) {
                 const glm::dvec3 p = vec(grid.origin) + grid.spacing * glm::dvec3(x, y, z);
                 const double r = glm::length(p);
-                labels.push_back(r > bodyRadius                   ? air
-                                 : r > bodyRadius - skinThickness ? skin
-                                 : tumourDistance(p) < 0          ? tumour
-                                 : arteryDistance(p) < 0          ? artery
-                                 : r < glandRadius                ? gland
-                                                                  : fat);
+                const Row row = r > bodyRadius                   ? air
+                                : r > bodyRadius - skinThickness ? skin
+                                : tumourDistance(p) < 0          ? tumour
+                                : arteryDistance(p) < 0          ? artery
+                                : r < glandRadius                ? gland
+                                                                 : fat;
+                const bool shell = std::abs(arteryDistance(p) - scenery.warnDistance[1]) < 0.5 * grid.spacing;
+                labels.push_back(row != air && shell ? row | channel::shellBit : row);
             }
     return labels;
 }
@@ -134,6 +137,12 @@ channel::State storyState(const channel::Scenery& scenery, double t)
                : glm::length(tip) < glandRadius    ? gland
                                                    : fat;
     s.inserted = s.phase == channel::Phase::inserted ? wayAt(t) : 0;
+    constexpr double curvature = 2.5;  // [1/m]
+    const double bend = 0.5 * curvature * s.inserted * s.inserted;
+    s.bend = {axis.y * bend, -axis.x * bend, 0};
+    s.ahead[0] = tumourDistance(tip);
+    s.ahead[1] = std::numeric_limits<double>::infinity();
+    s.aheadSpeed = t > punctureAt && t < arrivalAt ? 20e-3 : 0;
     s.cores = t >= fireAt ? 1 : 0;
     s.coreTarget = t >= fireAt ? 0.83 : 0;
     s.coreLength = t >= fireAt ? 14.2e-3 : 0;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include <array>
 #include <random>
 
 namespace palpate::render {
@@ -58,6 +59,21 @@ TEST(ViewFrame, HoldsThePlannedLineAndTheToolForAnyDirection)
         expectRightHanded(tool);
         EXPECT_NEAR(glm::dot(axis, tool.towards), 0, 1e-9);
         EXPECT_NEAR(glm::dot(tip - tool.centre, tool.towards), 0, 1e-12);
+    }
+}
+
+// Axial from the feet, sagittal from the left, coronal from the front; the point lies in all three.
+TEST(ViewFrame, OrthogonalFramesAreTheRadiologists)
+{
+    const glm::dvec3 tip(0.01, -0.02, 0.03);
+    const auto frames = orthogonalFrames(viewFrame(planned({0.01, -0.05, 0.02}, {0, 0, 0})), tip);
+    const std::array<std::array<const char*, 3>, 3> sides{{{"L", "A", "I"}, {"P", "S", "L"}, {"L", "S", "A"}}};
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        expectRightHanded(frames[i]);
+        EXPECT_EQ(side(frames[i].right), sides[i][0]);
+        EXPECT_EQ(side(frames[i].up), sides[i][1]);
+        EXPECT_EQ(side(frames[i].towards), sides[i][2]);
+        EXPECT_NEAR(glm::dot(tip - frames[i].centre, frames[i].towards), 0, 1e-12);
     }
 }
 

@@ -1,5 +1,6 @@
 #include <render/channel/channel.h>
-#include <render/overlay.h>
+#include <render/deformation.h>
+#include <render/screen_plan.h>
 #include <render/view_frame.h>
 #include <tests/render/body.h>
 
@@ -9,6 +10,7 @@
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPNGReader.h>
+#include <vtkSmartPointer.h>
 
 #include <fcntl.h>
 #include <sys/wait.h>
@@ -170,7 +172,7 @@ bool near(const Pixel& a, const Pixel& b, int tolerance)
 // Where the slice shows the point `p` [m] of its plane.
 Pixel onSlice(vtkImageData& image, const channel::Scenery& scenery, glm::dvec3 p)
 {
-    const Area area = ScreenPlan(width, height).slice;
+    const Area area = ScreenPlan(width, height).slices[0];
     const ViewFrame frame = viewFrame(scenery);
     const glm::dvec3 d = (p - frame.centre) * (std::min(area.width, area.height) / frame.extent);
     return pixelAt(image, area.x + area.width / 2 + static_cast<int>(std::lround(glm::dot(d, frame.right))),

@@ -1,0 +1,207 @@
+#include <apps/replay_player.h>
+
+#include <apps/session.h>
+#include <haptics/broadcast.h>
+#include <haptics/simulation.h>
+#include <render/channel/channel.h>
+
+#include <fmt/format.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace palpate::apps {
+
+namespace {
+
+using namespace haptics;
+
+constexpr std::uint64_t mostStates = 300000, mostShapes = 3000;
+
+// Everything there is to see of a record. One thread adds, another looks at what is there.
+class Film {
+public:
+    explicit Film(std::uint64_t ticks)
+        : stateStride_((ticks + mostStates - 1) / mostStates),
+          shapeStride_(channel::frameTicks * ((ticks / channel::frameTicks + mostShapes) / mostShapes)),
+          states_(ticks / stateStride_ + 1),
+          shapes_(ticks / shapeStride_ + 1)
+    {
+    }
+
+    void add(const channel::State& state, const Simulation& simulation, channel::Displaced& buffer)
+    {
+        if (state.tick % stateStride_ == 0) {
+            states_[state.tick / stateStride_] = state;
+        }
+        if (state.tick % shapeStride_ == 0) {
+            showShape(simulation, buffer);
+            shapes_[state.tick / shapeStride_].assign(buffer.nodes.begin(), buffer.nodes.begin() + buffer.count);
+        }
+        ticks_.store(state.tick + 1, std::memory_order_release);
+    }
+
+    std::uint64_t ticks() const noexcept { return ticks_.load(std::memory_order_acquire); }
+    const channel::State& state(std::uint64_t tick) const { return states_[tick / stateStride_]; }
+    std::uint64_t shapeAt(std::uint64_t tick) const noexcept { return tick / shapeStride_; }
+    const std::vector<channel::Displacement>& shape(std::uint64_t index) const { return shapes_[index]; }
+
+private:
+    std::uint64_t stateStride_, shapeStride_;
+    std::vector<channel::State> states_;
+    std::vector<std::vector<channel::Displacement>> shapes_;
+    std::atomic<std::uint64_t> ticks_{0};
+};
+
+std::uint64_t ticksOf(const Record& record, const std::string& file)
+{
+    const std::uint64_t ticks = record.ticks();
+    if (ticks == 0) {
+        throw std::runtime_error(file + ": no tick was recorded: there is nothing to play");
+    }
+    return ticks;
+}
+
+}  // namespace
+
+struct ReplayPlayer::Impl {
+    explicit Impl(const std::string& recordFile)
+        : file(recordFile),
+          record(recordFile),
+          model(reopenSession(recordFile, record.info())),
+          film(ticksOf(record, recordFile)),
+          session(fmt::format("replay-{}", getpid())),
+          publisher(publisherOf(session, model))
+    {
+        playback.length = static_cast<double>(record.ticks() - 1) * tickSeconds;
+        computing = std::thread([this] { compute(); });
+        showing = std::thread([this] { show(); });
+    }
+    ~Impl()
+    {
+        stop = true;
+        computing.join();
+        showing.join();
+    }
+
+    void blame(const std::string& what)
+    {
+        const std::lock_guard lock(problemGuard);
+        problem = problem.empty() ? what : problem;
+    }
+
+    void compute()
+    {
+        try {
+            Simulation simulation(model);
+            const auto buffer = std::make_unique<channel::Displaced>();
+            const ServoTiming timing;
+            channel::State state;
+            record.each([&](const TickRecord& then) {
+                if (stop) {
+                    return;
+                }
+                if (then.tick != film.ticks()) {
+                    throw std::runtime_error(fmt::format("{}: tick {} is missing in the record", file, film.ticks()));
+                }
+                const TickRecord& now = simulation.tick(then.device);
+                if (now.total != then.total) {
+                    blame(fmt::format("{}: forces differ from tick {} on: the record was made by another build ({})", file,
+                                      then.tick, record.info().build));
+                }
+                showTick(now, timing, state);
+                film.add(state, simulation, *buffer);
+                playback.ready = static_cast<double>(then.tick) * tickSeconds;
+            });
+        } catch (const std::exception& e) {
+            blame(e.what());
+            playback.length = playback.ready.load();
+        }
+    }
+
+    void publish(std::uint64_t tick, std::uint64_t& shown)
+    {
+        if (const std::uint64_t shape = film.shapeAt(tick); shape != shown) {
+            shown = shape;
+            channel::Displaced& out = publisher.backBuffer();
+            const auto& nodes = film.shape(shape);
+            std::copy(nodes.begin(), nodes.end(), out.nodes.begin());
+            out.count = static_cast<std::uint32_t>(nodes.size());
+            out.tick = tick;
+            publisher.publishDisplaced();
+        }
+        publisher.setState(film.state(tick));
+    }
+
+    // The record's clock runs on by real time times speed, stops when paused, and waits for what is not computed yet.
+    void show()
+    {
+        using Clock = std::chrono::steady_clock;
+        constexpr double none = std::numeric_limits<double>::quiet_NaN();
+        double time = 0;
+        std::uint64_t shown = std::numeric_limits<std::uint64_t>::max();
+        auto last = Clock::now();
+        while (!stop) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            const auto now = Clock::now();
+            const double passed = std::chrono::duration<double>(now - last).count();
+            last = now;
+            if (film.ticks() == 0) {
+                continue;
+            }
+            if (const double jump = playback.jump; !std::isnan(jump) && jump <= playback.ready) {
+                time = jump;
+                playback.jump = none;
+            } else if (std::isnan(jump) && !playback.paused) {
+                time += passed * playback.speed;
+            }
+            time = std::clamp<double>(time, 0.0, playback.ready);
+            // Half a tick on, so that a time that was made from a tick falls into that tick.
+            publish(static_cast<std::uint64_t>(time / tickSeconds + 0.5), shown);
+            playback.time = time;
+        }
+    }
+
+    std::string file;
+    Record record;
+    SessionModel model;
+    Film film;
+    std::string session;
+    channel::Publisher publisher;
+    render::Playback playback;
+    std::mutex problemGuard;
+    std::string problem;
+    std::atomic<bool> stop{false};
+    std::thread computing, showing;
+};
+
+ReplayPlayer::ReplayPlayer(const std::string& file) : impl_(std::make_unique<Impl>(file)) {}
+
+ReplayPlayer::~ReplayPlayer() = default;
+
+const std::string& ReplayPlayer::session() const noexcept
+{
+    return impl_->session;
+}
+
+render::Playback& ReplayPlayer::playback() noexcept
+{
+    return impl_->playback;
+}
+
+std::string ReplayPlayer::problem() const
+{
+    const std::lock_guard lock(impl_->problemGuard);
+    return impl_->problem;
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,112 @@
+#include <haptics/mouse.h>
+
+#include <haptics/bounded.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace palpate::haptics {
+
+namespace {
+
+constexpr double pressed = 0.05;  // [s]
+
+Vec3 vec(const channel::Triple& t) noexcept
+{
+    return {t[0], t[1], t[2]};
+}
+
+// What another program wrote may be anything.
+bool isSound(const channel::Input& input) noexcept
+{
+    return glm::length(vec(input.target)) < 10.0 && std::abs(glm::length(vec(input.axis)) - 1.0) < 1e-3;
+}
+
+}  // namespace
+
+MouseDevice::MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis, double period)
+    : source_(std::move(source)), period_(period), arm_(device, grip, start, period), goal_(start), axis_(axis)
+{
+}
+
+bool MouseDevice::Trigger::down(std::uint32_t asked, double period) noexcept
+{
+    if (left <= 0.0 && asked != done) {
+        done = asked;
+        left = 2.0 * pressed;
+    }
+    const bool isDown = left > pressed;
+    left = std::max(0.0, left - period);
+    return isDown;
+}
+
+void MouseDevice::listen() noexcept
+{
+    silence_ += period_;
+    const auto now = source_();
+    if (!now || !isSound(*now) || (heard_ && now->beat == input_.beat)) {
+        return;
+    }
+    const bool press = now->held != 0 && (input_.held == 0 || silence_ > longestSilence);
+    if (press) {
+        offset_ = arm_.position() - vec(now->target);
+    }
+    if (!heard_) {
+        // What a viewer before this session has counted is none of ours.
+        fire_.done = now->fires;
+        mark_.done = now->marks;
+    }
+    input_ = *now;
+    heard_ = true;
+    silence_ = 0.0;
+    ended_ = ended_ || input_.ended != 0;
+}
+
+void MouseDevice::follow() noexcept
+{
+    if (input_.held == 0 || silence_ > longestSilence) {
+        goal_ = arm_.position();
+        return;
+    }
+    const Vec3 way = vec(input_.target) + offset_ - goal_;
+    goal_ += bounded(way * std::min(1.0, period_ / lag), fastest * period_);
+}
+
+void MouseDevice::turn() noexcept
+{
+    const Vec3 way = vec(input_.axis) - axis_;
+    const Vec3 next = axis_ + bounded(way * std::min(1.0, period_ / lag), fastestTurn * period_);
+    if (const double length = glm::length(next); length > 0.5) {
+        axis_ = next / length;
+    }
+}
+
+DeviceSample MouseDevice::read() noexcept
+{
+    listen();
+    follow();
+    if (heard_) {
+        turn();
+    }
+    arm_.pull(goal_);
+    DeviceSample sample;
+    sample.position = arm_.read();
+    sample.axis = axis_;
+    sample.fresh = silence_ <= longestSilence || !heard_;
+    sample.buttons = input_.held != 0 ? buttonDeadMan : 0U;
+    sample.buttons |= fire_.down(input_.fires, period_) ? buttonFire : 0U;
+    sample.buttons |= mark_.down(input_.marks, period_) ? buttonMark : 0U;
+    return sample;
+}
+
+MouseDevice mouseBefore(const SessionModel& model, MouseDevice::Source source, double distance)
+{
+    const auto& way = model.approach;
+    const Vec3 axis = glm::normalize(way.aim - way.entry);
+    return {deviceParameters(model.scene.device), std::move(source), way.entry - distance * axis, axis};
+}
+
+}  // namespace palpate::haptics

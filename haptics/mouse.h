@@ -1,0 +1,70 @@
+#pragma once
+
+#include <haptics/arm.h>
+#include <haptics/device.h>
+#include <haptics/session_model.h>
+#include <render/channel/layout.h>
+
+#include <functional>
+#include <optional>
+
+namespace palpate::haptics {
+
+/// The hand of a viewer's user: the mouse says where the tool is to be, and a simulated stylus in a simulated grip follows
+/// it, so that tissue holds the tool back as it would hold a hand: how far it stays behind the mouse is what would be felt.
+///
+/// The mouse comes in jumps, one per picture. A goal follows it with a lag of the first order and no faster than a hand
+/// moves, and the grip pulls the stylus after the goal. A press of the dead-man switch starts where the tool is, and while
+/// it is up the tool stays: nothing jumps.
+///
+/// When the viewer is stuck or dead (its beat stands still) the samples are no longer fresh, so that the stabiliser fades
+/// the force to zero, and the tool stays where it is.
+class MouseDevice final : public Device {
+public:
+    /// What the viewer has written last; nothing while there is none. Must neither allocate nor block.
+    using Source = std::function<std::optional<channel::Input>()>;
+
+    /// @param start  where the tip waits until the viewer's hand moves it [m]    @param axis  of the tool (unit vector)
+    MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis, double period = tickSeconds);
+
+    DeviceSample read() noexcept override;
+    void write(Vec3 force) noexcept override { arm_.write(force); }
+    bool finished() const noexcept override { return ended_; }
+
+    static constexpr double fastest = 0.25;        // of the goal [m/s]
+    static constexpr double fastestTurn = 1.5;     // of the axis [rad/s]
+    static constexpr double lag = 0.02;            // of the goal behind the mouse [s]
+    static constexpr double longestSilence = 0.5;  // of a viewer that lives: a slow picture takes so long [s]
+    // Critically damped, so that a jump of the mouse does not ring; as stiff as a hand's.
+    static constexpr Grip grip{0.1, 16.0, 400.0};
+
+private:
+    // A button that is down for a while, and then up for as long.
+    struct Trigger {
+        std::uint32_t done = 0;
+        double left = 0;  // [s]
+
+        bool down(std::uint32_t asked, double period) noexcept;
+    };
+
+    void listen() noexcept;
+    void follow() noexcept;
+    void turn() noexcept;
+
+    Source source_;
+    double period_;
+    Arm arm_;
+    channel::Input input_;
+    bool heard_ = false;
+    double silence_ = 0;  // since the beat changed [s]
+    Vec3 offset_{0.0};    // from the mouse to the tool when the dead-man switch was pressed [m]
+    Vec3 goal_{0.0};      // [m]
+    Vec3 axis_{0.0};
+    Trigger fire_, mark_;
+    bool ended_ = false;
+};
+
+/// The mouse with the scene's device in the hand, its tip `distance` [m] outside the body on the planned line.
+MouseDevice mouseBefore(const SessionModel& model, MouseDevice::Source source, double distance);
+
+}  // namespace palpate::haptics

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <render/channel/layout.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace palpate::render {
+
+enum class EventKind : std::uint8_t { contact, inserted, out, near, veryNear, touching, fired, fault, finished };
+
+/// Something that a trainee or an instructor wants to find again.
+struct Event {
+    double time = 0;  // of the session [s]
+    EventKind kind = EventKind::contact;
+    std::uint32_t structure = 0;  // that a warning is about
+    double target = 0;            // fired: share of target tissue
+};
+
+/// What has happened from one state to the next.
+std::vector<Event> eventsBetween(const channel::State& before, const channel::State& now);
+
+/// "touching artery", "core: 83 % target".
+std::string words(const Event& event, const channel::Scenery& scenery);
+
+/// A name of a table, as words.
+std::string text(const channel::Name& name);
+
+}  // namespace palpate::render

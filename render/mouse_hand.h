@@ -1,0 +1,44 @@
+#pragma once
+
+#include <render/follower.h>
+
+#include <glm/vec3.hpp>
+
+#include <optional>
+
+namespace palpate::render {
+
+/// The mouse as the hand of a session: holds the session's hand for this viewer while it can be had, and turns what the
+/// user does into what is asked of the simulation.
+class MouseHand {
+public:
+    /// Takes the hand or leaves it, as sessions come and go, and tells the simulation. To be called often: it is the hand's
+    /// heartbeat.
+    void keep(const Follower& follower);
+    /// This viewer is the session's hand.
+    bool is() const noexcept { return hand_.has_value(); }
+
+    /// The dead-man switch. The hand begins where the tool is.
+    void press(const channel::State& state);
+    void release() noexcept { input_.held = 0; }
+    bool held() const noexcept { return is() && input_.held != 0; }
+    /// Where the hand is [m].
+    glm::dvec3 target() const noexcept;
+    /// Moves the hand while the switch is held [m].
+    void move(glm::dvec3 by) noexcept;
+    /// Turns the tool by `angle` [rad] about the unit vector `about`.
+    void turn(glm::dvec3 about, double angle) noexcept;
+    void fire() noexcept { ++input_.fires; }
+    void mark() noexcept { ++input_.marks; }
+    void end() noexcept { input_.ended = 1; }
+
+private:
+    void take(const Follower& follower);
+
+    std::optional<channel::ViewersHand> hand_;
+    channel::Input input_;
+    std::uint64_t attached_ = 0;
+    Clock::time_point tried_{};
+};
+
+}  // namespace palpate::render

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vtkRenderWindow.h>
+
+#include <sys/types.h>
+
+#include <filesystem>
+
+namespace palpate::render {
+
+/// A film of a window (MP4, H.264), written by ffmpeg as a process of its own. It appears whole or not at all.
+class MovieFile {
+public:
+    static constexpr double rate = 30;  // [1/s]
+
+    /// Throws std::runtime_error where ffmpeg is not installed. The window's size must not change.
+    MovieFile(std::filesystem::path file, vtkRenderWindow& window);
+    MovieFile(const MovieFile&) = delete;
+    MovieFile& operator=(const MovieFile&) = delete;
+    ~MovieFile();
+
+    /// The window as it is drawn, for so many frames. Throws std::runtime_error when ffmpeg has ended.
+    void add(int frames);
+    /// Waits for ffmpeg, and shows the file under its name. Throws std::runtime_error when ffmpeg failed.
+    void finish();
+
+private:
+    int closeAndWait() noexcept;
+
+    std::filesystem::path file_, partial_;
+    vtkRenderWindow& window_;
+    int pipe_ = -1;
+    pid_t ffmpeg_ = -1;
+};
+
+}  // namespace palpate::render

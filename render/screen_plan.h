@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+namespace palpate::render {
+
+/// `trainee`: the body large, the slice through the needle, figures. `instructor`: three orthogonal slices through the tip,
+/// a small body, traces of the last seconds, events, figures.
+enum class Layout : std::uint8_t { trainee, instructor };
+
+/// A rectangle of the window [pixels], from the lower left.
+struct Area {
+    int x = 0, y = 0, width = 0, height = 0;
+
+    bool empty() const noexcept { return width <= 0 || height <= 0; }
+};
+
+/// Where things are in a window of `width` x `height` pixels. What the window is too small for has an empty area.
+struct ScreenPlan {
+    /// `scale`: pixels per point of the screen, from 1.
+    ScreenPlan(int windowWidth, int windowHeight, Layout layout = Layout::trainee, double scale = 1);
+
+    int width, height;
+    double font;                 // [pixels]
+    Area view;                   // 3-D
+    std::array<Area, 3> slices;  // trainee: the first only
+    Area panel;                  // figures
+    Area events, forces, distances;
+    Area legend, health, banner;  // banner: the left and right ends and the baseline of warnings
+};
+
+inline constexpr double lineHeight = 1.42;  // in fonts
+
+}  // namespace palpate::render

@@ -1,0 +1,55 @@
+#include <render/shift_field.h>
+
+#include <glm/common.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::render {
+namespace {
+
+constexpr double affordable = 56e3;  // nodes in every frame: some milliseconds
+
+std::uint8_t byte(float share) noexcept
+{
+    return static_cast<std::uint8_t>(128 + std::lround(127.0F * share));
+}
+
+}  // namespace
+
+void sample(const Deformation& deformation, ShiftField& out)
+{
+    const VoxelBox& box = deformation.touched();
+    out.size = glm::ivec3(0);
+    if (box.empty())
+        return;
+    const channel::Grid& labels = deformation.grid();
+    const glm::dvec3 low = vec(labels.origin) + labels.spacing * glm::dvec3(box.low);
+    const glm::dvec3 extent = labels.spacing * glm::dvec3(box.high - box.low);
+    const double lattice = deformation.latticeSpacing();
+    out.spacing = std::max(0.5 * lattice, std::cbrt(extent.x * extent.y * extent.z / affordable));
+    out.origin = low;
+    out.size = glm::ivec3(glm::ceil(extent / out.spacing)) + 1;
+    const std::size_t nodes =
+        static_cast<std::size_t>(out.size.x) * static_cast<std::size_t>(out.size.y) * static_cast<std::size_t>(out.size.z);
+    out.shifts.resize(nodes);
+    out.texels.resize(nodes);
+    float largest = 0;
+    std::size_t at = 0;
+    for (int z = 0; z < out.size.z; ++z)
+        for (int y = 0; y < out.size.y; ++y) {
+            glm::vec3 shift(0);
+            for (int x = 0; x < out.size.x; ++x) {
+                deformation.rest(low + out.spacing * glm::dvec3(x, y, z), shift);
+                const glm::vec3 metres = static_cast<float>(lattice) * shift;
+                largest = std::max({largest, std::abs(metres.x), std::abs(metres.y), std::abs(metres.z)});
+                out.shifts[at++] = metres;
+            }
+        }
+    out.largest = largest;
+    const float scale = largest > 0 ? 1 / largest : 0;
+    for (std::size_t i = 0; i < nodes; ++i)
+        out.texels[i] = {byte(scale * out.shifts[i].x), byte(scale * out.shifts[i].y), byte(scale * out.shifts[i].z), 255};
+}
+
+}  // namespace palpate::render

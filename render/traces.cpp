@@ -1,0 +1,186 @@
+#include <render/traces.h>
+
+#include <render/overlay.h>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <render/deformation.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <string>
+#include <vector>
+
+namespace palpate::render {
+namespace {
+
+struct Curve {
+    std::string name;
+    Colour colour;
+    double width;  // [pixels]
+    std::function<double(const History::Moment&)> value;
+};
+
+// A diagram over time: `top` is the value at its upper edge.
+struct Diagram {
+    Canvas& canvas;
+    Area inner;  // [pixels]
+    double font, now, top;
+
+    double x(double time) const { return inner.x + inner.width * (1 + (time - now) / traceSeconds); }
+    double y(double value) const { return inner.y + inner.height * std::clamp(value / top, 0.0, 1.0); }
+};
+
+Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string& title, double now, double top,
+                const std::string& unit)
+{
+    canvas.rectangle({static_cast<double>(area.x), static_cast<double>(area.y)},
+                     {static_cast<double>(area.width), static_cast<double>(area.height)}, panelColour);
+    const int left = static_cast<int>(3.2 * font), low = static_cast<int>(1.7 * font), high = static_cast<int>(3.2 * font);
+    const Diagram d{canvas,
+                    {area.x + left, area.y + low, area.width - left - static_cast<int>(font), area.height - low - high},
+                    font,
+                    now,
+                    top};
+    canvas.text({area.x + 0.8 * font, area.y + area.height - 1.5 * font}, title, font, grey, Align::left, true);
+    constexpr int lines = 2;
+    for (int i = 0; i <= lines; ++i) {
+        const double value = top * i / lines;
+        canvas.rectangle({static_cast<double>(d.inner.x), d.y(value)}, {static_cast<double>(d.inner.width), 1}, dark);
+        canvas.text({d.inner.x - 0.4 * font, d.y(value) - 0.5 * font}, fmt::format("{:g}", value), 0.85 * font, grey,
+                    Align::right);
+    }
+    canvas.text({static_cast<double>(d.inner.x), area.y + 0.3 * font}, fmt::format("-{:g} s", traceSeconds), 0.85 * font,
+                grey);
+    canvas.text({static_cast<double>(d.inner.x + d.inner.width), area.y + 0.3 * font}, "now", 0.85 * font, grey,
+                Align::right);
+    canvas.text({d.inner.x - 0.4 * font, d.y(top) + 0.6 * font}, unit, 0.85 * font, grey, Align::right);
+    return d;
+}
+
+// One point per pixel column is all that can be seen.
+void draw(const Diagram& d, const History& history, const Curve& curve)
+{
+    Point2 last{};
+    bool any = false;
+    for (std::size_t i = 0; i < history.moments.size(); ++i) {
+        const History::Moment& moment = history.moments[i];
+        const double value = curve.value(moment);
+        if (!std::isfinite(value))
+            continue;
+        const Point2 point{d.x(moment.time), d.y(value)};
+        if (any && point[0] - last[0] < 1 && i + 1 < history.moments.size())
+            continue;
+        if (any)
+            d.canvas.line(last, point, curve.width, curve.colour);
+        last = point;
+        any = true;
+    }
+}
+
+void drawAll(const Diagram& d, const Area& area, const History& history, const std::vector<Curve>& curves)
+{
+    double x = d.inner.x;
+    const double y = area.y + area.height - 2.8 * d.font, size = 0.85 * d.font;
+    for (const Curve& curve : curves) {
+        draw(d, history, curve);
+        const double wide = (0.52 * static_cast<double>(curve.name.size()) + 2.4) * size;
+        if (x + wide > area.x + area.width)
+            continue;
+        d.canvas.rectangle({x, y + 0.3 * size}, {size, 0.4 * size}, curve.colour);
+        d.canvas.text({x + 1.3 * size, y}, curve.name, size, white);
+        x += wide;
+    }
+}
+
+double nowOf(const History& history)
+{
+    return history.moments.empty() ? 0 : history.moments.back().time;
+}
+
+}  // namespace
+
+void History::add(const channel::State& state)
+{
+    if (any_ && state.tick == last_.tick)
+        return;
+    if (any_ && state.time < last_.time) {
+        while (!moments.empty() && moments.back().time > state.time)
+            moments.pop_back();
+        while (!events.empty() && events.back().time > state.time)
+            events.pop_back();
+    } else if (any_) {
+        constexpr std::size_t most = 64;
+        for (const Event& event : eventsBetween(last_, state))
+            events.push_back(event);
+        while (events.size() > most)
+            events.pop_front();
+    }
+    Moment moment{
+        state.time, glm::length(vec(state.basic)), glm::length(vec(state.additional)), glm::length(vec(state.total)), {}};
+    for (std::size_t s = 0; s < moment.distance.size(); ++s)
+        moment.distance[s] = static_cast<float>(state.distance[s]);
+    // Between two pixel columns of a diagram the largest forces and the smallest distances count.
+    constexpr double apart = 0.02;  // [s]
+    if (!moments.empty() && moment.time >= began_ && moment.time - began_ < apart) {
+        Moment& last = moments.back();
+        last.basic = std::max(last.basic, moment.basic);
+        last.additional = std::max(last.additional, moment.additional);
+        last.total = std::max(last.total, moment.total);
+        for (std::size_t s = 0; s < moment.distance.size(); ++s)
+            last.distance[s] = std::min(last.distance[s], moment.distance[s]);
+    } else {
+        moments.push_back(moment);
+        began_ = moment.time;
+    }
+    while (moments.front().time < state.time - traceSeconds)
+        moments.pop_front();
+    last_ = state;
+    any_ = true;
+}
+
+void drawForceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery, const History& history)
+{
+    const double cap = std::max(scenery.forceCap, 0.1);
+    double most = 0;
+    for (const History::Moment& moment : history.moments)
+        most = std::max({most, moment.basic, moment.additional, moment.total});
+    // Half the limit when that is enough: most procedures need less.
+    const double top = most > 0.5 * cap ? 1.1 * cap : 0.55 * cap;
+    const Diagram d = frameOf(canvas, area, font, "FORCE ON THE HAND", nowOf(history), std::ceil(top), "N");
+    if (cap < d.top)
+        canvas.rectangle({static_cast<double>(d.inner.x), d.y(cap)}, {static_cast<double>(d.inner.width), 2}, red);
+    drawAll(d, area, history,
+            {{"basic", basicColour, 1.5, [](const auto& m) { return m.basic; }},
+             {"additional", additionalColour, 1.5, [](const auto& m) { return m.additional; }},
+             {"total", good, 2.5, [](const auto& m) { return m.total; }}});
+}
+
+void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery,
+                        const History& history)
+{
+    constexpr std::size_t shown = 4;
+    constexpr std::array<Colour, 5> colours{
+        {{0.95, 0.60, 0.95}, {1.0, 0.45, 0.40}, {0.50, 0.70, 1.0}, {1.0, 0.80, 0.40}, {0.60, 0.90, 0.90}}};
+    const std::size_t count = std::min<std::size_t>(scenery.structures, channel::maxStructures);
+    std::vector<std::size_t> order(count);
+    std::iota(order.begin(), order.end(), 0U);
+    if (count > 1 && !history.moments.empty())
+        std::sort(order.begin() + 1, order.end(), [&](std::size_t a, std::size_t b) {
+            return history.moments.back().distance[a] < history.moments.back().distance[b];
+        });
+    order.resize(std::min(count, shown));
+    std::sort(order.begin(), order.end());
+    constexpr double top = 40;  // [mm]
+    const Diagram d = frameOf(canvas, area, font, "DISTANCE FROM THE TIP", nowOf(history), top, "mm");
+    std::vector<Curve> curves;
+    for (const std::size_t s : order)
+        curves.push_back({text(scenery.structure[s]), s == 0 ? good : colours[s % colours.size()], s == 0 ? 2.5 : 1.5,
+                          [s](const History::Moment& m) { return 1e3 * static_cast<double>(m.distance[s]); }});
+    drawAll(d, area, history, curves);
+}
+
+}  // namespace palpate::render

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <render/canvas.h>
+#include <render/channel/layout.h>
+#include <render/events.h>
+#include <render/screen_plan.h>
+
+#include <array>
+#include <deque>
+
+namespace palpate::render {
+
+/// What a session has looked like lately, as far as the viewer has seen it.
+struct History {
+    struct Moment {
+        double time = 0;                                       // of the session [s]
+        double basic = 0, additional = 0, total = 0;           // [N]
+        std::array<float, channel::maxStructures> distance{};  // [m]
+    };
+    std::deque<Moment> moments;  // of the last traceSeconds
+    std::deque<Event> events;    // the last ones, oldest first
+
+    /// Takes a state in; what is later than it is forgotten, as after a jump in a record.
+    void add(const channel::State& state);
+
+private:
+    channel::State last_;
+    double began_ = 0;  // time of the newest moment [s]
+    bool any_ = false;
+};
+
+inline constexpr double traceSeconds = 10;
+
+/// Forces on the hand against the limit, and distances of the tip, over the last traceSeconds.
+void drawForceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery,
+                     const History& history);
+void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery,
+                        const History& history);
+
+}  // namespace palpate::render

@@ -1,0 +1,69 @@
+#include <tests/apps/desktop.h>
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <sstream>
+#include <thread>
+
+namespace palpate::apps {
+namespace {
+
+constexpr int patience = 200;  // looks
+constexpr auto betweenLooks = std::chrono::milliseconds(100);
+
+std::string socketOf(int number)
+{
+    return "/tmp/.X11-unix/X" + std::to_string(number);
+}
+
+}  // namespace
+
+bool installed(const std::string& program)
+{
+    std::istringstream path(std::getenv("PATH") != nullptr ? std::getenv("PATH") : "");
+    for (std::string folder; std::getline(path, folder, ':');)
+        if (::access((folder + "/" + program).c_str(), X_OK) == 0)
+            return true;
+    return false;
+}
+
+Desktop::Desktop()
+{
+    int number = 100 + static_cast<int>(::getpid() % 400);
+    while (std::filesystem::exists(socketOf(number)))
+        ++number;
+    display_ = ":" + std::to_string(number);
+    server_ = std::make_unique<Program>(
+        "/usr/bin/env", std::vector<std::string>{"Xvfb", display_, "-screen", "0", "1024x768x24", "-nolisten", "tcp"});
+    for (int i = 0; i < patience && !std::filesystem::exists(socketOf(number)); ++i)
+        std::this_thread::sleep_for(betweenLooks);
+}
+
+std::unique_ptr<Program> Desktop::start(const std::string& name, const std::vector<std::string>& arguments) const
+{
+    std::vector<std::string> words{"DISPLAY=" + display_, std::string(PALPATE_BIN_DIR) + "/" + name};
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return std::make_unique<Program>("/usr/bin/env", words);
+}
+
+std::string Desktop::xdotool(const std::vector<std::string>& words) const
+{
+    std::vector<std::string> all{"DISPLAY=" + display_, "xdotool"};
+    all.insert(all.end(), words.begin(), words.end());
+    return Program("/usr/bin/env", all).wait().out;
+}
+
+std::string Desktop::window(const std::string& name) const
+{
+    for (int i = 0; i < patience; ++i) {
+        std::istringstream found(xdotool({"search", "--onlyvisible", "--name", name}));
+        if (std::string id; found >> id)
+            return id;
+        std::this_thread::sleep_for(betweenLooks);
+    }
+    return {};
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <tests/apps/program.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace palpate::apps {
+
+/// Whether a program can be found in PATH.
+bool installed(const std::string& program);
+
+/// A display without a screen (Xvfb), with mouse and keyboard that xdotool moves.
+class Desktop {
+public:
+    Desktop();
+
+    /// `name`: palpate or palpate-view, on this display.
+    std::unique_ptr<Program> start(const std::string& name, const std::vector<std::string>& arguments) const;
+    /// xdotool's own words, such as {"key", "space"}. Returns what it printed.
+    std::string xdotool(const std::vector<std::string>& words) const;
+    /// Waits for a window of that name; empty when none comes.
+    std::string window(const std::string& name) const;
+
+private:
+    std::string display_;
+    std::unique_ptr<Program> server_;
+};
+
+}  // namespace palpate::apps

@@ -1,0 +1,169 @@
+#include <render/channel/channel.h>
+#include <tests/apps/desktop.h>
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <thread>
+
+namespace palpate::apps {
+namespace {
+
+using glm::dvec3;
+
+dvec3 vec(const channel::Triple& t)
+{
+    return {t[0], t[1], t[2]};
+}
+
+void wait(double seconds)
+{
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+// Somebody at a window: sees the tool as any viewer sees it, and has nothing but mouse and keys.
+class User {
+public:
+    User(const Desktop& desktop, const channel::Subscriber& eyes) : desktop_(desktop), eyes_(eyes) {}
+
+    channel::State sees() const { return *eyes_.state(); }
+
+    void takeTool(const std::string& window) const
+    {
+        desktop_.xdotool({"mousemove", "--window", window, "250", "80", "mousedown", "1"});
+        wait(0.5);
+    }
+
+    // How the tip goes when the mouse goes to the right, down, and the wheel turns.
+    void learn()
+    {
+        constexpr int step = 24;
+        pixelRight_ = tried({"mousemove_relative", "--", std::to_string(step), "0"}) / double(step);
+        pixelDown_ = tried({"mousemove_relative", "--", "0", std::to_string(step)}) / double(step);
+        notch_ = tried({"click", "4"});
+    }
+
+    // By at least half a pixel.
+    void move(dvec3 by)
+    {
+        left_ += by;
+        const dvec3 way = glm::inverse(glm::dmat3(pixelRight_, pixelDown_, notch_)) * left_;
+        const long right = std::lround(way.x), down = std::lround(way.y), notches = std::lround(way.z);
+        left_ -= double(right) * pixelRight_ + double(down) * pixelDown_ + double(notches) * notch_;
+        std::vector<std::string> words;
+        if (right != 0 || down != 0)
+            words = {"mousemove_relative", "--", std::to_string(right), std::to_string(down)};
+        for (long i = 0; i < std::abs(notches); ++i)
+            words.insert(words.end(), {"click", notches > 0 ? "4" : "5"});
+        if (!words.empty())
+            desktop_.xdotool(words);
+        wait(0.15);
+    }
+
+    void key(const std::string& name) const
+    {
+        desktop_.xdotool({"key", name});
+        wait(0.5);
+    }
+
+private:
+    dvec3 tried(const std::vector<std::string>& words) const
+    {
+        const dvec3 before = vec(sees().tip);
+        desktop_.xdotool(words);
+        wait(0.8);
+        return vec(sees().tip) - before;
+    }
+
+    const Desktop& desktop_;
+    const channel::Subscriber& eyes_;
+    dvec3 pixelRight_{0.0}, pixelDown_{0.0}, notch_{0.0}, left_{0.0};  // [m]
+};
+
+std::optional<channel::Subscriber> sessionWithHand(const std::string& name)
+{
+    for (int i = 0; i < 400; ++i) {
+        auto session = channel::Subscriber::attach(name);
+        if (session && session->state() && session->input())
+            return session;
+        wait(0.05);
+    }
+    return std::nullopt;
+}
+
+// Along the planned line until the target is so far ahead [m], or for so many moves.
+void advance(User& user, dvec3 axis, double ahead)
+{
+    constexpr double stride = 2e-3;  // [m]
+    for (int i = 0; i < 60 && user.sees().ahead[0] > ahead; ++i)
+        user.move(stride * axis);
+}
+
+void withdraw(User& user, dvec3 axis)
+{
+    constexpr double stride = 4e-3;  // [m]
+    for (int i = 0; i < 30 && user.sees().phase != channel::Phase::free; ++i)
+        user.move(-stride * axis);
+}
+
+TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
+{
+    if (!installed("Xvfb") || !installed("xdotool"))
+        GTEST_SKIP() << "needs Xvfb and xdotool (packages xvfb and xdotool)";
+    if (!built("palpate-view"))
+        GTEST_SKIP() << "palpate-view has not been built";
+    const Folder folder;
+    const std::string session = "desktop-" + std::to_string(::getpid());
+    const Desktop desktop;
+    const auto train = desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--session", session,
+                                                 "--record", folder / "s.db", "--json", folder / "s.json"});
+    const std::string window = desktop.window("Palpate");
+    const auto eyes = sessionWithHand(session);
+    ASSERT_FALSE(window.empty());
+    ASSERT_TRUE(eyes);
+    const dvec3 entry = vec(eyes->scenery().entry), aim = vec(eyes->scenery().aim), axis = glm::normalize(aim - entry);
+
+    User user(desktop, *eyes);
+    user.takeTool(window);
+    user.learn();
+    const dvec3 off = vec(user.sees().tip) - entry;
+    user.move(-(off - glm::dot(off, axis) * axis));
+    // The notch lies 2 to 22 mm ahead of the tip.
+    advance(user, axis, 6e-3);
+    EXPECT_EQ(user.sees().phase, channel::Phase::inserted);
+    user.key("space");
+    EXPECT_EQ(user.sees().cores, 1U);
+    withdraw(user, axis);
+    EXPECT_EQ(user.sees().phase, channel::Phase::free);
+    user.key("e");
+    const Outcome outcome = train->wait();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+
+    const auto json = nlohmann::json::parse(readText(folder / "s.json"));
+    ASSERT_EQ(json["core"].size(), 1U);
+    EXPECT_GT(json["core"][0]["target_fraction"], 0.2);
+    EXPECT_GE(json["punctures"], 1);
+    EXPECT_GT(json["peak_force_n"]["total"], 0.3);
+    EXPECT_EQ(json["device"], "mouse");
+    const auto replayed = figures({"replay", folder / "s.db"});
+    EXPECT_EQ(replayed["identical"], true);
+    EXPECT_EQ(replayed["force_hash"], json["force_hash"]);
+}
+
+TEST(Mouse, IsRefusedWhereNobodyCanMoveIt)
+{
+    expectRefusal({"train", "layered", "--device", "mouse", "--unpaced"}, "leave out --unpaced");
+    expectRefusal({"train", "layered", "--device", "mouse", "--no-view"}, "needs a window");
+    expectRefusal({"train", "layered", "--device", "mouse", "--trainee", "novice"}, "bring their own hand");
+}
+
+}  // namespace
+}  // namespace palpate::apps

@@ -1,0 +1,81 @@
+#include <tests/apps/desktop.h>
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+namespace palpate::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool canDraw()
+{
+    return built("palpate-view") && installed("Xvfb");
+}
+
+std::vector<fs::path> pictures(const fs::path& folder)
+{
+    std::vector<fs::path> found;
+    for (const auto& entry : fs::directory_iterator(folder))
+        found.push_back(entry.path().filename());
+    return found;
+}
+
+// The session's own pictures depend on the clock; those of its record are one per asked time, with every event.
+TEST(ReplayView, WritesAPictureOfEveryAskedTimeAndEveryEvent)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    const auto session = figures({"train", "layered", "--unpaced", "--no-view", "--record", folder / "s.db"});
+    Program view("palpate-view", {"--replay", folder / "s.db", "--offscreen", folder / "pictures", "--every", "1", "--size",
+                                  "400x320", "--json", "-"});
+    const Outcome outcome = view.wait();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const double length = 1e-3 * (session["ticks"].get<double>() - 1);
+    const auto frames = static_cast<std::size_t>(length) + 1;
+    std::size_t counted = 0, fired = 0, inserted = 0;
+    for (const auto& name : pictures(folder / "pictures")) {
+        counted += name.string().starts_with("frame_") ? 1 : 0;
+        fired += name.string().ends_with("_fired.png") ? 1 : 0;
+        inserted += name.string().ends_with("_inserted.png") ? 1 : 0;
+    }
+    EXPECT_EQ(counted, frames);
+    EXPECT_EQ(fired, 1U);
+    EXPECT_EQ(inserted, 1U);
+}
+
+TEST(ReplayView, WritesAFilmOrSaysThatFfmpegIsMissing)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
+    const std::vector<std::string> film{"--replay", folder / "s.db", "--movie", folder / "s.mp4", "--size", "321x320"};
+    const Outcome made = Program("palpate-view", film).wait();
+    if (!installed("ffmpeg")) {
+        EXPECT_EQ(made.status, 1);
+        EXPECT_NE(made.err.find("install the package ffmpeg"), std::string::npos) << made.err;
+        GTEST_SKIP() << "needs ffmpeg (package ffmpeg)";
+    }
+    ASSERT_EQ(made.status, 0) << made.err;
+    EXPECT_FALSE(fs::exists(folder / "s.mp4.part"));
+    const Outcome told = Program("/usr/bin/env", {"ffprobe", "-v", "error", "-show_entries", "stream=nb_frames,width",
+                                                  "-of", "csv=p=0", folder / "s.mp4"})
+                             .wait();
+    EXPECT_EQ(told.out, "322,30\n") << "a second, 30 pictures; the codec wants an even width";
+}
+
+TEST(ReplayView, RefusesWhatCannotBePlayed)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    const Outcome missing = Program("palpate-view", {"--replay", folder / "none.db", "--hidden"}).wait();
+    EXPECT_EQ(missing.status, 1);
+    EXPECT_NE(missing.err.find("none.db"), std::string::npos) << missing.err;
+}
+
+}  // namespace
+}  // namespace palpate::apps

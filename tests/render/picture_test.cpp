@@ -1,0 +1,337 @@
+#include <render/picture.h>
+
+#include <render/display.h>
+#include <render/needle_shape.h>
+#include <tests/render/body.h>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPNGWriter.h>
+#include <vtkRenderWindow.h>
+#include <vtkRendererCollection.h>
+#include <vtkWindowToImageFilter.h>
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::render {
+namespace {
+
+constexpr int width = 960, height = 720;
+
+using Pixel = std::array<int, 3>;
+
+bool near(const Pixel& a, const Pixel& b, int tolerance)
+{
+    return std::abs(a[0] - b[0]) <= tolerance && std::abs(a[1] - b[1]) <= tolerance && std::abs(a[2] - b[2]) <= tolerance;
+}
+
+Pixel pixelOf(const Colour& colour)
+{
+    const auto byte = [](double c) { return static_cast<int>(std::lround(255 * c)); };
+    return {byte(colour[0]), byte(colour[1]), byte(colour[2])};
+}
+
+struct Image {
+    int wide = 0, high = 0;
+    std::vector<std::uint8_t> bytes;
+
+    Pixel at(int x, int y) const
+    {
+        const std::size_t i =
+            3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(wide) + static_cast<std::size_t>(x));
+        return {bytes[i], bytes[i + 1], bytes[i + 2]};
+    }
+    int count(const Area& area, const Pixel& colour, int tolerance) const
+    {
+        int found = 0;
+        for (int y = area.y; y < area.y + area.height; ++y)
+            for (int x = area.x; x < area.x + area.width; ++x)
+                found += near(at(x, y), colour, tolerance) ? 1 : 0;
+        return found;
+    }
+    int differing(const Image& other, const Area& area) const
+    {
+        int found = 0;
+        for (int y = area.y; y < area.y + area.height; ++y)
+            for (int x = area.x; x < area.x + area.width; ++x)
+                found += near(at(x, y), other.at(x, y), 12) ? 0 : 1;
+        return found;
+    }
+};
+
+// One body and one window for all tests: both are slow to make.
+class Studio {
+public:
+    Studio() : labels(bodyLabels(scenery))
+    {
+        if (!displayWorks())
+            display_.emplace();
+        window_->SetShowWindow(false);
+        window_->SetOffScreenRendering(1);
+        window_->SetMultiSamples(0);
+        window_->SetSize(width, height);
+        picture_ = std::make_unique<Picture>(*window_);
+    }
+    ~Studio()
+    {
+        picture_.reset();
+        window_->Finalize();
+    }
+
+    // The story at `t`, told from its beginning; without the body's deformation where `rigid`.
+    Image take(double t, Layout layout, bool rigid = false, const std::string& file = {})
+    {
+        picture_->open(scenery, labels, "story");
+        picture_->show(layout);
+        picture_->resetView();
+        constexpr double step = 0.05;
+        for (double then = 0; then < t; then += step)
+            picture_->note(storyState(scenery, then));
+        auto displaced = std::make_unique<channel::Displaced>();
+        storyDisplaced(scenery, t, *displaced);
+        picture_->update(storyState(scenery, t), rigid ? nullptr : displaced.get(), {30, 0.02, 1000});
+        picture_->render(Quality::still);
+        return grab(file);
+    }
+    Image grab(const std::string& file = {})
+    {
+        vtkNew<vtkWindowToImageFilter> grab;
+        grab->SetInput(window_);
+        grab->SetInputBufferTypeToRGB();
+        grab->ReadFrontBufferOff();
+        grab->ShouldRerenderOff();
+        grab->Update();
+        // PALPATE_PICTURES: a folder to keep the pictures in, to look at them.
+        if (const char* folder = std::getenv("PALPATE_PICTURES"); folder != nullptr && !file.empty()) {
+            vtkNew<vtkPNGWriter> writer;
+            writer->SetInputConnection(grab->GetOutputPort());
+            writer->SetFileName((std::filesystem::path(folder) / (file + ".png")).c_str());
+            writer->Write();
+        }
+        vtkImageData& data = *grab->GetOutput();
+        Image image{data.GetDimensions()[0], data.GetDimensions()[1], {}};
+        const auto* first = static_cast<const std::uint8_t*>(data.GetScalarPointer());
+        image.bytes.assign(first, first + 3 * static_cast<std::size_t>(image.wide) * static_cast<std::size_t>(image.high));
+        return image;
+    }
+    // Where the 3-D view shows `p` [m].
+    glm::dvec2 project(glm::dvec3 p) const
+    {
+        vtkRenderer& view = *window_->GetRenderers()->GetFirstRenderer();
+        view.SetWorldPoint(1e3 * p.x, 1e3 * p.y, 1e3 * p.z, 1);
+        view.WorldToDisplay();
+        return {view.GetDisplayPoint()[0], view.GetDisplayPoint()[1]};
+    }
+    Picture& picture() { return *picture_; }
+
+    const channel::Scenery scenery = bodyScenery();
+    const std::vector<std::uint8_t> labels;
+
+private:
+    std::optional<PrivateDisplay> display_;
+    vtkNew<vtkRenderWindow> window_;
+    std::unique_ptr<Picture> picture_;
+};
+
+class PictureTest : public testing::Test {
+protected:
+    static void SetUpTestSuite()
+    {
+        try {
+            studio = std::make_unique<Studio>();
+        } catch (const std::runtime_error& problem) {
+            why = problem.what();
+        }
+    }
+    static void TearDownTestSuite() { studio.reset(); }
+    void SetUp() override
+    {
+        if (!studio)
+            GTEST_SKIP() << why;
+    }
+
+    static std::unique_ptr<Studio> studio;
+    static std::string why;
+};
+std::unique_ptr<Studio> PictureTest::studio;
+std::string PictureTest::why;
+
+struct Moment {
+    const char* name;
+    double time;
+};
+constexpr std::array<Moment, 5> moments{
+    {{"rest", 0.6}, {"pressed", 1.99}, {"pierced", 2.15}, {"warned", 2.9}, {"fired", 4.2}}};
+constexpr std::array<std::pair<Layout, const char*>, 2> layouts{
+    {{Layout::trainee, "trainee"}, {Layout::instructor, "instructor"}}};
+
+// Of points along the needle's middle line the 3-D view shows the needle's colour, lit, at all but a few (the aim's ball
+// and texts may lie over it); before it has moved there it does not.
+TEST_F(PictureTest, ShowsTheBentNeedleWhereThePoseProjects)
+{
+    constexpr Pixel lit{70, 235, 255};
+    for (const auto& [layout, layoutName] : layouts)
+        for (const Moment& moment : moments) {
+            const Image image = studio->take(moment.time, layout, false, std::string(layoutName) + "-" + moment.name);
+            const NeedleShape shape = needleShape(studio->scenery, storyState(studio->scenery, moment.time));
+            const Area view = ScreenPlan(width, height, layout).view;
+            int inside = 0, seen = 0;
+            for (std::size_t i = 0; i + 1 < shape.size(); ++i)
+                for (int k = 0; k < 40; ++k) {
+                    const glm::dvec3 on = shape[i] + 0.025 * k * (shape[i + 1] - shape[i]);
+                    if (glm::distance(on, shape.back()) < 2e-3)  // the point is thinner than a pixel
+                        continue;
+                    const glm::dvec2 p = studio->project(on);
+                    const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
+                    if (x < view.x || y < view.y || x >= view.x + view.width || y >= view.y + view.height)
+                        continue;
+                    ++inside;
+                    seen += near(image.at(x, y), lit, 75) ? 1 : 0;
+                }
+            ASSERT_GT(inside, 3) << layoutName << " " << moment.name;
+            EXPECT_GT(seen, 0.8 * inside) << layoutName << " " << moment.name << " of " << inside;
+        }
+}
+
+// The picture of the pressed body differs from that of the same tool over the body at rest, at the dimple and not far away.
+TEST_F(PictureTest, ShowsTheDeformationWhereItIs)
+{
+    for (const auto& [layout, layoutName] : layouts) {
+        const Image rigid = studio->take(1.99, layout, true), pressed = studio->take(1.99, layout);
+        const auto around = [&](glm::dvec3 p, int side) {
+            const glm::dvec2 at = studio->project(p);
+            return Area{static_cast<int>(at.x) - side / 2, static_cast<int>(at.y) - side / 2, side, side};
+        };
+        const Area view = ScreenPlan(width, height, layout).view;
+        const int side = view.height / 12;
+        const glm::dvec3 entry = vec(studio->scenery.entry), axis = glm::normalize(vec(studio->scenery.aim) - entry);
+        const glm::dvec3 dimple = entry + 3e-3 * axis + 4e-3 * glm::cross(axis, glm::dvec3(0, 0, 1));
+        const glm::dvec3 opposite = entry + 65e-3 * axis;
+        EXPECT_GT(rigid.differing(pressed, around(dimple, side)), side * side / 4) << layoutName;
+        EXPECT_EQ(rigid.differing(pressed, around(opposite, side)), 0) << layoutName;
+        const Area slice = ScreenPlan(width, height, layout).slices[0];
+        EXPECT_GT(rigid.differing(pressed, slice), slice.width * slice.height / 200) << layoutName;
+    }
+}
+
+TEST_F(PictureTest, WarnsInColourAndWordsOnlyWhenThereIsCause)
+{
+    const auto banner = [&](const Image& image, Layout layout) {
+        const ScreenPlan plan(width, height, layout);
+        const int font = static_cast<int>(plan.font);
+        return image.count({plan.banner.x, plan.banner.y, plan.banner.width, font}, pixelOf(amber), 4);
+    };
+    for (const auto& [layout, layoutName] : layouts) {
+        const int least = static_cast<int>(80 * ScreenPlan(width, height, layout).font);
+        EXPECT_LT(banner(studio->take(1.99, layout), layout), least / 10) << layoutName;
+        EXPECT_GT(banner(studio->take(2.9, layout), layout), least) << layoutName;
+    }
+}
+
+// The panel writes the core in the colour of what is good; the target's distance has it as well, before and after.
+TEST_F(PictureTest, TellsTheCoreAfterFiring)
+{
+    for (const auto& [layout, layoutName] : layouts) {
+        const ScreenPlan plan(width, height, layout);
+        const int before = studio->take(3.7, layout).count(plan.panel, pixelOf(good), 40);
+        const int after = studio->take(4.2, layout).count(plan.panel, pixelOf(good), 40);
+        EXPECT_GT(after, before + 100) << layoutName;
+    }
+}
+
+TEST_F(PictureTest, EveryPartOfTheInstructorsLayoutHasItsText)
+{
+    const Image image = studio->take(4.2, Layout::instructor);
+    const ScreenPlan plan(width, height, Layout::instructor);
+    for (const Area& area : {plan.view, plan.slices[0], plan.slices[1], plan.slices[2]})
+        EXPECT_GT(image.count(area, {255, 255, 255}, 30), 60);
+    for (const Area& area : {plan.panel, plan.events, plan.legend, plan.forces, plan.distances})
+        EXPECT_GT(image.count(area, pixelOf(white), 30), 60);
+    EXPECT_GT(image.count(plan.events, pixelOf(amber), 30), 20) << "the warning is among the events";
+    EXPECT_GT(image.count(plan.forces, pixelOf(basicColour), 40), 40) << "a curve and its name";
+}
+
+// The shell around the artery crosses the slice through the planned line.
+TEST_F(PictureTest, DrawsTheWarningDistanceOfAVitalStructure)
+{
+    const Image image = studio->take(0.05, Layout::trainee);
+    const ScreenPlan plan(width, height);
+    const Pixel shell = pixelOf({shellColour[0], shellColour[1], shellColour[2]});
+    const double pixels = std::min(plan.slices[0].width, plan.slices[0].height) / viewFrame(studio->scenery).extent;
+    const double around = 2 * std::acos(-1.0) * (2.5e-3 + studio->scenery.warnDistance[1]) * pixels, thick = 1e-3 * pixels;
+    const int drawn = image.count(plan.slices[0], shell, 2);
+    EXPECT_GT(drawn, 0.4 * around * thick);
+    EXPECT_LT(drawn, 2.0 * around * thick);
+}
+
+TEST_F(PictureTest, TheChosenTissueBecomesClearAndComesBack)
+{
+    const Image before = studio->take(0.05, Layout::trainee);
+    const Area view = ScreenPlan(width, height).view;
+    Picture& picture = studio->picture();
+    picture.selectTissue(-1);  // the last of the legend: the one that there is most of
+    picture.changeOpacity(0.05);
+    picture.render(Quality::still);
+    EXPECT_GT(before.differing(studio->grab(), view), view.width * view.height / 20);
+    picture.resetView();
+    picture.render(Quality::still);
+    EXPECT_EQ(before.differing(studio->grab(), view), 0);
+}
+
+TEST_F(PictureTest, WithoutTheCutTheBodyHidesWhatIsInside)
+{
+    const Image open = studio->take(0.05, Layout::trainee);
+    const Area view = ScreenPlan(width, height).view;
+    Picture& picture = studio->picture();
+    picture.setCut(false);
+    picture.render(Quality::still);
+    const Image whole = studio->grab();
+    picture.setCut(true);
+    picture.render(Quality::still);
+    constexpr Pixel tumour{140, 64, 191};
+    EXPECT_GT(open.count(view, tumour, 40), whole.count(view, tumour, 40) + 500);
+    EXPECT_EQ(open.differing(studio->grab(), view), 0);
+}
+
+TEST_F(PictureTest, HelpAndCaptionCoverNothingWhenTheyAreGone)
+{
+    const Image before = studio->take(0.05, Layout::trainee);
+    const Area all{0, 0, width, height};
+    Picture& picture = studio->picture();
+    picture.setHelp({{"?", "shows the keys"}, {"L", "changes the layout"}});
+    picture.setCaption("PAUSED");
+    picture.setTimeline(0.5);
+    picture.render(Quality::still);
+    const Image with = studio->grab();
+    EXPECT_GT(with.count(all, pixelOf(amber), 30), before.count(all, pixelOf(amber), 30) + 300);
+    picture.setHelp({});
+    picture.setCaption("");
+    picture.setTimeline(-1);
+    picture.render(Quality::still);
+    EXPECT_EQ(before.differing(studio->grab(), all), 0);
+}
+
+// under() is the inverse of the projection.
+TEST_F(PictureTest, FindsThePointUnderAPixel)
+{
+    studio->take(0.05, Layout::trainee);
+    for (const glm::dvec3 p : {glm::dvec3(0.0), glm::dvec3(0.01, -0.02, 0.005), vec(studio->scenery.entry)}) {
+        const glm::dvec2 pixel = studio->project(p);
+        EXPECT_LT(glm::distance(studio->picture().under({pixel.x, pixel.y}, p), p), 1e-6);
+    }
+}
+
+}  // namespace
+}  // namespace palpate::render

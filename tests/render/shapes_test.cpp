@@ -1,0 +1,194 @@
+#include <render/events.h>
+#include <render/needle_shape.h>
+#include <render/screen_plan.h>
+#include <render/shift_field.h>
+#include <render/traces.h>
+#include <tests/render/body.h>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include <cmath>
+#include <memory>
+#include <random>
+#include <vector>
+
+namespace palpate::render {
+namespace {
+
+TEST(NeedleShape, IsStraightWithoutABend)
+{
+    const channel::Scenery scenery = bodyScenery();
+    const channel::State state = storyState(scenery, 1.5);
+    const NeedleShape shape = needleShape(scenery, state);
+    EXPECT_NEAR(glm::distance(shape.front(), shape.back()), scenery.toolLength, 1e-12);
+    for (const glm::dvec3& p : shape)
+        EXPECT_NEAR(glm::length(glm::cross(p - shape.back(), vec(state.axis))), 0, 1e-12);
+}
+
+// Off the line of the shaft outside by bend (s / inserted)^2: constant second differences, and no kink at the entry.
+TEST(NeedleShape, BendsWithConstantCurvatureFromTheEntryOn)
+{
+    const channel::Scenery scenery = bodyScenery();
+    channel::State state = storyState(scenery, 3.4);
+    state.inserted = 0.04;
+    const glm::dvec3 aside = glm::normalize(vec(state.bend));
+    const NeedleShape shape = needleShape(scenery, state);
+    EXPECT_NEAR(glm::distance(shape.back(), vec(state.tip)), 0, 1e-12);
+    const auto off = [&](std::size_t i) { return glm::dot(shape[i] - shape[0], aside); };
+    EXPECT_NEAR(off(1), 0, 1e-12);
+    const double second = off(1) - 2 * off(2) + off(3);
+    EXPECT_GT(second, 0);
+    for (std::size_t i = 2; i + 1 < shape.size(); ++i)
+        EXPECT_NEAR(off(i - 1) - 2 * off(i) + off(i + 1), second, 1e-12);
+    EXPECT_NEAR(off(shape.size() - 1), glm::length(vec(state.bend)), 1e-12);
+}
+
+// What the ray caster looks up, decoded and interpolated as a texture is, against the fixed point.
+TEST(ShiftField, LooksUpTheRestPointOfWhatIsSeen)
+{
+    const channel::Scenery scenery = bodyScenery();
+    Deformation deformation(scenery, bodyLabels(scenery));
+    auto displaced = std::make_unique<channel::Displaced>();
+    storyDisplaced(scenery, 1.99, *displaced);
+    deformation.apply(*displaced);
+    ShiftField field;
+    sample(deformation, field);
+    ASSERT_GT(field.size.x, 8);
+    const auto texel = [&](glm::ivec3 n) {
+        const ShiftField::Texel& t =
+            field.texels[static_cast<std::size_t>((n.z * field.size.y + n.y) * field.size.x + n.x)];
+        return field.largest / 127 * (glm::dvec3(t[0], t[1], t[2]) - 128.0);
+    };
+    std::mt19937 random(3);
+    std::uniform_real_distribution<double> share(0, 1);
+    double worst = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const glm::dvec3 g = glm::dvec3(share(random), share(random), share(random)) * (glm::dvec3(field.size) - 1.001);
+        const glm::dvec3 x = field.origin + field.spacing * g;
+        glm::vec3 start(0);
+        if (deformation.tissueAt(x, start) == 0)
+            continue;
+        const glm::ivec3 low(g);
+        glm::dvec3 shift(0.0);
+        for (int k = 0; k < 8; ++k) {
+            const glm::ivec3 corner(k & 1, k / 2 & 1, k / 4);
+            const glm::dvec3 part = glm::abs(g - glm::dvec3(low) - 1.0 + glm::dvec3(corner));
+            shift += part.x * part.y * part.z * texel(low + corner);
+        }
+        worst = std::max(worst, glm::distance(x + shift, deformation.rest(x, start)));
+    }
+    EXPECT_LT(worst, 0.5e-3) << "half a voxel";
+    EXPECT_GT(field.largest, 4e-3);
+}
+
+TEST(ShiftField, IsEmptyAtRest)
+{
+    const channel::Scenery scenery = bodyScenery(40, 2.6e-3);
+    const Deformation deformation(scenery, bodyLabels(scenery));
+    ShiftField field;
+    sample(deformation, field);
+    EXPECT_EQ(field.size, glm::ivec3(0));
+}
+
+TEST(Deformation, TheWarningShellMovesWithTheTissue)
+{
+    channel::Scenery scenery = bodyScenery();
+    const std::vector<std::uint8_t> labels = bodyLabels(scenery);
+    Deformation deformation(scenery, labels);
+    auto displaced = std::make_unique<channel::Displaced>();
+    waveDisplaced(scenery, 0.3, 2e-3, *displaced);
+    deformation.apply(*displaced);
+    int shells = 0;
+    for (std::size_t i = 0; i < labels.size(); i += 7) {
+        if ((labels[i] & channel::shellBit) == 0)
+            continue;
+        const auto n = static_cast<int>(i), side = scenery.labels.size[0];
+        const glm::dvec3 rest =
+            vec(scenery.labels.origin) + scenery.labels.spacing * glm::dvec3(n % side, n / side % side, n / side / side);
+        glm::vec3 shift(0);
+        shells += (deformation.labelAt(deformation.seen(rest), shift) & channel::shellBit) != 0 ? 1 : -1;
+    }
+    EXPECT_GT(shells, 100);
+}
+
+TEST(Events, TellTheStoryInOrder)
+{
+    const channel::Scenery scenery = bodyScenery();
+    History history;
+    for (int ms = 0; ms < 5100; ms += 5)
+        history.add(storyState(scenery, 1e-3 * ms));
+    std::vector<EventKind> kinds;
+    for (const Event& event : history.events)
+        kinds.push_back(event.kind);
+    EXPECT_EQ(kinds, (std::vector{EventKind::contact, EventKind::inserted, EventKind::near, EventKind::fired,
+                                  EventKind::finished}));
+    EXPECT_EQ(words(history.events[2], scenery), "near artery");
+    EXPECT_EQ(words(history.events[3], scenery), "core: 83 % target");
+}
+
+TEST(History, KeepsPeaksThatNoPictureShows)
+{
+    History history;
+    for (std::uint64_t tick = 1; tick < 20'000; ++tick) {
+        channel::State state;
+        state.tick = tick;
+        state.time = 1e-3 * static_cast<double>(tick);
+        state.total = {tick == 15'007 ? 7.0 : 1.0, 0, 0};
+        state.distance[0] = tick == 15'013 ? -1e-3 : 1e-2;
+        history.add(state);
+    }
+    double peak = 0, nearest = 1;
+    for (const History::Moment& m : history.moments) {
+        peak = std::max(peak, m.total);
+        nearest = std::min(nearest, static_cast<double>(m.distance[0]));
+    }
+    EXPECT_EQ(peak, 7.0);
+    EXPECT_NEAR(nearest, -1e-3, 1e-9);
+    EXPECT_LT(history.moments.size(), 600U);
+    EXPECT_GE(history.moments.front().time, history.moments.back().time - traceSeconds - 0.1);
+}
+
+TEST(History, ForgetsWhatIsLaterThanAJumpBack)
+{
+    const channel::Scenery scenery = bodyScenery();
+    History history;
+    for (int ms = 0; ms < 4500; ms += 5)
+        history.add(storyState(scenery, 1e-3 * ms));
+    history.add(storyState(scenery, 1.5));
+    EXPECT_EQ(history.moments.back().time, 1.5);
+    ASSERT_EQ(history.events.size(), 1U);
+    EXPECT_EQ(history.events.back().kind, EventKind::contact);
+}
+
+// Whatever the window: every part lies inside it and no two cover each other.
+TEST(ScreenPlan, PartsFitTheWindowAndDoNotOverlap)
+{
+    std::mt19937 random(5);
+    std::uniform_int_distribution<int> side(320, 4000);
+    for (int i = 0; i < 500; ++i) {
+        const Layout layout = i % 2 == 0 ? Layout::trainee : Layout::instructor;
+        const ScreenPlan plan(side(random), side(random), layout, 1 + i % 3);
+        std::vector<Area> parts{plan.view, plan.panel, plan.slices[0], plan.slices[1], plan.slices[2]};
+        if (layout == Layout::instructor)
+            parts.insert(parts.end(), {plan.events, plan.legend, plan.forces, plan.distances});
+        for (std::size_t a = 0; a < parts.size(); ++a) {
+            const Area& p = parts[a];
+            if (p.empty())
+                continue;
+            EXPECT_TRUE(p.x >= 0 && p.y >= 0 && p.x + p.width <= plan.width && p.y + p.height <= plan.height)
+                << plan.width << " x " << plan.height << " part " << a;
+            for (std::size_t b = 0; b < a; ++b) {
+                const Area& q = parts[b];
+                EXPECT_TRUE(q.empty() || p.x + p.width <= q.x || q.x + q.width <= p.x || p.y + p.height <= q.y ||
+                            q.y + q.height <= p.y)
+                    << plan.width << " x " << plan.height << " parts " << b << " and " << a;
+            }
+        }
+        EXPECT_GE(plan.view.width + 1, plan.width / 4);
+        EXPECT_GE(plan.font, 10.0 * (1 + i % 3));
+    }
+}
+
+}  // namespace
+}  // namespace palpate::render
