@@ -47,7 +47,7 @@ public:
     std::uint8_t labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
 
     const channel::Grid& grid() const noexcept { return labelGrid_; }
-    double latticeSpacing() const noexcept { return lattice_.spacing; }
+    const channel::Grid& lattice() const noexcept { return lattice_; }
     /// Per display voxel at rest: tissue row (rowBits) and shellBit.
     std::span<const std::uint8_t> labels() const noexcept { return labels_; }
     /// Display voxels that do not look as they do at rest lie in here.

@@ -8,7 +8,7 @@
 namespace palpate::render {
 namespace {
 
-constexpr double affordable = 56e3;  // nodes in every frame: some milliseconds
+constexpr double affordable = 80e3;  // nodes in every frame: some milliseconds
 
 std::uint8_t byte(float share) noexcept
 {
@@ -25,11 +25,16 @@ void sample(const Deformation& deformation, ShiftField& out)
         return;
     const channel::Grid& labels = deformation.grid();
     const glm::dvec3 low = vec(labels.origin) + labels.spacing * glm::dvec3(box.low);
-    const glm::dvec3 extent = labels.spacing * glm::dvec3(box.high - box.low);
-    const double lattice = deformation.latticeSpacing();
-    out.spacing = std::max(0.5 * lattice, std::cbrt(extent.x * extent.y * extent.z / affordable));
-    out.origin = low;
-    out.size = glm::ivec3(glm::ceil(extent / out.spacing)) + 1;
+    const glm::dvec3 high = low + labels.spacing * glm::dvec3(box.high - box.low);
+    // On the lattice's own nodes, where the shift has its kinks.
+    const double lattice = deformation.lattice().spacing;
+    const glm::dvec3 corner = vec(deformation.lattice().origin);
+    out.origin = corner + lattice * glm::floor((low - corner) / lattice);
+    for (out.spacing = 0.5 * lattice;; out.spacing *= 2) {
+        out.size = glm::ivec3(glm::ceil((high - out.origin) / out.spacing)) + 1;
+        if (static_cast<double>(out.size.x) * out.size.y * out.size.z <= affordable)
+            break;
+    }
     const std::size_t nodes =
         static_cast<std::size_t>(out.size.x) * static_cast<std::size_t>(out.size.y) * static_cast<std::size_t>(out.size.z);
     out.shifts.resize(nodes);
@@ -40,7 +45,7 @@ void sample(const Deformation& deformation, ShiftField& out)
         for (int y = 0; y < out.size.y; ++y) {
             glm::vec3 shift(0);
             for (int x = 0; x < out.size.x; ++x) {
-                deformation.rest(low + out.spacing * glm::dvec3(x, y, z), shift);
+                deformation.rest(out.origin + out.spacing * glm::dvec3(x, y, z), shift);
                 const glm::vec3 metres = static_cast<float>(lattice) * shift;
                 largest = std::max({largest, std::abs(metres.x), std::abs(metres.y), std::abs(metres.z)});
                 out.shifts[at++] = metres;

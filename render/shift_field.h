@@ -23,8 +23,8 @@ struct ShiftField {
     std::vector<glm::vec3> shifts;  // the same in metres
 };
 
-/// Samples the present deformation, as fine as half a spacing of its lattice where that is affordable. Error: that of the
-/// trilinear interpolation between nodes, and largest / 127.
+/// Samples the present deformation, at half a spacing of its lattice, or a spacing, two, .. as far as that is affordable.
+/// Error: that of the trilinear interpolation between nodes, and largest / 127.
 void sample(const Deformation& deformation, ShiftField& out);
 
 }  // namespace palpate::render
