@@ -199,6 +199,24 @@ TEST(Fault, AStalledViewerCostsNoTicks)
     EXPECT_LT(missed[1], missed[0] + 100) << "a second of stalls";
 }
 
+// What is counted fits: p50 to max in order, and no more gaps than missed ticks. Without a load, which is not ours to
+// install.
+TEST(Fault, LatenessIsMeasuredWithAndWithoutRealTime)
+{
+    const nlohmann::json load = figures({"bench", "load", "layered", "--model", "spring", "--idle", "--runs", "1"});
+    ASSERT_EQ(load["cases"].size(), 2U);
+    EXPECT_FALSE(load["cases"][0]["asked_for_real_time"].get<bool>());
+    EXPECT_TRUE(load["cases"][1]["asked_for_real_time"].get<bool>());
+    for (const auto& run : load["cases"]) {
+        const auto& late = run["lateness_us"];
+        EXPECT_GE(late["p50"], 0.0);
+        EXPECT_LE(late["p50"], late["p99"]);
+        EXPECT_LE(late["p99"], late["max"]);
+        EXPECT_LE(run["gaps"], run["missed_ticks"]);
+        EXPECT_TRUE(!run["asked_for_real_time"] || run["sched_fifo"] || !load["warnings"].empty());
+    }
+}
+
 TEST(Fault, WhatStrikesNothingIsRefused)
 {
     const std::vector<std::string> unpaced{"train", "layered", "--unpaced", "--headless", "--inject"};

@@ -123,8 +123,9 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     const Folder folder;
     const std::string session = "desktop-" + std::to_string(::getpid());
     const Desktop desktop;
-    const auto train = desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--session", session,
-                                                 "--record", folder / "s.db", "--json", folder / "s.json"});
+    const auto train =
+        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--seconds", "120", "--session",
+                                  session, "--record", folder / "s.db", "--json", folder / "s.json"});
     const std::string window = desktop.window("Palpate");
     const auto eyes = sessionWithHand(session);
     ASSERT_FALSE(window.empty());
