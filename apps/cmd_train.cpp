@@ -20,9 +20,11 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <initializer_list>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -243,14 +245,23 @@ public:
     // Opens a window that has crashed again, twice a second at most.
     void lookAfter()
     {
+        const std::lock_guard lock(guard_);
         const auto now = std::chrono::steady_clock::now();
-        if (window && window->killed() && now - opened_ > std::chrono::milliseconds(500)) {
+        if (!window || !window->killed() || now - opened_ <= std::chrono::milliseconds(500)) {
+            return;
+        }
+        try {
             openWindow();
+        } catch (const std::exception& e) {
+            // The session goes on without it.
+            fmt::print(stderr, "palpate: {}\n", e.what());
         }
     }
 
+    // Also from another thread.
     void stall(bool stopped)
     {
+        const std::lock_guard lock(guard_);
         for (auto* viewer : {&window, &camera}) {
             if (*viewer) {
                 (*viewer)->stall(stopped);
@@ -275,6 +286,7 @@ private:
     }
 
     std::string session_, layout_;
+    std::mutex guard_;
     std::chrono::steady_clock::time_point opened_;
 };
 

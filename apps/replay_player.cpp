@@ -102,7 +102,7 @@ struct ReplayPlayer::Impl {
     void compute()
     {
         try {
-            Simulation simulation(model);
+            Simulation simulation(model, {1.0 / record.info().rate, {}});
             const auto buffer = std::make_unique<channel::Displaced>();
             const ServoTiming timing;
             channel::State state;
@@ -139,7 +139,11 @@ struct ReplayPlayer::Impl {
             out.tick = tick;
             publisher.publishDisplaced();
         }
-        publisher.setState(film.state(tick));
+        // Of a long record not every tick is kept: the one before stands for it.
+        channel::State state = film.state(tick);
+        state.tick = tick;
+        state.time = static_cast<double>(tick) * tickSeconds;
+        publisher.setState(state);
     }
 
     // The record's clock runs on by real time times speed, stops when paused, and waits for what is not computed yet.
@@ -158,10 +162,13 @@ struct ReplayPlayer::Impl {
             if (film.ticks() == 0) {
                 continue;
             }
-            if (const double jump = playback.jump; !std::isnan(jump) && jump <= playback.ready) {
-                time = jump;
-                playback.jump = none;
-            } else if (std::isnan(jump) && !playback.paused) {
+            if (double jump = playback.jump; !std::isnan(jump)) {
+                // Beyond the end is the end. A jump that is asked for just now is left for the next look.
+                if (const double to = std::min<double>(jump, playback.length); to <= playback.ready) {
+                    time = to;
+                    playback.jump.compare_exchange_strong(jump, none);
+                }
+            } else if (!playback.paused) {
                 time += passed * playback.speed;
             }
             time = std::clamp<double>(time, 0.0, playback.ready);

@@ -85,8 +85,8 @@ void receiveByMemory(const std::string& session, double setUp, Seen& seen)
     std::optional<channel::Subscriber> viewer;
     while (!viewer && !seen.stop) {
         viewer = channel::Subscriber::attach(session);
+        std::this_thread::sleep_for(std::chrono::milliseconds(viewer ? 0 : 1));  // its maker may need this core
     }
-    now();
     seen.ready = true;
     sleepUntil(now() + setUp);
     std::uint64_t last = 0;
@@ -129,11 +129,16 @@ public:
             throw std::runtime_error(failure("the viewer's process cannot be started"));
         }
         if (id_ == 0) {
-            claimRealTime();
-            if (options.transport == Transport::sharedMemory) {
-                receiveByMemory(session, options.setUp, *seen_);
-            } else {
-                receiveByPipe(pipe, options.setUp, *seen_);
+            // Whatever happens, this copy of the program runs no further.
+            try {
+                claimRealTime();
+                if (options.transport == Transport::sharedMemory) {
+                    receiveByMemory(session, options.setUp, *seen_);
+                } else {
+                    receiveByPipe(pipe, options.setUp, *seen_);
+                }
+            } catch (...) {
+                ::_exit(1);
             }
             ::_exit(0);
         }
@@ -151,6 +156,10 @@ public:
     void waitUntilReady() const
     {
         while (!seen_->ready) {
+            siginfo_t ended{};
+            if (::waitid(P_PID, static_cast<id_t>(id_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid == id_) {
+                throw std::runtime_error("the viewer's process has ended by itself");
+            }
             std::this_thread::sleep_for(std::chrono::milliseconds(1));
         }
     }

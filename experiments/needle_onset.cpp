@@ -2,6 +2,7 @@
 #include <haptics/simulation.h>
 #include <occupancy/query.h>
 
+#include <algorithm>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -61,7 +62,7 @@ Onset warningOnset(double speed)
         onset.points.push_back({pressed, moved, record.distance[1], vessel.distance.distance(sample.position)});
         for (std::uint32_t i = 0; i < record.eventCount; ++i) {
             if (record.events[i].kind == haptics::EventKind::warning) {
-                onset.warnedAt = pressed;
+                onset.warnedAt = std::min(onset.warnedAt, pressed);
             }
         }
     }

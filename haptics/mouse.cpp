@@ -34,6 +34,10 @@ MouseDevice::MouseDevice(const DeviceParameters& device, Source source, Vec3 sta
 
 bool MouseDevice::Trigger::down(std::uint32_t asked, double period) noexcept
 {
+    // A viewer that could not read what the one before it had counted begins anew: that is no press.
+    if (static_cast<std::int32_t>(asked - done) < 0) {
+        done = asked;
+    }
     if (left <= 0.0 && asked != done) {
         done = asked;
         left = 2.0 * pressed;

@@ -24,7 +24,8 @@ extern char** environ;
 namespace palpate::render {
 namespace {
 
-// `input` becomes ffmpeg's standard input. Returns what posix_spawnp() returns.
+// `input` becomes ffmpeg's standard input. A group of its own: Ctrl-C ends this program, which then finishes the film.
+// Returns what posix_spawnp() returns.
 int startFfmpeg(std::vector<std::string> words, int input, pid_t& id)
 {
     std::vector<char*> argv;
@@ -34,7 +35,11 @@ int startFfmpeg(std::vector<std::string> words, int input, pid_t& id)
     posix_spawn_file_actions_t files;
     ::posix_spawn_file_actions_init(&files);
     ::posix_spawn_file_actions_adddup2(&files, input, STDIN_FILENO);
-    const int error = ::posix_spawnp(&id, argv[0], &files, nullptr, argv.data(), environ);
+    posix_spawnattr_t attributes;
+    ::posix_spawnattr_init(&attributes);
+    ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+    const int error = ::posix_spawnp(&id, argv[0], &files, &attributes, argv.data(), environ);
+    ::posix_spawnattr_destroy(&attributes);
     ::posix_spawn_file_actions_destroy(&files);
     return error;
 }

@@ -93,7 +93,9 @@ private:
 // What the pictures of a session go to.
 class Outputs {
 public:
-    Outputs(const ViewerOptions& options, vtkRenderWindow& window) : every_(options.every)
+    // Of a record there is nothing between two ticks.
+    Outputs(const ViewerOptions& options, vtkRenderWindow& window)
+        : every_(options.playback != nullptr ? std::max(options.every, 2 * early) : options.every)
     {
         if (!options.offscreen.empty())
             files_.emplace(options.offscreen, window);
@@ -128,7 +130,7 @@ public:
             movie_->finish();
     }
 
-    static constexpr double early = 0.5e-3;  // [s]: half a tick
+    static constexpr double early = 0.501e-3;  // [s]: half a tick, and rounding
 
 private:
     double every_, fileDue_ = 0, movieDue_ = 0;

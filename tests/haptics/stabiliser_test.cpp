@@ -272,7 +272,8 @@ TEST(Stabiliser, NoWallGivesEnergy)
                     const auto what = device + " " + std::to_string(rate) + " " + std::to_string(stiffness) +
                                       (letGo ? " let go" : " gripped");
                     EXPECT_LT(course.made, 1e-3) << what;
-                    // At 4 kHz a step of the Falcon's encoder on such a wall is more than may change in a tick: it shakes on.
+                    // At 4 kHz a step of the Falcon's encoder on such a wall is more than may change in a tick: it shakes
+                    // on.
                     const bool shakes = device == "falcon" && rate > 1000.0 && stiffness > 2000.0;
                     EXPECT_LT(course.late, shakes ? 1e-3 : std::max(0.1e-3, 0.5 * course.early)) << what;
                 }
