@@ -78,11 +78,12 @@ struct ReplayPlayer::Impl {
         : file(recordFile),
           record(recordFile),
           model(reopenSession(recordFile, record.info())),
+          period(1.0 / record.info().rate),
           film(ticksOf(record, recordFile)),
           session(fmt::format("replay-{}", getpid())),
           publisher(publisherOf(session, model))
     {
-        playback.length = static_cast<double>(record.ticks() - 1) * tickSeconds;
+        playback.length = static_cast<double>(record.ticks() - 1) * period;
         computing = std::thread([this] { compute(); });
         showing = std::thread([this] { show(); });
     }
@@ -102,7 +103,7 @@ struct ReplayPlayer::Impl {
     void compute()
     {
         try {
-            Simulation simulation(model, {1.0 / record.info().rate, {}});
+            Simulation simulation(model, {period, {}});
             const auto buffer = std::make_unique<channel::Displaced>();
             const ServoTiming timing;
             channel::State state;
@@ -120,11 +121,12 @@ struct ReplayPlayer::Impl {
                 }
                 showTick(now, timing, state);
                 film.add(state, simulation, *buffer);
-                playback.ready = static_cast<double>(then.tick) * tickSeconds;
+                playback.ready = static_cast<double>(then.tick) * period;
             });
         } catch (const std::exception& e) {
             blame(e.what());
-            playback.length = playback.ready.load();
+            // Without a single tick there is no time that could be shown.
+            playback.length = film.ticks() > 0 ? playback.ready.load() : -1.0;
         }
     }
 
@@ -142,7 +144,7 @@ struct ReplayPlayer::Impl {
         // Of a long record not every tick is kept: the one before stands for it.
         channel::State state = film.state(tick);
         state.tick = tick;
-        state.time = static_cast<double>(tick) * tickSeconds;
+        state.time = static_cast<double>(tick) * period;
         publisher.setState(state);
     }
 
@@ -173,7 +175,7 @@ struct ReplayPlayer::Impl {
             }
             time = std::clamp<double>(time, 0.0, playback.ready);
             // Half a tick on, so that a time that was made from a tick falls into that tick.
-            publish(static_cast<std::uint64_t>(time / tickSeconds + 0.5), shown);
+            publish(static_cast<std::uint64_t>(time / period + 0.5), shown);
             playback.time = time;
         }
     }
@@ -181,6 +183,7 @@ struct ReplayPlayer::Impl {
     std::string file;
     Record record;
     SessionModel model;
+    double period;  // of its ticks [s]
     Film film;
     std::string session;
     channel::Publisher publisher;

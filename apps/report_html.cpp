@@ -276,7 +276,7 @@ std::string eventLabel(const haptics::Event& e, const haptics::SessionInfo& info
     const std::string structure = e.structure == 0xFF ? "" : nameOf(info.structures, e.structure);
     switch (e.kind) {
         case EventKind::contact:
-            return fmt::format("contact at {:.0f} mm/s", e.value * info.rate * 1e3);
+            return "contact";
         case EventKind::release:
             return "release";
         case EventKind::puncture:

@@ -152,9 +152,7 @@ void Simulation::accept(const DeviceSample& device) noexcept
     }
     hand_ = record_.device;
     hand_.position =
-        record_.device.fresh || ticks_ == 0
-            ? betweenSteps(record_.device.position, stabiliserOptions_.device.encoder, stabiliserOptions_.period, encoder_)
-            : encoder_.position;
+        betweenSteps(record_.device.position, stabiliserOptions_.device.encoder, stabiliserOptions_.period, encoder_);
     if (ticks_ == 0) {
         last_ = hand_.position;
     }

@@ -176,10 +176,11 @@ RenderedForce scaled(double by, const RenderedForce& f) noexcept
 // The largest share of `step` that keeps |from + share step| at `most` or below, where |from| is.
 double shareWithin(Vec3 from, Vec3 step, double most) noexcept
 {
-    if (glm::length(from + step) <= most) {
+    const double a = glm::dot(step, step);
+    if (glm::length(from + step) <= most || a <= 0.0) {
         return 1.0;
     }
-    const double a = glm::dot(step, step), b = glm::dot(from, step);
+    const double b = glm::dot(from, step);
     const double c = std::max(0.0, most * most - glm::dot(from, from));
     return std::clamp((std::sqrt(b * b + a * c) - b) / a, 0.0, 1.0);
 }
@@ -257,6 +258,9 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, con
     if (s.faulted || !held) {
         s.gain = 0.0;
         s.window.read.count = 0;
+        // What was put in is not given back any more, and no credit for another place.
+        s.ledger.tissue = std::max(s.ledger.tissue, 0.0);
+        s.ledger.stored = 0.0;
     } else {
         const StableLimits limits = stableLimits(o);
         const double slew = slewRate * o.period * cap;

@@ -30,7 +30,6 @@ public:
     void update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim);
 
 private:
-    void addNeedle(const channel::Scenery& scenery, vtkRenderer& renderer);
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
     void moveNeedle(const channel::Scenery& scenery, const channel::State& state);
     void leaveTrail(const channel::State& state);

@@ -46,6 +46,21 @@ TEST(ReplayView, WritesAPictureOfEveryAskedTimeAndEveryEvent)
     EXPECT_EQ(inserted, 1U);
 }
 
+// There is nothing between two ticks: every tick is one picture, and then it ends.
+TEST(ReplayView, WritesEveryTickOnceWhereNoTimeBetweenPicturesIsAskedFor)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    const auto session =
+        figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "0.01", "--record", folder / "s.db"});
+    const Outcome outcome = Program("palpate-view", {"--replay", folder / "s.db", "--offscreen", folder / "pictures",
+                                                     "--every", "0", "--size", "320x320"})
+                                .wait();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(pictures(folder / "pictures").size(), session["ticks"].get<std::size_t>());
+}
+
 TEST(ReplayView, WritesAFilmOrSaysThatFfmpegIsMissing)
 {
     if (!canDraw())

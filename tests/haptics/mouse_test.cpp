@@ -142,6 +142,21 @@ TEST(Mouse, EveryPressFiresOnceAndEndsOnce)
     EXPECT_TRUE(device.finished());
 }
 
+// A viewer that could not read what the one before it, which died, had counted.
+TEST(Mouse, CountsThatBeginAnewAreNoPress)
+{
+    Viewer viewer;
+    viewer.now.fires = 3;
+    MouseDevice device = deviceOf(viewer);
+    run(device, 10);
+    viewer.now.fires = 0;
+    for (int i = 0; i < 200; ++i) {
+        EXPECT_EQ(device.read().buttons & buttonFire, 0U);
+    }
+    viewer.now.fires = 1;
+    EXPECT_EQ(device.read().buttons & buttonFire, buttonFire);
+}
+
 TEST(Mouse, WhatIsNoPoseIsNotFollowed)
 {
     Viewer viewer;

@@ -376,6 +376,22 @@ TEST(Simulation, HostilePosesNeverHurtTheHand)
     }
 }
 
+// Ticks that came late have true poses, only no force to go with them: the tool follows, and none is caught up in a jump.
+TEST(Simulation, LatePosesAreFollowed)
+{
+    Simulation simulation(tests::blockSphere());
+    settle(simulation, -12e-3);
+    double before = 0.0;
+    for (int i = 1; i <= 100; ++i) {
+        auto sample = at({0, -12e-3 + 80e-6 * i, 0});
+        sample.fresh = i <= 30 || i > 80;
+        const double deep = simulation.tick(sample).penetration;
+        ASSERT_LE(deep - before, 1e-3) << i;
+        before = deep;
+    }
+    EXPECT_GT(before, 2e-3);
+}
+
 // Not a number, infinite, absurd, or without a direction: such a pose is never followed, and the force stays off.
 TEST(Simulation, ImpossiblePoseSwitchesTheForceOff)
 {
