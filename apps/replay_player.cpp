@@ -116,8 +116,9 @@ struct ReplayPlayer::Impl {
                 }
                 const TickRecord& now = simulation.tick(then.device);
                 if (now.total != then.total) {
-                    blame(fmt::format("{}: forces differ from tick {} on: the record was made by another build ({})", file,
-                                      then.tick, record.info().build));
+                    blame(fmt::format(
+                        "{}: forces differ from tick {} on: the record was made by another build or method ({})", file,
+                        then.tick, record.info().build));
                 }
                 showTick(now, timing, state);
                 film.add(state, simulation, *buffer);
