@@ -285,7 +285,8 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, con
         const double size = glm::length(sent.total());
         sent = scaled(s.gain * (size > cap ? cap / size : 1.0), sent);
         // A spring that is let go gives energy where its force does not fall with the motion.
-        const bool falls = glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
+        const bool falls =
+            device.fresh && glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
         sent = towards(s.sent, sent, falls ? mostFall(way, motion, slew, limits.stiffness, o.period) : slew, cap);
     }
     s.sent = sent;

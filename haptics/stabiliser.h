@@ -111,9 +111,9 @@ struct StabiliserState {
 /// - Gain: rises to 1 in half a second; falls to zero in 50 ms when poses stop being fresh or jump (over 10 m/s); is zero
 ///   while the dead-man switch is up.
 /// - Cap: all parts are scaled together, so that their sum is at most the cap (equation 1).
-/// - Slew: neither the sum nor a channel changes by more than 5 % of the cap per millisecond. Only on the way out a force
-///   may fall by the stable stiffness times the motion, if that is more: a spring that unloads late kicks. A fault and the
-///   dead-man switch end the force at once.
+/// - Slew: neither the sum nor a channel changes by more than 5 % of the cap per millisecond. Only on the way out,
+///   and while poses are fresh, a force may fall by the stable stiffness times the motion beside it: a spring that unloads
+///   late kicks. A fault and the dead-man switch end the force at once.
 SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& options,
                     StabiliserState& state) noexcept;
 
