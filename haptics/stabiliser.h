@@ -26,9 +26,9 @@ struct StableLimits {
 
 /// Stable: half of (b + B) / (T / 2 + t_d) (Gil et al., "Stability analysis of a 1 DOF haptic interface using the
 /// Routh-Hurwitz criterion", 2004), t_d with the lag of the amplifier. B is about a third of m over the time that the
-/// damping comes late. Pressed: that of periods of a millisecond where they are shorter, since steps of the encoder are
-/// then felt one by one. Resting: 2 c / D at most, beyond which friction c does not end what an encoder of step D begins
-/// (Abbott and Okamura, "Effects of position quantization and sampling rate on virtual-wall passivity", 2005).
+/// damping comes late. Pressed: 7 kN/m at most; the frames of these devices give way before. Resting: 2 c / D at most,
+/// beyond which friction c does not end what an encoder of step D begins (Abbott and Okamura, "Effects of position
+/// quantization and sampling rate on virtual-wall passivity", 2005).
 StableLimits stableLimits(const StabiliserOptions& options) noexcept;
 
 /// The force as it is sent: equation 1. The controller's damping is in the channels, in each what its own stiffness asks
@@ -64,7 +64,7 @@ struct Motion {
     double basic = 0;      // the same of the tissue's part [N/m]
 };
 
-/// Over the longest window in which the motion is straight.
+/// Over the longest window in which the motion is straight; see straightSince().
 Motion motionIn(const MotionWindow& window, double encoder, double period) noexcept;
 
 /// The energy that went through the port.

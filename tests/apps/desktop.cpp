@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cstdlib>
 #include <sstream>
 #include <thread>
 
@@ -19,15 +18,6 @@ std::string socketOf(int number)
 }
 
 }  // namespace
-
-bool installed(const std::string& program)
-{
-    std::istringstream path(std::getenv("PATH") != nullptr ? std::getenv("PATH") : "");
-    for (std::string folder; std::getline(path, folder, ':');)
-        if (::access((folder + "/" + program).c_str(), X_OK) == 0)
-            return true;
-    return false;
-}
 
 Desktop::Desktop()
 {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <tests/apps/program.h>
+#include <tests/installed.h>
 
 #include <filesystem>
 #include <memory>
@@ -9,8 +10,7 @@
 
 namespace palpate::apps {
 
-/// Whether a program can be found in PATH.
-bool installed(const std::string& program);
+using tests::installed;
 
 /// A display without a screen (Xvfb), with mouse and keyboard that xdotool moves.
 class Desktop {

@@ -2,6 +2,7 @@
 #include <render/deformation.h>
 #include <render/screen_plan.h>
 #include <render/view_frame.h>
+#include <tests/installed.h>
 #include <tests/render/body.h>
 
 #include <gtest/gtest.h>
@@ -21,11 +22,9 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -84,15 +83,6 @@ private:
     int result_ = -1;
 };
 
-bool installed(const std::string& program)
-{
-    std::istringstream path(std::getenv("PATH") != nullptr ? std::getenv("PATH") : "");
-    for (std::string folder; std::getline(path, folder, ':');)
-        if (::access((folder + "/" + program).c_str(), X_OK) == 0)
-            return true;
-    return false;
-}
-
 class Viewer : public testing::Test {
 protected:
     void SetUp() override
@@ -103,7 +93,7 @@ protected:
         fs::create_directories(folder_);
         if (!fs::exists(program()))
             GTEST_SKIP() << program() << " has not been built";
-        if (!installed("Xvfb") || !installed("xvfb-run"))
+        if (!tests::installed("Xvfb") || !tests::installed("xvfb-run"))
             GTEST_SKIP() << "needs Xvfb (package xvfb)";
     }
     void TearDown() override
