@@ -47,6 +47,12 @@ ChildProcess::~ChildProcess()
         kill(pid_, SIGCONT);  // what is stopped takes no other signal
         wait(2.0);
     }
+    if (pid_ > 0) {
+        // It holds nothing that could be lost: what a viewer shows is the session's, and files get their name when they are
+        // whole.
+        kill(pid_, SIGKILL);
+        wait(2.0);
+    }
 }
 
 void ChildProcess::stall(bool stopped) noexcept

@@ -16,7 +16,7 @@ public:
     ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy);
     ChildProcess(const ChildProcess&) = delete;
     ChildProcess& operator=(const ChildProcess&) = delete;
-    /// Asks it to end (SIGTERM) if it still runs.
+    /// Asks it to end (SIGTERM) if it still runs, and after two seconds no longer asks (SIGKILL).
     ~ChildProcess();
 
     /// Waits up to `seconds` for it to end by itself. Returns its exit status; -1 when it was killed or still runs.

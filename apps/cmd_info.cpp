@@ -1,6 +1,6 @@
 #include <apps/command.h>
+#include <apps/report/volume.h>
 #include <apps/session.h>
-#include <apps/volume_report.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>

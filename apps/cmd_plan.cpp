@@ -1,6 +1,6 @@
 #include <apps/command.h>
 
-#include <apps/cmd_bench_costs.h>
+#include <apps/bench/costs.h>
 #include <apps/outputs.h>
 #include <apps/progress.h>
 #include <apps/quantities.h>

@@ -1,7 +1,7 @@
 #include <apps/command.h>
 #include <apps/measures.h>
-#include <apps/report.h>
-#include <apps/report_groups.h>
+#include <apps/report/groups.h>
+#include <apps/report/report.h>
 
 #include <haptics/score.h>
 

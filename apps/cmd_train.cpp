@@ -5,7 +5,7 @@
 #include <apps/figures.h>
 #include <apps/measures.h>
 #include <apps/outputs.h>
-#include <apps/report.h>
+#include <apps/report/report.h>
 #include <apps/session.h>
 #include <apps/trainer.h>
 
@@ -232,7 +232,8 @@ void checkOutputs(const Options& o)
 // The viewers that a session starts.
 class Viewers {
 public:
-    Viewers(const Options& o, const std::string& session) : session_(session), layout_(o.layout)
+    Viewers(const Options& o, const std::string& session)
+        : session_(session), layout_(o.layout), handIsHere_(o.device == "mouse")
     {
         if (wantsWindow(o)) {
             openWindow();
@@ -242,13 +243,17 @@ public:
         }
     }
 
-    // Opens a window that has crashed again, twice a second at most.
-    void lookAfter()
+    // Opens a window that has crashed again, twice a second at most. False when the window that was the hand has been
+    // closed: nobody could move the tool any more.
+    bool lookAfter()
     {
         const std::lock_guard lock(guard_);
+        if (handIsHere_ && window && window->wait(0) >= 0) {
+            return false;
+        }
         const auto now = std::chrono::steady_clock::now();
         if (!window || !window->killed() || now - opened_ <= std::chrono::milliseconds(500)) {
-            return;
+            return true;
         }
         try {
             openWindow();
@@ -256,6 +261,7 @@ public:
             // The session goes on without it.
             fmt::print(stderr, "palpate: {}\n", e.what());
         }
+        return true;
     }
 
     // Also from another thread.
@@ -286,6 +292,7 @@ private:
     }
 
     std::string session_, layout_;
+    bool handIsHere_;
     std::mutex guard_;
     std::chrono::steady_clock::time_point opened_;
 };
@@ -341,7 +348,7 @@ void train(Options o)
     Viewers viewers(o, options.session);
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
     if (viewers.window) {
-        options.lookAfter = [&viewers] { viewers.lookAfter(); };
+        options.lookAfter = [&viewers] { return viewers.lookAfter(); };
     }
     Trainer trainer(model, info, options);
     TrainResult result = trainer.run();

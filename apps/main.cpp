@@ -1,6 +1,6 @@
-#include <apps/cmd_accuracy.h>
-#include <apps/cmd_stability.h>
+#include <apps/accuracy/command.h>
 #include <apps/command.h>
+#include <apps/stability/command.h>
 
 #include <CLI/CLI.hpp>
 

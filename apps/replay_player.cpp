@@ -94,10 +94,11 @@ struct ReplayPlayer::Impl {
         showing.join();
     }
 
-    void blame(const std::string& what)
+    void blame(const char* words, const std::string& what)
     {
         const std::lock_guard lock(problemGuard);
         problem = problem.empty() ? what : problem;
+        playback.fault = words;
     }
 
     void compute()
@@ -116,16 +117,17 @@ struct ReplayPlayer::Impl {
                 }
                 const TickRecord& now = simulation.tick(then.device);
                 if (now.total != then.total) {
-                    blame(fmt::format(
-                        "{}: forces differ from tick {} on: the record was made by another build or method ({})", file,
-                        then.tick, record.info().build));
+                    blame("FORCES ARE NOT THOSE OF THE RECORD",
+                          fmt::format(
+                              "{}: forces differ from tick {} on: the record was made by another build or method ({})",
+                              file, then.tick, record.info().build));
                 }
                 showTick(now, timing, state);
                 film.add(state, simulation, *buffer);
                 playback.ready = static_cast<double>(then.tick) * period;
             });
         } catch (const std::exception& e) {
-            blame(e.what());
+            blame("THE RECORD ENDS HERE", e.what());
             // Without a single tick there is no time that could be shown.
             playback.length = film.ticks() > 0 ? playback.ready.load() : -1.0;
         }

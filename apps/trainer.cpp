@@ -125,8 +125,8 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
         if (state) {
             showProgress(*state);
         }
-        if (options.lookAfter) {
-            options.lookAfter();
+        if (options.lookAfter && !options.lookAfter()) {
+            interrupted = true;
         }
     }
     if (terminal) {
@@ -269,7 +269,13 @@ TrainResult Trainer::run()
         done = true;
     });
     if (isatty(STDERR_FILENO) != 0 || impl_->options.lookAfter) {
-        waitFor(impl_->options, done);
+        try {
+            waitFor(impl_->options, done);
+        } catch (...) {
+            interrupted = true;
+            servo.join();
+            throw;
+        }
     }
     servo.join();
     for (const auto& warning : warnings) {

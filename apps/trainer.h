@@ -25,7 +25,8 @@ struct TrainOptions {
     haptics::ServoOptions servo;
     Faults faults;                           // on purpose
     std::function<void(bool)> stallViewers;  // stops them (true) or lets them go on; called from a thread of its own
-    std::function<void()> lookAfter;         // called ten times a second while the session runs, from the thread of run()
+    // Called ten times a second while the session runs, from the thread of run(); false ends the session.
+    std::function<bool()> lookAfter;
 };
 
 /// What a session came to.

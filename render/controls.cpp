@@ -232,11 +232,11 @@ std::vector<KeyHelp> Controls::help() const
 {
     std::vector<KeyHelp> keys;
     if (hand_.is())
-        keys = {{"hold left", "move the tool in the plane of the picture"},
-                {"wheel", "push it into the picture, or pull it out"},
-                {"Shift", "five times finer"},
-                {"arrows", "turn the tool"},
-                {"Space", "fire the biopsy gun"},
+        keys = {{"hold left", "take the tool and move it in the plane of the picture"},
+                {"  wheel", "push it into the picture, or pull it out"},
+                {"  Shift", "five times finer"},
+                {"  arrows", "turn the tool"},
+                {"  Space", "fire the biopsy gun"},
                 {"M", "mark the place of the tool"},
                 {"E", "end the session"}};
     else if (playback_ != nullptr)
@@ -266,8 +266,10 @@ std::string Controls::caption() const
         const Playback& p = *playback_;
         const std::string how = p.paused ? "PAUSED" : fmt::format("REPLAY x {:g}", p.speed.load());
         const bool computing = p.ready < p.length;
-        return fmt::format("{}   {:.3f} of {:.1f} s{}", how, p.time.load(), p.length.load(),
-                           computing ? fmt::format("   ({:.1f} s computed)", p.ready.load()) : "");
+        const char* fault = p.fault;
+        return fmt::format("{}   {:.3f} of {:.1f} s{}{}", how, p.time.load(), p.length.load(),
+                           computing ? fmt::format("   ({:.1f} s computed)", p.ready.load()) : "",
+                           fault != nullptr ? fmt::format("   {}", fault) : "");
     }
     if (!hand_.is())
         return "";

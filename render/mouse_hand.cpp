@@ -60,6 +60,8 @@ void MouseHand::move(glm::dvec3 by) noexcept
 // Rodrigues' formula; the length is kept at 1 against rounding.
 void MouseHand::turn(glm::dvec3 about, double angle) noexcept
 {
+    if (input_.held == 0)
+        return;
     const glm::dvec3 axis = vec(input_.axis);
     const glm::dvec3 turned = std::cos(angle) * axis + std::sin(angle) * glm::cross(about, axis) +
                               (1 - std::cos(angle)) * glm::dot(about, axis) * about;

@@ -24,11 +24,12 @@ public:
     bool held() const noexcept { return is() && input_.held != 0; }
     /// Where the hand is [m].
     glm::dvec3 target() const noexcept;
-    /// Moves the hand while the switch is held [m].
+    /// While the switch is held, and only then: moves the hand [m].
     void move(glm::dvec3 by) noexcept;
-    /// Turns the tool by `angle` [rad] about the unit vector `about`.
+    /// ... turns the tool by `angle` [rad] about the unit vector `about`.
     void turn(glm::dvec3 about, double angle) noexcept;
-    void fire() noexcept { ++input_.fires; }
+    /// ... fires the gun.
+    void fire() noexcept { input_.fires += input_.held; }
     void mark() noexcept { ++input_.marks; }
     void end() noexcept { input_.ended = 1; }
 

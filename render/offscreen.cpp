@@ -1,3 +1,4 @@
+#include <render/events.h>
 #include <render/follower.h>
 #include <render/hosts.h>
 #include <render/movie.h>
@@ -24,33 +25,38 @@
 namespace palpate::render {
 namespace {
 
-// A structure's name as a part of a file's name.
-std::string fileWord(const channel::Name& name)
+// An event as a part of a file's name: "very_near_artery".
+std::string fileWords(const Event& event, const channel::Name& structure)
 {
-    std::string word(name.data(), std::find(name.begin(), name.end(), '\0'));
-    for (char& c : word)
+    const std::string about = "_" + text(structure);
+    const auto words = [&]() -> std::string {
+        switch (event.kind) {
+            case EventKind::contact:
+                return "contact";
+            case EventKind::inserted:
+                return "inserted";
+            case EventKind::out:
+                return "out";
+            case EventKind::near:
+                return "near" + about;
+            case EventKind::veryNear:
+                return "very_near" + about;
+            case EventKind::touching:
+                return "touching" + about;
+            case EventKind::fired:
+                return "fired";
+            case EventKind::fault:
+                return "fault";
+            case EventKind::finished:
+                break;
+        }
+        return "finished";
+    }();
+    std::string name = words;
+    for (char& c : name)
         if (std::isalnum(static_cast<unsigned char>(c)) == 0)
             c = '_';
-    return word;
-}
-
-// What has happened from one state to the next, as words for files.
-std::vector<std::string> eventsBetween(const channel::State& before, const channel::State& now,
-                                       const channel::Name& warnedName)
-{
-    std::vector<std::string> events;
-    if (now.phase != before.phase && now.phase != channel::Phase::free)
-        events.emplace_back(now.phase == channel::Phase::contact ? "contact" : "inserted");
-    if (now.warning != before.warning && now.warning != channel::Warning::none)
-        events.push_back(std::string(now.warning == channel::Warning::near       ? "warning_"
-                                     : now.warning == channel::Warning::veryNear ? "very_near_"
-                                                                                 : "touching_") +
-                         fileWord(warnedName));
-    if (now.cores > before.cores)
-        events.emplace_back("fired");
-    if (now.status != before.status && now.status != channel::Status::running)
-        events.emplace_back(now.status == channel::Status::faulted ? "fault" : "finished");
-    return events;
+    return name;
 }
 
 // Writes under another name first, so that whoever watches the folder never reads half a picture.
@@ -164,14 +170,20 @@ bool askFor(Playback& playback, double time, const Follower& follower)
 void writeAll(const ViewerOptions& options, const std::atomic<bool>& stop, Picture& picture, Follower& follower,
               Outputs& outputs)
 {
+    constexpr double look = 1e-3 * channel::frameTicks;  // how far apart a record is searched for events [s]
     channel::State before;
     bool any = false;
     while (!stop && follower.ending() != channel::Ending::finished &&
            (options.frames == 0 || outputs.written() < options.frames)) {
         follower.poll(picture);
-        if (options.playback != nullptr && outputs.nextDue() > options.playback->length + Outputs::early)
-            return;
-        const bool there = options.playback == nullptr || askFor(*options.playback, outputs.nextDue(), follower);
+        double next = 0;
+        if (options.playback != nullptr) {
+            const double length = options.playback->length;
+            if (length < (any ? before.time + Outputs::early : 0.0))
+                return;
+            next = std::min({outputs.nextDue(), before.time + (any ? look : 0.0), length});
+        }
+        const bool there = options.playback == nullptr || askFor(*options.playback, next, follower);
         if (!follower.known() || !there || (any && follower.state().tick == before.tick)) {
             std::this_thread::sleep_for(std::chrono::milliseconds(options.playback != nullptr ? 1 : 4));
             continue;
@@ -184,12 +196,14 @@ void writeAll(const ViewerOptions& options, const std::atomic<bool>& stop, Pictu
             outputs.begin(now.time);
         }
         const auto& names = follower.structures();
-        const auto events = eventsBetween(before, now, names[std::min<std::size_t>(now.warned, names.size() - 1)]);
+        std::vector<std::string> events;
+        for (const Event& event : eventsBetween(before, now))
+            events.push_back(fileWords(event, names[std::min<std::size_t>(event.structure, names.size() - 1)]));
         if (now.time >= outputs.nextDue() - Outputs::early || !events.empty()) {
             const bool inTime = options.playback == nullptr && (options.every <= 0 || !options.movie.empty());
             follower.draw(picture, inTime ? Quality::moving : Quality::still);
             outputs.write(now.time, events);
-        } else {
+        } else if (options.playback == nullptr) {
             std::this_thread::sleep_for(std::chrono::milliseconds(4));
         }
         before = now;

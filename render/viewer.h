@@ -16,7 +16,8 @@ struct Playback {
     std::atomic<double> jump{std::numeric_limits<double>::quiet_NaN()};  // to this time [s]; taken by the player
     std::atomic<double> time{0};                                         // shown now [s]
     std::atomic<double> ready{0};                                        // computed so far [s]
-    std::atomic<double> length{0};                                       // [s]
+    std::atomic<double> length{0};                                       // [s]; negative when there is nothing to show
+    std::atomic<const char*> fault{nullptr};                             // what is wrong with the record, in a few words
 };
 
 /// What a viewer shows, and where.

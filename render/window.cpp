@@ -176,7 +176,8 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     Controls controls(window.get(), *interactor, picture, follower, options.playback);
     FrameClock clock;
     auto used = Clock::now();
-    while (!stop && !follower.over() && glfwWindowShouldClose(window.get()) == GLFW_FALSE &&
+    const auto nothingToShow = [&] { return options.playback != nullptr && options.playback->length < 0; };
+    while (!stop && !follower.over() && glfwWindowShouldClose(window.get()) == GLFW_FALSE && !nothingToShow() &&
            (options.frames == 0 || follower.frames() < options.frames)) {
         glfwPollEvents();
         shown.fit(window.get());

@@ -1,5 +1,5 @@
-#include <apps/chart.h>
-#include <apps/chart_axis.h>
+#include <apps/chart/axis.h>
+#include <apps/chart/chart.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>

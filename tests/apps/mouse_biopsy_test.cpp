@@ -159,6 +159,28 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     EXPECT_EQ(replayed["force_hash"], json["force_hash"]);
 }
 
+// Nobody could move the tool any more.
+TEST(Desktop, ASessionEndsWithTheWindowThatIsItsHand)
+{
+    if (!built("palpate-view") || !installed("Xvfb") || !installed("xdotool"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Folder folder;
+    const std::string session = "closed-" + std::to_string(::getpid());
+    const Desktop desktop;
+    const auto train = desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--seconds", "600",
+                                                 "--session", session, "--record", folder / "s.db"});
+    ASSERT_FALSE(desktop.window("Palpate").empty());
+    const auto eyes = sessionWithHand(session);
+    ASSERT_TRUE(eyes);
+    desktop.xdotool({"key", "space"});  // fires only while the dead-man switch is held
+    wait(0.5);
+    EXPECT_EQ(eyes->state()->cores, 0U);
+    desktop.xdotool({"key", "q"});
+    const Outcome outcome = train->wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(figures({"replay", folder / "s.db"})["identical"], true);
+}
+
 TEST(Mouse, IsRefusedWhereNobodyCanMoveIt)
 {
     expectRefusal({"train", "layered", "--device", "mouse", "--unpaced"}, "leave out --unpaced");

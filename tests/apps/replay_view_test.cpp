@@ -2,7 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
 
 namespace palpate::apps {
 namespace {
@@ -80,6 +86,56 @@ TEST(ReplayView, WritesAFilmOrSaysThatFfmpegIsMissing)
                                                   "-of", "csv=p=0", folder / "s.mp4"})
                              .wait();
     EXPECT_EQ(told.out, "322,30\n") << "a second, 30 pictures; the codec wants an even width";
+}
+
+std::vector<std::uint64_t> ticksIn(const fs::path& timeline)
+{
+    std::ifstream file(timeline);
+    std::vector<std::uint64_t> ticks;
+    std::string line;
+    std::getline(file, line);
+    while (std::getline(file, line))
+        ticks.push_back(std::stoull(line));
+    return ticks;
+}
+
+TEST(ReplayView, KeysGoThroughTheRecordInBothDirections)
+{
+    if (!canDraw() || !installed("xdotool"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Folder folder;
+    const auto session =
+        figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
+    const Desktop desktop;
+    const auto view = desktop.start("palpate-view", {"--replay", folder / "s.db", "--layout", "instructor", "--size",
+                                                     "400x320", "--timeline", folder / "t.csv"});
+    ASSERT_FALSE(desktop.window("Palpate").empty());
+    const auto key = [&](const char* name) {
+        desktop.xdotool({"key", name});
+        std::this_thread::sleep_for(std::chrono::milliseconds(1200));
+    };
+    for (const char* name : {"space", "End", "Home", "period", "period", "comma", "shift+period", "Right", "Left", "q"})
+        key(name);
+    const Outcome outcome = view->wait();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const auto ticks = ticksIn(folder / "t.csv");
+    const std::vector<std::uint64_t> asked{session["ticks"].get<std::uint64_t>() - 1, 0, 1, 2, 1, 34, 1034, 34};
+    ASSERT_GE(ticks.size(), asked.size());
+    EXPECT_EQ(std::vector<std::uint64_t>(ticks.end() - static_cast<std::ptrdiff_t>(asked.size()), ticks.end()), asked);
+}
+
+TEST(ReplayView, SaysThatARecordHasLostItsBeginning)
+{
+    if (!canDraw() || !installed("sqlite3"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and sqlite3 (packages xvfb and sqlite3)";
+    const Folder folder;
+    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
+    const Outcome cut =
+        Program("/usr/bin/env", {"sqlite3", folder / "s.db", "DELETE FROM ticks WHERE tick < 10;"}).wait();
+    ASSERT_EQ(cut.status, 0) << cut.err;
+    const Outcome window = Program("palpate-view", {"--replay", folder / "s.db", "--hidden"}).wait();
+    EXPECT_EQ(window.status, 1);
+    EXPECT_NE(window.err.find("tick 0 is missing"), std::string::npos) << window.err;
 }
 
 TEST(ReplayView, RefusesWhatCannotBePlayed)

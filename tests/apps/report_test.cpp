@@ -1,6 +1,6 @@
-#include <apps/report.h>
-#include <apps/report_data.h>
-#include <apps/report_html.h>
+#include <apps/report/data.h>
+#include <apps/report/html.h>
+#include <apps/report/report.h>
 
 #include <tests/haptics/synthetic_session.h>
 

@@ -212,7 +212,7 @@ TEST_F(Viewer, WritesAPictureOfEveryEventAndEndsWithTheSession)
     EXPECT_EQ(viewer.wait(), 0) << said("viewer");
     EXPECT_EQ(publisher.wait(), 0) << said("publisher");
     for (const char* name : {"frame_00000.png", "frame_00002.png", "000_contact.png", "001_inserted.png",
-                             "002_warning_artery.png", "003_fired.png", "004_finished.png"})
+                             "002_near_artery.png", "003_fired.png", "004_finished.png"})
         EXPECT_TRUE(fs::exists(fs::path(pictures()) / name)) << name;
 }
 
