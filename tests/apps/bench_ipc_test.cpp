@@ -1,9 +1,12 @@
 #include <tests/apps/program.h>
+#include <tests/installed.h>
 
 #include <gtest/gtest.h>
 
 namespace palpate::apps {
 namespace {
+
+using tests::installed;
 
 // What the thesis saw: whoever comes late has all that was sent in the meantime before it. In shared memory there is
 // nothing before the newest.
@@ -39,6 +42,22 @@ TEST(BenchSync, TellsHowFarApartTwoViewersShowTheSameTick)
     EXPECT_GE(state["p50"], 0.0);
     EXPECT_GT(json["frames"], 5);
     EXPECT_EQ(json["frame_ms"], 33.0);
+}
+
+TEST(BenchView, MeasuresPicturesOfWhatMovesBesideAServoLoop)
+{
+    if (!built("palpate-view") || !installed("Xvfb"))
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const auto json = figures({"bench", "view", "layered", "--voxels", "48", "--layout", "instructor", "--frames", "12",
+                               "--width", "320", "--height", "320"});
+    ASSERT_EQ(json["cases"].size(), 1U);
+    for (const auto& c : json["cases"]) {
+        EXPECT_EQ(c["frames"], 12) << c;
+        EXPECT_GT(c["frame_ms_p50"], 0.0) << c;
+        EXPECT_LE(c["frame_ms_p50"], c["frame_ms_p90"]) << c;
+        EXPECT_GT(c["moving_share"], 0.0) << c;
+        EXPECT_GE(c["lateness_us_p99"], 0.0) << c;
+    }
 }
 
 }  // namespace

@@ -1,7 +1,5 @@
 #include <tests/apps/desktop.h>
 
-#include <unistd.h>
-
 #include <chrono>
 #include <sstream>
 #include <thread>
@@ -12,23 +10,20 @@ namespace {
 constexpr int patience = 200;  // looks
 constexpr auto betweenLooks = std::chrono::milliseconds(100);
 
-std::string socketOf(int number)
-{
-    return "/tmp/.X11-unix/X" + std::to_string(number);
-}
-
 }  // namespace
 
+// The server chooses a number that is free, and tells it when it is ready.
 Desktop::Desktop()
 {
-    int number = 100 + static_cast<int>(::getpid() % 400);
-    while (std::filesystem::exists(socketOf(number)))
-        ++number;
-    display_ = ":" + std::to_string(number);
+    const std::string file = folder_ / "display";
     server_ = std::make_unique<Program>(
-        "/usr/bin/env", std::vector<std::string>{"Xvfb", display_, "-screen", "0", "1024x768x24", "-nolisten", "tcp"});
-    for (int i = 0; i < patience && !std::filesystem::exists(socketOf(number)); ++i)
+        "/usr/bin/env",
+        std::vector<std::string>{"sh", "-c", "exec Xvfb -displayfd 3 -screen 0 1024x768x24 -nolisten tcp 3> " + file});
+    for (int i = 0; i < patience && display_.empty(); ++i) {
         std::this_thread::sleep_for(betweenLooks);
+        if (const std::string told = readText(file); told.ends_with('\n'))
+            display_ = ":" + told.substr(0, told.size() - 1);
+    }
 }
 
 std::unique_ptr<Program> Desktop::start(const std::string& name, const std::vector<std::string>& arguments) const

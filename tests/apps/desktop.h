@@ -25,6 +25,7 @@ public:
     std::string window(const std::string& name) const;
 
 private:
+    Folder folder_;  // of what the server tells
     std::string display_;
     std::unique_ptr<Program> server_;
 };
