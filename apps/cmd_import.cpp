@@ -1,18 +1,23 @@
 #include <apps/command.h>
-#include <apps/volume_report.h>
+#include <apps/outputs.h>
+#include <apps/prepare/mapping.h>
+#include <apps/prepare/steps.h>
+#include <apps/progress.h>
+#include <apps/quantities.h>
+#include <apps/report/volume.h>
+#include <datasets/label_map.h>
 #include <datasets/tables.h>
 #include <volume/fnv.h>
 #include <volume/import.h>
+#include <volume/resample.h>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
+#include <cmath>
 #include <ctime>
-#include <map>
 #include <memory>
 #include <stdexcept>
 
@@ -20,176 +25,299 @@ namespace palpate::apps {
 
 namespace {
 
-using volume::LabelName;
+namespace fs = std::filesystem;
 
-struct ImportOptions {
-    std::filesystem::path labels, output, tissues, json;
-    std::string map, defaultTissue;
+struct Options {
+    fs::path input, output, tissues, image, json;
+    std::string stiffness;
+    volume::ImportOptions reading;
+    MappingOptions mapping;
+    PreparationOptions steps;
+    std::string voxel, closeSkinHoles, addSkin, pad, cropMargin;
 };
 
-using Counts = std::map<std::uint16_t, std::uint64_t>;  // label value, voxels
-
-Counts countLabels(const volume::LabelImage& image)
+// "2", "2mm" or "0.2cm" in metres; a number alone is in millimetres.
+double lengthFrom(const std::string& option, const std::string& text, double least, double most)
 {
-    std::vector<std::uint64_t> histogram(65536, 0);
-    for (const std::uint16_t value : image.values) {
-        ++histogram[value];
+    const auto plain = lengthOf(text + "mm");
+    const auto length = plain ? plain : lengthOf(text);
+    if (!length || !(*length >= least && *length <= most)) {
+        throw std::runtime_error(
+            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
     }
-    Counts counts;
-    for (std::size_t v = 0; v < histogram.size(); ++v) {
-        if (histogram[v] > 0) {
-            counts[static_cast<std::uint16_t>(v)] = histogram[v];
-        }
+    return *length;
+}
+
+void readLengths(Options& o)
+{
+    const auto set = [](double& target, const std::string& option, const std::string& text, double least, double most) {
+        target = text.empty() ? target : lengthFrom(option, text, least, most);
+    };
+    set(o.steps.voxel, "--voxel", o.voxel, 0.05e-3, 50e-3);
+    set(o.steps.addSkin, "--add-skin", o.addSkin, 0.05e-3, 50e-3);
+    set(o.steps.pad, "--pad", o.pad, 0.05e-3, 0.5);
+    set(o.steps.cropMargin, "--crop-margin", o.cropMargin, 0, 1);
+    if (o.steps.closeSkinHoles) {
+        set(*o.steps.closeSkinHoles, "--close-skin-holes", o.closeSkinHoles, 0.05e-3, 0.5);
     }
-    return counts;
 }
 
-const LabelName* find(const std::vector<LabelName>& names, std::uint16_t value)
+// The image on the voxels of the labels.
+volume::CompanionImage readImage(const Options& o, const volume::LabelImage& labels, const volume::TissueTable& table,
+                                 std::vector<std::string>& notes, Progress& progress)
 {
-    const auto found = std::find_if(names.begin(), names.end(), [&](const LabelName& n) { return n.value == value; });
-    return found == names.end() ? nullptr : &*found;
-}
-
-bool covers(const datasets::LabelMap& map, const Counts& counts)
-{
-    return std::all_of(counts.begin(), counts.end(),
-                       [&](const auto& label) { return label.first == 0 || find(map.labels, label.first) != nullptr; });
-}
-
-// The file's own names agree with the map's for every label that is there.
-bool namesAgree(const datasets::LabelMap& map, const std::vector<LabelName>& names, const Counts& counts)
-{
-    return std::all_of(counts.begin(), counts.end(), [&](const auto& label) {
-        const LabelName* ours = find(map.labels, label.first);
-        const LabelName* theirs = find(names, label.first);
-        return label.first == 0 || (ours != nullptr && theirs != nullptr && ours->name == theirs->name);
-    });
-}
-
-// Values that run almost without gaps from 1 on say nothing about who wrote them; 1, 2, 29, 33, 40, 88 ... do.
-bool valuesTell(const Counts& counts)
-{
-    return counts.size() >= 6 && counts.rbegin()->first >= 2 * counts.size();
-}
-
-// The built-in map that the file was certainly made by, or none.
-std::vector<LabelName> recognise(const volume::ImportedLabels& labels, const Counts& counts,
-                                 std::vector<std::string>& notes)
-{
-    std::vector<datasets::LabelMap> byValue;
-    for (const std::string& name : datasets::labelMapNames()) {
-        datasets::LabelMap map = datasets::labelMap(name);
-        if (!labels.names.empty() && namesAgree(map, labels.names, counts)) {
-            notes.push_back(fmt::format("label map '{}' recognised by the names in the file", name));
-            return map.labels;
-        }
-        if (labels.names.empty() && valuesTell(counts) && covers(map, counts)) {
-            byValue.push_back(std::move(map));
-        }
+    volume::ImportOptions reading;
+    reading.series = o.reading.series;
+    reading.progress = [&](double share) { progress.show(fmt::format("reading the image: {:.0f} %", 100 * share)); };
+    const volume::ImportedImage image = volume::importImage(o.image, reading);
+    for (const std::string& warning : image.warnings) {
+        notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
     }
-    if (byValue.size() != 1) {
-        return {};
+    const volume::VoxelGrid from{image.size, image.affine}, to{labels.size, labels.affine};
+    volume::CompanionImage companion;
+    companion.unit = image.what;
+    if (!o.stiffness.empty()) {
+        companion.stiffness = datasets::stiffnessMap(o.stiffness, image.what, table);
     }
-    notes.push_back(fmt::format("label map '{}' recognised by the label values: --map says otherwise", byValue[0].name));
-    return byValue[0].labels;
+    progress.show("resampling the image");
+    const float missing = image.what == "HU" ? -1000.0F : 0.0F;
+    companion.values = volume::resampledImage(from, image.values, to, std::nanf(""));
+    std::uint64_t bare = 0;
+    for (std::size_t i = 0; i < companion.values.size(); ++i) {
+        bare += std::isnan(companion.values[i]) && labels.values[i] != 0 ? 1 : 0;
+        companion.values[i] = std::isnan(companion.values[i]) ? missing : companion.values[i];
+    }
+    if (bare == labels.values.size() || bare > labels.values.size() / 2) {
+        throw std::runtime_error(
+            fmt::format("{}: it covers less than half of the labelled voxels: is it of the same patient "
+                        "and frame?",
+                        o.image.string()));
+    }
+    if (bare > 0) {
+        notes.push_back(fmt::format("{} labelled voxels lie outside the image and have {} there{}", bare, missing,
+                                    companion.stiffness.points.empty() ? "" : ", for their stiffness too"));
+    }
+    return companion;
 }
 
-[[noreturn]] void refuseUnknown(const ImportOptions& options, const std::vector<LabelName>& names, const Counts& unknown)
-{
-    std::vector<std::string> list;
-    for (const auto& [value, voxels] : unknown) {
-        const LabelName* name = find(names, value);
-        list.push_back(
-            fmt::format("{}{} ({} voxels)", value, name != nullptr ? fmt::format(" '{}'", name->name) : "", voxels));
-    }
-    throw std::runtime_error(fmt::format(
-        "{}: no tissue is known for {} of its labels: {}: give --map ({} or a TOML file), or --default-tissue NAME",
-        options.labels.string(), unknown.size(), fmt::join(list, ", "), fmt::join(datasets::labelMapNames(), ", ")));
-}
-
-// A name and a tissue for every label: from the map, else by the file's segment name, else the default tissue.
-std::vector<LabelName> nameLabels(const ImportOptions& options, const volume::ImportedLabels& labels, const Counts& counts,
-                                  const volume::TissueTable& table, std::vector<std::string>& notes)
-{
-    const std::vector<LabelName> map =
-        options.map.empty() ? recognise(labels, counts, notes) : datasets::labelMap(options.map).labels;
-    std::vector<LabelName> named;
-    Counts unknown;
-    for (const auto& [value, voxels] : counts) {
-        const LabelName* mapped = find(map, value);
-        const LabelName* own = find(labels.names, value);
-        if (mapped != nullptr) {
-            named.push_back(*mapped);
-        } else if (own != nullptr && table.find(own->name)) {
-            named.push_back({value, own->name, own->name});
-        } else if (value != 0 && !options.defaultTissue.empty()) {
-            named.push_back({value, own != nullptr ? own->name : fmt::format("label {}", value), options.defaultTissue});
-            notes.push_back(fmt::format("label {} ({} voxels) is taken as {}", value, voxels, options.defaultTissue));
-        } else if (value != 0) {
-            unknown[value] = voxels;
-        }
-    }
-    if (!unknown.empty()) {
-        refuseUnknown(options, labels.names, unknown);
-    }
-    return named;
-}
-
-volume::Provenance provenanceOf(const ImportOptions& options, const volume::ImportedLabels& labels,
-                                const std::vector<std::string>& notes)
+volume::Provenance provenanceOf(const Options& o, const volume::LabelImage& image, const std::vector<std::string>& notes,
+                                const std::vector<PreparationStep>& steps)
 {
     volume::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
-    hash.addAll(labels.image.values);
-    volume::Provenance provenance = {{"source", options.labels.filename().string()},
-                                     {"bytes", std::to_string(std::filesystem::file_size(options.labels))},
+    hash.addAll(image.values);
+    volume::Provenance provenance = {{"source", o.input.filename().string()},
                                      {"label hash", fmt::format("{:016x}", hash.value)},
                                      {"imported", fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr)))},
                                      {"program", PALPATE_BUILD}};
+    std::error_code none;
+    if (fs::is_regular_file(o.input, none)) {
+        provenance.insert(provenance.begin() + 1, {"bytes", std::to_string(fs::file_size(o.input))});
+    }
+    if (!o.image.empty()) {
+        provenance.emplace_back("image file", o.image.filename().string());
+    }
+    if (!o.stiffness.empty()) {
+        provenance.emplace_back("stiffness", fmt::format("scaled by the image, map {}", o.stiffness));
+    }
+    for (const PreparationStep& step : steps) {
+        provenance.emplace_back(stepKey, step.text);
+    }
     for (const std::string& note : notes) {
         provenance.emplace_back(warningKey, note);
     }
     return provenance;
 }
 
-void runImport(const ImportOptions& options)
+// What became of voxels that several segments hold.
+void noteOverlaps(const volume::ImportedLabels& labels, std::vector<std::string>& notes)
 {
-    const volume::TissueTable table =
-        options.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(options.tissues);
-    if (!options.defaultTissue.empty() && !table.find(options.defaultTissue)) {
-        throw std::runtime_error(
-            fmt::format("--default-tissue {}: is not in the tissue table '{}'", options.defaultTissue, table.name));
+    const auto nameOf = [&](std::uint16_t value) {
+        for (const volume::LabelName& n : labels.names) {
+            if (n.value == value) {
+                return n.name;
+            }
+        }
+        return fmt::format("label {}", value);
+    };
+    for (const volume::Overlap& o : labels.overlaps) {
+        notes.push_back(fmt::format("{} voxels of '{}' lie in '{}' too, which has them: --overlap says otherwise", o.voxels,
+                                    nameOf(o.lost), nameOf(o.kept)));
     }
-    volume::ImportedLabels labels = volume::importLabels(options.labels);
+}
+
+nlohmann::json figuresOf(const volume::Tissue& tissue, const volume::ImportedLabels& labels,
+                         const std::vector<PreparationStep>& steps)
+{
+    nlohmann::json figures = volumeFigures(tissue);
+    figures["steps"] = stepFigures(steps);
+    figures["overlaps"] = nlohmann::json::array();
+    for (const volume::Overlap& o : labels.overlaps) {
+        figures["overlaps"].push_back({{"kept", o.kept}, {"lost", o.lost}, {"voxels", o.voxels}});
+    }
+    return figures;
+}
+
+void checkOptions(const Options& o)
+{
+    if (o.output.empty() == o.mapping.writeMap.empty()) {
+        throw std::runtime_error("palpate import: give -o V.vdb, or --write-map FILE to begin a label map instead");
+    }
+    if (!o.output.empty() && o.output.extension() != ".vdb") {
+        throw std::runtime_error(o.output.string() + ": a volume is a .vdb file: name it so");
+    }
+    if (!o.stiffness.empty() && o.image.empty()) {
+        throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
+    }
+    checkOutput(o.output);
+    checkOutput(o.mapping.writeMap);
+    checkOutput(o.json);
+}
+
+void runImport(Options o)
+{
+    readLengths(o);
+    checkOptions(o);
+    const volume::TissueTable table = o.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(o.tissues);
+    Progress progress;
+    o.reading.sheared = o.steps.voxel > 0;
+    o.reading.progress = [&](double share) { progress.show(fmt::format("reading: {:.0f} %", 100 * share)); };
+    volume::ImportedLabels labels = volume::importLabels(o.input, o.reading);
+    const LabelCounts counts = countLabels(labels.image);
+    if (!o.mapping.writeMap.empty()) {
+        const std::size_t open = writeLabelMap(o.mapping, o.input, labels, counts, table);
+        progress.clear();
+        fmt::print("{}: {} labels, {} of them to be filled in\n", o.mapping.writeMap.string(), counts.size(), open);
+        return;
+    }
     std::vector<std::string> notes = labels.warnings;
-    const std::vector<LabelName> named = nameLabels(options, labels, countLabels(labels.image), table, notes);
-    volume::Provenance provenance = provenanceOf(options, labels, notes);
-    const volume::Tissue tissue = volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance));
+    noteOverlaps(labels, notes);
+    std::vector<volume::LabelName> named = mapLabels(o.mapping, o.input, labels, counts, table, notes);
+    const auto steps = prepare(labels.image, named, table, o.steps, [&](const std::string& what) { progress.show(what); });
+    std::optional<volume::CompanionImage> image;
+    if (!o.image.empty()) {
+        image = readImage(o, labels.image, table, notes, progress);
+    }
+    progress.show("making tissue");
+    volume::Provenance provenance = provenanceOf(o, labels.image, notes, steps);
+    const volume::Tissue tissue =
+        volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance), image ? &*image : nullptr);
     labels.image.values = {};
-    tissue.save(options.output);
-    if (options.json != "-") {
-        fmt::print("{} -> {}\n\n", options.labels.string(), options.output.string());
+    image.reset();
+    progress.show("writing");
+    tissue.save(o.output);
+    progress.clear();
+    if (o.json != "-") {
+        fmt::print("{} -> {}\n\n", o.input.string(), o.output.string());
         printVolume(tissue);
     }
-    if (!options.json.empty()) {
-        writeJson(options.json, volumeFigures(tissue));
+    if (!o.json.empty()) {
+        writeJson(o.json, figuresOf(tissue, labels, steps));
     }
+}
+
+void addReading(CLI::App& command, Options& o)
+{
+    command
+        .add_option("--overlap", o.reading.overlap,
+                    "Segment that a voxel of several belongs to: smallest (default), first, last, or names, later ones win")
+        ->type_name("RULE|NAMES")
+        ->delimiter(',')
+        ->group("Reading");
+    command.add_option("--series", o.reading.series, "SeriesInstanceUID to take of a folder of several")
+        ->type_name("UID")
+        ->group("Reading");
+    command
+        .add_option("--threshold", o.reading.fractionalThreshold,
+                    "From which a probability of a fractional DICOM SEG is tissue (default 0.5)")
+        ->check(CLI::Range(0.0, 1.0))
+        ->group("Reading");
+    command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
+        ->type_name("FILE")
+        ->group("Reading");
+    command
+        .add_option("--stiffness-from", o.stiffness,
+                    "Scale Young's modulus by the image: the built-in map hu, or a TOML file (docs/scenes.md)")
+        ->type_name("hu|FILE")
+        ->group("Reading");
+}
+
+void addMapping(CLI::App& command, Options& o)
+{
+    command.add_option("--map,--labels", o.mapping.map, "What the labels are: a built-in label map's name, or a TOML file")
+        ->type_name("NAME|FILE")
+        ->group("Tissue");
+    command.add_option("--set", o.mapping.set, "Tissue of one label, by its name or value; may be repeated")
+        ->type_name("LABEL=TISSUE")
+        ->group("Tissue");
+    command.add_option("--default-tissue", o.mapping.defaultTissue, "Tissue of labels that nothing else names")
+        ->type_name("NAME")
+        ->group("Tissue");
+    command
+        .add_option("--write-map", o.mapping.writeMap,
+                    "Write a label map to edit, with what is known of the labels, and stop")
+        ->type_name("FILE")
+        ->group("Tissue");
+    command.add_option("--tissues", o.tissues, "Tissue table in place of the built-in one")
+        ->type_name("FILE")
+        ->group("Tissue");
+}
+
+void addSteps(CLI::App& command, Options& o)
+{
+    const char* group = "Changes, done in this order; lengths in mm, or with a unit";
+    command
+        .add_option("--crop", o.steps.crop, "Keep a box around all tissue, around a structure, or x0,x1,y0,y1,z0,z1 in LPS")
+        ->type_name("tissue|NAME|BOX")
+        ->group(group);
+    command.add_option("--crop-margin", o.cropMargin, "Around the structure (default 10)")->type_name("MM")->group(group);
+    command.add_option("--voxel", o.voxel, "Resample to cubes; straightens sheared grids")->type_name("MM")->group(group);
+    command
+        .add_option_function<std::vector<std::string>>(
+            "--largest-component",
+            [&o](const std::vector<std::string>& names) {
+                o.steps.largest = true;
+                for (const std::string& name : names) {
+                    if (!name.empty()) {
+                        o.steps.largestOf.push_back(name);
+                    }
+                }
+            },
+            "Keep only the largest piece of every label, or of this one")
+        ->expected(0, 1)
+        ->type_name("[NAME]")
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+        ->group(group);
+    command
+        .add_option_function<std::vector<std::string>>(
+            "--close-skin-holes",
+            [&o](const std::vector<std::string>& size) {
+                o.steps.closeSkinHoles = 10e-3;
+                o.closeSkinHoles = size.empty() ? "" : size[0];
+            },
+            "Close holes in the skin up to this size (10)")
+        ->expected(0, 1)
+        ->type_name("[MM]")
+        ->group(group);
+    command.add_option("--add-skin", o.addSkin, "Make the outermost layer of tissue skin")->type_name("MM")->group(group);
+    command.add_option("--pad", o.pad, "Add outside on all sides")->type_name("MM")->group(group);
 }
 
 }  // namespace
 
 void addImport(CLI::App& app)
 {
-    const auto options = std::make_shared<ImportOptions>();
-    CLI::App* command = app.add_subcommand("import", "Turn a label map (NIfTI, NRRD, MetaImage) into a volume of tissue");
-    command->add_option("labels", options->labels, "Label map")->type_name("LABELS")->required();
-    command->add_option("-o,--output", options->output, "Volume to write (.vdb)")->type_name("V.vdb")->required();
-    command->add_option("--map", options->map, "What the labels are: a built-in map's name, or a TOML file")
-        ->type_name("NAME|FILE");
-    command->add_option("--tissues", options->tissues, "Tissue table in place of the built-in one")->type_name("FILE");
-    command->add_option("--default-tissue", options->defaultTissue, "Tissue of labels that nothing else names")
-        ->type_name("NAME");
-    command->add_option("--json", options->json, "Write the figures here, - for standard output")->type_name("FILE");
-    command->final_callback([options] { runImport(*options); });
+    const auto o = std::make_shared<Options>();
+    CLI::App* command = app.add_subcommand(
+        "import", "Turn a segmentation (NIfTI, NRRD, MetaImage, DICOM, OpenVDB, folder) into a volume of tissue");
+    command->add_option("input", o->input, "Label map or segmentation: a file, or a folder of masks or of DICOM")
+        ->type_name("LABELS")
+        ->required();
+    command->add_option("-o,--output", o->output, "Volume to write")->type_name("V.vdb");
+    command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
+    addReading(*command, *o);
+    addMapping(*command, *o);
+    addSteps(*command, *o);
+    command->final_callback([o] { runImport(*o); });
 }
 
 }  // namespace palpate::apps

@@ -1,6 +1,7 @@
 #include <apps/command.h>
 
 #include <apps/child_process.h>
+#include <apps/falcon.h>
 #include <apps/faults.h>
 #include <apps/figures.h>
 #include <apps/measures.h>
@@ -45,6 +46,7 @@ struct Options {
     bool sceneGiven = false;
     SceneChanges changes;
     std::string device = "hand";
+    FalconOptions falcon;
     std::string trainee;
     std::string task, lesionFrom;
     double lesionDiameter = 10;  // [mm]
@@ -178,10 +180,11 @@ void checkFaults(const Options& o)
 void checkDevice(const Options& o)
 {
     if (!o.trainee.empty() && o.device != "hand") {
-        throw std::runtime_error("--trainee " + o.trainee + ": needs --device hand; mouse and record bring their own hand");
+        throw std::runtime_error("--trainee " + o.trainee +
+                                 ": needs --device hand; mouse, falcon and record bring their own hand");
     }
-    if (o.device == "mouse" && o.unpaced) {
-        throw std::runtime_error("--device mouse: somebody holds it: leave out --unpaced");
+    if ((o.device == "mouse" || o.device == "falcon") && o.unpaced) {
+        throw std::runtime_error("--device " + o.device + ": somebody holds it: leave out --unpaced");
     }
     if (o.device == "mouse" && !wantsWindow(o) && o.session.empty()) {
         throw std::runtime_error(
@@ -333,10 +336,16 @@ void train(Options o)
     checkOutputs(o);
     const auto record = recordFile(o);
     applyTask(o);
+    std::shared_ptr<falcon::Driver> falcon;
+    if (o.device == "falcon") {
+        falcon = openFalcon(o.falcon);
+        o.changes.arm = o.changes.arm.value_or("falcon");
+    }
     const auto model = openSession(o.scene, o.changes);
     const auto info = describeSession(model, o.scene, deviceInWords(o));
     TrainOptions options;
     options.device = o.device;
+    options.falcon = std::move(falcon);
     options.trainee = o.trainee;
     options.seed = o.changes.seed.value_or(1);
     options.session = sessionName(o);
@@ -402,9 +411,12 @@ void addTrain(CLI::App& app)
         ->check(CLI::Range(2.0, 50.0))
         ->capture_default_str();
     c->add_flag("--lesion-sphere", o->sphere, "A ball instead of lobes and spikes");
-    c->add_option("--device", o->device,
-                  "hand (a scripted trainee), mouse (of the viewer's window), or a record (.db) whose poses are played")
+    c->add_option(
+         "--device", o->device,
+         "hand (a scripted trainee), mouse (of the viewer's window), falcon (Novint Falcon), or a record (.db) whose "
+         "poses are played")
         ->capture_default_str();
+    addFalconOptions(*c, o->falcon);
     c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
         ->check(CLI::IsMember(haptics::skillNames()));
     c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
@@ -435,7 +447,8 @@ void addTrain(CLI::App& app)
                   "unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s; several separated by commas")
         ->take_all();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
-    c->final_callback([o, scene] {
+    c->final_callback([o, scene, c] {
+        checkFalconOptions(*c, o->device == "falcon");
         o->sceneGiven = scene->count() > 0;
         train(*o);
     });

@@ -14,11 +14,14 @@ namespace palpate::apps {
 void addTrain(CLI::App& app);
 void addImport(CLI::App& app);
 void addInfo(CLI::App& app);
+void addExport(CLI::App& app);
+void addScene(CLI::App& app);
 void addPhantom(CLI::App& app);
 void addReplay(CLI::App& app);
 void addScore(CLI::App& app);
 void addPlan(CLI::App& app);
 void addBench(CLI::App& app);
+void addDevices(CLI::App& app);
 
 /// Writes figures where `--json FILE` asked for them ("-" = standard output). Throws std::runtime_error.
 void writeJson(const std::filesystem::path& file, const nlohmann::json& figures);

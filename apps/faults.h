@@ -53,6 +53,7 @@ public:
     void write(Vec3 force) noexcept override;
     void observe(const haptics::TickRecord& record) noexcept override { device_->observe(record); }
     bool finished() const noexcept override { return device_->finished(); }
+    std::string problem() const override { return device_->problem(); }
 
 private:
     const Fault* active(FaultKind kind) const noexcept;

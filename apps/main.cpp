@@ -1,6 +1,7 @@
 #include <apps/accuracy/command.h>
 #include <apps/command.h>
 #include <apps/stability/command.h>
+#include <apps/sweep/command.h>
 
 #include <CLI/CLI.hpp>
 
@@ -26,13 +27,17 @@ int main(int argc, char** argv)
     addTrain(app);
     addImport(app);
     addInfo(app);
+    addExport(app);
+    addScene(app);
     addPhantom(app);
     addReplay(app);
     addScore(app);
     addPlan(app);
     addBench(app);
+    addDevices(app);
     addAccuracy(app);
     addStability(app);
+    addSweep(app);
 
     try {
         app.parse(argc, argv);

@@ -1,6 +1,7 @@
 #include <apps/trainer.h>
 
 #include <haptics/broadcast.h>
+#include <haptics/falcon/device.h>
 #include <haptics/hand.h>
 #include <haptics/mouse.h>
 #include <haptics/palpator.h>
@@ -85,6 +86,8 @@ std::unique_ptr<Device> openDevice(const TrainOptions& options, const SessionMod
     if (options.device == "mouse") {
         device = std::make_unique<MouseDevice>(mouseBefore(
             model, [&] { return broadcast.input(); }, startDistance));
+    } else if (options.falcon) {
+        device = falcon::falconBefore(model, options.falcon, startDistance);
     } else if (options.device != "hand") {
         device = std::make_unique<ReplayDevice>(Record(options.device));
     } else if (model.scene.task == datasets::SessionTask::find) {
@@ -237,6 +240,9 @@ struct Trainer::Impl {
                 result.problem = fmt::format("{}: {} ticks were lost by the recorder: record to a faster disk",
                                              options.record.string(), result.lostRecords);
             }
+        }
+        if (result.problem.empty()) {
+            result.problem = device->problem();
         }
         if (tally.faulted && result.problem.empty()) {
             result.problem = "a force or a pose was not finite: the force was switched off (event 'fault' in the record)";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <apps/faults.h>
+#include <haptics/falcon/driver.h>
 #include <haptics/recorder.h>
 #include <haptics/replay.h>
 #include <haptics/score.h>
@@ -17,7 +18,8 @@
 namespace palpate::apps {
 
 struct TrainOptions {
-    std::string device = "hand";   // or "mouse" (of a viewer), or the file of a record
+    std::string device = "hand";             // or "mouse" (of a viewer), "falcon", or the file of a record
+    std::shared_ptr<falcon::Driver> falcon;  // of device "falcon", ready
     std::string trainee;           // whose hand it is, see haptics/trainee.h; empty: one that follows the scene's script
     std::uint64_t seed = 1;        // of the trainee's errors
     std::string session;           // name for viewers

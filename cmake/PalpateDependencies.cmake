@@ -13,13 +13,24 @@ find_package(fmt CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)
 find_package(nlohmann_json CONFIG REQUIRED)
 find_package(tomlplusplus CONFIG REQUIRED)
+find_package(muparser CONFIG REQUIRED)
 find_package(SQLite3 REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(Boost 1.74 REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(PkgConfig REQUIRED)
+pkg_check_modules(libusb REQUIRED IMPORTED_TARGET GLOBAL libusb-1.0)
 
-find_package(ITK 5.2 REQUIRED COMPONENTS
-  ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta)
+# The importer's decoders: DICOM (its own config file asks for far more than is linked here), JPEG 2000, bzip2.
+find_package(BZip2 REQUIRED)
+find_path(DCMTK_INCLUDE dcmtk/dcmdata/dctk.h REQUIRED)
+find_path(OPENJPEG_INCLUDE openjpeg.h PATH_SUFFIXES openjpeg-2.5 REQUIRED)
+add_library(palpate_dicom INTERFACE IMPORTED)
+target_include_directories(palpate_dicom SYSTEM INTERFACE ${DCMTK_INCLUDE} ${OPENJPEG_INCLUDE})
+foreach(part dcmjpls dcmtkcharls dcmjpeg ijg8 ijg12 ijg16 dcmimage dcmimgle dcmdata oflog ofstd openjp2)
+  find_library(PALPATE_${part}_LIBRARY ${part} REQUIRED)
+  target_link_libraries(palpate_dicom INTERFACE ${PALPATE_${part}_LIBRARY})
+endforeach()
 
 if(PALPATE_REFERENCE)
   find_package(CGAL 5.5 CONFIG REQUIRED)
@@ -39,4 +50,7 @@ endif()
 
 if(BUILD_TESTING)
   find_package(GTest CONFIG REQUIRED)
+  # A second reader of medical images, to compare with.
+  find_package(ITK 5.2 REQUIRED COMPONENTS
+    ITKCommon ITKIOImageBase ITKIONIFTI ITKIONRRD ITKIOMeta ITKIOGDCM)
 endif()

@@ -1,3 +1,4 @@
+#include <datasets/approach.h>
 #include <datasets/scene.h>
 
 #include <fmt/format.h>
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
@@ -26,15 +28,17 @@ using Labels = std::vector<std::uint16_t>;
 constexpr std::size_t mostSamples = 2'000'000;   // of the search for the target
 constexpr std::size_t mostFieldNodes = 300'000;  // of a distance field
 constexpr int directionCount = 600;
-constexpr int borderVoxels = 3;         // the body's surface so near to the image's border is a cut, not skin
-constexpr double freeOutside = 0.06;    // length of needle that must be in air before it enters [m]
-constexpr double comfort = 7e-3;        // clearance beyond which more is no better [m]
-constexpr double discSpacing = 0.7e-3;  // of the samples around a line [m]
-constexpr double beyondTip = 3e-3;      // a line must also be clear so far beyond the fired tip [m]
-constexpr double startDistance = 0.03;  // of the tip from the skin, before and after [m]
-constexpr double leastInside = 3e-3;    // the tip is so deep before the gun fires [m]
-constexpr double steepest = 0.5;        // cosine between needle and skin's normal; flatter, the tip slips on the skin
-constexpr double skinPatch = 5e-3;      // radius of the patch that tells the skin's normal [m]
+constexpr int borderVoxels = 3;          // the body's surface so near to the image's border is a cut, not skin
+constexpr double freeOutside = 0.06;     // length of needle that must be in air before it enters [m]
+constexpr double comfort = 7e-3;         // clearance beyond which more is no better [m]
+constexpr double discSpacing = 0.7e-3;   // of the samples around a line [m]
+constexpr double beyondTip = 3e-3;       // a line must also be clear so far beyond the fired tip [m]
+constexpr double startDistance = 0.03;   // of the tip from the skin, before and after [m]
+constexpr double leastInside = 3e-3;     // the tip is so deep before the gun fires [m]
+constexpr double steepest = 0.5;         // cosine between needle and skin's normal; flatter, the tip slips on the skin
+constexpr double skinPatch = 5e-3;       // radius of the patch that tells the skin's normal [m]
+constexpr double otherDirection = 0.94;  // cosine between two proposals, at most
+constexpr double otherPlace = 10e-3;     // or so far are their aims apart [m]
 constexpr double clearances[] = {4e-3, 2.5e-3, 1.5e-3};  // tried in this order, beside the needle's radius [m]
 
 struct Blob {
@@ -272,8 +276,7 @@ double clearance(const Surroundings& s, const Tissue::Reader& reader, Vec3 from,
 }
 
 struct Line {
-    Approach approach;
-    double clearance = 0;
+    Proposal way;
     double cost = 0;
 };
 
@@ -294,14 +297,16 @@ std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const T
     if (!entry || glm::length(*entry - aim) > scene.tool.length) {
         return std::nullopt;
     }
-    if (glm::dot(skinNormal(s, reader, *entry), direction) < steepest) {
+    const double upright = glm::dot(skinNormal(s, reader, *entry), direction);
+    if (upright < steepest) {
         return std::nullopt;
     }
     const double length = glm::length(*entry - aim);
     const double fired = firingDepth(scene.tool, length) + throwOf(scene.tool);
     const double room = clearance(s, reader, *entry, *entry - (fired + beyondTip) * direction) - scene.tool.radius;
     const double offCentre = std::max(0.0, fired - (length + halfNotch(scene.tool)));
-    return Line{{*entry, aim}, room, length + 3.0 * (std::max(0.0, comfort - room) + offCentre)};
+    const Proposal way{{*entry, aim}, length, room, std::acos(std::min(1.0, upright)), offCentre};
+    return Line{way, length + 3.0 * (std::max(0.0, comfort - room) + offCentre)};
 }
 
 // Ways into `aim` from all around, on Fibonacci's spiral.
@@ -327,32 +332,63 @@ void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vect
 
 }  // namespace
 
-Approach planApproach(const Scene& scene, const Tissue& tissue)
+namespace {
+
+// All lines to the target that keep `margin` from what is forbidden, or nothing to say how far, the most of `clearances`
+// that some keep; the best first.
+std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optional<double> margin)
 {
-    const std::vector<Vec3> points = aims(scene, tissue);
-    if (scene.entry) {
-        return {*scene.entry, points.front()};
-    }
     const Surroundings s = surroundings(scene, tissue);
     std::vector<Line> lines;
-    for (const Vec3 aim : points) {
+    for (const Vec3 aim : aims(scene, tissue)) {
         collectLines(scene, s, aim, lines);
     }
-    for (const double least : clearances) {
-        const Line* best = nullptr;
-        for (const Line& line : lines) {
-            if (line.clearance >= least && (best == nullptr || line.cost < best->cost)) {
-                best = &line;
-            }
-        }
-        if (best != nullptr) {
-            return best->approach;
+    std::stable_sort(lines.begin(), lines.end(), [](const Line& a, const Line& b) { return a.cost < b.cost; });
+    const std::vector<double> wanted =
+        margin ? std::vector<double>{*margin} : std::vector<double>(std::begin(clearances), std::end(clearances));
+    for (const double least : wanted) {
+        std::vector<Line> good;
+        std::copy_if(lines.begin(), lines.end(), std::back_inserter(good),
+                     [&](const Line& line) { return line.way.clearance >= least; });
+        if (!good.empty()) {
+            return good;
         }
     }
-    throw std::runtime_error(fmt::format(
-        "{}: no straight way to '{}' from the skin that keeps {} mm from vital structures and bone ({} ways reach it): set "
-        "entry_mm and aim_mm in [target]",
-        scene.name, scene.target, clearances[std::size(clearances) - 1] * 1e3, lines.size()));
+    throw std::runtime_error(
+        fmt::format("{}: no straight way to '{}' from the skin that keeps {:g} mm from vital structures and bone ({} ways "
+                    "reach it): set "
+                    "entry_mm and aim_mm in [target]",
+                    scene.name, scene.target, wanted.back() * 1e3, lines.size()));
+}
+
+// Two lines between which there is something to choose.
+bool differ(const Proposal& a, const Proposal& b)
+{
+    const Vec3 da = (a.approach.aim - a.approach.entry) / a.length, db = (b.approach.aim - b.approach.entry) / b.length;
+    return glm::dot(da, db) < otherDirection || glm::length(a.approach.aim - b.approach.aim) > otherPlace;
+}
+
+}  // namespace
+
+Approach planApproach(const Scene& scene, const Tissue& tissue)
+{
+    if (scene.entry) {
+        return {*scene.entry, aims(scene, tissue).front()};
+    }
+    return goodLines(scene, tissue, std::nullopt).front().way.approach;
+}
+
+std::vector<Proposal> proposeApproaches(const Scene& scene, const Tissue& tissue, std::size_t most,
+                                        std::optional<double> margin)
+{
+    std::vector<Proposal> out;
+    for (const Line& line : goodLines(scene, tissue, margin)) {
+        const bool isNew = std::all_of(out.begin(), out.end(), [&](const Proposal& p) { return differ(p, line.way); });
+        if (isNew && out.size() < most) {
+            out.push_back(line.way);
+        }
+    }
+    return out;
 }
 
 // The tip then stands half a notch beyond the aim. A shallow aim is missed rather than fired at from outside.

@@ -3,8 +3,6 @@
 #include <datasets/phantom_parts.h>
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -27,24 +25,21 @@ using volume::Tissue;
 constexpr double farthest = 5000.0;  // a coordinate from the origin [mm]
 constexpr int surfaceSamples = 200;  // of a lesion that looks for room
 
-LabelImage labelsOf(const Tissue& tissue)
+std::vector<volume::LabelName> namesOf(const Tissue& tissue)
 {
-    LabelImage image;
-    image.size = tissue.size();
-    image.affine = tissue.affine();
-    image.values.resize(static_cast<std::size_t>(image.size.x) * static_cast<std::size_t>(image.size.y) *
-                        static_cast<std::size_t>(image.size.z));
-    tbb::parallel_for(tbb::blocked_range<int>(0, image.size.z, 4), [&](const tbb::blocked_range<int>& slab) {
-        const Tissue::Reader reader(tissue);
-        for (int k = slab.begin(); k < slab.end(); ++k) {
-            for (int j = 0; j < image.size.y; ++j) {
-                for (int i = 0; i < image.size.x; ++i) {
-                    image.values[image.offset({i, j, k})] = reader.label(image.affine.toPatient(Vec3(i, j, k)));
-                }
-            }
-        }
-    });
-    return image;
+    std::vector<volume::LabelName> names;
+    for (const volume::Structure& s : tissue.structures()) {
+        names.push_back({s.value, s.name, tissue.table().rows[s.tissue].name, s.colour, s.terminology});
+    }
+    return names;
+}
+
+// The volume with other labels or another table; its image stays.
+Tissue rebuilt(const Tissue& tissue, const LabelImage& image, volume::TissueTable table,
+               const std::vector<volume::LabelName>& names, volume::Provenance provenance)
+{
+    const auto companion = tissue.companion();
+    return Tissue::fromLabels(image, std::move(table), names, std::move(provenance), companion ? &*companion : nullptr);
 }
 
 // Whether a point [m] lies in an insert.
@@ -143,12 +138,11 @@ Vec3 parsePoint(const std::string& line, const std::string& where)
 
 Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
 {
-    LabelImage image = labelsOf(tissue);
-    std::vector<volume::LabelName> names;
+    LabelImage image = tissue.labels();
+    std::vector<volume::LabelName> names = namesOf(tissue);
     std::vector<char> inside(65536, 0);
     std::uint16_t next = 1;
     for (const volume::Structure& s : tissue.structures()) {
-        names.push_back({s.value, s.name, tissue.table().rows[s.tissue].name});
         inside[s.value] = tissue.table().rows[s.tissue].role == Role::air ? 0 : 1;
         next = std::max<std::uint16_t>(next, static_cast<std::uint16_t>(s.value + 1));
     }
@@ -172,7 +166,12 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
         inside[next++] = 1;
         provenance.emplace_back("insert", insert.name);
     }
-    return Tissue::fromLabels(image, tissue.table(), names, std::move(provenance));
+    return rebuilt(tissue, image, tissue.table(), names, std::move(provenance));
+}
+
+Tissue withTable(const Tissue& tissue, volume::TissueTable table)
+{
+    return rebuilt(tissue, tissue.labels(), std::move(table), namesOf(tissue), tissue.provenance());
 }
 
 std::vector<Vec3> loadLocations(const std::filesystem::path& file)
@@ -209,6 +208,30 @@ Insert placeLesion(const Tissue& tissue, const std::filesystem::path& locations,
         "{}: at none of its {} places does a lesion of {:g} mm lie wholly in the volume's tissue: is it of this "
         "volume? else choose a smaller one",
         locations.string(), places.size(), lesion.diameter * 1e3));
+}
+
+Insert placeLesionIn(const Tissue& tissue, const std::string& structure, Insert lesion)
+{
+    constexpr std::size_t mostNodes = 4'000'000;
+    const Vec3 voxel = tissue.affine().spacing();
+    const double wanted = std::max(std::min({voxel.x, voxel.y, voxel.z}), lesion.diameter / 8);
+    const volume::NodeGrid grid = volume::affordableGrid(tissue.box(), wanted, mostNodes);
+    const volume::DistanceField field = tissue.distanceTo(tissue.labelsNamed(structure), grid);
+    const double radius = Shape(lesion).bound();
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < field.values.size(); ++i) {
+        if (static_cast<double>(field.values[i]) < -radius) {
+            places.push_back(i);
+        }
+    }
+    if (places.empty()) {
+        const float deepest = *std::min_element(field.values.begin(), field.values.end());
+        throw std::runtime_error(fmt::format("'{}' has no room for a lesion {:g} mm across: {:.0f} mm fit in at most",
+                                             structure, 2e3 * radius, std::max(0.0, -2e3 * static_cast<double>(deepest))));
+    }
+    Random random(lesion.seed);
+    lesion.centre = grid.position(grid.node(places[random.bits() % places.size()]));
+    return lesion;
 }
 
 }  // namespace palpate::datasets

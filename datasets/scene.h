@@ -10,6 +10,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace palpate::datasets {
@@ -119,6 +120,12 @@ struct VolumeSource {
     std::vector<Insert> inserts;  // one after the other
 };
 
+/// What a scene changes in one row of its volume's tissue table, by the keys of tissue tables and in their units.
+struct TissueChange {
+    std::string tissue;
+    std::vector<std::pair<std::string, double>> values;  // e.g. youngs_kpa, 10
+};
+
 /// What the trainee is asked for: a core of the target, or where it is and how large (palpation).
 enum class SessionTask : std::uint8_t { biopsy, find };
 
@@ -128,6 +135,7 @@ struct Scene {
     std::string text;  // the TOML it was read from; parsing it again gives this scene (replay relies on it)
     VolumeSource source;
     std::string tissues;  // tissue table file; empty = built-in
+    std::vector<TissueChange> tissueChanges;
     SessionTask task = SessionTask::biopsy;
     ToolSpec tool;
     ModelSettings model;

@@ -369,6 +369,7 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     if (tissues && !scene.source.file.empty()) {
         top.refuse("tissues", "a volume file holds its tissues; give the table to `palpate import --tissues`");
     }
+    scene.tissueChanges = readTissueChanges(top);
     readTool(top, scene.tool);
     readModel(top, scene.model);
     readDffb(top, scene.dffb);
@@ -423,6 +424,7 @@ std::string sceneText(const Scene& scene)
     for (const Insert& insert : scene.source.inserts) {
         out += insertText(insert);
     }
+    out += tissueChangesText(scene.tissueChanges);
     out += fmt::format("\n[tool]\nkind = \"{}\"\n{}", toolKinds[static_cast<std::size_t>(scene.tool.kind)],
                        writeFields<ToolSpec>(toolFields, scene.tool));
     out += modelText(scene.model);

@@ -3,12 +3,20 @@
 #include <datasets/scene.h>
 
 #include <cstddef>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace palpate::datasets {
 
+class Section;
+
 /// Vital structures of a scene: a session follows 16 structures, the target among them.
 inline constexpr std::size_t mostVital = 15;
+
+/// The tables [tissue.NAME] of a scene, and back.
+std::vector<TissueChange> readTissueChanges(Section& top);
+std::string tissueChangesText(std::span<const TissueChange> changes);
 
 /// A scene as TOML text with every field, for scenes that no one wrote. parseScene() reads it back.
 std::string sceneText(const Scene& scene);

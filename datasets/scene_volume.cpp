@@ -114,12 +114,15 @@ namespace {
 Tissue volumeAlone(const Scene& scene)
 {
     if (scene.source.file.empty()) {
-        return makePhantom(scene.source.phantom, scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues));
+        auto table = scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues);
+        return makePhantom(scene.source.phantom, withChanges(std::move(table), scene.tissueChanges));
     }
     if (scene.source.file.extension() != ".vdb") {
         throw std::runtime_error(scene.source.file.string() + ": not a .vdb volume: convert it with `palpate import`");
     }
-    return Tissue::load(scene.source.file);
+    Tissue tissue = Tissue::load(scene.source.file);
+    return scene.tissueChanges.empty() ? std::move(tissue)
+                                       : withTable(tissue, withChanges(tissue.table(), scene.tissueChanges));
 }
 
 }  // namespace

@@ -1,11 +1,12 @@
 #include <datasets/tables.h>
 
 #include <datasets/embedded.h>
+#include <datasets/scene_text.h>
 #include <datasets/toml_fields.h>
 
 #include <algorithm>
 #include <array>
-#include <set>
+#include <span>
 #include <stdexcept>
 
 namespace palpate::datasets {
@@ -70,6 +71,18 @@ glm::vec3 readColour(Section& section)
     return colour;
 }
 
+// Empty, or the key that does not go with the others and why.
+std::pair<std::string_view, std::string> misfit(const TissueRow& row)
+{
+    if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
+        return {"youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest)};
+    }
+    if (row.cuttingForce > row.punctureForce) {
+        return {"cutting_n", "must not be over puncture_n: the force drops after the puncture"};
+    }
+    return {};
+}
+
 TissueRow readTissue(Section& section)
 {
     TissueRow row;
@@ -84,11 +97,8 @@ TissueRow readTissue(Section& section)
     readFields<TissueRow>(section, tissueFields, row, Need::all);
     readFields<TissueRow>(section, measuredFields, row, Need::some);
     section.finish();
-    if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
-        section.refuse("youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest), "kPa");
-    }
-    if (row.cuttingForce > row.punctureForce) {
-        section.refuse("cutting_n", "must not be over puncture_n: the force drops after the puncture", "N");
+    if (const auto [key, why] = misfit(row); !key.empty()) {
+        section.refuse(key, why, key == "cutting_n" ? "N" : "kPa");
     }
     return row;
 }
@@ -119,35 +129,81 @@ TissueTable readTissues(std::string_view text, const std::string& file)
     return table;
 }
 
-LabelMap readLabelMap(std::string_view text, const std::string& file)
+}  // namespace
+
+// Applies `use` to every number that tissue tables give a row.
+template <class Use>
+void forNumbers(Use use)
 {
-    const toml::table root = parseToml(text, file);
-    Section top(root, file, "");
-    LabelMap map;
-    map.name = top.word("name").value_or(std::filesystem::path(file).stem().string());
-    std::set<std::uint16_t> seen;
-    for (Section& section : top.sections("labels")) {
-        const auto value = section.integer("value", "", 0, 65535);
-        const auto name = section.word("name");
-        const auto tissue = section.word("tissue");
-        if (!value || !name || !tissue) {
-            section.missing(!value ? "value" : !name ? "name" : "tissue", "each label has value, name and tissue");
+    for (const std::span<const Field<TissueRow>> fields :
+         {std::span<const Field<TissueRow>>(tissueFields), std::span<const Field<TissueRow>>(measuredFields)}) {
+        for (const Field<TissueRow>& f : fields) {
+            if (const auto* const member = std::get_if<double TissueRow::*>(&f.member)) {
+                use(f, *member);
+            }
         }
-        section.finish();
-        if (!seen.insert(static_cast<std::uint16_t>(*value)).second) {
-            section.refuse("value", "is there twice");
-        }
-        map.labels.push_back({static_cast<std::uint16_t>(*value), *name, *tissue});
     }
-    top.finish();
-    if (map.labels.empty()) {
-        throw std::runtime_error(file +
-                                 ": no labels in it: labels = [ { value = 1, name = \"liver\", tissue = \"liver\" } ]");
-    }
-    return map;
 }
 
-}  // namespace
+std::vector<TissueChange> readTissueChanges(Section& top)
+{
+    std::vector<TissueChange> changes;
+    std::optional<Section> all = top.section("tissue");
+    if (!all) {
+        return changes;
+    }
+    for (const std::string& name : all->keys()) {
+        Section section = *all->section(name);
+        TissueChange change{name, {}};
+        forNumbers([&](const Field<TissueRow>& f, double TissueRow::*) {
+            if (const auto value = section.number(f.key, f.unit, f.low, f.high)) {
+                change.values.emplace_back(f.key, *value);
+            }
+        });
+        section.finish();
+        changes.push_back(std::move(change));
+    }
+    return changes;
+}
+
+std::string tissueChangesText(std::span<const TissueChange> changes)
+{
+    std::string out;
+    for (const TissueChange& change : changes) {
+        out += fmt::format("\n[tissue.{}]\n", tomlString(change.tissue));
+        for (const auto& [key, value] : change.values) {
+            out += fmt::format("{} = {}\n", key, value);
+        }
+    }
+    return out;
+}
+
+TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes)
+{
+    for (const TissueChange& change : changes) {
+        const auto index = table.find(change.tissue);
+        if (!index || *index == 0) {
+            std::vector<std::string> names;
+            for (const TissueRow& row : std::span(table.rows).subspan(1)) {
+                names.push_back(row.name);
+            }
+            throw std::runtime_error(fmt::format("[tissue.{}]: is not in the volume's tissue table; it has: {}",
+                                                 change.tissue, fmt::join(names, ", ")));
+        }
+        TissueRow& row = table.rows[*index];
+        forNumbers([&](const Field<TissueRow>& f, double TissueRow::*member) {
+            for (const auto& [key, value] : change.values) {
+                if (key == f.key) {
+                    row.*member = value * f.si;
+                }
+            }
+        });
+        if (const auto [key, why] = misfit(row); !key.empty()) {
+            throw std::runtime_error(fmt::format("[tissue.{}] {}: {}", change.tissue, key, why));
+        }
+    }
+    return table;
+}
 
 volume::TissueTable defaultTissues()
 {
@@ -157,26 +213,6 @@ volume::TissueTable defaultTissues()
 volume::TissueTable loadTissues(const std::filesystem::path& file)
 {
     return readTissues(readText(file), file.string());
-}
-
-std::vector<std::string> labelMapNames()
-{
-    return {"victre", "totalsegmentator"};
-}
-
-LabelMap labelMap(const std::string& nameOrFile)
-{
-    const std::vector<std::string> names = labelMapNames();
-    if (std::find(names.begin(), names.end(), nameOrFile) != names.end()) {
-        const std::string file = nameOrFile + ".toml";
-        return readLabelMap(embeddedFile("tables/" + file), "built-in " + file);
-    }
-    std::error_code error;
-    if (!std::filesystem::exists(nameOrFile, error)) {
-        throw std::runtime_error(
-            fmt::format("{}: neither a file nor a built-in label map ({})", nameOrFile, fmt::join(names, ", ")));
-    }
-    return readLabelMap(readText(nameOrFile), nameOrFile);
 }
 
 }  // namespace palpate::datasets

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <datasets/scene.h>
 #include <volume/label_image.h>
 #include <volume/tissue_table.h>
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,15 +18,8 @@ volume::TissueTable defaultTissues();
 /// kPa").
 volume::TissueTable loadTissues(const std::filesystem::path& file);
 
-/// How label values of one segmenter map to tissues.
-struct LabelMap {
-    std::string name;
-    std::vector<volume::LabelName> labels;
-};
-
-/// Names of the built-in maps: "victre", "totalsegmentator".
-std::vector<std::string> labelMapNames();
-/// A built-in map by name, or one from a TOML file. Throws std::runtime_error that lists the names there are.
-LabelMap labelMap(const std::string& nameOrFile);
+/// The table with the changes of a scene in it. Throws std::runtime_error for a tissue that it does not have, and for
+/// values that do not go together.
+volume::TissueTable withChanges(volume::TissueTable table, std::span<const TissueChange> changes);
 
 }  // namespace palpate::datasets

@@ -294,6 +294,15 @@ std::vector<Section> Section::sections(std::string_view key)
     return out;
 }
 
+std::vector<std::string> Section::keys() const
+{
+    std::vector<std::string> out;
+    for (const auto& [key, node] : *table_) {
+        out.emplace_back(key.str());
+    }
+    return out;
+}
+
 void Section::finish() const
 {
     for (const auto& [key, node] : *table_) {

@@ -43,6 +43,10 @@ public:
     /// The tables of an array; titles "[[key]]".
     std::vector<Section> sections(std::string_view key);
 
+    /// The value of a key as it stands, or null.
+    const toml::node* node(std::string_view key) { return find(key); }
+    /// All keys of the table.
+    std::vector<std::string> keys() const;
     bool has(std::string_view key) const { return table_->contains(key); }
     void setTitle(std::string title) { title_ = std::move(title); }
     /// Refuses the value of `key`.

@@ -2,6 +2,8 @@
 
 #include <haptics/tick.h>
 
+#include <string>
+
 namespace palpate::haptics {
 
 /// A haptic device: real, simulated or replayed. Called from the servo thread, once each per tick.
@@ -16,6 +18,8 @@ public:
     virtual void observe(const TickRecord& /*record*/) noexcept {}
     /// True when there is nothing more to do: the script or the record has come to its end.
     virtual bool finished() const noexcept = 0;
+    /// What ended it before its time, for the user; empty: nothing. Not from the servo thread.
+    virtual std::string problem() const { return {}; }
 };
 
 }  // namespace palpate::haptics

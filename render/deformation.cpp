@@ -45,6 +45,14 @@ double spline(double d) noexcept
     return d < 0.5 ? 0.75 - d * d : 0.5 * (1.5 - d) * (1.5 - d);
 }
 
+// Four floats that are added and multiplied at once.
+using Lanes = float __attribute__((vector_size(16)));
+
+Lanes lanes(const glm::vec4& v) noexcept
+{
+    return Lanes{v.x, v.y, v.z, v.w};
+}
+
 }  // namespace
 
 VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept
@@ -63,11 +71,15 @@ Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::u
     std::size_t nodes = 1;
     for (const std::int32_t n : lattice_.size)
         nodes *= static_cast<std::size_t>(std::max(n, 0));
-    u_.resize(nodes, glm::vec3(0));
+    u_.resize(nodes, glm::vec4(0));
     visited_.resize(nodes, 0);
-    air_.resize(nodes, 0);
-    for (std::size_t i = 0; i < nodes; ++i)
-        air_[i] = restTissue(position(lattice_, node(lattice_, static_cast<std::uint32_t>(i)))) == 0;
+    place_.resize(nodes, 0);
+    for (std::size_t i = 0; i < nodes; ++i) {
+        const glm::ivec3 n = node(lattice_, static_cast<std::uint32_t>(i));
+        const bool air = restTissue(position(lattice_, n)) == 0;
+        place_[i] = static_cast<std::uint8_t>((air ? airBit : 0) |
+                                              (inside(lattice_, n - 1) && inside(lattice_, n + 1) ? 0 : borderBit));
+    }
     markNearAir();
 }
 
@@ -88,23 +100,39 @@ void Deformation::markPure()
     }
 }
 
+// Visits a node and its neighbours, as far as there are any.
+template <class Visit>
+void Deformation::eachAround(std::uint32_t at, Visit visit) const
+{
+    const auto row = static_cast<std::uint32_t>(lattice_.size[0]),
+               layer = row * static_cast<std::uint32_t>(lattice_.size[1]);
+    if ((place_[at] & borderBit) == 0) {
+        const std::uint32_t first = at - layer - row - 1;
+        for (std::uint32_t z = 0; z < 3; ++z)
+            for (std::uint32_t y = 0; y < 3; ++y)
+                for (std::uint32_t x = 0; x < 3; ++x)
+                    visit(first + z * layer + y * row + x);
+        return;
+    }
+    const glm::ivec3 middle = node(lattice_, at);
+    for (int k = 0; k < 27; ++k) {
+        const glm::ivec3 n = middle + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
+        if (inside(lattice_, n))
+            visit(static_cast<std::uint32_t>(offset(lattice_, n)));
+    }
+}
+
 void Deformation::markNearAir()
 {
-    nearAir_.resize(air_.size(), 0);
-    for (std::size_t i = 0; i < air_.size(); ++i) {
-        const glm::ivec3 middle = node(lattice_, static_cast<std::uint32_t>(i));
-        for (int k = 0; k < 27 && air_[i] != 0; ++k) {
-            const glm::ivec3 n = middle + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
-            if (inside(lattice_, n))
-                nearAir_[offset(lattice_, n)] = 1;
-        }
-    }
+    for (std::uint32_t i = 0; i < place_.size(); ++i)
+        if ((place_[i] & airBit) != 0)
+            eachAround(i, [&](std::uint32_t at) { place_[at] |= nearAirBit; });
 }
 
 VoxelBox Deformation::apply(const channel::Displaced& displaced)
 {
     for (const std::uint32_t n : moved_)
-        u_[n] = glm::vec3(0);
+        u_[n] = glm::vec4(0);
     moved_.clear();
     ++pass_;
     largest_ = 0;
@@ -112,13 +140,13 @@ VoxelBox Deformation::apply(const channel::Displaced& displaced)
     for (std::size_t i = 0; i < count; ++i) {
         const channel::Displacement& d = displaced.nodes[i];
         const glm::vec3 u(d.u[0], d.u[1], d.u[2]);
-        const double length = glm::length(glm::dvec3(u));
+        const float length = glm::length(u);
         if (d.node >= u_.size() || !(length > 0) || !std::isfinite(length) || visited_[d.node] == pass_)
             continue;
-        u_[d.node] = u;
+        u_[d.node] = glm::vec4(u, 0);
         visited_[d.node] = pass_;
         moved_.push_back(d.node);
-        largest_ = std::max(largest_, length);
+        largest_ = std::max(largest_, static_cast<double>(length));
     }
     carryAir();
     const VoxelBox now = boxOfMoved();
@@ -139,13 +167,14 @@ void Deformation::carryAir()
         const std::size_t end = moved_.size();
         frontier_.clear();
         for (std::size_t m = begin; m < end; ++m)
-            if (nearAir_[moved_[m]] != 0)
-                reachAir(node(lattice_, moved_[m]));
+            if ((place_[moved_[m]] & nearAirBit) != 0)
+                reachAir(moved_[m]);
         for (const std::uint32_t at : frontier_) {
-            const glm::vec3 mean = meanAround(node(lattice_, at));
+            const glm::vec3 mean = meanAround(at);
             const float length = glm::length(mean), less = step * static_cast<float>(lattice_.spacing);
-            u_[at] = layer < whole ? mean : length > less ? mean * (1 - less / length) : glm::vec3(0);
-            if (u_[at] != glm::vec3(0))
+            const glm::vec3 carried = layer < whole ? mean : length > less ? mean * (1 - less / length) : glm::vec3(0);
+            u_[at] = glm::vec4(carried, 0);
+            if (carried != glm::vec3(0))
                 moved_.push_back(at);
         }
         if (layer < whole)
@@ -154,32 +183,25 @@ void Deformation::carryAir()
     }
 }
 
-void Deformation::reachAir(glm::ivec3 around)
+void Deformation::reachAir(std::uint32_t around)
 {
-    for (int k = 0; k < 27; ++k) {
-        const glm::ivec3 n = around + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
-        if (!inside(lattice_, n))
-            continue;
-        const auto at = static_cast<std::uint32_t>(offset(lattice_, n));
-        if (air_[at] != 0 && visited_[at] != pass_) {
+    eachAround(around, [&](std::uint32_t at) {
+        if ((place_[at] & airBit) != 0 && visited_[at] != pass_) {
             visited_[at] = pass_;
             frontier_.push_back(at);
         }
-    }
+    });
 }
 
-glm::vec3 Deformation::meanAround(glm::ivec3 around) const noexcept
+glm::vec3 Deformation::meanAround(std::uint32_t around) const noexcept
 {
-    glm::vec3 sum(0);
+    glm::vec4 sum(0);
     int neighbours = 0;
-    for (int k = 0; k < 27; ++k) {
-        const glm::ivec3 n = around + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
-        if (!inside(lattice_, n) || u_[offset(lattice_, n)] == glm::vec3(0))
-            continue;
-        sum += u_[offset(lattice_, n)];
-        ++neighbours;
-    }
-    return neighbours > 0 ? sum / static_cast<float>(neighbours) : sum;
+    eachAround(around, [&](std::uint32_t at) {
+        sum += u_[at];
+        neighbours += u_[at] != glm::vec4(0) ? 1 : 0;
+    });
+    return glm::vec3(sum) / static_cast<float>(std::max(neighbours, 1));
 }
 
 VoxelBox Deformation::boxOfMoved() const
@@ -187,9 +209,19 @@ VoxelBox Deformation::boxOfMoved() const
     if (moved_.empty())
         return {};
     glm::ivec3 low = size(lattice_), high(-1);
+    const auto row = static_cast<std::uint32_t>(lattice_.size[0]);
+    glm::ivec3 first(0);  // of the row that the last node was in
+    std::uint32_t begin = ~row;
     for (std::size_t m = 0; m < visible_; ++m) {
-        low = glm::min(low, node(lattice_, moved_[m]));
-        high = glm::max(high, node(lattice_, moved_[m]));
+        if (moved_[m] - begin >= row) {
+            begin = moved_[m] - moved_[m] % row;
+            first = node(lattice_, begin);
+            low = glm::min(low, glm::ivec3(low.x, first.y, first.z));
+            high = glm::max(high, first);
+        }
+        const int x = static_cast<int>(moved_[m] - begin);
+        low.x = std::min(low.x, x);
+        high.x = std::max(high.x, x);
     }
     // A node reaches one spacing into its cells, and what it moves lands up to |u| further away.
     const glm::dvec3 reach(lattice_.spacing + largest_ + labelGrid_.spacing);
@@ -207,23 +239,26 @@ glm::vec3 Deformation::displacement(glm::vec3 g) const noexcept
     const glm::ivec3 cell(g);
     const glm::vec3 part = g - glm::vec3(cell);
     const auto row = static_cast<std::size_t>(lattice_.size[0]), layer = row * static_cast<std::size_t>(lattice_.size[1]);
-    const glm::vec3* u = &u_[offset(lattice_, cell)];
-    const auto alongX = [&](std::size_t at) { return u[at] + part.x * (u[at + 1] - u[at]); };
+    const glm::vec4* u = &u_[offset(lattice_, cell)];
+    const auto alongX = [&](std::size_t at) {
+        const Lanes from = lanes(u[at]);
+        return from + part.x * (lanes(u[at + 1]) - from);
+    };
     const auto alongXY = [&](std::size_t at) {
-        const glm::vec3 near = alongX(at);
+        const Lanes near = alongX(at);
         return near + part.y * (alongX(at + row) - near);
     };
-    const glm::vec3 below = alongXY(0);
-    return below + part.z * (alongXY(layer) - below);
+    const Lanes below = alongXY(0), sum = below + part.z * (alongXY(layer) - below);
+    return {sum[0], sum[1], sum[2]};
 }
 
-// In lattice units and single precision: this runs for every voxel that moves, in every frame.
-glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
+// In lattice units and single precision: this runs for every node of a shift field and every pixel of a slice, in every
+// frame.
+void Deformation::follow(glm::vec3 g, glm::vec3& shift) const noexcept
 {
     constexpr int iterations = 5;
     constexpr float enough = 0.03F;  // [lattice spacings]
     const auto perMetre = static_cast<float>(1 / lattice_.spacing);
-    const glm::vec3 g((x - vec(lattice_.origin)) / lattice_.spacing);
     for (int i = 0; i < iterations; ++i) {
         const glm::vec3 next = -perMetre * displacement(g + shift);
         const glm::vec3 step = glm::abs(next - shift);
@@ -231,6 +266,11 @@ glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
         if (std::max({step.x, step.y, step.z}) < enough)
             break;
     }
+}
+
+glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
+{
+    follow(glm::vec3((x - vec(lattice_.origin)) / lattice_.spacing), shift);
     return shift == glm::vec3(0) ? x : x + lattice_.spacing * glm::dvec3(shift);
 }
 

@@ -3,6 +3,7 @@
 #include <render/channel/layout.h>
 
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -38,6 +39,8 @@ public:
     /// The rest point X that lies at `x` [m], by the fixed point X <- x - u(X).
     /// @param shift  where to start, X - x in lattice spacings, and where it ended: the next point along a row starts there
     glm::dvec3 rest(glm::dvec3 x, glm::vec3& shift) const noexcept;
+    /// The same in the lattice's own terms, for what needs many of them: takes shift(g) to X - x, both in spacings.
+    void follow(glm::vec3 g, glm::vec3& shift) const noexcept;
     /// Where the rest point `p` [m] lies now.
     glm::dvec3 seen(glm::dvec3 p) const noexcept;
     /// Tissue at `x` [m] in the deformed body; `shift` as above. Around a point the tissue with the largest quadratic
@@ -55,6 +58,8 @@ public:
 
 private:
     static constexpr std::uint8_t pureBit = 0x40;  // the 26 voxels around are of the same tissue
+    // A node outside the body; that one or one of its neighbours is; it has not all 26 of them.
+    static constexpr std::uint8_t airBit = 1, nearAirBit = 2, borderBit = 4;
 
     /// At `g` [lattice spacings from the lattice's origin], in metres.
     glm::vec3 displacement(glm::vec3 g) const noexcept;
@@ -62,15 +67,16 @@ private:
     void markPure();
     void markNearAir();
     void carryAir();
-    void reachAir(glm::ivec3 around);
-    glm::vec3 meanAround(glm::ivec3 around) const noexcept;
+    void reachAir(std::uint32_t around);
+    glm::vec3 meanAround(std::uint32_t around) const noexcept;
+    template <class Visit>
+    void eachAround(std::uint32_t node, Visit visit) const;
     VoxelBox boxOfMoved() const;
 
     channel::Grid labelGrid_, lattice_;
     std::vector<std::uint8_t> labels_;    // with pureBit
-    std::vector<std::uint8_t> air_;       // per lattice node: outside the body
-    std::vector<std::uint8_t> nearAir_;   // per lattice node: that one or a neighbour is
-    std::vector<glm::vec3> u_;            // per lattice node [m]
+    std::vector<std::uint8_t> place_;     // per lattice node: airBit, nearAirBit, borderBit
+    std::vector<glm::vec4> u_;            // per lattice node [m], and 0
     std::vector<std::uint32_t> moved_;    // nodes with u != 0
     std::vector<std::uint32_t> visited_;  // per lattice node: last pass that gave it a value
     std::vector<std::uint32_t> frontier_;

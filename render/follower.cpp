@@ -74,7 +74,7 @@ bool Follower::over() const noexcept
 
 bool Follower::moving() const noexcept
 {
-    constexpr double settled = 0.8;  // [s]: longer than a hand pauses, for a fine picture is slow to leave
+    constexpr double settled = 1.2;  // [s]: longer than a hand pauses, for a fine picture is slow to leave
     return subscriber_ && seconds(Clock::now() - moved_) < settled;
 }
 
@@ -204,7 +204,7 @@ void Follower::draw(Picture& picture, Quality quality)
         readShape();
     if (known_)
         picture.update(state_, std::exchange(reshaped_, false) ? displaced_.get() : nullptr, health_);
-    picture.render(quality);
+    picture.render(quality, polled_);
     const auto now = Clock::now();
     if (!known_)
         return;

@@ -180,9 +180,8 @@ ScreenPlan Picture::screenPlan() const
     return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_};
 }
 
-void Picture::render(Quality quality)
+void Picture::render(Quality quality, std::chrono::steady_clock::time_point began)
 {
-    const auto start = std::chrono::steady_clock::now();
     const ScreenPlan plan = screenPlan();
     const double w = plan.width, h = plan.height;
     const Area all{0, 0, plan.width, plan.height}, view = session_ ? plan.view : all;
@@ -208,7 +207,7 @@ void Picture::render(Quality quality)
         software_ = name.find("llvmpipe") != std::string::npos || name.find("softpipe") != std::string::npos;
     }
     if (session_)
-        session_->volume.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+        session_->volume.took(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
 }
 
 // The plane of the cut holds the needle (in the air the planned line) and turns with the camera, so that from wherever one

@@ -16,6 +16,7 @@
 #include <vtkRenderer.h>
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -41,8 +42,9 @@ public:
     void note(const channel::State& state);
     /// Words across the picture until the next setNotice(); empty = none.
     void setNotice(const std::string& words, const std::string& smaller);
-    /// `moving`: coarser where the renderer is software.
-    void render(Quality quality);
+    /// `moving`: coarser where the renderer is software, so that the picture is finished in time, counted from `began`,
+    /// when the work on it did begin.
+    void render(Quality quality, std::chrono::steady_clock::time_point began = std::chrono::steady_clock::now());
 
     void show(Layout layout);
     Layout layout() const noexcept { return layout_; }

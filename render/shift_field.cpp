@@ -12,7 +12,7 @@ constexpr double affordable = 80e3;  // nodes in every frame: some milliseconds
 
 std::uint8_t byte(float share) noexcept
 {
-    return static_cast<std::uint8_t>(128 + std::lround(127.0F * share));
+    return static_cast<std::uint8_t>(128.5F + 127.0F * share);  // over zero: it is rounded
 }
 
 }  // namespace
@@ -39,13 +39,15 @@ void sample(const Deformation& deformation, ShiftField& out)
         static_cast<std::size_t>(out.size.x) * static_cast<std::size_t>(out.size.y) * static_cast<std::size_t>(out.size.z);
     out.shifts.resize(nodes);
     out.texels.resize(nodes);
+    const glm::vec3 first((out.origin - corner) / lattice);
+    const auto apart = static_cast<float>(out.spacing / lattice);
     float largest = 0;
     std::size_t at = 0;
     for (int z = 0; z < out.size.z; ++z)
         for (int y = 0; y < out.size.y; ++y) {
             glm::vec3 shift(0);
             for (int x = 0; x < out.size.x; ++x) {
-                deformation.rest(out.origin + out.spacing * glm::dvec3(x, y, z), shift);
+                deformation.follow(first + apart * glm::vec3(x, y, z), shift);
                 const glm::vec3 metres = static_cast<float>(lattice) * shift;
                 largest = std::max({largest, std::abs(metres.x), std::abs(metres.y), std::abs(metres.z)});
                 out.shifts[at++] = metres;

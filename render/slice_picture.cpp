@@ -26,6 +26,11 @@ std::uint8_t byte(float value)
     return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
 }
 
+std::array<std::uint8_t, 3> pixelOf(const std::array<float, 3>& colour)
+{
+    return {byte(colour[0]), byte(colour[1]), byte(colour[2])};
+}
+
 double pixelsPerMetre(const ViewFrame& frame, const Area& area)
 {
     return std::min(area.width, area.height) / frame.extent;
@@ -94,6 +99,10 @@ void SlicePicture::update(const channel::Scenery& scenery, const Deformation& de
         image_->SetDimensions(area.width, area.height, 1);
         image_->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
     }
+    std::array<std::array<std::uint8_t, 3>, channel::maxTissues> tissues{};
+    for (std::size_t t = 0; t < tissues.size(); ++t)
+        tissues[t] = t == 0 ? airPixel : pixelOf(scenery.tissue[t].colour);
+    const std::array<std::uint8_t, 3> shell = pixelOf(shellColour);
     auto* pixels = static_cast<std::array<std::uint8_t, 3>*>(image_->GetScalarPointer());
     const double metres = 1 / pixelsPerMetre(frame_, area);
     const channel::Grid& grid = deformation.grid();
@@ -108,9 +117,7 @@ void SlicePicture::update(const channel::Scenery& scenery, const Deformation& de
                 continue;
             const std::uint8_t label = deformation.labelAt(p, shift);
             const std::size_t tissue = label & channel::rowBits;
-            const auto& colour =
-                (label & channel::shellBit) != 0 ? shellColour : scenery.tissue[tissue % channel::maxTissues].colour;
-            const auto pixel = tissue == 0 ? airPixel : std::array{byte(colour[0]), byte(colour[1]), byte(colour[2])};
+            const auto& pixel = tissue != 0 && (label & channel::shellBit) != 0 ? shell : tissues[tissue];
             for (int y = row; y < std::min(row + step, area.height); ++y)
                 std::fill_n(pixels + static_cast<std::ptrdiff_t>(y) * area.width + column,
                             std::min(step, area.width - column), pixel);

@@ -3,6 +3,7 @@
 #include <render/display.h>
 #include <render/hosts.h>
 
+#include <malloc.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -27,6 +28,11 @@ void standBack()
     [[maybe_unused]] const int level = ::nice(nicer);
     const unsigned cores = std::thread::hardware_concurrency();
     ::setenv("LP_NUM_THREADS", std::to_string(cores > 2 ? cores / 2 : 1).c_str(), 0);
+    // Buffers of every picture would else go back to the system and come again: the kernel clears them, and while it does
+    // the simulation cannot have that core.
+    constexpr int kept = 32 << 20;  // [bytes]
+    ::mallopt(M_MMAP_THRESHOLD, kept);
+    ::mallopt(M_TRIM_THRESHOLD, kept);
 }
 
 void check(const ViewerOptions& options)

@@ -1,10 +1,13 @@
 #include <render/volume_picture.h>
 
+#include <render/ray_shader.h>
+
 #include <vtkCallbackCommand.h>
+#include <vtkCamera.h>
 #include <vtkCommand.h>
+#include <vtkMatrix4x4.h>
 #include <vtkOpenGLRenderWindow.h>
 #include <vtkPiecewiseFunction.h>
-#include <vtkPlaneCollection.h>
 #include <vtkShaderProgram.h>
 #include <vtkShaderProperty.h>
 #include <vtkVolumeProperty.h>
@@ -14,6 +17,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 namespace palpate::render {
 namespace {
@@ -52,6 +56,20 @@ float lambert(glm::vec3 step, glm::vec3 light) noexcept
     return glm::mix(1.0F, lit, std::min(1.0F, length / border));
 }
 
+// A texture of bytes, `components` for each texel.
+void fill(vtkTextureObject& texture, vtkOpenGLRenderWindow& window, int filter, glm::ivec3 size, int components,
+          const void* bytes)
+{
+    texture.SetContext(&window);
+    texture.SetMinificationFilter(filter);
+    texture.SetMagnificationFilter(filter);
+    texture.SetWrapS(vtkTextureObject::ClampToEdge);
+    texture.SetWrapT(vtkTextureObject::ClampToEdge);
+    texture.SetWrapR(vtkTextureObject::ClampToEdge);
+    texture.Create3DFromRaw(static_cast<unsigned>(size.x), static_cast<unsigned>(size.y), static_cast<unsigned>(size.z),
+                            components, VTK_UNSIGNED_CHAR, const_cast<void*>(bytes));
+}
+
 // The row of a label; air for rows that the table does not have.
 std::size_t rowOf(const channel::Scenery& scenery, std::uint8_t label) noexcept
 {
@@ -62,7 +80,7 @@ std::size_t rowOf(const channel::Scenery& scenery, std::uint8_t label) noexcept
 }  // namespace
 
 VolumePicture::VolumePicture(const channel::Scenery& scenery, const Deformation& deformation, vtkRenderer& renderer)
-    : renderer_(renderer), grid_(scenery.labels)
+    : renderer_(renderer), grid_(scenery.labels), way_(leapGrid(scenery.labels, deformation.labels()))
 {
     const double spacing = grid_.spacing * mm;
     image_->SetDimensions(grid_.size[0], grid_.size[1], grid_.size[2]);
@@ -83,9 +101,6 @@ VolumePicture::VolumePicture(const channel::Scenery& scenery, const Deformation&
     property.SetScalarOpacity(opacity);
     property.SetInterpolationTypeToLinear();
     property.ShadeOff();
-    // A tissue's opacity is meant for a layer of this thickness: with it fat stays clear over the depth of a breast.
-    constexpr double layer = 6;  // [mm]
-    property.SetScalarOpacityUnitDistance(layer);
     mapper_->SetInputData(image_);
     mapper_->SetAutoAdjustSampleDistances(0);
     volume_->SetMapper(mapper_);
@@ -145,27 +160,16 @@ void VolumePicture::paint(const channel::Scenery& scenery, const Deformation& de
     image_->Modified();
 }
 
-// Every look into the volume goes through palpateRest(). Positions are texture coordinates of the volume.
 void VolumePicture::teachShader()
 {
     vtkShaderProperty& shader = *volume_->GetShaderProperty();
-    shader.AddFragmentShaderReplacement("//VTK::CustomUniforms::Dec", true,
-                                        R"(//VTK::CustomUniforms::Dec
-uniform sampler3D palpateShift;
-uniform vec3 palpateScale;   // to texture coordinates of the shifts
-uniform vec3 palpateOffset;
-uniform vec3 palpateReach;   // shift per unit of a texel
-vec3 palpateRest(vec3 p)
-{
-    vec3 q = p * palpateScale + palpateOffset;
-    if (any(lessThan(q, vec3(0.0))) || any(greaterThan(q, vec3(1.0))))
-        return p;
-    return p + (texture(palpateShift, q).xyz - 128.0 / 255.0) * palpateReach;
-}
-)",
-                                        true);
-    shader.AddFragmentShaderReplacement("texture3D(in_volume[0], g_dataPos)", false,
-                                        "texture3D(in_volume[0], palpateRest(g_dataPos))", true);
+    const auto before = [&](const std::string& mark, const char* ours) {
+        shader.AddFragmentShaderReplacement(mark, true, ours + ("\n" + mark), true);
+    };
+    before("//VTK::RenderToImage::Dec", ray_shader::declarations);
+    before("//VTK::DepthPeeling::Ray::PathCheck", ray_shader::march);
+    for (const char* mark : ray_shader::unwanted)
+        shader.AddFragmentShaderReplacement(mark, true, "", true);
     vtkNew<vtkCallbackCommand> tell;
     tell->SetClientData(this);
     tell->SetCallback([](vtkObject*, unsigned long, void* self, void* program) {
@@ -194,8 +198,39 @@ void VolumePicture::setUniforms(vtkShaderProgram& program)
     set("palpateScale", scale);
     set("palpateOffset", offset);
     set("palpateReach", reach);
+    set("palpateBlocks", count / static_cast<double>(LeapGrid::side));
+    set("palpateWhole", whole * mm);
+    program.SetUniformf("palpateEnough", moving_ ? 0.97F : 0.99F);
+    setView(program, corner, whole);
     shifts_->Activate();
     program.SetUniformi("palpateShift", shifts_->GetTextureUnit());
+    leaps_->Activate();
+    program.SetUniformi("palpateLeaps", leaps_->GetTextureUnit());
+}
+
+// How the rays go, in texture coordinates of the volume, which begins at `corner` and is `whole` wide [m].
+void VolumePicture::setView(vtkShaderProgram& program, glm::dvec3 corner, glm::dvec3 whole)
+{
+    vtkCamera& camera = *renderer_.GetActiveCamera();
+    const double* eye = camera.GetPosition();
+    const glm::vec3 at((glm::dvec3(eye[0], eye[1], eye[2]) / mm - corner) / whole);
+    program.SetUniform3f("palpateEye", &at.x);
+    vtkNew<vtkMatrix4x4> world;
+    vtkMatrix4x4::Invert(camera.GetCompositeProjectionTransformMatrix(renderer_.GetTiledAspectRatio(), -1, 1), world);
+    std::array<float, 16> fromScreen{};  // columns
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row) {
+            const double w = world->GetElement(3, column);
+            const double value = row == 3 ? w : (world->GetElement(row, column) / mm - corner[row] * w) / whole[row];
+            fromScreen[static_cast<std::size_t>(4 * column + row)] = static_cast<float>(value);
+        }
+    program.SetUniformMatrix4x4("palpateFromScreen", fromScreen.data());
+    const glm::dvec3 normal = cutNormal_ * whole;
+    const bool cut = cutNormal_ != glm::dvec3(0.0);
+    const std::array<float, 4> plane{static_cast<float>(normal.x), static_cast<float>(normal.y),
+                                     static_cast<float>(normal.z),
+                                     cut ? static_cast<float>(glm::dot(cutNormal_, corner - cutPoint_)) : 1.0F};
+    program.SetUniform4f("palpateCut", plane.data());
 }
 
 void VolumePicture::update(const Deformation& deformation)
@@ -212,30 +247,24 @@ void VolumePicture::upload()
     changed_ = false;
     vtkOpenGLRenderWindow* window = vtkOpenGLRenderWindow::SafeDownCast(renderer_.GetRenderWindow());
     window->Start();
-    shifts_->SetContext(window);
-    shifts_->SetMinificationFilter(vtkTextureObject::Linear);
-    shifts_->SetMagnificationFilter(vtkTextureObject::Linear);
-    shifts_->SetWrapS(vtkTextureObject::ClampToEdge);
-    shifts_->SetWrapT(vtkTextureObject::ClampToEdge);
-    shifts_->SetWrapR(vtkTextureObject::ClampToEdge);
-    ShiftField::Texel none{128, 128, 128, 255};
-    const bool any = field_.size.x > 0;
-    const auto along = [&](int axis) { return any ? static_cast<unsigned>(field_.size[axis]) : 1U; };
-    shifts_->Create3DFromRaw(along(0), along(1), along(2), 4, VTK_UNSIGNED_CHAR, any ? field_.texels.data() : &none);
+    if (leaps_->GetHandle() == 0)
+        fill(*leaps_, *window, vtkTextureObject::Nearest, way_.size, 1, way_.blocks.data());
+    const ShiftField::Texel none{128, 128, 128, 255};
+    if (field_.size.x > 0)
+        fill(*shifts_, *window, vtkTextureObject::Linear, field_.size, 4, field_.texels.data());
+    else
+        fill(*shifts_, *window, vtkTextureObject::Linear, glm::ivec3(1), 4, &none);
 }
 
 void VolumePicture::cut(glm::dvec3 point, glm::dvec3 normal)
 {
-    const glm::dvec3 at = point * mm;
-    plane_->SetOrigin(at.x, at.y, at.z);
-    plane_->SetNormal(-normal.x, -normal.y, -normal.z);
-    if (mapper_->GetClippingPlanes() == nullptr || mapper_->GetClippingPlanes()->GetNumberOfItems() == 0)
-        mapper_->AddClippingPlane(plane_);
+    cutPoint_ = point;
+    cutNormal_ = -normal;
 }
 
 void VolumePicture::uncut()
 {
-    mapper_->RemoveAllClippingPlanes();
+    cutNormal_ = glm::dvec3(0.0);
 }
 
 void VolumePicture::prepare(Quality quality, bool software, double pixels)
@@ -249,20 +278,15 @@ void VolumePicture::prepare(Quality quality, bool software, double pixels)
         mapper_->SetSampleDistance(static_cast<float>((software ? 1.0 : 0.5) * voxel));
         return;
     }
-    // Other rays make VTK allocate its buffers anew: only in steps, and not back and forth.
-    constexpr double steps = 4, coarsest = 4, change = 0.2;
-    const double apart = std::clamp(std::sqrt(pixels / rays_), 1.0, coarsest);
-    if (std::abs(apart - castApart_) > change)
-        castApart_ = std::round(apart * steps) / steps;
-    mapper_->SetImageSampleDistance(static_cast<float>(castApart_));
-    mapper_->SetSampleDistance(static_cast<float>(std::clamp(0.75 * castApart_, 1.0, 3.0) * voxel));
+    const double apart = budget_.apart(pixels);
+    mapper_->SetImageSampleDistance(static_cast<float>(apart));
+    mapper_->SetSampleDistance(static_cast<float>(std::clamp(0.75 * apart, 1.0, 3.0) * voxel));
 }
 
 void VolumePicture::took(double seconds)
 {
-    constexpr double budget = 0.028, fewest = 8e3, most = 400e3;
-    if (moving_ && seconds > 0)
-        rays_ = std::clamp(rays_ * std::clamp(budget / seconds, 0.75, 1.1), fewest, most);
+    if (moving_)
+        budget_.took(seconds);
 }
 
 }  // namespace palpate::render

@@ -2,12 +2,13 @@
 
 #include <render/channel/layout.h>
 #include <render/deformation.h>
+#include <render/leap_grid.h>
+#include <render/ray_budget.h>
 #include <render/shift_field.h>
 
 #include <vtkGPUVolumeRayCastMapper.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
-#include <vtkPlane.h>
 #include <vtkRenderer.h>
 #include <vtkTextureObject.h>
 #include <vtkVolume.h>
@@ -49,29 +50,31 @@ public:
     void prepare(Quality quality, bool software, double pixels);
     /// False when the picture was made without a body: VTK asks for what its shader needs from the second one on.
     bool shown() const noexcept { return shown_; }
-    /// After it: how long the whole picture took [s]. What moves is cast as finely as 30 pictures a second allow.
+    /// After it: how long the whole picture took [s], from the state on. What moves is cast as finely as 30 pictures a
+    /// second allow.
     void took(double seconds);
 
 private:
     void computeLight(const channel::Scenery& scenery, const Deformation& deformation);
     void teachShader();
     void setUniforms(vtkShaderProgram& program);
+    void setView(vtkShaderProgram& program, glm::dvec3 corner, glm::dvec3 whole);
     void upload();
 
     vtkRenderer& renderer_;
     channel::Grid grid_;
     std::vector<std::uint8_t> light_;  // per voxel
+    LeapGrid way_;
     ShiftField field_;
     bool changed_ = true;
     bool moving_ = false;
     bool shown_ = false;
-    double rays_ = 30e3;    // that fit in a picture while things move
-    double castApart_ = 2;  // [pixels] from ray to ray
+    RayBudget budget_;
     vtkNew<vtkImageData> image_;
-    vtkNew<vtkTextureObject> shifts_;
+    vtkNew<vtkTextureObject> shifts_, leaps_;
     vtkNew<vtkGPUVolumeRayCastMapper> mapper_;
     vtkNew<vtkVolume> volume_;
-    vtkNew<vtkPlane> plane_;
+    glm::dvec3 cutPoint_{0.0}, cutNormal_{0.0};  // what lies where the normal points to is seen; 0: all
 };
 
 }  // namespace palpate::render

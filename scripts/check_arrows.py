@@ -16,17 +16,21 @@ ARROWS = {
     "render/channel": set(),
     "render": {"render/channel"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "render/channel"},
+    "haptics/falcon": {"volume", "datasets", "haptics"},
     "experiments": {"volume", "occupancy", "chainmail", "datasets", "haptics"},
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "experiments"},
-    "apps": {"volume", "datasets", "haptics", "render", "render/channel", "experiments", "reference"},
+    "apps": {"volume", "datasets", "haptics", "haptics/falcon", "render", "render/channel", "experiments", "reference"},
 }
 # Third-party headers that stay in one folder.
 OWNERS = {
     "openvdb/": {"volume"},
-    "itk": {"volume"},
+    "dcmtk/": {"volume"},
+    "openjpeg": {"volume"},
+    "itk": {"tests"},  # an independent reader to compare with
     "vtk": {"render", "reference"},
     "GLFW/": {"render"},
-    "sqlite3": {"haptics"},
+    "sqlite3": {"haptics", "apps"},
+    "libusb": {"haptics"},
     "CGAL/": {"reference"},
     "getfem/": {"reference"},
     "gmm/": {"reference"},

@@ -2,24 +2,62 @@
 
 #include <volume/label_image.h>
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
 namespace palpate::volume {
 
+/// What a reader cannot know by itself.
+struct ImportOptions {
+    /// Which segment a voxel belongs to where several hold it: names of segments, of which later ones win, or one of
+    /// "smallest", "last", "first". Segments that are not named lose against those that are. Empty: "smallest", the segment
+    /// with the fewest voxels wins (the later one where they have the same number), so that no structure is swallowed.
+    std::vector<std::string> overlap;
+    float fractionalThreshold = 0.5F;  // a probability from which a voxel is taken as set (DICOM SEG of type FRACTIONAL)
+    std::string series;                // SeriesInstanceUID to take where a folder holds several
+    /// Grids whose voxel axes are not at right angles (tilted gantry, affine registration) are refused unless the caller
+    /// resamples them. Images are read in any case.
+    bool sheared = false;
+    std::function<void(double)> progress = {};  // is called with the share that is done, 0 to 1; may be empty
+};
+
+/// Voxels that two segments claimed.
+struct Overlap {
+    std::uint16_t kept = 0;  // label value of the segment that won
+    std::uint16_t lost = 0;  // of one that did not
+    std::uint64_t voxels = 0;
+};
+
 /// A label map as a file holds it, with what the reader had to say.
 struct ImportedLabels {
     LabelImage image;
     std::vector<LabelName> names;       // segment names where the file holds some; tissue is left empty
+    std::vector<Overlap> overlaps;      // a voxel of `lost` is counted once, against the segment that has it now
     std::vector<std::string> warnings;  // geometry that was chosen among several, and the like
 };
 
-/// Reads a label map: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd).
-/// NRRD and MetaImage are decoded by ITK, after the header was checked against the bytes that are there. What ITK would get
-/// wrong without an error is decoded here: NIfTI (it turns NaN into 0) and files whose header is wrong about their
-/// compression. A NIfTI is placed by its sform when that has a code, else by its qform. Throws std::runtime_error ("FILE:
-/// what is wrong and what to do").
-ImportedLabels importLabels(const std::filesystem::path& file);
+/// An intensity image: CT, MR.
+struct ImportedImage {
+    Index3 size{0};
+    Affine affine;
+    std::vector<float> values;  // size.x * size.y * size.z, x fastest; finite
+    std::string what;           // "HU" where the file says that it is CT, else empty
+    std::vector<std::string> warnings;
+};
+
+/// Reads a label map. A file: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd),
+/// DICOM SEG, OpenVDB. A folder: a DICOM series, or one mask per structure. docs/formats.md has the rules of each. Every
+/// header is checked against the bytes that are there before anything is allocated for it. Throws std::runtime_error
+/// ("FILE: what is wrong and what to do").
+ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptions& options = {});
+
+/// Reads an intensity image from the same formats, slope and intercept applied. Throws like importLabels().
+ImportedImage importImage(const std::filesystem::path& path, const ImportOptions& options = {});
+
+/// Largest deviation of the angles between voxel axes from a right angle [rad].
+double shearOf(const Affine& affine) noexcept;
 
 }  // namespace palpate::volume

@@ -2,7 +2,9 @@
 
 #include <volume/geometry.h>
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,8 +27,10 @@ struct LabelImage {
 /// A name for one label value, and the tissue it is made of.
 struct LabelName {
     std::uint16_t value = 0;
-    std::string name;    // the structure: "tumour", "left lung"
-    std::string tissue;  // a row of the tissue table
+    std::string name;                                                  // the structure: "tumour", "left lung"
+    std::string tissue;                                                // a row of the tissue table
+    std::optional<std::array<std::uint8_t, 3>> colour = std::nullopt;  // red, green, blue, where the file gives one
+    std::string terminology = {};  // what the structure is in a coding scheme, as the file writes it
 };
 
 }  // namespace palpate::volume

@@ -1,214 +1,15 @@
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
-#include <fmt/format.h>
-#include <openvdb/tools/Prune.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 #include <glm/common.hpp>
 #include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <limits>
-#include <map>
-#include <stdexcept>
 
 namespace palpate::volume {
-
-namespace {
-
-constexpr int leafSide = 8;  // voxels along the side of an OpenVDB leaf
-
-// Voxels and extent of every label value of some slices.
-struct Census {
-    std::vector<std::uint64_t> voxels = std::vector<std::uint64_t>(65536, 0);
-    std::vector<IndexBox> extent =
-        std::vector<IndexBox>(65536, {Index3(std::numeric_limits<int>::max()), Index3(std::numeric_limits<int>::min())});
-
-    void add(std::uint16_t value, Index3 from, Index3 to, std::uint64_t count)
-    {
-        voxels[value] += count;
-        extent[value].low = glm::min(extent[value].low, from);
-        extent[value].high = glm::max(extent[value].high, to);
-    }
-    void join(const Census& other)
-    {
-        for (std::size_t v = 0; v < voxels.size(); ++v) {
-            if (other.voxels[v] > 0) {
-                add(static_cast<std::uint16_t>(v), other.extent[v].low, other.extent[v].high, other.voxels[v]);
-            }
-        }
-    }
-};
-
-// Counts runs of equal values along x: label maps are made of long ones.
-void countSlice(const LabelImage& image, int z, Census& census)
-{
-    for (int y = 0; y < image.size.y; ++y) {
-        const std::uint16_t* row = image.values.data() + image.offset({0, y, z});
-        for (int x = 0; x < image.size.x;) {
-            const int start = x;
-            const std::uint16_t value = row[x];
-            while (x < image.size.x && row[x] == value) {
-                ++x;
-            }
-            census.add(value, {start, y, z}, {x - 1, y, z}, static_cast<std::uint64_t>(x - start));
-        }
-    }
-}
-
-Census takeCensus(const LabelImage& image)
-{
-    const tbb::blocked_range<int> slices(0, image.size.z, 16);
-    return tbb::parallel_reduce(
-        slices, Census{},
-        [&](const tbb::blocked_range<int>& range, Census census) {
-            for (int z = range.begin(); z != range.end(); ++z) {
-                countSlice(image, z, census);
-            }
-            return census;
-        },
-        [](Census a, const Census& b) {
-            a.join(b);
-            return a;
-        });
-}
-
-// One leaf-sized block of a tree under construction: a leaf, or a tile when all of it has one value.
-template <typename Leaf>
-struct Block {
-    std::unique_ptr<Leaf> leaf;
-    typename Leaf::ValueType tile{};
-};
-
-template <typename Leaf>
-Block<Leaf> makeBlock(const LabelImage& image, const std::vector<typename Leaf::ValueType>& valueOf, Index3 low)
-{
-    using Value = typename Leaf::ValueType;
-    const Index3 high = glm::min(low + leafSide, image.size);
-    const Value first = valueOf[image.values[image.offset(low)]];
-    bool uniform = high == low + leafSide || first == Value{};
-    auto leaf = std::make_unique<Leaf>(openvdb::Coord(low.x, low.y, low.z), Value{}, false);
-    const std::size_t slice = image.offset({0, 0, 1});
-    const auto fillColumn = [&](int x, int y) {
-        const openvdb::Index at = Leaf::coordToOffset(openvdb::Coord(x, y, low.z));
-        const std::size_t from = image.offset({x, y, low.z});
-        for (int z = 0; z < high.z - low.z; ++z) {
-            const Value value = valueOf[image.values[from + static_cast<std::size_t>(z) * slice]];
-            uniform = uniform && value == first;
-            if (value != Value{}) {
-                leaf->setValueOn(at + static_cast<openvdb::Index>(z), value);
-            }
-        }
-    };
-    for (int x = low.x; x < high.x; ++x) {
-        for (int y = low.y; y < high.y; ++y) {
-            fillColumn(x, y);
-        }
-    }
-    if (uniform) {
-        leaf.reset();
-    }
-    return {std::move(leaf), uniform ? first : Value{}};
-}
-
-// A grid of valueOf[label], active where it differs from the background 0; uniform regions become tiles.
-// One layer of blocks at a time, so that no dense array of the grid's own type is needed.
-template <typename Grid>
-typename Grid::Ptr gridOf(const LabelImage& image, const std::vector<typename Grid::ValueType>& valueOf)
-{
-    using Leaf = typename Grid::TreeType::LeafNodeType;
-    typename Grid::Ptr grid = Grid::create();
-    auto& tree = grid->tree();
-    const Index3 blocks = (image.size + leafSide - 1) / leafSide;
-    std::vector<Block<Leaf>> layer(static_cast<std::size_t>(blocks.x) * static_cast<std::size_t>(blocks.y));
-    for (int bz = 0; bz < blocks.z; ++bz) {
-        const auto blockOf = [&](std::size_t i) {
-            const int n = static_cast<int>(i);
-            return Index3(n % blocks.x, n / blocks.x, bz) * leafSide;
-        };
-        tbb::parallel_for(std::size_t{0}, layer.size(),
-                          [&](std::size_t i) { layer[i] = makeBlock<Leaf>(image, valueOf, blockOf(i)); });
-        for (std::size_t i = 0; i < layer.size(); ++i) {
-            if (layer[i].leaf) {
-                tree.addLeaf(layer[i].leaf.release());
-            } else if (layer[i].tile != typename Grid::ValueType{}) {
-                const Index3 low = blockOf(i);
-                tree.addTile(1, openvdb::Coord(low.x, low.y, low.z), layer[i].tile, true);
-            }
-        }
-    }
-    openvdb::tools::pruneTiles(tree);
-    grid->setTransform(transformOf(image.affine));
-    return grid;
-}
-
-void checkImage(const LabelImage& image)
-{
-    if (image.size.x < 1 || image.size.y < 1 || image.size.z < 1) {
-        throw std::runtime_error(
-            fmt::format("a label map of {} x {} x {} voxels is empty", image.size.x, image.size.y, image.size.z));
-    }
-    if (image.values.size() != image.offset({0, 0, image.size.z})) {
-        throw std::runtime_error(fmt::format("a label map of {} x {} x {} voxels has {} values", image.size.x, image.size.y,
-                                             image.size.z, image.values.size()));
-    }
-    if (!(image.affine.voxelVolume() > 0)) {
-        throw std::runtime_error("a label map's voxels have no volume: its directions are dependent or its spacing is 0");
-    }
-}
-
-void checkTable(const TissueTable& table)
-{
-    if (table.rows.empty() || table.rows.front().role != Role::air) {
-        throw std::runtime_error(fmt::format("tissue table '{}': row 0 must be air, the outside", table.name));
-    }
-    if (table.rows.size() > 256) {
-        throw std::runtime_error(
-            fmt::format("tissue table '{}' has {} rows; 256 is the most", table.name, table.rows.size()));
-    }
-}
-
-std::uint8_t rowOf(const TissueTable& table, const LabelName& label)
-{
-    if (label.tissue.empty()) {
-        throw std::runtime_error(fmt::format("label {} '{}' has no tissue: map it to one", label.value, label.name));
-    }
-    const auto row = table.find(label.tissue);
-    if (!row) {
-        throw std::runtime_error(fmt::format("label {} '{}': no tissue '{}' in the tissue table '{}'", label.value,
-                                             label.name, label.tissue, table.name));
-    }
-    return *row;
-}
-
-void addStructures(TissueData& tissue, const Census& census, std::span<const LabelName> names)
-{
-    std::map<std::uint16_t, const LabelName*> named;
-    for (const LabelName& n : names) {
-        named.emplace(n.value, &n);
-    }
-    for (std::size_t v = 0; v < census.voxels.size(); ++v) {
-        if (census.voxels[v] == 0) {
-            continue;
-        }
-        const auto value = static_cast<std::uint16_t>(v);
-        const auto found = named.find(value);
-        Structure s{value, "outside", 0, census.voxels[v],
-                    static_cast<double>(census.voxels[v]) * tissue.affine.voxelVolume()};
-        if (found != named.end()) {
-            s.name = found->second->name;
-            s.tissue = rowOf(tissue.table, *found->second);
-        } else if (value != 0) {
-            throw std::runtime_error(fmt::format("label {} ({} voxels) has no name: map it to a tissue", value, s.voxels));
-        }
-        tissue.structures.push_back(std::move(s));
-        tissue.extents.push_back(census.extent[v]);
-    }
-}
-
-}  // namespace
 
 openvdb::math::Transform::Ptr transformOf(const Affine& affine)
 {
@@ -217,6 +18,11 @@ openvdb::math::Transform::Ptr transformOf(const Affine& affine)
     const Vec3& o = affine.origin;
     return openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(
         m[0].x, m[0].y, m[0].z, 0.0, m[1].x, m[1].y, m[1].z, 0.0, m[2].x, m[2].y, m[2].z, 0.0, o.x, o.y, o.z, 1.0));
+}
+
+double valueOfAir(const std::string& unit) noexcept
+{
+    return unit == "HU" ? -1000.0 : 0.0;
 }
 
 Box patientBox(const Affine& affine, const IndexBox& extent)
@@ -258,35 +64,16 @@ IndexBox TissueData::extentOf(const std::vector<std::uint8_t>& wanted) const
     return all;
 }
 
-Tissue Tissue::fromLabels(const LabelImage& image, TissueTable table, std::span<const LabelName> names,
-                          Provenance provenance)
+double StiffnessMap::factor(double value) const noexcept
 {
-    checkImage(image);
-    checkTable(table);
-    auto impl = std::make_unique<Impl>();
-    impl->size = image.size;
-    impl->affine = image.affine;
-    impl->table = std::move(table);
-    impl->provenance = std::move(provenance);
-    addStructures(*impl, takeCensus(image), names);
-    impl->derive();
-
-    std::vector<std::int32_t> labelOf(65536, 0);
-    std::vector<float> stiffnessOf(65536, 0.0F);
-    for (const Structure& s : impl->structures) {
-        labelOf[s.value] = s.value;
-        if (impl->lookup.solid[s.value] != 0) {
-            stiffnessOf[s.value] = static_cast<float>(impl->table.rows[s.tissue].youngsModulus * 1e-3);
-        }
+    const auto after = std::upper_bound(points.begin(), points.end(), value,
+                                        [](double v, const std::pair<double, double>& p) { return v < p.first; });
+    if (after == points.begin() || after == points.end()) {
+        return points.empty() ? 1.0 : (after == points.end() ? points.back() : points.front()).second;
     }
-    std::vector<bool> solidOf(impl->lookup.solid.begin(), impl->lookup.solid.end());
-    impl->label = gridOf<openvdb::Int32Grid>(image, labelOf);
-    impl->stiffness = gridOf<openvdb::FloatGrid>(image, stiffnessOf);
-    impl->occupancy = gridOf<openvdb::BoolGrid>(image, solidOf);
-    impl->label->setName("label");
-    impl->stiffness->setName("stiffness");
-    impl->occupancy->setName("occupancy");
-    return Tissue(std::move(impl));
+    const auto before = after - 1;
+    const double t = (value - before->first) / (after->first - before->first);
+    return before->second + t * (after->second - before->second);
 }
 
 Tissue::Tissue(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -321,7 +108,57 @@ Box Tissue::box() const noexcept
 
 MemoryUse Tissue::memory() const
 {
-    return {impl_->label->memUsage(), impl_->stiffness->memUsage(), impl_->occupancy->memUsage()};
+    return {impl_->label->memUsage(), impl_->stiffness->memUsage(), impl_->occupancy->memUsage(),
+            impl_->image ? impl_->image->memUsage() : 0};
+}
+
+bool Tissue::hasImage() const noexcept
+{
+    return impl_->image != nullptr;
+}
+const std::string& Tissue::imageUnit() const noexcept
+{
+    return impl_->imageUnit;
+}
+const StiffnessMap& Tissue::stiffnessMap() const noexcept
+{
+    return impl_->stiffnessMap;
+}
+
+namespace {
+
+// Calls visit(offset, value) for every voxel of a grid, slices on all cores.
+template <typename Grid, typename Visit>
+void forEachVoxel(const Grid& grid, const LabelImage& places, const Visit& visit)
+{
+    tbb::parallel_for(tbb::blocked_range<int>(0, places.size.z, 8), [&](const tbb::blocked_range<int>& slab) {
+        const auto accessor = grid.getConstUnsafeAccessor();
+        forEachIndex(Index3(0, 0, slab.begin()), Index3(places.size.x - 1, places.size.y - 1, slab.end() - 1),
+                     [&](Index3 n) { visit(places.offset(n), accessor.getValue(openvdb::Coord(n.x, n.y, n.z))); });
+    });
+}
+
+}  // namespace
+
+LabelImage Tissue::labels() const
+{
+    LabelImage image{impl_->size, impl_->affine, {}};
+    image.values.resize(image.offset({0, 0, image.size.z}));
+    forEachVoxel(*impl_->label, image,
+                 [&](std::size_t at, std::int32_t value) { image.values[at] = static_cast<std::uint16_t>(value); });
+    return image;
+}
+
+std::optional<CompanionImage> Tissue::companion() const
+{
+    if (!impl_->image) {
+        return std::nullopt;
+    }
+    const LabelImage places{impl_->size, impl_->affine, {}};
+    CompanionImage image{{}, impl_->imageUnit, impl_->stiffnessMap};
+    image.values.resize(places.offset({0, 0, places.size.z}));
+    forEachVoxel(*impl_->image, places, [&](std::size_t at, float value) { image.values[at] = value; });
+    return image;
 }
 
 std::vector<std::uint16_t> Tissue::labelsNamed(std::string_view wanted) const

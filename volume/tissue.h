@@ -5,9 +5,11 @@
 #include <volume/scalar_field.h>
 #include <volume/tissue_table.h>
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -22,7 +24,9 @@ struct Structure {
     std::string name;
     std::uint8_t tissue = 0;  // row of the tissue table
     std::uint64_t voxels = 0;
-    double volume = 0;  // [m^3]
+    double volume = 0;                                                 // [m^3]
+    std::optional<std::array<std::uint8_t, 3>> colour = std::nullopt;  // as in LabelName
+    std::string terminology = {};
 };
 
 /// Where a volume comes from, kept in the file.
@@ -33,6 +37,22 @@ struct MemoryUse {
     std::uint64_t label = 0;
     std::uint64_t stiffness = 0;
     std::uint64_t occupancy = 0;
+    std::uint64_t image = 0;
+};
+
+/// How an image scales Young's modulus: a factor, piecewise linear in the image's value and constant beyond the points.
+struct StiffnessMap {
+    std::vector<std::pair<double, double>> points;  // value, factor; by value. None: the image changes nothing
+    std::vector<std::string> tissues;               // of the table, that it applies to; none: all of them
+
+    double factor(double value) const noexcept;
+};
+
+/// An intensity image on the voxels of a label map.
+struct CompanionImage {
+    std::vector<float> values;  // one per voxel, x fastest
+    std::string unit;           // "HU", or empty
+    StiffnessMap stiffness;
 };
 
 /// The tissue in a cell as one elastic material.
@@ -50,6 +70,7 @@ struct CellMaterial {
 ///     label      Int32, background 0   the label value of every voxel
 ///     stiffness  Float, background 0   Young's modulus [kPa], per voxel
 ///     occupancy  Bool,  background 0   true where there is tissue
+///     image      Float                 an intensity image where there is tissue; only of volumes that came with one
 ///
 /// Homogeneous regions are stored as tiles. Immutable, so that threads may share it; each thread reads through its own
 /// Reader. OpenVDB stays behind this header.
@@ -57,8 +78,9 @@ class Tissue {
 public:
     /// Builds the grids. Throws std::runtime_error for a label value without a name or a name without a tissue.
     /// Voxels of role air, and value 0 when it has no name, are outside.
+    /// @param companion  an intensity image that is kept with the labels, and may scale their stiffness; may be null
     static Tissue fromLabels(const LabelImage& image, TissueTable table, std::span<const LabelName> names,
-                             Provenance provenance);
+                             Provenance provenance, const CompanionImage* companion = nullptr);
     /// Reads a .vdb that save() wrote. Throws std::runtime_error ("FILE: what is wrong and what to do").
     static Tissue load(const std::filesystem::path& file);
     /// Writes beside `file` and renames, so that a full disk leaves what was there.
@@ -74,6 +96,14 @@ public:
     std::span<const Structure> structures() const noexcept;  // every label value in the volume, 0 included, by value
     const Provenance& provenance() const noexcept;
     MemoryUse memory() const;
+    /// The label map that it was made from.
+    LabelImage labels() const;
+    /// The image that it came with; where there is no tissue, the value of air (-1000 HU, else 0).
+    std::optional<CompanionImage> companion() const;
+    bool hasImage() const noexcept;
+    /// Of the image: its unit and what it does to the stiffness.
+    const std::string& imageUnit() const noexcept;
+    const StiffnessMap& stiffnessMap() const noexcept;
     /// Box of the voxels that hold tissue [m].
     Box box() const noexcept;
     /// The structure called `name`, else those whose tissue is called so. Empty when there is none.

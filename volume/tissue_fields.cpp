@@ -14,6 +14,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <type_traits>
 
 namespace palpate::volume {
 
@@ -25,7 +26,10 @@ namespace {
 class CellSampler {
 public:
     CellSampler(const TissueData& tissue, const NodeGrid& grid)
-        : size_(tissue.size), label_(tissue.label->getConstUnsafeAccessor())
+        : size_(tissue.size),
+          label_(tissue.label->getConstUnsafeAccessor()),
+          stiffness_(tissue.stiffness->getConstUnsafeAccessor()),
+          scaledBy_(tissue.stiffnessMap.points.empty() ? nullptr : &tissue)
     {
         const Mat3 toIndex = glm::inverse(tissue.affine.linear);
         const Vec3 voxel = tissue.affine.spacing();
@@ -44,7 +48,8 @@ public:
 
     std::size_t samples() const { return offsets_.size(); }
 
-    // Calls visit(label, weight) for the voxels at node n; the weights add up to 1, less what lies outside the volume.
+    // Calls visit(label, weight), or visit(label, weight, factor on its tissue's stiffness), for the voxels at node n; the
+    // weights add up to 1, less what lies outside the volume.
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
@@ -80,15 +85,31 @@ private:
     void read(Index3 n, double weight, const Visit& visit) const
     {
         if (n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size_.x && n.y < size_.y && n.z < size_.z) {
-            visit(static_cast<std::uint16_t>(label_.getValue(openvdb::Coord(n.x, n.y, n.z))), weight);
+            const openvdb::Coord ijk(n.x, n.y, n.z);
+            const auto label = static_cast<std::uint16_t>(label_.getValue(ijk));
+            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, double>) {
+                visit(label, weight, scaledBy_ != nullptr ? factor(label, ijk) : 1.0);
+            } else {
+                visit(label, weight);
+            }
         }
+    }
+
+    // What the image makes of the modulus of a voxel's tissue.
+    double factor(std::uint16_t label, const openvdb::Coord& ijk) const
+    {
+        const double own = scaledBy_->table.rows[scaledBy_->lookup.row[label]].youngsModulus;
+        const double here = 1e3 * static_cast<double>(stiffness_.getValue(ijk));
+        return own > 0 && here > 0 ? here / own : 1.0;
     }
 
     Index3 size_;
     openvdb::Int32Grid::ConstUnsafeAccessor label_;
-    std::vector<Vec3> offsets_;  // samples of a cell, in voxels from the node
-    Mat3 step_{1.0};             // node steps in voxels
-    Vec3 start_{0.0};            // node (0, 0, 0) in voxels
+    openvdb::FloatGrid::ConstUnsafeAccessor stiffness_;
+    const TissueData* scaledBy_;  // null where no image scales the stiffness
+    std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
+    Mat3 step_{1.0};              // node steps in voxels
+    Vec3 start_{0.0};             // node (0, 0, 0) in voxels
     glm::bvec3 interpolate_{false};
 };
 
@@ -128,9 +149,9 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
     } free, held;
     double poisson = 0.0;
     double stiffening = 0.0;
-    sampler.visit(n, [&](std::uint16_t label, double weight) {
+    sampler.visit(n, [&](std::uint16_t label, double weight, double scale) {
         if (const TissueRow* row = rows[label]) {
-            (row->fixed ? held : free).add(weight, row->youngsModulus);
+            (row->fixed ? held : free).add(weight, row->youngsModulus * scale);
             poisson += weight * row->poissonRatio;
             stiffening += weight * row->stiffening;
         }
@@ -285,8 +306,8 @@ double cellModulus(const CellSampler& sampler, Index3 n, const std::vector<doubl
     double weight = 0;
     double sum = 0;
     double inverse = 0;
-    sampler.visit(n, [&](std::uint16_t label, double w) {
-        const double e = modulus[label];
+    sampler.visit(n, [&](std::uint16_t label, double w, double scale) {
+        const double e = modulus[label] * scale;
         if (e > 0) {
             weight += w;
             sum += w * e;

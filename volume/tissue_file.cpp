@@ -21,7 +21,7 @@ namespace {
 using nlohmann::json;
 
 constexpr const char* metadataKey = "palpate_volume";
-constexpr int formatVersion = 1;
+constexpr int formatVersion = 2;  // since 2 an image may scale the stiffness
 
 // OpenVDB's registry of grid types must be filled once before anything is read.
 void initialise()
@@ -115,14 +115,26 @@ json describe(const TissueData& t)
                               {"voxels", s.voxels},
                               {"low", triple(t.extents[i].low)},
                               {"high", triple(t.extents[i].high)}});
+        if (s.colour) {
+            structures.back()["colour"] = *s.colour;
+        }
+        if (!s.terminology.empty()) {
+            structures.back()["terminology"] = s.terminology;
+        }
     }
-    return {{"format", formatVersion},
-            {"size", triple(t.size)},
-            {"steps_m", {triple(t.affine.linear[0]), triple(t.affine.linear[1]), triple(t.affine.linear[2])}},
-            {"origin_m", triple(t.affine.origin)},
-            {"table", {{"name", t.table.name}, {"rows", rows}}},
-            {"structures", structures},
-            {"provenance", t.provenance}};
+    json out{{"format", t.stiffnessMap.points.empty() ? 1 : formatVersion},
+             {"size", triple(t.size)},
+             {"steps_m", {triple(t.affine.linear[0]), triple(t.affine.linear[1]), triple(t.affine.linear[2])}},
+             {"origin_m", triple(t.affine.origin)},
+             {"table", {{"name", t.table.name}, {"rows", rows}}},
+             {"structures", structures},
+             {"provenance", t.provenance}};
+    if (t.image) {
+        out["image"] = {{"unit", t.imageUnit},
+                        {"stiffness_points", t.stiffnessMap.points},
+                        {"stiffness_tissues", t.stiffnessMap.tissues}};
+    }
+    return out;
 }
 
 void readStructures(const json& list, TissueData& t)
@@ -136,6 +148,10 @@ void readStructures(const json& list, TissueData& t)
         const auto voxels = j.at("voxels").get<std::uint64_t>();
         t.structures.push_back({j.at("value").get<std::uint16_t>(), j.at("name").get<std::string>(), *row, voxels,
                                 static_cast<double>(voxels) * t.affine.voxelVolume()});
+        if (j.contains("colour")) {
+            t.structures.back().colour = j.at("colour").get<std::array<std::uint8_t, 3>>();
+        }
+        t.structures.back().terminology = j.value("terminology", "");
         t.extents.push_back({index3(j.at("low")), index3(j.at("high"))});
     }
 }
@@ -157,6 +173,12 @@ void readDescription(const json& j, TissueData& t)
     }
     t.provenance = j.at("provenance").get<Provenance>();
     readStructures(j.at("structures"), t);
+    if (j.contains("image")) {
+        const json& image = j.at("image");
+        t.imageUnit = image.at("unit").get<std::string>();
+        t.stiffnessMap.points = image.at("stiffness_points").get<std::vector<std::pair<double, double>>>();
+        t.stiffnessMap.tissues = image.at("stiffness_tissues").get<std::vector<std::string>>();
+    }
 }
 
 // openvdb::io::File does not report a failed write; this writes the same bytes through a stream that throws.
@@ -176,7 +198,11 @@ void writeFile(const std::filesystem::path& file, const TissueData& t)
     std::ofstream out;
     out.exceptions(std::ios::failbit | std::ios::badbit);
     out.open(file, std::ios::binary | std::ios::trunc);
-    Writer().write(out, {t.label, t.stiffness, t.occupancy}, meta);
+    openvdb::GridCPtrVec grids{t.label, t.stiffness, t.occupancy};
+    if (t.image) {
+        grids.push_back(t.image);
+    }
+    Writer().write(out, grids, meta);
     out.close();
 }
 
@@ -274,6 +300,9 @@ Tissue Tissue::load(const std::filesystem::path& file)
         impl->label = gridNamed<openvdb::Int32Grid>(*grids, "label");
         impl->stiffness = gridNamed<openvdb::FloatGrid>(*grids, "stiffness");
         impl->occupancy = gridNamed<openvdb::BoolGrid>(*grids, "occupancy");
+        if (description.contains("image")) {
+            impl->image = gridNamed<openvdb::FloatGrid>(*grids, "image");
+        }
         impl->derive();
         checkCounts(*impl);
     } catch (const std::exception& e) {

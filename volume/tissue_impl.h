@@ -37,6 +37,9 @@ struct TissueData {
     openvdb::Int32Grid::Ptr label;
     openvdb::FloatGrid::Ptr stiffness;  // [kPa]
     openvdb::BoolGrid::Ptr occupancy;
+    openvdb::FloatGrid::Ptr image;  // null where there is none
+    std::string imageUnit;
+    StiffnessMap stiffnessMap;
 
     /// Fills `lookup` and `box` from the table, the structures and their extents.
     void derive();
@@ -48,6 +51,9 @@ struct Tissue::Impl : TissueData {};
 
 /// The affine as OpenVDB's index-to-world transform [m].
 openvdb::math::Transform::Ptr transformOf(const Affine& affine);
+
+/// What an image in `unit` has where there is no tissue.
+double valueOfAir(const std::string& unit) noexcept;
 
 /// The patient box around the voxels of `extent` [m].
 Box patientBox(const Affine& affine, const IndexBox& extent);

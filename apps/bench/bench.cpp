@@ -5,6 +5,8 @@
 #include <apps/bench/kernel.h>
 #include <apps/bench/load.h>
 #include <apps/bench/needle.h>
+#include <apps/bench/scale.h>
+#include <apps/bench/tasks.h>
 #include <apps/bench/view.h>
 #include <apps/figures.h>
 #include <apps/outputs.h>
@@ -190,6 +192,8 @@ void addBench(CLI::App& app)
     addBenchLoad(*bench);
     addBenchIpc(*bench);
     addBenchSync(*bench);
+    addBenchTasks(*bench);
+    addBenchScale(*bench);
     addBenchNeedle(*bench);
     addBenchView(*bench);
 }

@@ -94,22 +94,6 @@ std::string outcome(const ReportData& d, const haptics::Record& record)
     return escape(text) + (record.complete() ? "" : " The record ends early.");
 }
 
-// JSON that may stand in a script element: no "</script" and nothing that is not UTF-8.
-std::string embedded(const nlohmann::json& data)
-{
-    const std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-    std::string out;
-    out.reserve(text.size());
-    for (const char c : text) {
-        if (c == '<') {
-            out += "\\u003c";
-        } else {
-            out += c;
-        }
-    }
-    return out;
-}
-
 // What the servo loop said about its own punctuality, where it did.
 std::string lateness(const haptics::Record& record)
 {
@@ -125,6 +109,21 @@ std::string lateness(const haptics::Record& record)
 }
 
 }  // namespace
+
+std::string embedded(const nlohmann::json& data)
+{
+    const std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    std::string out;
+    out.reserve(text.size());
+    for (const char c : text) {
+        if (c == '<') {
+            out += "\\u003c";
+        } else {
+            out += c;
+        }
+    }
+    return out;
+}
 
 std::string page(std::string_view title, std::string_view body, const nlohmann::json& data)
 {

@@ -16,6 +16,9 @@ namespace palpate::apps {
 /// Text as it may stand in HTML, also in an attribute.
 std::string escape(std::string_view text);
 
+/// JSON that may stand in a script element: no "</script" and nothing that is not UTF-8.
+std::string embedded(const nlohmann::json& data);
+
 /// A whole page that needs no other file: `body` between the style and the scripts that draw data["charts"], each in the
 /// place that chartCard() made for its key.
 ///

@@ -68,6 +68,17 @@ void printStructures(const volume::Tissue& tissue)
     }
 }
 
+std::string imageText(const volume::Tissue& tissue)
+{
+    const std::string unit = tissue.imageUnit().empty() ? "no known unit" : tissue.imageUnit();
+    std::string text = fmt::format("on the voxels of the tissue, in {}", unit);
+    if (const auto& points = tissue.stiffnessMap().points; !points.empty()) {
+        text += fmt::format("; scales the stiffness by {:g} at {:g} to {:g} at {:g}", points.front().second,
+                            points.front().first, points.back().second, points.back().first);
+    }
+    return text;
+}
+
 }  // namespace
 
 nlohmann::json volumeFigures(const volume::Tissue& tissue)
@@ -95,10 +106,12 @@ nlohmann::json volumeFigures(const volume::Tissue& tissue)
         }
     }
     nlohmann::json provenance = nlohmann::json::object();
-    nlohmann::json warnings = nlohmann::json::array();
+    nlohmann::json warnings = nlohmann::json::array(), done = nlohmann::json::array();
     for (const auto& [key, value] : tissue.provenance()) {
         if (key == warningKey) {
             warnings.push_back(value);
+        } else if (key == stepKey) {
+            done.push_back(value);
         } else {
             provenance[key] = value;
         }
@@ -109,11 +122,14 @@ nlohmann::json volumeFigures(const volume::Tissue& tissue)
             {"direction", directions},
             {"origin_mm", {origin.x, origin.y, origin.z}},
             {"labels", labels},
-            {"memory_mb", megabytes(use.label + use.stiffness + use.occupancy)},
+            {"memory_mb", megabytes(use.label + use.stiffness + use.occupancy + use.image)},
             {"grids_mb",
              {{"label", megabytes(use.label)},
               {"stiffness", megabytes(use.stiffness)},
-              {"occupancy", megabytes(use.occupancy)}}},
+              {"occupancy", megabytes(use.occupancy)},
+              {"image", megabytes(use.image)}}},
+            {"image", tissue.hasImage() ? nlohmann::json(imageText(tissue)) : nlohmann::json(nullptr)},
+            {"done", done},
             {"tissue_table", tissue.table().name},
             {"provenance", provenance},
             {"warnings", warnings}};
@@ -124,9 +140,13 @@ void printVolume(const volume::Tissue& tissue)
     printGeometry(tissue);
     printStructures(tissue);
     const volume::MemoryUse use = tissue.memory();
-    fmt::print("\nmemory       {:.1f} MB: label {:.1f}, stiffness {:.1f}, occupancy {:.1f}\n",
-               megabytes(use.label + use.stiffness + use.occupancy), megabytes(use.label), megabytes(use.stiffness),
-               megabytes(use.occupancy));
+    fmt::print("\nmemory       {:.1f} MB: label {:.1f}, stiffness {:.1f}, occupancy {:.1f}{}\n",
+               megabytes(use.label + use.stiffness + use.occupancy + use.image), megabytes(use.label),
+               megabytes(use.stiffness), megabytes(use.occupancy),
+               tissue.hasImage() ? fmt::format(", image {:.1f}", megabytes(use.image)) : "");
+    if (tissue.hasImage()) {
+        fmt::print("image        {}\n", imageText(tissue));
+    }
     fmt::print("tissues      {}\n", tissue.table().name);
     for (const auto& [key, value] : tissue.provenance()) {
         fmt::print("{:<12} {}\n", key, value);

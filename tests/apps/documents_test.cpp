@@ -1,3 +1,4 @@
+#include <datasets/label_map.h>
 #include <datasets/scene.h>
 #include <datasets/scene_text.h>
 #include <datasets/tables.h>
@@ -170,10 +171,13 @@ TEST(Documents, TheExamplesLoad)
         files.push_back(folder / (std::to_string(files.size()) + ".toml"));
         writeText(files.back(), text.substr(begin, text.find("```", begin) - begin));
     }
-    ASSERT_EQ(files.size(), 3U);
+    ASSERT_EQ(files.size(), 4U);
     EXPECT_EQ(datasets::loadScene(files[0]).target, "tumour_2");
     EXPECT_EQ(datasets::loadTissues(files[1]).name, "mine");
-    EXPECT_EQ(datasets::labelMap(files[2]).labels.size(), 2U);
+    const datasets::LabelMap map = datasets::labelMap(files[2]);
+    EXPECT_EQ(map.labels.size(), 2U);
+    EXPECT_EQ(map.segments.size(), 1U);
+    EXPECT_EQ(datasets::stiffnessMap(files[3], "HU", datasets::defaultTissues()).points.size(), 3U);
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ public:
     void send(int signal);
     Outcome wait();
     bool running();
+    int pid() const noexcept { return pid_; }
 
 private:
     Folder folder_;  // of its standard output and error

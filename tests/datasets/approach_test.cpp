@@ -1,3 +1,4 @@
+#include <datasets/approach.h>
 #include <datasets/scene.h>
 #include <datasets/scene_text.h>
 #include <datasets/tables.h>
@@ -72,6 +73,32 @@ TEST(PlanApproach, AimsAtTheMiddleOfASphereByTheShortestWay)
     EXPECT_LT(glm::length(way.entry - way.aim), 0.0265);
     scene.entry = Vec3(0.01, 0, 0);
     EXPECT_EQ(planApproach(scene, tissue).entry, Vec3(0.01, 0, 0));
+}
+
+// Several ways, the best first, each as clear and as steep as it says, and no two alike.
+TEST(ProposeApproaches, WaysDifferAndKeepTheirMargin)
+{
+    Scene scene = *builtInScene("breast");
+    const Tissue tissue = sceneVolume(scene);
+    const Voxels voxels(tissue);
+    const std::vector<Proposal> ways = proposeApproaches(scene, tissue, 4, 3e-3);
+    ASSERT_GE(ways.size(), 2U);
+    EXPECT_EQ(proposeApproaches(scene, tissue, 4).front().approach.entry, planApproach(scene, tissue).entry);
+    for (std::size_t i = 0; i < ways.size(); ++i) {
+        SCOPED_TRACE(i);
+        const Approach& way = ways[i].approach;
+        const Vec3 inward = glm::normalize(way.aim - way.entry);
+        EXPECT_DOUBLE_EQ(ways[i].length, glm::length(way.aim - way.entry));
+        EXPECT_GE(ways[i].clearance, 3e-3);
+        const Vec3 fired = way.aim + scene.tool.notchLength / 2 * inward;
+        EXPECT_FALSE(touchesForbidden(tissue, voxels, way.entry, fired, scene.tool.radius + 3e-3 - 1e-3));
+        EXPECT_LE(ways[i].angle, std::acos(0.5));
+        for (std::size_t j = 0; j < i; ++j) {
+            const Vec3 other = glm::normalize(ways[j].approach.aim - ways[j].approach.entry);
+            const bool apart = glm::length(ways[j].approach.aim - way.aim) > 10e-3;
+            EXPECT_TRUE(glm::dot(inward, other) < 0.941 || apart);
+        }
+    }
 }
 
 // The notch is 20 mm and the throw 22 mm: with 3 mm of tip in the skin the line must be 15 mm long for a centred notch. A

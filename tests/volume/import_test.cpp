@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 #include <zlib.h>
+#include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -124,6 +126,36 @@ struct Nifti {
     }
 };
 
+// A NIfTI-2 header with the same meaning, in either byte order.
+std::string nifti2(bool swapped)
+{
+    std::string bytes(544, '\0');
+    const auto put = [&](std::size_t at, auto value) {
+        char raw[sizeof value];
+        std::memcpy(raw, &value, sizeof value);
+        if (swapped) {
+            std::reverse(raw, raw + sizeof value);
+        }
+        std::memcpy(bytes.data() + at, raw, sizeof value);
+    };
+    put(0, std::int32_t{540});
+    std::memcpy(bytes.data() + 4, "n+2\0\r\n\032\n", 8);
+    put(12, std::int16_t{4});
+    put(14, std::int16_t{16});
+    const std::int64_t dim[8] = {3, 4, 5, 6, 1, 1, 1, 1};
+    for (std::size_t i = 0; i < 8; ++i) {
+        put(16 + 8 * i, dim[i]);
+        put(104 + 8 * i, 1.0);
+    }
+    put(168, std::int64_t{544});
+    put(348, std::int32_t{1});
+    put(400, 2.0);   // x to the right
+    put(440, 3.0);   // y to the front
+    put(480, 4.0);   // z to the head
+    put(488, 50.0);  // and 50 mm up
+    return bytes;
+}
+
 void expectRamp(const ImportedLabels& labels)
 {
     EXPECT_EQ(labels.image.size, Index3(4, 5, 6));
@@ -170,12 +202,102 @@ TEST_F(ImportFile, BigEndianVoxelsOfAMisdeclaredFileAreTurned)
     expectRamp(importLabels(write("v.mhd", meta("BinaryDataByteOrderMSB = True\n", "MET_USHORT", "4 5 6", "v.raw"))));
 }
 
+TEST_F(ImportFile, SecondVersionOfNiftiComesInInBothByteOrders)
+{
+    std::string turned = bytesOf(ramp<std::int16_t>());
+    for (std::size_t i = 0; i < turned.size(); i += 2) {
+        std::swap(turned[i], turned[i + 1]);
+    }
+    for (const bool swapped : {false, true}) {
+        const auto labels =
+            importLabels(write("a.nii", nifti2(swapped) + (swapped ? turned : bytesOf(ramp<std::int16_t>()))));
+        expectRamp(labels);
+        EXPECT_NEAR(labels.image.affine.linear[0].x, -2e-3, 1e-15);
+        EXPECT_NEAR(labels.image.affine.linear[1].y, -3e-3, 1e-15);
+        EXPECT_NEAR(labels.image.affine.linear[2].z, 4e-3, 1e-15);
+        EXPECT_NEAR(labels.image.affine.origin.z, 50e-3, 1e-15);
+    }
+    expectRefused(write("a.nii", nifti2(false)), "cut short");
+}
+
+// A slope makes an image of what is stored; the header and the voxels may lie in two files.
+TEST_F(ImportFile, PairsOfFilesAndImagesComeIn)
+{
+    Nifti header(4, 16);
+    header.put(112, 0.5F).put(116, -3.0F).put(108, 0.0F);
+    std::memcpy(header.bytes.data() + 344, "ni1", 4);
+    header.bytes.resize(348);
+    write("pair.hdr", header.bytes);
+    expectRefused(folder / "pair.hdr", "are not there");
+    write("pair.img", bytesOf(ramp<std::int16_t>()));
+    for (const char* name : {"pair.hdr", "pair.img"}) {
+        const ImportedImage image = importImage(folder / name);
+        ASSERT_EQ(image.values.size(), 120U);
+        for (std::size_t i = 0; i < 120; ++i) {
+            ASSERT_FLOAT_EQ(image.values[i], 0.5F * static_cast<float>(i % 7) - 3.0F);
+        }
+    }
+    std::memset(header.bytes.data() + 344, 0, 4);
+    expectRefused(write("pair.hdr", header.bytes), "Analyze 7.5");
+}
+
+TEST_F(ImportFile, VoxelsThatAreNotNumbersTakeTheSmallestOfAnImage)
+{
+    auto floats = ramp<float>();
+    floats[0] = -5.0F;
+    floats[3] = std::numeric_limits<float>::quiet_NaN();
+    const ImportedImage image = importImage(write("a.nii", Nifti(16, 32).bytes + bytesOf(floats)));
+    EXPECT_EQ(image.values[3], -5.0F);
+    ASSERT_EQ(image.warnings.size(), 1U);
+    EXPECT_NE(image.warnings[0].find("1 voxels are not numbers"), std::string::npos);
+}
+
+// Freesurfer: c is the centre at index size / 2; its axes are RAS.
+TEST_F(ImportFile, FreeSurferVolumesComeIn)
+{
+    std::string bytes(284, '\0');
+    const auto put = [&](std::size_t at, auto value) {
+        char raw[sizeof value];
+        std::memcpy(raw, &value, sizeof value);
+        std::reverse(raw, raw + sizeof value);
+        std::memcpy(bytes.data() + at, raw, sizeof value);
+    };
+    const std::int32_t head[7] = {1, 4, 5, 6, 1, 0, 0};
+    for (std::size_t i = 0; i < 7; ++i) {
+        put(4 * i, head[i]);
+    }
+    put(28, std::int16_t{1});
+    const float numbers[15] = {1, 2, 3, -1, 0, 0, 0, 0, -1, 0, 1, 0, 10, 20, 30};  // spacing, x, y, z, centre
+    for (std::size_t i = 0; i < 15; ++i) {
+        put(30 + 4 * i, numbers[i]);
+    }
+    const auto labels = importLabels(write("a.mgz", gzip(bytes + bytesOf(ramp<std::uint8_t>()) + std::string(20, 'x'))));
+    expectRamp(labels);
+    const Affine& a = labels.image.affine;
+    EXPECT_NEAR(glm::length(a.linear[0] - Vec3(1e-3, 0, 0)), 0, 1e-9);   // left
+    EXPECT_NEAR(glm::length(a.linear[1] - Vec3(0, 0, -2e-3)), 0, 1e-9);  // down
+    EXPECT_NEAR(glm::length(a.linear[2] - Vec3(0, -3e-3, 0)), 0, 1e-9);  // to the front
+    EXPECT_NEAR(glm::length(a.toPatient({2, 2.5, 3}) - Vec3(-10e-3, -20e-3, 30e-3)), 0, 1e-9);
+}
+
+// An inflated stream whose end falls onto the end of a buffer is not a short one.
+TEST_F(ImportFile, PackedDataOfEverySizeEndWhereTheyEnd)
+{
+    for (const int n : {1023, 1024, 1025, 2048}) {
+        std::string plain(static_cast<std::size_t>(n) * 1024, '\0');
+        plain[5] = 1;
+        const std::string size = fmt::format("1024 {} 1", n);
+        EXPECT_EQ(reason(write("a.mha", meta("CompressedData = True\n", "MET_UCHAR", size) + gzip(plain))), "") << n;
+    }
+}
+
 TEST_F(ImportFile, SizesThatDoNotFitTheBytesAreRefused)
 {
     const std::string data = bytesOf(ramp<std::uint8_t>());
-    for (const char* size : {"4 5 7", "4 5 5", "4 4 6", "3 5 6", "40 50 60", "32767 32767 32767"}) {
+    for (const char* size : {"4 5 7", "4 5 5", "4 4 6", "3 5 6", "40 50 60", "1000 2000 2000"}) {
         expectRefused(write("a.mha", meta("", "MET_UCHAR", size) + data), "bytes");
     }
+    expectRefused(write("a.mha", meta("", "MET_UCHAR", "32767 32767 32767") + data), "more than");
     expectRefused(write("a.mha", meta("", "MET_USHORT") + data), "cut short");
     expectRefused(write("a.mha", meta("", "MET_UCHAR", "4 0 6") + data), "1 to 32767");
     expectRefused(write("a.mha", meta("", "MET_UCHAR", "-4 5 6") + data), "1 to 32767");
@@ -228,7 +350,7 @@ TEST_F(ImportFile, ScaledNiftiIsTakenWhenTheResultsAreLabels)
         importLabels(write("a.nii", Nifti().put(112, 2.0F).put(116, 1.0F).bytes + bytesOf(ramp<std::uint8_t>())));
     EXPECT_EQ(labels.image.values[0], 1);
     EXPECT_EQ(labels.image.values[6], 13);
-    expectRefused(write("a.nii", Nifti().put(112, 0.3F).bytes + bytesOf(ramp<std::uint8_t>())), "scl_slope");
+    expectRefused(write("a.nii", Nifti().put(112, 0.3F).bytes + bytesOf(ramp<std::uint8_t>())), "its slope is applied");
 }
 
 // RAS in the file, LPS here; the sform counts, and a qform that disagrees is worth a warning.
@@ -282,11 +404,14 @@ TEST_F(ImportFile, ManyVolumesAndManyValuesPerVoxelAreRefused)
     const std::string twice = bytesOf(ramp<std::uint8_t>()) + bytesOf(ramp<std::uint8_t>());
     expectRefused(write("a.nii", Nifti().put<std::int16_t>(40, 4).put<std::int16_t>(48, 2).bytes + twice), "4 dimensions");
     expectRefused(write("a.mha", meta("ElementNumberOfChannels = 2\n") + twice), "2 values per voxel");
-    expectRefused(write("a.nrrd",
-                        "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 4 5 6\nkinds: list domain domain domain\n"
-                        "encoding: raw\n\n" +
-                            twice),
-                  "2 layers");
+    for (const char* kinds :
+         {"vector domain domain domain", "RGB-color domain domain domain", "time domain domain domain"}) {
+        expectRefused(write("a.nrrd", fmt::format("NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 4 5 6\nkinds: {}\n"
+                                                  "encoding: raw\n\n",
+                                                  kinds) +
+                                          twice),
+                      "several values per voxel");
+    }
 }
 
 TEST_F(ImportFile, NrrdComesInRawAndPackedAndIsRefusedWhenItLies)

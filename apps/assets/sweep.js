@@ -1,0 +1,165 @@
+"use strict";
+// Draws the report of a sweep from the data in the page. ECharts comes before this script.
+const data = JSON.parse(document.getElementById("data").textContent);
+const byId = (id) => document.getElementById(id);
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+const names = data.axes.map((a) => a.name);
+const all = "(all together)";
+const mostValues = 12, mostCurves = 8; // of an axis: beyond, its values are put into bins
+const charts = {};
+
+const column = { output: (row, o) => row[names.length + o], axis: (row, a) => row[a] };
+
+// The values of an axis in the order of the plan, or bins of it where there are over `most`.
+function levels(a, most = mostValues, bins = most) {
+  const axis = data.axes[a];
+  if (axis.words) return axis.values.map((v) => ({ label: String(v), holds: (x) => x === v }));
+  const values = [...new Set(data.rows.map((row) => row[a]))].sort((p, q) => p - q);
+  const text = (v) => String(Number(v.toPrecision(4)));
+  if (values.length <= most) return values.map((v) => ({ label: text(v), middle: v, holds: (x) => x === v }));
+  const low = values[0], high = values[values.length - 1];
+  const place = (t) => (axis.log ? low * (high / low) ** t : low + t * (high - low));
+  return Array.from({ length: bins }, (_, i) => {
+    const from = place(i / bins), to = place((i + 1) / bins), last = i + 1 === bins;
+    const middle = place((i + 0.5) / bins);
+    return { label: bins < most ? `${Number(from.toPrecision(3))} to ${Number(to.toPrecision(3))}` : text(middle), middle, holds: (x) => x >= from && (last || x < to) };
+  });
+}
+
+function quantile(sorted, share) {
+  const at = share * (sorted.length - 1), below = Math.floor(at);
+  return sorted[below] + (at - below) * ((sorted[below + 1] ?? sorted[below]) - sorted[below]);
+}
+
+const finite = (v) => typeof v === "number" && Number.isFinite(v);
+const short = (v) => (finite(v) ? String(Number(v.toPrecision(4))) : "–");
+
+function chart(id, option, height) {
+  const place = byId(id);
+  if (height) place.style.height = height + "px";
+  charts[id] ??= echarts.init(place, null, { renderer: "svg" });
+  charts[id].resize();
+  charts[id].setOption({ animation: false, textStyle: { fontFamily: "system-ui, sans-serif" }, ...option }, true);
+}
+
+const axisStyle = () => ({
+  nameTextStyle: { color: colour("soft") }, nameLocation: "middle", axisLabel: { color: colour("soft") },
+  axisLine: { lineStyle: { color: colour("line") } }, splitLine: { lineStyle: { color: colour("grid") } },
+});
+const tip = () => ({ backgroundColor: colour("card"), borderColor: colour("line"), textStyle: { color: colour("ink"), fontSize: 12.5 } });
+
+// One curve with its band: the middle half of the cases at each level.
+function curveOf(rows, a, o, steps) {
+  return steps.map((level, i) => {
+    const values = rows.filter((row) => level.holds(row[a])).map((row) => column.output(row, o)).filter(finite).sort((p, q) => p - q);
+    const x = data.axes[a].words ? i : level.middle;
+    return values.length ? { x, n: values.length, low: quantile(values, 0.25), mid: quantile(values, 0.5), high: quantile(values, 0.75) } : null;
+  }).filter(Boolean);
+}
+
+function drawCurve(o, a, b) {
+  const steps = levels(a), axis = data.axes[a];
+  const groups = b === null ? [{ label: data.outputs[o], holds: () => true, whole: true }] : levels(b, mostCurves, 4);
+  const series = [];
+  groups.forEach((group, g) => {
+    const rows = data.rows.filter((row) => group.whole || group.holds(row[b]));
+    const points = curveOf(rows, a, o, steps), shade = colour("c" + (g % 8));
+    const name = group.whole ? group.label : names[b] + " = " + group.label;
+    const band = [...points.map((p) => [p.x, p.high]), ...points.slice().reverse().map((p) => [p.x, p.low])];
+    if (points.length > 1) {
+      series.push({
+        name, type: "custom", silent: true, z: 1, data: [[0]], itemStyle: { color: shade }, tooltip: { show: false },
+        renderItem: (params, api) => ({ type: "polygon", shape: { points: band.map((p) => api.coord(p)) }, style: { fill: shade, opacity: 0.16 }, clipPath: null }),
+        clip: true,
+      });
+    }
+    series.push({
+      name, type: "line", z: 3, symbolSize: 6, itemStyle: { color: shade }, lineStyle: { color: shade, width: 1.8 },
+      data: points.map((p) => ({ value: [p.x, p.mid], n: p.n, low: p.low, high: p.high })),
+      markLine: g > 0 ? undefined : {
+        symbol: "none", silent: true, lineStyle: { color: colour("soft"), type: "dashed" },
+        label: { formatter: "{b}", position: "insideEndTop", color: colour("soft") },
+        data: data.marks.filter((m) => m.output === data.outputs[o]).map((m) => ({ name: m.label, yAxis: m.at })),
+      },
+    });
+  });
+  const x = axis.words
+    ? { type: "category", data: steps.map((s) => s.label) }
+    : { type: axis.log ? "log" : "value", scale: true, min: "dataMin", max: "dataMax", axisLabel: { color: colour("soft"), formatter: short } };
+  chart("curve", {
+    grid: { left: 74, right: 24, top: groups.length > 5 ? 62 : 44, bottom: 92 },
+    legend: { type: "plain", top: 4, textStyle: { color: colour("soft") }, data: [...new Set(series.map((s) => s.name))] },
+    tooltip: { trigger: "item", ...tip(), formatter: (p) => `${p.marker}${p.seriesName}<br>${names[a]}: ${axis.words ? steps[p.value[0]]?.label ?? p.name : short(p.value[0])}<br>median ${short(p.value[1])}, middle half ${short(p.data.low)} to ${short(p.data.high)}, ${p.data.n} cases` },
+    xAxis: { ...axisStyle(), name: names[a], nameGap: 28, ...x },
+    yAxis: { ...axisStyle(), name: data.outputs[o], nameGap: 54, type: "value", scale: true },
+    dataZoom: axis.words ? [] : [{ type: "slider", height: 18, bottom: 12, textStyle: { color: colour("soft") }, labelFormatter: (v) => short(v) }, { type: "inside" }],
+    series,
+  });
+}
+
+function drawMap(o, a, b) {
+  const across = levels(a), up = levels(b), cells = [];
+  up.forEach((v, j) => across.forEach((u, i) => {
+    const values = data.rows.filter((row) => u.holds(row[a]) && v.holds(row[b])).map((row) => column.output(row, o)).filter(finite);
+    if (values.length) cells.push([i, j, values.reduce((s, x) => s + x, 0) / values.length, values.length]);
+  }));
+  const values = cells.map((c) => c[2]);
+  chart("map", {
+    grid: { left: 84, right: 110, top: 16, bottom: 56 },
+    tooltip: { ...tip(), formatter: (p) => `${names[a]} ${across[p.value[0]].label}, ${names[b]} ${up[p.value[1]].label}<br>${data.outputs[o]}: ${short(p.value[2])} (${p.value[3]} cases)` },
+    xAxis: { ...axisStyle(), type: "category", name: names[a], nameGap: 30, data: across.map((l) => l.label) },
+    yAxis: { ...axisStyle(), type: "category", name: names[b], nameGap: 58, data: up.map((l) => l.label) },
+    visualMap: {
+      min: Math.min(...values), max: Math.max(...values), calculable: true, right: 4, top: "middle", dimension: 2, formatter: short,
+      textStyle: { color: colour("soft") }, inRange: { color: ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"] },
+    },
+    series: [{ type: "heatmap", data: cells, label: { show: cells.length <= 64, formatter: (p) => short(p.value[2]) } }],
+  });
+}
+
+function drawRank(o) {
+  const s = data.sensitivity, list = s.outputs[data.outputs[o]] || [];
+  byId("method").textContent = list.length ? s.method + "." : "No ranking can be had: cases are missing, or the output does not vary.";
+  const cells = (tag, values) => values.map((v) => { const e = document.createElement(tag); e.textContent = v; return e; });
+  const line = (tag, values) => { const tr = document.createElement("tr"); tr.append(...cells(tag, values)); return tr; };
+  byId("indices").replaceChildren(...(list.length ? [line("th", ["axis", ...s.measures]), ...list.map((e) => line("td", [e.axis, ...e.values.map(short)]))] : []));
+  const bars = list.slice().reverse();
+  chart("rank", {
+    grid: { left: 150, right: 40, top: 6, bottom: 26 },
+    tooltip: { ...tip(), formatter: (p) => `${p.name}: ${short(p.value)}` },
+    xAxis: { ...axisStyle(), type: "value", min: 0 },
+    yAxis: { ...axisStyle(), type: "category", data: bars.map((e) => e.axis) },
+    series: [{ type: "bar", data: bars.map((e) => Math.max(e.values[0] ?? 0, 0)), itemStyle: { color: colour("accent") }, barMaxWidth: 26 }],
+  }, 60 + 34 * Math.max(list.length, 1));
+}
+
+function fill(id, labels, chosen) {
+  byId(id).replaceChildren(...labels.map((label) => { const o = document.createElement("option"); o.textContent = o.value = label; return o; }));
+  byId(id).value = labels.includes(chosen) ? chosen : labels[0];
+}
+
+function draw() {
+  const o = data.outputs.indexOf(byId("output").value), at = (id) => names.indexOf(byId(id).value);
+  drawCurve(o, at("x"), byId("by").value === all ? null : at("by"));
+  byId("map").closest("section").hidden = names.length < 2;
+  if (names.length > 1) drawMap(o, at("mapx"), at("mapy"));
+  drawRank(o);
+  document.body.dataset.drawn = byId("output").value;
+}
+
+// What is shown stands in the address, so that a view can be passed on: #output=..&x=..&by=..
+const chosen = new URLSearchParams(location.hash.slice(1));
+fill("output", data.outputs, chosen.get("output"));
+fill("x", names, chosen.get("x"));
+fill("by", [all, ...names], chosen.get("by") ?? (names.length > 1 ? names[1] : all));
+fill("mapx", names, chosen.get("mapx"));
+fill("mapy", names, chosen.get("mapy") ?? names[1]);
+for (const id of ["output", "x", "by", "mapx", "mapy"]) {
+  byId(id).addEventListener("change", () => {
+    history.replaceState(null, "", "#" + new URLSearchParams(["output", "x", "by", "mapx", "mapy"].map((i) => [i, byId(i).value])));
+    draw();
+  });
+}
+draw();
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+addEventListener("resize", () => Object.values(charts).forEach((c) => c.resize()));

@@ -1,0 +1,241 @@
+#include <apps/command.h>
+
+#include <apps/falcon.h>
+
+#include <haptics/falcon/usb.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double slow = 400.0;  // exchanges per second, below which a hub or a cable is in the way
+
+struct DevicesOptions {
+    FalconOptions falcon;
+    bool installUdev = false;
+    fs::path rules = "/etc/udev/rules.d";
+    std::uint64_t exchanges = 0;
+    std::string json;
+};
+
+// What a look at the Falcon itself shows.
+struct State {
+    bool running = false, homed = false;
+    std::string problem;  // why it could not be looked at; empty: it could
+};
+
+struct Exchanges {
+    falcon::LinkCounts counts;
+    double seconds = 0;
+    std::vector<double> roundTrip;  // of those answered [s], sorted
+    bool loaded = false;
+};
+
+std::string textOf(const fs::path& file)
+{
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void installRule(const fs::path& folder)
+{
+    const fs::path file = folder / falcon::udevRuleFile;
+    std::ofstream stream(file);
+    stream << falcon::udevRule() << std::flush;
+    if (!stream) {
+        throw std::runtime_error(fmt::format("{}: cannot be written ({}): run 'sudo palpate devices --install-udev'",
+                                             file.string(), std::strerror(errno)));
+    }
+    ::chmod(file.c_str(), 0644);
+    // Without udev (a container) the rule waits for it.
+    const bool told = std::system(
+                          "udevadm control --reload >/dev/null 2>&1 && udevadm trigger --subsystem-match=usb "
+                          ">/dev/null 2>&1") == 0;
+    fmt::print("{}: written{}; plug the Falcon in again\n", file.string(),
+               told ? "" : " (udev does not run here: it is read when it starts)");
+}
+
+State look()
+{
+    const auto wire = falcon::usbTransport();
+    falcon::LinkOptions options;
+    options.home = false;
+    falcon::Link link(*wire, options, [](const std::string&) {});
+    const std::atomic<bool> never{false};
+    State state;
+    try {
+        link.connect(never);
+        state.running = true;
+        state.homed = link.reading().homed == falcon::allHomed;
+    } catch (const falcon::Trouble& trouble) {
+        if (trouble.cause() != falcon::Cause::firmwareFile) {
+            state.problem = trouble.what();
+        }
+    }
+    link.close();
+    return state;
+}
+
+// Packets there and back, without torque.
+Exchanges exchange(const DevicesOptions& o)
+{
+    const auto wire = falcon::usbTransport();
+    falcon::Link link(*wire, linkOptions(o.falcon), sayForFalcon);
+    const std::atomic<bool> never{false};
+    link.connect(never);
+    Exchanges done;
+    done.loaded = link.loaded();
+    done.roundTrip.reserve(o.exchanges);
+    const double start = wire->now();
+    while (link.counts().exchanges < o.exchanges) {
+        const double before = wire->now();
+        if (link.exchange({})) {
+            done.roundTrip.push_back(wire->now() - before);
+        } else if (link.lost()) {
+            throw std::runtime_error(fmt::format("the Falcon {} after {} exchanges: check its cable and power supply",
+                                                 wire->gone() ? "was unplugged" : "stopped answering",
+                                                 done.roundTrip.size()));
+        }
+    }
+    done.seconds = wire->now() - start;
+    done.counts = link.counts();
+    link.rest();
+    link.close();
+    std::ranges::sort(done.roundTrip);
+    return done;
+}
+
+double atShare(const std::vector<double>& sorted, double share)
+{
+    const auto i = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
+    return sorted[std::min(i, sorted.size() - 1)];
+}
+
+nlohmann::json figuresOf(const Exchanges& e)
+{
+    return {{"answered", e.counts.exchanges},
+            {"unanswered", e.counts.unanswered},
+            {"implausible", e.counts.implausible},
+            {"lost_bytes", e.counts.lostBytes},
+            {"firmware_loaded", e.loaded},
+            {"rate_hz", static_cast<double>(e.counts.exchanges) / e.seconds},
+            {"round_trip_us",
+             {{"p50", 1e6 * atShare(e.roundTrip, 0.5)},
+              {"p99", 1e6 * atShare(e.roundTrip, 0.99)},
+              {"max", 1e6 * e.roundTrip.back()}}}};
+}
+
+void printExchanges(const Exchanges& e)
+{
+    const double rate = static_cast<double>(e.counts.exchanges) / e.seconds;
+    fmt::print("{} packets there and back: {:.0f} per second, {:.0f} us (p50), {:.0f} us (p99)\n", e.counts.exchanges, rate,
+               1e6 * atShare(e.roundTrip, 0.5), 1e6 * atShare(e.roundTrip, 0.99));
+    fmt::print("  {} were not answered, {} not plausible, {} bytes belonged to none\n", e.counts.unanswered,
+               e.counts.implausible, e.counts.lostBytes);
+    if (rate < slow || 100 * (e.counts.unanswered + e.counts.implausible) > e.counts.exchanges) {
+        fmt::print("  this is too slow or too unsure to feel tissue: plug the Falcon straight into the computer\n");
+    }
+}
+
+nlohmann::json list(const DevicesOptions& o)
+{
+    const bool quiet = o.json == "-";
+    const auto say = [quiet](const std::string& line) { quiet ? void() : fmt::print("{}\n", line); };
+    const auto falcons = falcon::listFalcons();
+    auto figures = nlohmann::json::array();
+    for (const auto& f : falcons) {
+        // With the options for an exchange that follows, the look would only take time.
+        const State state = f.allowed && f.driver.empty() && o.exchanges == 0 ? look() : State{};
+        say(fmt::format("Novint Falcon on bus {}, address {}", f.bus, f.address));
+        say(fmt::format("  may be opened   {}",
+                        f.allowed ? "yes" : "no: run 'sudo palpate devices --install-udev', plug it in again"));
+        say(fmt::format("  kernel driver   {}",
+                        f.driver.empty() ? "none" : f.driver + " (is detached when the Falcon is used)"));
+        if (!state.problem.empty()) {
+            say("  firmware        cannot be asked: " + state.problem);
+        } else if (f.allowed && f.driver.empty() && o.exchanges == 0) {
+            say(fmt::format("  firmware        {}", !state.running ? "not loaded: give it with --falcon-firmware FILE"
+                                                    : state.homed  ? "runs, homed"
+                                                                   : "runs, not homed yet"));
+        }
+        figures.push_back({{"bus", f.bus},
+                           {"address", f.address},
+                           {"node", f.node},
+                           {"kernel_driver", f.driver},
+                           {"allowed", f.allowed},
+                           {"firmware_runs", state.running},
+                           {"homed", state.homed}});
+    }
+    if (falcons.empty()) {
+        say("no Falcon is plugged in (USB 0403:cb48): plug in its cable and its power supply");
+    }
+    const fs::path rule = o.rules / falcon::udevRuleFile;
+    const bool there = textOf(rule) == falcon::udevRule();
+    say(fmt::format("udev rule         {}",
+                    there ? rule.string() : "not there: 'sudo palpate devices --install-udev' writes it"));
+    nlohmann::json all{{"falcons", figures}, {"udev_rule", {{"file", rule.string()}, {"installed", there}}}};
+    if (!o.falcon.firmware.empty()) {
+        const auto firmware = falcon::readFirmware(o.falcon.firmware);
+        say(fmt::format("firmware          {}: {} bytes", firmware.file, firmware.image.size()));
+        all["firmware"] = {{"file", firmware.file}, {"bytes", firmware.image.size()}};
+    }
+    say("without a Falcon: --device hand (a scripted trainee), --device mouse (of the viewer's window)");
+    return all;
+}
+
+void devices(const DevicesOptions& o)
+{
+    if (o.installUdev) {
+        installRule(o.rules);
+        return;
+    }
+    auto figures = list(o);
+    if (o.exchanges > 0) {
+        const Exchanges done = exchange(o);
+        figures["exchanges"] = figuresOf(done);
+        if (o.json != "-") {
+            printExchanges(done);
+        }
+    }
+    if (!o.json.empty()) {
+        writeJson(o.json, figures);
+    }
+}
+
+}  // namespace
+
+void addDevices(CLI::App& app)
+{
+    const auto o = std::make_shared<DevicesOptions>();
+    CLI::App* c = app.add_subcommand("devices", "List haptic devices: what is there, what is missing");
+    c->add_option("--falcon-firmware", o->falcon.firmware, "Firmware of the Novint Falcon (a file of its maker's)");
+    c->add_option("--exchanges", o->exchanges,
+                  "Make the Falcon ready and exchange so many packets without force: how fast, how surely")
+        ->check(CLI::Range(1, 10000000));
+    auto* install = c->add_flag("--install-udev", o->installUdev, "Write the rule that lets you open the Falcon (as root)");
+    c->add_option("--udev-folder", o->rules, "Where udev's rules are")->capture_default_str();
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)")
+        ->excludes(install);
+    c->final_callback([o] { devices(*o); });
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,222 @@
+#include <apps/command.h>
+#include <apps/deformed_state.h>
+#include <apps/outputs.h>
+#include <apps/progress.h>
+#include <apps/quantities.h>
+#include <apps/session.h>
+#include <datasets/label_map.h>
+#include <volume/export.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "displacement", "inverse"};
+
+struct Options {
+    fs::path volume, output, map, json;
+    std::string record, at, what;
+    bool nifti2 = false;
+};
+
+bool isVtu(const fs::path& file)
+{
+    return file.extension() == ".vtu" || file.extension() == ".VTU";
+}
+
+bool ofRecordOnly(const std::string& what)
+{
+    return what == "displacement" || what == "inverse";
+}
+
+void checkOptions(Options& o)
+{
+    if (o.what.empty()) {
+        o.what = isVtu(o.output) ? "displacement" : "labels";
+    }
+    if (o.volume.empty() == o.record.empty()) {
+        throw std::runtime_error("palpate export: give a volume (V.vdb), or a record (--record FILE --at TIME)");
+    }
+    if (o.record.empty() != o.at.empty()) {
+        throw std::runtime_error(o.at.empty() ? "--record: needs a time of the session: add --at 3.2s"
+                                              : "--at: is a time of a record: add --record FILE");
+    }
+    if (o.record.empty() && ofRecordOnly(o.what)) {
+        throw std::runtime_error(
+            fmt::format("{}: {} is of a session: give --record FILE --at TIME", o.output.string(), o.what));
+    }
+    if (!o.record.empty() && !ofRecordOnly(o.what) && o.what != "labels") {
+        throw std::runtime_error(fmt::format("--what {}: does not change in a session: export it of the volume", o.what));
+    }
+    if (isVtu(o.output) && o.what != "displacement") {
+        throw std::runtime_error(
+            fmt::format("{}: a .vtu holds the displacement of a record's nodes, not {}: name it .nii.gz "
+                        "or .nrrd",
+                        o.output.string(), o.what));
+    }
+    if (!o.map.empty() && o.what != "labels") {
+        throw std::runtime_error("--write-map: goes with labels");
+    }
+    if (!isVtu(o.output)) {
+        volume::checkExportName(o.output);
+    }
+    checkOutput(o.output);
+    checkOutput(o.map);
+    checkOutput(o.json);
+}
+
+double timeFrom(const std::string& text)
+{
+    const auto plain = timeOf(text + "s");
+    const auto time = plain ? plain : timeOf(text);
+    if (!time) {
+        throw std::runtime_error(fmt::format("--at {}: must be a time, 3.2s or 3200ms", text));
+    }
+    return *time;
+}
+
+// Names, colours and terms of the structures; a structure without a colour of its own has its tissue's.
+std::vector<volume::LabelName> namesOf(const volume::Tissue& tissue)
+{
+    std::vector<volume::LabelName> names;
+    for (const volume::Structure& s : tissue.structures()) {
+        const volume::TissueRow& row = tissue.table().rows[s.tissue];
+        volume::LabelName name{s.value, s.name, row.name, s.colour, s.terminology};
+        if (!name.colour) {
+            std::array<std::uint8_t, 3> rgb{};
+            for (int k = 0; k < 3; ++k) {
+                rgb[static_cast<std::size_t>(k)] = static_cast<std::uint8_t>(std::lround(255.0F * row.colour[k]));
+            }
+            name.colour = rgb;
+        }
+        names.push_back(std::move(name));
+    }
+    return names;
+}
+
+void writeMap(const Options& o, const volume::Tissue& tissue)
+{
+    if (o.map.empty()) {
+        return;
+    }
+    datasets::LabelMap map{
+        o.volume.empty() ? fs::path(o.record).stem().string() : o.volume.stem().string(), namesOf(tissue), {}};
+    writeWhole(o.map, fmt::format("# Names and tissues of the labels in {}: palpate import --map.\n{}",
+                                  o.output.filename().string(), datasets::labelMapText(map)));
+}
+
+std::vector<float> stiffnessOf(const volume::Tissue& tissue)
+{
+    const volume::LabelImage places{tissue.size(), tissue.affine(), {}};
+    std::vector<float> kilopascal(places.offset({0, 0, places.size.z}));
+    const volume::Tissue::Reader reader(tissue);
+    volume::forEachIndex(Index3(0), places.size - 1, [&](Index3 n) {
+        kilopascal[places.offset(n)] = static_cast<float>(1e-3 * reader.youngsModulus(places.affine.toPatient(Vec3(n))));
+    });
+    return kilopascal;
+}
+
+void exportVolume(const Options& o, const volume::ExportOptions& how)
+{
+    const volume::Tissue tissue = loadVolume(o.volume);
+    const volume::VoxelGrid grid{tissue.size(), tissue.affine()};
+    if (o.what == "labels") {
+        volume::exportLabels(o.output, tissue.labels(), namesOf(tissue), how);
+        writeMap(o, tissue);
+    } else if (o.what == "stiffness") {
+        volume::exportImage(o.output, grid, stiffnessOf(tissue), how);
+    } else if (const auto image = tissue.companion()) {
+        volume::exportImage(o.output, grid, image->values, how);
+    } else {
+        throw std::runtime_error(o.volume.string() + ": holds no image: give one to 'palpate import --image'");
+    }
+}
+
+// What to say of it behind the file's name.
+std::string exportState(const Options& o, const volume::ExportOptions& how, Progress& progress, nlohmann::json& figures)
+{
+    const DeformedState state(o.record, timeFrom(o.at), [&](double share) {
+        progress.show(fmt::format("computing the session again: {:.0f} %", 100 * share));
+    });
+    const auto& lattice = state.model().lattice;
+    if (o.what == "labels") {
+        volume::exportLabels(o.output, state.labels(), namesOf(*state.model().tissue), how);
+        writeMap(o, *state.model().tissue);
+    } else if (isVtu(o.output)) {
+        volume::exportVtu(o.output, lattice.grid, lattice.tissue, state.shape().u());
+    } else {
+        volume::exportVectors(o.output, state.grid(), o.what == "inverse" ? state.inverse() : state.displacement(), how);
+    }
+    double most = 0;
+    for (const chainmail::Node n : state.shape().moved()) {
+        most = std::max(most, 1e3 * static_cast<double>(glm::length(state.shape().u()[n])));
+    }
+    figures["tick"] = state.tick();
+    figures["moved_nodes"] = state.shape().moved().size();
+    figures["largest_displacement_mm"] = most;
+    return fmt::format(" at tick {}: {} nodes moved, by up to {:.2f} mm", state.tick(), state.shape().moved().size(), most);
+}
+
+void runExport(Options o)
+{
+    checkOptions(o);
+    Progress progress;
+    volume::ExportOptions how;
+    how.nifti2 = o.nifti2;
+    how.progress = [&](double share) { progress.show(fmt::format("writing: {:.0f} %", 100 * share)); };
+    nlohmann::json figures{{"file", o.output.string()}, {"what", o.what}};
+    std::string more;
+    if (o.record.empty()) {
+        exportVolume(o, how);
+    } else {
+        more = exportState(o, how, progress, figures);
+    }
+    progress.clear();
+    if (o.json != "-") {
+        fmt::print("{} -> {} ({}{})\n", o.record.empty() ? o.volume.string() : o.record, o.output.string(), o.what, more);
+    }
+    if (!o.json.empty()) {
+        writeJson(o.json, figures);
+    }
+}
+
+}  // namespace
+
+void addExport(CLI::App& app)
+{
+    const auto o = std::make_shared<Options>();
+    CLI::App* command = app.add_subcommand(
+        "export", "Write a volume, or the deformed state of a record, as NIfTI, NRRD, MetaImage or .vtu");
+    command->add_option("volume", o->volume, "Volume (.vdb)")->type_name("V.vdb");
+    command->add_option("-o,--output", o->output, "File to write: .nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd or .vtu")
+        ->type_name("FILE")
+        ->required();
+    command->add_option("--record", o->record, "Record of a session (train --record), in place of a volume")
+        ->type_name("FILE");
+    command->add_option("--at", o->at, "Time of the session, 3.2s")->type_name("TIME");
+    command
+        ->add_option("--what", o->what,
+                     "labels (default), image, stiffness [kPa]; of a record labels, displacement or its inverse [mm, LPS]")
+        ->check(CLI::IsMember(whatChoices));
+    command->add_flag("--nifti2", o->nifti2, "NIfTI-2: positions as doubles");
+    command->add_option("--write-map", o->map, "Write names and tissues too, as a label map for import --map")
+        ->type_name("FILE");
+    command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->final_callback([o] { runExport(*o); });
+}
+
+}  // namespace palpate::apps

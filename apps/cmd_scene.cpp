@@ -1,0 +1,288 @@
+#include <apps/command.h>
+#include <apps/outputs.h>
+#include <apps/progress.h>
+#include <apps/quantities.h>
+#include <apps/session.h>
+#include <datasets/approach.h>
+#include <datasets/insert.h>
+#include <datasets/scene_text.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+using datasets::Proposal;
+using datasets::Scene;
+
+constexpr double handle = 0.03;  // of the needle that stays outside [m]
+
+struct Options {
+    fs::path volume, output, json;
+    std::string target, margin, lesionIn, lesionSize, lesionTissue = "idc_high_grade";
+    std::vector<std::string> vital;
+    std::uint64_t seed = 1;
+    int proposals = 5, choose = 1;
+};
+
+// Biopsy needles in the order in which they are tried: a large core first, a short throw where there is no room.
+struct Needle {
+    const char* name;
+    double radius, notchRadius, throwLength, notch;  // [m]
+};
+constexpr std::array<Needle, 4> needles{{{"14 G, 22 mm throw", 1.05e-3, 0.8e-3, 22e-3, 20e-3},
+                                         {"16 G, 22 mm throw", 0.825e-3, 0.6e-3, 22e-3, 20e-3},
+                                         {"18 G, 22 mm throw", 0.635e-3, 0.45e-3, 22e-3, 20e-3},
+                                         {"18 G, 11 mm throw", 0.635e-3, 0.45e-3, 11e-3, 9e-3}}};
+constexpr std::array<double, 5> needleLengths{0.1, 0.12, 0.16, 0.2, 0.25};  // [m]
+
+double lengthFrom(const std::string& option, const std::string& text, double least, double most)
+{
+    const auto plain = lengthOf(text + "mm");
+    const auto length = plain ? plain : lengthOf(text);
+    if (!length || !(*length >= least && *length <= most)) {
+        throw std::runtime_error(
+            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
+    }
+    return *length;
+}
+
+void checkStructure(const volume::Tissue& tissue, const std::string& option, const std::string& name)
+{
+    if (!tissue.labelsNamed(name).empty()) {
+        return;
+    }
+    std::vector<std::string> names;
+    for (const volume::Structure& s : tissue.structures()) {
+        if (tissue.table().rows[s.tissue].role != volume::Role::air) {
+            names.push_back(s.name);
+        }
+    }
+    throw std::runtime_error(fmt::format("{} {}: no structure or tissue of the volume is called so; there are {}", option,
+                                         name, fmt::join(names, ", ")));
+}
+
+// The scene without a way in.
+Scene sceneOf(const Options& o, const volume::Tissue& tissue, const std::optional<datasets::Insert>& lesion)
+{
+    const std::string target = lesion ? lesion->name : o.target;
+    Scene scene = datasets::sceneForVolume(o.volume, tissue, target);
+    if (!o.vital.empty()) {
+        scene.vital.clear();
+        for (const std::string& name : o.vital) {
+            checkStructure(tissue, "--vital", name);
+            scene.vital.push_back({.name = name});
+        }
+        if (scene.vital.size() > datasets::mostVital) {
+            throw std::runtime_error(
+                fmt::format("--vital: {} names; {} are the most", scene.vital.size(), datasets::mostVital));
+        }
+    }
+    if (lesion) {
+        scene.source.inserts.push_back(*lesion);
+    }
+    return scene;
+}
+
+struct Found {
+    std::string needle;
+    std::vector<Proposal> ways;
+};
+
+// Ways in with the first needle that has one; sets the scene's tool.
+Found findWays(Scene& scene, const Options& o, const volume::Tissue& tissue, const std::optional<double>& margin)
+{
+    std::string why;
+    for (const Needle& needle : needles) {
+        scene.tool.radius = needle.radius;
+        scene.tool.notchRadius = needle.notchRadius;
+        scene.tool.throwLength = needle.throwLength;
+        scene.tool.notchLength = needle.notch;
+        scene.tool.length = needleLengths.back() - handle;
+        try {
+            return {needle.name, datasets::proposeApproaches(scene, tissue, static_cast<std::size_t>(o.proposals), margin)};
+        } catch (const std::runtime_error& e) {
+            why = why.empty() ? e.what() : why;
+        }
+    }
+    throw std::runtime_error(why);
+}
+
+double needleLengthFor(const Scene& scene, const Proposal& way)
+{
+    const double wanted =
+        std::max(way.length, datasets::firingDepth(scene.tool, way.length) + scene.tool.throwLength) + handle;
+    for (const double length : needleLengths) {
+        if (length >= wanted) {
+            return length;
+        }
+    }
+    return needleLengths.back();
+}
+
+// The volume's file as the scene should name it: relative where it lies beside or below the scene.
+fs::path fileFor(const fs::path& volume, const fs::path& scene)
+{
+    const fs::path folder = fs::absolute(scene).parent_path().lexically_normal();
+    const fs::path file = fs::absolute(volume).lexically_normal();
+    const fs::path relative = file.lexically_relative(folder);
+    return relative.empty() || *relative.begin() == ".." ? file : relative;
+}
+
+std::string pointText(Vec3 p)
+{
+    return fmt::format("{:.1f} {:.1f} {:.1f}", 1e3 * p.x, 1e3 * p.y, 1e3 * p.z);
+}
+
+double degrees(double angle)
+{
+    return angle * 180.0 / std::numbers::pi;
+}
+
+std::string clearanceText(const Proposal& way)
+{
+    constexpr double seen = 6.5e-3;  // what proposeApproaches() can tell apart
+    return way.clearance >= seen ? fmt::format("> {:.1f}", 1e3 * seen) : fmt::format("{:.1f}", 1e3 * way.clearance);
+}
+
+void writeScene(Scene scene, const Options& o, const Found& found, const Proposal& way)
+{
+    scene.entry = way.approach.entry;
+    scene.aim = way.approach.aim;
+    scene.tool.length = needleLengthFor(scene, way);
+    scene.source.file = fileFor(o.volume, o.output);
+    scene.name = o.output.stem().string();
+    const std::string comment = fmt::format(
+        "# Proposed by palpate scene: way {} of {}, {:.1f} mm to the aim, {} mm from what must not be touched; {}, {:.0f} "
+        "mm "
+        "long.\n# The viewer looks at the plane of this line.\n",
+        o.choose, found.ways.size(), 1e3 * way.length, clearanceText(way), found.needle, 1e3 * scene.tool.length);
+    const std::string text = comment + datasets::sceneText(scene);
+    datasets::parseScene(text, o.output);  // what cannot be read back is not written
+    writeWhole(o.output, text);
+}
+
+nlohmann::json figuresOf(const Scene& scene, const Found& found, const Options& o)
+{
+    nlohmann::json ways = nlohmann::json::array();
+    const auto triple = [](Vec3 p) { return nlohmann::json{1e3 * p.x, 1e3 * p.y, 1e3 * p.z}; };
+    for (const Proposal& p : found.ways) {
+        ways.push_back({{"entry_mm", triple(p.approach.entry)},
+                        {"aim_mm", triple(p.approach.aim)},
+                        {"length_mm", 1e3 * p.length},
+                        {"clearance_mm", 1e3 * p.clearance},
+                        {"angle_deg", degrees(p.angle)},
+                        {"off_centre_mm", 1e3 * p.offCentre}});
+    }
+    std::vector<std::string> vital;
+    for (const datasets::VitalStructure& v : scene.vital) {
+        vital.push_back(v.name);
+    }
+    return {{"scene", o.output.string()}, {"target", scene.target}, {"vital", vital},
+            {"needle", found.needle},     {"chosen", o.choose},     {"ways", ways}};
+}
+
+void printWays(const Scene& scene, const Found& found, const Options& o)
+{
+    std::vector<std::string> vital;
+    for (const datasets::VitalStructure& v : scene.vital) {
+        vital.push_back(v.name);
+    }
+    fmt::print("target   {}\nvital    {}\nneedle   {}\n\n", scene.target,
+               vital.empty() ? "none" : fmt::format("{}", fmt::join(vital, ", ")), found.needle);
+    fmt::print("way  entry [mm, LPS]         aim [mm, LPS]           length [mm]  clearance [mm]  slant [deg]\n");
+    for (std::size_t i = 0; i < found.ways.size(); ++i) {
+        const Proposal& p = found.ways[i];
+        fmt::print("{:>3}{} {:<23} {:<23} {:>11.1f}  {:>14}  {:>11.0f}{}\n", i + 1,
+                   static_cast<int>(i) + 1 == o.choose ? "*" : " ", pointText(p.approach.entry), pointText(p.approach.aim),
+                   1e3 * p.length, clearanceText(p), degrees(p.angle),
+                   p.offCentre > 0.5e-3 ? fmt::format("  notch {:.0f} mm beyond the aim", 1e3 * p.offCentre) : "");
+    }
+}
+
+void runScene(const Options& o)
+{
+    checkOutput(o.output);
+    checkOutput(o.json);
+    std::optional<double> margin;
+    if (!o.margin.empty()) {
+        margin = lengthFrom("--margin", o.margin, 0, 6e-3);
+    }
+    Progress progress;
+    progress.show("loading the volume");
+    volume::Tissue tissue = loadVolume(o.volume);
+    std::optional<datasets::Insert> lesion;
+    if (!o.lesionIn.empty()) {
+        checkStructure(tissue, "--lesion-in", o.lesionIn);
+        datasets::Insert shape;
+        shape.tissue = o.lesionTissue;
+        shape.diameter = lengthFrom("--lesion", o.lesionSize.empty() ? "15mm" : o.lesionSize, 1e-3, 0.1);
+        shape.seed = o.seed;
+        lesion = datasets::placeLesionIn(tissue, o.lesionIn, shape);
+        tissue = datasets::withInserts(tissue, std::vector<datasets::Insert>{*lesion});
+    } else if (!o.target.empty()) {
+        checkStructure(tissue, "--target", o.target);
+    }
+    Scene scene = sceneOf(o, tissue, lesion);
+    progress.show("looking for ways in");
+    const Found found = findWays(scene, o, tissue, margin);
+    if (o.choose > static_cast<int>(found.ways.size())) {
+        throw std::runtime_error(fmt::format("--choose {}: there are {} ways in", o.choose, found.ways.size()));
+    }
+    writeScene(scene, o, found, found.ways[static_cast<std::size_t>(o.choose - 1)]);
+    progress.clear();
+    if (o.json != "-") {
+        printWays(scene, found, o);
+        fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose, o.output.string());
+    }
+    if (!o.json.empty()) {
+        writeJson(o.json, figuresOf(scene, found, o));
+    }
+}
+
+}  // namespace
+
+void addScene(CLI::App& app)
+{
+    const auto o = std::make_shared<Options>();
+    CLI::App* command =
+        app.add_subcommand("scene", "Propose ways from the skin to a target in a volume, and write a biopsy as a scene");
+    command->add_option("volume", o->volume, "Volume (.vdb)")->type_name("V.vdb")->required();
+    command->add_option("-o,--output", o->output, "Scene to write")->type_name("S.toml")->required();
+    auto* target =
+        command->add_option("--target", o->target, "Structure to sample; default: the first tumour")->type_name("NAME");
+    command->add_option("--vital", o->vital, "What must not be touched, as a,b,c; default: all tissue of role vital")
+        ->type_name("NAMES")
+        ->delimiter(',');
+    command
+        ->add_option("--margin", o->margin,
+                     "Least distance from needle to those, and to bone; default: what there is room for")
+        ->type_name("MM");
+    command->add_option("--proposals", o->proposals, "Ways that are shown, at most (5)")->check(CLI::Range(1, 50));
+    command->add_option("--choose", o->choose, "Which of them is written (1, the best)")->check(CLI::Range(1, 50));
+    auto* in = command->add_option("--lesion-in", o->lesionIn, "Put a lesion into this structure, as the target")
+                   ->type_name("NAME")
+                   ->excludes(target);
+    command->add_option("--lesion", o->lesionSize, "Its diameter (15)")->type_name("MM")->needs(in);
+    command->add_option("--lesion-tissue", o->lesionTissue, "What it is made of (idc_high_grade)")
+        ->type_name("NAME")
+        ->needs(in);
+    command->add_option("--seed", o->seed, "Where in the structure it lies (1)")->needs(in);
+    command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->final_callback([o] { runScene(*o); });
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <datasets/scene.h>
+#include <volume/tissue.h>
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace palpate::datasets {
+
+/// A way to the target, and what speaks for it.
+struct Proposal {
+    Approach approach;
+    double length = 0;     // from the skin to the aim [m]
+    double clearance = 0;  // between needle and the nearest vital structure, bone or fixed tissue, as far as it is looked
+                           // for: 7 mm [m]
+    double angle = 0;      // between needle and the skin's normal [rad]
+    double offCentre = 0;  // of the fired notch's middle beyond the aim: the line is too short for the throw [m]
+};
+
+/// As planApproach(), but several ways that differ, at most `most`; the first is that of planApproach(). The line is
+/// searched from all around, entries in the scene are not looked at.
+/// @param margin  clearance that each must have [m]; nothing: as much as possible of 4, 2.5 and 1.5 mm
+/// Throws std::runtime_error when there is none.
+std::vector<Proposal> proposeApproaches(const Scene& scene, const volume::Tissue& tissue, std::size_t most,
+                                        std::optional<double> margin = std::nullopt);
+
+}  // namespace palpate::datasets

@@ -1,0 +1,230 @@
+#include <datasets/label_map.h>
+
+#include <datasets/embedded.h>
+#include <datasets/toml_fields.h>
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <set>
+#include <stdexcept>
+
+namespace palpate::datasets {
+
+namespace {
+
+constexpr double farthestValue = 1e6;  // of an image
+constexpr double mostFactor = 1e3;     // on a modulus
+
+LabelMap readLabelMap(std::string_view text, const std::string& file)
+{
+    const toml::table root = parseToml(text, file);
+    Section top(root, file, "");
+    LabelMap map;
+    map.name = top.word("name").value_or(std::filesystem::path(file).stem().string());
+    std::set<std::uint16_t> seen;
+    for (Section& section : top.sections("labels")) {
+        const auto value = section.integer("value", "", 0, 65535);
+        const auto name = section.word("name");
+        const auto tissue = section.word("tissue");
+        if (!tissue || (!value && !name)) {
+            section.missing(tissue ? "value" : "tissue", "each label has a tissue, and a value or a name or both");
+        }
+        section.finish();
+        if (!value) {
+            map.segments.emplace_back(*name, *tissue);
+        } else if (seen.insert(static_cast<std::uint16_t>(*value)).second) {
+            map.labels.push_back({static_cast<std::uint16_t>(*value), name.value_or(""), *tissue});
+        } else {
+            section.refuse("value", "is there twice");
+        }
+    }
+    top.finish();
+    if (map.labels.empty() && map.segments.empty()) {
+        throw std::runtime_error(file +
+                                 ": no labels in it: labels = [ { value = 1, name = \"liver\", tissue = \"liver\" } ]");
+    }
+    return map;
+}
+
+// Text of a built-in table, or of the file that is called so.
+std::string textOf(const std::string& nameOrFile, const std::vector<std::string>& names, std::string_view what,
+                   std::string& origin)
+{
+    if (std::find(names.begin(), names.end(), nameOrFile) != names.end()) {
+        origin = "built-in " + nameOrFile + ".toml";
+        return std::string(embeddedFile("tables/" + nameOrFile + ".toml"));
+    }
+    std::error_code error;
+    if (!std::filesystem::exists(nameOrFile, error)) {
+        throw std::runtime_error(
+            fmt::format("{}: neither a file nor a built-in {} ({})", nameOrFile, what, fmt::join(names, ", ")));
+    }
+    origin = nameOrFile;
+    return readText(nameOrFile);
+}
+
+// Where `phrase` begins in `words`, or nothing.
+bool holds(const std::vector<std::string>& words, const std::vector<std::string>& phrase)
+{
+    return !phrase.empty() && std::search(words.begin(), words.end(), phrase.begin(), phrase.end()) != words.end();
+}
+
+// points = [[value, factor], ..]
+std::vector<std::pair<double, double>> pointsOf(Section& top)
+{
+    constexpr const char* form = "must be [[value, factor], ..] with growing values and factors from 0.001 to 1000";
+    std::vector<std::pair<double, double>> points;
+    const toml::node* node = top.node("points");
+    const toml::array* list = node != nullptr ? node->as_array() : nullptr;
+    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+        const toml::array* pair = list->get(i)->as_array();
+        const auto value = pair != nullptr && pair->size() == 2 ? pair->get(0)->value<double>() : std::nullopt;
+        const auto factor = pair != nullptr && pair->size() == 2 ? pair->get(1)->value<double>() : std::nullopt;
+        const bool grows = value && std::abs(*value) <= farthestValue && (points.empty() || *value > points.back().first);
+        if (!grows || !factor || !(*factor >= 1 / mostFactor && *factor <= mostFactor)) {
+            top.refuse("points", form);
+        }
+        points.emplace_back(*value, *factor);
+    }
+    if (points.empty() && node != nullptr) {
+        top.refuse("points", form);
+    }
+    if (points.empty()) {
+        top.missing("points", form);
+    }
+    return points;
+}
+
+}  // namespace
+
+std::vector<std::string> labelMapNames()
+{
+    return {"victre", "totalsegmentator", "freesurfer", "spl-abdomen", "spl-brain"};
+}
+
+LabelMap labelMap(const std::string& nameOrFile)
+{
+    std::string origin;
+    const std::string text = textOf(nameOrFile, labelMapNames(), "label map", origin);
+    return readLabelMap(text, origin);
+}
+
+std::string labelMapText(const LabelMap& map)
+{
+    std::string out = fmt::format("name = {}\nlabels = [\n", tomlString(map.name));
+    for (const volume::LabelName& label : map.labels) {
+        out += fmt::format("  {{ value = {}, name = {}, tissue = {} }},\n", label.value, tomlString(label.name),
+                           tomlString(label.tissue));
+    }
+    for (const auto& [name, tissue] : map.segments) {
+        out += fmt::format("  {{ name = {}, tissue = {} }},\n", tomlString(name), tomlString(tissue));
+    }
+    return out + "]\n";
+}
+
+StructureNames::StructureNames()
+{
+    const std::string file = "built-in names.toml";
+    const toml::table root = parseToml(embeddedFile("tables/names.toml"), file);
+    for (const toml::node& word : *root["ignored"].as_array()) {
+        ignored_.push_back(*word.value<std::string>());
+    }
+    for (const toml::node& entry : *root["names"].as_array()) {
+        const toml::table& table = *entry.as_table();
+        const std::string tissue = *table["tissue"].value<std::string>();
+        phrases_.emplace_back(wordsOf(tissue), tissue);
+        for (const toml::node& phrase : *table["words"].as_array()) {
+            phrases_.emplace_back(wordsOf(*phrase.value<std::string>()), tissue);
+        }
+    }
+    for (const std::string& map : labelMapNames()) {
+        for (const volume::LabelName& label : labelMap(map).labels) {
+            labels_.emplace_back(wordsOf(label.name), label.tissue);
+        }
+    }
+}
+
+// Words in lower case without what says nothing about the tissue; plurals in -s as singulars.
+StructureNames::Words StructureNames::wordsOf(std::string_view name) const
+{
+    Words words(1);
+    for (const char c : name) {
+        const auto letter = static_cast<unsigned char>(c);
+        if (std::isalpha(letter) != 0 || letter >= 0x80) {
+            words.back() += static_cast<char>(std::tolower(letter));
+        } else if (!words.back().empty()) {
+            words.emplace_back();
+        }
+    }
+    Words out;
+    for (std::string& word : words) {
+        const bool says = std::find(ignored_.begin(), ignored_.end(), word) == ignored_.end();
+        if (!word.empty() && says) {
+            if (word.size() > 3 && word.ends_with('s') && !word.ends_with("ss") && !word.ends_with("us") &&
+                !word.ends_with("is") && !word.ends_with("as")) {
+                word.pop_back();
+            }
+            out.push_back(std::move(word));
+        }
+    }
+    return out;
+}
+
+std::optional<std::string> StructureNames::tissueOf(std::string_view name) const
+{
+    const Words words = wordsOf(name);
+    for (const auto* known : {&phrases_, &labels_}) {
+        for (const auto& [phrase, tissue] : *known) {
+            if (!words.empty() && words == phrase) {
+                return tissue;
+            }
+        }
+    }
+    return std::nullopt;
+}
+
+std::optional<std::string> StructureNames::suggestion(std::string_view name) const
+{
+    const Words words = wordsOf(name);
+    const std::pair<Words, std::string>* best = nullptr;
+    for (const auto& known : phrases_) {
+        if (holds(words, known.first) && (best == nullptr || known.first.size() > best->first.size())) {
+            best = &known;
+        }
+    }
+    return best != nullptr ? std::optional(best->second) : std::nullopt;
+}
+
+volume::StiffnessMap stiffnessMap(const std::string& nameOrFile, const std::string& unit, const volume::TissueTable& table)
+{
+    std::string file;
+    const std::string text = textOf(nameOrFile, {"hu"}, "stiffness map", file);
+    const toml::table root = parseToml(text, file);
+    Section top(root, file, "");
+    const auto wanted = top.word("unit");
+    if (wanted && *wanted != unit) {
+        top.refuse("unit", fmt::format("the image is in {}: give a map for that", unit.empty() ? "no known unit" : unit));
+    }
+    volume::StiffnessMap map{pointsOf(top), {}};
+    if (const toml::node* node = top.node("tissues")) {
+        const toml::array* list = node->as_array();
+        for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+            map.tissues.push_back(list->get(i)->value<std::string>().value_or(""));
+        }
+        if (map.tissues.empty()) {
+            top.refuse("tissues", "must be a list of tissues: [\"fat\", \"gland\"]");
+        }
+    }
+    for (const std::string& tissue : map.tissues) {
+        if (!table.find(tissue)) {
+            top.refuse("tissues", fmt::format("'{}' is not in the tissue table '{}'", tissue, table.name));
+        }
+    }
+    top.finish();
+    return map;
+}
+
+}  // namespace palpate::datasets

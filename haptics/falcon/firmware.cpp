@@ -1,0 +1,167 @@
+#include <haptics/falcon/firmware.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <system_error>
+
+namespace palpate::falcon {
+
+namespace {
+
+constexpr std::size_t smallest = 512, largest = std::size_t{1} << 20U;  // that an image can be [bytes]
+constexpr std::size_t chunk = 62;                                       // of the upload: a packet less the status [bytes]
+constexpr int greetings = 5;
+constexpr double answerTime = 0.3;  // [s]
+constexpr double echoTime = 1.0;    // of a chunk [s]
+constexpr double breath = 0.02;     // between settings that the device's processor has to see [s]
+
+// Reads until `want` bytes are there or the time is over.
+std::vector<std::uint8_t> collect(Transport& wire, std::size_t want, double seconds)
+{
+    std::vector<std::uint8_t> bytes;
+    std::array<std::uint8_t, usbPacket> part{};
+    const double end = wire.now() + seconds;
+    while (bytes.size() < want && !wire.gone()) {
+        const double left = end - wire.now();
+        if (left <= 0.0) {
+            break;
+        }
+        const std::size_t n = wire.receive(part, left);
+        bytes.insert(bytes.end(), part.begin(), part.begin() + static_cast<std::ptrdiff_t>(n));
+    }
+    if (wire.gone()) {
+        throw Trouble(Cause::unplugged,
+                      "the Falcon was unplugged while its firmware was loaded: plug it in and start again");
+    }
+    return bytes;
+}
+
+void put(Transport& wire, std::span<const std::uint8_t> bytes)
+{
+    if (!wire.send(bytes)) {
+        throw Trouble(wire.gone() ? Cause::unplugged : Cause::silent,
+                      "the Falcon takes no bytes: check its cable and power supply, then plug it in again");
+    }
+}
+
+// The loader's answer, with or without a zero before it.
+bool isWelcome(std::span<const std::uint8_t> answer)
+{
+    constexpr std::array<std::uint8_t, 4> welcome{0x0A, 0x44, 0x2C, 0x0D};
+    const auto rest = !answer.empty() && answer[0] == 0 ? answer.subspan(1) : answer;
+    return std::ranges::equal(rest.first(std::min(rest.size(), welcome.size())), welcome);
+}
+
+void greet(Transport& wire)
+{
+    constexpr std::array<std::uint8_t, 3> greeting{0x0A, 0x43, 0x0D};
+    bool heard = false;
+    for (int i = 0; i < greetings; ++i) {
+        put(wire, greeting);
+        auto answer = collect(wire, 4, answerTime);
+        if (answer.size() == 4 && answer[0] == 0) {
+            const auto rest = collect(wire, 1, answerTime);
+            answer.insert(answer.end(), rest.begin(), rest.end());
+        }
+        if (isWelcome(answer)) {
+            return;
+        }
+        heard = heard || !answer.empty();
+    }
+    if (heard) {
+        throw Trouble(Cause::garbled,
+                      "the Falcon's loader answers with something else: plug it straight into the computer "
+                      "instead of a hub, or take another cable");
+    }
+    throw Trouble(
+        Cause::silent,
+        "the Falcon is there but does not answer: plug in its power supply (the lamps light up), then check the cable");
+}
+
+void compareEcho(std::span<const std::uint8_t> sent, std::span<const std::uint8_t> echo, std::size_t offset,
+                 std::size_t total)
+{
+    const auto [there, back] = std::ranges::mismatch(sent, echo);
+    if (there == sent.end()) {
+        return;
+    }
+    const auto at = offset + static_cast<std::size_t>(there - sent.begin());
+    const std::string what =
+        back == echo.end() ? std::string("did not come back") : fmt::format("came back as 0x{:02x}", *back);
+    throw Trouble(
+        Cause::garbled,
+        fmt::format("firmware byte {} of {} (0x{:02x}) {}: plug the Falcon straight into the computer instead of a "
+                    "hub, or take another cable",
+                    at + 1, total, *there, what));
+}
+
+}  // namespace
+
+Firmware readFirmware(const std::filesystem::path& file)
+{
+    Firmware firmware{file.string(), {}};
+    std::error_code ignored;
+    std::ifstream stream;
+    if (!std::filesystem::is_directory(file, ignored)) {
+        stream.open(file, std::ios::binary);
+    }
+    if (stream.is_open()) {
+        firmware.image.assign(std::istreambuf_iterator<char>(stream), {});
+    }
+    if (!stream.is_open() || stream.bad()) {
+        throw Trouble(Cause::firmwareFile, firmware.file + ": cannot be read: give the file with the Falcon's firmware");
+    }
+    if (firmware.image.size() < smallest || firmware.image.size() > largest) {
+        throw Trouble(Cause::firmwareFile,
+                      fmt::format("{}: has {} bytes, a Falcon's firmware has {} to {}: give the file with the firmware",
+                                  firmware.file, firmware.image.size(), smallest, largest));
+    }
+    return firmware;
+}
+
+void loadFirmware(Transport& wire, const Firmware& firmware, const std::atomic<bool>& stop)
+{
+    wire.control(Request::reset, bridge::purgeIn);
+    wire.control(Request::reset, bridge::purgeOut);
+    wire.control(Request::latency, 16);
+    wire.control(Request::baud, bridge::baud9600);
+    wire.control(Request::format, bridge::eightN1);
+    wire.control(Request::flowControl, bridge::noFlowControl);
+    wire.control(Request::modemControl, bridge::rtsLow);
+    wire.control(Request::modemControl, bridge::dtrLow);
+    wire.sleep(breath);
+    wire.control(Request::modemControl, bridge::dtrHigh);
+    wire.sleep(breath);
+    greet(wire);
+
+    wire.control(Request::modemControl, bridge::dtrLow);
+    wire.control(Request::baud, bridge::baud140k);
+    wire.sleep(breath);
+    constexpr std::array<std::uint8_t, 1> begin{0x41};
+    put(wire, begin);
+    compareEcho(begin, collect(wire, 1, echoTime), 0, 1);
+
+    const std::span<const std::uint8_t> image(firmware.image);
+    for (std::size_t at = 0; at < image.size(); at += chunk) {
+        if (stop) {
+            throw Trouble(Cause::interrupted, "interrupted while the Falcon's firmware was loaded");
+        }
+        const auto part = image.subspan(at, std::min(chunk, image.size() - at));
+        put(wire, part);
+        compareEcho(part, collect(wire, part.size(), echoTime), at, image.size());
+    }
+}
+
+void enterRunMode(Transport& wire)
+{
+    wire.control(Request::latency, 1);
+    wire.control(Request::baud, bridge::baud1500k);
+    wire.control(Request::reset, bridge::purgeIn);
+    wire.control(Request::reset, bridge::purgeOut);
+}
+
+}  // namespace palpate::falcon

@@ -1,0 +1,231 @@
+#include <tests/apps/program.h>
+#include <volume/export.h>
+#include <volume/import.h>
+
+#include <gtest/gtest.h>
+#include <glm/geometric.hpp>
+
+#include <cstdlib>
+#include <fstream>
+#include <map>
+
+namespace palpate::apps {
+namespace {
+
+using volume::LabelImage;
+using volume::LabelName;
+
+// A body of 80 x 64 x 60 mm in voxels of 2 x 2 x 4 mm with a lump, a vessel behind it and two loose voxels of lump.
+LabelImage patient()
+{
+    LabelImage image{{44, 36, 20}, {Mat3(1.0), Vec3(0.0)}, {}};
+    image.affine.linear = Mat3(Vec3(-2e-3, 0, 0), Vec3(0, 2e-3, 0), Vec3(0, 0, 4e-3));
+    image.affine.origin = Vec3(43e-3, -35e-3, -38e-3);
+    volume::forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
+        const Vec3 p = image.affine.toPatient(Vec3(n));
+        const Vec3 q = p / Vec3(40e-3, 32e-3, 30e-3);
+        std::uint16_t label = glm::dot(q, q) < 1 ? 1 : 0;
+        label = label != 0 && glm::length(p - Vec3(0, -6e-3, 0)) < 8e-3 ? std::uint16_t{2} : label;
+        label = label != 0 && glm::length(Vec3(p.x, p.y - 12e-3, 0)) < 4e-3 ? std::uint16_t{3} : label;
+        image.values.push_back(label);
+    });
+    image.values[image.offset({30, 12, 12})] = 2;
+    image.values[image.offset({31, 12, 12})] = 2;
+    return image;
+}
+
+const std::vector<LabelName> segments{{1, "Body", ""}, {2, "Left lesion", ""}, {3, "Aorta", ""}};
+
+std::map<std::string, std::uint64_t> voxelsOf(const nlohmann::json& j)
+{
+    std::map<std::string, std::uint64_t> out;
+    for (const auto& label : j.at("labels")) {
+        out[label.at("name")] = label.at("voxels");
+    }
+    return out;
+}
+
+std::string tissueOf(const nlohmann::json& j, const std::string& name)
+{
+    for (const auto& label : j.at("labels")) {
+        if (label.at("name") == name) {
+            return label.at("tissue");
+        }
+    }
+    return "none";
+}
+
+class Researcher : public ::testing::Test {
+protected:
+    void SetUp() override
+    {
+        volume::exportLabels(seg, patient(), segments);
+        volume::exportLabels(bare, patient(), {});
+    }
+
+    const Folder folder;
+    const std::string seg = folder / "patient.seg.nrrd", bare = folder / "bare.mha", vdb = folder / "patient.vdb";
+};
+
+TEST_F(Researcher, SegmentsAreMappedByTheirNamesAndUnknownLabelsAreListed)
+{
+    const auto j = figures({"import", seg, "-o", vdb});
+    EXPECT_EQ(tissueOf(j, "Body"), "soft_tissue");
+    EXPECT_EQ(tissueOf(j, "Left lesion"), "idc_high_grade");
+    EXPECT_EQ(tissueOf(j, "Aorta"), "artery");
+    expectRefusal({"import", bare, "-o", vdb}, "3 of its labels: 1 (");
+    expectRefusal({"import", bare, "-o", vdb, "--set", "9=fat"}, "--set 9=fat: no voxel has a label");
+    expectRefusal({"import", bare, "-o", vdb, "--set", "1=jelly"}, "'jelly' is not in the tissue table");
+    const auto set = figures({"import", bare, "-o", vdb, "--set", "1=fat", "--default-tissue", "muscle"});
+    EXPECT_EQ(tissueOf(set, "label 1"), "fat");
+    EXPECT_EQ(tissueOf(set, "label 3"), "muscle");
+    EXPECT_EQ(figures({"import", seg, "-o", vdb, "--set", "Left lesion=ilc"}).at("labels").at(2).at("tissue"), "ilc");
+}
+
+// A label map that was begun by the program and filled in by hand is one that it takes.
+TEST_F(Researcher, ALabelMapIsBegunAndFilledIn)
+{
+    const std::string map = folder / "map.toml";
+    ASSERT_EQ(palpate({"import", bare, "--write-map", map}).status, 0);
+    expectRefusal({"import", bare, "--map", map, "-o", vdb}, "no tissue '?'");
+    std::string text = readText(map);
+    for (std::size_t at = text.find("\"?\"", text.find("labels")); at != std::string::npos; at = text.find("\"?\"", at)) {
+        text.replace(at, 3, "\"liver\"");
+    }
+    writeText(map, text);
+    EXPECT_EQ(tissueOf(figures({"import", bare, "--map", map, "-o", vdb}), "label 3"), "liver");
+}
+
+// Each step reports what it did, and the volume holds it; nothing is done that was not asked for.
+TEST_F(Researcher, StepsAreReportedToTheVoxel)
+{
+    const auto plain = voxelsOf(figures({"import", seg, "-o", vdb}));
+    EXPECT_TRUE(figures({"import", seg, "-o", vdb}).at("steps").empty());
+    const auto j =
+        figures({"import", seg, "-o", vdb, "--largest-component", "Left lesion", "--add-skin", "4mm", "--pad", "8"});
+    const auto after = voxelsOf(j);
+    EXPECT_EQ(after.at("Left lesion"), plain.at("Left lesion") - 2);
+    EXPECT_EQ(tissueOf(j, "skin"), "skin");
+    std::uint64_t skin = 0;
+    for (const auto& step : j.at("steps")) {
+        skin +=
+            step.at("step") == "add-skin" && step.at("structure") == "skin" ? step.at("voxels").get<std::uint64_t>() : 0;
+    }
+    EXPECT_EQ(skin, after.at("skin"));
+    EXPECT_EQ(after.at("Body") + after.at("Left lesion") + after.at("Aorta") + after.at("skin"),
+              plain.at("Body") + plain.at("Left lesion") + plain.at("Aorta"));
+    EXPECT_EQ(j.at("size"), (std::vector<int>{44 + 8, 36 + 8, 20 + 4}));
+    const auto cubes =
+        figures({"import", seg, "-o", vdb, "--voxel", "2mm", "--crop", "Left lesion", "--crop-margin", "10"});
+    EXPECT_NEAR(cubes.at("spacing_mm").at(2).get<double>(), 2.0, 1e-9);
+    EXPECT_EQ(cubes.at("steps").at(0).at("step"), "crop");
+    for (const auto& step : cubes.at("steps")) {
+        if (step.contains("before_ml") && step.at("structure") == "Left lesion") {
+            EXPECT_LT(std::abs(step.at("change_pct").get<double>()), 5.0);
+        }
+    }
+    expectRefusal({"import", seg, "-o", vdb, "--crop", "liver"}, "--crop liver: there is no structure");
+    expectRefusal({"import", seg, "-o", vdb, "--voxel", "huge"}, "--voxel huge: must be a length");
+    expectRefusal({"import", seg, "-o", vdb, "--close-skin-holes"}, "nothing in the volume is skin");
+}
+
+// An image on another grid, and what it does to the stiffness.
+TEST_F(Researcher, AnImageOnAnotherGridScalesTheStiffness)
+{
+    const volume::VoxelGrid grid{{30, 30, 30}, {Mat3(4e-3), Vec3(-58e-3)}};
+    std::vector<float> values;
+    volume::forEachIndex(Index3(0), grid.size - 1, [&](Index3 n) {
+        values.push_back(static_cast<float>(500.0 + 1e3 * grid.affine.toPatient(Vec3(n)).x));
+    });
+    const std::string image = folder / "mr.nrrd", map = folder / "map.toml", out = folder / "kpa.nrrd";
+    volume::exportImage(image, grid, values);
+    writeText(map, "points = [[400, 0.1], [600, 2.1]]\n");  // factor = 1.1 + x / 100 mm
+    const auto j = figures({"import", seg, "-o", vdb, "--image", image, "--stiffness-from", map});
+    EXPECT_GT(j.at("grids_mb").at("image").get<double>(), 0.0);
+    ASSERT_EQ(palpate({"export", vdb, "-o", out, "--what", "stiffness"}).status, 0);
+    const volume::ImportedImage stiffness = volume::importImage(out);
+    const LabelImage labels = patient();
+    volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
+        if (labels.values[labels.offset(n)] == 1) {
+            const double x = labels.affine.toPatient(Vec3(n)).x;
+            ASSERT_NEAR(stiffness.values[labels.offset(n)], 10.0 * (1.1 + x / 0.1), 1e-3);
+        }
+    });
+    expectRefusal({"import", seg, "-o", vdb, "--image", image, "--stiffness-from", "hu"}, "the image is in no known unit");
+    expectRefusal({"import", seg, "-o", vdb, "--stiffness-from", "hu"}, "add --image");
+}
+
+// Out of the program and in again: the same voxels, names and tissues at the same places.
+TEST_F(Researcher, AnExportIsImportedAgainAsItWas)
+{
+    const auto before = figures({"import", seg, "-o", vdb, "--add-skin", "3"});
+    const std::string again = folder / "again.vdb", map = folder / "again.toml";
+    for (const std::string name : {"e.nii.gz", "e.nrrd", "e.seg.nrrd", "e.mhd"}) {
+        SCOPED_TRACE(name);
+        const std::string file = folder / name;
+        ASSERT_EQ(palpate({"export", vdb, "-o", file, "--write-map", map}).status, 0);
+        const auto after = figures({"import", file, "--map", map, "-o", again});
+        EXPECT_EQ(after.at("labels"), before.at("labels"));
+        EXPECT_EQ(after.at("size"), before.at("size"));
+        for (int k = 0; k < 3; ++k) {
+            const auto i = static_cast<std::size_t>(k);
+            EXPECT_NEAR(after.at("origin_mm").at(i).get<double>(), before.at("origin_mm").at(i).get<double>(), 1e-6);
+        }
+        EXPECT_EQ(after.at("provenance").at("label hash"), before.at("provenance").at("label hash"));
+    }
+    expectRefusal({"export", vdb, "-o", folder / "e.png"}, "is no format that is written");
+    expectRefusal({"export", vdb, "-o", folder / "e.vtu"}, "is of a session");
+    expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--what", "image"}, "holds no image");
+}
+
+// OpenVDB's own tool lists our grids, with the voxels that we count.
+TEST_F(Researcher, OtherOpenVdbToolsReadTheVolume)
+{
+    if (std::system("command -v vdb_print > /dev/null") != 0) {
+        GTEST_SKIP() << "vdb_print is not installed (libopenvdb-tools)";
+    }
+    const auto j = figures({"import", seg, "-o", vdb});
+    const std::string list = folder / "grids.txt";
+    ASSERT_EQ(std::system(("vdb_print -l '" + vdb + "' > '" + list + "' 2>&1").c_str()), 0);
+    std::string text = readText(list);
+    std::erase(text, ',');  // thousands
+    for (const char* grid : {"label", "stiffness", "occupancy"}) {
+        EXPECT_NE(text.find(grid), std::string::npos) << text;
+    }
+    const auto voxels = voxelsOf(j);
+    const std::uint64_t active = voxels.at("Body") + voxels.at("Left lesion") + voxels.at("Aorta");
+    EXPECT_NE(text.find(std::to_string(active)), std::string::npos) << text;
+}
+
+// From a segmentation to a biopsy, and the deformed tissue back to a file.
+TEST_F(Researcher, ASceneIsProposedRunsAndItsStatesAreExported)
+{
+    ASSERT_EQ(palpate({"import", seg, "-o", vdb, "--add-skin", "3mm", "--pad", "10mm"}).status, 0);
+    const std::string scene = folder / "biopsy.toml", record = folder / "s.db";
+    const auto j = figures({"scene", vdb, "--target", "Left lesion", "--vital", "Aorta", "-o", scene});
+    ASSERT_GE(j.at("ways").size(), 2U);
+    EXPECT_EQ(j.at("vital"), (std::vector<std::string>{"Aorta"}));
+    EXPECT_NE(readText(scene).find("file = \"patient.vdb\""), std::string::npos);
+    for (const auto& way : j.at("ways")) {
+        EXPECT_GE(way.at("clearance_mm").get<double>(), 1.5);
+    }
+    const auto trained = figures({"train", scene, "--headless", "--unpaced", "--model", "chainmail", "--record", record});
+    ASSERT_FALSE(trained.at("core").empty());
+    EXPECT_GT(trained.at("core").at(0).at("length_in_lesion_mm").get<double>(), 5.0);
+
+    const std::string rest = folder / "rest.nii.gz", first = folder / "first.nii.gz", field = folder / "u.nii.gz";
+    ASSERT_EQ(palpate({"export", vdb, "-o", rest}).status, 0);
+    ASSERT_EQ(palpate({"export", "--record", record, "--at", "0s", "-o", first}).status, 0);
+    EXPECT_EQ(volume::importLabels(rest).image.values, volume::importLabels(first).image.values);
+    const auto moved = figures({"export", "--record", record, "--at", "3s", "-o", field, "--what", "displacement"});
+    EXPECT_GE(moved.at("tick").get<int>(), 2999);
+    ASSERT_EQ(palpate({"export", "--record", record, "--at", "3s", "-o", folder / "u.vtu"}).status, 0);
+    const std::string vtu = readText(folder / "u.vtu");
+    EXPECT_NE(vtu.find("displacement_mm"), std::string::npos);
+    expectRefusal({"export", "--record", record, "--at", "900s", "-o", field}, "the record runs from 0 s to");
+    expectRefusal({"scene", vdb, "--target", "spleen", "-o", scene}, "--target spleen: no structure or tissue");
+    expectRefusal({"scene", vdb, "--lesion-in", "Aorta", "--lesion", "30mm", "-o", scene}, "has no room");
+}
+
+}  // namespace
+}  // namespace palpate::apps

@@ -1,0 +1,252 @@
+#include <experiments/sweep/plan.h>
+#include <tests/apps/program.h>
+#include <tests/apps/sweep_plan.h>
+
+#include <gtest/gtest.h>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <thread>
+
+namespace palpate::apps {
+namespace {
+
+using nlohmann::json;
+
+constexpr int patience = 600;  // looks of 50 ms
+
+// Starts the sweep and waits until it has so many cases.
+void runUntil(Program& sweep, const std::filesystem::path& folder, std::size_t cases)
+{
+    for (int i = 0; i < patience && sweep.running() && casesIn(folder) < cases; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+}
+
+class Sweep : public testing::Test {
+protected:
+    std::string plan(const std::string& name, const std::string& text)
+    {
+        writeText(here_ / name, text);
+        return here_ / name;
+    }
+    std::string folder(const std::string& name) { return here_ / name; }
+
+private:
+    Folder here_;
+};
+
+TEST_F(Sweep, TheTableHoldsEveryCaseAndDoesNotDependOnTheProcesses)
+{
+    const std::string file = plan("p.toml", shortPlan(2));
+    const json one = figures({"sweep", file, "-o", folder("one"), "--jobs", "1"});
+    EXPECT_EQ(one["cases"], 24);
+    EXPECT_EQ(one["done"], 24);
+    EXPECT_EQ(one["failed"], 0);
+    figures({"sweep", file, "-o", folder("three"), "--jobs", "3"});
+    EXPECT_EQ(sameOnEveryRun(folder("one")), sameOnEveryRun(folder("three")));
+    const auto rows = csvRows(std::filesystem::path(folder("one")) / "table.csv");
+    ASSERT_EQ(rows.size(), 25U);
+    EXPECT_EQ(rows[0],
+              (std::vector<std::string>{"case", "point", "repeat", "seed", "youngs_kpa", "depth_mm", "force_n", "work_mj",
+                                        "force_in_jnd", "error", "build", "machine", "tick_us", "case_s"}));
+    // Deeper and stiffer take more force; the formula is what it says.
+    const auto force = [&](std::size_t c) { return std::stod(rows[c + 1][6]); };
+    EXPECT_GT(force(2), force(0));
+    EXPECT_GT(force(8), force(0));
+    EXPECT_DOUBLE_EQ(std::stod(rows[1][8]), force(0) / 0.07);
+    // The database says the same.
+    const Outcome sqlite =
+        Program("/usr/bin/sqlite3", {folder("one") + "/table.db", "SELECT count(*), round(sum(force_n), 6) FROM results"})
+            .wait();
+    double sum = 0;
+    for (std::size_t c = 0; c < 24; ++c) {
+        sum += force(c);
+    }
+    EXPECT_EQ(sqlite.out.substr(0, 3), "24|");
+    EXPECT_NEAR(std::stod(sqlite.out.substr(3)), sum, 1e-5);
+}
+
+// Killed three times at moments that chance chooses, and once more when it is done.
+TEST_F(Sweep, ResumedAfterKillsTheTableIsTheSame)
+{
+    const std::string file = plan("p.toml", shortPlan(4));
+    figures({"sweep", file, "-o", folder("whole"), "--jobs", "2"});
+    std::mt19937 random(std::random_device{}());
+    std::size_t before = 0;
+    for (int kills = 0; kills < 3; ++kills) {
+        Program sweep("palpate", {"sweep", file, "-o", folder("killed"), "--jobs", "2"});
+        runUntil(sweep, folder("killed"), before + 1 + random() % 10);
+        sweep.send(SIGKILL);
+        sweep.wait();
+        const std::size_t now = casesIn(folder("killed"));
+        EXPECT_GE(now, before) << "a finished case was lost";
+        before = now;
+    }
+    const json last = figures({"sweep", "-o", folder("killed"), "--jobs", "2"});
+    EXPECT_EQ(last["done"], 48);
+    EXPECT_EQ(sameOnEveryRun(folder("whole")), sameOnEveryRun(folder("killed")));
+    const json nothing = figures({"sweep", file, "-o", folder("killed")});
+    EXPECT_EQ(nothing["seconds"], 0.0);
+}
+
+TEST_F(Sweep, CtrlCFinishesWhatRunsAndGoesOnLater)
+{
+    const std::string file = plan("p.toml", shortPlan(20));
+    Program sweep("palpate", {"sweep", file, "-o", folder("s"), "--jobs", "2"});
+    runUntil(sweep, folder("s"), 3);
+    sweep.send(SIGINT);
+    const Outcome outcome = sweep.wait();
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.err.find("palpate: stopped: "), std::string::npos) << outcome.err;
+    const std::size_t there = csvRows(std::filesystem::path(folder("s")) / "table.csv").size() - 1;
+    EXPECT_EQ(there, casesIn(folder("s")));
+    EXPECT_LT(there, 240U);
+    EXPECT_FALSE(std::filesystem::exists(folder("s") + "/lock"));
+}
+
+// A lump outside the body, and processes that die: rows with their error, not the end.
+TEST_F(Sweep, ACaseThatFailsIsARow)
+{
+    const std::string file = plan(
+        "p.toml",
+        "scene = \"find-lump\"\noutputs = [\"force_n\"]\n[procedure]\nkind = \"press\"\nspeed_mm_s = 80\nhold_ms = 25\n"
+        "[set]\nvolume.voxel_mm = 4\nvolume.parameters.width_mm = 40\nmodel.setting = \"fast\"\ninsert.lump.centre_mm.x = "
+        "0\n"
+        "insert.lump.centre_mm.z = 0\n[[axis]]\nname = \"y_mm\"\nkey = \"insert.lump.centre_mm.y\"\nvalues = [12, 400, "
+        "16]\n");
+    const json done = figures({"sweep", file, "-o", folder("s"), "--jobs", "1"});
+    EXPECT_EQ(done["done"], 3);
+    EXPECT_EQ(done["failed"], 1);
+    const auto rows = csvRows(std::filesystem::path(folder("s")) / "table.csv");
+    EXPECT_GT(std::stod(rows[1][5]), 0.0);
+    EXPECT_EQ(rows[2][5], "");
+    EXPECT_NE(readText(folder("s") + "/table.csv").find("there is no tissue of the volume"), std::string::npos);
+}
+
+TEST_F(Sweep, AProcessThatCrashesCostsItsCaseAndOneThatIsKilledNone)
+{
+    const std::string file = plan("p.toml", shortPlan(10));
+    Program sweep("palpate", {"sweep", file, "-o", folder("s"), "--jobs", "2"});
+    runUntil(sweep, folder("s"), 1);
+    for (const int signal : {SIGSEGV, SIGKILL}) {
+        const auto children = childrenOf(sweep.pid());
+        ASSERT_FALSE(children.empty());
+        kill(children.front(), signal);
+        runUntil(sweep, folder("s"), casesIn(folder("s")) + 4);
+    }
+    EXPECT_EQ(sweep.wait().status, 0);
+    std::size_t failed = 0;
+    for (const auto& row : csvRows(std::filesystem::path(folder("s")) / "table.csv")) {
+        failed += row[9].find("signal 11") != std::string::npos ? 1 : 0;
+        EXPECT_EQ(row[9].find("signal 9"), std::string::npos);
+    }
+    EXPECT_LE(failed, 1U);
+    const json again = figures({"sweep", "-o", folder("s"), "--retry"});
+    EXPECT_EQ(again["failed"], 0);
+    EXPECT_EQ(again["done"], 120);
+}
+
+TEST_F(Sweep, TwoRunsOnAFolderExcludeEachOther)
+{
+    const std::string file = plan("p.toml", shortPlan(40));
+    Program sweep("palpate", {"sweep", file, "-o", folder("s"), "--jobs", "1"});
+    runUntil(sweep, folder("s"), 1);
+    expectRefusal({"sweep", file, "-o", folder("s")}, "another run works on it (process " + std::to_string(sweep.pid()));
+    sweep.send(SIGKILL);
+    sweep.wait();
+    // Of a machine that cannot be asked: held while it beats, free when the beat has stopped.
+    json lock = json::parse(readText(folder("s") + "/lock"));
+    lock["place"] = "elsewhere";
+    lock["machine"] = "node7";
+    writeText(folder("s") + "/lock", lock.dump() + "\n");
+    expectRefusal({"sweep", "-o", folder("s")}, "on node7");
+    timespec old[2];
+    clock_gettime(CLOCK_REALTIME, &old[0]);
+    old[0].tv_sec -= 120;
+    old[1] = old[0];
+    utimensat(AT_FDCWD, (folder("s") + "/lock").c_str(), old, 0);
+    Program next("palpate", {"sweep", "-o", folder("s"), "--jobs", "1"});
+    const std::size_t before = casesIn(folder("s"));
+    runUntil(next, folder("s"), before + 1);
+    EXPECT_GT(casesIn(folder("s")), before);
+}
+
+TEST_F(Sweep, AFullDiskIsOneLine)
+{
+    const std::string file = plan("p.toml", shortPlan(2));
+    const std::string program = std::filesystem::path(PALPATE_BIN_DIR) / "palpate";
+    // No file over 4 kB: the cases have room, the table has none.
+    const Outcome full =
+        Program("/bin/bash", {"-c", "trap '' XFSZ; ulimit -f 4; exec " + program + " sweep " + file + " -o " + folder("s")})
+            .wait();
+    EXPECT_EQ(full.status, 1);
+    EXPECT_EQ(std::ranges::count(full.err, '\n'), 1) << full.err;
+    EXPECT_NE(full.err.find("cannot be written"), std::string::npos) << full.err;
+    EXPECT_EQ(casesIn(folder("s")), 24U);
+    EXPECT_EQ(figures({"sweep", "-o", folder("s")})["done"], 24);
+}
+
+TEST_F(Sweep, DryRunSaysWhatItTakesAndLeavesNothing)
+{
+    const std::string file = plan("p.toml", shortPlan(5));
+    const json dry = figures({"sweep", file, "--dry-run", "--jobs", "2"});
+    EXPECT_EQ(dry["cases"], 60);
+    EXPECT_GT(dry["case_s"], 0.0);
+    EXPECT_NEAR(dry["estimated_s"].get<double>(), 30 * dry["case_s"].get<double>(), 1e-9);
+    EXPECT_NEAR(dry["disk_mb"].get<double>(), 60 * 4096e-6, 1e-9);
+    expectRefusal({"sweep", "-o", folder("s")}, "holds no sweep");
+}
+
+TEST_F(Sweep, RecordsReplay)
+{
+    std::string text = shortPlan(1, "records = true\n");
+    text.replace(text.find("steps = 3"), 9, "steps = 2");
+    text.replace(text.find("[1, 2, 3, 4]"), 12, "[2]");
+    figures({"sweep", plan("p.toml", text), "-o", folder("s"), "--jobs", "2"});
+    for (const char* const record : {"0.db", "1.db"}) {
+        EXPECT_TRUE(figures({"replay", folder("s") + "/records/" + record})["identical"].get<bool>());
+    }
+}
+
+TEST_F(Sweep, RefusesWhatCannotBe)
+{
+    const std::string file = plan("p.toml", shortPlan(1)), other = plan("q.toml", shortPlan(2));
+    expectRefusal({"sweep", file}, "add -o DIR");
+    expectRefusal({"sweep", "moon", "-o", folder("s")}, "ready plans are: palpation");
+    writeText(plan("x", ""), "");
+    expectRefusal({"sweep", file, "-o", std::filesystem::path(file).parent_path().string()},
+                  "is not empty and holds no sweep");
+    figures({"sweep", file, "-o", folder("s"), "--jobs", "2"});
+    expectRefusal({"sweep", other, "-o", folder("s")}, "holds another plan");
+    expectRefusal({"sweep", file, "-o", folder("s"), "--time", "10"}, "--slurm");
+    expectRefusal({"sweep", "--report", folder("none")}, "holds no sweep");
+}
+
+TEST_F(Sweep, TheExampleOfTheDocumentIsAPlan)
+{
+    const std::string page = readText(PALPATE_SOURCE_DIR "/docs/sweeps.md");
+    const auto begin = page.find("```toml\n") + 8;
+    const std::string text = page.substr(begin, page.find("```", begin) - begin);
+    const auto example = experiments::parsePlan(text, "example.toml", experiments::namedScene);
+    EXPECT_EQ(example.cases(), 12U);
+    EXPECT_EQ(example.marks.size(), 1U);
+}
+
+TEST_F(Sweep, TheListHoldsReadyPlansAndOutputs)
+{
+    const std::string list = palpate({"sweep", "--list"}).out;
+    for (const char* const name :
+         {"palpation", "guidance", "needle-force", "voxel-size", "model-ladder", "puncture_force_n"}) {
+        EXPECT_NE(list.find(name), std::string::npos) << name;
+    }
+}
+
+}  // namespace
+}  // namespace palpate::apps

@@ -1,0 +1,87 @@
+#include <tests/apps/program.h>
+#include <tests/apps/sweep_plan.h>
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+namespace palpate::apps {
+namespace {
+
+using nlohmann::json;
+
+// What a browser makes of a page: its document once the scripts have run.
+std::string documentOf(const std::string& address, const std::string& profile)
+{
+    return Program("/usr/bin/chromium", {"--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
+                                         "--user-data-dir=" + profile, "--virtual-time-budget=5000", "--dump-dom", address})
+        .wait()
+        .out;
+}
+
+std::string partOf(const std::string& page, const std::string& id)
+{
+    const auto begin = page.find("id=\"" + id + "\"");
+    const auto end = page.find("</section>", begin);
+    return begin == std::string::npos ? "" : page.substr(begin, end - begin);
+}
+
+std::size_t countOf(const std::string& text, const std::string& what)
+{
+    std::size_t count = 0;
+    for (auto at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) {
+        ++count;
+    }
+    return count;
+}
+
+// Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.
+TEST(SweepReport, IsDrawnByABrowserFromOneFile)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    std::string text = shortPlan(1, "name = \"A </script> & B\"\n");
+    text += "[[mark]]\noutput = \"force_n\"\nat = 0.07\nlabel = \"felt <here>\"\n";
+    writeText(here / "p.toml", text);
+    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
+    const json ranking = figures({"sweep", "--report", here / "s"});
+    const std::string file = here / "s" / "report.html";
+    const std::string raw = readText(file);
+    EXPECT_EQ(raw.find("src=\"http"), std::string::npos);
+    EXPECT_EQ(raw.find("A </script>"), std::string::npos) << "text of a plan must not end a script";
+
+    const std::string page = documentOf("file://" + file, here / "profile");
+    EXPECT_NE(page.find("data-drawn=\"force_n\""), std::string::npos) << "the script did not come to its end";
+    EXPECT_NE(page.find("12 of 12 cases, 0 failed"), std::string::npos);
+    const std::string curve = partOf(page, "curve"), map = partOf(page, "map"), rank = partOf(page, "rank");
+    for (const char* const depth : {"depth_mm = 1", "depth_mm = 2", "depth_mm = 3", "depth_mm = 4"}) {
+        EXPECT_NE(curve.find(depth), std::string::npos) << depth;
+    }
+    EXPECT_NE(curve.find("felt &lt;here&gt;"), std::string::npos);
+    EXPECT_GE(countOf(curve, "<path"), 8U);
+    // A field of the map for each of 3 x 4 points, with its value.
+    const auto rows = csvRows(here / "s" / "table.csv");
+    std::size_t found = 0;
+    for (std::size_t c = 1; c < rows.size(); ++c) {
+        char value[32];
+        std::snprintf(value, sizeof value, "%.4g", std::stod(rows[c][6]));
+        found += map.find(std::string(">") + value + "<") != std::string::npos ? 1 : 0;
+    }
+    EXPECT_EQ(found, 12U);
+    // The ranking's table says what --json says.
+    const json& first = ranking["outputs"]["force_n"][0];
+    EXPECT_NE(rank.find("<td>" + first["axis"].get<std::string>() + "</td>"), std::string::npos);
+
+    const std::string other =
+        documentOf("file://" + file + "#output=work_mj&x=depth_mm&by=(all together)", here / "profile");
+    EXPECT_NE(other.find("data-drawn=\"work_mj\""), std::string::npos);
+    EXPECT_EQ(partOf(other, "curve").find("depth_mm = 1"), std::string::npos);
+    EXPECT_NE(partOf(other, "curve").find(">work_mj<"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate::apps

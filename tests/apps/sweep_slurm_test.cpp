@@ -1,0 +1,85 @@
+#include <tests/apps/program.h>
+#include <tests/apps/slurm.h>
+#include <tests/apps/sweep_plan.h>
+
+#include <gtest/gtest.h>
+
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+namespace palpate::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+// The process of a task that works on the folder; 0: none.
+int workerOn(const std::string& folder)
+{
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator("/proc", none)) {
+        const int pid = std::atoi(entry.path().filename().c_str());
+        const std::string words = pid > 0 ? readText(entry.path() / "cmdline") : "";
+        if (words.find("--work") != std::string::npos && words.find(folder) != std::string::npos &&
+            words.find("slurm_script") == std::string::npos) {
+            return pid;
+        }
+    }
+    return 0;
+}
+
+std::size_t submissionsOf(const std::string& folder)
+{
+    std::size_t count = 0;
+    for (const auto& entry : fs::directory_iterator(folder + "/slurm")) {
+        count += entry.path().extension() == ".sh" ? 1 : 0;
+    }
+    return count;
+}
+
+// A task is killed in the middle of the sweep: its cases are submitted again, and the table is that of one machine. Half of
+// the cases are done here before, by processes of this machine.
+TEST(SweepOnSlurm, ItsTableIsThatOfOneMachineAlsoWhenATaskIsKilled)
+{
+    const Slurm slurm;
+    if (!slurm.problem().empty()) {
+        GTEST_SKIP() << "no Slurm to test with: " << slurm.problem();
+    }
+    const Folder here;
+    const std::string plan = here / "p.toml", local = here / "local", cluster = here / "cluster";
+    writeText(plan, shortPlan(8));
+    figures({"sweep", plan, "-o", local, "--jobs", "2"});
+
+    Program begun("palpate", {"sweep", plan, "-o", cluster, "--jobs", "1"});
+    for (int i = 0; i < 600 && casesIn(cluster) < 4; ++i) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    begun.send(SIGINT);
+    begun.wait();
+
+    const std::size_t before = casesIn(cluster);
+    Program sweep("palpate",
+                  {"sweep", "-o", cluster, "--slurm", "--chunk", "24", "--partition", "main", "--json", here / "f.json"});
+    bool killed = false;
+    for (int i = 0; i < 3000 && !killed && sweep.running(); ++i) {
+        const int worker = casesIn(cluster) > before ? workerOn(cluster) : 0;
+        killed = worker > 0 && kill(worker, SIGKILL) == 0;
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_TRUE(killed) << "no task was there to be killed";
+    const Outcome outcome = sweep.wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_GE(submissionsOf(cluster), 2U) << "what was lost must be submitted again";
+    const json done = json::parse(readText(here / "f.json"));
+    EXPECT_EQ(done["done"], 96);
+    EXPECT_EQ(done["failed"], 0);
+    EXPECT_EQ(sameOnEveryRun(local), sameOnEveryRun(cluster));
+    expectRefusal({"sweep", plan, "-o", here / "refused", "--slurm", "--partition", "nowhere"}, "sbatch: ");
+}
+
+}  // namespace
+}  // namespace palpate::apps

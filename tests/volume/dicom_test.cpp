@@ -1,0 +1,428 @@
+// DICOM series and segmentations made here with DCMTK, slice by slice.
+#include <volume/import.h>
+
+#include <dcmtk/config/osconfig.h>
+
+#include <dcmtk/dcmdata/dcrleerg.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmjpeg/djencode.h>
+#include <dcmtk/dcmjpeg/djrplol.h>
+#include <dcmtk/dcmjpls/djencode.h>
+#include <dcmtk/dcmjpls/djrparam.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <numeric>
+
+namespace palpate::volume {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int columns = 7;
+constexpr int rows = 5;
+
+std::string vector(const Vec3& v)
+{
+    return fmt::format("{:.10g}\\{:.10g}\\{:.10g}", v.x, v.y, v.z);
+}
+
+/// A slice to be written. Lengths in mm, as in the file.
+struct Slice {
+    Vec3 position{0.0};
+    Vec3 alongRow{1, 0, 0};
+    Vec3 alongColumn{0, 1, 0};
+    std::string series = "1.2.3";
+    std::string instance = {};  // of its own where empty
+    int index = 0;              // voxel (i, j) holds i + 10 j + 100 index - 50
+    std::function<void(DcmDataset&)> change = {};
+    E_TransferSyntax syntax = EXS_LittleEndianExplicit;
+    Uint16 bits = 12;  // stored
+};
+
+class Dicom : public ::testing::Test {
+protected:
+    void SetUp() override { fs::create_directories(folder); }
+    void TearDown() override { fs::remove_all(folder); }
+
+    void write(const std::string& name, const Slice& slice) const
+    {
+        DcmFileFormat file;
+        DcmDataset& data = *file.getDataset();
+        const auto put = [&](const DcmTagKey& tag, const std::string& value) {
+            data.putAndInsertString(tag, value.c_str());
+        };
+        put(DCM_SOPClassUID, UID_CTImageStorage);
+        put(DCM_SOPInstanceUID, slice.instance.empty() ? "1.2.3.4." + std::to_string(slice.index + 1) : slice.instance);
+        put(DCM_SeriesInstanceUID, slice.series);
+        put(DCM_Modality, "CT");
+        put(DCM_PhotometricInterpretation, "MONOCHROME2");
+        put(DCM_PixelSpacing, "2\\0.5");  // rows 2 mm apart, columns 0.5 mm
+        put(DCM_SliceThickness, "9");
+        put(DCM_ImagePositionPatient, vector(slice.position));
+        put(DCM_ImageOrientationPatient, vector(slice.alongRow) + "\\" + vector(slice.alongColumn));
+        put(DCM_RescaleSlope, "2");
+        put(DCM_RescaleIntercept, "-1000");
+        data.putAndInsertUint16(DCM_SamplesPerPixel, 1);
+        data.putAndInsertUint16(DCM_Rows, rows);
+        data.putAndInsertUint16(DCM_Columns, columns);
+        data.putAndInsertUint16(DCM_BitsAllocated, 16);
+        data.putAndInsertUint16(DCM_BitsStored, slice.bits);
+        data.putAndInsertUint16(DCM_HighBit, static_cast<Uint16>(slice.bits - 1));
+        data.putAndInsertUint16(DCM_PixelRepresentation, 1);
+        std::vector<Uint16> pixels;
+        for (int j = 0; j < rows; ++j) {
+            for (int i = 0; i < columns; ++i) {
+                pixels.push_back(static_cast<Uint16>((i + 10 * j + 100 * slice.index - 50) & ((1 << slice.bits) - 1)));
+            }
+        }
+        data.putAndInsertUint16Array(DCM_PixelData, pixels.data(), pixels.size());
+        if (slice.change) {
+            slice.change(data);
+        }
+        compress(data, slice.syntax);
+        const OFCondition saved = file.saveFile((folder / name).c_str(), slice.syntax);
+        ASSERT_TRUE(saved.good()) << saved.text();
+    }
+
+    // Five slices along the normal, `gap` mm apart, `drift` mm to the side with each.
+    void writeSeries(const Vec3& x, const Vec3& y, double gap, const Vec3& drift = Vec3(0.0)) const
+    {
+        const Vec3 n = glm::cross(x, y);
+        const std::array<const char*, 5> names = {"c", "e", "a", "d", "b"};  // not in the order of the slices
+        for (int k = 0; k < 5; ++k) {
+            write(names[static_cast<std::size_t>(k)],
+                  {Vec3(10, 20, 30) + static_cast<double>(k) * (gap * n + drift), x, y, "1.2.3", "", k, {}});
+        }
+    }
+
+    std::string reason(const ImportOptions& options = {}) const
+    {
+        try {
+            importImage(folder, options);
+            return "";
+        } catch (const std::runtime_error& e) {
+            EXPECT_EQ(std::string(e.what()).find('\n'), std::string::npos);
+            return e.what();
+        }
+    }
+
+    static void compress(DcmDataset& data, E_TransferSyntax syntax)
+    {
+        DcmRLEEncoderRegistration::registerCodecs();
+        DJEncoderRegistration::registerCodecs();
+        DJLSEncoderRegistration::registerCodecs();
+        const DJ_RPLossless jpeg;
+        const DJLSRepresentationParameter jpegLs(0, OFTrue);
+        const DcmRepresentationParameter* parameter = syntax == EXS_JPEGProcess14SV1 ? &jpeg
+                                                      : syntax == EXS_JPEGLSLossless
+                                                          ? &jpegLs
+                                                          : static_cast<const DcmRepresentationParameter*>(nullptr);
+        ASSERT_TRUE(data.chooseRepresentation(syntax, parameter).good());
+    }
+
+    fs::path folder = fs::temp_directory_path() / fmt::format("palpate-dicom-{}", ::getpid());
+};
+
+// value = 2 (i + 10 j + 100 k - 50) - 1000, at position + 0.5 i x + 2 j y + gap k n.
+void expectValues(const ImportedImage& image)
+{
+    ASSERT_EQ(image.size, Index3(columns, rows, 5));
+    for (int k = 0; k < 5; ++k) {
+        for (int j = 0; j < rows; ++j) {
+            for (int i = 0; i < columns; ++i) {
+                const auto at = static_cast<std::size_t>((k * rows + j) * columns + i);
+                ASSERT_EQ(image.values[at], static_cast<float>(2 * (i + 10 * j + 100 * k - 50) - 1000));
+            }
+        }
+    }
+}
+
+TEST_F(Dicom, SlicesAreSortedByTheirPlaceAlongAnyNormal)
+{
+    const Vec3 x = glm::normalize(Vec3(1, 2, -1)), y = glm::normalize(glm::cross(Vec3(0, 0, 1), x));
+    writeSeries(x, y, 3);
+    const ImportedImage image = importImage(folder);
+    expectValues(image);
+    EXPECT_EQ(image.what, "HU");
+    EXPECT_TRUE(image.warnings.empty());
+    const Vec3 expected = 1e-3 * (Vec3(10, 20, 30) + 1.5 * x + 4.0 * y + 12.0 * glm::cross(x, y));
+    EXPECT_NEAR(glm::length(image.affine.toPatient({3, 2, 4}) - expected), 0, 1e-9);
+}
+
+TEST_F(Dicom, CompressedSyntaxesHoldTheSamePixels)
+{
+    for (const E_TransferSyntax syntax : {EXS_LittleEndianImplicit, EXS_BigEndianExplicit, EXS_DeflatedLittleEndianExplicit,
+                                          EXS_RLELossless, EXS_JPEGProcess14SV1, EXS_JPEGLSLossless}) {
+        for (int k = 0; k < 5; ++k) {
+            write(std::to_string(k), {Vec3(0, 0, 2 * k),
+                                      {1, 0, 0},
+                                      {0, 1, 0},
+                                      "1.2.3",
+                                      "",
+                                      k,
+                                      {},
+                                      syntax,
+                                      syntax == EXS_JPEGLSLossless ? Uint16{16} : Uint16{12}});
+        }
+        SCOPED_TRACE(DcmXfer(syntax).getXferName());
+        ASSERT_EQ(reason(), "");
+        expectValues(importImage(folder));
+    }
+}
+
+TEST_F(Dicom, MissingUnevenAndDoubledSlicesAreRefused)
+{
+    writeSeries({1, 0, 0}, {0, 1, 0}, 3);
+    fs::copy_file(folder / "a", folder / "copy");  // the same slice twice is no harm
+    const ImportedImage twice = importImage(folder);
+    expectValues(twice);
+    ASSERT_EQ(twice.warnings.size(), 1U);
+    write("copy", {Vec3(10, 20, 36), {1, 0, 0}, {0, 1, 0}, "1.2.3", "1.2.3.99", 3, {}});
+    EXPECT_NE(reason().find("two slices in one place"), std::string::npos) << reason();
+    fs::remove(folder / "copy");
+    fs::remove(folder / "a");
+    EXPECT_NE(reason().find("a slice is missing between e and d"), std::string::npos) << reason();
+    write("a", {Vec3(10, 20, 37), {1, 0, 0}, {0, 1, 0}, "1.2.3", "", 2, {}});
+    EXPECT_NE(reason().find("uneven"), std::string::npos) << reason();
+}
+
+TEST_F(Dicom, WhatDoesNotBelongTogetherIsRefused)
+{
+    writeSeries({1, 0, 0}, {0, 1, 0}, 3);
+    const auto odd = [&](Slice slice, const std::string& word) {
+        slice.instance = "1.2.3.77";
+        write("odd", slice);
+        EXPECT_NE(reason().find(word), std::string::npos) << reason();
+        fs::remove(folder / "odd");
+    };
+    odd({Vec3(10, 20, 45), {0, 1, 0}, {0, 0, 1}}, "different directions");
+    odd({Vec3(10, 20, 45), {1, 0, 0}, {0, 1, 0}, "9.9"}, "2 series: say which with --series");
+    odd({Vec3(10, 20, 45),
+         {1, 0, 0},
+         {0, 1, 0},
+         "1.2.3",
+         "",
+         5,
+         [](DcmDataset& d) { d.putAndInsertString(DCM_PixelSpacing, "2\\0.6"); }},
+        "different pixel spacings");
+    odd({Vec3(10, 20, 45),
+         {1, 0, 0},
+         {0, 1, 0},
+         "1.2.3",
+         "",
+         5,
+         [](DcmDataset& d) { d.findAndDeleteElement(DCM_ImagePositionPatient); }},
+        "does not say where its slice is");
+    odd({Vec3(10, 20, 45), {1, 0, 0}, {0, 1, 0}, "1.2.3", "", 5, [](DcmDataset& d) { d.putAndInsertUint16(DCM_Rows, 4); }},
+        "different sizes");
+    odd({Vec3(10, 20, 45),
+         {1, 0, 0},
+         {0, 1, 0},
+         "1.2.3",
+         "",
+         5,
+         [](DcmDataset& d) { d.putAndInsertString(DCM_ImageOrientationPatient, "1\\0\\0\\0.5\\1\\0"); }},
+        "not two unit vectors");
+    odd({Vec3(10, 20, 45),
+         {1, 0, 0},
+         {0, 1, 0},
+         "1.2.3",
+         "",
+         5,
+         [](DcmDataset& d) { d.putAndInsertUint16(DCM_SamplesPerPixel, 3); }},
+        "colours");
+    ASSERT_EQ(reason(), "");
+    write("other", {Vec3(10, 20, 45), {1, 0, 0}, {0, 1, 0}, "9.9"});
+    ImportOptions options;
+    options.series = "1.2.3";
+    EXPECT_EQ(reason(options), "");
+    options.series = "4.4";
+    EXPECT_NE(reason(options).find("--series 4.4 is not there: name one of these: 1.2.3"), std::string::npos)
+        << reason(options);
+    fs::remove(folder / "other");
+    for (const char* name : {"a", "b", "c", "d", "e"}) {
+        write(name, {Vec3(10, 20, name[0]), {1, 0, 0}, {0, 1, 0}, "1.2.3", "", name[0] - 'a', [](DcmDataset& d) {
+                         d.putAndInsertUint16(DCM_Rows, 500);
+                     }});
+    }
+    EXPECT_NE(reason().find("promises 7 x 500 x 1 pixels"), std::string::npos) << reason();
+}
+
+// A gantry tilted by 14 degrees: slices stay upright and shift, so the grid is sheared by that angle.
+TEST_F(Dicom, ATiltedGantryIsASheardGrid)
+{
+    writeSeries({1, 0, 0}, {0, 1, 0}, 4, {0, 4 * std::tan(14 * 3.14159265358979 / 180), 0});
+    const ImportedImage image = importImage(folder);
+    expectValues(image);
+    ASSERT_EQ(image.warnings.size(), 1U);
+    EXPECT_NE(image.warnings[0].find("sheared by 14.0 degrees"), std::string::npos);
+    EXPECT_NEAR(shearOf(image.affine), 14 * 3.14159265358979 / 180, 1e-6);
+    EXPECT_NEAR(image.affine.toPatient({0, 0, 4}).z, 46e-3, 1e-9);
+    EXPECT_THROW(importLabels(folder), std::runtime_error);
+}
+
+/// A segmentation to be written: `inside(segment, i, j, k)` gives the stored value; frames that hold none are left out.
+struct Segmentation {
+    std::string type = "BINARY";
+    int bits = 1;
+    int segments = 2;
+    int slices = 6;
+    std::function<int(int, int, int, int)> inside;
+};
+
+class DicomSeg : public Dicom {
+protected:
+    fs::path write(const Segmentation& s) const
+    {
+        DcmFileFormat file;
+        DcmDataset& data = *file.getDataset();
+        data.putAndInsertString(DCM_SOPClassUID, UID_SegmentationStorage);
+        data.putAndInsertString(DCM_SOPInstanceUID, "1.2.9");
+        data.putAndInsertString(DCM_SeriesInstanceUID, "1.2.8");
+        data.putAndInsertString(DCM_Modality, "SEG");
+        data.putAndInsertString(DCM_SegmentationType, s.type.c_str());
+        data.putAndInsertString(DCM_PhotometricInterpretation, "MONOCHROME2");
+        data.putAndInsertUint16(DCM_MaximumFractionalValue, 200);
+        data.putAndInsertUint16(DCM_SamplesPerPixel, 1);
+        data.putAndInsertUint16(DCM_Rows, rows);
+        data.putAndInsertUint16(DCM_Columns, columns);
+        data.putAndInsertUint16(DCM_BitsAllocated, static_cast<Uint16>(s.bits));
+        data.putAndInsertUint16(DCM_BitsStored, static_cast<Uint16>(s.bits));
+        data.putAndInsertUint16(DCM_HighBit, static_cast<Uint16>(s.bits - 1));
+        data.putAndInsertUint16(DCM_PixelRepresentation, 0);
+        for (int n = 1; n <= s.segments; ++n) {
+            DcmItem* item = nullptr;
+            data.findOrCreateSequenceItem(DCM_SegmentSequence, item, -2);
+            item->putAndInsertUint16(DCM_SegmentNumber, static_cast<Uint16>(n));
+            item->putAndInsertString(DCM_SegmentLabel, fmt::format("part {}", n).c_str());
+            const Uint16 white[3] = {65535, 32896, 32896};
+            item->putAndInsertUint16Array(DCM_RecommendedDisplayCIELabValue, white, 3);
+        }
+        DcmItem *shared = nullptr, *measures = nullptr, *direction = nullptr;
+        data.findOrCreateSequenceItem(DCM_SharedFunctionalGroupsSequence, shared);
+        shared->findOrCreateSequenceItem(DCM_PixelMeasuresSequence, measures);
+        measures->putAndInsertString(DCM_PixelSpacing, "2\\0.5");
+        measures->putAndInsertString(DCM_SliceThickness, "3");
+        measures->putAndInsertString(DCM_SpacingBetweenSlices, "3");
+        shared->findOrCreateSequenceItem(DCM_PlaneOrientationSequence, direction);
+        direction->putAndInsertString(DCM_ImageOrientationPatient, "1\\0\\0\\0\\1\\0");
+        std::vector<int> values;
+        int frames = 0;
+        for (int n = 1; n <= (s.type == "LABELMAP" ? 1 : s.segments); ++n) {
+            for (int k = 0; k < s.slices; ++k) {
+                frames += addFrame(data, s, n, k, values) ? 1 : 0;
+            }
+        }
+        data.putAndInsertString(DCM_NumberOfFrames, std::to_string(frames).c_str());
+        std::vector<Uint8> bytes(values.size() * static_cast<std::size_t>(s.bits) / 8 + 2, 0);
+        for (std::size_t i = 0; i < values.size(); ++i) {
+            const auto v = static_cast<unsigned>(values[i]);
+            if (s.bits == 1) {
+                bytes[i / 8] = static_cast<Uint8>(bytes[i / 8] | (v << (i % 8)));
+            } else {
+                bytes[i] = static_cast<Uint8>(v);
+            }
+        }
+        data.putAndInsertUint8Array(DCM_PixelData, bytes.data(), bytes.size() / 2 * 2);
+        EXPECT_TRUE(file.saveFile((folder / "seg.dcm").c_str(), EXS_LittleEndianExplicit).good());
+        return folder / "seg.dcm";
+    }
+
+private:
+    static bool addFrame(DcmDataset& data, const Segmentation& s, int segment, int k, std::vector<int>& values)
+    {
+        std::vector<int> frame;
+        for (int j = 0; j < rows; ++j) {
+            for (int i = 0; i < columns; ++i) {
+                frame.push_back(s.inside(segment, i, j, k));
+            }
+        }
+        if (std::accumulate(frame.begin(), frame.end(), 0) == 0) {
+            return false;
+        }
+        values.insert(values.end(), frame.begin(), frame.end());
+        DcmItem *item = nullptr, *position = nullptr, *which = nullptr;
+        data.findOrCreateSequenceItem(DCM_PerFrameFunctionalGroupsSequence, item, -2);
+        item->findOrCreateSequenceItem(DCM_PlanePositionSequence, position);
+        position->putAndInsertString(DCM_ImagePositionPatient, vector(Vec3(10, 20, 30 + 3 * k)).c_str());
+        if (s.type != "LABELMAP") {
+            item->findOrCreateSequenceItem(DCM_SegmentIdentificationSequence, which);
+            which->putAndInsertUint16(DCM_ReferencedSegmentNumber, static_cast<Uint16>(segment));
+        }
+        return true;
+    }
+};
+
+// Part 1 fills slices 0 and 4 but for a column, part 2 is a block in slice 4: slices 1 to 3 have no frame, and a frame of
+// 35 bits begins within a byte.
+TEST_F(DicomSeg, BinaryFramesAreSparseOverlapAndBeginWithinBytes)
+{
+    const Segmentation s{"BINARY", 1, 2, 6, [](int segment, int i, int j, int k) {
+                             const bool one = (k == 0 || k == 4) && i != 3;
+                             const bool two = k == 4 && i >= 2 && i <= 4 && j >= 1 && j <= 2;
+                             return segment == 1 ? one : two;
+                         }};
+    const ImportedLabels labels = importLabels(write(s));
+    ASSERT_EQ(labels.image.size, Index3(columns, rows, 5));
+    forEachIndex(Index3(0), labels.image.size - 1, [&](Index3 n) {
+        const int expected = s.inside(2, n.x, n.y, n.z) != 0 ? 2 : s.inside(1, n.x, n.y, n.z);
+        ASSERT_EQ(labels.image.values[labels.image.offset(n)], expected);
+    });
+    ASSERT_EQ(labels.overlaps.size(), 1U);
+    EXPECT_EQ(labels.overlaps[0].kept, 2);
+    EXPECT_EQ(labels.overlaps[0].lost, 1);
+    EXPECT_EQ(labels.overlaps[0].voxels, 4U);
+    EXPECT_NEAR(glm::length(labels.image.affine.toPatient({2, 1, 4}) - Vec3(11e-3, 22e-3, 42e-3)), 0, 1e-12);
+    ASSERT_EQ(labels.names.size(), 2U);
+    EXPECT_EQ(labels.names[1].name, "part 2");
+    ASSERT_TRUE(labels.names[1].colour);
+    for (const std::uint8_t c : *labels.names[1].colour) {
+        EXPECT_NEAR(c, 255, 1);  // CIELab 100, 0, 0 is white
+    }
+}
+
+// 0 to 200 stands for 0 to 1.
+TEST_F(DicomSeg, FractionalVoxelsCountFromTheThreshold)
+{
+    const fs::path file =
+        write({"FRACTIONAL", 8, 1, 2, [](int, int i, int j, int k) { return i + columns * j + 100 * k; }});
+    for (const float threshold : {0.0F, 0.1F, 0.5F, 0.6F}) {
+        ImportOptions options;
+        options.fractionalThreshold = threshold;
+        const ImportedLabels labels = importLabels(file, options);
+        std::size_t expected = 0;
+        for (int v = 1; v < 135; ++v) {
+            const bool stored = v < 35 || v >= 100;
+            expected += stored && static_cast<double>(v) >= 200 * static_cast<double>(threshold) ? 1U : 0U;
+        }
+        EXPECT_EQ(static_cast<std::size_t>(std::count(labels.image.values.begin(), labels.image.values.end(), 1)), expected)
+            << threshold;
+        EXPECT_FALSE(labels.warnings.empty());
+    }
+}
+
+TEST_F(DicomSeg, LabelMapsComeInAndUnknownSegmentsAreRefused)
+{
+    Segmentation s{"LABELMAP", 8, 3, 4, [](int, int i, int j, int k) { return (i + j + k) % 4; }};
+    const ImportedLabels labels = importLabels(write(s));
+    forEachIndex(Index3(0), labels.image.size - 1,
+                 [&](Index3 n) { ASSERT_EQ(labels.image.values[labels.image.offset(n)], (n.x + n.y + n.z) % 4); });
+    EXPECT_EQ(labels.names.size(), 3U);
+    s.segments = 2;
+    try {
+        importLabels(write(s));
+        FAIL();
+    } catch (const std::runtime_error& e) {
+        EXPECT_NE(std::string(e.what()).find("segment 3, which its list does not hold"), std::string::npos) << e.what();
+    }
+}
+
+}  // namespace
+}  // namespace palpate::volume

@@ -1,0 +1,110 @@
+#include <volume/import/dicom.h>
+#include <volume/import/dicom_file.h>
+
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace palpate::volume {
+
+namespace {
+
+using Objects = std::vector<DicomObject>;
+
+std::string kindOf(const DicomObject& object)
+{
+    return object.description.empty() ? object.modality : fmt::format("{} '{}'", object.modality, object.description);
+}
+
+std::string listOf(const std::map<std::string, Objects>& series)
+{
+    std::vector<std::string> list;
+    for (const auto& [uid, objects] : series) {
+        if (list.size() == 5) {
+            list.emplace_back("...");
+            break;
+        }
+        list.push_back(fmt::format("{} ({}, {} files)", uid, kindOf(objects[0]), objects.size()));
+    }
+    return fmt::format("{}", fmt::join(list, ", "));
+}
+
+// The one series that is meant.
+Objects chosen(const std::filesystem::path& path, const Files& files, const std::string& wanted)
+{
+    std::map<std::string, Objects> series;
+    for (const std::filesystem::path& file : files) {
+        DicomObject object = readDicom(file);
+        if (object.pixels) {
+            series[object.series].push_back(std::move(object));
+        } else if (files.size() == 1) {
+            refuse(path, fmt::format("is DICOM without pixels (modality '{}'): name the series, or a DICOM SEG",
+                                     object.modality));
+        }
+    }
+    if (series.empty()) {
+        refuse(path, "holds DICOM files, but none with pixels: name a folder with one series");
+    }
+    if (!wanted.empty()) {
+        const auto found = series.find(wanted);
+        if (found == series.end()) {
+            refuse(path, fmt::format("--series {} is not there: name one of these: {}", wanted, listOf(series)));
+        }
+        return std::move(found->second);
+    }
+    if (series.size() > 1) {
+        refuse(path, fmt::format("holds {} series: say which with --series, or name one file: {}", series.size(),
+                                 listOf(series)));
+    }
+    return std::move(series.begin()->second);
+}
+
+}  // namespace
+
+ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files, const ImportOptions& options)
+{
+    const Objects objects = chosen(path, files, options.series);
+    const auto segmentations =
+        std::count_if(objects.begin(), objects.end(), [](const DicomObject& o) { return !o.segmentationType.empty(); });
+    if (segmentations > 0) {
+        if (objects.size() > 1) {
+            refuse(path, fmt::format("holds {} DICOM SEG files of one series: name one of them", objects.size()));
+        }
+        return readSegmentation(objects[0], options);
+    }
+    DicomVolume volume = readSeries(path, objects, options.sheared, options.progress);
+    ImportedLabels out;
+    out.image.size = volume.size;
+    out.image.affine = volume.affine;
+    LabelSink sink(path, volume.size, true);
+    std::vector<double> row;
+    for (std::size_t at = 0; at < volume.values.size(); at += row.size()) {
+        const std::size_t count = std::min<std::size_t>(65536, volume.values.size() - at);
+        row.assign(volume.values.begin() + static_cast<std::ptrdiff_t>(at),
+                   volume.values.begin() + static_cast<std::ptrdiff_t>(at + count));
+        sink.add(row);
+    }
+    volume.values = {};
+    out.image.values = sink.finish(false);
+    out.warnings = std::move(volume.warnings);
+    return out;
+}
+
+ImportedImage dicomImage(const std::filesystem::path& path, const Files& files, const ImportOptions& options)
+{
+    const Objects objects = chosen(path, files, options.series);
+    if (!objects[0].segmentationType.empty()) {
+        refuse(path, "is a DICOM SEG, not an image: name the series that it was made of");
+    }
+    DicomVolume volume = readSeries(path, objects, true, options.progress);
+    ImportedImage out;
+    out.size = volume.size;
+    out.affine = volume.affine;
+    out.values = std::move(volume.values);
+    out.what = volume.hounsfield ? "HU" : "";
+    out.warnings = std::move(volume.warnings);
+    makeFinite(path, out.values, out.warnings);
+    return out;
+}
+
+}  // namespace palpate::volume

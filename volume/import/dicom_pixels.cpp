@@ -1,0 +1,199 @@
+#include <volume/import/dicom_file.h>
+
+#include <dcmtk/config/osconfig.h>
+
+#include <dcmtk/dcmdata/dcpixel.h>
+#include <dcmtk/dcmdata/dcpixseq.h>
+#include <dcmtk/dcmdata/dcpxitem.h>
+#include <dcmtk/dcmdata/dcrledrg.h>
+#include <dcmtk/dcmdata/dctk.h>
+#include <dcmtk/dcmjpeg/djdecode.h>
+#include <dcmtk/dcmjpls/djdecode.h>
+
+#include <cstring>
+#include <mutex>
+
+namespace palpate::volume {
+
+namespace {
+
+void registerCodecs()
+{
+    static std::once_flag once;
+    std::call_once(once, [] {
+        DcmRLEDecoderRegistration::registerCodecs();
+        DJDecoderRegistration::registerCodecs();
+        DJLSDecoderRegistration::registerCodecs();
+    });
+}
+
+bool isJpeg2000(E_TransferSyntax syntax)
+{
+    return syntax == EXS_JPEG2000LosslessOnly || syntax == EXS_JPEG2000;
+}
+
+}  // namespace
+
+struct DicomPixels::Data {
+    const DicomObject& object;
+    DcmFileFormat format;
+    DcmPixelData* pixels = nullptr;
+    DcmPixelSequence* fragments = nullptr;  // where the pixels are compressed
+    E_TransferSyntax syntax = EXS_Unknown;
+    std::vector<Uint8> buffer;
+    std::vector<std::int32_t> values;
+
+    explicit Data(const DicomObject& o) : object(o) {}
+
+    [[noreturn]] void fail(const std::string& why) const { refuse(object.file, why + ": get the file again"); }
+
+    std::uint64_t frameBits() const { return object.pixelsPerFrame() * static_cast<std::uint64_t>(object.bitsAllocated); }
+
+    void open();
+    void checkSize() const;
+    std::vector<std::byte> codeStream(std::size_t index) const;
+    void readPlain(std::size_t index);
+    void readBits(std::size_t index);
+    void normalise();
+};
+
+void DicomPixels::Data::open()
+{
+    registerCodecs();
+    if (format.loadFile(object.file.c_str()).bad()) {
+        fail("its DICOM cannot be read");
+    }
+    DcmElement* element = nullptr;
+    if (format.getDataset()->findAndGetElement(DCM_PixelData, element).bad() ||
+        (pixels = dynamic_cast<DcmPixelData*>(element)) == nullptr) {
+        fail("it has no pixels");
+    }
+    const DcmRepresentationParameter* parameter = nullptr;
+    pixels->getOriginalRepresentationKey(syntax, parameter);
+    if (DcmXfer(syntax).isEncapsulated() && pixels->getEncapsulatedRepresentation(syntax, parameter, fragments).bad()) {
+        fail("its compressed pixels cannot be found");
+    }
+    checkSize();
+    values.resize(object.pixelsPerFrame());
+}
+
+// What the header promises against what is there, before anything is decoded.
+void DicomPixels::Data::checkSize() const
+{
+    if (fragments != nullptr) {
+        // The first item is the table of offsets.
+        const std::size_t there = fragments->card() > 0 ? fragments->card() - 1 : 0;
+        if (there < object.frames.size()) {
+            fail(fmt::format("its header promises {} frames, but there are {} compressed ones", object.frames.size(),
+                             there));
+        }
+        return;
+    }
+    const std::uint64_t wanted = (frameBits() * object.frames.size() + 7) / 8;
+    const std::uint64_t there = pixels->getLengthField();
+    if (there < wanted) {
+        fail(fmt::format("its header promises {} x {} x {} pixels of {} bits, {} bytes in all, but there are {}",
+                         object.columns, object.rows, object.frames.size(), object.bitsAllocated, wanted, there));
+    }
+}
+
+// The bytes of one compressed frame: one fragment, or all of a single frame's.
+std::vector<std::byte> DicomPixels::Data::codeStream(std::size_t index) const
+{
+    const std::size_t there = fragments->card() - 1;
+    const bool single = object.frames.size() == 1;
+    if (!single && there != object.frames.size()) {
+        fail("its compressed frames are in several pieces each, which is not read");
+    }
+    std::vector<std::byte> stream;
+    for (std::size_t i = single ? 0 : index; i < (single ? there : index + 1); ++i) {
+        DcmPixelItem* item = nullptr;
+        Uint8* bytes = nullptr;
+        if (fragments->getItem(item, static_cast<unsigned long>(i + 1)).bad() || item->getUint8Array(bytes).bad() ||
+            bytes == nullptr) {
+            fail("its compressed pixels cannot be read");
+        }
+        const auto* first = reinterpret_cast<const std::byte*>(bytes);
+        stream.insert(stream.end(), first, first + item->getLength());
+    }
+    return stream;
+}
+
+void DicomPixels::Data::readPlain(std::size_t index)
+{
+    const std::size_t width = static_cast<std::size_t>(object.bitsAllocated) / 8;
+    buffer.resize(values.size() * width + values.size() * width % 2);
+    Uint32 fragment = 0;
+    OFString colours;
+    if (pixels
+            ->getUncompressedFrame(format.getDataset(), static_cast<Uint32>(index), fragment, buffer.data(),
+                                   static_cast<Uint32>(buffer.size()), colours)
+            .bad()) {
+        if (fragments != nullptr) {
+            fail(fmt::format("its pixels ({}) cannot be decoded", DcmXfer(syntax).getXferName()));
+        }
+        fail("its pixels cannot be read");
+    }
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        Uint16 two = buffer[i * width];
+        if (width == 2) {
+            std::memcpy(&two, buffer.data() + 2 * i, 2);
+        }
+        values[i] = two >> (object.highBit + 1 - object.bitsStored);
+    }
+}
+
+// Frames of single bits follow each other without a gap.
+void DicomPixels::Data::readBits(std::size_t index)
+{
+    Uint8* bytes = nullptr;
+    if (fragments != nullptr) {
+        fail("its pixels of one bit are compressed, which is not read");
+    }
+    if (pixels->getUint8Array(bytes).bad() || bytes == nullptr) {
+        fail("its pixels cannot be read");
+    }
+    const std::uint64_t first = index * values.size();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const std::uint64_t bit = first + i;
+        values[i] = (bytes[bit / 8] >> (bit % 8)) & 1;
+    }
+}
+
+void DicomPixels::Data::normalise()
+{
+    const int spare = 32 - object.bitsStored;
+    for (std::int32_t& v : values) {
+        const std::uint32_t bits = static_cast<std::uint32_t>(v) << spare;
+        v = object.isSigned ? static_cast<std::int32_t>(bits) >> spare : static_cast<std::int32_t>(bits >> spare);
+    }
+}
+
+DicomPixels::DicomPixels(const DicomObject& object) : data_(std::make_unique<Data>(object))
+{
+    data_->open();
+}
+
+DicomPixels::~DicomPixels() = default;
+
+std::span<const std::int32_t> DicomPixels::frame(std::size_t index)
+{
+    const DicomObject& object = data_->object;
+    if (object.bitsAllocated == 1) {
+        data_->readBits(index);
+        return data_->values;
+    }
+    if (data_->fragments != nullptr && isJpeg2000(data_->syntax)) {
+        try {
+            data_->values = decodeJpeg2000(data_->codeStream(index), object.columns, object.rows);
+        } catch (const std::runtime_error& e) {
+            refuse(object.file, e.what());
+        }
+    } else {
+        data_->readPlain(index);
+    }
+    data_->normalise();
+    return data_->values;
+}
+
+}  // namespace palpate::volume

@@ -1,0 +1,155 @@
+#include <volume/import/dicom.h>
+#include <volume/import/header_text.h>
+#include <volume/import/segments.h>
+
+#include <glm/common.hpp>
+
+#include <algorithm>
+
+namespace palpate::volume {
+
+namespace {
+
+Files filesIn(const std::filesystem::path& folder)
+{
+    Files files;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+        if (entry.is_regular_file() && entry.path().filename().string()[0] != '.') {
+            files.push_back(entry.path());
+        }
+    }
+    std::sort(files.begin(), files.end());
+    return files;
+}
+
+// "liver" of liver.nii.gz.
+std::string structureName(const std::filesystem::path& file)
+{
+    std::string name = file.filename().string();
+    if (lowerCase(file.extension().string()) == ".gz") {
+        name = file.stem().string();
+    }
+    return name.substr(0, name.rfind('.'));
+}
+
+// Any value but 0 is inside; more than one such value is no mask.
+Segment readMask(const Source& source, std::uint16_t value, const std::function<void(double)>& progress)
+{
+    Segment segment;
+    segment.label = {value, structureName(source.header), ""};
+    double inside = 0;
+    std::uint32_t voxel = 0;
+    decode(source, progress, [&](std::span<const double> values) {
+        for (const double v : values) {
+            if (v != 0) {
+                inside = inside == 0 ? v : inside;
+                if (v != inside) {
+                    refuse(source.header,
+                           fmt::format("holds the values {} and {} beside 0, but in a folder of masks each file is "
+                                       "one structure: name this file alone if it is a label map",
+                                       inside, v));
+                }
+                segment.add(voxel);
+            }
+            ++voxel;
+        }
+    });
+    return segment;
+}
+
+void checkSameGrid(const Source& first, const Source& other)
+{
+    const bool sameSize = first.size == other.size;
+    double apart = 0;  // [voxels]
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3 index = Vec3(first.size - 1) * Vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
+        const Vec3 d = glm::abs(first.affine.toIndex(other.affine.toPatient(index)) - index);
+        apart = std::max({apart, d.x, d.y, d.z});
+    }
+    if (!sameSize || !(apart < 0.01)) {
+        refuse(other.header,
+               fmt::format("is not on the grid of {} (sizes {} x {} x {} and {} x {} x {}, up to {:.2g} voxels "
+                           "apart): masks of one folder must share a grid, resample it or leave it out",
+                           first.header.filename().string(), other.size.x, other.size.y, other.size.z, first.size.x,
+                           first.size.y, first.size.z, apart));
+    }
+}
+
+ImportedLabels masks(const std::filesystem::path& folder, const Files& files, const ImportOptions& options)
+{
+    ImportedLabels out;
+    std::vector<Segment> segments;
+    Source first;
+    for (std::size_t i = 0; i < files.size(); ++i) {
+        Source source = readSource(files[i]);
+        checkAffine(files[i], source.affine, options.sheared, source.warnings);
+        if (source.layers > 1) {
+            refuse(files[i], "has layers of segments, so it is no mask: name this file alone");
+        }
+        if (i == 0) {
+            first = source;
+            out.warnings = source.warnings;
+        }
+        checkSameGrid(first, source);
+        checkBytes(source);
+        const auto progress = [&](double share) {
+            if (options.progress) {
+                options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
+            }
+        };
+        segments.push_back(readMask(source, static_cast<std::uint16_t>(i + 1), progress));
+    }
+    out.image.size = first.size;
+    out.image.affine = first.affine;
+    flatten(folder, std::move(segments), options, out);
+    return out;
+}
+
+}  // namespace
+
+Files dicomFilesIn(const std::filesystem::path& folder)
+{
+    Files files = filesIn(folder);
+    std::erase_if(files, [](const std::filesystem::path& f) { return !isDicom(f); });
+    if (files.empty()) {
+        refuse(folder, "holds no DICOM files: name a folder with one series, or a file");
+    }
+    return files;
+}
+
+ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOptions& options)
+{
+    const Files all = filesIn(folder);
+    Files volumes, dicom;
+    for (const std::filesystem::path& file : all) {
+        if (hasSourceName(file)) {
+            // The two files of a pair are one volume.
+            const std::string ending = lowerCase(file.extension().string());
+            if (ending != ".img" && lowerCase(file.stem().extension().string()) != ".img") {
+                volumes.push_back(file);
+            }
+        } else if (isDicom(file)) {
+            dicom.push_back(file);
+        }
+    }
+    if (!volumes.empty() && !dicom.empty()) {
+        refuse(folder,
+               fmt::format("holds {} volume files and {} DICOM files: name one of the files, or a folder with one kind",
+                           volumes.size(), dicom.size()));
+    }
+    if (!dicom.empty()) {
+        return dicomLabels(folder, dicom, options);
+    }
+    if (volumes.empty()) {
+        refuse(folder,
+               fmt::format("holds {} files, but no DICOM and no masks (NIfTI, NRRD, MetaImage): name a file, or the "
+                           "folder that holds them itself",
+                           all.size()));
+    }
+    if (volumes.size() > 65535) {
+        refuse(folder, "holds more than 65535 masks: name a folder with fewer");
+    }
+    return masks(folder, volumes, options);
+}
+
+}  // namespace palpate::volume

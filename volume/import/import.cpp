@@ -1,0 +1,153 @@
+#include <volume/import.h>
+#include <volume/import/dicom.h>
+#include <volume/import/header_text.h>
+#include <volume/import/segments.h>
+#include <volume/import/source.h>
+
+#include <algorithm>
+#include <fstream>
+
+namespace palpate::volume {
+
+namespace {
+
+bool endsWith(const std::string& text, const std::string& ending)
+{
+    return text.size() >= ending.size() && text.compare(text.size() - ending.size(), ending.size(), ending) == 0;
+}
+
+bool isVdb(const std::filesystem::path& file)
+{
+    return lowerCase(file.extension().string()) == ".vdb";
+}
+
+using SourceReader = Source (*)(const std::filesystem::path&);
+
+// The reader by the name's ending; none for other names.
+SourceReader readerFor(const std::filesystem::path& file)
+{
+    const std::string name = lowerCase(file.filename().string());
+    const auto ends = [&](std::initializer_list<const char*> endings) {
+        return std::any_of(endings.begin(), endings.end(), [&](const char* e) { return endsWith(name, e); });
+    };
+    if (ends({".nii", ".nii.gz", ".hdr", ".hdr.gz", ".img", ".img.gz"})) {
+        return readNifti;
+    }
+    if (ends({".nrrd", ".nhdr"})) {
+        return readNrrd;
+    }
+    if (ends({".mha", ".mhd"})) {
+        return readMeta;
+    }
+    return ends({".mgz", ".mgh"}) ? readMgh : nullptr;
+}
+
+void checkFile(const std::filesystem::path& file)
+{
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) {
+        refuse(file, "there is no such file: check the name");
+    }
+    std::ifstream in(file, std::ios::binary);
+    std::string start(23, '\0');
+    in.read(start.data(), static_cast<std::streamsize>(start.size()));
+    if (in.gcount() == 0) {
+        refuse(file, in.is_open() ? "is empty: get the file again" : "cannot be opened: check the permissions");
+    }
+    if (start.rfind("version https://git-lfs", 0) == 0) {
+        refuse(file, "is a git-LFS pointer, not the data: run 'git lfs pull' where it came from");
+    }
+}
+
+ImportedLabels labelsOf(Source source, const ImportOptions& options)
+{
+    ImportedLabels out;
+    out.image.size = source.size;
+    out.image.affine = source.affine;
+    if (source.layers > 1) {
+        flatten(source.header, layeredSegments(source, options.progress), options, out);
+    } else {
+        LabelSink sink(source.header, source.size, source.scaled);
+        decode(source, options.progress, [&](std::span<const double> values) { sink.add(values); });
+        out.image.values = sink.finish(source.label);
+        for (SegmentName& s : source.segments) {
+            out.names.push_back(std::move(s.label));
+        }
+    }
+    // What the header left to choose comes first.
+    out.warnings.insert(out.warnings.begin(), source.warnings.begin(), source.warnings.end());
+    return out;
+}
+
+Source checkedSource(const std::filesystem::path& file, bool sheared)
+{
+    Source source = readSource(file);
+    checkAffine(file, source.affine, sheared, source.warnings);
+    checkBytes(source);
+    return source;
+}
+
+}  // namespace
+
+bool hasSourceName(const std::filesystem::path& file)
+{
+    return readerFor(file) != nullptr;
+}
+
+Source readSource(const std::filesystem::path& file)
+{
+    checkFile(file);
+    const SourceReader reader = readerFor(file);
+    if (reader == nullptr) {
+        refuse(file,
+               "is no format that is read: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), "
+               "FreeSurfer (.mgz), DICOM or OpenVDB (.vdb)");
+    }
+    return reader(file);
+}
+
+ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptions& options)
+{
+    if (std::filesystem::is_directory(path)) {
+        return folderLabels(path, options);
+    }
+    checkFile(path);
+    if (isVdb(path)) {
+        return vdbLabels(path);
+    }
+    if (isDicom(path)) {
+        return dicomLabels(path, {path}, options);
+    }
+    return labelsOf(checkedSource(path, options.sheared), options);
+}
+
+ImportedImage importImage(const std::filesystem::path& path, const ImportOptions& options)
+{
+    if (std::filesystem::is_directory(path)) {
+        return dicomImage(path, dicomFilesIn(path), options);
+    }
+    checkFile(path);
+    if (isVdb(path)) {
+        refuse(path, "is OpenVDB, of which only labels are read: save the image as NIfTI");
+    }
+    if (isDicom(path)) {
+        return dicomImage(path, {path}, options);
+    }
+    Source source = checkedSource(path, true);
+    if (source.layers > 1) {
+        refuse(path, fmt::format("has {} layers: an image has one, give the image itself", source.layers));
+    }
+    ImportedImage out;
+    out.size = source.size;
+    out.affine = source.affine;
+    out.values.reserve(static_cast<std::size_t>(source.voxels()));
+    decode(source, options.progress, [&](std::span<const double> values) {
+        std::transform(values.begin(), values.end(), std::back_inserter(out.values),
+                       [](double v) { return static_cast<float>(v); });
+    });
+    out.warnings = std::move(source.warnings);
+    makeFinite(path, out.values, out.warnings);
+    return out;
+}
+
+}  // namespace palpate::volume

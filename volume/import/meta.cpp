@@ -1,0 +1,181 @@
+#include <volume/import/header_text.h>
+#include <volume/import/source.h>
+
+#include <cmath>
+#include <fstream>
+
+namespace palpate::volume {
+
+namespace {
+
+using Fields = std::map<std::string, std::string>;
+
+// Reads "Key = value" lines up to ElementDataFile, the last one; `end` is where the bytes behind it begin.
+Fields readFields(const std::filesystem::path& file, std::uint64_t& end)
+{
+    std::ifstream in(file, std::ios::binary);
+    Fields fields;
+    std::string line;
+    while (fields.count("ElementDataFile") == 0 && fields.size() < 1000 && end < 1000000 && std::getline(in, line)) {
+        end += line.size() + 1;
+        const auto equals = line.find('=');
+        if (equals == std::string::npos || line.size() > 10000) {
+            break;
+        }
+        fields[trimmed(line.substr(0, equals))] = trimmed(line.substr(equals + 1));
+    }
+    if (fields.count("ElementDataFile") == 0 || fields.count("DimSize") == 0 || fields.count("ElementType") == 0) {
+        refuse(file,
+               "is not a MetaImage, DimSize, ElementType or ElementDataFile is missing from its header: save it again");
+    }
+    return fields;
+}
+
+bool isTrue(const Fields& fields, const std::string& key)
+{
+    const auto found = fields.find(key);
+    return found != fields.end() && !found->second.empty() &&
+           std::string("Tt1").find(found->second[0]) != std::string::npos;
+}
+
+// The first of several names of the same thing that is there.
+std::string firstOf(const Fields& fields, std::initializer_list<const char*> keys)
+{
+    for (const char* key : keys) {
+        if (const auto found = fields.find(key); found != fields.end()) {
+            return found->second;
+        }
+    }
+    return "";
+}
+
+Component componentNamed(const std::filesystem::path& file, const std::string& type)
+{
+    static const std::map<std::string, Component> types = {
+        {"MET_UCHAR", Component::u8},       {"MET_CHAR", Component::i8},       {"MET_USHORT", Component::u16},
+        {"MET_SHORT", Component::i16},      {"MET_UINT", Component::u32},      {"MET_INT", Component::i32},
+        {"MET_ULONG_LONG", Component::u64}, {"MET_LONG_LONG", Component::i64}, {"MET_FLOAT", Component::f32},
+        {"MET_DOUBLE", Component::f64}};
+    const auto found = types.find(type);
+    if (found == types.end()) {
+        refuse(file, fmt::format("ElementType = {}: is not read, save it with one number of 8 to 64 bits per voxel",
+                                 type.substr(0, 60)));
+    }
+    return found->second;
+}
+
+Index3 sizeOf(const std::filesystem::path& file, const Fields& fields)
+{
+    const std::vector<std::int64_t> sizes = integers(file, "DimSize", fields.at("DimSize"));
+    const std::string dimensions = firstOf(fields, {"NDims"});
+    if (!dimensions.empty() && integer(file, "NDims", dimensions) != static_cast<std::int64_t>(sizes.size())) {
+        refuse(file, fmt::format("NDims = {} but DimSize = {}: its header contradicts itself, save it again", dimensions,
+                                 fields.at("DimSize")));
+    }
+    return checkedSize(file, sizes);
+}
+
+std::vector<double> someNumbers(const std::filesystem::path& file, const Fields& fields, const char* what,
+                                std::initializer_list<const char*> keys, std::vector<double> fallback)
+{
+    const std::string text = firstOf(fields, keys);
+    if (text.empty()) {
+        return fallback;
+    }
+    std::vector<double> found = numbers(file, what, text);
+    if (found.size() != fallback.size()) {
+        refuse(file, fmt::format("{} = {}: must be {} numbers, save it again", what, text.substr(0, 100), fallback.size()));
+    }
+    return found;
+}
+
+// MetaImage writes the direction of one axis after the other, in LPS.
+void place(const Fields& fields, Source& source)
+{
+    const std::filesystem::path& file = source.header;
+    const std::string units = lowerCase(firstOf(fields, {"DistanceUnits"}));
+    if (!units.empty() && units != "mm" && units != "?") {
+        refuse(file, fmt::format("DistanceUnits = {}: only mm is understood, save it with mm", units.substr(0, 60)));
+    }
+    const auto direction = someNumbers(file, fields, "TransformMatrix", {"TransformMatrix", "Rotation", "Orientation"},
+                                       {1, 0, 0, 0, 1, 0, 0, 0, 1});
+    const auto origin = someNumbers(file, fields, "Offset", {"Offset", "Position", "Origin"}, {0, 0, 0});
+    if (firstOf(fields, {"ElementSpacing", "ElementSize"}).empty()) {
+        source.warnings.emplace_back("its header gives no ElementSpacing: voxels of 1 mm are assumed");
+    }
+    const auto spacing = someNumbers(file, fields, "ElementSpacing", {"ElementSpacing", "ElementSize"}, {1, 1, 1});
+    for (int k = 0; k < 3; ++k) {
+        const auto at = static_cast<std::size_t>(k);
+        source.affine.origin[k] = 1e-3 * origin[at];
+        source.affine.linear[k] =
+            1e-3 * std::abs(spacing[at]) * Vec3(direction[3 * at], direction[3 * at + 1], direction[3 * at + 2]);
+    }
+}
+
+void locateData(const Fields& fields, std::uint64_t headerEnd, Source& source)
+{
+    const std::string& name = fields.at("ElementDataFile");
+    if (name == "LIST" || name.rfind("LIST ", 0) == 0 || name.find('%') != std::string::npos) {
+        refuse(source.header, "its slices lie in one file each: save it as one file");
+    }
+    const bool local = lowerCase(name) == "local";
+    source.data = local ? source.header : besides(source.header, name);
+    source.offset = local ? headerEnd : 0;
+    const std::string given = firstOf(fields, {"HeaderSize"});
+    const std::int64_t headerSize = given.empty() ? 0 : integer(source.header, "HeaderSize", given);
+    if (headerSize < -1) {
+        refuse(source.header, fmt::format("HeaderSize = {}: must be -1 or more, save it again", headerSize));
+    }
+    source.fromEnd = headerSize == -1;
+    source.offset += headerSize > 0 ? static_cast<std::uint64_t>(headerSize) : 0;
+}
+
+// VICTRE phantoms come with gzip data and CompressedData = False; other headers count fewer compressed bytes than there
+// are.
+void judgePacking(const Fields& fields, Source& source)
+{
+    const bool declared = isTrue(fields, "CompressedData");
+    const std::uint64_t stored = unpackedSize(source.data, source.offset, Encoding::raw, 0);
+    const bool exact = stored == source.voxels() * bytesOf(source.component);
+    const Encoding there = looksLike(source.data, source.offset);
+    source.encoding = there == Encoding::deflate && (declared || !exact) ? there : Encoding::raw;
+    const bool packed = source.encoding == Encoding::deflate;
+    if (packed != declared) {
+        source.warnings.push_back(fmt::format("its header says CompressedData = {}, but the data are {}: read as they are",
+                                              declared ? "True" : "False", packed ? "compressed" : "not compressed"));
+    }
+    const std::string counted = firstOf(fields, {"CompressedDataSize"});
+    if (declared && !counted.empty() && counted != std::to_string(stored)) {
+        source.warnings.push_back(
+            fmt::format("its header says CompressedDataSize = {}, but there are {} bytes: read to the end",
+                        counted.substr(0, 30), stored));
+    }
+}
+
+}  // namespace
+
+Source readMeta(const std::filesystem::path& file)
+{
+    std::uint64_t headerEnd = 0;
+    const Fields fields = readFields(file, headerEnd);
+    Source source;
+    source.header = file;
+    source.size = sizeOf(file, fields);
+    source.component = componentNamed(file, fields.at("ElementType"));
+    source.bigEndian = isTrue(fields, "BinaryDataByteOrderMSB") || isTrue(fields, "ElementByteOrderMSB");
+    const std::string channels = firstOf(fields, {"ElementNumberOfChannels"});
+    if (!channels.empty() && channels != "1") {
+        refuse(file, fmt::format("has {} values per voxel: save it with one", channels.substr(0, 30)));
+    }
+    place(fields, source);
+    if (fields.count("BinaryData") != 0 && !isTrue(fields, "BinaryData")) {
+        locateData(fields, headerEnd, source);
+        source.encoding = Encoding::text;
+        return source;
+    }
+    locateData(fields, headerEnd, source);
+    judgePacking(fields, source);
+    return source;
+}
+
+}  // namespace palpate::volume

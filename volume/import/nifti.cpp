@@ -1,0 +1,179 @@
+#include <volume/import/nifti.h>
+
+#include <cmath>
+#include <map>
+#include <regex>
+
+namespace palpate::volume {
+
+namespace {
+
+constexpr int intentLabel = 1002;  // NIFTI_INTENT_LABEL
+
+bool isLength(const std::vector<std::byte>& bytes, std::size_t length, bool swapped)
+{
+    std::array<std::byte, 4> raw{};
+    std::copy_n(bytes.begin(), 4, raw.begin());
+    if (swapped) {
+        std::reverse(raw.begin(), raw.end());
+    }
+    return std::bit_cast<std::int32_t>(raw) == static_cast<std::int32_t>(length);
+}
+
+NiftiHeader readHeader(const std::filesystem::path& file)
+{
+    const Encoding encoding = looksLike(file, 0);
+    std::vector<std::byte> bytes = unpackedBytes(file, 0, encoding, 0, NiftiHeader::secondBytes);
+    if (bytes.size() < NiftiHeader::firstBytes) {
+        refuse(file, fmt::format("ends after {} bytes, but a NIfTI header has {}: get the file again", bytes.size(),
+                                 NiftiHeader::firstBytes));
+    }
+    for (const bool swapped : {false, true}) {
+        if (isLength(bytes, NiftiHeader::firstBytes, swapped)) {
+            NiftiHeader header(std::move(bytes), false, swapped);
+            if (header.magic() != "n+1" && header.magic() != "ni1") {
+                refuse(file, "is Analyze 7.5, which does not say which side is left: save it as NIfTI");
+            }
+            return header;
+        }
+        if (bytes.size() == NiftiHeader::secondBytes && isLength(bytes, NiftiHeader::secondBytes, swapped)) {
+            NiftiHeader header(std::move(bytes), true, swapped);
+            if (header.magic() != "n+2" && header.magic() != "ni2") {
+                refuse(file, "is not a NIfTI-2 file, its magic is missing: save it again");
+            }
+            return header;
+        }
+    }
+    refuse(file, "is not a NIfTI file, its header does not begin with its length (348 or 540): save it again");
+}
+
+Component componentOf(const std::filesystem::path& file, const NiftiHeader& header)
+{
+    static const std::map<int, Component> types = {
+        {2, Component::u8},  {256, Component::i8},   {512, Component::u16},  {4, Component::i16},  {768, Component::u32},
+        {8, Component::i32}, {1280, Component::u64}, {1024, Component::i64}, {16, Component::f32}, {64, Component::f64}};
+    const int code = header.datatype();
+    if (code == 128 || code == 2304 || code == 32 || code == 1792 || code == 2048) {
+        refuse(file, "has colours or complex numbers as voxels: save it with one number per voxel");
+    }
+    const auto found = types.find(code);
+    if (found == types.end()) {
+        refuse(file, fmt::format("datatype {} is not read: save it with whole or floating-point numbers", code));
+    }
+    if (header.bitpix() < 0 || static_cast<std::uint64_t>(header.bitpix()) != 8 * bytesOf(found->second)) {
+        refuse(file,
+               fmt::format("datatype {} has {} bits per voxel, but bitpix says {}: its header contradicts itself, save "
+                           "it again",
+                           code, 8 * bytesOf(found->second), header.bitpix()));
+    }
+    return found->second;
+}
+
+Index3 sizeOf(const std::filesystem::path& file, const NiftiHeader& header)
+{
+    const std::int64_t dimensions = header.dim(0);
+    if (dimensions < 1 || dimensions > 7) {
+        refuse(file, fmt::format("dim[0] = {}, but it must be 1 to 7: its header is wrong, save it again", dimensions));
+    }
+    std::vector<std::int64_t> sizes;
+    for (std::int64_t i = 1; i <= dimensions; ++i) {
+        sizes.push_back(header.dim(static_cast<std::size_t>(i)));
+    }
+    while (sizes.size() > 3 && sizes.back() == 1) {
+        sizes.pop_back();
+    }
+    return checkedSize(file, sizes);
+}
+
+void locateData(const NiftiHeader& header, Source& source)
+{
+    const bool single = header.magic()[1] == '+';
+    source.data = source.header;
+    const double start = header.voxOffset();
+    if (!(start >= 0 && start < 1e9) || (single && start < static_cast<double>(header.length())) ||
+        start != std::floor(start)) {
+        refuse(source.header, fmt::format("vox_offset = {}: the voxels cannot begin there, save it again", start));
+    }
+    source.skip = static_cast<std::uint64_t>(start);
+    if (!single) {
+        std::string stem = source.header.string();
+        stem = std::regex_replace(stem, std::regex("\\.(hdr|img|nii)(\\.gz)?$", std::regex::icase), "");
+        source.data = stem + ".img";
+        if (!std::filesystem::is_regular_file(source.data)) {
+            source.data = stem + ".img.gz";
+        }
+        if (!std::filesystem::is_regular_file(source.data)) {
+            refuse(source.header, fmt::format("its voxels, {}.img, are not there: put that file beside it", stem));
+        }
+    }
+    source.encoding = looksLike(source.data, 0);
+}
+
+// Label names of TotalSegmentator and Caret: <Label Key="5" ...><![CDATA[liver]]></Label> in a header extension.
+std::vector<SegmentName> extensionNames(const Source& source, std::size_t headerBytes)
+{
+    constexpr std::uint64_t most = std::uint64_t{1} << 20;
+    if (source.data != source.header || source.skip <= headerBytes + 4 || source.skip > most) {
+        return {};
+    }
+    const std::vector<std::byte> bytes =
+        unpackedBytes(source.data, 0, source.encoding, headerBytes, source.skip - headerBytes);
+    const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    // Looked for piece by piece: std::regex needs a frame of the stack for each character of a repetition.
+    const std::regex key("Key=\"(\\d{1,5})\"");
+    std::vector<SegmentName> names;
+    for (auto at = text.find("<Label "); at != std::string::npos; at = text.find("<Label ", at + 1)) {
+        const auto open = text.find('>', at);
+        const auto close = text.find("</Label>", at);
+        std::smatch match;
+        if (open == std::string::npos || close == std::string::npos || open > close || close - at > 2000) {
+            continue;
+        }
+        const std::string attributes = text.substr(at, open - at);
+        std::string name = text.substr(open + 1, close - open - 1);
+        if (name.rfind("<![CDATA[", 0) == 0 && name.size() >= 12) {
+            name = name.substr(9, name.size() - 12);
+        }
+        if (std::regex_search(attributes, match, key) && std::stoi(match[1]) <= 65535 && !name.empty()) {
+            names.push_back({{static_cast<std::uint16_t>(std::stoi(match[1])), name, ""}, 0});
+        }
+    }
+    return names;
+}
+
+void readScale(const NiftiHeader& header, Source& source)
+{
+    const double slope = header.slope();
+    const double intercept = header.intercept();
+    if (!std::isfinite(slope) || !std::isfinite(intercept)) {
+        source.warnings.emplace_back("its scl_slope or scl_inter is not a number: the values are taken as they are stored");
+        return;
+    }
+    source.scaled = slope != 0 && (slope != 1 || intercept != 0);
+    source.slope = source.scaled ? slope : 1.0;
+    source.intercept = source.scaled ? intercept : 0.0;
+}
+
+}  // namespace
+
+Source readNifti(const std::filesystem::path& file)
+{
+    // An .img is opened through its header.
+    Source source;
+    source.header = std::regex_replace(file.string(), std::regex("\\.img(\\.gz)?$", std::regex::icase), ".hdr$1");
+    if (!std::filesystem::is_regular_file(source.header)) {
+        refuse(file, fmt::format("its header {} is not there: put that file beside it", source.header.string()));
+    }
+    const NiftiHeader header = readHeader(source.header);
+    source.size = sizeOf(file, header);
+    source.component = componentOf(file, header);
+    source.bigEndian = header.swapped();
+    source.label = header.intent() == intentLabel;
+    readScale(header, source);
+    placeNifti(header, source);
+    locateData(header, source);
+    source.segments = extensionNames(source, header.length());
+    return source;
+}
+
+}  // namespace palpate::volume

@@ -1,0 +1,118 @@
+#pragma once
+
+#include <volume/geometry.h>
+#include <volume/import.h>
+#include <volume/import/unpack.h>
+#include <volume/label_image.h>
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+// Inside volume/import/ only: what the readers of the formats with a header and one stream of voxels agree on.
+namespace palpate::volume {
+
+enum class Component : std::uint8_t { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 };
+
+constexpr std::uint64_t bytesOf(Component c)
+{
+    constexpr std::array<std::uint64_t, 10> bytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+    return bytes[static_cast<std::size_t>(c)];
+}
+
+/// A segment that a header names, and where its voxels are: those with `value` in layer `layer`.
+struct SegmentName {
+    LabelName label;
+    std::uint64_t layer = 0;
+};
+
+/// What a header says, and where its voxels are.
+struct Source {
+    std::filesystem::path header;
+    std::filesystem::path data;  // the file with the voxels; often the header's own
+    Index3 size{0};
+    Affine affine;
+    Component component = Component::u8;
+    bool bigEndian = false;
+    Encoding encoding = Encoding::raw;
+    std::uint64_t offset = 0;   // where the voxel stream begins in `data`
+    std::uint64_t skip = 0;     // bytes before the voxels in the decoded stream
+    bool fromEnd = false;       // the voxels are the last bytes of the stream; skip is then unknown
+    std::uint64_t trailer = 0;  // bytes that may follow the voxels
+    bool scaled = false;        // the values meant are slope * stored + intercept
+    double slope = 1;
+    double intercept = 0;
+    std::uint64_t layers = 1;  // segmentations of the same space in one stream
+    std::uint64_t inner = 1;   // how many elements of one layer follow each other before the next layer's
+    bool label = false;        // the file says itself that it is a label map
+    std::vector<SegmentName> segments;
+    std::vector<std::string> warnings;
+
+    std::uint64_t voxels() const
+    {
+        return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z);
+    }
+    std::uint64_t elements() const { return voxels() * layers; }
+};
+
+Source readNifti(const std::filesystem::path& file);
+Source readNrrd(const std::filesystem::path& file);
+Source readMeta(const std::filesystem::path& file);
+Source readMgh(const std::filesystem::path& file);
+
+/// The reader by the file's name; refuses what none is for, and what is no volume at all (empty, git-LFS pointer).
+Source readSource(const std::filesystem::path& file);
+/// True for the name of a file that readSource() reads.
+bool hasSourceName(const std::filesystem::path& file);
+
+/// The header's promise against the bytes that are there; sets `skip` where the voxels are the last of them.
+void checkBytes(Source& source);
+
+/// The voxels in the order of the file, slope and intercept applied, a piece at a time.
+void decode(const Source& source, const std::function<void(double)>& progress,
+            const std::function<void(std::span<const double>)>& sink);
+
+[[noreturn]] inline void refuse(const std::filesystem::path& file, const std::string& why)
+{
+    throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
+}
+
+/// The three sizes of a header, each in 1..32767 and not too many voxels, so that nothing absurd is allocated.
+Index3 checkedSize(const std::filesystem::path& file, const std::vector<std::int64_t>& sizes);
+
+/// Refuses spacings that are not positive and finite, and sheared axes unless `sheared`, which leave a warning.
+void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings);
+
+/// Turns values into labels, one after another, and refuses what no label map holds.
+class LabelSink {
+public:
+    /// `rounded`: the values went through a slope, which leaves a rounding of single precision.
+    LabelSink(std::filesystem::path file, Index3 size, bool rounded);
+
+    void add(std::span<const double> values);
+    /// Refuses images (too many different values) and empty maps; the labels.
+    std::vector<std::uint16_t> finish(bool surelyLabels);
+
+    static std::uint16_t label(const std::filesystem::path& file, double value, bool rounded, const std::string& voxel);
+
+private:
+    std::filesystem::path file_;
+    Index3 size_;
+    bool rounded_;
+    std::vector<std::uint16_t> labels_;
+    std::vector<bool> seen_;
+};
+
+/// Values of an image: what is not a number takes the smallest value that is one, with a warning.
+void makeFinite(const std::filesystem::path& file, std::vector<float>& values, std::vector<std::string>& warnings);
+
+}  // namespace palpate::volume

@@ -1,0 +1,331 @@
+#include <volume/import/unpack.h>
+
+#include <bzlib.h>
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace palpate::volume {
+
+namespace {
+
+using Sink = std::function<bool(std::span<const std::byte>)>;
+
+constexpr std::size_t chunk = std::size_t{1} << 18;
+
+std::ifstream openAt(const std::filesystem::path& file, std::uint64_t offset)
+{
+    std::ifstream in(file, std::ios::binary);
+    if (!in) {
+        throw std::runtime_error(fmt::format("{}: cannot be opened: check the name and the permissions", file.string()));
+    }
+    in.seekg(static_cast<std::streamoff>(offset));
+    return in;
+}
+
+std::size_t fill(std::ifstream& in, std::vector<std::byte>& buffer)
+{
+    in.read(reinterpret_cast<char*>(buffer.data()), static_cast<std::streamsize>(buffer.size()));
+    return static_cast<std::size_t>(in.gcount());
+}
+
+[[noreturn]] void damaged(const std::filesystem::path& file, const std::string& why)
+{
+    throw std::runtime_error(
+        fmt::format("{}: its compressed data are damaged ({}): get the file again", file.string(), why));
+}
+
+[[noreturn]] void cutShort(const std::filesystem::path& file)
+{
+    throw std::runtime_error(
+        fmt::format("{}: its compressed data end too early: the file is cut short, get it again", file.string()));
+}
+
+// zlib's inflater; 47 makes it accept gzip and zlib streams.
+class Inflater {
+public:
+    Inflater()
+    {
+        if (inflateInit2(&stream_, 47) != Z_OK) {
+            throw std::runtime_error("zlib cannot start: out of memory");
+        }
+    }
+    ~Inflater() { inflateEnd(&stream_); }
+    Inflater(const Inflater&) = delete;
+    Inflater& operator=(const Inflater&) = delete;
+
+    z_stream& stream() { return stream_; }
+
+private:
+    z_stream stream_{};
+};
+
+void inflateAll(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
+{
+    Inflater inflater;
+    z_stream& z = inflater.stream();
+    std::vector<std::byte> packed(chunk);
+    std::vector<std::byte> plain(4 * chunk);
+    bool ended = false;
+    while (const std::size_t count = fill(in, packed)) {
+        z.next_in = reinterpret_cast<Bytef*>(packed.data());
+        z.avail_in = static_cast<uInt>(count);
+        z.avail_out = 1;
+        // A full buffer may mean that there is more to come of what is read already.
+        while (z.avail_in > 0 || (z.avail_out == 0 && !ended)) {
+            // A gzip file may hold several members, one after another; anything else behind the end is padding.
+            if (ended && (*z.next_in != 0x1f || inflateReset(&z) != Z_OK)) {
+                return;
+            }
+            z.next_out = reinterpret_cast<Bytef*>(plain.data());
+            z.avail_out = static_cast<uInt>(plain.size());
+            const int status = inflate(&z, Z_NO_FLUSH);
+            if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) {
+                damaged(file, z.msg != nullptr ? z.msg : "zlib error");
+            }
+            ended = status == Z_STREAM_END;
+            if (!sink({plain.data(), plain.size() - z.avail_out})) {
+                return;
+            }
+        }
+    }
+    if (!ended) {
+        cutShort(file);
+    }
+}
+
+class Bunzipper {
+public:
+    Bunzipper() { start(); }
+    ~Bunzipper() { BZ2_bzDecompressEnd(&stream_); }
+    Bunzipper(const Bunzipper&) = delete;
+    Bunzipper& operator=(const Bunzipper&) = delete;
+
+    bz_stream& stream() { return stream_; }
+    /// Goes on with a further stream; false where none begins.
+    bool restart()
+    {
+        if (*stream_.next_in != 'B') {
+            return false;
+        }
+        BZ2_bzDecompressEnd(&stream_);
+        const bz_stream rest = stream_;
+        stream_ = {};
+        start();
+        stream_.next_in = rest.next_in;
+        stream_.avail_in = rest.avail_in;
+        return true;
+    }
+
+private:
+    void start()
+    {
+        if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK) {
+            throw std::runtime_error("bzip2 cannot start: out of memory");
+        }
+    }
+    bz_stream stream_{};
+};
+
+void bunzipAll(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
+{
+    Bunzipper bunzipper;
+    std::vector<std::byte> packed(chunk);
+    std::vector<std::byte> plain(4 * chunk);
+    bool ended = false;
+    while (const std::size_t count = fill(in, packed)) {
+        bunzipper.stream().next_in = reinterpret_cast<char*>(packed.data());
+        bunzipper.stream().avail_in = static_cast<unsigned>(count);
+        bunzipper.stream().avail_out = 1;
+        while (bunzipper.stream().avail_in > 0 || (bunzipper.stream().avail_out == 0 && !ended)) {
+            if (ended && !bunzipper.restart()) {
+                return;  // padding behind the end
+            }
+            bz_stream& b = bunzipper.stream();
+            b.next_out = reinterpret_cast<char*>(plain.data());
+            b.avail_out = static_cast<unsigned>(plain.size());
+            const int status = BZ2_bzDecompress(&b);
+            if (status != BZ_OK && status != BZ_STREAM_END) {
+                damaged(file, fmt::format("bzip2 error {}", status));
+            }
+            ended = status == BZ_STREAM_END;
+            if (!sink({plain.data(), plain.size() - b.avail_out})) {
+                return;
+            }
+        }
+    }
+    if (!ended) {
+        cutShort(file);
+    }
+}
+
+// One number of a text; NaN is one, a word is not.
+double number(const std::filesystem::path& file, const std::string& token)
+{
+    double value = 0;
+    const char* first = token.data() + (token[0] == '+' ? 1 : 0);
+    const auto [end, error] = std::from_chars(first, token.data() + token.size(), value);
+    if (error == std::errc::result_out_of_range) {
+        return std::numeric_limits<double>::infinity();
+    }
+    if (error != std::errc() || end != token.data() + token.size()) {
+        throw std::runtime_error(
+            fmt::format("{}: its voxels are text, but '{}' is no number: save it again with gzip encoding", file.string(),
+                        token.substr(0, 20)));
+    }
+    return value;
+}
+
+bool isSpace(char c)
+{
+    return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == ',' || c == '\f' || c == '\v';
+}
+
+void readText(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
+{
+    constexpr std::size_t longest = 400;  // no number is longer
+    std::vector<std::byte> buffer(chunk);
+    std::vector<double> numbers;
+    std::string token;
+    const auto flush = [&] { return sink(std::as_bytes(std::span(numbers))); };
+    while (const std::size_t count = fill(in, buffer)) {
+        numbers.clear();
+        for (std::size_t i = 0; i < count; ++i) {
+            const char c = static_cast<char>(buffer[i]);
+            if (!isSpace(c) && token.size() < longest) {
+                token += c;
+            } else if (!token.empty()) {
+                numbers.push_back(number(file, token));
+                token.clear();
+            }
+        }
+        if (!flush()) {
+            return;
+        }
+    }
+    numbers.clear();
+    if (!token.empty()) {
+        numbers.push_back(number(file, token));
+    }
+    flush();
+}
+
+int hexDigit(char c)
+{
+    const auto at = std::string_view("0123456789abcdefABCDEF").find(c);
+    return at == std::string_view::npos ? -1 : static_cast<int>(at < 16 ? at : at - 6);
+}
+
+void readHex(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
+{
+    std::vector<std::byte> buffer(chunk);
+    std::vector<std::byte> bytes;
+    int high = -1;
+    while (const std::size_t count = fill(in, buffer)) {
+        bytes.clear();
+        for (std::size_t i = 0; i < count; ++i) {
+            const char c = static_cast<char>(buffer[i]);
+            if (isSpace(c)) {
+                continue;
+            }
+            const int digit = hexDigit(c);
+            if (digit < 0) {
+                throw std::runtime_error(fmt::format(
+                    "{}: its voxels are hexadecimal digits, but there is a character with code {} among them: save "
+                    "it again with gzip encoding",
+                    file.string(), static_cast<int>(static_cast<unsigned char>(c))));
+            }
+            if (high < 0) {
+                high = digit;
+            } else {
+                bytes.push_back(static_cast<std::byte>(16 * high + digit));
+                high = -1;
+            }
+        }
+        if (!sink(bytes)) {
+            return;
+        }
+    }
+}
+
+}  // namespace
+
+Encoding looksLike(const std::filesystem::path& file, std::uint64_t offset)
+{
+    std::ifstream in = openAt(file, offset);
+    std::array<unsigned char, 10> magic{};
+    in.read(reinterpret_cast<char*>(magic.data()), magic.size());
+    const auto there = in.gcount();
+    const bool gzip = magic[0] == 0x1f && magic[1] == 0x8b;
+    const bool zlib = magic[0] == 0x78 && (magic[0] * 256 + magic[1]) % 31 == 0;
+    if (there >= 2 && (gzip || zlib)) {
+        return Encoding::deflate;
+    }
+    constexpr std::array<unsigned char, 6> block = {0x31, 0x41, 0x59, 0x26, 0x53, 0x59};  // begins each of bzip2's blocks
+    const bool bzip2 =
+        std::memcmp(magic.data(), "BZh", 3) == 0 && std::equal(block.begin(), block.end(), magic.begin() + 4);
+    return there == 10 && bzip2 ? Encoding::bzip2 : Encoding::raw;
+}
+
+void unpack(const std::filesystem::path& file, std::uint64_t offset, Encoding encoding, const Sink& sink)
+{
+    std::ifstream in = openAt(file, offset);
+    switch (encoding) {
+        case Encoding::deflate:
+            return inflateAll(file, in, sink);
+        case Encoding::bzip2:
+            return bunzipAll(file, in, sink);
+        case Encoding::text:
+            return readText(file, in, sink);
+        case Encoding::hex:
+            return readHex(file, in, sink);
+        case Encoding::raw:
+            break;
+    }
+    std::vector<std::byte> buffer(chunk);
+    while (const std::size_t count = fill(in, buffer)) {
+        if (!sink({buffer.data(), count})) {
+            return;
+        }
+    }
+}
+
+std::uint64_t unpackedSize(const std::filesystem::path& file, std::uint64_t offset, Encoding encoding, std::uint64_t most)
+{
+    if (encoding == Encoding::raw) {
+        const std::uint64_t size = std::filesystem::file_size(file);
+        return size > offset ? size - offset : 0;
+    }
+    std::uint64_t size = 0;
+    unpack(file, offset, encoding, [&](std::span<const std::byte> bytes) {
+        size += bytes.size();
+        return size <= most;
+    });
+    return size;
+}
+
+std::vector<std::byte> unpackedBytes(const std::filesystem::path& file, std::uint64_t offset, Encoding encoding,
+                                     std::uint64_t skip, std::uint64_t count)
+{
+    std::vector<std::byte> out;
+    unpack(file, offset, encoding, [&](std::span<const std::byte> bytes) {
+        const std::uint64_t over = std::min<std::uint64_t>(skip, bytes.size());
+        skip -= over;
+        const auto rest = bytes.subspan(over);
+        const auto wanted = rest.first(std::min<std::uint64_t>(rest.size(), count - out.size()));
+        out.insert(out.end(), wanted.begin(), wanted.end());
+        return out.size() < count;
+    });
+    return out;
+}
+
+}  // namespace palpate::volume

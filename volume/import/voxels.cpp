@@ -1,0 +1,285 @@
+#include <volume/import/source.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace palpate::volume {
+
+namespace {
+
+constexpr std::size_t mostLabels = 1024;                 // more different values than this is an image
+constexpr std::uint64_t mostVoxels = 0xffffffff;         // of one volume
+constexpr std::uint64_t mostPadding = 16;                // [bytes]
+constexpr double mostShear = 2e-3;                       // cosine between voxel axes
+constexpr double degree = 3.14159265358979323846 / 180;  // [rad]
+
+template <typename T>
+void appendAs(std::span<const std::byte> bytes, bool turned, std::vector<double>& out)
+{
+    for (std::size_t at = 0; at + sizeof(T) <= bytes.size(); at += sizeof(T)) {
+        std::array<std::byte, sizeof(T)> raw;
+        std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), sizeof(T), raw.begin());
+        if (turned) {
+            std::reverse(raw.begin(), raw.end());
+        }
+        out.push_back(static_cast<double>(std::bit_cast<T>(raw)));
+    }
+}
+
+void append(Component component, std::span<const std::byte> bytes, bool turned, std::vector<double>& out)
+{
+    switch (component) {
+        case Component::u8:
+            return appendAs<std::uint8_t>(bytes, turned, out);
+        case Component::i8:
+            return appendAs<std::int8_t>(bytes, turned, out);
+        case Component::u16:
+            return appendAs<std::uint16_t>(bytes, turned, out);
+        case Component::i16:
+            return appendAs<std::int16_t>(bytes, turned, out);
+        case Component::u32:
+            return appendAs<std::uint32_t>(bytes, turned, out);
+        case Component::i32:
+            return appendAs<std::int32_t>(bytes, turned, out);
+        case Component::u64:
+            return appendAs<std::uint64_t>(bytes, turned, out);
+        case Component::i64:
+            return appendAs<std::int64_t>(bytes, turned, out);
+        case Component::f32:
+            return appendAs<float>(bytes, turned, out);
+        case Component::f64:
+            return appendAs<double>(bytes, turned, out);
+    }
+}
+
+std::string voxelName(Index3 size, std::size_t at)
+{
+    const auto nx = static_cast<std::size_t>(size.x);
+    const auto ny = static_cast<std::size_t>(size.y);
+    return fmt::format("voxel ({}, {}, {})", at % nx, at / nx % ny, at / nx / ny);
+}
+
+}  // namespace
+
+Index3 checkedSize(const std::filesystem::path& file, const std::vector<std::int64_t>& sizes)
+{
+    const std::string text = fmt::format("{}", fmt::join(sizes, " x "));
+    if (sizes.size() > 3) {
+        refuse(file, fmt::format("has {} dimensions ({}): save one volume of it", sizes.size(), text));
+    }
+    if (sizes.size() < 3) {
+        refuse(file, fmt::format("has {} dimensions ({}): a volume has 3, give one", sizes.size(), text));
+    }
+    if (std::any_of(sizes.begin(), sizes.end(), [](std::int64_t n) { return n < 1 || n > 32767; })) {
+        refuse(file, fmt::format("its size is {}: each side must be 1 to 32767 voxels, save it again", text));
+    }
+    if (static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]) > mostVoxels) {
+        refuse(file,
+               fmt::format("its size is {}: more than {} voxels are not read, crop or resample it", text, mostVoxels));
+    }
+    return {static_cast<int>(sizes[0]), static_cast<int>(sizes[1]), static_cast<int>(sizes[2])};
+}
+
+// Readers return zeros, or what lay in memory, for what is missing.
+void checkBytes(Source& source)
+{
+    const std::uint64_t width = source.encoding == Encoding::text ? sizeof(double) : bytesOf(source.component);
+    const std::uint64_t wanted = source.elements() * width;
+    const std::uint64_t most = source.fromEnd ? std::numeric_limits<std::uint64_t>::max()
+                                              : source.skip + wanted + std::max(mostPadding, source.trailer);
+    const std::uint64_t there = unpackedSize(source.data, source.offset, source.encoding, most);
+    if (source.fromEnd && there >= wanted) {
+        source.skip = there - wanted;
+        return;
+    }
+    const std::uint64_t expected = source.skip + wanted;
+    const std::string size = fmt::format("{} x {} x {}{}", source.size.x, source.size.y, source.size.z,
+                                         source.layers > 1 ? fmt::format(" x {} layers", source.layers) : "");
+    const std::string sizes =
+        source.encoding == Encoding::text
+            ? fmt::format("its header promises {} voxels, but there are {} numbers", size, there / width)
+            : fmt::format("its header promises {} voxels of {} bytes, {} in all, but there are {}{}", size, width, expected,
+                          there > most ? "more than " : "", std::min(there, most));
+    if (there < expected) {
+        refuse(source.header, sizes + ": it is cut short or its header is wrong, get or save it again");
+    }
+    if (there - expected <= source.trailer) {
+        return;
+    }
+    // A little padding at the end is harmless; what could be a wrong size, or a header of its own, is not.
+    const Index3 n = source.size;
+    const auto sheet = static_cast<std::uint64_t>(std::min({n.x * n.y, n.y * n.z, n.x * n.z}));
+    if (there - expected >= std::min(mostPadding, sheet * width)) {
+        refuse(source.header, sizes + ": its header is wrong or the data begin elsewhere, save it again");
+    }
+    if (there > expected) {
+        source.warnings.push_back(fmt::format("{} bytes behind the voxels are ignored", there - expected));
+    }
+}
+
+void decode(const Source& source, const std::function<void(double)>& progress,
+            const std::function<void(std::span<const double>)>& sink)
+{
+    const bool text = source.encoding == Encoding::text;
+    const Component component = text ? Component::f64 : source.component;
+    const std::uint64_t width = bytesOf(component);
+    const bool turned = !text && source.bigEndian != (std::endian::native == std::endian::big);
+    std::uint64_t skip = source.skip;
+    std::uint64_t left = source.elements() * width;
+    const double all = static_cast<double>(left);
+    std::vector<std::byte> kept;  // the beginning of an element whose end is in the next piece
+    std::vector<double> values;
+    unpack(source.data, source.offset, source.encoding, [&](std::span<const std::byte> bytes) {
+        const std::uint64_t over = std::min<std::uint64_t>(skip, bytes.size());
+        skip -= over;
+        const auto rest = bytes.subspan(over);
+        const auto wanted = rest.first(std::min<std::uint64_t>(rest.size(), left));
+        left -= wanted.size();
+        values.clear();
+        std::size_t used = 0;
+        if (!kept.empty()) {
+            used = std::min<std::size_t>(width - kept.size(), wanted.size());
+            kept.insert(kept.end(), wanted.begin(), wanted.begin() + static_cast<std::ptrdiff_t>(used));
+            if (kept.size() == width) {
+                append(component, kept, turned, values);
+                kept.clear();
+            }
+        }
+        const std::size_t whole = (wanted.size() - used) / width * width;
+        append(component, wanted.subspan(used, whole), turned, values);
+        kept.insert(kept.end(), wanted.begin() + static_cast<std::ptrdiff_t>(used + whole), wanted.end());
+        if (source.scaled) {
+            for (double& v : values) {
+                v = source.slope * v + source.intercept;
+            }
+        }
+        sink(values);
+        if (progress) {
+            progress(1.0 - static_cast<double>(left) / all);
+        }
+        return left > 0;
+    });
+    if (left > 0) {
+        refuse(source.header, "its data changed while they were read: try again");
+    }
+}
+
+double shearOf(const Affine& affine) noexcept
+{
+    const Mat3& m = affine.linear;
+    const Vec3 spacing = affine.spacing();
+    const double cosine = std::max({std::abs(glm::dot(m[0], m[1])) / (spacing.x * spacing.y),
+                                    std::abs(glm::dot(m[1], m[2])) / (spacing.y * spacing.z),
+                                    std::abs(glm::dot(m[0], m[2])) / (spacing.x * spacing.z)});
+    return std::asin(std::min(1.0, cosine));
+}
+
+void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings)
+{
+    const Vec3 spacing = affine.spacing();
+    const bool finite = std::isfinite(affine.voxelVolume()) && std::isfinite(glm::dot(affine.origin, Vec3(1.0)));
+    if (!finite || !(spacing.x > 0 && spacing.y > 0 && spacing.z > 0)) {
+        refuse(file, fmt::format("its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again",
+                                 1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
+    }
+    if (std::max({spacing.x, spacing.y, spacing.z}) > 10 || std::min({spacing.x, spacing.y, spacing.z}) < 1e-9) {
+        refuse(file, fmt::format("its voxels are {} x {} x {} mm: that is no patient, check the units in its header",
+                                 1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
+    }
+    const double shear = shearOf(affine);
+    // Three axes can be at wrong angles in pairs too small to see, and still lie in one plane.
+    if (affine.voxelVolume() < 1e-3 * spacing.x * spacing.y * spacing.z) {
+        refuse(file, "its voxel axes lie in one plane: the directions in its header are wrong, save it again");
+    }
+    if (std::sin(shear) <= mostShear) {
+        return;
+    }
+    const std::string said = fmt::format(
+        "its voxel axes are sheared by {:.1f} degrees (a tilted gantry, or an affine "
+        "registration)",
+        shear / degree);
+    if (!sheared) {
+        refuse(file, said + ": give --voxel MM, which resamples it to a straight grid");
+    }
+    warnings.push_back(said);
+}
+
+LabelSink::LabelSink(std::filesystem::path file, Index3 size, bool rounded)
+    : file_(std::move(file)), size_(size), rounded_(rounded), seen_(65536, false)
+{
+    labels_.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z));
+}
+
+std::uint16_t LabelSink::label(const std::filesystem::path& file, double value, bool rounded, const std::string& voxel)
+{
+    if (!std::isfinite(value)) {
+        refuse(file, fmt::format("{} is not a number ({}): a label map holds whole numbers from 0 to 65535, give the "
+                                 "segmentation",
+                                 voxel, value));
+    }
+    const double whole = std::round(value);
+    if (whole < 0 || whole > 65535) {
+        refuse(file,
+               fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
+                           "an image: give the segmentation that was made of it",
+                           voxel, value));
+    }
+    // A slope that is no power of two leaves a rounding of single precision.
+    if (std::abs(value - whole) > (rounded ? 1e-6 * std::max(1.0, std::abs(value)) : 0.0)) {
+        refuse(file, fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, this is an image or a "
+                                 "probability{}: give the segmentation",
+                                 voxel, value, rounded ? " (its slope is applied)" : ""));
+    }
+    return static_cast<std::uint16_t>(whole);
+}
+
+void LabelSink::add(std::span<const double> values)
+{
+    for (const double value : values) {
+        // In a label map nothing else happens.
+        const auto plain = value >= 0 && value <= 65535 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+        const bool exact = static_cast<double>(plain) == value;
+        labels_.push_back(exact ? plain : label(file_, value, rounded_, voxelName(size_, labels_.size())));
+        seen_[labels_.back()] = true;
+    }
+}
+
+std::vector<std::uint16_t> LabelSink::finish(bool surelyLabels)
+{
+    const auto different = static_cast<std::size_t>(std::count(seen_.begin(), seen_.end(), true));
+    if (different > mostLabels && !surelyLabels) {
+        refuse(file_, fmt::format("has {} different values, so it is not a label map (at most {}) but an image: give the "
+                                  "segmentation that was made of it",
+                                  different, mostLabels));
+    }
+    if (different == 1 && seen_[0]) {
+        refuse(file_, "no voxel is set: every label is 0, give a segmentation that holds something");
+    }
+    return std::move(labels_);
+}
+
+void makeFinite(const std::filesystem::path& file, std::vector<float>& values, std::vector<std::string>& warnings)
+{
+    float lowest = std::numeric_limits<float>::infinity();
+    std::size_t bad = 0;
+    for (const float v : values) {
+        bad += std::isfinite(v) ? 0 : 1;
+        lowest = std::isfinite(v) ? std::min(lowest, v) : lowest;
+    }
+    if (bad == values.size()) {
+        refuse(file, "no voxel is a number: save the image again");
+    }
+    if (bad > 0) {
+        std::replace_if(
+            values.begin(), values.end(), [](float v) { return !std::isfinite(v); }, lowest);
+        warnings.push_back(
+            fmt::format("{} voxels are not numbers: the smallest value, {}, is taken for them", bad, lowest));
+    }
+}
+
+}  // namespace palpate::volume

@@ -1,0 +1,404 @@
+#include <volume/resample.h>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vector_relational.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace palpate::volume {
+
+namespace {
+
+constexpr int blockSide = 8;         // new voxels that are looked at together
+constexpr int mostSamples = 8;       // along an axis of a new voxel
+constexpr double equal = 1e-9;       // shares that differ by less are the same
+constexpr double mostLoss = 0.1;     // of a structure's volume before it gets voxels back
+constexpr float leastShare = 1e-4F;  // of a voxel that a structure can get back
+
+std::size_t countOf(Index3 size)
+{
+    return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+}
+
+// The orthogonal matrix nearest to `m` (N. Higham, "Computing the Polar Decomposition", 1986); a mirrored one stays so.
+Mat3 nearestOrthogonal(Mat3 m)
+{
+    for (int step = 0; step < 50; ++step) {
+        const Mat3 next = 0.5 * (m + glm::transpose(glm::inverse(m)));
+        const Mat3 change = next - m;
+        m = next;
+        if (glm::length(change[0]) + glm::length(change[1]) + glm::length(change[2]) < 1e-15) {
+            break;
+        }
+    }
+    return m;
+}
+
+struct Share {
+    std::uint16_t label = 0;
+    double weight = 0;
+};
+
+// Finds the share of each label in new voxels.
+class Sampler {
+public:
+    Sampler(const LabelImage& image, const VoxelGrid& grid, std::span<const std::uint64_t> voxels)
+        : image_(image), voxels_(voxels)
+    {
+        const Mat3 toIndex = glm::inverse(image.affine.linear);
+        const Vec3 old = image.affine.spacing();
+        const Vec3 spacing = grid.affine.spacing();
+        step_ = toIndex * grid.affine.linear;
+        start_ = toIndex * (grid.affine.origin - image.affine.origin);
+        Index3 samples(1);
+        for (int k = 0; k < 3; ++k) {
+            const double widest = std::max({std::abs(step_[k].x), std::abs(step_[k].y), std::abs(step_[k].z)});
+            samples[k] = std::clamp(static_cast<int>(std::ceil(widest - 1e-6)), 1, mostSamples);
+            interpolate_[k] = old[k] > 0.499 * std::min({spacing.x, spacing.y, spacing.z});
+        }
+        forEachIndex(Index3(0), samples - 1,
+                     [&](Index3 n) { offsets_.push_back(step_ * ((Vec3(n) + 0.5) / Vec3(samples) - 0.5)); });
+        for (const Vec3& offset : offsets_) {
+            reach_ = glm::max(reach_, glm::abs(offset) + 1.0);
+        }
+    }
+
+    // The one label that all of the new voxels from `low` to `high` are made of, or -1.
+    int uniform(Index3 low, Index3 high) const
+    {
+        Vec3 first(std::numeric_limits<double>::max()), last(std::numeric_limits<double>::lowest());
+        for (int corner = 0; corner < 8; ++corner) {
+            const Vec3 n((corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y,
+                         (corner & 4) != 0 ? high.z : low.z);
+            first = glm::min(first, start_ + step_ * n);
+            last = glm::max(last, start_ + step_ * n);
+        }
+        const Index3 size = image_.size;
+        const Index3 from(glm::floor(glm::max(first - reach_, Vec3(-2.0))));
+        const Index3 to(glm::ceil(glm::min(last + reach_, Vec3(size) + 2.0)));
+        const bool beyond = glm::any(glm::lessThan(from, Index3(0))) || glm::any(glm::greaterThanEqual(to, size));
+        const Index3 a = glm::clamp(from, Index3(0), size - 1);
+        const Index3 b = glm::clamp(to, Index3(0), size - 1);
+        const std::uint16_t value = beyond ? std::uint16_t{0} : image_.values[image_.offset(a)];
+        for (int z = a.z; z <= b.z; ++z) {
+            for (int y = a.y; y <= b.y; ++y) {
+                const std::uint16_t* row = image_.values.data() + image_.offset({0, y, z});
+                if (!std::all_of(row + a.x, row + b.x + 1, [&](std::uint16_t v) { return v == value; })) {
+                    return -1;
+                }
+            }
+        }
+        return value;
+    }
+
+    // The shares of the labels in new voxel `n`; what is beyond the image counts as label 0. They add up to 1.
+    void shares(Index3 n, std::vector<Share>& out) const
+    {
+        out.clear();
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const double part = 1.0 / static_cast<double>(offsets_.size());
+        for (const Vec3& offset : offsets_) {
+            const Vec3 at = centre + offset;
+            const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
+            const Vec3 t = (at - low) * Vec3(interpolate_);
+            for (int corner = 0; corner < 8; ++corner) {
+                const Index3 step(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
+                const Vec3 w = glm::mix(1.0 - t, t, Vec3(step));
+                if (const double weight = w.x * w.y * w.z; weight > 0) {
+                    add(out, Index3(low) + step, part * weight);
+                }
+            }
+        }
+    }
+
+    std::uint16_t winner(const std::vector<Share>& shares) const
+    {
+        const Share* best = &shares.front();
+        for (const Share& s : shares) {
+            const bool more = s.weight > best->weight + equal;
+            const bool same = !more && s.weight > best->weight - equal;
+            const auto rank = [&](std::uint16_t label) { return std::pair(voxels_[label], label); };
+            best = more || (same && rank(s.label) < rank(best->label)) ? &s : best;
+        }
+        return best->label;
+    }
+
+private:
+    void add(std::vector<Share>& out, Index3 n, double weight) const
+    {
+        const bool inside = glm::all(glm::greaterThanEqual(n, Index3(0))) && glm::all(glm::lessThan(n, image_.size));
+        const std::uint16_t label = inside ? image_.values[image_.offset(n)] : std::uint16_t{0};
+        for (Share& s : out) {
+            if (s.label == label) {
+                s.weight += weight;
+                return;
+            }
+        }
+        out.push_back({label, weight});
+    }
+
+    const LabelImage& image_;
+    std::span<const std::uint64_t> voxels_;  // of each label in the old image (65536 x 1)
+    std::vector<Vec3> offsets_;              // samples of a new voxel [old voxels from its centre]
+    Mat3 step_{1.0};                         // steps of new voxels [old voxels]
+    Vec3 start_{0.0};                        // centre of new voxel (0, 0, 0) [old voxels]
+    Vec3 reach_{0.0};                        // of a new voxel's samples [old voxels]
+    glm::bvec3 interpolate_{false};
+};
+
+// A voxel that a thin structure may get: it fills `share` of it.
+struct Claim {
+    float share = 0;
+    std::size_t voxel = 0;
+};
+
+using Totals = std::vector<double>;  // by label (65536 x 1)
+
+// What one slab of new voxels adds to the totals, by label that occurs in it.
+struct Slab {
+    std::vector<std::pair<std::uint16_t, double>> filled;
+    std::vector<std::pair<std::uint16_t, std::vector<Claim>>> claims;
+};
+
+class Resampling {
+public:
+    Resampling(const LabelImage& image, const VoxelGrid& grid, const std::function<void(double)>& progress)
+        : image_(image), grid_(grid), progress_(progress), voxels_(65536, 0)
+    {
+        for (const std::uint16_t v : image.values) {
+            ++voxels_[v];
+        }
+        out_.size = grid.size;
+        out_.affine = grid.affine;
+        out_.values.assign(countOf(grid.size), 0);
+    }
+
+    ResampledLabels run()
+    {
+        const Totals filled = fill();
+        std::vector<std::uint64_t> won(65536, 0);
+        for (const std::uint16_t v : out_.values) {
+            ++won[v];
+        }
+        const std::vector<std::uint64_t> regained = giveBack(filled, won);
+        ResampledLabels result;
+        for (std::size_t v = 1; v < voxels_.size(); ++v) {
+            if (voxels_[v] > 0) {
+                result.changes.push_back({static_cast<std::uint16_t>(v),
+                                          static_cast<double>(voxels_[v]) * image_.affine.voxelVolume(),
+                                          static_cast<double>(won[v]) * grid_.affine.voxelVolume(), regained[v]});
+            }
+        }
+        result.image = std::move(out_);
+        return result;
+    }
+
+private:
+    // Calls visit(voxel, shares, slab) for new voxels of more than one label and uniform(label, count, slab) for blocks of
+    // one; slabs on all cores, each with a record of its own so that sums do not depend on who was first.
+    template <typename Visit, typename Uniform>
+    std::vector<Slab> sweep(double from, double to, const Visit& visit, const Uniform& uniform)
+    {
+        const Sampler sampler(image_, grid_, voxels_);
+        const Index3 blocks = (grid_.size + blockSide - 1) / blockSide;
+        std::vector<Slab> slabs(static_cast<std::size_t>(blocks.z));
+        constexpr int atOnce = 8;
+        for (int first = 0; first < blocks.z; first += atOnce) {
+            tbb::parallel_for(first, std::min(first + atOnce, blocks.z), [&](int bz) {
+                Slab& slab = slabs[static_cast<std::size_t>(bz)];
+                std::vector<Share> shares;
+                forEachIndex(Index3(0, 0, bz), Index3(blocks.x - 1, blocks.y - 1, bz), [&](Index3 block) {
+                    const Index3 low = block * blockSide;
+                    const Index3 high = glm::min(low + blockSide, grid_.size) - 1;
+                    if (const int label = sampler.uniform(low, high); label >= 0) {
+                        uniform(low, high, static_cast<std::uint16_t>(label), slab);
+                        return;
+                    }
+                    forEachIndex(low, high, [&](Index3 n) {
+                        sampler.shares(n, shares);
+                        visit(out_.offset(n), shares, sampler, slab);
+                    });
+                });
+            });
+            if (progress_) {
+                progress_(from + (to - from) * std::min(1.0, static_cast<double>(first + atOnce) / blocks.z));
+            }
+        }
+        return slabs;
+    }
+
+    // Gives every new voxel the label with the largest share; returns how many voxels each label fills.
+    Totals fill()
+    {
+        const auto count = [](Slab& slab, std::uint16_t label, double by) {
+            for (auto& [known, sum] : slab.filled) {
+                if (known == label) {
+                    sum += by;
+                    return;
+                }
+            }
+            slab.filled.emplace_back(label, by);
+        };
+        const auto slabs = sweep(
+            0, 0.8,
+            [&](std::size_t voxel, const std::vector<Share>& shares, const Sampler& sampler, Slab& slab) {
+                out_.values[voxel] = sampler.winner(shares);
+                for (const Share& s : shares) {
+                    count(slab, s.label, s.weight);
+                }
+            },
+            [&](Index3 low, Index3 high, std::uint16_t label, Slab& slab) {
+                forEachIndex(low, high, [&](Index3 n) { out_.values[out_.offset(n)] = label; });
+                count(slab, label, static_cast<double>(countOf(high - low + 1)));
+            });
+        Totals filled(65536, 0.0);
+        for (const Slab& slab : slabs) {
+            for (const auto& [label, sum] : slab.filled) {
+                filled[label] += sum;
+            }
+        }
+        return filled;
+    }
+
+    // The rule for thin structures. `won` (voxels of each label) is kept up to date; returns what each label got.
+    std::vector<std::uint64_t> giveBack(const Totals& filled, std::vector<std::uint64_t>& won)
+    {
+        std::vector<std::uint64_t> got(65536, 0);
+        std::vector<std::uint16_t> thin;
+        std::vector<char> isThin(65536, 0);
+        for (std::size_t v = 1; v < voxels_.size(); ++v) {
+            if (voxels_[v] > 0 && filled[v] > 0 && static_cast<double>(won[v]) < (1 - mostLoss) * filled[v]) {
+                thin.push_back(static_cast<std::uint16_t>(v));
+                isThin[v] = 1;
+            }
+        }
+        if (thin.empty()) {
+            return got;
+        }
+        std::vector<std::vector<Claim>> claims = claimsOf(isThin);
+        std::stable_sort(thin.begin(), thin.end(), [&](std::uint16_t a, std::uint16_t b) { return filled[a] < filled[b]; });
+        for (const std::uint16_t label : thin) {
+            const auto wanted = static_cast<std::uint64_t>(std::max(1.0, std::round(filled[label])));
+            for (const Claim& claim : claims[label]) {
+                if (won[label] >= wanted) {
+                    break;
+                }
+                std::uint16_t& voxel = out_.values[claim.voxel];
+                const bool spare = isThin[voxel] == 0 || (won[label] == 0 && won[voxel] > 1);
+                if (spare) {
+                    --won[voxel];
+                    ++won[label];
+                    ++got[label];
+                    voxel = label;
+                }
+            }
+        }
+        return got;
+    }
+
+    // By label: voxels that it has a share of but not won, those that it fills most of first.
+    std::vector<std::vector<Claim>> claimsOf(const std::vector<char>& isThin)
+    {
+        const auto slabs = sweep(
+            0.8, 1,
+            [&](std::size_t voxel, const std::vector<Share>& shares, const Sampler&, Slab& slab) {
+                for (const Share& s : shares) {
+                    if (isThin[s.label] == 0 || out_.values[voxel] == s.label || s.weight < leastShare) {
+                        continue;
+                    }
+                    auto at = std::find_if(slab.claims.begin(), slab.claims.end(),
+                                           [&](const auto& c) { return c.first == s.label; });
+                    if (at == slab.claims.end()) {
+                        at = slab.claims.insert(at, {s.label, {}});
+                    }
+                    at->second.push_back({static_cast<float>(s.weight), voxel});
+                }
+            },
+            [](Index3, Index3, std::uint16_t, Slab&) {});
+        std::vector<std::vector<Claim>> claims(65536);
+        for (const Slab& slab : slabs) {
+            for (const auto& [label, list] : slab.claims) {
+                claims[label].insert(claims[label].end(), list.begin(), list.end());
+            }
+        }
+        for (auto& list : claims) {
+            std::sort(list.begin(), list.end(), [](const Claim& a, const Claim& b) {
+                return std::pair(-a.share, a.voxel) < std::pair(-b.share, b.voxel);
+            });
+        }
+        return claims;
+    }
+
+    const LabelImage& image_;
+    const VoxelGrid& grid_;
+    const std::function<void(double)>& progress_;
+    std::vector<std::uint64_t> voxels_;  // of each label in the old image (65536 x 1)
+    LabelImage out_;
+};
+
+}  // namespace
+
+VoxelGrid isotropicGrid(const VoxelGrid& of, double spacing)
+{
+    const Vec3 steps = of.affine.spacing();
+    const Mat3& m = of.affine.linear;
+    const Mat3 axes = nearestOrthogonal(Mat3(m[0] / steps.x, m[1] / steps.y, m[2] / steps.z));
+    const Vec3 middle = of.affine.toPatient(0.5 * Vec3(of.size - 1));
+    Vec3 half(0.0);
+    for (int corner = 0; corner < 4; ++corner) {
+        const Vec3 side(1.0, (corner & 1) != 0 ? 1.0 : -1.0, (corner & 2) != 0 ? 1.0 : -1.0);
+        const Vec3 along = glm::transpose(axes) * (m * (0.5 * side * Vec3(of.size)));
+        half = glm::max(half, glm::abs(along));
+    }
+    VoxelGrid grid;
+    grid.size = glm::max(Index3(glm::ceil(2.0 * half / spacing - 1e-6)), Index3(1));
+    grid.affine.linear = axes * spacing;
+    grid.affine.origin = middle - grid.affine.linear * (0.5 * Vec3(grid.size - 1));
+    return grid;
+}
+
+ResampledLabels resampled(const LabelImage& image, const VoxelGrid& grid, const std::function<void(double)>& progress)
+{
+    return Resampling(image, grid, progress).run();
+}
+
+std::vector<float> resampledImage(const VoxelGrid& of, std::span<const float> values, const VoxelGrid& grid, float outside)
+{
+    const Mat3 toIndex = glm::inverse(of.affine.linear);
+    const Mat3 step = toIndex * grid.affine.linear;
+    const Vec3 start = toIndex * (grid.affine.origin - of.affine.origin);
+    const LabelImage places{grid.size, {}, {}}, from{of.size, {}, {}};
+    std::vector<float> out(countOf(grid.size), outside);
+    tbb::parallel_for(0, grid.size.z, [&](int z) {
+        forEachIndex(Index3(0, 0, z), Index3(grid.size.x - 1, grid.size.y - 1, z), [&](Index3 n) {
+            const Vec3 at = start + step * Vec3(n);
+            const Vec3 last(of.size - 1);
+            // Half a voxel beyond the outermost centres is still inside the outermost voxels.
+            if (glm::any(glm::lessThan(at, Vec3(-0.5 - 1e-9))) || glm::any(glm::greaterThan(at, last + 0.5 + 1e-9))) {
+                return;
+            }
+            const Vec3 inside = glm::clamp(at, Vec3(0.0), last);
+            const Vec3 low = glm::min(glm::floor(inside), glm::max(last - 1.0, Vec3(0.0)));
+            const Vec3 t = inside - low;
+            double sum = 0;
+            for (int corner = 0; corner < 8; ++corner) {
+                const Index3 next(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
+                const Vec3 w = glm::mix(1.0 - t, t, Vec3(next));
+                if (const double weight = w.x * w.y * w.z; weight > 0) {
+                    sum += weight * static_cast<double>(values[from.offset(Index3(low) + next)]);
+                }
+            }
+            out[places.offset(n)] = static_cast<float>(sum);
+        });
+    });
+    return out;
+}
+
+}  // namespace palpate::volume
