@@ -36,18 +36,6 @@ struct Options {
     std::string voxel, closeSkinHoles, addSkin, pad, cropMargin;
 };
 
-// "2", "2mm" or "0.2cm" in metres; a number alone is in millimetres.
-double lengthFrom(const std::string& option, const std::string& text, double least, double most)
-{
-    const auto plain = lengthOf(text + "mm");
-    const auto length = plain ? plain : lengthOf(text);
-    if (!length || !(*length >= least && *length <= most)) {
-        throw std::runtime_error(
-            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
-    }
-    return *length;
-}
-
 void readLengths(Options& o)
 {
     const auto set = [](double& target, const std::string& option, const std::string& text, double least, double most) {

@@ -49,17 +49,6 @@ constexpr std::array<Needle, 4> needles{{{"14 G, 22 mm throw", 1.05e-3, 0.8e-3, 
                                          {"18 G, 11 mm throw", 0.635e-3, 0.45e-3, 11e-3, 9e-3}}};
 constexpr std::array<double, 5> needleLengths{0.1, 0.12, 0.16, 0.2, 0.25};  // [m]
 
-double lengthFrom(const std::string& option, const std::string& text, double least, double most)
-{
-    const auto plain = lengthOf(text + "mm");
-    const auto length = plain ? plain : lengthOf(text);
-    if (!length || !(*length >= least && *length <= most)) {
-        throw std::runtime_error(
-            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
-    }
-    return *length;
-}
-
 void checkStructure(const volume::Tissue& tissue, const std::string& option, const std::string& name)
 {
     if (!tissue.labelsNamed(name).empty()) {

@@ -70,4 +70,15 @@ double parseTime(const std::string& option, const std::string& text)
     throw std::runtime_error(fmt::format("{}: {}: must be over 0 and up to 1 s, as 400us or 0.4ms", option, text));
 }
 
+double lengthFrom(const std::string& option, const std::string& text, double least, double most)
+{
+    const auto plain = lengthOf(text + "mm");
+    const auto length = plain ? plain : lengthOf(text);
+    if (!length || !(*length >= least && *length <= most)) {
+        throw std::runtime_error(
+            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
+    }
+    return *length;
+}
+
 }  // namespace palpate::apps

@@ -18,4 +18,8 @@ double parseShare(const std::string& option, const std::string& text);
 /// "400us", "0.4ms" or "0.0004s" in seconds, over 0 and up to 1 s. Throws std::runtime_error that names the option.
 double parseTime(const std::string& option, const std::string& text);
 
+/// "2", "2mm" or "0.2cm" in metres, from `least` to `most` [m]; a number alone is in millimetres. Throws std::runtime_error
+/// that names the option.
+double lengthFrom(const std::string& option, const std::string& text, double least, double most);
+
 }  // namespace palpate::apps

@@ -199,23 +199,11 @@ haptics::SessionModel reopenSession(const std::string& file, const haptics::Sess
 haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
                                      const std::string& device)
 {
-    haptics::SessionInfo info;
-    info.scene = model.scene.name;
-    info.sceneText = model.scene.text;
+    haptics::SessionInfo info = haptics::infoOf(model);
     info.sceneOrigin = origin;
-    info.volumeHash = haptics::modelHash(model);
-    info.model = levelOf(model.scene);
     info.device = device;
     info.build = PALPATE_BUILD;
     info.seed = model.scene.source.phantom.seed;
-    info.extra.emplace_back(haptics::targetShapeKey, haptics::toText(haptics::shapeOfTarget(model)));
-    for (const auto& s : model.structures) {
-        info.structures.push_back(s.name);
-        info.warnDistances.push_back(s.warnDistance);
-    }
-    for (const auto& row : model.tissue->table().rows) {
-        info.tissues.push_back(row.name);
-    }
     return info;
 }
 

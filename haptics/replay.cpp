@@ -1,5 +1,6 @@
 #include <haptics/replay.h>
 
+#include <haptics/score.h>
 #include <haptics/simulation.h>
 #include <volume/fnv.h>
 
@@ -96,6 +97,24 @@ std::string modelHash(const SessionModel& model)
         hash.addAll(s.distance.values);
     }
     return fmt::format("{:016x}", hash.value);
+}
+
+SessionInfo infoOf(const SessionModel& model)
+{
+    SessionInfo info;
+    info.scene = model.scene.name;
+    info.sceneText = model.scene.text;
+    info.volumeHash = modelHash(model);
+    info.model = datasets::modelLevels[static_cast<std::size_t>(model.scene.model.level)];
+    info.extra.emplace_back(targetShapeKey, toText(shapeOfTarget(model)));
+    for (const auto& s : model.structures) {
+        info.structures.push_back(s.name);
+        info.warnDistances.push_back(s.warnDistance);
+    }
+    for (const auto& row : model.tissue->table().rows) {
+        info.tissues.push_back(row.name);
+    }
+    return info;
 }
 
 }  // namespace palpate::haptics

@@ -137,8 +137,8 @@ void dryRun(const Options& o)
         fmt::print("{}{}", &a == &plan.axes[0] ? "" : ", ", a.name);
     }
     fmt::print("\nabout {:.3g} s a case, measured on {}: {} on {}; {:.3g} MB on the disk\n", seconds,
-               plural(measured.size(), "case"), duration(all), plural(static_cast<std::size_t>(o.jobs), "process"),
-               disk / 1e6);
+               plural(measured.size(), "case"), duration(all),
+               o.jobs == 1 ? std::string("one process") : fmt::format("{} processes", o.jobs), disk / 1e6);
     if (!o.json.empty()) {
         writeJson(o.json, {{"cases", plan.cases()}, {"case_s", seconds}, {"estimated_s", all}, {"disk_mb", disk / 1e6}});
     }

@@ -45,23 +45,11 @@ const Value& kept(std::list<std::pair<std::string, Value>>& all, const std::stri
 haptics::SessionInfo describe(const haptics::SessionModel& model, const Procedure& procedure, std::uint64_t seed,
                               const std::string& build)
 {
-    haptics::SessionInfo info;
-    info.scene = model.scene.name;
-    info.sceneText = model.scene.text;
+    haptics::SessionInfo info = haptics::infoOf(model);
     info.sceneOrigin = "sweep";
-    info.volumeHash = haptics::modelHash(model);
-    info.model = datasets::modelLevels[static_cast<std::size_t>(model.scene.model.level)];
     info.device = fmt::format("{} {}", procedureNames[static_cast<std::size_t>(procedure.kind)], procedure.trainee);
     info.build = build;
     info.seed = seed;
-    info.extra.emplace_back(haptics::targetShapeKey, haptics::toText(haptics::shapeOfTarget(model)));
-    for (const auto& s : model.structures) {
-        info.structures.push_back(s.name);
-        info.warnDistances.push_back(s.warnDistance);
-    }
-    for (const auto& row : model.tissue->table().rows) {
-        info.tissues.push_back(row.name);
-    }
     return info;
 }
 

@@ -91,7 +91,8 @@ TEST(ViewerFaults, KilledAndStoppedViewersCostNoTickAndLeaveNothing)
     RecordProperty("viewers_killed", killed);
     RecordProperty("missed_ticks_alone", missedBefore);
     RecordProperty("missed_ticks_watched", missed);
-    EXPECT_LE(missed, missedBefore + static_cast<int>(0.01 * watched["ticks"].get<double>()));
+    // The machine's other work differs from one run to the next; a loop that waited for viewers would miss most ticks.
+    EXPECT_LE(missed, 2 * missedBefore + static_cast<int>(0.05 * watched["ticks"].get<double>()));
     if (missed == 0 && missedBefore == 0) {
         EXPECT_EQ(watched["force_hash"], before["force_hash"]);
     }

@@ -1,9 +1,9 @@
 // Files made here, byte by byte, that tell the truth and that lie.
+#include <tests/folder.h>
 #include <volume/import.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <zlib.h>
 #include <glm/geometric.hpp>
 
@@ -21,9 +21,6 @@ namespace fs = std::filesystem;
 
 class ImportFile : public ::testing::Test {
 protected:
-    void SetUp() override { fs::create_directories(folder); }
-    void TearDown() override { fs::remove_all(folder); }
-
     fs::path write(const std::string& name, const std::string& bytes) const
     {
         std::ofstream(folder / name, std::ios::binary) << bytes;
@@ -48,7 +45,7 @@ protected:
         EXPECT_NE(why.find(word), std::string::npos) << why;
     }
 
-    fs::path folder = fs::temp_directory_path() / fmt::format("palpate-import-{}", ::getpid());
+    const tests::Folder folder;
 };
 
 template <typename T>
@@ -443,7 +440,7 @@ TEST_F(ImportFile, WhatIsNoLabelMapIsNamed)
     expectRefused(write("a.nrrd", "hello"), "NRRD");
     expectRefused(write("a.mha", "hello"), "not a MetaImage");
     expectRefused(write("a.dcm", std::string(128, '\0') + "DICM"), "DICOM");
-    expectRefused(folder, "folder");
+    expectRefused(folder.path(), "folder");
     expectRefused(folder / "missing.nii", "no such file");
 }
 

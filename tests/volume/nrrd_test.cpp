@@ -1,10 +1,10 @@
 // NRRD files made here: every encoding, every order of axes, layers of segments that overlap.
+#include <tests/folder.h>
 #include <volume/import.h>
 
 #include <bzlib.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 #include <zlib.h>
 #include <glm/geometric.hpp>
 
@@ -20,9 +20,6 @@ namespace fs = std::filesystem;
 
 class Nrrd : public ::testing::Test {
 protected:
-    void SetUp() override { fs::create_directories(folder); }
-    void TearDown() override { fs::remove_all(folder); }
-
     fs::path write(const std::string& name, const std::string& bytes) const
     {
         std::ofstream(folder / name, std::ios::binary) << bytes;
@@ -38,7 +35,7 @@ protected:
         }
     }
 
-    fs::path folder = fs::temp_directory_path() / fmt::format("palpate-nrrd-{}", ::getpid());
+    const tests::Folder folder;
 };
 
 std::vector<std::uint16_t> ramp()
