@@ -50,7 +50,8 @@ ReplayResult replay(const Record& record, const SessionModel& model);
 /// A hash of what forces depend on: tissue table, grids, labels' counts, lattice and fields (64-bit FNV-1a, in
 /// hexadecimal). A record keeps it, so that it is never replayed on another volume.
 std::string modelHash(const SessionModel& model);
-/// What a record says of a session that only its model decides: all but where the scene came from, the device and the build.
+/// What a record says of a session that only its model decides: all but where the scene came from, the device and the
+/// build.
 SessionInfo infoOf(const SessionModel& model);
 
 }  // namespace palpate::haptics

@@ -130,8 +130,7 @@ TEST(ReplayView, SaysThatARecordHasLostItsBeginning)
         GTEST_SKIP() << "needs palpate-view, Xvfb and sqlite3 (packages xvfb and sqlite3)";
     const Folder folder;
     figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
-    const Outcome cut =
-        Program("/usr/bin/env", {"sqlite3", folder / "s.db", "DELETE FROM ticks WHERE tick < 10;"}).wait();
+    const Outcome cut = Program("/usr/bin/env", {"sqlite3", folder / "s.db", "DELETE FROM ticks WHERE tick < 10;"}).wait();
     ASSERT_EQ(cut.status, 0) << cut.err;
     const Outcome window = Program("palpate-view", {"--replay", folder / "s.db", "--hidden"}).wait();
     EXPECT_EQ(window.status, 1);
