@@ -149,9 +149,8 @@ void exportVolume(const Options& o, const volume::ExportOptions& how)
 // What to say of it behind the file's name.
 std::string exportState(const Options& o, const volume::ExportOptions& how, Progress& progress, nlohmann::json& figures)
 {
-    const DeformedState state(o.record, timeFrom(o.at), [&](double share) {
-        progress.show(fmt::format("computing the session again: {:.0f} %", 100 * share));
-    });
+    const DeformedState state(o.record, timeFrom(o.at),
+                              [&](double share) { progress.show("computing the session again", share); });
     const auto& lattice = state.model().lattice;
     if (o.what == "labels") {
         volume::exportLabels(o.output, state.labels(), namesOf(*state.model().tissue), how);
@@ -174,10 +173,11 @@ std::string exportState(const Options& o, const volume::ExportOptions& how, Prog
 void runExport(Options o)
 {
     checkOptions(o);
-    Progress progress;
+    Progress progress(Progress::Clock::ticking);
+    progress.show("reading");
     volume::ExportOptions how;
     how.nifti2 = o.nifti2;
-    how.progress = [&](double share) { progress.show(fmt::format("writing: {:.0f} %", 100 * share)); };
+    how.progress = [&](double share) { progress.show("writing", share); };
     nlohmann::json figures{{"file", o.output.string()}, {"what", o.what}};
     std::string more;
     if (o.record.empty()) {

@@ -19,6 +19,7 @@
 #include <cmath>
 #include <ctime>
 #include <memory>
+#include <new>
 #include <stdexcept>
 
 namespace palpate::apps {
@@ -29,7 +30,7 @@ namespace fs = std::filesystem;
 
 struct Options {
     fs::path input, output, tissues, image, json;
-    std::string stiffness;
+    std::string stiffness, imageUnit;
     volume::ImportOptions reading;
     MappingOptions mapping;
     PreparationOptions steps;
@@ -56,19 +57,24 @@ volume::CompanionImage readImage(const Options& o, const volume::LabelImage& lab
 {
     volume::ImportOptions reading;
     reading.series = o.reading.series;
-    reading.progress = [&](double share) { progress.show(fmt::format("reading the image: {:.0f} %", 100 * share)); };
+    progress.show("checking the image");
+    reading.progress = [&](double share) { progress.show("reading the image", share); };
     const volume::ImportedImage image = volume::importImage(o.image, reading);
     for (const std::string& warning : image.warnings) {
         notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
     }
     const volume::VoxelGrid from{image.size, image.affine}, to{labels.size, labels.affine};
+    if (!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit) {
+        throw std::runtime_error(
+            fmt::format("{}: says itself that it is in {}: leave --image-unit out", o.image.string(), image.what));
+    }
     volume::CompanionImage companion;
-    companion.unit = image.what;
+    companion.unit = o.imageUnit.empty() ? image.what : o.imageUnit;
     if (!o.stiffness.empty()) {
-        companion.stiffness = datasets::stiffnessMap(o.stiffness, image.what, table);
+        companion.stiffness = datasets::stiffnessMap(o.stiffness, companion.unit, table);
     }
     progress.show("resampling the image");
-    const float missing = image.what == "HU" ? -1000.0F : 0.0F;
+    const float missing = companion.unit == "HU" ? -1000.0F : 0.0F;
     companion.values = volume::resampledImage(from, image.values, to, std::nanf(""));
     std::uint64_t bare = 0;
     for (std::size_t i = 0; i < companion.values.size(); ++i) {
@@ -77,9 +83,9 @@ volume::CompanionImage readImage(const Options& o, const volume::LabelImage& lab
     }
     if (bare == labels.values.size() || bare > labels.values.size() / 2) {
         throw std::runtime_error(
-            fmt::format("{}: it covers less than half of the labelled voxels: is it of the same patient "
-                        "and frame?",
-                        o.image.string()));
+            fmt::format("{}: it covers less than half of the labelled voxels of {}: give the image that the "
+                        "segmentation was made of, in the same patient frame",
+                        o.image.string(), o.input.filename().string()));
     }
     if (bare > 0) {
         notes.push_back(fmt::format("{} labelled voxels lie outside the image and have {} there{}", bare, missing,
@@ -156,6 +162,9 @@ void checkOptions(const Options& o)
     if (!o.stiffness.empty() && o.image.empty()) {
         throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
     }
+    if (!o.imageUnit.empty() && o.image.empty()) {
+        throw std::runtime_error("--image-unit: needs the image: add --image FILE");
+    }
     checkOutput(o.output);
     checkOutput(o.mapping.writeMap);
     checkOutput(o.json);
@@ -166,10 +175,12 @@ void runImport(Options o)
     readLengths(o);
     checkOptions(o);
     const volume::TissueTable table = o.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(o.tissues);
-    Progress progress;
+    Progress progress(Progress::Clock::ticking);
+    progress.show("checking the file");
     o.reading.sheared = o.steps.voxel > 0;
-    o.reading.progress = [&](double share) { progress.show(fmt::format("reading: {:.0f} %", 100 * share)); };
+    o.reading.progress = [&](double share) { progress.show("reading", share); };
     volume::ImportedLabels labels = volume::importLabels(o.input, o.reading);
+    progress.show("counting labels");
     const LabelCounts counts = countLabels(labels.image);
     if (!o.mapping.writeMap.empty()) {
         const std::size_t open = writeLabelMap(o.mapping, o.input, labels, counts, table);
@@ -221,6 +232,9 @@ void addReading(CLI::App& command, Options& o)
         ->group("Reading");
     command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
         ->type_name("FILE")
+        ->group("Reading");
+    command.add_option("--image-unit", o.imageUnit, "HU: the image is CT in Hounsfield units; only DICOM says so itself")
+        ->check(CLI::IsMember({"HU"}))
         ->group("Reading");
     command
         .add_option("--stiffness-from", o.stiffness,
@@ -305,7 +319,14 @@ void addImport(CLI::App& app)
     addReading(*command, *o);
     addMapping(*command, *o);
     addSteps(*command, *o);
-    command->final_callback([o] { runImport(*o); });
+    command->final_callback([o] {
+        try {
+            runImport(*o);
+        } catch (const std::bad_alloc&) {
+            throw std::runtime_error(o->input.string() +
+                                     ": needs more memory than there is: crop it, or resample it to larger voxels");
+        }
+    });
 }
 
 }  // namespace palpate::apps

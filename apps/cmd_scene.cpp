@@ -229,7 +229,8 @@ void runScene(const Options& o)
     progress.show("looking for ways in");
     const Found found = findWays(scene, o, tissue, margin);
     if (o.choose > static_cast<int>(found.ways.size())) {
-        throw std::runtime_error(fmt::format("--choose {}: there are {} ways in", o.choose, found.ways.size()));
+        throw std::runtime_error(
+            fmt::format("--choose {}: there are {} ways: choose one of these", o.choose, found.ways.size()));
     }
     writeScene(scene, o, found, found.ways[static_cast<std::size_t>(o.choose - 1)]);
     progress.clear();

@@ -116,7 +116,23 @@ std::string missesInWords(const haptics::ServoTiming& timing)
                        timing.overruns);
 }
 
-void summarise(const TrainResult& result, const haptics::SessionInfo& info)
+// What to do about a machine that is too slow for the tissue model, or nothing.
+std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model)
+{
+    constexpr double bearable = 0.01;  // of the ticks
+    const double share =
+        static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
+    if (share <= bearable) {
+        return "";
+    }
+    const bool coarser =
+        model.level == datasets::ModelLevel::elastic && model.setting != datasets::elasticSettings().front();
+    return fmt::format("{:.0f} % of the ticks took over 1 ms: this machine is too slow for the tissue model; {}\n",
+                       100 * share,
+                       coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
+}
+
+void summarise(const TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
 {
     const auto tick = result.timing.work.percentiles();
     const auto late = result.timing.lateness.percentiles();
@@ -124,6 +140,7 @@ void summarise(const TrainResult& result, const haptics::SessionInfo& info)
         "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
         result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
         1e6 * late.p50, 1e6 * late.p99);
+    fmt::print("{}", slowness(result.timing, model));
     fmt::print("peak force {:.2f} N (tissue {:.2f} N, guidance {:.2f} N)\n", result.peakTotal, result.peakBasic,
                result.peakAdditional);
     for (std::size_t i = 0; i < result.cores.size(); ++i) {
@@ -364,7 +381,7 @@ void train(Options o)
     writeOutputs(o, info, viewers, result);
 
     if (o.json != "-") {
-        summarise(result, info);
+        summarise(result, info, model.scene.model);
         for (const auto& [name, file] : {std::pair<const char*, std::string>{"report", o.report},
                                          {"record", record.string()},
                                          {"pictures", o.pictures}}) {

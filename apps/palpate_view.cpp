@@ -57,7 +57,7 @@ int main(int argc, char** argv)
     CLI::App app("Shows a Palpate session that runs in another process. The key ? lists keys and what the mouse does.",
                  "palpate-view");
     palpate::render::ViewerOptions options;
-    std::string size = "1280x960", json, layout = "trainee", timeline, replay;
+    std::string size = "1280x960", json, layout = "trainee", slices = "tinted", timeline, replay;
     app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
     app.add_option("--offscreen", options.offscreen, "Write PNG files to this folder instead of opening a window");
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");
@@ -65,6 +65,10 @@ int main(int argc, char** argv)
         ->excludes("--session");
     app.add_option("--layout", layout, "trainee or instructor")
         ->check(CLI::IsMember({"trainee", "instructor"}))
+        ->capture_default_str();
+    app.add_option("--slices", slices,
+                   "Of a body with an image: tissue, tinted (the image in the tissues' colours) or image")
+        ->check(CLI::IsMember({"tissue", "tinted", "image"}))
         ->capture_default_str();
     app.add_flag("--hidden", options.hidden, "Draw as in a window, on a display that nobody sees (Xvfb): to measure");
     app.add_option("--timeline", timeline, "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");
@@ -82,6 +86,8 @@ int main(int argc, char** argv)
         app.parse(argc, argv);
         readSize(size, options);
         options.instructor = layout == "instructor";
+        using palpate::render::SliceLook;
+        options.slices = slices == "tissue" ? SliceLook::tissue : slices == "image" ? SliceLook::image : SliceLook::tinted;
         std::optional<palpate::apps::ReplayPlayer> player;
         if (!replay.empty()) {
             player.emplace(replay);

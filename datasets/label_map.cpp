@@ -206,7 +206,10 @@ volume::StiffnessMap stiffnessMap(const std::string& nameOrFile, const std::stri
     Section top(root, file, "");
     const auto wanted = top.word("unit");
     if (wanted && *wanted != unit) {
-        top.refuse("unit", fmt::format("the image is in {}: give a map for that", unit.empty() ? "no known unit" : unit));
+        const bool perhaps = unit.empty() && *wanted == "HU";
+        top.refuse("unit",
+                   perhaps ? "the image does not say its unit: add --image-unit HU if it is CT"
+                           : fmt::format("the image is in {}: give a map for that", unit.empty() ? "no known unit" : unit));
     }
     volume::StiffnessMap map{pointsOf(top), {}};
     if (const toml::node* node = top.node("tissues")) {

@@ -1,5 +1,7 @@
 #include <haptics/broadcast.h>
 
+#include <haptics/display_image.h>
+
 #include <glm/common.hpp>
 
 #include <algorithm>
@@ -119,7 +121,12 @@ channel::Publisher publisherOf(const std::string& session, const SessionModel& m
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand,
                                const volume::NodeGrid& display)
 {
-    return {session, sceneryOf(model, display, viewersHand), labelsOn(model, display)};
+    auto scenery = sceneryOf(model, display, viewersHand);
+    std::vector<std::uint16_t> image;
+    if (model.tissue->hasImage()) {
+        image = displayImage(display, model.tissue->imageOn(display), model.tissue->imageUnit(), scenery);
+    }
+    return {session, scenery, labelsOn(model, display), image};
 }
 
 void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& state) noexcept

@@ -13,7 +13,7 @@ namespace palpate::haptics {
 /// The segment of a session, with its scenery. Throws std::runtime_error when it cannot be made.
 /// @param viewersHand  the mouse of a viewer is the hand
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand = false);
-/// The same with the body's tissues sampled on `display`.
+/// The same with the body's tissues, and the image if it has one, sampled on `display`.
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand,
                                const volume::NodeGrid& display);
 

@@ -44,6 +44,11 @@ Point2 point(glm::dvec2 p)
     return {p.x, p.y};
 }
 
+SliceLook following(SliceLook look)
+{
+    return look == SliceLook::tinted ? SliceLook::image : look == SliceLook::image ? SliceLook::tissue : SliceLook::tinted;
+}
+
 // The picture's directions at a point [m]: to the right and up on the screen, and into it. Unit vectors.
 struct Screen {
     glm::dvec3 right, up, into;
@@ -89,6 +94,7 @@ void Controls::keep()
 {
     hand_.keep(follower_);
     picture_.setCaption(caption());
+    picture_.setHand(hand_.is() && hand_.held() ? std::optional(hand_.target()) : std::nullopt);
     if (playback_ != nullptr)
         picture_.setTimeline(playback_->time / std::max<double>(playback_->length, 1e-3));
 }
@@ -164,6 +170,10 @@ bool Controls::pictureKey(int key, const std::string& name, bool shift)
         picture_.resetView();
     else if (name == "c")
         picture_.setCut(!picture_.cut());
+    else if (name == "i" && picture_.hasImage())
+        picture_.show(following(picture_.sliceLook()));
+    else if (name == "w" && picture_.hasImage())
+        picture_.nextWindow();
     else if (key == GLFW_KEY_TAB)
         picture_.selectTissue(shift ? -1 : 1);
     else if (key == GLFW_KEY_PAGE_UP || key == GLFW_KEY_PAGE_DOWN)
@@ -246,16 +256,18 @@ std::vector<KeyHelp> Controls::help() const
                 {"up down", "twice as fast, half as fast"},
                 {"Home End", "to the beginning, the end"},
                 {"hold left", "drag through the time"}};
-    const std::vector<KeyHelp> all{{hand_.is() || playback_ != nullptr ? "hold right" : "hold left", "turn the camera"},
-                                   {"hold middle", "shift the camera"},
-                                   {hand_.is() ? "+ -" : "wheel, + -", "nearer, further"},
-                                   {"R", "camera and opacities as at first"},
-                                   {"L", "layout: trainee, instructor"},
-                                   {"C", "cut towards the tool, whole body"},
-                                   {"Tab", "choose a tissue"},
-                                   {"Page up, down", "the tissue's opacity"},
-                                   {"? H F1", "these keys"},
-                                   {"Q Esc", "close the window"}};
+    std::vector<KeyHelp> all{{hand_.is() || playback_ != nullptr ? "hold right" : "hold left", "turn the camera"},
+                             {"hold middle", "shift the camera"},
+                             {hand_.is() ? "+ -" : "wheel, + -", "nearer, further"},
+                             {"R", "camera and opacities as at first"},
+                             {"L", "layout: trainee, instructor"},
+                             {"C", "cut towards the tool, whole body"},
+                             {"Tab", "choose a tissue"},
+                             {"Page up, down", "the tissue's opacity"},
+                             {"? H F1", "these keys"},
+                             {"Q Esc", "close the window"}};
+    if (picture_.hasImage())
+        all.insert(all.begin() + 6, {{"I", "slices: image and tissues, image, tissues"}, {"W", "the image's grey window"}});
     keys.insert(keys.end(), all.begin(), all.end());
     return keys;
 }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 namespace palpate::render {
@@ -73,14 +74,7 @@ Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::u
         nodes *= static_cast<std::size_t>(std::max(n, 0));
     u_.resize(nodes, glm::vec4(0));
     visited_.resize(nodes, 0);
-    place_.resize(nodes, 0);
-    for (std::size_t i = 0; i < nodes; ++i) {
-        const glm::ivec3 n = node(lattice_, static_cast<std::uint32_t>(i));
-        const bool air = restTissue(position(lattice_, n)) == 0;
-        place_[i] = static_cast<std::uint8_t>((air ? airBit : 0) |
-                                              (inside(lattice_, n - 1) && inside(lattice_, n + 1) ? 0 : borderBit));
-    }
-    markNearAir();
+    layerAir();
 }
 
 // Axis after axis: of three cells that are the same within themselves and to each other.
@@ -100,33 +94,48 @@ void Deformation::markPure()
     }
 }
 
-// Visits a node and its neighbours, as far as there are any.
-template <class Visit>
-void Deformation::eachAround(std::uint32_t at, Visit visit) const
+// Layer after layer: the air nodes next to a node of the body, the air next to them, ..
+void Deformation::layerAir()
 {
-    const auto row = static_cast<std::uint32_t>(lattice_.size[0]),
-               layer = row * static_cast<std::uint32_t>(lattice_.size[1]);
-    if ((place_[at] & borderBit) == 0) {
-        const std::uint32_t first = at - layer - row - 1;
-        for (std::uint32_t z = 0; z < 3; ++z)
-            for (std::uint32_t y = 0; y < 3; ++y)
-                for (std::uint32_t x = 0; x < 3; ++x)
-                    visit(first + z * layer + y * row + x);
-        return;
+    const int row = lattice_.size[0], layer = row * lattice_.size[1];
+    for (int k = 0; k < neighbours; ++k)
+        around_[static_cast<std::size_t>(k)] = (k / 9 - 1) * layer + (k / 3 % 3 - 1) * row + k % 3 - 1;
+    inward_.resize(u_.size(), 0);
+    outward_.resize(u_.size(), 0);
+    std::vector<std::uint8_t> layers(u_.size(), 0);  // 0 = body, from 1 on air, unknown = not reached yet
+    constexpr std::uint8_t unknown = 0xff;
+    std::vector<std::uint32_t> last, next;
+    for (std::uint32_t i = 0; i < u_.size(); ++i) {
+        const bool air = restTissue(position(lattice_, node(lattice_, i))) == 0;
+        layers[i] = air ? unknown : 0;
+        if (!air)
+            last.push_back(i);
     }
-    const glm::ivec3 middle = node(lattice_, at);
-    for (int k = 0; k < 27; ++k) {
-        const glm::ivec3 n = middle + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1;
-        if (inside(lattice_, n))
-            visit(static_cast<std::uint32_t>(offset(lattice_, n)));
+    std::uint8_t depth = 1;
+    const auto reach = [&](std::uint32_t from, int k) {
+        if (!inside(lattice_, node(lattice_, from) + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1))
+            return;
+        const std::uint32_t at = neighbour(from, static_cast<std::size_t>(k));
+        if (layers[at] == unknown) {
+            layers[at] = depth;
+            next.push_back(at);
+        }
+        if (layers[at] == depth) {
+            outward_[from] |= 1U << k;
+            inward_[at] |= 1U << (neighbours - 1 - k);
+        }
+    };
+    for (; depth <= airLayers; ++depth, last.swap(next)) {
+        next.clear();
+        for (const std::uint32_t from : last)
+            for (int k = 0; k < neighbours; ++k)
+                reach(from, k);
     }
 }
 
-void Deformation::markNearAir()
+std::uint32_t Deformation::neighbour(std::uint32_t node, std::size_t k) const noexcept
 {
-    for (std::uint32_t i = 0; i < place_.size(); ++i)
-        if ((place_[i] & airBit) != 0)
-            eachAround(i, [&](std::uint32_t at) { place_[at] |= nearAirBit; });
+    return node + static_cast<std::uint32_t>(around_[k]);
 }
 
 VoxelBox Deformation::apply(const channel::Displaced& displaced)
@@ -135,19 +144,20 @@ VoxelBox Deformation::apply(const channel::Displaced& displaced)
         u_[n] = glm::vec4(0);
     moved_.clear();
     ++pass_;
-    largest_ = 0;
+    float largest = 0;
     const std::size_t count = std::min<std::size_t>(displaced.count, channel::maxDisplaced);
     for (std::size_t i = 0; i < count; ++i) {
         const channel::Displacement& d = displaced.nodes[i];
         const glm::vec3 u(d.u[0], d.u[1], d.u[2]);
-        const float length = glm::length(u);
-        if (d.node >= u_.size() || !(length > 0) || !std::isfinite(length) || visited_[d.node] == pass_)
+        const float square = glm::dot(u, u);
+        if (d.node >= u_.size() || !(square > 0) || !std::isfinite(square) || visited_[d.node] == pass_)
             continue;
-        u_[d.node] = glm::vec4(u, 0);
+        u_[d.node] = glm::vec4(u, 1);
         visited_[d.node] = pass_;
         moved_.push_back(d.node);
-        largest_ = std::max(largest_, static_cast<double>(length));
+        largest = std::max(largest, square);
     }
+    largest_ = std::sqrt(largest);
     carryAir();
     const VoxelBox now = boxOfMoved();
     const VoxelBox changed = enclosing(last_, now);
@@ -159,23 +169,21 @@ VoxelBox Deformation::apply(const channel::Displaced& displaced)
 // lag behind by up to a spacing, and deep dimples would fold. So the air goes along, and less from layer to layer.
 void Deformation::carryAir()
 {
-    constexpr int layers = 16, whole = 2;
+    constexpr int whole = 2;
     constexpr float step = 0.6F;  // [lattice spacings per layer]; under 1, so that nothing folds
     std::size_t begin = 0;
     visible_ = moved_.size();
-    for (int layer = 0; layer < layers && begin < moved_.size(); ++layer) {
+    for (int layer = 0; layer < airLayers && begin < moved_.size(); ++layer) {
         const std::size_t end = moved_.size();
-        frontier_.clear();
-        for (std::size_t m = begin; m < end; ++m)
-            if ((place_[moved_[m]] & nearAirBit) != 0)
-                reachAir(moved_[m]);
+        reachAir(std::span(moved_).subspan(begin));
         for (const std::uint32_t at : frontier_) {
-            const glm::vec3 mean = meanAround(at);
+            const glm::vec3 mean = meanInside(at);
             const float length = glm::length(mean), less = step * static_cast<float>(lattice_.spacing);
             const glm::vec3 carried = layer < whole ? mean : length > less ? mean * (1 - less / length) : glm::vec3(0);
-            u_[at] = glm::vec4(carried, 0);
-            if (carried != glm::vec3(0))
-                moved_.push_back(at);
+            if (carried == glm::vec3(0))
+                continue;
+            u_[at] = glm::vec4(carried, 1);
+            moved_.push_back(at);
         }
         if (layer < whole)
             visible_ = moved_.size();
@@ -183,25 +191,27 @@ void Deformation::carryAir()
     }
 }
 
-void Deformation::reachAir(std::uint32_t around)
+// The air nodes of the next layer.
+void Deformation::reachAir(std::span<const std::uint32_t> from)
 {
-    eachAround(around, [&](std::uint32_t at) {
-        if ((place_[at] & airBit) != 0 && visited_[at] != pass_) {
-            visited_[at] = pass_;
-            frontier_.push_back(at);
+    frontier_.clear();
+    for (const std::uint32_t node : from)
+        for (std::uint32_t left = outward_[node]; left != 0; left &= left - 1) {
+            const std::uint32_t at = neighbour(node, static_cast<std::size_t>(std::countr_zero(left)));
+            if (visited_[at] != pass_) {
+                visited_[at] = pass_;
+                frontier_.push_back(at);
+            }
         }
-    });
 }
 
-glm::vec3 Deformation::meanAround(std::uint32_t around) const noexcept
+// Of the neighbours one layer further in, as far as they have moved.
+glm::vec3 Deformation::meanInside(std::uint32_t node) const noexcept
 {
-    glm::vec4 sum(0);
-    int neighbours = 0;
-    eachAround(around, [&](std::uint32_t at) {
-        sum += u_[at];
-        neighbours += u_[at] != glm::vec4(0) ? 1 : 0;
-    });
-    return glm::vec3(sum) / static_cast<float>(std::max(neighbours, 1));
+    Lanes sum{};
+    for (std::uint32_t left = inward_[node]; left != 0; left &= left - 1)
+        sum += lanes(u_[neighbour(node, static_cast<std::size_t>(std::countr_zero(left)))]);
+    return glm::vec3(sum[0], sum[1], sum[2]) / std::max(sum[3], 1.0F);
 }
 
 VoxelBox Deformation::boxOfMoved() const
@@ -290,24 +300,30 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
     const std::uint8_t label = labels_[offset(labelGrid_, middle)];
     if ((label & pureBit) != 0)
         return label & channel::rowBits;
-    std::array<std::uint8_t, 27> tissue{};
-    for (std::size_t k = 0; k < tissue.size(); ++k) {
-        const int i = static_cast<int>(k);
-        tissue[k] = labels_[offset(labelGrid_, middle + glm::ivec3(i % 3, i / 3 % 3, i / 9) - 1)] & channel::rowBits;
-    }
-    std::array<std::array<double, 3>, 3> along{};
+    std::array<std::array<float, 3>, 3> along{};
     for (int axis = 0; axis < 3; ++axis)
         for (int step = 0; step < 3; ++step)
             along[static_cast<std::size_t>(axis)][static_cast<std::size_t>(step)] =
-                spline(g[axis] - nearest[axis] - (step - 1));
-    std::array<double, 256> sum{};
-    std::uint8_t best = tissue[0];
-    for (std::size_t k = 0; k < tissue.size(); ++k) {
-        sum[tissue[k]] += along[0][k % 3] * along[1][k / 3 % 3] * along[2][k / 9];
-        if (sum[tissue[k]] > sum[best])
-            best = tissue[k];
-    }
-    return best;
+                static_cast<float>(spline(g[axis] - nearest[axis] - (step - 1)));
+    std::array<std::uint8_t, neighbours> tissues{};  // that there are, and their weights
+    std::array<float, neighbours> sums{};
+    std::size_t known = 0;
+    const auto row = static_cast<std::size_t>(labelGrid_.size[0]),
+               layer = row * static_cast<std::size_t>(labelGrid_.size[1]);
+    const std::uint8_t* corner = &labels_[offset(labelGrid_, middle - 1)];
+    for (std::size_t z = 0; z < 3; ++z)
+        for (std::size_t y = 0; y < 3; ++y)
+            for (std::size_t x = 0; x < 3; ++x) {
+                const std::uint8_t tissue = corner[z * layer + y * row + x] & channel::rowBits;
+                std::size_t n = 0;
+                while (n < known && tissues[n] != tissue)
+                    ++n;
+                known = std::max(known, n + 1);
+                tissues[n] = tissue;
+                sums[n] += along[0][x] * along[1][y] * along[2][z];
+            }
+    const auto best = std::max_element(sums.begin(), sums.begin() + static_cast<std::ptrdiff_t>(known));
+    return tissues[static_cast<std::size_t>(best - sums.begin())];
 }
 
 std::uint8_t Deformation::tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept
@@ -315,9 +331,8 @@ std::uint8_t Deformation::tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcep
     return restTissue(rest(x, shift));
 }
 
-std::uint8_t Deformation::labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept
+std::uint8_t Deformation::restLabel(glm::dvec3 p) const noexcept
 {
-    const glm::dvec3 p = rest(x, shift);
     const glm::ivec3 nearest(glm::floor((p - vec(labelGrid_.origin)) / labelGrid_.spacing + 0.5));
     const std::uint8_t tissue = restTissue(p);
     if (tissue == 0 || !inside(labelGrid_, nearest))

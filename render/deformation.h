@@ -5,6 +5,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -47,7 +48,9 @@ public:
     /// spline weight wins: borders are smooth, and no label turns into another one.
     std::uint8_t tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
     /// The same with shellBit where a warning distance ends.
-    std::uint8_t labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
+    std::uint8_t labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept { return restLabel(rest(x, shift)); }
+    /// The same of the rest point `p` [m].
+    std::uint8_t restLabel(glm::dvec3 p) const noexcept;
 
     const channel::Grid& grid() const noexcept { return labelGrid_; }
     const channel::Grid& lattice() const noexcept { return lattice_; }
@@ -58,27 +61,28 @@ public:
 
 private:
     static constexpr std::uint8_t pureBit = 0x40;  // the 26 voxels around are of the same tissue
-    // A node outside the body; that one or one of its neighbours is; it has not all 26 of them.
-    static constexpr std::uint8_t airBit = 1, nearAirBit = 2, borderBit = 4;
+    static constexpr int neighbours = 27;          // of a node in its 3 x 3 x 3, itself in the middle
+    static constexpr int airLayers = 16;           // that go along with the body
 
     /// At `g` [lattice spacings from the lattice's origin], in metres.
     glm::vec3 displacement(glm::vec3 g) const noexcept;
     std::uint8_t restTissue(glm::dvec3 p) const noexcept;
     void markPure();
-    void markNearAir();
+    void layerAir();
+    std::uint32_t neighbour(std::uint32_t node, std::size_t k) const noexcept;
     void carryAir();
-    void reachAir(std::uint32_t around);
-    glm::vec3 meanAround(std::uint32_t around) const noexcept;
-    template <class Visit>
-    void eachAround(std::uint32_t node, Visit visit) const;
+    void reachAir(std::span<const std::uint32_t> from);
+    glm::vec3 meanInside(std::uint32_t node) const noexcept;
     VoxelBox boxOfMoved() const;
 
     channel::Grid labelGrid_, lattice_;
-    std::vector<std::uint8_t> labels_;    // with pureBit
-    std::vector<std::uint8_t> place_;     // per lattice node: airBit, nearAirBit, borderBit
-    std::vector<glm::vec4> u_;            // per lattice node [m], and 0
-    std::vector<std::uint32_t> moved_;    // nodes with u != 0
-    std::vector<std::uint32_t> visited_;  // per lattice node: last pass that gave it a value
+    std::vector<std::uint8_t> labels_;  // with pureBit
+    // Per lattice node, a bit per neighbour: air one layer further out; air or body one layer further in.
+    std::vector<std::uint32_t> outward_, inward_;
+    std::array<std::int32_t, neighbours> around_{};  // from a node to its neighbours
+    std::vector<glm::vec4> u_;                       // per lattice node [m], and 1 if it has moved
+    std::vector<std::uint32_t> moved_;               // nodes with u != 0
+    std::vector<std::uint32_t> visited_;             // per lattice node: last pass that gave it a value
     std::vector<std::uint32_t> frontier_;
     std::uint32_t pass_ = 0;
     std::size_t visible_ = 0;  // of moved_: body and the air next to it; further air moves only air

@@ -102,7 +102,7 @@ void Follower::tryAttach(Picture& picture)
     state_ = {};
     health_ = {};
     structures_ = subscriber_->scenery().structure;
-    picture.open(subscriber_->scenery(), subscriber_->labels(), name);
+    picture.open(subscriber_->scenery(), subscriber_->labels(), name, subscriber_->image());
     picture.setNotice("", "");
 }
 
@@ -198,13 +198,16 @@ void Follower::poll(Picture& picture)
         leave(picture);
 }
 
-void Follower::draw(Picture& picture, Quality quality)
+void Follower::draw(Picture& picture, Quality quality, const std::function<void()>& present)
 {
     if (subscriber_)
         readShape();
     if (known_)
         picture.update(state_, std::exchange(reshaped_, false) ? displaced_.get() : nullptr, health_);
-    picture.render(quality, polled_);
+    picture.render(quality);
+    if (present)
+        present();
+    picture.finish(polled_);
     const auto now = Clock::now();
     if (!known_)
         return;

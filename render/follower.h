@@ -7,6 +7,7 @@
 
 #include <array>
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,8 +27,8 @@ public:
     /// Looks what has come; to be called often. Throws std::runtime_error when there has been no session for `wait`
     /// seconds, or the one that there was has been killed and has not come back.
     void poll(Picture& picture);
-    /// Draws what has come, and measures.
-    void draw(Picture& picture, Quality quality);
+    /// Draws what has come, brings it to the screen (`present`), and measures.
+    void draw(Picture& picture, Quality quality, const std::function<void()>& present = {});
 
     /// The session that is followed; null when there is none.
     const channel::Subscriber* session() const noexcept { return subscriber_ ? &*subscriber_ : nullptr; }

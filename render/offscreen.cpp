@@ -225,6 +225,7 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool
     Outputs outputs(options, *window);
     Picture picture(*window);
     picture.show(options.instructor ? Layout::instructor : Layout::trainee);
+    picture.show(options.slices);
     Follower follower(options.session, options.wait);
     writeAll(options, stop, picture, follower, outputs);
     outputs.finish();

@@ -1,6 +1,8 @@
 #include <render/picture.h>
 
+#include <vtkCallbackCommand.h>
 #include <vtkCamera.h>
+#include <vtkCommand.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -53,12 +55,13 @@ std::vector<std::uint8_t> tissuesIn(const channel::Scenery& scenery, std::span<c
 }  // namespace
 
 struct Picture::Session {
-    Session(const channel::Scenery& shown, std::span<const std::uint8_t> labels, std::string sessionName,
-            vtkRenderer& renderer)
+    Session(const channel::Scenery& shown, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image,
+            std::string sessionName, vtkRenderer& renderer)
         : scenery(shown),
           name(std::move(sessionName)),
           frame(viewFrame(shown)),
           deformation(shown, labels),
+          grey(shown, image),
           volume(shown, deformation, renderer),
           tool(shown, renderer),
           legend(tissuesIn(shown, labels))
@@ -73,6 +76,7 @@ struct Picture::Session {
     std::string name;
     ViewFrame frame;
     Deformation deformation;
+    GreyImage grey;
     VolumePicture volume;
     ToolPicture tool;
     std::vector<std::uint8_t> legend;                 // rows of the tissues that there are, smallest volume first
@@ -95,19 +99,25 @@ Picture::Picture(vtkRenderWindow& window)
     flat_->InteractiveOff();
     window_.AddRenderer(view_);
     window_.AddRenderer(flat_);
+    vtkNew<vtkCallbackCommand> needed;
+    needed->SetClientData(this);
+    needed->SetCallback([](vtkObject*, unsigned long, void* self, void*) { static_cast<Picture*>(self)->awaitSlices(); });
+    flat_->AddObserver(vtkCommand::StartEvent, needed);
 }
 
 Picture::~Picture() = default;
 
-void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session)
+void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
+                   std::span<const std::uint16_t> image)
 {
     close();
-    session_ = std::make_unique<Session>(scenery, labels, session, *view_);
+    session_ = std::make_unique<Session>(scenery, labels, image, session, *view_);
     aimCamera();
 }
 
 void Picture::close()
 {
+    awaitSlices();
     session_.reset();
     view_->RemoveAllViewProps();
     for (SlicePicture& slice : slices_)
@@ -180,7 +190,7 @@ ScreenPlan Picture::screenPlan() const
     return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_};
 }
 
-void Picture::render(Quality quality, std::chrono::steady_clock::time_point began)
+void Picture::render(Quality quality)
 {
     const ScreenPlan plan = screenPlan();
     const double w = plan.width, h = plan.height;
@@ -200,6 +210,11 @@ void Picture::render(Quality quality, std::chrono::steady_clock::time_point bega
     window_.Render();
     if (session_ && !session_->volume.shown())
         window_.Render();
+    awaitSlices();
+}
+
+void Picture::finish(std::chrono::steady_clock::time_point began)
+{
     window_.WaitForCompletion();
     if (!software_) {
         // The driver is known from the first picture on.
@@ -244,15 +259,28 @@ void Picture::drawSlices(const ScreenPlan& plan, int step)
         frames = orthogonalFrames(s.frame, s.known ? vec(s.state.tip) : s.frame.centre);
     else if (s.known && s.scenery.tool == channel::ToolKind::needle)
         frames[0] = through(s.frame, vec(s.state.tip), vec(s.state.axis));
+    const Anatomy anatomy{s.scenery, s.deformation, s.grey, look_};
+    bool due = false;
     for (std::size_t i = 0; i < slices_.size(); ++i) {
         if (plan.slices[i].empty()) {
             slices_[i].hide();
             continue;
         }
-        slices_[i].update(s.scenery, s.deformation, frames[i], plan.slices[i], s.changed, step);
-        slices_[i].annotate(canvas_, s.scenery, s.state, s.aim(), plan.font);
+        due = slices_[i].update(anatomy, frames[i], plan.slices[i], s.changed, step) || due;
+        slices_[i].annotate(canvas_, anatomy, s.state, s.aim(), plan.font);
     }
     s.changed = {};
+    if (due)
+        painting_ = std::async(std::launch::async, [this, anatomy] {
+            for (SlicePicture& slice : slices_)
+                slice.paint(anatomy);
+        });
+}
+
+void Picture::awaitSlices()
+{
+    if (painting_.valid())
+        painting_.get();
 }
 
 void Picture::drawFlat(const ScreenPlan& plan)
@@ -264,12 +292,13 @@ void Picture::drawFlat(const ScreenPlan& plan)
         drawForceTraces(canvas_, plan.forces, plan.font, s.scenery, s.history);
     if (!plan.distances.empty())
         drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
-    if (help_.empty()) {
+    // Where the legend has a place of its own help does not cover it.
+    if (help_.empty() || !plan.events.empty()) {
         const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
         drawLegend(canvas_, plan, s.scenery, {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1});
-    } else {
-        drawHelp(canvas_, plan, help_);
     }
+    if (!help_.empty())
+        drawHelp(canvas_, plan, help_);
     drawCaption(canvas_, plan, caption_, timeline_);
 }
 
@@ -303,6 +332,17 @@ void Picture::setCut(bool open)
     cut_ = open;
 }
 
+bool Picture::hasImage() const noexcept
+{
+    return session_ != nullptr && !session_->grey.empty();
+}
+
+void Picture::nextWindow() noexcept
+{
+    if (session_)
+        session_->grey.nextWindow();
+}
+
 void Picture::resetView()
 {
     if (!session_)
@@ -316,6 +356,12 @@ void Picture::resetView()
 void Picture::setHelp(std::vector<KeyHelp> keys)
 {
     help_ = std::move(keys);
+}
+
+void Picture::setHand(std::optional<glm::dvec3> hand)
+{
+    if (session_)
+        session_->tool.showHand(hand);
 }
 
 void Picture::setCaption(const std::string& words)

@@ -18,6 +18,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,7 +35,8 @@ public:
     ~Picture();
 
     /// Takes a session's scenery on; the camera starts anew.
-    void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session);
+    void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
+              std::span<const std::uint16_t> image = {});
     void close();
     /// Shows what has come. `displaced` is null when there is nothing newer.
     void update(const channel::State& state, const channel::Displaced* displaced, const Health& health);
@@ -42,9 +44,11 @@ public:
     void note(const channel::State& state);
     /// Words across the picture until the next setNotice(); empty = none.
     void setNotice(const std::string& words, const std::string& smaller);
-    /// `moving`: coarser where the renderer is software, so that the picture is finished in time, counted from `began`,
-    /// when the work on it did begin.
-    void render(Quality quality, std::chrono::steady_clock::time_point began = std::chrono::steady_clock::now());
+    /// `moving`: coarser where the renderer is software, so that the picture is finished in time.
+    void render(Quality quality);
+    /// Waits until the picture is drawn, and reckons with the time since `began`, when the work on it did begin, for the
+    /// next.
+    void finish(std::chrono::steady_clock::time_point began);
 
     void show(Layout layout);
     Layout layout() const noexcept { return layout_; }
@@ -55,10 +59,18 @@ public:
     /// Cuts the body open towards the needle (the default), or shows it whole.
     void setCut(bool open);
     bool cut() const noexcept { return cut_; }
+    /// How slices show a body that came with an image; tinted at first.
+    void show(SliceLook look) noexcept { look_ = look; }
+    SliceLook sliceLook() const noexcept { return look_; }
+    bool hasImage() const noexcept;
+    /// Shows the image through the session's next window.
+    void nextWindow() noexcept;
     /// Camera and opacities as they were when the session was opened.
     void resetView();
     /// Lists the keys across the picture; empty = hidden.
     void setHelp(std::vector<KeyHelp> keys);
+    /// Where the hand is that holds the tool [m]; nothing: not shown.
+    void setHand(std::optional<glm::dvec3> hand);
     /// A few words on top, such as "PAUSED" or "REPLAY x 0.5"; empty = none.
     void setCaption(const std::string& words);
     /// A bar that shows which share of a record is over, in [0, 1]; negative = none.
@@ -78,6 +90,7 @@ private:
     ScreenPlan screenPlan() const;
     void openBody();
     void drawSlices(const ScreenPlan& plan, int step);
+    void awaitSlices();
     void drawFlat(const ScreenPlan& plan);
 
     vtkRenderWindow& window_;
@@ -86,9 +99,11 @@ private:
     std::array<SlicePicture, 3> slices_;
     Canvas canvas_;
     std::unique_ptr<Session> session_;
+    std::future<void> painting_;  // of the slices, while the body is drawn
     std::string words_, smaller_, caption_;
     std::vector<KeyHelp> help_;
     Layout layout_ = Layout::trainee;
+    SliceLook look_ = SliceLook::tinted;
     bool cut_ = true;
     double timeline_ = -1, scale_ = 1;
     std::optional<bool> software_;

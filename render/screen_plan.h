@@ -9,6 +9,10 @@ namespace palpate::render {
 /// a small body, traces of the last seconds, events, figures.
 enum class Layout : std::uint8_t { trainee, instructor };
 
+/// What a slice shows of a body that came with an intensity image: the colours of its tissues, the image tinted with them,
+/// or the image alone. Without an image it is always the first.
+enum class SliceLook : std::uint8_t { tissue, tinted, image };
+
 /// A rectangle of the window [pixels], from the lower left.
 struct Area {
     int x = 0, y = 0, width = 0, height = 0;

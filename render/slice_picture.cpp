@@ -19,16 +19,48 @@ namespace palpate::render {
 namespace {
 
 constexpr Colour white{1, 1, 1}, farTool{0.16, 0.55, 0.65};
-constexpr std::array<std::uint8_t, 3> airPixel{12, 13, 18};
+using Pixel = std::array<std::uint8_t, 3>;
+constexpr Pixel airPixel{12, 13, 18};
 
 std::uint8_t byte(float value)
 {
     return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
 }
 
-std::array<std::uint8_t, 3> pixelOf(const std::array<float, 3>& colour)
+Pixel pixelOf(const std::array<float, 3>& colour)
 {
     return {byte(colour[0]), byte(colour[1]), byte(colour[2])};
+}
+
+// What a tissue is drawn with: its own part, and how much of the image's grey comes to it.
+struct Paint {
+    std::array<float, 3> own{};
+    float grey = 0;
+
+    Pixel over(float image) const
+    {
+        const auto mixed = [&](std::size_t k) { return static_cast<std::uint8_t>(own[k] + grey * image + 0.5F); };
+        return {mixed(0), mixed(1), mixed(2)};
+    }
+};
+
+// Tissues that are opaque in the 3-D view, such as vessels and tumours, tint the image more than fat does.
+std::array<Paint, channel::maxTissues> paintsOf(const Anatomy& anatomy)
+{
+    constexpr float least = 0.16F, most = 0.6F;
+    std::array<Paint, channel::maxTissues> paints{};
+    for (std::size_t t = 0; t < paints.size(); ++t) {
+        const channel::TissueLook& tissue = anatomy.scenery.tissue[t];
+        const float opacity = std::clamp(tissue.opacity, 0.0F, 1.0F);
+        const float colour = t == 0 || !anatomy.imageShown()     ? 1
+                             : anatomy.look == SliceLook::tinted ? least + (most - least) * opacity
+                                                                 : 0;
+        const Pixel pixel = t == 0 ? airPixel : pixelOf(tissue.colour);
+        for (std::size_t k = 0; k < 3; ++k)
+            paints[t].own[k] = colour * pixel[k];
+        paints[t].grey = 1 - colour;
+    }
+    return paints;
 }
 
 double pixelsPerMetre(const ViewFrame& frame, const Area& area)
@@ -77,8 +109,8 @@ SlicePicture::SlicePicture(vtkRenderer& renderer)
     renderer.AddActor2D(actor_);
 }
 
-void SlicePicture::update(const channel::Scenery& scenery, const Deformation& deformation, const ViewFrame& frame,
-                          const Area& area, const VoxelBox& changed, int step)
+bool SlicePicture::update(const Anatomy& anatomy, const ViewFrame& frame, const Area& area, const VoxelBox& changed,
+                          int step)
 {
     const bool resized = area.width != area_.width || area.height != area_.height;
     // Turns and shifts too small for a pixel are not worth a new picture.
@@ -86,44 +118,60 @@ void SlicePicture::update(const channel::Scenery& scenery, const Deformation& de
                         glm::distance(frame.right, frame_.right) * frame.extent +
                         glm::distance(frame.up, frame_.up) * frame.extent;
     const bool turned = turn * pixelsPerMetre(frame, area) > 1.0;
+    const bool other = anatomy.look != look_ || anatomy.grey.window() != window_;
     area_ = area;
     actor_->SetPosition(area.x, area.y);
     actor_->SetVisibility(1);
-    const bool all = resized || turned || step_ != step;
+    const bool all = resized || turned || other || step_ != step;
     if (!all && changed.empty())
-        return;
+        return false;
     if (all)
         frame_ = frame;
     step_ = step;
+    look_ = anatomy.look;
+    window_ = anatomy.grey.window();
     if (resized) {
         image_->SetDimensions(area.width, area.height, 1);
         image_->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
     }
-    std::array<std::array<std::uint8_t, 3>, channel::maxTissues> tissues{};
-    for (std::size_t t = 0; t < tissues.size(); ++t)
-        tissues[t] = t == 0 ? airPixel : pixelOf(scenery.tissue[t].colour);
-    const std::array<std::uint8_t, 3> shell = pixelOf(shellColour);
-    auto* pixels = static_cast<std::array<std::uint8_t, 3>*>(image_->GetScalarPointer());
-    const double metres = 1 / pixelsPerMetre(frame_, area);
+    due_ = all ? VoxelBox{} : changed;
+    image_->Modified();
+    return true;
+}
+
+void SlicePicture::paint(const Anatomy& anatomy)
+{
+    if (!due_)
+        return;
+    const Deformation& deformation = anatomy.deformation;
+    const std::array<Paint, channel::maxTissues> paints = paintsOf(anatomy);
+    const bool grey = anatomy.imageShown(), shells = !grey || anatomy.look != SliceLook::image;
+    const Pixel shell = pixelOf(shellColour);
+    auto* pixels = static_cast<Pixel*>(image_->GetScalarPointer());
+    const double metres = 1 / pixelsPerMetre(frame_, area_);
     const channel::Grid& grid = deformation.grid();
-    const glm::dvec3 low = vec(grid.origin) + grid.spacing * glm::dvec3(changed.low),
-                     high = vec(grid.origin) + grid.spacing * glm::dvec3(changed.high);
-    for (int row = 0; row < area.height; row += step) {
+    const VoxelBox box = *std::exchange(due_, std::nullopt);
+    const bool all = box.empty();
+    const int step = step_;
+    const glm::dvec3 low = vec(grid.origin) + grid.spacing * glm::dvec3(box.low),
+                     high = vec(grid.origin) + grid.spacing * glm::dvec3(box.high);
+    for (int row = 0; row < area_.height; row += step) {
         glm::vec3 shift(0);
-        for (int column = 0; column < area.width; column += step) {
-            const glm::dvec3 p = frame_.centre + frame_.right * ((column + 0.5 * step - 0.5 * area.width) * metres) +
-                                 frame_.up * ((row + 0.5 * step - 0.5 * area.height) * metres);
+        for (int column = 0; column < area_.width; column += step) {
+            const glm::dvec3 p = frame_.centre + frame_.right * ((column + 0.5 * step - 0.5 * area_.width) * metres) +
+                                 frame_.up * ((row + 0.5 * step - 0.5 * area_.height) * metres);
             if (!all && (glm::any(glm::lessThan(p, low)) || glm::any(glm::greaterThan(p, high))))
                 continue;
-            const std::uint8_t label = deformation.labelAt(p, shift);
+            const glm::dvec3 rest = deformation.rest(p, shift);
+            const std::uint8_t label = deformation.restLabel(rest);
             const std::size_t tissue = label & channel::rowBits;
-            const auto& pixel = tissue != 0 && (label & channel::shellBit) != 0 ? shell : tissues[tissue];
-            for (int y = row; y < std::min(row + step, area.height); ++y)
-                std::fill_n(pixels + static_cast<std::ptrdiff_t>(y) * area.width + column,
-                            std::min(step, area.width - column), pixel);
+            const bool onShell = shells && tissue != 0 && (label & channel::shellBit) != 0;
+            const Pixel pixel = onShell ? shell : paints[tissue].over(grey && tissue != 0 ? anatomy.grey.at(rest) : 0.0F);
+            for (int y = row; y < std::min(row + step, area_.height); ++y)
+                std::fill_n(pixels + static_cast<std::ptrdiff_t>(y) * area_.width + column,
+                            std::min(step, area_.width - column), pixel);
         }
     }
-    image_->Modified();
 }
 
 void SlicePicture::hide()
@@ -166,9 +214,10 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
         canvas.ring(pixel(tip), width / 2 + 2, 2, white);
 }
 
-void SlicePicture::annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim,
+void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channel::State& state, glm::dvec3 aim,
                             double font) const
 {
+    const channel::Scenery& scenery = anatomy.scenery;
     const glm::dvec3 entry = vec(scenery.entry);
     const bool planned = entry != vec(scenery.aim);
     constexpr int dashes = 10;
@@ -199,6 +248,13 @@ void SlicePicture::annotate(Canvas& canvas, const channel::Scenery& scenery, con
     canvas.rectangle({left + 0.5 * font, bottom + 2}, {std::max(bar, 3.2 * font) + font, 1.9 * font}, {0, 0, 0}, 0.55);
     canvas.rectangle({left + font, bottom + 0.35 * font}, {bar, 3}, white);
     canvas.text({left + font, bottom + 0.6 * font}, "10 mm", 0.9 * font, white);
+    if (anatomy.imageShown()) {
+        const std::string name = anatomy.grey.windowName(), range = anatomy.grey.windowRange();
+        const double wide = 0.46 * font * static_cast<double>(std::max(name.size(), range.size())) + font;
+        canvas.rectangle({right - wide - 0.2 * font, bottom + 2}, {wide, 2.5 * font}, {0, 0, 0}, 0.55);
+        canvas.text({right - 0.7 * font, bottom + 1.5 * font}, name, 0.9 * font, white, Align::right);
+        canvas.text({right - 0.7 * font, bottom + 0.4 * font}, range, 0.9 * font, white, Align::right);
+    }
 }
 
 }  // namespace palpate::render

@@ -3,6 +3,7 @@
 #include <render/canvas.h>
 #include <render/channel/layout.h>
 #include <render/deformation.h>
+#include <render/grey_image.h>
 #include <render/screen_plan.h>
 #include <render/view_frame.h>
 
@@ -11,21 +12,34 @@
 #include <vtkNew.h>
 #include <vtkRenderer.h>
 
+#include <optional>
+
 namespace palpate::render {
+
+/// What there is to see in a slice, and how.
+struct Anatomy {
+    const channel::Scenery& scenery;
+    const Deformation& deformation;
+    const GreyImage& grey;
+    SliceLook look = SliceLook::tissue;
+
+    bool imageShown() const noexcept { return look != SliceLook::tissue && !grey.empty(); }
+};
 
 /// The deformed anatomy in a plane, as a flat picture in the window.
 class SlicePicture {
 public:
     explicit SlicePicture(vtkRenderer& renderer);
 
-    /// Computes the anatomy anew in `changed`, and everywhere after a turn of the plane or with another area. `step`:
-    /// pixels from one that is computed to the next.
-    void update(const channel::Scenery& scenery, const Deformation& deformation, const ViewFrame& frame, const Area& area,
-                const VoxelBox& changed, int step);
-    /// Tool, planned line, `aim` where it lies now [m], scale bar and the sides of the patient. What is off the plane is
-    /// drawn thinner and darker.
-    void annotate(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim,
-                  double font) const;
+    /// Finds what of the anatomy has to be computed anew: what is in `changed`, and all after a turn of the plane, with
+    /// another area and another look. `step`: pixels from one that is computed to the next. Returns whether paint() has
+    /// work.
+    bool update(const Anatomy& anatomy, const ViewFrame& frame, const Area& area, const VoxelBox& changed, int step);
+    /// Computes it. Uses nothing of VTK's, so that it may run beside the drawing of what is not this slice.
+    void paint(const Anatomy& anatomy);
+    /// Tool, planned line, `aim` where it lies now [m], scale bar, the sides of the patient and the image's window. What is
+    /// off the plane is drawn thinner and darker.
+    void annotate(Canvas& canvas, const Anatomy& anatomy, const channel::State& state, glm::dvec3 aim, double font) const;
     void hide();
 
 private:
@@ -36,7 +50,11 @@ private:
     vtkNew<vtkActor2D> actor_;
     ViewFrame frame_;
     Area area_;
-    int step_ = 0;  // of what is drawn; 0: nothing
+    std::optional<VoxelBox> due_;  // to be computed anew; empty: everything
+    // Of what is drawn; step 0: nothing.
+    int step_ = 0;
+    SliceLook look_ = SliceLook::tissue;
+    std::uint32_t window_ = 0;
 };
 
 }  // namespace palpate::render

@@ -169,6 +169,10 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
     constexpr double trail = 0.3;  // [mm]
     setLine(*trail_, {});
     showTube(renderer, *trail_, trail, 6, trailColour);
+    setLine(*lead_, {});
+    showTube(renderer, *lead_, trail, 6, handColour);
+    show(renderer, *hand_, ball(1.0), handColour);
+    hand_->SetVisibility(0);
     addPlan(scenery, renderer);
 }
 
@@ -224,9 +228,21 @@ void ToolPicture::leaveTrail(const channel::State& state)
     setLine(*trail_, trailPoints_);
 }
 
+void ToolPicture::showHand(std::optional<glm::dvec3> hand)
+{
+    if (!hand && hand_->GetVisibility() == 0)
+        return;
+    hand_->SetVisibility(hand ? 1 : 0);
+    const glm::dvec3 at = hand.value_or(tip_);
+    hand_->SetPosition(at.x * mm, at.y * mm, at.z * mm);
+    const std::array line{tip_, at};
+    setLine(*lead_, hand ? std::span<const glm::dvec3>(line) : std::span<const glm::dvec3>());
+}
+
 void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim)
 {
     const glm::dvec3 tip = vec(state.tip) * mm, proxy = vec(state.proxy) * mm;
+    tip_ = vec(state.tip);
     aim_->SetPosition(aim.x * mm, aim.y * mm, aim.z * mm);
     leaveTrail(state);
     glm::dvec3 axis = vec(state.axis);

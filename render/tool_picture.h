@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 
 #include <array>
+#include <optional>
 #include <vector>
 
 namespace palpate::render {
@@ -20,6 +21,7 @@ inline constexpr std::array<double, 3> toolColour{0.25, 0.85, 1.0};
 inline constexpr std::array<double, 3> planColour{1.0, 1.0, 1.0};
 inline constexpr std::array<double, 3> proxyColour{1.0, 0.9, 0.2};
 inline constexpr std::array<double, 3> trailColour{1.0, 0.45, 0.85};
+inline constexpr std::array<double, 3> handColour{0.55, 1.0, 0.35};
 
 /// The tool, a needle as it is bent; the way that its tip has come since it went in; the point on the surface that it would
 /// be at without penetration; the planned line and its aim.
@@ -28,6 +30,8 @@ public:
     ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer);
     /// `aim`: where the line's end lies now [m].
     void update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim);
+    /// Where the hand is that holds the tool [m], with a line to the tip; nothing: not shown.
+    void showHand(std::optional<glm::dvec3> hand);
 
 private:
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
@@ -36,9 +40,10 @@ private:
 
     bool turns_ = false;         // with the axis: no sphere
     vtkNew<vtkTransform> pose_;  // of the tool; of a needle, of its point
-    vtkNew<vtkActor> proxy_, aim_;
-    vtkNew<vtkPolyData> shaft_, trail_;    // middle line of a needle, way of its tip [mm]
-    std::vector<glm::dvec3> trailPoints_;  // [m]
+    glm::dvec3 tip_{0.0};        // [m]
+    vtkNew<vtkActor> proxy_, aim_, hand_;
+    vtkNew<vtkPolyData> shaft_, trail_, lead_;  // middle line of a needle, way of its tip, from the tip to the hand [mm]
+    std::vector<glm::dvec3> trailPoints_;       // [m]
     channel::Phase phase_ = channel::Phase::free;
 };
 

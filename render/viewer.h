@@ -1,5 +1,7 @@
 #pragma once
 
+#include <render/screen_plan.h>
+
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
@@ -22,16 +24,17 @@ struct Playback {
 
 /// What a viewer shows, and where.
 struct ViewerOptions {
-    std::string session;              // name; empty = the only one that runs
-    std::filesystem::path offscreen;  // folder for PNG files
-    std::filesystem::path movie;      // MP4 file; neither = a window
-    bool hidden = false;              // the window is on a display of its own that nobody sees, for measurements
-    bool instructor = false;          // layout to begin with
-    int width = 1280, height = 960;   // [pixels]
-    double every = 0.5;               // offscreen: session time from one picture to the next [s]
-    double wait = 10;                 // how long without a session before giving up [s]
-    std::uint64_t frames = 0;         // end after so many pictures; 0 = no limit
-    Playback* playback = nullptr;     // of the session, when it is a record
+    std::string session;                   // name; empty = the only one that runs
+    std::filesystem::path offscreen;       // folder for PNG files
+    std::filesystem::path movie;           // MP4 file; neither = a window
+    bool hidden = false;                   // the window is on a display of its own that nobody sees, for measurements
+    bool instructor = false;               // layout to begin with
+    SliceLook slices = SliceLook::tinted;  // to begin with, where there is an image
+    int width = 1280, height = 960;        // [pixels]
+    double every = 0.5;                    // offscreen: session time from one picture to the next [s]
+    double wait = 10;                      // how long without a session before giving up [s]
+    std::uint64_t frames = 0;              // end after so many pictures; 0 = no limit
+    Playback* playback = nullptr;          // of the session, when it is a record
 };
 
 /// A picture, by the clock CLOCK_MONOTONIC.

@@ -14,6 +14,7 @@
 #include <vtkGenericRenderWindowInteractor.h>
 #include <vtkInteractorStyleTrackballCamera.h>
 #include <vtkNew.h>
+#include <vtkOpenGLFramebufferObject.h>
 #include <vtkOpenGLState.h>
 
 #include <algorithm>
@@ -86,8 +87,24 @@ void connect(vtkGenericOpenGLRenderWindow& target, GLFWwindow* window)
     target.SetShowWindow(true);
     if (!target.InitializeFromCurrentContext())
         throw std::runtime_error("the display has no OpenGL 3.2, which the viewer needs");
+    target.SetSwapBuffers(0);
+}
 
-    target.SetFrameBlitModeToBlitToHardware();
+// The picture goes to the window with one copy of its colours. VTK's own way copies colours and depths, and both twice.
+void present(vtkGenericOpenGLRenderWindow& target, GLFWwindow* window)
+{
+    vtkOpenGLState& state = *target.GetState();
+    const int width = target.GetSize()[0], height = target.GetSize()[1];
+    state.PushFramebufferBindings();
+    target.GetRenderFramebuffer()->Bind(GL_READ_FRAMEBUFFER);
+    target.GetRenderFramebuffer()->ActivateReadBuffer(0);
+    state.vtkglBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+    state.vtkglDrawBuffer(GL_BACK_LEFT);
+    state.vtkglViewport(0, 0, width, height);
+    state.vtkglScissor(0, 0, width, height);
+    state.vtkglBlitFramebuffer(0, 0, width, height, 0, 0, width, height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+    state.PopFramebufferBindings();
+    glfwSwapBuffers(window);
 }
 
 // What the callback for the window's size needs; the window's own pointer belongs to the controls.
@@ -164,6 +181,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
 
     Picture picture(*target);
     picture.show(options.instructor ? Layout::instructor : Layout::trainee);
+    picture.show(options.slices);
     vtkNew<vtkGenericRenderWindowInteractor> interactor;
     interactor->SetRenderWindow(target);
     vtkNew<vtkInteractorStyleTrackballCamera> style;
@@ -199,8 +217,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
         // hide what is drawn over them at the same depth.
         target->GetState()->Reset();
         target->GetState()->vtkglDepthFunc(GL_LEQUAL);
-        follower.draw(picture, moving ? Quality::moving : Quality::still);
-        glfwSwapBuffers(window.get());
+        follower.draw(picture, moving ? Quality::moving : Quality::still, [&] { present(*target, window.get()); });
         clock.end();
     }
     ViewerFigures figures = follower.figures();

@@ -37,8 +37,10 @@ std::string segmentText(std::size_t index, const ExportedSegment& s)
                        colour[1] / 255.0, colour[2] / 255.0, key, s.label.colour ? 0 : 1);
     out += fmt::format("{}Extent:={} {} {} {} {} {}\n", key, s.low.x, s.high.x, s.low.y, s.high.y, s.low.z, s.high.z);
     out += fmt::format("{}LabelValue:={}\n{}Layer:=0\n", key, s.label.value, key);
+    // Readers take the tags for granted.
     const std::string& terms = s.label.terminology;
-    out += terms.empty() ? "" : fmt::format("{}Tags:=TerminologyEntry:{}|\n", key, valueText(terms));
+    out += fmt::format("{}Tags:=Segmentation.Status:completed|{}\n", key,
+                       terms.empty() ? "" : fmt::format("TerminologyEntry:{}|", valueText(terms)));
     return out;
 }
 

@@ -30,7 +30,7 @@ struct LabelName {
     std::string name;                                                  // the structure: "tumour", "left lung"
     std::string tissue;                                                // a row of the tissue table
     std::optional<std::array<std::uint8_t, 3>> colour = std::nullopt;  // red, green, blue, where the file gives one
-    std::string terminology = {};  // what the structure is in a coding scheme, as the file writes it
+    std::string terminology = {};  // what the structure is in a coding scheme, as 3D Slicer writes it
 };
 
 }  // namespace palpate::volume

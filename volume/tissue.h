@@ -140,6 +140,8 @@ public:
     std::vector<CellMaterial> materialOn(const NodeGrid& grid) const;
     /// Row of the tissue table that fills most of each node's cell (count x 1); air where under half of it is tissue.
     std::vector<std::uint8_t> tissueOn(const NodeGrid& grid) const;
+    /// Mean of the image over the tissue in each node's cell; not a number where there is none, or no image (count x 1).
+    std::vector<float> imageOn(const NodeGrid& grid) const;
 
 private:
     struct Impl;

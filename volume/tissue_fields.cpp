@@ -48,8 +48,8 @@ public:
 
     std::size_t samples() const { return offsets_.size(); }
 
-    // Calls visit(label, weight), or visit(label, weight, factor on its tissue's stiffness), for the voxels at node n; the
-    // weights add up to 1, less what lies outside the volume.
+    // Calls visit(label, weight), or visit(label, weight, factor on its tissue's stiffness), or visit(label, weight,
+    // voxel), for the voxels at node n; the weights add up to 1, less what lies outside the volume.
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
@@ -89,6 +89,8 @@ private:
             const auto label = static_cast<std::uint16_t>(label_.getValue(ijk));
             if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, double>) {
                 visit(label, weight, scaledBy_ != nullptr ? factor(label, ijk) : 1.0);
+            } else if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
+                visit(label, weight, ijk);
             } else {
                 visit(label, weight);
             }
@@ -448,6 +450,34 @@ std::vector<std::uint8_t> Tissue::tissueOn(const NodeGrid& grid) const
         }
     });
     return rows;
+}
+
+std::vector<float> Tissue::imageOn(const NodeGrid& grid) const
+{
+    checkGrid(grid);
+    const TissueData& tissue = *impl_;
+    std::vector<float> values(grid.count(), std::numeric_limits<float>::quiet_NaN());
+    if (!tissue.image) {
+        return values;
+    }
+    const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
+    forEachRow(tissue, grid, range, [&](const CellSampler& sampler, Index3 n) {
+        const auto image = tissue.image->getConstUnsafeAccessor();
+        for (; n.x <= range.high.x; ++n.x) {
+            double sum = 0, weight = 0;
+            sampler.visit(n, [&](std::uint16_t label, double w, const openvdb::Coord& voxel) {
+                const auto value = static_cast<double>(image.getValue(voxel));
+                if (tissue.lookup.solid[label] != 0 && std::isfinite(value)) {
+                    sum += w * value;
+                    weight += w;
+                }
+            });
+            if (weight > 0) {
+                values[grid.offset(n)] = static_cast<float>(sum / weight);
+            }
+        }
+    });
+    return values;
 }
 
 }  // namespace palpate::volume

@@ -5,6 +5,7 @@
 #include <apps/figures.h>
 #include <apps/outputs.h>
 #include <apps/session.h>
+#include <datasets/scene.h>
 #include <experiments/bench_tick.h>
 #include <haptics/broadcast.h>
 
@@ -23,6 +24,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -41,6 +43,7 @@ struct Options {
     int width = 800;
     int height = 600;
     int frames = 150;
+    std::optional<std::string> setting;
     bool alone = false;
     std::string json;
 };
@@ -91,6 +94,7 @@ public:
               do {
                   timing = experiments::benchTick(model, {true, 0.0, 0}).all;
                   lateness.push_back(timing.lateness.percentiles().p99);
+                  ticks += timing.ticks;
                   missed += timing.missed;
               } while (!stop_);
           })
@@ -108,10 +112,14 @@ public:
         }
     }
 
+    // p99, of the worst session [us]
+    double latenessP99() const { return 1e6 * *std::max_element(lateness.begin(), lateness.end()); }
+    double missedShare() const { return static_cast<double>(missed) / static_cast<double>(missed + ticks); }
+
     std::vector<std::string> warnings;
     haptics::ServoTiming timing;   // of the last session
     std::vector<double> lateness;  // p99 of each session [s]
-    std::uint64_t missed = 0;
+    std::uint64_t ticks = 0, missed = 0;
 
 private:
     std::atomic<bool> stop_{false};
@@ -162,9 +170,16 @@ nlohmann::json readFigures(const fs::path& file)
     return figures;
 }
 
+haptics::SessionModel openScene(const Options& o)
+{
+    SceneChanges changes;
+    changes.setting = o.setting;
+    return openSession(o.scene, changes);
+}
+
 nlohmann::json measure(const Options& o, int side, const std::string& layout)
 {
-    const auto model = openSession(o.scene, {});
+    const auto model = openScene(o);
     const auto count = static_cast<std::size_t>(side) * static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
     const Vec3 extent = model.tissue->box().high - model.tissue->box().low;
     const double finest = 0.9 * std::cbrt(extent.x * extent.y * extent.z / static_cast<double>(count));
@@ -199,8 +214,9 @@ nlohmann::json measure(const Options& o, int side, const std::string& layout)
                           {"frame_ms_p90", figures["frame_ms_p90"]}};
     if (servo) {
         servo->end();
-        result["lateness_us_p99"] = 1e6 * *std::max_element(servo->lateness.begin(), servo->lateness.end());
-        result["missed_ticks"] = servo->missed;
+        result["lateness_us_p99"] = servo->latenessP99();
+        result["missed_share"] = servo->missedShare();
+        result["tick_us_p50"] = 1e6 * servo->timing.work.percentiles().p50;
         result["warnings"] = servo->warnings;
     }
     return result;
@@ -213,25 +229,38 @@ void benchView(const Options& o)
     if (tell) {
         fmt::print(
             "a picture of {} x {} pixels, everything deforming in every frame; the servo loop's lateness beside it\n"
-            "{:>8} {:<10} {:>9} {:>9} {:>9} {:>9} {:>8}\n",
-            o.width, o.height, "voxels", "layout", "p50 [ms]", "p90 [ms]", "frames/s", "late [us]", "missed");
+            "{:>8} {:<10} {:>9} {:>9} {:>9} {:>9} {:>10}\n",
+            o.width, o.height, "voxels", "layout", "p50 [ms]", "p90 [ms]", "frames/s", "late [us]", "missed [%]");
+    }
+    nlohmann::json result{{"scene", o.scene}, {"cores", std::thread::hardware_concurrency()}};
+    if (!o.alone) {
+        const auto model = openScene(o);
+        ServoBeside unseen(model);
+        unseen.end();  // after one session
+        result["without_viewer"] = {{"lateness_us_p99", unseen.latenessP99()}, {"missed_share", unseen.missedShare()}};
+        if (tell) {
+            fmt::print("{:>8} {:<10} {:>9} {:>9} {:>9} {:>9.1f} {:>10.2f}\n", "none", "", "", "", "", unseen.latenessP99(),
+                       100 * unseen.missedShare());
+            std::fflush(stdout);
+        }
     }
     auto cases = nlohmann::json::array();
     for (const int side : o.sides) {
         for (const auto& layout : o.layouts) {
             const auto c = measure(o, side, layout);
             if (tell) {
-                fmt::print("{:>6}^3 {:<10} {:>9.1f} {:>9.1f} {:>9.1f} {:>9.1f} {:>8}\n", side, layout,
+                fmt::print("{:>6}^3 {:<10} {:>9.1f} {:>9.1f} {:>9.1f} {:>9.1f} {:>10.2f}\n", side, layout,
                            c["frame_ms_p50"].get<double>(), c["frame_ms_p90"].get<double>(),
                            c["frames_per_second"].get<double>(), c.value("lateness_us_p99", 0.0),
-                           c.value("missed_ticks", 0));
+                           100 * c.value("missed_share", 0.0));
                 std::fflush(stdout);
             }
             cases.push_back(c);
         }
     }
     if (!o.json.empty()) {
-        writeJson(o.json, {{"scene", o.scene}, {"cores", std::thread::hardware_concurrency()}, {"cases", cases}});
+        result["cases"] = cases;
+        writeJson(o.json, result);
     }
 }
 
@@ -255,6 +284,8 @@ void addBenchView(CLI::App& bench)
     view->add_option("--width", o->width, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--height", o->height, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--frames", o->frames, "Pictures of each case")->check(CLI::Range(10, 100000))->capture_default_str();
+    view->add_option("--setting", o->setting, "How fine level elastic of the servo loop is")
+        ->check(CLI::IsMember(datasets::elasticSettings()));
     view->add_flag("--alone", o->alone, "Without a servo loop beside it, to compare");
     view->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     view->final_callback([o] { benchView(*o); });

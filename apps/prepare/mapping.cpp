@@ -83,6 +83,30 @@ struct Setting {
     }
 };
 
+std::vector<std::string> tissuesOf(const volume::TissueTable& table)
+{
+    std::vector<std::string> names;
+    for (const volume::TissueRow& row : table.rows) {
+        names.push_back(row.name);
+    }
+    return names;
+}
+
+// The labels that are there, for a message.
+std::string listOf(const volume::ImportedLabels& labels, const LabelCounts& counts)
+{
+    std::vector<std::string> list;
+    for (const auto& [value, voxels] : counts) {
+        if (list.size() == mostListed) {
+            list.emplace_back("...");
+            break;
+        }
+        const LabelName* own = find(labels.names, value);
+        list.push_back(own == nullptr ? std::to_string(value) : fmt::format("{} '{}'", value, own->name));
+    }
+    return fmt::format("{}", fmt::join(list, ", "));
+}
+
 std::vector<Setting> readSettings(const MappingOptions& options, const volume::TissueTable& table)
 {
     std::vector<Setting> settings;
@@ -93,12 +117,8 @@ std::vector<Setting> readSettings(const MappingOptions& options, const volume::T
         }
         settings.push_back({text, text.substr(0, at), text.substr(at + 1)});
         if (!table.find(settings.back().tissue)) {
-            std::vector<std::string> rows;
-            for (const volume::TissueRow& row : table.rows) {
-                rows.push_back(row.name);
-            }
             throw std::runtime_error(fmt::format("--set {}: '{}' is not in the tissue table '{}'; it has: {}", text,
-                                                 settings.back().tissue, table.name, fmt::join(rows, ", ")));
+                                                 settings.back().tissue, table.name, fmt::join(tissuesOf(table), ", ")));
         }
     }
     return settings;
@@ -128,7 +148,8 @@ public:
         };
         for (const Setting& s : settings_) {
             if (!there(s)) {
-                throw std::runtime_error(fmt::format("--set {}: no voxel has a label of that name or value", s.text));
+                throw std::runtime_error(fmt::format("--set {}: no voxel has a label of that name or value; there are {}",
+                                                     s.text, listOf(labels, counts)));
             }
         }
     }
@@ -233,8 +254,8 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
                                  const volume::TissueTable& table, std::vector<std::string>& notes)
 {
     if (!options.defaultTissue.empty() && !table.find(options.defaultTissue)) {
-        throw std::runtime_error(
-            fmt::format("--default-tissue {}: is not in the tissue table '{}'", options.defaultTissue, table.name));
+        throw std::runtime_error(fmt::format("--default-tissue {}: is not in the tissue table '{}'; it has: {}",
+                                             options.defaultTissue, table.name, fmt::join(tissuesOf(table), ", ")));
     }
     const Mapper mapper(options, labels, counts, table, notes);
     std::vector<LabelName> named;

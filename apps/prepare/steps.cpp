@@ -168,6 +168,19 @@ private:
                          Index3(glm::floor(glm::min(last + 1e-6, Vec3(image_.size)))));
     }
 
+    // Where the voxels are, for a message.
+    std::string extentText() const
+    {
+        Vec3 low(std::numeric_limits<double>::max()), high(std::numeric_limits<double>::lowest());
+        for (int corner = 0; corner < 8; ++corner) {
+            const Vec3 n = Vec3(image_.size - 1) * Vec3(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
+            low = glm::min(low, image_.affine.toPatient(n));
+            high = glm::max(high, image_.affine.toPatient(n));
+        }
+        return fmt::format("they lie in {:.1f},{:.1f},{:.1f},{:.1f},{:.1f},{:.1f} mm (LPS)", 1e3 * low.x, 1e3 * high.x,
+                           1e3 * low.y, 1e3 * high.y, 1e3 * low.z, 1e3 * high.z);
+    }
+
     void crop()
     {
         tell_("cropping");
@@ -184,7 +197,7 @@ private:
         }
         const Index3 low = glm::max(box->first, Index3(0)), high = glm::min(box->second, image_.size - 1);
         if (glm::any(glm::lessThan(high, low))) {
-            throw std::runtime_error(fmt::format("--crop {}: no voxel lies there", options_.crop));
+            throw std::runtime_error(fmt::format("--crop {}: no voxel lies there; {}", options_.crop, extentText()));
         }
         const std::size_t before = image_.values.size();
         image_ = volume::cropped(image_, low, high);
@@ -293,7 +306,7 @@ private:
         }
         const auto at = std::find(used.begin() + 1, used.end(), false);
         if (at == used.end()) {
-            throw std::runtime_error("--add-skin: every label value from 1 to 65535 is in use");
+            throw std::runtime_error("--add-skin: every label value from 1 to 65535 is in use: save the labels with fewer");
         }
         return static_cast<std::uint16_t>(at - used.begin());
     }
@@ -305,7 +318,8 @@ private:
                 return row.name;
             }
         }
-        throw std::runtime_error(fmt::format("--add-skin: the tissue table '{}' has no tissue of role skin", table_.name));
+        throw std::runtime_error(
+            fmt::format("--add-skin: the tissue table '{}' has no tissue of role skin: add one to it", table_.name));
     }
 
     void pad()
@@ -313,7 +327,8 @@ private:
         const Index3 by(glm::ceil(options_.pad / image_.affine.spacing() - 1e-6));
         const Vec3 size = Vec3(image_.size + 2 * by);
         if (!(size.x * size.y * size.z < mostVoxels)) {
-            throw std::runtime_error(fmt::format("--pad {:g}mm: makes over 4 thousand million voxels", 1e3 * options_.pad));
+            throw std::runtime_error(fmt::format(
+                "--pad {:g}mm: makes over 4 thousand million voxels: choose less, or larger voxels", 1e3 * options_.pad));
         }
         const std::size_t before = image_.values.size();
         image_ = volume::padded(image_, by);

@@ -16,8 +16,10 @@ namespace palpate::channel {
 class Publisher {
 public:
     /// `session`: letters, digits, '-' and '_'. Throws std::runtime_error when the segment cannot be made; takes over a
-    /// segment whose owner is dead. `labels`: one tissue row per node of scenery.labels.
-    Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels);
+    /// segment whose owner is dead. `labels`: one tissue row per node of scenery.labels,
+    /// `image`: one code for each as well, or none where scenery has no windows.
+    Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels,
+              std::span<const std::uint16_t> image = {});
     Publisher(Publisher&&) noexcept;
     ~Publisher();
 
@@ -50,6 +52,8 @@ public:
 
     const Scenery& scenery() const noexcept;
     std::span<const std::uint8_t> labels() const noexcept;
+    /// Empty where there is no image.
+    std::span<const std::uint16_t> image() const noexcept;
     /// A consistent copy of the last tick; nothing when the writer died in the middle of a write.
     std::optional<State> state() const noexcept;
     /// Copies the last displaced nodes if they are newer than `out.publication`. When it returns false `out.nodes` may hold

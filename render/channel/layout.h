@@ -9,6 +9,7 @@
 ///     Header      magic, version, layout hash, offsets     written once
 ///     Scenery     names, colours, grids, tool, line        written once
 ///     labels      tissue row and shellBit per voxel        written once
+///     image       code of its intensity per voxel          written once; only of bodies that came with an image
 ///     State       sequence lock                            every tick
 ///     Input       sequence lock, in a page of its own      by the viewer whose mouse is the hand
 ///     Displaced   four slots, a sequence lock each         at frame rate
@@ -17,10 +18,11 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 2;
+inline constexpr std::uint32_t version = 3;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
+inline constexpr std::size_t maxWindows = 4;
 inline constexpr std::size_t maxDisplaced = 1U << 16;
 inline constexpr std::size_t nameLength = 32;
 /// Of a display voxel: the row of its tissue, and whether it lies on the border of a vital structure's warning distance.
@@ -43,6 +45,12 @@ struct TissueLook {
     float opacity = 0;
 };
 
+/// A range of an image's values that is shown from black to white.
+struct GreyWindow {
+    Name name{};
+    double low = 0, high = 0;  // in the image's unit
+};
+
 enum class ToolKind : std::uint32_t { sphere, needle, capsule };
 
 /// What does not change during a session.
@@ -62,6 +70,13 @@ struct Scenery {
     Triple entry{};
     Triple aim{};
     double forceCap = 0;
+    // Of the intensity image, whose value at a display voxel is imageLow + imageStep * code.
+    std::uint32_t windows = 0;  // to choose from, the best one first; 0: there is no image
+    std::uint32_t padding = 0;
+    std::array<GreyWindow, maxWindows> window{};
+    Name imageUnit{};  // "HU"; empty: not known
+    double imageLow = 0;
+    double imageStep = 0;
 };
 
 enum class Phase : std::uint32_t { free, contact, inserted };

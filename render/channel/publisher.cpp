@@ -125,19 +125,14 @@ constexpr std::size_t aligned(std::size_t bytes)
     return (bytes + page - 1) / page * page;
 }
 
-std::size_t labelCount(const Scenery& scenery)
+void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels, std::size_t image)
 {
-    std::size_t count = 1;
-    for (const std::int32_t n : scenery.labels.size)
-        count *= static_cast<std::size_t>(std::max(n, 0));
-    return count;
-}
-
-void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels)
-{
-    if (labels == 0 || labels != labelCount(scenery))
+    if (labels == 0 || labels != voxelsOf(scenery))
         throw std::runtime_error("session " + session + ": " + std::to_string(labels) + " labels for a grid of " +
-                                 std::to_string(labelCount(scenery)));
+                                 std::to_string(voxelsOf(scenery)));
+    if (scenery.windows > maxWindows || image != (scenery.windows > 0 ? labels : 0))
+        throw std::runtime_error("session " + session + ": an image of " + std::to_string(image) + " voxels with " +
+                                 std::to_string(scenery.windows) + " windows, for " + std::to_string(labels) + " labels");
     if (scenery.tissues > maxTissues || scenery.structures > maxStructures)
         throw std::runtime_error("session " + session + ": at most " + std::to_string(maxTissues) + " tissues and " +
                                  std::to_string(maxStructures) + " structures can be shown");
@@ -153,13 +148,14 @@ std::uint64_t now() noexcept
 }  // namespace
 
 struct Publisher::Impl {
-    Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels);
+    Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels,
+         std::span<const std::uint16_t> image);
     ~Impl();
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
     void allocate(std::size_t size);
-    void fill(const Scenery& scenery, std::span<const std::uint8_t> labels);
+    void fill(const Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image);
     void show();
     void release() noexcept;
 
@@ -175,25 +171,28 @@ struct Publisher::Impl {
     std::unique_ptr<Displaced> back = std::make_unique<Displaced>();
 };
 
-Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels)
+Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels,
+                      std::span<const std::uint16_t> image)
     : session(sessionName), name(segmentName(sessionName)), temporary(name + "." + std::to_string(::getpid()))
 {
-    checkScenery(session, scenery, labels.size());
+    checkScenery(session, scenery, labels.size(), image.size());
     removeLeftBehind(session, name);
     removeOthersLeftBehind();
     const std::size_t scene = aligned(sizeof(Header)), label = scene + aligned(sizeof(Scenery)),
-                      states = label + aligned(labels.size()), inputs = states + aligned(sizeof(StateBlock)),
-                      displacements = inputs + aligned(sizeof(InputBlock));
+                      grey = label + aligned(labels.size()), states = grey + aligned(image.size_bytes()),
+                      inputs = states + aligned(sizeof(StateBlock)), displacements = inputs + aligned(sizeof(InputBlock));
     try {
         allocate(displacements + aligned(sizeof(DisplacedBlock)));
         header = new (base) Header;
         header->sceneryOffset = scene;
         header->labelsOffset = label;
         header->labelsBytes = labels.size();
+        header->imageOffset = grey;
+        header->imageBytes = image.size_bytes();
         header->stateOffset = states;
         header->inputOffset = inputs;
         header->displacedOffset = displacements;
-        fill(scenery, labels);
+        fill(scenery, labels, image);
         show();
     } catch (...) {
         release();
@@ -216,7 +215,8 @@ void Publisher::Impl::allocate(std::size_t size)
     base = static_cast<std::byte*>(mapped);
 }
 
-void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t> labels)
+void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t> labels,
+                           std::span<const std::uint16_t> image)
 {
     header->version = version;
     header->layoutHash = layoutHash();
@@ -226,6 +226,8 @@ void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t>
     header->closed.store(0, std::memory_order_relaxed);
     new (base + header->sceneryOffset) Scenery(scenery);
     std::memcpy(base + header->labelsOffset, labels.data(), labels.size());
+    if (!image.empty())
+        std::memcpy(base + header->imageOffset, image.data(), image.size_bytes());
     state = new (base + header->stateOffset) StateBlock;
     input = new (base + header->inputOffset) InputBlock;
     displaced = new (base + header->displacedOffset) DisplacedBlock;
@@ -266,8 +268,9 @@ Publisher::Impl::~Impl()
     release();
 }
 
-Publisher::Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels)
-    : impl_(std::make_unique<Impl>(session, scenery, labels))
+Publisher::Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels,
+                     std::span<const std::uint16_t> image)
+    : impl_(std::make_unique<Impl>(session, scenery, labels, image))
 {
 }
 

@@ -32,8 +32,8 @@ struct Header {
     std::uint64_t bytes = 0;  // of the segment
     std::uint64_t ownerPid = 0;
     std::uint64_t ownerStart = 0;  // start time of the owner [clock ticks since boot]: a recycled pid has another
-    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, stateOffset = 0, inputOffset = 0,
-                  displacedOffset = 0;
+    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, imageOffset = 0, imageBytes = 0, stateOffset = 0,
+                  inputOffset = 0, displacedOffset = 0;
     Word closed;  // 1: the owner has ended the session itself
 };
 
@@ -70,6 +70,7 @@ constexpr std::uint64_t layoutHash() noexcept
     for (const std::size_t value : {sizeof(Header),
                                     sizeof(Grid),
                                     sizeof(TissueLook),
+                                    sizeof(GreyWindow),
                                     sizeof(Scenery),
                                     sizeof(State),
                                     sizeof(Input),
@@ -80,9 +81,11 @@ constexpr std::uint64_t layoutHash() noexcept
                                     sizeof(DisplacedBlock),
                                     maxTissues,
                                     maxStructures,
+                                    maxWindows,
                                     maxDisplaced,
                                     nameLength,
                                     displacedSlots,
+                                    offsetof(Header, imageOffset),
                                     offsetof(Header, ownerPid),
                                     offsetof(Header, closed),
                                     offsetof(Grid, origin),
@@ -99,6 +102,9 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(Scenery, entry),
                                     offsetof(Scenery, aim),
                                     offsetof(Scenery, forceCap),
+                                    offsetof(Scenery, window),
+                                    offsetof(Scenery, imageUnit),
+                                    offsetof(Scenery, imageLow),
                                     offsetof(State, time),
                                     offsetof(State, tip),
                                     offsetof(State, bend),
@@ -123,6 +129,15 @@ constexpr std::uint64_t layoutHash() noexcept
         for (int byte = 0; byte < 8; ++byte)
             hash = (hash ^ ((value >> (8 * byte)) & 0xFF)) * 1099511628211ULL;
     return hash;
+}
+
+/// Display voxels of a scenery; 0 where its grid has a side without any.
+inline std::uint64_t voxelsOf(const Scenery& scenery) noexcept
+{
+    std::uint64_t count = 1;
+    for (const std::int32_t n : scenery.labels.size)
+        count *= n > 0 ? static_cast<std::uint64_t>(n) : 0;
+    return count;
 }
 
 /// "/palpate-SESSION". Throws std::runtime_error for a name that is not made of letters, digits, '-' and '_'.

@@ -26,6 +26,14 @@ bool within(std::uint64_t offset, std::uint64_t length, std::uint64_t bytes) noe
     return offset <= bytes && length <= bytes - offset && offset % alignof(Word) == 0;
 }
 
+// Whether labels and image are as large as the scenery says.
+bool coherent(const Header& header, const Scenery& scenery) noexcept
+{
+    const std::uint64_t voxels = voxelsOf(scenery);
+    return header.labelsBytes == voxels && scenery.windows <= maxWindows &&
+           header.imageBytes == (scenery.windows > 0 ? voxels * sizeof(std::uint16_t) : 0);
+}
+
 // Throws when `header` is not one that this program can read.
 void check(const std::string& session, const Header& header, std::uint64_t bytes)
 {
@@ -37,12 +45,13 @@ void check(const std::string& session, const Header& header, std::uint64_t bytes
                std::to_string(version) + "; install both from the same build");
     if (header.layoutHash != layoutHash())
         refuse("the simulation and this viewer were built with different layouts; install both from the same build");
-    const bool sound = header.bytes == bytes && within(header.sceneryOffset, sizeof(Scenery), bytes) &&
-                       within(header.labelsOffset, header.labelsBytes, bytes) &&
-                       within(header.stateOffset, sizeof(StateBlock), bytes) &&
-                       within(header.inputOffset, sizeof(InputBlock), bytes) &&
-                       within(header.displacedOffset, sizeof(DisplacedBlock), bytes);
-    if (!sound)
+    const bool sound =
+        header.bytes == bytes && within(header.sceneryOffset, sizeof(Scenery), bytes) &&
+        within(header.labelsOffset, header.labelsBytes, bytes) && within(header.imageOffset, header.imageBytes, bytes) &&
+        within(header.stateOffset, sizeof(StateBlock), bytes) && within(header.inputOffset, sizeof(InputBlock), bytes) &&
+        within(header.displacedOffset, sizeof(DisplacedBlock), bytes);
+    if (!sound || !coherent(header, *reinterpret_cast<const Scenery*>(reinterpret_cast<const std::byte*>(&header) +
+                                                                      header.sceneryOffset)))
         refuse("its shared memory is damaged; end the simulation and start it again");
 }
 
@@ -115,6 +124,11 @@ const Scenery& Subscriber::scenery() const noexcept
 std::span<const std::uint8_t> Subscriber::labels() const noexcept
 {
     return {&impl_->at<std::uint8_t>(impl_->header->labelsOffset), impl_->header->labelsBytes};
+}
+
+std::span<const std::uint16_t> Subscriber::image() const noexcept
+{
+    return {&impl_->at<std::uint16_t>(impl_->header->imageOffset), impl_->header->imageBytes / sizeof(std::uint16_t)};
 }
 
 std::optional<State> Subscriber::state() const noexcept

@@ -151,7 +151,9 @@ TEST_F(Researcher, AnImageOnAnotherGridScalesTheStiffness)
             ASSERT_NEAR(stiffness.values[labels.offset(n)], 10.0 * (1.1 + x / 0.1), 1e-3);
         }
     });
-    expectRefusal({"import", seg, "-o", vdb, "--image", image, "--stiffness-from", "hu"}, "the image is in no known unit");
+    expectRefusal({"import", seg, "-o", vdb, "--image", image, "--stiffness-from", "hu"}, "add --image-unit HU");
+    const auto ct = figures({"import", seg, "-o", vdb, "--image", image, "--image-unit", "HU", "--stiffness-from", "hu"});
+    EXPECT_EQ(ct.at("image"), "on the voxels of the tissue, in HU; scales the stiffness by 0.5 at -60 to 2 at 140");
     expectRefusal({"import", seg, "-o", vdb, "--stiffness-from", "hu"}, "add --image");
 }
 

@@ -13,6 +13,7 @@
 #include <fstream>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::channel {
@@ -306,6 +307,88 @@ TEST(Session, ViewersMapItReadOnly)
     EXPECT_EQ(mappings, 1);
     killAndReap(child);
     removeSegment(session);
+}
+
+Scenery sceneryWithImage()
+{
+    Scenery scenery = smallScenery();
+    scenery.windows = 1;
+    scenery.window[0] = {{"soft tissue"}, -160, 240};
+    return scenery;
+}
+
+std::vector<std::uint16_t> smallImage()
+{
+    std::vector<std::uint16_t> image;
+    for (std::uint16_t i = 0; i < 60; ++i)
+        image.push_back(static_cast<std::uint16_t>(1000 * i));
+    return image;
+}
+
+std::uint64_t bytesOf(const std::string& session)
+{
+    return RawSegment(segmentName(session)).at<Header>(0).bytes;
+}
+
+// It takes its two bytes for each voxel, in whole pages, and a session without one takes none.
+TEST(Session, BringsTheImageToViewersAndPaysOnlyWhereThereIsOne)
+{
+    const std::string plain = sessionNamed("plain"), session = sessionNamed("image");
+    const Publisher without(plain, smallScenery(), smallLabels());
+    const Publisher with(session, sceneryWithImage(), smallLabels(), smallImage());
+    const auto viewer = Subscriber::attach(session), other = Subscriber::attach(plain);
+    ASSERT_TRUE(viewer && other);
+    const auto seen = viewer->image();
+    EXPECT_EQ(std::vector<std::uint16_t>(seen.begin(), seen.end()), smallImage());
+    const auto labels = viewer->labels();
+    EXPECT_EQ(std::vector<std::uint8_t>(labels.begin(), labels.end()), smallLabels());
+    EXPECT_EQ(viewer->scenery().window[0].high, 240);
+    EXPECT_TRUE(other->image().empty());
+    EXPECT_EQ(other->scenery().windows, 0U);
+    EXPECT_EQ(bytesOf(session), bytesOf(plain) + 4096);
+}
+
+TEST(Session, AnImageThatDoesNotFillTheGridOrHasNoWindowIsRefused)
+{
+    const std::string session = sessionNamed("badimage");
+    auto cut = smallImage();
+    cut.pop_back();
+    Scenery many = sceneryWithImage();
+    many.windows = maxWindows + 1;
+    const auto refused = [&](const Scenery& scenery, const std::vector<std::uint16_t>& image) {
+        return messageOf([&] { Publisher(session, scenery, smallLabels(), image); }).find("an image of") !=
+               std::string::npos;
+    };
+    EXPECT_TRUE(refused(sceneryWithImage(), cut));
+    EXPECT_TRUE(refused(sceneryWithImage(), {}));
+    EXPECT_TRUE(refused(smallScenery(), smallImage()));
+    EXPECT_TRUE(refused(many, smallImage()));
+    EXPECT_FALSE(listed(session));
+}
+
+// A viewer reads as many codes as the grid has voxels: whatever in the segment says otherwise is damage.
+TEST(Session, WhoseImageIsNotWhatTheSceneryClaimsIsRefused)
+{
+    const std::string session = sessionNamed("damaged");
+    const Publisher publisher(session, sceneryWithImage(), smallLabels(), smallImage());
+    RawSegment raw(segmentName(session));
+    auto& header = raw.at<Header>(0);
+    auto& scenery = raw.at<Scenery>(header.sceneryOffset);
+    const auto refused = [&](auto& field, auto value) {
+        const auto before = std::exchange(field, value);
+        const bool damaged = messageOf([&] { Subscriber::attach(session); }).find("damaged") != std::string::npos;
+        field = before;
+        return damaged;
+    };
+    EXPECT_TRUE(refused(header.imageBytes, 0U));
+    EXPECT_TRUE(refused(header.imageBytes, 118U));
+    EXPECT_TRUE(refused(header.imageOffset, header.bytes - 64));
+    EXPECT_TRUE(refused(header.imageOffset, header.imageOffset + 1));
+    EXPECT_TRUE(refused(scenery.windows, 0U));
+    EXPECT_TRUE(refused(scenery.windows, static_cast<std::uint32_t>(maxWindows + 1)));
+    EXPECT_TRUE(refused(scenery.labels.size[2], 30));
+    EXPECT_TRUE(refused(scenery.labels.size[2], -3));
+    EXPECT_TRUE(Subscriber::attach(session).has_value());
 }
 
 TEST(Session, LabelsThatDoNotFillTheGridAreRefused)

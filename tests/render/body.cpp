@@ -110,6 +110,21 @@ std::vector<std::uint8_t> bodyLabels(const channel::Scenery& scenery)
     return labels;
 }
 
+std::vector<std::uint16_t> bodyImage(channel::Scenery& scenery)
+{
+    const channel::Grid& grid = scenery.labels;
+    constexpr double most = 1000, codes = 65535;
+    scenery.windows = 2;
+    scenery.window[0] = {named("all"), 0, most};
+    scenery.window[1] = {named("upper half"), most / 2, most};
+    scenery.imageUnit = named("HU");
+    scenery.imageStep = most / codes;
+    std::vector<std::uint16_t> image;
+    for (int i = 0; i < grid.size[0] * grid.size[1] * grid.size[2]; ++i)
+        image.push_back(static_cast<std::uint16_t>(std::lround(codes * (i % grid.size[0]) / (grid.size[0] - 1))));
+    return image;
+}
+
 channel::State storyState(const channel::Scenery& scenery, double t)
 {
     const glm::dvec3 axis = planAxis(), tip = entryPoint + wayAt(t) * axis;

@@ -12,6 +12,9 @@ namespace palpate::render {
 channel::Scenery bodyScenery(int voxels = 104, double spacing = 1e-3);
 std::vector<std::uint8_t> bodyLabels(const channel::Scenery& scenery);
 
+/// An image of it that rises along x from 0 to 1000, black to white, and says so in the scenery.
+std::vector<std::uint16_t> bodyImage(channel::Scenery& scenery);
+
 /// What is published at time `t` [s] of the story; it lasts storySeconds.
 inline constexpr double storySeconds = 5.0;
 inline constexpr double contactAt = 0.8, punctureAt = 2.0, arrivalAt = 3.5, fireAt = 3.8;

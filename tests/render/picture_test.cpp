@@ -205,6 +205,29 @@ TEST_F(PictureTest, ShowsTheBentNeedleWhereThePoseProjects)
         }
 }
 
+// A mark where the hand is, a line from it to the tip, and nothing of both when there is no hand.
+TEST_F(PictureTest, ShowsHowFarTheHandIsAheadOfTheTip)
+{
+    const Image before = studio->take(0.05, Layout::trainee);
+    const channel::State state = storyState(studio->scenery, 0.05);
+    const glm::dvec3 tip = vec(state.tip), hand = tip + 10e-3 * vec(state.axis) + glm::dvec3(10e-3, 0, 0);
+    Picture& picture = studio->picture();
+    picture.setHand(hand);
+    picture.render(Quality::still);
+    const Image with = studio->grab();
+    const auto shown = [&](glm::dvec3 p, const Image& image) {
+        const glm::dvec2 at = studio->project(p);
+        const Area around{static_cast<int>(at.x) - 3, static_cast<int>(at.y) - 3, 7, 7};
+        return image.count(around, pixelOf(handColour), 90);
+    };
+    EXPECT_GT(shown(hand, with), 30);
+    EXPECT_GT(shown(0.5 * (hand + tip), with), 3);
+    EXPECT_EQ(shown(hand, before), 0);
+    picture.setHand({});
+    picture.render(Quality::still);
+    EXPECT_EQ(before.differing(studio->grab(), {0, 0, width, height}), 0);
+}
+
 // The picture of the pressed body differs from that of the same tool over the body at rest, at the dimple and not far away.
 TEST_F(PictureTest, ShowsTheDeformationWhereItIs)
 {
@@ -321,6 +344,40 @@ TEST_F(PictureTest, HelpAndCaptionCoverNothingWhenTheyAreGone)
     picture.setTimeline(-1);
     picture.render(Quality::still);
     EXPECT_EQ(before.differing(studio->grab(), all), 0);
+}
+
+// Another look and another window are seen in the slice and nowhere else, and only where there is an image.
+TEST_F(PictureTest, ShowsAnImageInTheSliceOnly)
+{
+    const Area slice = ScreenPlan(width, height).slices[0], all{0, 0, width, height};
+    Picture& picture = studio->picture();
+    const auto pictureOf = [&](SliceLook look) {
+        picture.show(look);
+        picture.render(Quality::still);
+        return studio->grab();
+    };
+    const Image plain = studio->take(0.05, Layout::trainee);
+    EXPECT_FALSE(picture.hasImage());
+    EXPECT_EQ(plain.differing(pictureOf(SliceLook::image), all), 0);
+
+    channel::Scenery scenery = studio->scenery;
+    const auto codes = bodyImage(scenery);
+    picture.open(scenery, studio->labels, "story", codes);
+    picture.update(storyState(scenery, 0.05), nullptr, {30, 0.02, 1000});
+    EXPECT_TRUE(picture.hasImage());
+    const Image grey = pictureOf(SliceLook::image), colours = pictureOf(SliceLook::tissue),
+                tinted = pictureOf(SliceLook::tinted);
+    const int body = slice.width * slice.height / 3;
+    for (const Image* other : {&colours, &tinted}) {
+        EXPECT_GT(grey.differing(*other, slice), body);
+        EXPECT_EQ(grey.differing(*other, all), grey.differing(*other, slice));
+    }
+    EXPECT_EQ(plain.differing(colours, slice), 0);
+    picture.nextWindow();
+    EXPECT_GT(grey.differing(pictureOf(SliceLook::image), slice), body);
+    picture.nextWindow();
+    EXPECT_EQ(grey.differing(pictureOf(SliceLook::image), all), 0) << "the first window again";
+    picture.show(SliceLook::tinted);
 }
 
 // under() is the inverse of the projection.

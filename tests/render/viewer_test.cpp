@@ -178,6 +178,25 @@ int countNear(vtkImageData& image, const Area& area, const Pixel& colour, int to
     return count;
 }
 
+// The image rises along x: grey is 255 times the share of the way through the grid.
+TEST_F(Viewer, ShowsTheImageInItsSlices)
+{
+    channel::Scenery scenery = bodyScenery();
+    const auto image = bodyImage(scenery);
+    channel::Publisher publisher(session_, scenery, bodyLabels(scenery), image);
+    publisher.setState(storyState(scenery, 0.05));
+    Process viewer(view({"--frames", "1", "--slices", "image"}), log("viewer"));
+    ASSERT_EQ(viewer.wait(), 0) << said("viewer");
+    vtkNew<vtkPNGReader> reader;
+    reader->SetFileName((fs::path(pictures()) / "frame_00000.png").c_str());
+    reader->Update();
+    const channel::Grid& grid = scenery.labels;
+    for (const double x : {-30e-3, -12e-3, 10e-3, 25e-3}) {
+        const int grey = static_cast<int>(255 * (x - grid.origin[0]) / ((grid.size[0] - 1) * grid.spacing));
+        EXPECT_TRUE(near(onSlice(*reader->GetOutput(), scenery, {x, 15e-3, 0}), {grey, grey, grey}, 3)) << x;
+    }
+}
+
 TEST_F(Viewer, ShowsTheDimpleAndTheNeedleWhereTheyAre)
 {
     const auto before = pictureAt("0.05"), after = pictureAt("1.99");

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace palpate::volume {
 namespace {
@@ -74,6 +76,43 @@ TEST(Companion, ScalesTheStiffnessOfTheTissuesItIsMeantFor)
     const Tissue::Reader reader(scaled);
     EXPECT_NEAR(reader.youngsModulus(Vec3(0, 0, 11e-3)), 2 * 3.25e3, 1e-3);
     EXPECT_NEAR(reader.youngsModulus(Vec3(0.0)), 43.7e3, 1e-3);
+}
+
+// A cell that is all tissue has the ramp's value at its middle, however the voxels lie to the grid: to rounding where it
+// interpolates between voxels, else to half a voxel (steps of 10). Where no tissue is near there is no value.
+TEST(Companion, IsTheMeanOverTheTissueInACell)
+{
+    const LabelImage image = block();
+    const CompanionImage companion = ramp(image, {});
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {}, &companion);
+    for (const double spacing : {1e-3, 2e-3, 3.9e-3, 4.5e-3}) {
+        const NodeGrid grid = coveringGrid(tissue.box(), spacing, 4 * spacing);
+        const std::vector<float> values = tissue.imageOn(grid);
+        ASSERT_EQ(values.size(), grid.count());
+        const bool exact = spacing < 4e-3;
+        std::size_t within = 0, beyond = 0;
+        for (std::size_t i = 0; i < grid.count(); ++i) {
+            const Vec3 p = grid.position(grid.node(i));
+            const double reach = spacing + 3.5e-3;  // of a cell's samples and the voxels around them
+            if (glm::length(p) < 14e-3 - reach) {
+                EXPECT_NEAR(static_cast<double>(values[i]), 10 * image.affine.toIndex(p).x, exact ? 1e-3 : 5.0);
+                ++within;
+            } else if (glm::length(p) > 14e-3 + reach) {
+                EXPECT_TRUE(std::isnan(values[i]));
+                ++beyond;
+            }
+        }
+        EXPECT_GT(within, 5U);
+        EXPECT_GT(beyond, 5U);
+    }
+}
+
+TEST(Companion, IsNowhereWithoutOne)
+{
+    const Tissue tissue = Tissue::fromLabels(block(), table(), names(), {});
+    for (const float value : tissue.imageOn(coveringGrid(tissue.box(), 4e-3, 0))) {
+        ASSERT_TRUE(std::isnan(value));
+    }
 }
 
 TEST(Companion, OfAnotherSizeIsRefused)

@@ -17,8 +17,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <numeric>
+#include <random>
 
 namespace palpate::volume {
 namespace {
@@ -177,6 +180,43 @@ TEST_F(Dicom, CompressedSyntaxesHoldTheSamePixels)
     }
 }
 
+// DCMTK's decoder of RLE follows damaged offsets out of its buffer; CharLS, that of JPEG-LS, has its assertions armed.
+TEST_F(Dicom, DamagedCompressedPixelsAreTakenOrRefused)
+{
+    for (const E_TransferSyntax syntax : {EXS_RLELossless, EXS_JPEGProcess14SV1, EXS_JPEGLSLossless}) {
+        SCOPED_TRACE(DcmXfer(syntax).getXferName());
+        write("a", {Vec3(0.0),
+                    {1, 0, 0},
+                    {0, 1, 0},
+                    "1.2.3",
+                    "",
+                    0,
+                    {},
+                    syntax,
+                    syntax == EXS_JPEGLSLossless ? Uint16{16} : Uint16{12}});
+        ASSERT_EQ(reason(), "");
+        std::ifstream in(folder / "a", std::ios::binary);
+        const std::string whole{std::istreambuf_iterator<char>(in), {}};
+        std::size_t refused = 0;
+        const std::size_t pixels = whole.rfind("\xe0\x7f\x10");
+        ASSERT_NE(pixels, std::string::npos);
+        const auto damageAt = [&](std::initializer_list<std::size_t> places) {
+            std::string bytes = whole;
+            for (const std::size_t at : places) {
+                bytes[at] = static_cast<char>(~bytes[at]);
+            }
+            std::ofstream(folder / "a", std::ios::binary) << bytes;
+            refused += reason().empty() ? 0 : 1;
+        };
+        std::mt19937 random(1);
+        for (std::size_t at = pixels + 20; at < whole.size(); ++at) {
+            damageAt({at});
+            damageAt({at, pixels + 20 + random() % (whole.size() - pixels - 20)});
+        }
+        EXPECT_GT(refused, 5U);
+    }
+}
+
 TEST_F(Dicom, MissingUnevenAndDoubledSlicesAreRefused)
 {
     writeSeries({1, 0, 0}, {0, 1, 0}, 3);
@@ -302,6 +342,9 @@ protected:
             data.findOrCreateSequenceItem(DCM_SegmentSequence, item, -2);
             item->putAndInsertUint16(DCM_SegmentNumber, static_cast<Uint16>(n));
             item->putAndInsertString(DCM_SegmentLabel, fmt::format("part {}", n).c_str());
+            code(*item, DCM_SegmentedPropertyCategoryCodeSequence, "123037004", "Anatomical Structure");
+            code(*code(*item, DCM_SegmentedPropertyTypeCodeSequence, "64033007", "Kid~ney"),
+                 DCM_SegmentedPropertyTypeModifierCodeSequence, "7771000", "Left");
             const Uint16 white[3] = {65535, 32896, 32896};
             item->putAndInsertUint16Array(DCM_RecommendedDisplayCIELabValue, white, 3);
         }
@@ -336,6 +379,16 @@ protected:
     }
 
 private:
+    static DcmItem* code(DcmItem& parent, const DcmTagKey& tag, const char* value, const char* meaning)
+    {
+        DcmItem* item = nullptr;
+        parent.findOrCreateSequenceItem(tag, item);
+        item->putAndInsertString(DCM_CodingSchemeDesignator, "SCT");
+        item->putAndInsertString(DCM_CodeValue, value);
+        item->putAndInsertString(DCM_CodeMeaning, meaning);
+        return item;
+    }
+
     static bool addFrame(DcmDataset& data, const Segmentation& s, int segment, int k, std::vector<int>& values)
     {
         std::vector<int> frame;
@@ -382,6 +435,9 @@ TEST_F(DicomSeg, BinaryFramesAreSparseOverlapAndBeginWithinBytes)
     EXPECT_NEAR(glm::length(labels.image.affine.toPatient({2, 1, 4}) - Vec3(11e-3, 22e-3, 42e-3)), 0, 1e-12);
     ASSERT_EQ(labels.names.size(), 2U);
     EXPECT_EQ(labels.names[1].name, "part 2");
+    EXPECT_EQ(labels.names[1].terminology,
+              "Segmentation category and type - DICOM master list~SCT^123037004^Anatomical Structure~SCT^64033007^Kid ney~"
+              "SCT^7771000^Left~Anatomic codes - DICOM master list~^^~^^");
     ASSERT_TRUE(labels.names[1].colour);
     for (const std::uint8_t c : *labels.names[1].colour) {
         EXPECT_NEAR(c, 255, 1);  // CIELab 100, 0, 0 is white

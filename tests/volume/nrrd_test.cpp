@@ -219,6 +219,35 @@ TEST_F(Nrrd, LayersComeInWhicheverAxisListsThem)
     EXPECT_EQ(first.names[2].value, 3);  // 1 is taken
 }
 
+// Names go to terminals and into UTF-8 files: no control character gets there, and Latin-1 is what it was meant to be.
+TEST_F(Nrrd, NamesAreTextWhateverBytesTheyAre)
+{
+    const std::array<std::pair<std::string, std::string>, 7> names = {
+        {{"Sch\xe4"
+          "del",
+          "Sch\xc3\xa4"
+          "del"},
+         {"Sch\xc3\xa4"
+          "del",
+          "Sch\xc3\xa4"
+          "del"},
+         {"\x1b[2Jred", " [2Jred"},
+         {"a\x7f\xc2\x9b"
+          "b\x85",
+          "a  b "},
+         {"\xe2\x82\xac \xf0\x9f\xab\x81", "\xe2\x82\xac \xf0\x9f\xab\x81"},
+         {"\xed\xa0\x80", "\xc3\xad\xc2\xa0 "},
+         {"cut \xe2\x82", "cut \xc3\xa2 "}}};
+    for (const auto& [written, meant] : names) {
+        const std::string segment = fmt::format("Segment0_ID:=a\nSegment0_Name:={}\nSegment0_LabelValue:=1\n", written);
+        EXPECT_EQ(importLabels(write("a.seg.nrrd", head("raw", segment) + bytesOf(std::vector<std::uint16_t>(120, 1))))
+                      .names.at(0)
+                      .name,
+                  meant);
+    }
+    EXPECT_EQ(reason(head("\x1b]0;x\x07")).find('\x1b'), std::string::npos);
+}
+
 // The four rules, and what each takes from whom: voxels 50..59 are large's and small's, 60..64 other's and small's.
 TEST_F(Nrrd, OverlapIsResolvedByTheRuleThatIsAskedFor)
 {

@@ -151,14 +151,37 @@ void readFrames(DcmDataset& data, DicomObject& object)
     }
 }
 
-std::string code(DcmItem& segment, const DcmTagKey& tag)
+DcmItem* firstItem(DcmItem* parent, const DcmTagKey& tag)
 {
     DcmItem* item = nullptr;
-    if (segment.findAndGetSequenceItem(tag, item, 0).bad() || item == nullptr) {
+    return parent != nullptr && parent->findAndGetSequenceItem(tag, item, 0).good() ? item : nullptr;
+}
+
+// scheme^value^meaning of a code, "^^" where there is none; ~, ^ and | part the entries of a terminology.
+std::string codeText(DcmItem* code)
+{
+    const auto part = [&](const DcmTagKey& tag) {
+        std::string out = code == nullptr ? "" : text(*code, tag);
+        std::replace_if(
+            out.begin(), out.end(), [](char c) { return c == '~' || c == '^' || c == '|'; }, ' ');
+        return out;
+    };
+    return fmt::format("{}^{}^{}", part(DCM_CodingSchemeDesignator), part(DCM_CodeValue), part(DCM_CodeMeaning));
+}
+
+// As 3D Slicer writes it: context, category, type, its modifier, context, region, its modifier.
+std::string terminologyOf(DcmItem& segment)
+{
+    DcmItem* type = firstItem(&segment, DCM_SegmentedPropertyTypeCodeSequence);
+    DcmItem* region = firstItem(&segment, DCM_AnatomicRegionSequence);
+    if (type == nullptr) {
         return "";
     }
-    return fmt::format("{}^{}^{}", text(*item, DCM_CodingSchemeDesignator), text(*item, DCM_CodeValue),
-                       text(*item, DCM_CodeMeaning));
+    return fmt::format(
+        "Segmentation category and type - DICOM master list~{}~{}~{}~Anatomic codes - DICOM master list~{}~{}",
+        codeText(firstItem(&segment, DCM_SegmentedPropertyCategoryCodeSequence)), codeText(type),
+        codeText(firstItem(type, DCM_SegmentedPropertyTypeModifierCodeSequence)), codeText(region),
+        codeText(firstItem(region, DCM_AnatomicRegionModifierSequence)));
 }
 
 // CIELab of the white point D50, as DICOM writes it (PS3.3 C.10.7.1.1), to sRGB.
@@ -199,8 +222,7 @@ void readSegments(DcmDataset& data, DicomObject& object)
         LabelName name;
         name.value = static_cast<std::uint16_t>(whole(item, DCM_SegmentNumber, 0));
         name.name = text(item, DCM_SegmentLabel);
-        name.terminology = fmt::format("{}~{}", code(item, DCM_SegmentedPropertyCategoryCodeSequence),
-                                       code(item, DCM_SegmentedPropertyTypeCodeSequence));
+        name.terminology = terminologyOf(item);
         Uint16 lab[3] = {0, 0, 0};
         bool coloured = true;
         for (unsigned long i = 0; i < 3; ++i) {

@@ -52,6 +52,7 @@ struct DicomPixels::Data {
     void open();
     void checkSize() const;
     std::vector<std::byte> codeStream(std::size_t index) const;
+    void checkRle(std::size_t index) const;
     void readPlain(std::size_t index);
     void readBits(std::size_t index);
     void normalise();
@@ -119,8 +120,34 @@ std::vector<std::byte> DicomPixels::Data::codeStream(std::size_t index) const
     return stream;
 }
 
+// An RLE frame begins with the number of its segments, one for each byte of a pixel, and 15 offsets to them (DICOM PS3.5,
+// G.5). DCMTK follows these wherever they lead.
+void DicomPixels::Data::checkRle(std::size_t index) const
+{
+    constexpr std::size_t headerBytes = 64;
+    const std::vector<std::byte> stream = codeStream(index);
+    const auto number = [&](std::size_t i) {
+        std::uint32_t value = 0;
+        for (std::size_t k = 4; k-- > 0;) {
+            value = value << 8 | std::to_integer<std::uint32_t>(stream[4 * i + k]);
+        }
+        return value;
+    };
+    const auto segments = static_cast<std::size_t>(object.bitsAllocated) / 8;
+    bool sound = stream.size() > headerBytes && number(0) == segments && number(1) == headerBytes;
+    for (std::size_t i = 2; sound && i <= segments; ++i) {
+        sound = number(i) > number(i - 1) && number(i) < stream.size();
+    }
+    if (!sound) {
+        fail("its RLE data are damaged, their segments lie outside of them");
+    }
+}
+
 void DicomPixels::Data::readPlain(std::size_t index)
 {
+    if (fragments != nullptr && syntax == EXS_RLELossless) {
+        checkRle(index);
+    }
     const std::size_t width = static_cast<std::size_t>(object.bitsAllocated) / 8;
     buffer.resize(values.size() * width + values.size() * width % 2);
     Uint32 fragment = 0;

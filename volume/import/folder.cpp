@@ -1,3 +1,4 @@
+#include <volume/import/barrier.h>
 #include <volume/import/dicom.h>
 #include <volume/import/header_text.h>
 #include <volume/import/segments.h>
@@ -29,7 +30,7 @@ std::string structureName(const std::filesystem::path& file)
     if (lowerCase(file.extension().string()) == ".gz") {
         name = file.stem().string();
     }
-    return name.substr(0, name.rfind('.'));
+    return printable(name.substr(0, name.rfind('.')));
 }
 
 // Any value but 0 is inside; more than one such value is no mask.
@@ -138,7 +139,8 @@ ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOpt
                            volumes.size(), dicom.size()));
     }
     if (!dicom.empty()) {
-        return dicomLabels(folder, dicom, options);
+        return labelsApart(folder, dicomLibrary, options,
+                           [&](const ImportOptions& o) { return dicomLabels(folder, dicom, o); });
     }
     if (volumes.empty()) {
         refuse(folder,

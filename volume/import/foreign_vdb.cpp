@@ -43,7 +43,7 @@ void fill(const std::filesystem::path& file, const Grid& grid, ImportedLabels& o
 {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
     if (box.empty()) {
-        refuse(file, "no voxel is set: the grid has no active voxels");
+        refuse(file, "no voxel is set, the grid has no active voxels: save the one that holds the labels");
     }
     const openvdb::Coord dim = box.dim();
     LabelImage& image = out.image;

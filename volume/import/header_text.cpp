@@ -30,7 +30,46 @@ std::vector<T> parsed(const std::filesystem::path& file, const std::string& what
     return out;
 }
 
+// Bytes of the UTF-8 character that begins at `at`; 0 where none does. RFC 3629, section 4.
+std::size_t utf8Length(const std::string& text, std::size_t at)
+{
+    const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+    const unsigned lead = byte(at);
+    const std::size_t length = lead < 0x80 ? 1 : lead < 0xc2 ? 0 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : lead < 0xf5 ? 4 : 0;
+    if (length < 2 || at + length > text.size()) {
+        return length == 1 ? 1 : 0;
+    }
+    const unsigned low = lead == 0xe0 ? 0xa0 : lead == 0xf0 ? 0x90 : 0x80;
+    const unsigned high = lead == 0xed ? 0x9f : lead == 0xf4 ? 0x8f : 0xbf;
+    bool whole = byte(at + 1) >= low && byte(at + 1) <= high;
+    for (std::size_t i = 2; i < length; ++i) {
+        whole = whole && (byte(at + i) & 0xc0) == 0x80;
+    }
+    return whole ? length : 0;
+}
+
 }  // namespace
+
+std::string printable(const std::string& text)
+{
+    std::string out;
+    for (std::size_t at = 0; at < text.size();) {
+        const std::size_t length = utf8Length(text, at);
+        const auto code = static_cast<unsigned char>(text[at]);
+        const bool control = code < 0x20 || code == 0x7f || (length == 0 && code < 0xa0) ||
+                             (length == 2 && code == 0xc2 && static_cast<unsigned char>(text[at + 1]) < 0xa0);
+        if (control) {
+            out += ' ';
+        } else if (length == 0) {
+            out += static_cast<char>(0xc0 | (code >> 6));
+            out += static_cast<char>(0x80 | (code & 0x3f));
+        } else {
+            out += text.substr(at, length);
+        }
+        at += std::max<std::size_t>(1, length);
+    }
+    return out;
+}
 
 std::string trimmed(const std::string& text)
 {

@@ -11,6 +11,10 @@ namespace palpate::volume {
 std::string trimmed(const std::string& text);
 std::string lowerCase(std::string text);
 
+/// What can be put on a terminal and into UTF-8 files, on one line: control characters become spaces, and bytes that are
+/// not UTF-8 are taken as Latin-1.
+std::string printable(const std::string& text);
+
 /// The numbers of "1 2 3"; `what` ("DimSize") names them in the refusal of anything else, and of numbers that are not
 /// finite.
 std::vector<double> numbers(const std::filesystem::path& file, const std::string& what, const std::string& text);

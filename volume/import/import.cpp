@@ -1,4 +1,5 @@
 #include <volume/import.h>
+#include <volume/import/barrier.h>
 #include <volume/import/dicom.h>
 #include <volume/import/header_text.h>
 #include <volume/import/segments.h>
@@ -84,7 +85,32 @@ Source checkedSource(const std::filesystem::path& file, bool sheared)
     Source source = readSource(file);
     checkAffine(file, source.affine, sheared, source.warnings);
     checkBytes(source);
+    for (SegmentName& s : source.segments) {
+        s.label.name = printable(s.label.name);
+    }
     return source;
+}
+
+// Texts of the file end up on terminals and in other files.
+void clean(std::vector<std::string>& texts)
+{
+    std::transform(texts.begin(), texts.end(), texts.begin(), printable);
+}
+
+ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions& options)
+{
+    if (std::filesystem::is_directory(path)) {
+        return folderLabels(path, options);
+    }
+    checkFile(path);
+    if (isVdb(path)) {
+        return labelsApart(path, "OpenVDB", options, [&](const ImportOptions&) { return vdbLabels(path); });
+    }
+    if (isDicom(path)) {
+        return labelsApart(path, dicomLibrary, options,
+                           [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
+    }
+    return labelsOf(checkedSource(path, options.sheared), options);
 }
 
 }  // namespace
@@ -108,30 +134,27 @@ Source readSource(const std::filesystem::path& file)
 
 ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptions& options)
 {
-    if (std::filesystem::is_directory(path)) {
-        return folderLabels(path, options);
+    ImportedLabels out = readLabels(path, options);
+    clean(out.warnings);
+    for (LabelName& n : out.names) {
+        n.name = printable(n.name);
+        n.terminology = printable(n.terminology);
     }
-    checkFile(path);
-    if (isVdb(path)) {
-        return vdbLabels(path);
-    }
-    if (isDicom(path)) {
-        return dicomLabels(path, {path}, options);
-    }
-    return labelsOf(checkedSource(path, options.sheared), options);
+    return out;
 }
 
 ImportedImage importImage(const std::filesystem::path& path, const ImportOptions& options)
 {
-    if (std::filesystem::is_directory(path)) {
-        return dicomImage(path, dicomFilesIn(path), options);
+    const bool folder = std::filesystem::is_directory(path);
+    if (!folder) {
+        checkFile(path);
     }
-    checkFile(path);
-    if (isVdb(path)) {
+    if (!folder && isVdb(path)) {
         refuse(path, "is OpenVDB, of which only labels are read: save the image as NIfTI");
     }
-    if (isDicom(path)) {
-        return dicomImage(path, {path}, options);
+    if (folder || isDicom(path)) {
+        const Files files = folder ? dicomFilesIn(path) : Files{path};
+        return imageApart(path, dicomLibrary, options, [&](const ImportOptions& o) { return dicomImage(path, files, o); });
     }
     Source source = checkedSource(path, true);
     if (source.layers > 1) {
@@ -147,6 +170,7 @@ ImportedImage importImage(const std::filesystem::path& path, const ImportOptions
     });
     out.warnings = std::move(source.warnings);
     makeFinite(path, out.values, out.warnings);
+    clean(out.warnings);
     return out;
 }
 

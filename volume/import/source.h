@@ -2,6 +2,7 @@
 
 #include <volume/geometry.h>
 #include <volume/import.h>
+#include <volume/import/header_text.h>
 #include <volume/import/unpack.h>
 #include <volume/label_image.h>
 
@@ -83,7 +84,7 @@ void decode(const Source& source, const std::function<void(double)>& progress,
 
 [[noreturn]] inline void refuse(const std::filesystem::path& file, const std::string& why)
 {
-    throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
+    throw std::runtime_error(printable(fmt::format("{}: {}", file.string(), why)));
 }
 
 /// The three sizes of a header, each in 1..32767 and not too many voxels, so that nothing absurd is allocated.

@@ -15,19 +15,23 @@ namespace {
 constexpr std::size_t mostLabels = 1024;                 // more different values than this is an image
 constexpr std::uint64_t mostVoxels = 0xffffffff;         // of one volume
 constexpr std::uint64_t mostPadding = 16;                // [bytes]
+constexpr std::uint64_t mostBefore = 1 << 30;            // unpacked, in front of voxels that are the last bytes [bytes]
 constexpr double mostShear = 2e-3;                       // cosine between voxel axes
 constexpr double degree = 3.14159265358979323846 / 180;  // [rad]
 
 template <typename T>
 void appendAs(std::span<const std::byte> bytes, bool turned, std::vector<double>& out)
 {
-    for (std::size_t at = 0; at + sizeof(T) <= bytes.size(); at += sizeof(T)) {
+    const std::size_t count = bytes.size() / sizeof(T);
+    const std::size_t first = out.size();
+    out.resize(first + count);
+    for (std::size_t i = 0; i < count; ++i) {
         std::array<std::byte, sizeof(T)> raw;
-        std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), sizeof(T), raw.begin());
+        std::memcpy(raw.data(), bytes.data() + i * sizeof(T), sizeof(T));
         if (turned) {
             std::reverse(raw.begin(), raw.end());
         }
-        out.push_back(static_cast<double>(std::bit_cast<T>(raw)));
+        out[first + i] = static_cast<double>(std::bit_cast<T>(raw));
     }
 }
 
@@ -90,10 +94,10 @@ void checkBytes(Source& source)
 {
     const std::uint64_t width = source.encoding == Encoding::text ? sizeof(double) : bytesOf(source.component);
     const std::uint64_t wanted = source.elements() * width;
-    const std::uint64_t most = source.fromEnd ? std::numeric_limits<std::uint64_t>::max()
-                                              : source.skip + wanted + std::max(mostPadding, source.trailer);
+    const std::uint64_t most =
+        source.fromEnd ? wanted + mostBefore : source.skip + wanted + std::max(mostPadding, source.trailer);
     const std::uint64_t there = unpackedSize(source.data, source.offset, source.encoding, most);
-    if (source.fromEnd && there >= wanted) {
+    if (source.fromEnd && there >= wanted && (there <= most || source.encoding == Encoding::raw)) {
         source.skip = there - wanted;
         return;
     }
