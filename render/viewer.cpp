@@ -6,6 +6,7 @@
 #include <malloc.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
@@ -27,7 +28,7 @@ void standBack()
     constexpr int nicer = 5;
     [[maybe_unused]] const int level = ::nice(nicer);
     const unsigned cores = std::thread::hardware_concurrency();
-    ::setenv("LP_NUM_THREADS", std::to_string(cores > 2 ? cores / 2 : 1).c_str(), 0);
+    ::setenv("LP_NUM_THREADS", std::to_string(cores > 4 ? cores / 2 : std::min(cores, 2U)).c_str(), 0);
     // Buffers of every picture would else go back to the system and come again: the kernel clears them, and while it does
     // the simulation cannot have that core.
     constexpr int kept = 32 << 20;  // [bytes]

@@ -8,6 +8,7 @@
 #include <apps/outputs.h>
 #include <apps/session.h>
 #include <apps/trainer.h>
+#include <datasets/scene.h>
 #include <render/channel/layout.h>
 
 #include <fmt/format.h>
@@ -105,6 +106,7 @@ void benchIpc(const IpcOptions& o)
 
 struct SyncOptions {
     std::string scene = "find-lump", size = "640x480";
+    SceneChanges changes;
     double seconds = 15.0;
     std::string json;
 };
@@ -171,7 +173,7 @@ void printSync(const nlohmann::json& f)
 void benchSync(const SyncOptions& o)
 {
     checkOutput(o.json);
-    const auto model = openSession(o.scene, {});
+    const auto model = openSession(o.scene, o.changes);
     const auto info = describeSession(model, o.scene, "hand");
     const ScratchFolder scratch;
     TrainOptions options;
@@ -231,6 +233,8 @@ void addBenchSync(CLI::App& bench)
     auto o = std::make_shared<SyncOptions>();
     auto* sync = bench.add_subcommand("sync", "How far apart in time two viewers show the same tick");
     sync->add_option("SCENE", o->scene, "Scene of the session")->capture_default_str();
+    sync->add_option("--setting", o->changes.setting, "How fine level elastic is")
+        ->check(CLI::IsMember(datasets::elasticSettings()));
     sync->add_option("--seconds", o->seconds, "Of the session [s]")->check(CLI::Range(1.0, 600.0))->capture_default_str();
     sync->add_option("--size", o->size, "Of the viewers' windows, WIDTHxHEIGHT in pixels")->capture_default_str();
     sync->add_option("--json", o->json, "Write figures to this file (- = standard output)");

@@ -24,7 +24,6 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -43,7 +42,7 @@ struct Options {
     int width = 800;
     int height = 600;
     int frames = 150;
-    std::optional<std::string> setting;
+    SceneChanges changes;
     bool alone = false;
     std::string json;
 };
@@ -170,16 +169,9 @@ nlohmann::json readFigures(const fs::path& file)
     return figures;
 }
 
-haptics::SessionModel openScene(const Options& o)
-{
-    SceneChanges changes;
-    changes.setting = o.setting;
-    return openSession(o.scene, changes);
-}
-
 nlohmann::json measure(const Options& o, int side, const std::string& layout)
 {
-    const auto model = openScene(o);
+    const auto model = openSession(o.scene, o.changes);
     const auto count = static_cast<std::size_t>(side) * static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
     const Vec3 extent = model.tissue->box().high - model.tissue->box().low;
     const double finest = 0.9 * std::cbrt(extent.x * extent.y * extent.z / static_cast<double>(count));
@@ -234,7 +226,7 @@ void benchView(const Options& o)
     }
     nlohmann::json result{{"scene", o.scene}, {"cores", std::thread::hardware_concurrency()}};
     if (!o.alone) {
-        const auto model = openScene(o);
+        const auto model = openSession(o.scene, o.changes);
         ServoBeside unseen(model);
         unseen.end();  // after one session
         result["without_viewer"] = {{"lateness_us_p99", unseen.latenessP99()}, {"missed_share", unseen.missedShare()}};
@@ -284,7 +276,7 @@ void addBenchView(CLI::App& bench)
     view->add_option("--width", o->width, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--height", o->height, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--frames", o->frames, "Pictures of each case")->check(CLI::Range(10, 100000))->capture_default_str();
-    view->add_option("--setting", o->setting, "How fine level elastic of the servo loop is")
+    view->add_option("--setting", o->changes.setting, "How fine level elastic of the servo loop is")
         ->check(CLI::IsMember(datasets::elasticSettings()));
     view->add_flag("--alone", o->alone, "Without a servo loop beside it, to compare");
     view->add_option("--json", o->json, "Write figures to this file (- = standard output)");
