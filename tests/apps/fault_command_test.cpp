@@ -1,6 +1,7 @@
 #include <tests/apps/program.h>
 
 #include <haptics/recorder.h>
+#include <haptics/stabiliser.h>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
@@ -38,11 +39,19 @@ struct Session {
     std::vector<haptics::TickRecord> ticks;
 };
 
+// A force may also fall as fast as a stable spring does on the way that the hand goes along with it; a machine that is late
+// makes that way longer. No hand goes as far as a pose jumps.
 void expectContinuousForce(const Session& session)
 {
+    const double stiffest = haptics::stableLimits({}).stiffness;
+    constexpr double furthest = 2e-3;  // [m]
     for (std::size_t i = 1; i < session.ticks.size(); ++i) {
-        const double step = glm::distance(session.ticks[i].total, session.ticks[i - 1].total);
-        ASSERT_LE(step, slew * (1.0 + 1e-9)) << "tick " << i;
+        const auto &before = session.ticks[i - 1], &now = session.ticks[i];
+        const Vec3 way = now.device.position - before.device.position;
+        const bool falls = now.device.fresh && glm::length(way) < furthest && glm::dot(before.total, way) > 0.0 &&
+                           glm::length(now.total) < glm::length(before.total);
+        const double step = glm::distance(now.total, before.total);
+        ASSERT_LE(step, (slew + (falls ? stiffest * glm::length(way) : 0.0)) * (1.0 + 1e-9)) << "tick " << i;
     }
 }
 
