@@ -127,9 +127,9 @@ std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSe
     }
     const bool coarser =
         model.level == datasets::ModelLevel::elastic && model.setting != datasets::elasticSettings().front();
-    return fmt::format("{:.0f} % of the ticks took over 1 ms: this machine is too slow for the tissue model; {}\n",
-                       100 * share,
-                       coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
+    return fmt::format(
+        "{:.0f} % of the ticks took over 1 ms: this machine is too slow or too busy for the tissue model; {}\n",
+        100 * share, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
 }
 
 void summarise(const TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
