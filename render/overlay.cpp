@@ -245,8 +245,13 @@ void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     drawDistances(pen, scenery, state, distanceLines);
 
     const double x = plan.view.x + edge, top = plan.view.y + plan.view.height;
-    canvas.text({x, top - 1.8 * font}, text(scenery.scene), 1.25 * font, white, Align::left, true);
-    canvas.text({x, top - 3.2 * font}, fmt::format("session {}   {:.1f} s", session, state.time), font, grey);
+    // Over the body as well: dark below bright.
+    const auto words = [&](double y, const std::string& what, double size, const Colour& colour, bool bold) {
+        canvas.text({x + 1, y - 1}, what, size, {0, 0, 0}, Align::left, bold);
+        canvas.text({x, y}, what, size, colour, Align::left, bold);
+    };
+    words(top - 1.8 * font, text(scenery.scene), 1.25 * font, white, true);
+    words(top - 3.2 * font, fmt::format("session {}   {:.1f} s", session, state.time), font, white, false);
     drawWarning(canvas, plan, scenery, state);
     drawHealth(canvas, plan, state, health);
 }
