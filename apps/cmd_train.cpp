@@ -437,8 +437,7 @@ void addTrain(CLI::App& app)
     c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
         ->check(CLI::IsMember(haptics::skillNames()));
     c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
-    c->add_option("--setting", o->changes.setting, "How fine level elastic is")
-        ->check(CLI::IsMember(datasets::elasticSettings()));
+    addSetting(*c, o->changes);
     c->add_option("--arm", o->changes.arm, "Haptic device that the stabiliser reckons with and the hand holds")
         ->check(CLI::IsMember(haptics::deviceNames()));
     c->add_option("--dffb", o->changes.dffb, "Differential force feedback; fade: its gain falls over the session or trials")

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cassert>
@@ -132,6 +133,12 @@ Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissu
 }
 
 }  // namespace
+
+void addSetting(CLI::App& command, SceneChanges& changes)
+{
+    command.add_option("--setting", changes.setting, "How fine level elastic is")
+        ->check(CLI::IsMember(datasets::elasticSettings()));
+}
 
 volume::Tissue loadVolume(const std::filesystem::path& file)
 {

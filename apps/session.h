@@ -11,6 +11,10 @@
 #include <string>
 #include <vector>
 
+namespace CLI {
+class App;
+}
+
 namespace palpate::apps {
 
 /// What --dffb takes: `on` is the scene's own mode, or `field` where it has none; `fade` is `on` with a gain that falls to
@@ -39,6 +43,9 @@ struct SceneChanges {
     bool palpate = false;              // find the target with a fingertip instead of taking a core of it
     std::vector<datasets::Insert> inserts;
 };
+
+/// The option --setting of a command.
+void addSetting(CLI::App& command, SceneChanges& changes);
 
 /// Loads a volume (.vdb). Throws std::runtime_error, also for a folder.
 volume::Tissue loadVolume(const std::filesystem::path& file);

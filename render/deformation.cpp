@@ -326,11 +326,6 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
     return tissues[static_cast<std::size_t>(best - sums.begin())];
 }
 
-std::uint8_t Deformation::tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept
-{
-    return restTissue(rest(x, shift));
-}
-
 std::uint8_t Deformation::restLabel(glm::dvec3 p) const noexcept
 {
     const glm::ivec3 nearest(glm::floor((p - vec(labelGrid_.origin)) / labelGrid_.spacing + 0.5));

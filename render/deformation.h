@@ -44,12 +44,8 @@ public:
     void follow(glm::vec3 g, glm::vec3& shift) const noexcept;
     /// Where the rest point `p` [m] lies now.
     glm::dvec3 seen(glm::dvec3 p) const noexcept;
-    /// Tissue at `x` [m] in the deformed body; `shift` as above. Around a point the tissue with the largest quadratic
-    /// spline weight wins: borders are smooth, and no label turns into another one.
-    std::uint8_t tissueAt(glm::dvec3 x, glm::vec3& shift) const noexcept;
-    /// The same with shellBit where a warning distance ends.
-    std::uint8_t labelAt(glm::dvec3 x, glm::vec3& shift) const noexcept { return restLabel(rest(x, shift)); }
-    /// The same of the rest point `p` [m].
+    /// Tissue at the rest point `p` [m], with shellBit where a warning distance ends. Around a point the tissue with the
+    /// largest quadratic spline weight wins: borders are smooth, and no label turns into another one.
     std::uint8_t restLabel(glm::dvec3 p) const noexcept;
 
     const channel::Grid& grid() const noexcept { return labelGrid_; }

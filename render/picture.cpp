@@ -199,6 +199,7 @@ void Picture::render(Quality quality)
     canvas_.begin();
     if (session_) {
         openBody();
+        session_->tool.showHand(hand_, vec(session_->state.tip));
         session_->volume.prepare(quality, software_.value_or(true), static_cast<double>(view.width) * view.height);
         drawSlices(plan, quality == Quality::moving && software_.value_or(true) ? 2 : 1);
         drawFlat(plan);
@@ -356,12 +357,6 @@ void Picture::resetView()
 void Picture::setHelp(std::vector<KeyHelp> keys)
 {
     help_ = std::move(keys);
-}
-
-void Picture::setHand(std::optional<glm::dvec3> hand)
-{
-    if (session_)
-        session_->tool.showHand(hand);
 }
 
 void Picture::setCaption(const std::string& words)

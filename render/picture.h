@@ -70,7 +70,7 @@ public:
     /// Lists the keys across the picture; empty = hidden.
     void setHelp(std::vector<KeyHelp> keys);
     /// Where the hand is that holds the tool [m]; nothing: not shown.
-    void setHand(std::optional<glm::dvec3> hand);
+    void setHand(std::optional<glm::dvec3> hand) noexcept { hand_ = hand; }
     /// A few words on top, such as "PAUSED" or "REPLAY x 0.5"; empty = none.
     void setCaption(const std::string& words);
     /// A bar that shows which share of a record is over, in [0, 1]; negative = none.
@@ -106,6 +106,7 @@ private:
     SliceLook look_ = SliceLook::tinted;
     bool cut_ = true;
     double timeline_ = -1, scale_ = 1;
+    std::optional<glm::dvec3> hand_;
     std::optional<bool> software_;
 };
 

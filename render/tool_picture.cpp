@@ -228,21 +228,20 @@ void ToolPicture::leaveTrail(const channel::State& state)
     setLine(*trail_, trailPoints_);
 }
 
-void ToolPicture::showHand(std::optional<glm::dvec3> hand)
+void ToolPicture::showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip)
 {
     if (!hand && hand_->GetVisibility() == 0)
         return;
     hand_->SetVisibility(hand ? 1 : 0);
-    const glm::dvec3 at = hand.value_or(tip_);
+    const glm::dvec3 at = hand.value_or(tip);
     hand_->SetPosition(at.x * mm, at.y * mm, at.z * mm);
-    const std::array line{tip_, at};
+    const std::array line{tip, at};
     setLine(*lead_, hand ? std::span<const glm::dvec3>(line) : std::span<const glm::dvec3>());
 }
 
 void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim)
 {
     const glm::dvec3 tip = vec(state.tip) * mm, proxy = vec(state.proxy) * mm;
-    tip_ = vec(state.tip);
     aim_->SetPosition(aim.x * mm, aim.y * mm, aim.z * mm);
     leaveTrail(state);
     glm::dvec3 axis = vec(state.axis);

@@ -30,8 +30,8 @@ public:
     ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer);
     /// `aim`: where the line's end lies now [m].
     void update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim);
-    /// Where the hand is that holds the tool [m], with a line to the tip; nothing: not shown.
-    void showHand(std::optional<glm::dvec3> hand);
+    /// Where the hand is that holds the tool [m], with a line to the `tip`; nothing: not shown.
+    void showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip);
 
 private:
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
@@ -40,7 +40,6 @@ private:
 
     bool turns_ = false;         // with the axis: no sphere
     vtkNew<vtkTransform> pose_;  // of the tool; of a needle, of its point
-    glm::dvec3 tip_{0.0};        // [m]
     vtkNew<vtkActor> proxy_, aim_, hand_;
     vtkNew<vtkPolyData> shaft_, trail_, lead_;  // middle line of a needle, way of its tip, from the tip to the hand [mm]
     std::vector<glm::dvec3> trailPoints_;       // [m]

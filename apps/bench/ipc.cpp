@@ -8,7 +8,6 @@
 #include <apps/outputs.h>
 #include <apps/session.h>
 #include <apps/trainer.h>
-#include <datasets/scene.h>
 #include <render/channel/layout.h>
 
 #include <fmt/format.h>
@@ -233,8 +232,7 @@ void addBenchSync(CLI::App& bench)
     auto o = std::make_shared<SyncOptions>();
     auto* sync = bench.add_subcommand("sync", "How far apart in time two viewers show the same tick");
     sync->add_option("SCENE", o->scene, "Scene of the session")->capture_default_str();
-    sync->add_option("--setting", o->changes.setting, "How fine level elastic is")
-        ->check(CLI::IsMember(datasets::elasticSettings()));
+    addSetting(*sync, o->changes);
     sync->add_option("--seconds", o->seconds, "Of the session [s]")->check(CLI::Range(1.0, 600.0))->capture_default_str();
     sync->add_option("--size", o->size, "Of the viewers' windows, WIDTHxHEIGHT in pixels")->capture_default_str();
     sync->add_option("--json", o->json, "Write figures to this file (- = standard output)");

@@ -5,7 +5,6 @@
 #include <apps/figures.h>
 #include <apps/outputs.h>
 #include <apps/session.h>
-#include <datasets/scene.h>
 #include <experiments/bench_tick.h>
 #include <haptics/broadcast.h>
 
@@ -169,9 +168,8 @@ nlohmann::json readFigures(const fs::path& file)
     return figures;
 }
 
-nlohmann::json measure(const Options& o, int side, const std::string& layout)
+nlohmann::json measure(const Options& o, const haptics::SessionModel& model, int side, const std::string& layout)
 {
-    const auto model = openSession(o.scene, o.changes);
     const auto count = static_cast<std::size_t>(side) * static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
     const Vec3 extent = model.tissue->box().high - model.tissue->box().low;
     const double finest = 0.9 * std::cbrt(extent.x * extent.y * extent.z / static_cast<double>(count));
@@ -225,8 +223,8 @@ void benchView(const Options& o)
             o.width, o.height, "voxels", "layout", "p50 [ms]", "p90 [ms]", "frames/s", "late [us]", "missed [%]");
     }
     nlohmann::json result{{"scene", o.scene}, {"cores", std::thread::hardware_concurrency()}};
+    const auto model = openSession(o.scene, o.changes);
     if (!o.alone) {
-        const auto model = openSession(o.scene, o.changes);
         ServoBeside unseen(model);
         unseen.end();  // after one session
         result["without_viewer"] = {{"lateness_us_p99", unseen.latenessP99()}, {"missed_share", unseen.missedShare()}};
@@ -239,7 +237,7 @@ void benchView(const Options& o)
     auto cases = nlohmann::json::array();
     for (const int side : o.sides) {
         for (const auto& layout : o.layouts) {
-            const auto c = measure(o, side, layout);
+            const auto c = measure(o, model, side, layout);
             if (tell) {
                 fmt::print("{:>6}^3 {:<10} {:>9.1f} {:>9.1f} {:>9.1f} {:>9.1f} {:>10.2f}\n", side, layout,
                            c["frame_ms_p50"].get<double>(), c["frame_ms_p90"].get<double>(),
@@ -276,8 +274,7 @@ void addBenchView(CLI::App& bench)
     view->add_option("--width", o->width, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--height", o->height, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--frames", o->frames, "Pictures of each case")->check(CLI::Range(10, 100000))->capture_default_str();
-    view->add_option("--setting", o->changes.setting, "How fine level elastic of the servo loop is")
-        ->check(CLI::IsMember(datasets::elasticSettings()));
+    addSetting(*view, o->changes);
     view->add_flag("--alone", o->alone, "Without a servo loop beside it, to compare");
     view->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     view->final_callback([o] { benchView(*o); });

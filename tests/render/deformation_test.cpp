@@ -47,7 +47,7 @@ glm::dvec3 restOf(const Deformation& d, glm::dvec3 x)
 std::uint8_t tissueOf(const Deformation& d, glm::dvec3 x)
 {
     glm::vec3 shift(0);
-    return d.tissueAt(x, shift);
+    return d.restLabel(d.rest(x, shift)) & channel::rowBits;
 }
 
 // x = X + g X gives X = x / (1 + g); trilinear interpolation is exact on it.

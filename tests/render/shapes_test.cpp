@@ -68,7 +68,7 @@ TEST(ShiftField, LooksUpTheRestPointOfWhatIsSeen)
         const glm::dvec3 g = glm::dvec3(share(random), share(random), share(random)) * (glm::dvec3(field.size) - 1.001);
         const glm::dvec3 x = field.origin + field.spacing * g;
         glm::vec3 start(0);
-        if (deformation.tissueAt(x, start) == 0)
+        if ((deformation.restLabel(deformation.rest(x, start)) & channel::rowBits) == 0)
             continue;
         const glm::ivec3 low(g);
         glm::dvec3 shift(0.0);
@@ -111,7 +111,8 @@ TEST(Deformation, TheWarningShellMovesWithTheTissue)
         const glm::dvec3 rest =
             vec(scenery.labels.origin) + scenery.labels.spacing * glm::dvec3(n % side, n / side % side, n / side / side);
         glm::vec3 shift(0);
-        shells += (deformation.labelAt(deformation.seen(rest), shift) & channel::shellBit) != 0 ? 1 : -1;
+        shells +=
+            (deformation.restLabel(deformation.rest(deformation.seen(rest), shift)) & channel::shellBit) != 0 ? 1 : -1;
     }
     EXPECT_GT(shells, 100);
 }

@@ -105,6 +105,13 @@ protected:
         }
     }
 
+    // Slice `k` of a series along z.
+    void writePacked(const std::string& name, int k, E_TransferSyntax syntax) const
+    {
+        const Uint16 bits = syntax == EXS_JPEGLSLossless ? 16 : 12;
+        write(name, {Vec3(0, 0, 2 * k), {1, 0, 0}, {0, 1, 0}, "1.2.3", "", k, {}, syntax, bits});
+    }
+
     std::string reason(const ImportOptions& options = {}) const
     {
         try {
@@ -164,15 +171,7 @@ TEST_F(Dicom, CompressedSyntaxesHoldTheSamePixels)
     for (const E_TransferSyntax syntax : {EXS_LittleEndianImplicit, EXS_BigEndianExplicit, EXS_DeflatedLittleEndianExplicit,
                                           EXS_RLELossless, EXS_JPEGProcess14SV1, EXS_JPEGLSLossless}) {
         for (int k = 0; k < 5; ++k) {
-            write(std::to_string(k), {Vec3(0, 0, 2 * k),
-                                      {1, 0, 0},
-                                      {0, 1, 0},
-                                      "1.2.3",
-                                      "",
-                                      k,
-                                      {},
-                                      syntax,
-                                      syntax == EXS_JPEGLSLossless ? Uint16{16} : Uint16{12}});
+            writePacked(std::to_string(k), k, syntax);
         }
         SCOPED_TRACE(DcmXfer(syntax).getXferName());
         ASSERT_EQ(reason(), "");
@@ -185,15 +184,7 @@ TEST_F(Dicom, DamagedCompressedPixelsAreTakenOrRefused)
 {
     for (const E_TransferSyntax syntax : {EXS_RLELossless, EXS_JPEGProcess14SV1, EXS_JPEGLSLossless}) {
         SCOPED_TRACE(DcmXfer(syntax).getXferName());
-        write("a", {Vec3(0.0),
-                    {1, 0, 0},
-                    {0, 1, 0},
-                    "1.2.3",
-                    "",
-                    0,
-                    {},
-                    syntax,
-                    syntax == EXS_JPEGLSLossless ? Uint16{16} : Uint16{12}});
+        writePacked("a", 0, syntax);
         ASSERT_EQ(reason(), "");
         std::ifstream in(folder / "a", std::ios::binary);
         const std::string whole{std::istreambuf_iterator<char>(in), {}};
