@@ -130,11 +130,25 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
         }
     }
     drag(load);
+    spreadPressure();
     for (ContactSite& s : active()) {
         touch(s, shapes_, ties_);
         if (const double friction = frictionOf(s); friction > 0.0) {
             s.limit = friction * std::max(s.depth, 0.0);
             touch(s, shapes_, ties_);
+        }
+    }
+}
+
+// Contacts press on the area that the tissue has now. It is kept while a call solves, so that a call keeps one energy.
+void Elastic::spreadPressure() noexcept
+{
+    if (!options_.finiteStrain) {
+        return;
+    }
+    for (ContactSite& s : active()) {
+        if (!s.isTie) {
+            s.stiffness = s.atRest * areaRatio(stack_.body(), stack_.windows(), s);
         }
     }
 }
@@ -435,6 +449,7 @@ void Elastic::measure(ElasticResult& result) const noexcept
         if (!s.isTie && s.active()) {
             ++result.contacts;
             result.depth = std::max(result.depth, s.depth);
+            result.stretch = std::max(result.stretch, s.stiffness / s.atRest);
         }
     }
 }

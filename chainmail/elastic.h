@@ -23,6 +23,7 @@ struct ElasticResult {
     double energy = 0;           // of tissue and contacts [J]
     double residual = 0;         // forces out of balance before the last step, Euclidean norm over degrees of freedom [N]
     double depth = 0;            // of the deepest point of tissue inside a tool [m]
+    double stretch = 0;          // largest area of a piece of surface that a tool presses, over that at rest [-]
     std::uint32_t contacts = 0;  // points that a tool presses
     std::uint32_t cycles = 0;
     std::uint32_t shortened = 0;  // steps that would have raised the energy
@@ -98,6 +99,7 @@ private:
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     void settle() noexcept;
     void meet(const ElasticLoad& load, bool moved) noexcept;
+    void spreadPressure() noexcept;
     bool touched() const noexcept;
     void refreshForces() noexcept;
     void refreshResidual() noexcept;

@@ -261,8 +261,8 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             }
             const float mu = finest.mu[finest.nodes.offset(under)];
             if (mu > 0.0F) {
-                body.points.push_back(
-                    {Vec3f(on), Vec3f(anchorOf(finest, on, under)), static_cast<float>(sub * sub * sub * hat / width), mu});
+                body.points.push_back({Vec3f(on), Vec3f(anchorOf(finest, on, under)), Vec3f(normal),
+                                       static_cast<float>(sub * sub * sub * hat / width), mu});
                 ++run.count;
             }
         });
@@ -272,15 +272,19 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
     });
 }
 
-// What one cell's modes give to the diagonal at each of its nodes: h / 32 (128 / 9 mu + 2 lambda).
+// What one cell's modes give to the diagonal at each of its nodes: h / 32 (2 mu (46 / 9 + 4 / 3 (1 + s)) + 2 lambda), with
+// s = lambda / (lambda + 2 mu) of bending.
 void addDiagonal(CellLevel& level)
 {
     const auto& g = level.nodes;
     level.diagonal.assign(g.count(), 0.0F);
     volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
         const std::size_t at = g.offset(c);
-        const float share = static_cast<float>(g.spacing / 32.0) * (128.0F / 9.0F * level.mu[at] + 2.0F * level.lambda[at]);
-        if (share > 0.0F) {
+        const float mu = level.mu[at];
+        const float lambda = level.lambda[at];
+        if (mu > 0.0F) {
+            const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
+            const float share = static_cast<float>(g.spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += share; });
         }
     });

@@ -23,6 +23,7 @@ struct CellLevel {
 struct SurfacePoint {
     Vec3f position{0.0F};  // [m]
     Vec3f anchor{0.0F};    // the nearest point in a cell that has tissue: what it moves with [m]
+    Vec3f normal{0.0F};    // unit vector out of the body
     float area = 0;        // [m^2]
     float mu = 0;          // of the tissue under it [Pa]
 };

@@ -11,10 +11,12 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
+constexpr double penalty = 20.0;    // contact stiffness per area, in E / h
+constexpr double leastRatio = 0.3;  // of areas: bounds far beyond what tissue bears
+constexpr double mostRatio = 30.0;
 
-// Stiffness of a surface point. A whole contact must not be stiffer than `stiffest`: spread over a quarter of the tool's
-// cross-section, what a shallow press touches.
+// Stiffness of a surface point by its area at rest. A whole contact must not be stiffer than `stiffest`: spread over a
+// quarter of the tool's cross-section, what a shallow press touches.
 double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
 {
     const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
@@ -96,7 +98,7 @@ private:
             site.anchor = Vec3(point.anchor);
             site.owner = static_cast<std::uint16_t>(index);
             site.point = i;
-            site.stiffness = siteStiffness(point, spacing, tool);
+            site.atRest = site.stiffness = siteStiffness(point, spacing, tool);
             if (add(site) && nearest(shape, site.rest, site.u) > near_) {
                 --count_;
             }
@@ -148,6 +150,22 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
         return;
     }
     site.level = static_cast<std::uint16_t>(windows.size());
+}
+
+double areaRatio(const ElasticBody& body, std::span<const Window> windows, const ContactSite& site) noexcept
+{
+    const Window& w = windows[site.level];
+    const double quarter = 0.25 / body.levels[site.level].nodes.spacing;
+    std::array<Vec3, 3> f{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};  // columns of F
+    for (int c = 0; c < 8; ++c) {
+        const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
+        f[0] += (c & 1) != 0 ? u : -u;
+        f[1] += (c & 2) != 0 ? u : -u;
+        f[2] += (c & 4) != 0 ? u : -u;
+    }
+    const Vec3 n(body.points[site.point].normal);
+    const Vec3 area = n.x * glm::cross(f[1], f[2]) + n.y * glm::cross(f[2], f[0]) + n.z * glm::cross(f[0], f[1]);
+    return std::clamp(glm::length(area), leastRatio, mostRatio);
 }
 
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept

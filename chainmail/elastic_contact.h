@@ -37,8 +37,8 @@ struct ElasticLoad {
 ///
 /// The penalty grows with the square of the depth, E = k depth^2 / 2 at each surface point, so that the force is smooth
 /// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
-/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area: under
-/// a pressure p a tool sinks in by p h / 20 E.
+/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area as the
+/// tissue lies now: under a pressure p a tool sinks in by p h / 20 E, however far the surface under it is stretched.
 struct ContactSite {
     std::uint32_t node = 0;  // lowest node of the cell that it lies in
     std::uint16_t level = 0;
@@ -48,7 +48,8 @@ struct ContactSite {
     std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
     Vec3 rest{0.0};
     Vec3 anchor{0.0};      // the point in a cell that it moves with [m]
-    double stiffness = 0;  // of a surface point; of a tie along its axis [N/m]
+    double atRest = 0;     // stiffness of a surface point, by its area at rest [N/m]
+    double stiffness = 0;  // the same, by its area in this call; of a tie along its axis [N/m]
     double across = 0;     // of a tie, across its axis [N/m]
 
     Vec3 u{0.0};        // its displacement [m]
@@ -94,6 +95,10 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
 /// @returns  how many; more than out holds are left out
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
                       std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept;
+
+/// Area of the surface around a site now, over that at rest: |cof(F) N|, F the cell's mean deformation gradient and N the
+/// normal at rest (Nanson's formula), within bounds that keep a cell that is turned inside out from having its say.
+double areaRatio(const ElasticBody& body, std::span<const Window> windows, const ContactSite& site) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

@@ -53,13 +53,15 @@ struct StepFields {
 ///
 ///     E = 2 h (mu Q + lambda D^2)
 ///     Q = 2 (u_x^2 + v_y^2 + w_z^2) + (u_y + v_x)^2 + (u_z + w_x)^2 + (v_z + w_y)^2
-///       + u_xy^2 + u_zx^2 + v_xy^2 + v_yz^2 + w_yz^2 + w_zx^2
+///       + 2/3 (u_xy^2 + w_yz^2 + s (u_xy + w_yz)^2 + u_zx^2 + v_yz^2 + s (u_zx + v_yz)^2 + v_xy^2 + w_zx^2 + s (v_xy + w_zx)^2)
 ///       + 2/3 (u_yz^2 + v_zx^2 + w_xy^2 + u_yz v_zx + v_zx w_xy + w_xy u_yz) + 4/9 (u_xyz^2 + v_xyz^2 + w_xyz^2)
 ///
-/// The mean divergence alone carries lambda: no locking towards nu = 0.5, and no hourglass mode without energy.
+/// with s = lambda / (lambda + 2 mu). The mean divergence alone carries lambda: no locking towards nu = 0.5, and no hourglass
+/// mode without energy. Bending is exact (assumed strain): no parasitic shear, and the strain across the bent fibres is the
+/// one without stress across them.
 /// Sources: D. P. Flanagan, T. Belytschko, "A uniform strain hexahedron and quadrilateral with orthogonal hourglass
-/// control", Int. J. Numer. Methods Eng. 17, 1981 (modes); T. J. R. Hughes, "Generalization of selective integration
-/// procedures to anisotropic and nonlinear media", Int. J. Numer. Methods Eng. 15, 1980.
+/// control", Int. J. Numer. Methods Eng. 17, 1981 (modes); T. Belytschko, L. P. Bindeman, "Assumed strain stabilization of
+/// the eight node hexahedral element", Comput. Methods Appl. Mech. Eng. 105, 1993 (bending).
 struct Kernels {
     const char* name;
     int width;  // floats per vector
@@ -70,7 +72,8 @@ struct Kernels {
     /// As apply(), for finite strain: the mean deformation gradient F of each cell goes through the stable neo-Hookean
     /// energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim, "Stable
     /// Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite when a
-    /// cell inverts; the other modes keep their linear stiffness. Tissue that stiffens adds  mu/4 b (I_C - 3)^2  where I_C
+    /// cell inverts. The other modes have the energy above in axes that turn and stretch with the cell, F^T m for a mode m,
+    /// so that a turn costs nothing. Tissue that stiffens adds  mu/4 b (I_C - 3)^2  where I_C
     /// > 3. `inverse` is 1 / spacing [1/m].
     /// @returns  the energy [J]
     double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,

@@ -94,26 +94,64 @@ inline Plane operator+(const Plane& a, const Plane& b) noexcept
     return {a.ss + b.ss, a.ds + b.ds, a.sd + b.sd, a.dd + b.dd};
 }
 
-// Modes that bend and twist a cell: linear in every model.
-inline void hourglass(Lanes mu, const Modes (&m)[3], Modes (&g)[3]) noexcept
+// Modes that bend and twist a cell. Bending: with s = lambda / (lambda + 2 mu), the strain across it as free of stress.
+inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
-    const Lanes two = 2.0F * mu;
-    const Lanes third = (2.0F / 3.0F) * mu;
+    constexpr float tiny = 1e-30F;  // so that an empty cell divides by something
+    const Lanes bend = (4.0F / 3.0F) * mu;
+    const Lanes both = bend * lambda / (lambda + 2.0F * mu + tiny);
+    const Lanes twist = (2.0F / 3.0F) * mu;
     const Lanes ninth = (8.0F / 9.0F) * mu;
-    const Lanes c = third * (m[0].yz + m[1].zx + m[2].xy);
-    g[0].xy = two * m[0].xy;
-    g[0].zx = two * m[0].zx;
-    g[0].yz = third * m[0].yz + c;
-    g[1].xy = two * m[1].xy;
-    g[1].yz = two * m[1].yz;
-    g[1].zx = third * m[1].zx + c;
-    g[2].yz = two * m[2].yz;
-    g[2].zx = two * m[2].zx;
-    g[2].xy = third * m[2].xy + c;
+    const Lanes alongX = both * (m[1].xy + m[2].zx);
+    const Lanes alongY = both * (m[0].xy + m[2].yz);
+    const Lanes alongZ = both * (m[0].zx + m[1].yz);
+    const Lanes c = twist * (m[0].yz + m[1].zx + m[2].xy);
+    g[0].xy = bend * m[0].xy + alongY;
+    g[0].zx = bend * m[0].zx + alongZ;
+    g[0].yz = twist * m[0].yz + c;
+    g[1].xy = bend * m[1].xy + alongX;
+    g[1].yz = bend * m[1].yz + alongZ;
+    g[1].zx = twist * m[1].zx + c;
+    g[2].yz = bend * m[2].yz + alongY;
+    g[2].zx = bend * m[2].zx + alongX;
+    g[2].xy = twist * m[2].xy + c;
 #pragma GCC unroll 3
     for (int q = 0; q < 3; ++q) {
         g[q].xyz = ninth * m[q].xyz;
     }
+}
+
+// The same in axes that turn and stretch with the cell: with F its mean deformation gradient, a mode m becomes F^T m.
+// Adds to g the gradient of that energy, and returns twice the energy.
+inline Lanes hourglassTurned(Lanes mu, Lanes lambda, float quarter, const Lanes (&f)[3][3], const Modes (&m)[3],
+                             Modes (&g)[3]) noexcept
+{
+    Modes b[3];
+    Modes w[3];
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) {
+        b[j].xy = m[j].xy + f[0][j] * m[0].xy + f[1][j] * m[1].xy + f[2][j] * m[2].xy;
+        b[j].yz = m[j].yz + f[0][j] * m[0].yz + f[1][j] * m[1].yz + f[2][j] * m[2].yz;
+        b[j].zx = m[j].zx + f[0][j] * m[0].zx + f[1][j] * m[1].zx + f[2][j] * m[2].zx;
+        b[j].xyz = m[j].xyz + f[0][j] * m[0].xyz + f[1][j] * m[1].xyz + f[2][j] * m[2].xyz;
+    }
+    hourglass(mu, lambda, b, w);
+    Lanes twice{};
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+        g[i].xy = w[i].xy + f[i][0] * w[0].xy + f[i][1] * w[1].xy + f[i][2] * w[2].xy;
+        g[i].yz = w[i].yz + f[i][0] * w[0].yz + f[i][1] * w[1].yz + f[i][2] * w[2].yz;
+        g[i].zx = w[i].zx + f[i][0] * w[0].zx + f[i][1] * w[1].zx + f[i][2] * w[2].zx;
+        g[i].xyz = w[i].xyz + f[i][0] * w[0].xyz + f[i][1] * w[1].xyz + f[i][2] * w[2].xyz;
+        const Lanes byF[3] = {m[i].xy * w[0].xy + m[i].yz * w[0].yz + m[i].zx * w[0].zx + m[i].xyz * w[0].xyz,
+                              m[i].xy * w[1].xy + m[i].yz * w[1].yz + m[i].zx * w[1].zx + m[i].xyz * w[1].xyz,
+                              m[i].xy * w[2].xy + m[i].yz * w[2].yz + m[i].zx * w[2].zx + m[i].xyz * w[2].xyz};
+        g[i].x += quarter * byF[0];
+        g[i].y += quarter * byF[1];
+        g[i].z += quarter * byF[2];
+        twice += w[i].xy * b[i].xy + w[i].yz * b[i].yz + w[i].zx * b[i].zx + w[i].xyz * b[i].xyz;
+    }
+    return twice;
 }
 
 // Small strain: the law of kernels.h.
@@ -129,7 +167,7 @@ struct Linear {
         g[0].y = g[1].x = two * (m[0].y + m[1].x);
         g[0].z = g[2].x = two * (m[0].z + m[2].x);
         g[1].z = g[2].y = two * (m[1].z + m[2].y);
-        hourglass(mu, m, g);
+        hourglass(mu, lambda, m, g);
     }
 };
 
@@ -193,13 +231,8 @@ struct NeoHookean {
         g[2].x = p[2][0];
         g[2].y = p[2][1];
         g[2].z = p[2][2];
-        hourglass(mu, m, g);
-        // h^3 W is 32 h^2 times W of the scaled stiffness; the linear modes hold half of their gradient times themselves.
-        Lanes bend{};
-#pragma GCC unroll 3
-        for (int i = 0; i < 3; ++i) {
-            bend += g[i].xy * m[i].xy + g[i].yz * m[i].yz + g[i].zx * m[i].zx + g[i].xyz * m[i].xyz;
-        }
+        const Lanes bend = hourglassTurned(mu, lambda, q, f, m, g);
+        // h^3 W is 32 h^2 times W of the scaled stiffness.
         const float h2 = 32.0F / (inverse * inverse);
         energy[turn] +=
             h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume + 0.25F * extra * more) +

@@ -16,10 +16,7 @@ namespace {
 
 // The part of a needle's shaft that collision looks at, from the tip [m].
 constexpr double shaftQueried = 6e-3;
-// Between contact law and elastic body: neither viscosity nor a light touch is a measure of a body.
-constexpr double mostTrust = 3.0;
-constexpr double closing = 0.25;  // depth beyond a sphere's radius over which the surface closes, in radii
-constexpr int smallWindow = 9;    // nodes deep: of the elastic level's step down
+constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
 
 // How much of the tool behind its tip collision looks at [m].
 double queriedLength(const datasets::ToolSpec& tool) noexcept
@@ -235,26 +232,10 @@ chainmail::Reaction Simulation::deform() noexcept
     return reaction;
 }
 
-// Down to its radius a sphere feels the elastic body. Deeper the surface closes over it, and what small elements then say
-// is no force for a hand: there the contact law goes on, as much stiffer or softer as the body was found to be. Over a part
-// of the radius one goes over into the other: a hand that hovers about that depth feels no step.
-Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) noexcept
+// Where level `elastic` knows the force of a tool that presses, it is the force, at any depth; else it is the law's.
+Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) const noexcept
 {
-    if (tip_.phase == Phase::free || level_ != datasets::ModelLevel::elastic) {
-        trust_ = 1.0;
-        return law;
-    }
-    const double depth = glm::distance(tool_.position, tip_.proxy) / model_.scene.tool.radius;
-    if (!reaction.force) {
-        return trust_ * law;
-    }
-    if (depth <= 1.0) {
-        const double known = glm::length(law);
-        const double ratio = known > 0.0 ? glm::length(*reaction.force) / known : 1.0;
-        trust_ = std::clamp(ratio, 1.0 / mostTrust, mostTrust);
-        return *reaction.force;
-    }
-    return glm::mix(*reaction.force, trust_ * law, std::min((depth - 1.0) / closing, 1.0));
+    return tip_.phase != Phase::free && reaction.force ? *reaction.force : law;
 }
 
 // The gun fires once per press of its button, and only a needle that is inside takes a core.

@@ -47,7 +47,7 @@ private:
     occupancy::Sweep collide() noexcept;
     chainmail::Grip grip() const noexcept;
     chainmail::Reaction deform() noexcept;
-    Vec3 contactForce(Vec3 law, const chainmail::Reaction& reaction) noexcept;
+    Vec3 contactForce(Vec3 law, const chainmail::Reaction& reaction) const noexcept;
     void fire() noexcept;
 
     const SessionModel& model_;
@@ -59,7 +59,6 @@ private:
     std::array<std::unique_ptr<chainmail::ElasticLevel>, 2> elastic_;
     datasets::ModelLevel level_;
     int stepsDown_ = 0;
-    double trust_ = 1;  // the elastic body's force over the contact law's, where both are known
     occupancy::Body body_;
     std::unique_ptr<occupancy::ContactSet> contacts_;
     DeviceSample hand_;  // the device's pose, between encoder steps
