@@ -12,6 +12,11 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t mostTools = 16;
+constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
+constexpr double mostStretch = 5.0;    // of the area under a tool: from 8 on cells there have more than one equilibrium
+constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this share of its radius ...
+constexpr double sinkSpacings = 0.15;  // ... and of the spacing
+constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of mostStretch
 constexpr double reach = 0.6;          // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
 constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
@@ -39,6 +44,8 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
       sites_(options.maxSites)
 {
     memory_ = options.viscosity / (1.0 + options.viscosity);
+    held_.reserve(mostTools);
+    tools_.reserve(mostTools);
     shapes_.reserve(mostTools);
     foundFor_.reserve(mostTools);
     friction_.reserve(mostTools);
@@ -66,6 +73,9 @@ Vec3 Elastic::displacement(Vec3 rest) const noexcept
 void Elastic::settle() noexcept
 {
     siteCount_ = 0;
+    for (HeldTool& held : held_) {
+        held.depth = held.stretch = 0.0;
+    }
     if (atRest_) {
         return;
     }
@@ -76,6 +86,30 @@ void Elastic::settle() noexcept
     toolAt_.clear();
     atRest_ = true;
     hasIncrement_ = false;
+}
+
+// The tools, held back where the body does not bear them, as deep as the last call lets them go.
+std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept
+{
+    const double h = stack_.body().levels.front().nodes.spacing;
+    held_.resize(tools.size());
+    tools_.assign(tools.begin(), tools.end());
+    for (std::size_t i = 0; i < tools.size(); ++i) {
+        ElasticTool& tool = tools_[i];
+        HeldTool& held = held_[i];
+        const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
+        const double depth = glm::length(tool.pushed);
+        const double most = options_.finiteStrain ? depth : std::min(depth, smallStrain * radius);
+        const double further =
+            std::min(sinkRadii * radius + sinkSpacings * h - held.depth, ease * radius * (mostStretch - held.stretch));
+        held.given = holdsBack ? std::clamp(held.given + further, 0.0, most) : depth;
+        held.behind = depth - held.given;
+        const Vec3 back = depth > 0.0 ? held.behind / depth * tool.pushed : Vec3(0.0);
+        tool.shape.a -= back;
+        tool.shape.b -= back;
+        tool.pushed -= back;
+    }
+    return tools_;
 }
 
 // True when the sites found for an earlier call still serve: nothing moved far.
@@ -384,7 +418,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 {
     ElasticResult result;
     ElasticLoad load = all;
-    load.tools = load.tools.first(std::min(load.tools.size(), mostTools));
+    load.tools = heldTools(load.tools.first(std::min(load.tools.size(), mostTools)), effort.holdsBack);
     multigrid_.clearContacts();
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
@@ -442,14 +476,20 @@ void Elastic::balance() noexcept
     balance_ = contacts > 0.0 ? std::clamp(tissue / contacts, 1.0 / mostBalance, mostBalance) : 1.0;
 }
 
-void Elastic::measure(ElasticResult& result) const noexcept
+void Elastic::measure(ElasticResult& result) noexcept
 {
     result.energy = energy_ + contactEnergy() / (1.0 - memory_);
+    for (HeldTool& held : held_) {
+        held.depth = held.stretch = 0.0;
+        result.behind = std::max(result.behind, held.behind);
+    }
     for (const ContactSite& s : sites()) {
         if (!s.isTie && s.active()) {
             ++result.contacts;
             result.depth = std::max(result.depth, s.depth);
-            result.stretch = std::max(result.stretch, s.stiffness / s.atRest);
+            HeldTool& held = held_[s.owner];
+            held.depth = std::max(held.depth, s.depth);
+            held.stretch = std::max(held.stretch, s.stiffness / s.atRest);
         }
     }
 }
@@ -472,7 +512,7 @@ Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept
             sum -= balance_ * s.force;
         }
     }
-    return sum;
+    return isTie || owner >= held_.size() ? sum : held_[owner].force() * sum;
 }
 
 }  // namespace palpate::chainmail

@@ -23,7 +23,7 @@ struct ElasticResult {
     double energy = 0;           // of tissue and contacts [J]
     double residual = 0;         // forces out of balance before the last step, Euclidean norm over degrees of freedom [N]
     double depth = 0;            // of the deepest point of tissue inside a tool [m]
-    double stretch = 0;          // largest area of a piece of surface that a tool presses, over that at rest [-]
+    double behind = 0;           // by how much the deepest tool is held back, see Elastic [m]
     std::uint32_t contacts = 0;  // points that a tool presses
     std::uint32_t cycles = 0;
     std::uint32_t shortened = 0;  // steps that would have raised the energy
@@ -42,6 +42,12 @@ struct ElasticResult {
 /// Viscosity (Kelvin-Voigt, one time for all tissue) is integrated by implicit Euler: the tissue's force is
 /// a + c (a - v), v the force after the call before and c the viscous time in calls. Divided by 1 + c this is the same
 /// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node.
+///
+/// A tool presses only as deep as the cells bear: where the surface under it is stretched to five times its area, where it
+/// sinks into the tool by more than a bound, or where small strain is pressed by more than a radius, the tool that the body
+/// feels is held back on its way, ElasticTool::pushed. From there the force grows by the slope that Hertz's law has where
+/// it is, 3/2 F/d: a contact that cannot grow wider is a flat punch, whose force is linear. The same holds back a tool that
+/// would jump through a thin part in one call.
 ///
 /// Sources: S. F. McCormick, "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids);
 /// A. V. Knyazev, "Toward the optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps).
@@ -62,10 +68,11 @@ public:
         const double t = options_.tolerance;
         return relaxWhile(load, {options_.cycles, t, furtherCycles * t, farOff * t});
     }
-    /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces.
+    /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces. No tool is
+    /// held back.
     ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept
     {
-        return relaxWhile(load, {cycles, tolerance, tolerance, 0.0});
+        return relaxWhile(load, {cycles, tolerance, tolerance, 0.0, false});
     }
 
     /// Force of the tissue on tool `i` and on tie `i` of the last load [N]: that of the contacts, times the ratio of the
@@ -95,8 +102,18 @@ private:
     struct Effort {
         int cycles;
         double first, further, far;
+        bool holdsBack = true;
+    };
+    // A tool as the body feels it.
+    struct HeldTool {
+        double given = 0;    // how deep it is [m]
+        double behind = 0;   // how much deeper the real one is [m]
+        double depth = 0;    // to which the surface sank into it in the last call [m]
+        double stretch = 0;  // largest area under it in the last call, over that at rest [-]
+        double force() const noexcept { return given > 0.0 ? 1.0 + 1.5 * behind / given : 1.0; }
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
+    std::span<const ElasticTool> heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept;
     void settle() noexcept;
     void meet(const ElasticLoad& load, bool moved) noexcept;
     void spreadPressure() noexcept;
@@ -117,7 +134,7 @@ private:
     bool oneCycle(Before before, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
     void balance() noexcept;
-    void measure(ElasticResult& result) const noexcept;
+    void measure(ElasticResult& result) noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
 
     ElasticOptions options_;
@@ -128,9 +145,11 @@ private:
     std::vector<occupancy::ShapeDistance> shapes_;
     std::vector<occupancy::RoundCone> foundFor_;  // the tools when the sites were looked for
     std::size_t tiesFound_ = 0;
-    std::vector<double> friction_;  // of each tool
-    std::vector<Vec3> toolAt_;      // in the last call [m]
-    std::vector<Vec3f> slip_;       // of each surface point that was a site, where there is friction [m]
+    std::vector<HeldTool> held_;      // of each tool
+    std::vector<ElasticTool> tools_;  // where the body feels them
+    std::vector<double> friction_;    // of each tool
+    std::vector<Vec3> toolAt_;        // in the last call [m]
+    std::vector<Vec3f> slip_;         // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
     double memory_ = 0;   // share of the last call's stress that viscosity holds against this one's
     double energy_ = 0;   // of the tissue [J]

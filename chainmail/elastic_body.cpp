@@ -284,7 +284,8 @@ void addDiagonal(CellLevel& level)
         const float lambda = level.lambda[at];
         if (mu > 0.0F) {
             const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
-            const float share = static_cast<float>(g.spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
+            const float share =
+                static_cast<float>(g.spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += share; });
         }
     });

@@ -48,8 +48,8 @@ public:
         const auto& grid = body_.levels.front().nodes;
         const auto& s = tool.shape;
         const double radius = std::max(s.radiusA, s.radiusB) + near_ + grid.spacing;
-        const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.carried) - radius;
-        const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.carried) + radius;
+        const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.pushed) - radius;
+        const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.pushed) + radius;
         // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
         const Vec3 last(grid.size - 2);
         const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), last));

@@ -13,7 +13,7 @@ namespace palpate::chainmail {
 /// A rigid tool that tissue cannot enter.
 struct ElasticTool {
     occupancy::RoundCone shape;  // where it is now [m]
-    Vec3 carried{0.0};           // about how far it has carried the tissue that it touches [m]: where to look for contacts
+    Vec3 pushed{0.0};            // its way there from where it would lie on the surface at rest [m]
     double stiffest = 1e4;  // of the whole contact [N/m], bone is no stiffer: the force on a hand is held by the stabiliser
     double friction = 0;    // Coulomb [-]
 };

@@ -53,15 +53,16 @@ struct StepFields {
 ///
 ///     E = 2 h (mu Q + lambda D^2)
 ///     Q = 2 (u_x^2 + v_y^2 + w_z^2) + (u_y + v_x)^2 + (u_z + w_x)^2 + (v_z + w_y)^2
-///       + 2/3 (u_xy^2 + w_yz^2 + s (u_xy + w_yz)^2 + u_zx^2 + v_yz^2 + s (u_zx + v_yz)^2 + v_xy^2 + w_zx^2 + s (v_xy + w_zx)^2)
+///       + 2/3 (u_xy^2 + w_yz^2 + s (u_xy + w_yz)^2 + u_zx^2 + v_yz^2 + s (u_zx + v_yz)^2 + v_xy^2 + w_zx^2 + s (v_xy +
+///       w_zx)^2)
 ///       + 2/3 (u_yz^2 + v_zx^2 + w_xy^2 + u_yz v_zx + v_zx w_xy + w_xy u_yz) + 4/9 (u_xyz^2 + v_xyz^2 + w_xyz^2)
 ///
-/// with s = lambda / (lambda + 2 mu). The mean divergence alone carries lambda: no locking towards nu = 0.5, and no hourglass
-/// mode without energy. Bending is exact (assumed strain): no parasitic shear, and the strain across the bent fibres is the
-/// one without stress across them.
-/// Sources: D. P. Flanagan, T. Belytschko, "A uniform strain hexahedron and quadrilateral with orthogonal hourglass
-/// control", Int. J. Numer. Methods Eng. 17, 1981 (modes); T. Belytschko, L. P. Bindeman, "Assumed strain stabilization of
-/// the eight node hexahedral element", Comput. Methods Appl. Mech. Eng. 105, 1993 (bending).
+/// with s = lambda / (lambda + 2 mu). The mean divergence alone carries lambda: no locking towards nu = 0.5, and no
+/// hourglass mode without energy. Bending is exact (assumed strain): no parasitic shear, and the strain across the bent
+/// fibres is the one without stress across them. Sources: D. P. Flanagan, T. Belytschko, "A uniform strain hexahedron and
+/// quadrilateral with orthogonal hourglass control", Int. J. Numer. Methods Eng. 17, 1981 (modes); T. Belytschko, L. P.
+/// Bindeman, "Assumed strain stabilization of the eight node hexahedral element", Comput. Methods Appl. Mech. Eng. 105,
+/// 1993 (bending).
 struct Kernels {
     const char* name;
     int width;  // floats per vector

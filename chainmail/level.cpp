@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace palpate::chainmail {
 
@@ -13,11 +12,6 @@ namespace {
 
 constexpr double shaftPiece = 4e-3;      // of the shaft that one tie stands for, at least [m]
 constexpr double tieStiffness = 8.0;     // of a held point, in E h: stiff beside the tissue, soft enough to converge fast
-constexpr double smallStrain = 1.0;      // deepest that small strain is pressed, in the tool's radii
-constexpr double mostStretch = 5.0;      // of the area under a tool: from 8 on cells there have more than one equilibrium
-constexpr double sinkRadii = 0.03;       // the surface sinks into a tool by at most this share of its radius ...
-constexpr double sinkSpacings = 0.15;    // ... and of the spacing
-constexpr double ease = 0.02;            // most by which the body's tool goes deeper per call, in its radii, by what is left
 constexpr float leastShown = 20e-6F;     // displacements below are not carried to the outer lattice [m]
 constexpr int nearNodes = 4;             // nodes to each side of the tool that every call writes
 constexpr int layersPerCall = 4;         // of the finest window, beside those
@@ -73,7 +67,6 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
     : shape_(shape),
       surface_(surface),
       elastic_(body, options, focusAt(surface, start)),
-      deepest_(options.finiteStrain ? std::numeric_limits<double>::infinity() : smallStrain),
       turns_(body.levels.size(), Index3(0))
 {
     const Index3 size = elastic_.stack().windows().front().size();
@@ -86,36 +79,14 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
 
 ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
 {
-    if (grip.kind != Grip::Kind::press) {
-        given_ = 0.0;
-    } else {
-        const Vec3 pushed = grip.position - grip.proxy;
-        const double depth = glm::length(pushed);
-        given_ = bearable(depth, grip.shape.radiusA);
-        const Vec3 behind = depth > 0.0 ? (depth - given_) / depth * pushed : Vec3(0.0);
+    if (grip.kind == Grip::Kind::press) {
         tool_.shape = grip.shape;
-        tool_.shape.a -= behind;
-        tool_.shape.b -= behind;
-        tool_.carried = pushed - behind;
+        tool_.pushed = grip.position - grip.proxy;
         tool_.friction = grip.friction;
         const Vec3 under = grip.proxy - surface_.distance(grip.proxy) * surface_.normal(grip.proxy);
         return {{&tool_, 1}, {}, focusAt(surface_, under)};
     }
     return grip.kind == Grip::Kind::point ? tie(grip) : ElasticLoad{{}, {}, focusAt(surface_, grip.position)};
-}
-
-double ElasticLevel::bearable(double depth, double radius) const noexcept
-{
-    const double sink = sinkRadii * radius + sinkSpacings * elastic_.body().levels.front().nodes.spacing;
-    const double further = std::min(sink - last_.depth, ease * radius * (mostStretch - last_.stretch));
-    return std::clamp(given_ + further, 0.0, std::min(depth, deepest_ * radius));
-}
-
-// What the body feels, and where the real tool is deeper, as much more as a flat punch would.
-Vec3 ElasticLevel::pressForce(const Grip& grip) const noexcept
-{
-    const double beyond = glm::distance(grip.position, grip.proxy) - given_;
-    return (given_ > 0.0 ? 1.0 + 1.5 * beyond / given_ : 1.0) * elastic_.toolForce(0);
 }
 
 double ElasticLevel::tieStiffnessAt(Vec3 rest) const noexcept
@@ -161,7 +132,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     revisitMoved();
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
     if (grip.kind == Grip::Kind::press) {
-        reaction.force = pressForce(grip);
+        reaction.force = elastic_.toolForce(0);
     }
     return reaction;
 }

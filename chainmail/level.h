@@ -70,12 +70,6 @@ private:
 
 /// Level 2: elastic equilibrium on nested windows; forces of a pressing tool come from its energy, from first touch on.
 ///
-/// The body is given a tool that presses only as deep as its cells bear. Where the surface under the tool is stretched to
-/// five times its area, where it sinks into the tool by more than a bound, or where small strain is pressed by more than a
-/// radius, the tool that the body feels stays behind the real one. From there the force grows by the slope that Hertz's law
-/// has where it is, 3/2 F/d: a contact that cannot grow wider is a flat punch, whose force is linear. The same holds back a
-/// tool that would jump through a thin part in one call.
-///
 /// The lattice gets the windows' displacement at the middles of their cells: around the tool in every call, further out by
 /// turns, a fixed number of nodes per call. Tissue that would turn inside out keeps the shape it had:
 /// the lattice goes towards the windows' shape only as far as every cell keeps its orientation.
@@ -91,8 +85,6 @@ private:
     static constexpr std::size_t mostShaftTies = 8;
 
     ElasticLoad load(const Grip& grip) noexcept;
-    double bearable(double depth, double radius) const noexcept;
-    Vec3 pressForce(const Grip& grip) const noexcept;
     ElasticLoad tie(const Grip& grip) noexcept;
     double tieStiffnessAt(Vec3 rest) const noexcept;
     Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
@@ -110,8 +102,6 @@ private:
     const volume::DistanceField& surface_;
     Elastic elastic_;
     ElasticTool tool_;
-    double deepest_ = 0;  // that a tool may press, in its radii [-]
-    double given_ = 0;    // how deep the tool is that the body feels [m]
     std::array<Tie, 1 + mostShaftTies> ties_;  // the tip's, then the shaft's
     std::vector<Vec3f> before_;                // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;

@@ -152,7 +152,7 @@ void TrialLoad::set(TrialPose pose) noexcept
     const Vec3 at = path_.start + way;
     const double radius = path_.tool.radius;
     tool_.shape = {at - path_.tool.length * path_.inward, at, radius, radius};
-    tool_.carried = way;
+    tool_.pushed = std::max(pose.pressed - path_.gap, 0.0) * path_.inward;
     // The point of the surface at rest that is nearest to the tool's foremost one.
     const Vec3 foremost = at + radius * path_.inward;
     load_.focus =

@@ -59,7 +59,7 @@ public:
         tools_[0] = tests::ball(at_, 5e-3 * unit(), std::pow(10.0, 6.0 * unit()));
         const Vec3 end = at_ + 20e-3 * (Vec3(unit(), unit(), unit()) - 0.5);
         tools_[1].shape = {at_, end, 4e-3 * unit(), 4e-3 * unit()};
-        tools_[1].carried = step_;
+        tools_[1].pushed = step_;
         toolCount_ = random_() % 3;
         tieCount_ = random_() % 3;
         for (Tie& tie : ties_) {
