@@ -5,7 +5,9 @@
 #include <glm/matrix.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 
 namespace palpate::chainmail {
 
@@ -13,7 +15,7 @@ namespace {
 
 constexpr std::size_t mostTools = 16;
 constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
-constexpr double mostStretch = 5.0;    // of the area under a tool: from 8 on cells there have more than one equilibrium
+constexpr double mostStretch = 6.5;    // of the area under a tool: from 8 on cells there have more than one equilibrium
 constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this share of its radius ...
 constexpr double sinkSpacings = 0.15;  // ... and of the spacing
 constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of mostStretch
@@ -174,16 +176,27 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
 }
 
-// Contacts press on the area that the tissue has now. It is kept while a call solves, so that a call keeps one energy.
+// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells resolve. Both
+// are kept while a call solves, so that a call keeps one energy.
 void Elastic::spreadPressure() noexcept
 {
-    if (!options_.finiteStrain) {
-        return;
-    }
+    const auto& body = stack_.body();
+    std::array<double, mostTools> area{};
     for (ContactSite& s : active()) {
         if (!s.isTie) {
-            s.stiffness = s.atRest * areaRatio(stack_.body(), stack_.windows(), s);
+            const double ratio = options_.finiteStrain ? areaRatio(body, stack_.windows(), s) : 1.0;
+            s.stiffness = s.atRest * ratio;
+            area[s.owner] += shapes_[s.owner].distance(s.rest + s.u) < 0.0
+                                 ? ratio * static_cast<double>(body.points[s.point].area)
+                                 : 0.0;
         }
+    }
+    std::array<double, mostTools> share{};
+    for (std::size_t i = 0; i < shapes_.size(); ++i) {
+        share[i] = resolvedShare(std::sqrt(area[i] / std::numbers::pi) / body.levels.front().nodes.spacing);
+    }
+    for (ContactSite& s : active()) {
+        s.stiffness *= s.isTie ? 1.0 : share[s.owner];
     }
 }
 

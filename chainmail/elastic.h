@@ -43,7 +43,7 @@ struct ElasticResult {
 /// a + c (a - v), v the force after the call before and c the viscous time in calls. Divided by 1 + c this is the same
 /// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node.
 ///
-/// A tool presses only as deep as the cells bear: where the surface under it is stretched to five times its area, where it
+/// A tool presses only as deep as the cells bear: where the surface under it is stretched to six times its area, where it
 /// sinks into the tool by more than a bound, or where small strain is pressed by more than a radius, the tool that the body
 /// feels is held back on its way, ElasticTool::pushed. From there the force grows by the slope that Hertz's law has where
 /// it is, 3/2 F/d: a contact that cannot grow wider is a flat punch, whose force is linear. The same holds back a tool that

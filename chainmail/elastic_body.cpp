@@ -19,7 +19,6 @@ constexpr float leastTissue = 0.01F;  // cells with less of a typical stiffness 
 constexpr float wholly = 0.98F;       // share of a cell that is held: bone, but for the rounding of samples
 constexpr int powerSteps = 30;
 constexpr double onItsBack = 0.05;  // share of the body's depth that is fixed when nothing else is
-constexpr int pointsPerEdge = 2;    // surface points sit in sub-cells of half the spacing
 
 struct Moduli {
     double mu = 0;
@@ -234,22 +233,30 @@ Vec3 anchorOf(const CellLevel& level, Vec3 on, Index3 under)
     return glm::clamp(on, g.position(under) + edge, g.position(under + 1) - edge);
 }
 
+// Of sub-cells along a cell, in which surface points sit: two, and more where a small tool would fall between the points.
+int pointsPerEdge(double spacing, double toolRadius)
+{
+    constexpr int fewest = 2;
+    constexpr int most = 8;
+    return toolRadius > 0.0 ? std::clamp(static_cast<int>(std::ceil(2.0 * spacing / toolRadius)), fewest, most) : fewest;
+}
+
 // The surface as points with areas: in every sub-cell near it the distance field gives the nearest point, and a hat as wide
 // as the sub-cell looks along the normal shares the area among the sub-cells that see the same piece.
 // Source: B. Engquist, A.-K. Tornberg, R. Tsai, "Discretization of Dirac delta functions in level set methods", J. Comput.
 // Phys. 207, 2005.
-void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surface, ElasticBody& body)
+void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surface, int perEdge, ElasticBody& body)
 {
     const auto& finest = body.levels.front();
-    const double sub = cells.spacing / pointsPerEdge;
+    const double sub = cells.spacing / perEdge;
     volume::forEachIndex(Index3(1), cells.size - 2, [&](Index3 c) {
         const Vec3 middle = cells.position(c);
         if (std::abs(surface.at(middle)) > 1.9 * cells.spacing) {
             return;
         }
         SurfaceCell run{c, static_cast<std::uint32_t>(body.points.size()), 0};
-        volume::forEachIndex(Index3(0), Index3(pointsPerEdge - 1), [&](Index3 s) {
-            const Vec3 p = middle + sub * (Vec3(s) + 0.5 - 0.5 * pointsPerEdge);
+        volume::forEachIndex(Index3(0), Index3(perEdge - 1), [&](Index3 s) {
+            const Vec3 p = middle + sub * (Vec3(s) + 0.5 - 0.5 * perEdge);
             const Vec3 normal = surface.normal(p);
             const double width = sub * (std::abs(normal.x) + std::abs(normal.y) + std::abs(normal.z));
             const double distance = surface.at(p);
@@ -344,7 +351,7 @@ void indexRows(ElasticBody& body)
 }  // namespace
 
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
-                        const volume::DistanceField& surface, double poissonCap)
+                        const volume::DistanceField& surface, double poissonCap, double toolRadius)
 {
     ElasticBody body;
     int levels = 1;
@@ -355,7 +362,7 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     if (!body.held) {
         layOnItsBack(body.levels.front());
     }
-    addSurface(cells, surface, body);
+    addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), body);
     addDiagonal(body.levels.front());
     std::vector<float> held = heldShares(cells, materials, body.levels.front());
     while (static_cast<int>(body.levels.size()) < levels) {

@@ -54,12 +54,14 @@ struct ElasticBody {
 /// @param cells        centres of the finest level's cells; the cells at its border must be empty
 /// @param surface      signed distance to the body's surface at rest [m]
 /// @param poissonCap   Poisson's ratios above are lowered to this [-], under 0.5
+/// @param toolRadius   of the smallest tool that will press: the surface has points closer than that; 0: of any that is
+///                     larger than a cell [m]
 ///
 /// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A body without fixed
 /// tissue lies on its back: the nodes of the rear 5 % are fixed (frame LPS: y to the back).
 ///
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
-                        const volume::DistanceField& surface, double poissonCap);
+                        const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0);
 
 }  // namespace palpate::chainmail

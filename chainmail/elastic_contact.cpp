@@ -12,6 +12,8 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr double penalty = 20.0;    // contact stiffness per area, in E / h
+constexpr double unresolved = 3.3;  // compliance that cells lack under a point, in that of the contact
+constexpr double resolved = 1.8;    // radius of a patch that lacks none, in cells
 constexpr double leastRatio = 0.3;  // of areas: bounds far beyond what tissue bears
 constexpr double mostRatio = 30.0;
 
@@ -166,6 +168,12 @@ double areaRatio(const ElasticBody& body, std::span<const Window> windows, const
     const Vec3 n(body.points[site.point].normal);
     const Vec3 area = n.x * glm::cross(f[1], f[2]) + n.y * glm::cross(f[2], f[0]) + n.z * glm::cross(f[0], f[1]);
     return std::clamp(glm::length(area), leastRatio, mostRatio);
+}
+
+double resolvedShare(double radiusInCells) noexcept
+{
+    const double t = std::min(radiusInCells / resolved, 1.0);
+    return 1.0 / (1.0 + unresolved * (1.0 - t * t));
 }
 
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept

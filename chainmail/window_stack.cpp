@@ -10,8 +10,9 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double leastRoom = 1.5;  // cells between focus and border, under which a window moves sooner
-constexpr int slack = 4;           // nodes that a window may be off before it moves; even, so that coarse nodes stay nodes
+// Nodes between where a window is and where it should be at which it moves: it moves by steps of two, so that coarse nodes
+// stay nodes, and a hand that trembles between two places should not move it.
+constexpr double slack = 1.3;
 
 // A window is as deep as asked for and half as wide again: what a tool moves spreads along the surface. Along x it is as
 // wide as whole vectors allow at about the same cost.
@@ -51,7 +52,8 @@ WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus
     place();
 }
 
-Index3 WindowStack::wantedLow(std::size_t level, const Focus& focus) const noexcept
+// Lowest node of a window around the focus, as far as the grid has nodes; not rounded.
+Vec3 WindowStack::wantedPlace(std::size_t level, const Focus& focus) const noexcept
 {
     const auto& grid = body_->levels[level].nodes;
     const Index3 size = windows_[level].size();
@@ -59,8 +61,13 @@ Index3 WindowStack::wantedLow(std::size_t level, const Focus& focus) const noexc
     const double half = 0.5 * (std::min({size.x, size.y, size.z}) - 1) - 1.5;
     const double shift = std::max(0.0, half - focus.depth / grid.spacing);
     const Vec3 middle = (focus.point - grid.origin) / grid.spacing + shift * focus.inward;
-    const Index3 low = 2 * Index3(glm::round(0.5 * (middle - 0.5 * Vec3(size - 1))));
-    return glm::clamp(low, Index3(0), grid.size - size);
+    return glm::clamp(middle - 0.5 * Vec3(size - 1), Vec3(0.0), Vec3(grid.size - size));
+}
+
+Index3 WindowStack::wantedLow(std::size_t level, const Focus& focus) const noexcept
+{
+    const Index3 low = 2 * Index3(glm::round(0.5 * wantedPlace(level, focus)));
+    return glm::clamp(low, Index3(0), body_->levels[level].nodes.size - windows_[level].size());
 }
 
 void WindowStack::place() noexcept
@@ -87,25 +94,14 @@ void WindowStack::place() noexcept
     }
 }
 
-double WindowStack::roomAround(std::size_t level, Index3 low, const Focus& focus) const noexcept
-{
-    const auto& grid = body_->levels[level].nodes;
-    const Vec3 at = (focus.point - grid.origin) / grid.spacing - Vec3(low);
-    const Vec3 room = glm::min(at, Vec3(windows_[level].size() - 1) - at);
-    return std::min({room.x, room.y, room.z});
-}
-
 bool WindowStack::follow(const Focus& focus, bool carry) noexcept
 {
     bool moves = false;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         oldLow_[l] = low_[l];
+        const Vec3 off = glm::abs(wantedPlace(l, focus) - Vec3(low_[l]));
         const Index3 wanted = wantedLow(l, focus);
-        const Index3 off = glm::abs(wanted - low_[l]);
-        // Little lies outside of the surface: along a slope a contact would soon leave through that side.
-        const double room = roomAround(l, low_[l], focus);
-        const bool leaves = room < leastRoom && roomAround(l, wanted, focus) > room + 0.5;
-        if (leaves || std::max({off.x, off.y, off.z}) > slack) {
+        if (std::max({off.x, off.y, off.z}) > slack && wanted != low_[l]) {
             low_[l] = wanted;
             moves = true;
         }

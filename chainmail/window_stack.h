@@ -62,9 +62,8 @@ public:
     void clear(Field field) noexcept;
 
 private:
+    Vec3 wantedPlace(std::size_t level, const Focus& focus) const noexcept;
     Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
-    // Cells between the focus and the nearest side of a window that lies there.
-    double roomAround(std::size_t level, Index3 low, const Focus& focus) const noexcept;
     void place() noexcept;
     void transfer(Field field) noexcept;
     double applyWith(Field x, Field y, bool finite) noexcept;

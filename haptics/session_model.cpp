@@ -40,8 +40,9 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
     if (scene.model.level != datasets::ModelLevel::elastic) {
         return nullptr;
     }
+    const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
     return std::make_shared<chainmail::ElasticBody>(
-        chainmail::elasticBody(cells, tissue.materialOn(cells), surface, scene.model.elastic.poissonCap));
+        chainmail::elasticBody(cells, tissue.materialOn(cells), surface, scene.model.elastic.poissonCap, presses));
 }
 
 std::string structureNames(const volume::Tissue& tissue)
