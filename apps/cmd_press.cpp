@@ -111,6 +111,7 @@ json sampleFigures(const PressSample& s)
             {"energy_mj", 1e3 * s.energy},
             {"residual", s.residual},
             {"depth_mm", 1e3 * s.depth},
+            {"doubtful", s.doubtful},
             {"us", 1e6 * s.took}};
 }
 
@@ -147,6 +148,7 @@ json pressFigures(const Options& o, const Run& run)
              {"windows_moved", s.windowMoves},
              {"tick_us", {{"p50", 1e6 * s.p50}, {"p99", 1e6 * s.p99}, {"max", 1e6 * s.max}}},
              {"peak_force_n", s.peakForce},
+             {"doubtful_from_s", s.doubtfulFrom ? json(*s.doubtfulFrom) : json()},
              {"samples", json::array()},
              {"displacement", json::array()}};
     for (const PressSample& sample : run.samples) {
@@ -161,17 +163,18 @@ json pressFigures(const Options& o, const Run& run)
 
 std::string pressTable(const Run& run)
 {
-    std::string text = "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,us";
+    std::string text =
+        "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,doubtful,us";
     for (std::size_t i = 1; i <= run.points.size(); ++i) {
         text += fmt::format(",u{0}_x_mm,u{0}_y_mm,u{0}_z_mm", i);
     }
     const auto out = std::back_inserter(text);
     for (const PressSample& s : run.samples) {
         const Vec3 p = 1e3 * s.pose.position;
-        fmt::format_to(out,
-                       "\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:.1f}",
-                       s.pose.seconds, p.x, p.y, p.z, s.force.x, s.force.y, s.force.z, 1e6 * s.contactArea, 1e3 * s.energy,
-                       s.residual, 1e3 * s.depth, 1e6 * s.took);
+        fmt::format_to(
+            out, "\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:d},{:.1f}",
+            s.pose.seconds, p.x, p.y, p.z, s.force.x, s.force.y, s.force.z, 1e6 * s.contactArea, 1e3 * s.energy, s.residual,
+            1e3 * s.depth, s.doubtful, 1e6 * s.took);
         for (const Vec3& u : s.displacement) {
             fmt::format_to(out, ",{:.10g},{:.10g},{:.10g}", 1e3 * u.x, 1e3 * u.y, 1e3 * u.z);
         }
@@ -193,6 +196,12 @@ void print(const Options& o, const Run& run)
                p.z);
     fmt::print("{} ticks, {} in contact; one takes {:.0f} us (p50), {:.0f} us (p99); windows moved {} times\n", s.ticks,
                s.inContact, 1e6 * s.p50, 1e6 * s.p99, s.windowMoves);
+    if (s.doubtfulFrom) {
+        fmt::print(
+            "from {:.3f} s on the tissue's surface slips around the tool: it is too deep for its radius, and forces "
+            "are doubtful\n",
+            *s.doubtfulFrom);
+    }
     if (s.notConverged > 0) {
         fmt::print("{} of {} samples are not solved to convergence: column residual says which\n", s.notConverged,
                    run.samples.size());

@@ -224,6 +224,7 @@ PosePath readPosePath(std::istream& in, const std::string& origin, Vec3 standard
         file.require(pathColumns[c]);
     }
     PosePath path;
+    path.origin = origin;
     while (file.nextRow()) {
         ToolPose pose{file.position(), turned ? axisOf(file) : standardAxis};
         pose.seconds = timed ? file.number(seconds, latest, " s") : tickSeconds * static_cast<double>(path.poses.size());

@@ -19,6 +19,7 @@ struct ToolPose {
 
 /// The way of a tool. Between two poses it goes straight and evenly, and its axis turns with it.
 struct PosePath {
+    std::string origin;           // the file, for errors
     std::vector<ToolPose> poses;  // at least one; their times rise
 
     /// How many ticks of 1 ms it takes: the first at the first pose, the last not before the last pose.

@@ -1,13 +1,11 @@
 #include <experiments/press/pose_load.h>
 
-#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace palpate::experiments {
 
@@ -40,13 +38,8 @@ PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec&
     if (model.surface.distance(first.position) < 0.0) {
         hold(0.0);
     }
-    if (ties_.empty()) {
-        throw std::runtime_error(fmt::format(
-            "the needle's tip is not in tissue at the first pose, {:.2f}, {:.2f}, {:.2f} mm: a path of a needle "
-            "begins where it has hold of the tissue",
-            1e3 * first.position.x, 1e3 * first.position.y, 1e3 * first.position.z));
-    }
-    for (double s = tieSpacing; s <= tool_.length && model.surface.distance(onShaft(first, s)) < 0.0; s += tieSpacing) {
+    for (double s = tieSpacing; holds() && s <= tool_.length && model.surface.distance(onShaft(first, s)) < 0.0;
+         s += tieSpacing) {
         hold(s);
     }
     load_.ties = ties_;

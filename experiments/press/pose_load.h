@@ -19,11 +19,12 @@ class PoseLoad {
 public:
     /// @param first  where a needle takes hold
     /// @pre          the model's level is elastic
-    /// Throws std::runtime_error when a needle's tip is not in tissue at `first`.
     PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec& tool, const ToolPose& first);
     PoseLoad(const PoseLoad&) = delete;
     PoseLoad& operator=(const PoseLoad&) = delete;
 
+    /// False for a needle whose tip is not in tissue at `first`: then it may not be used.
+    bool holds() const noexcept { return !isNeedle() || !ties_.empty(); }
     /// @param elastic  as the last call left it: how far it carries the tissue along
     void set(const ToolPose& pose, const chainmail::Elastic& elastic) noexcept;
     const chainmail::ElasticLoad& load() const noexcept { return load_; }

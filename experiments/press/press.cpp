@@ -43,6 +43,10 @@ std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const 
 chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& model, const PoseLoad& load)
 {
     const auto distance = [&](const ToolPose& pose) { return model.surface.distance(pose.position); };
+    if (!load.holds()) {
+        throw std::runtime_error(
+            path.origin + ": the needle's tip is not in tissue at the first pose: begin where it has hold of the tissue");
+    }
     return load.focusOf(*std::ranges::min_element(path.poses, {}, distance));
 }
 
@@ -95,10 +99,11 @@ private:
         s.energy = result.energy;
         s.residual = shareLeft(elastic_, result);
         s.depth = result.depth;
+        doubtful_ = !elastic_.atRest() && (doubtful_ || s.depth > doubtfulDepth * options_.tool.radius);
+        s.doubtful = doubtful_;
         if (!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy)) {
             throw std::runtime_error(
-                fmt::format("{:.3f} s: the force is no number: the tool may be too deep in the tissue, or "
-                            "move too fast",
+                fmt::format("{}: {:.3f} s: the force is no number: lead the tool less deep or more slowly", path_.origin,
                             pose.seconds));
         }
         summary_.notConverged += converge && s.residual > pressTolerance ? 1 : 0;
@@ -111,10 +116,13 @@ private:
         if (elastic_.atRest()) {
             return;
         }
+        if (s.doubtful && !summary_.doubtfulFrom) {
+            summary_.doubtfulFrom = s.pose.seconds;
+        }
         ++summary_.inContact;
         summary_.windowMoves += result.moved ? 1 : 0;
         seconds_.push_back(s.took);
-        if (const double force = glm::length(s.force); force > summary_.peakForce) {
+        if (const double force = glm::length(s.force); force > summary_.peakForce && !s.doubtful) {
             summary_.peakForce = force;
             summary_.peakAt = s.pose;
         }
@@ -126,6 +134,7 @@ private:
     PoseLoad load_;
     Elastic elastic_;
     PressSummary summary_;
+    bool doubtful_ = false;
     std::vector<double> seconds_;  // of ticks in contact
 };
 
