@@ -26,6 +26,8 @@ constexpr double leastAxis = 1e-6;   // shorter ones have no direction
 constexpr double halfTurn = -0.999;  // cosine between axes of which neither way round is the shorter
 constexpr double rounding = 1e-6;    // of a tick
 
+constexpr std::string_view byteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write one
+
 const std::vector<std::string> pathColumns{"x_mm", "y_mm", "z_mm", "seconds", "axis_x", "axis_y", "axis_z"};
 constexpr std::size_t seconds = 3, axis = 4;  // their places; positions come first
 const std::vector<std::string> pointColumns{"x_mm", "y_mm", "z_mm"};
@@ -59,11 +61,7 @@ public:
             throw std::runtime_error(
                 fmt::format("{}: holds no line of column names: begin with {}", origin_, fmt::join(known_, ",")));
         }
-        std::string_view head = line_;
-        if (head.starts_with("\xEF\xBB\xBF")) {
-            head.remove_prefix(3);
-        }
-        for (const std::string_view name : cellsOf(head)) {
+        for (const std::string_view name : cellsOf(line_)) {
             addColumn(name);
         }
         for (const char* name : {"x_mm", "y_mm", "z_mm"}) {
@@ -122,7 +120,9 @@ private:
     bool next()
     {
         while (std::getline(in_, line_)) {
-            ++number_;
+            if (++number_ == 1 && line_.starts_with(byteOrderMark)) {
+                line_.erase(0, byteOrderMark.size());
+            }
             if (const auto text = trimmed(line_); !text.empty() && text.front() != '#') {
                 return true;
             }
