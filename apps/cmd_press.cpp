@@ -188,7 +188,8 @@ void print(const Options& o, const Run& run)
     fmt::print("{}: {} in {}, setting {}, {:g} mm\n", o.scene, kindName(run.press.tool.kind), o.path,
                run.model.scene.model.setting, 1e3 * run.model.lattice.grid.spacing);
     if (s.inContact == 0) {
-        fmt::print("{} ticks; the tool never touches the tissue\n", s.ticks);
+        fmt::print("{} ticks; the tool never touches the tissue's surface{}\n", s.ticks,
+                   s.doubtfulFrom ? ": it is inside of it" : "");
         return;
     }
     const Vec3 p = 1e3 * s.peakAt.position;

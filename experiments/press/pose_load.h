@@ -30,6 +30,8 @@ public:
     const chainmail::ElasticLoad& load() const noexcept { return load_; }
     /// Of the tissue on the tool in the last call [N].
     Vec3 force(const chainmail::Elastic& elastic) const noexcept;
+    /// Signed distance from the surface at rest to the deepest place on the tool's axis, negative inside [m].
+    double axisOutside(const ToolPose& pose) const noexcept { return model_.surface.distance(deepest(pose)); }
     /// Where windows shall be while the tool is there.
     chainmail::Focus focusOf(const ToolPose& pose) const noexcept;
 

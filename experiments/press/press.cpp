@@ -99,8 +99,7 @@ private:
         s.energy = result.energy;
         s.residual = shareLeft(elastic_, result);
         s.depth = result.depth;
-        doubtful_ = !elastic_.atRest() && (doubtful_ || s.depth > doubtfulDepth * options_.tool.radius);
-        s.doubtful = doubtful_;
+        s.doubtful = doubtful_ = isDoubtful(s);
         if (!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy)) {
             throw std::runtime_error(
                 fmt::format("{}: {:.3f} s: the force is no number: lead the tool less deep or more slowly", path_.origin,
@@ -111,13 +110,22 @@ private:
         return s;
     }
 
+    bool isDoubtful(const PressSample& s) const
+    {
+        if (options_.tool.kind == datasets::ToolKind::needle) {
+            return false;
+        }
+        return elastic_.atRest() ? load_.axisOutside(s.pose) < 0.0
+                                 : doubtful_ || s.depth > doubtfulDepth * options_.tool.radius;
+    }
+
     void count(const PressSample& s, const ElasticResult& result)
     {
-        if (elastic_.atRest()) {
-            return;
-        }
         if (s.doubtful && !summary_.doubtfulFrom) {
             summary_.doubtfulFrom = s.pose.seconds;
+        }
+        if (elastic_.atRest()) {
+            return;
         }
         ++summary_.inContact;
         summary_.windowMoves += result.moved ? 1 : 0;

@@ -291,5 +291,13 @@ TEST(Press, ATooDeepToolIsDoubtfulUntilItHasLeft)
     EXPECT_FALSE(p.samples.back().doubtful);
 }
 
+TEST(Press, AToolInsideOfTheTissueThatTouchesNothingIsDoubtful)
+{
+    const Pressed p = pressed(read("x_mm,y_mm,z_mm\n0,8,0\n"), {toolOf(ToolKind::sphere, 1e-3, 0.0)});
+    EXPECT_EQ(p.summary.inContact, 0U);
+    EXPECT_TRUE(p.samples.front().doubtful);
+    EXPECT_FALSE(pressed(read("x_mm,y_mm,z_mm\n0,8,0\n"), {toolOf(ToolKind::needle, 0.0, 0.0)}).samples.front().doubtful);
+}
+
 }  // namespace
 }  // namespace palpate::experiments
