@@ -46,8 +46,8 @@ struct PressSummary {
 
 /// Tissue that is deeper inside a tool than this share of its radius is about to slip around it, and comes out on its other
 /// side: the surface gave way, the force falls and may turn round. From there on, until the tool has left the tissue,
-/// samples are doubtful; so are those of a tool whose axis is in the body and which touches nothing. In all of the built-in
-/// scenes a surface that slipped was this deep before.
+/// samples are doubtful; so are those of a tool whose axis is in the body and which touches nothing. In blocks and plates a
+/// surface that slipped was this deep before.
 inline constexpr double doubtfulDepth = 0.1;
 
 /// Residual to which PressOptions::converge solves, share of the contacts' forces.
