@@ -20,6 +20,7 @@ void addPhantom(CLI::App& app);
 void addReplay(CLI::App& app);
 void addScore(CLI::App& app);
 void addPlan(CLI::App& app);
+void addPress(CLI::App& app);
 void addBench(CLI::App& app);
 void addDevices(CLI::App& app);
 

@@ -33,6 +33,7 @@ int main(int argc, char** argv)
     addReplay(app);
     addScore(app);
     addPlan(app);
+    addPress(app);
     addBench(app);
     addDevices(app);
     addAccuracy(app);

@@ -88,35 +88,6 @@ double contactForces(const Elastic& elastic)
     return sum;
 }
 
-// The point itself, or where it lies outside the cells' staircase, the nearest one in a cell beside it.
-Vec3 nearestTissue(const CellLevel& level, Vec3 rest)
-{
-    const auto& grid = level.nodes;
-    const Vec3 at = (rest - grid.origin) / grid.spacing;
-    const Index3 own(glm::floor(at));
-    const auto isTissue = [&](Index3 c) { return grid.contains(c) && level.mu[grid.offset(c)] > 0.0F; };
-    if (isTissue(own)) {
-        return rest;
-    }
-    Vec3 nearest = at;
-    double least = std::numeric_limits<double>::max();
-    volume::forEachIndex(own - 1, own + 1, [&](Index3 c) {
-        const Vec3 p = glm::clamp(at, Vec3(c), Vec3(c + 1));
-        if (const double d = glm::distance(p, at); d < least && isTissue(c)) {
-            least = d;
-            nearest = p;
-        }
-    });
-    return grid.origin + grid.spacing * nearest;
-}
-
-// What is left of the residual, as a share of the contacts' forces.
-double shareLeft(const Elastic& elastic, const ElasticResult& result)
-{
-    const double force = contactForces(elastic);
-    return force > 0.0 ? result.residual / force : 0.0;
-}
-
 // From rest, or, where the energy may have more than one minimum, from the state before.
 double converge(Elastic& elastic, const ElasticLoad& load, const ReferenceOptions& options, ElasticResult& result)
 {
@@ -159,13 +130,6 @@ ReferenceState stateOf(const Elastic& elastic, const TrialLoad& load, std::span<
     state.sites = static_cast<std::uint32_t>(elastic.sites().size());
     state.strain = localStrain(elastic, state.focus);
     return state;
-}
-
-double threadSeconds()
-{
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 double meanOf(std::span<const double> values)
@@ -244,6 +208,40 @@ TrialErrors look(const TrialModel& model, const Reference& reference, const Posi
 }
 
 }  // namespace
+
+Vec3 nearestTissue(const CellLevel& level, Vec3 rest)
+{
+    const auto& grid = level.nodes;
+    const Vec3 at = (rest - grid.origin) / grid.spacing;
+    const Index3 own(glm::floor(at));
+    const auto isTissue = [&](Index3 c) { return grid.contains(c) && level.mu[grid.offset(c)] > 0.0F; };
+    if (isTissue(own)) {
+        return rest;
+    }
+    Vec3 nearest = at;
+    double least = std::numeric_limits<double>::max();
+    volume::forEachIndex(own - 1, own + 1, [&](Index3 c) {
+        const Vec3 p = glm::clamp(at, Vec3(c), Vec3(c + 1));
+        if (const double d = glm::distance(p, at); d < least && isTissue(c)) {
+            least = d;
+            nearest = p;
+        }
+    });
+    return grid.origin + grid.spacing * nearest;
+}
+
+double shareLeft(const Elastic& elastic, const ElasticResult& result)
+{
+    const double force = contactForces(elastic);
+    return force > 0.0 ? result.residual / force : 0.0;
+}
+
+double threadSeconds()
+{
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
 
 ElasticOptions wholeGrid(int cycles, bool finiteStrain)
 {

@@ -34,6 +34,13 @@ struct Reference {
     double residual = 0;    // worst of any state, share of the contacts' forces
 };
 
+/// The point itself, or where it lies outside the cells' staircase, the nearest one in a cell with tissue beside it [m].
+Vec3 nearestTissue(const chainmail::CellLevel& level, Vec3 rest);
+/// What is left of the residual, as a share of the contacts' forces.
+double shareLeft(const chainmail::Elastic& elastic, const chainmail::ElasticResult& result);
+/// Processor time of this thread so far [s].
+double threadSeconds();
+
 /// A whole body in one window: every level covers all of it.
 chainmail::ElasticOptions wholeGrid(int cycles, bool finiteStrain);
 

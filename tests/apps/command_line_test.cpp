@@ -11,7 +11,8 @@ TEST(CommandLine, EveryCommandExplainsItself)
 {
     const std::vector<Words> commands{
         {},        {"train"}, {"import"},        {"info"},           {"phantom"},         {"replay"},
-        {"score"}, {"bench"}, {"bench", "tick"}, {"bench", "query"}, {"bench", "kernel"}, {"plan"}};
+        {"score"}, {"bench"}, {"bench", "tick"}, {"bench", "query"}, {"bench", "kernel"}, {"plan"},
+        {"press"}};
     for (Words words : commands) {
         words.push_back("--help");
         const Outcome outcome = palpate(words);
@@ -25,7 +26,7 @@ TEST(CommandLine, EveryCommandExplainsItself)
 TEST(CommandLine, TheHelpListsEveryCommand)
 {
     const std::string help = palpate({"--help"}).out;
-    for (const std::string command : {"train", "import", "info", "phantom", "replay", "score", "plan", "bench"}) {
+    for (const std::string command : {"train", "import", "info", "phantom", "replay", "score", "plan", "press", "bench"}) {
         EXPECT_NE(help.find("\n  " + command + " "), std::string::npos) << command;
     }
 }

@@ -1,0 +1,287 @@
+#include <apps/command.h>
+
+#include <apps/outputs.h>
+#include <apps/progress.h>
+#include <apps/session.h>
+#include <experiments/press/pose_load.h>
+#include <experiments/press/press.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <array>
+#include <cstdio>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::apps {
+
+using datasets::ToolKind;
+using datasets::ToolSpec;
+using experiments::FilePoint;
+using experiments::PosePath;
+using experiments::PressSample;
+using experiments::PressSummary;
+using nlohmann::json;
+
+namespace {
+
+const std::vector<std::string> toolKinds{"sphere", "needle", "capsule"};  // in the order of ToolKind
+constexpr double leastRadius = 0.1, mostRadius = 100.0;                   // [mm]
+constexpr double mostLength = 500.0;                                      // [mm]
+constexpr std::size_t progressEvery = 200;                                // ticks
+
+struct Options {
+    std::string scene, path, at, csv, json;
+    SceneChanges changes;
+    std::string level = "elastic";
+    std::optional<std::string> tool;
+    std::optional<double> radius, length;  // [mm]
+    std::size_t every = 1;
+    bool converge = false;
+};
+
+// Everything that a run needs and gives.
+struct Run {
+    haptics::SessionModel model;
+    PosePath path;
+    std::vector<FilePoint> points;
+    experiments::PressOptions press;
+    std::vector<PressSample> samples;
+    PressSummary summary;
+};
+
+double inRange(const std::string& option, double value, double least, double most)
+{
+    if (!(value >= least && value <= most)) {
+        throw std::runtime_error(fmt::format("{} {:g}: must be {:g} to {:g} mm", option, value, least, most));
+    }
+    return 1e-3 * value;
+}
+
+std::string kindName(ToolKind kind)
+{
+    return toolKinds[static_cast<std::size_t>(kind)];
+}
+
+// The scene's tool with what the command line says of it. What neither says is not guessed.
+ToolSpec toolOf(const Options& o, const ToolSpec& scene)
+{
+    ToolSpec tool = scene;
+    if (o.tool) {
+        tool.kind = static_cast<ToolKind>(std::ranges::find(toolKinds, *o.tool) - toolKinds.begin());
+    }
+    const bool needle = tool.kind == ToolKind::needle, other = tool.kind != scene.kind;
+    if (needle ? o.radius.has_value() : tool.kind == ToolKind::sphere && o.length) {
+        throw std::runtime_error(fmt::format("{}: the tool is a {}: this changes nothing",
+                                             needle ? "--radius-mm" : "--length-mm", kindName(tool.kind)));
+    }
+    if (!needle && scene.kind == ToolKind::needle && !o.radius) {
+        throw std::runtime_error(fmt::format(
+            "--tool {}: {}'s own tool is a needle: say how thick this one is with --radius-mm", *o.tool, o.scene));
+    }
+    if (other && tool.kind == ToolKind::capsule && !o.length) {
+        throw std::runtime_error(
+            fmt::format("--tool capsule: {}'s own tool is a {}: say how long this one is with --length-mm", o.scene,
+                        kindName(scene.kind)));
+    }
+    tool.length = needle && other ? ToolSpec{}.length : tool.length;
+    tool.radius = o.radius ? inRange("--radius-mm", *o.radius, leastRadius, mostRadius) : tool.radius;
+    tool.length = o.length ? inRange("--length-mm", *o.length, 0.0, mostLength) : tool.length;
+    return tool;
+}
+
+json millimetres(Vec3 v)
+{
+    return {1e3 * v.x, 1e3 * v.y, 1e3 * v.z};
+}
+
+json sampleFigures(const PressSample& s)
+{
+    return {{"seconds", s.pose.seconds},
+            {"position_mm", millimetres(s.pose.position)},
+            {"axis", {s.pose.axis.x, s.pose.axis.y, s.pose.axis.z}},
+            {"force_n", {s.force.x, s.force.y, s.force.z}},
+            {"contact_mm2", 1e6 * s.contactArea},
+            {"energy_mj", 1e3 * s.energy},
+            {"residual", s.residual},
+            {"depth_mm", 1e3 * s.depth},
+            {"doubtful", s.doubtful},
+            {"us", 1e6 * s.took}};
+}
+
+json toolFigures(const Run& run)
+{
+    const ToolSpec& tool = run.press.tool;
+    json out{{"kind", kindName(tool.kind)}};
+    if (tool.kind != ToolKind::needle) {
+        out["radius_mm"] = 1e3 * tool.radius;
+        out["friction"] = run.model.scene.model.elastic.friction;
+    }
+    if (tool.kind != ToolKind::sphere) {
+        out["length_mm"] = 1e3 * tool.length;
+    }
+    return out;
+}
+
+json pressFigures(const Options& o, const Run& run)
+{
+    const auto& settings = run.model.scene.model.elastic;
+    const PressSummary& s = run.summary;
+    json out{{"scene", o.scene},
+             {"path", o.path},
+             {"setting", run.model.scene.model.setting},
+             {"spacing_mm", 1e3 * run.model.lattice.grid.spacing},
+             {"window", settings.window},
+             {"cycles", settings.cycles},
+             {"strain", settings.strain == datasets::Strain::finite ? "finite" : "small"},
+             {"converged", o.converge},
+             {"not_converged", s.notConverged},
+             {"tool", toolFigures(run)},
+             {"ticks", s.ticks},
+             {"ticks_in_contact", s.inContact},
+             {"windows_moved", s.windowMoves},
+             {"tick_us", {{"p50", 1e6 * s.p50}, {"p99", 1e6 * s.p99}, {"max", 1e6 * s.max}}},
+             {"peak_force_n", s.peakForce},
+             {"doubtful_from_s", s.doubtfulFrom ? json(*s.doubtfulFrom) : json()},
+             {"samples", json::array()},
+             {"displacement", json::array()}};
+    for (const PressSample& sample : run.samples) {
+        out["samples"].push_back(sampleFigures(sample));
+    }
+    for (std::size_t i = 0; i < run.points.size(); ++i) {
+        out["displacement"].push_back(
+            {{"at_mm", millimetres(run.points[i].at)}, {"by_mm", millimetres(run.samples.back().displacement[i])}});
+    }
+    return out;
+}
+
+std::string pressTable(const Run& run)
+{
+    std::string text =
+        "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,doubtful,us";
+    for (std::size_t i = 1; i <= run.points.size(); ++i) {
+        text += fmt::format(",u{0}_x_mm,u{0}_y_mm,u{0}_z_mm", i);
+    }
+    const auto out = std::back_inserter(text);
+    for (const PressSample& s : run.samples) {
+        const Vec3 p = 1e3 * s.pose.position;
+        fmt::format_to(
+            out, "\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:d},{:.1f}",
+            s.pose.seconds, p.x, p.y, p.z, s.force.x, s.force.y, s.force.z, 1e6 * s.contactArea, 1e3 * s.energy, s.residual,
+            1e3 * s.depth, s.doubtful, 1e6 * s.took);
+        for (const Vec3& u : s.displacement) {
+            fmt::format_to(out, ",{:.10g},{:.10g},{:.10g}", 1e3 * u.x, 1e3 * u.y, 1e3 * u.z);
+        }
+    }
+    return text + '\n';
+}
+
+void print(const Options& o, const Run& run)
+{
+    const PressSummary& s = run.summary;
+    fmt::print("{}: {} in {}, setting {}, {:g} mm\n", o.scene, kindName(run.press.tool.kind), o.path,
+               run.model.scene.model.setting, 1e3 * run.model.lattice.grid.spacing);
+    if (s.inContact == 0) {
+        fmt::print("{} ticks; the tool never touches the tissue's surface{}\n", s.ticks,
+                   s.doubtfulFrom ? ": it is inside of it" : "");
+        return;
+    }
+    const Vec3 p = 1e3 * s.peakAt.position;
+    fmt::print("peak force {:.3f} N after {:.3f} s at {:.2f}, {:.2f}, {:.2f} mm\n", s.peakForce, s.peakAt.seconds, p.x, p.y,
+               p.z);
+    fmt::print("{} ticks, {} in contact; one takes {:.0f} us (p50), {:.0f} us (p99); windows moved {} times\n", s.ticks,
+               s.inContact, 1e6 * s.p50, 1e6 * s.p99, s.windowMoves);
+    if (s.doubtfulFrom) {
+        fmt::print(
+            "from {:.3f} s on the tissue's surface slips around the tool: it is too deep for its radius, and forces "
+            "are doubtful\n",
+            *s.doubtfulFrom);
+    }
+    if (s.notConverged > 0) {
+        fmt::print("{} of {} samples are not solved to convergence: column residual says which\n", s.notConverged,
+                   run.samples.size());
+    }
+}
+
+void write(const Options& o, const Run& run)
+{
+    if (o.csv == "-") {
+        std::fputs(pressTable(run).c_str(), stdout);
+    } else if (!o.csv.empty()) {
+        writeWhole(o.csv, pressTable(run));
+    }
+    if (!o.json.empty()) {
+        writeJson(o.json, pressFigures(o, run));
+    }
+}
+
+void runPress(const Options& o)
+{
+    checkOutput(o.json);
+    checkOutput(o.csv);
+    if (o.json == "-" && o.csv == "-") {
+        throw std::runtime_error("--json -, --csv -: standard output takes one of them: give the other a file");
+    }
+    Progress progress;
+    progress.show(o.scene + ": volume");
+    SceneChanges changes = o.changes;
+    changes.model = o.level;
+    Run run{openSession(o.scene, changes), {}, {}, {}, {}, {}};
+    run.press = {toolOf(o, run.model.scene.tool), o.every, o.converge};
+    run.path = experiments::loadPosePath(o.path, experiments::plannedAxis(run.model));
+    if (!o.at.empty()) {
+        run.points = experiments::loadPoints(o.at);
+    }
+    const auto ticks = static_cast<double>(run.path.ticks());
+    try {
+        run.summary = experiments::press(run.model, run.path, run.points, run.press, [&](const PressSample& s) {
+            if (run.samples.size() % progressEvery == 0) {
+                progress.show(o.scene, 1e3 * (s.pose.seconds - run.path.poses.front().seconds) / ticks);
+            }
+            run.samples.push_back(s);
+        });
+    } catch (...) {
+        progress.clear();
+        throw;
+    }
+    progress.clear();
+    write(o, run);
+    if (o.json != "-" && o.csv != "-") {
+        print(o, run);
+    }
+}
+
+}  // namespace
+
+void addPress(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    CLI::App* c = app.add_subcommand("press", "Lead a tool along a path from a file, and give the tissue's raw force");
+    c->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
+    c->add_option("--path", o->path, "Poses of the tool: CSV with x_mm,y_mm,z_mm and perhaps seconds, axis_x,axis_y,axis_z")
+        ->type_name("FILE")
+        ->required();
+    addSetting(*c, o->changes);
+    c->add_option("--model", o->level, "Tissue model; only elastic has forces of its own")
+        ->check(CLI::IsMember({"elastic"}))
+        ->capture_default_str();
+    c->add_option("--at", o->at, "Points whose displacement is wanted: CSV with x_mm,y_mm,z_mm")->type_name("FILE");
+    c->add_option("--tool", o->tool, "Another tool than the scene's")->check(CLI::IsMember(toolKinds));
+    c->add_option("--radius-mm", o->radius, "Its radius (sphere, capsule)");
+    c->add_option("--length-mm", o->length, "Its length (capsule: between the middles of its ends; needle)");
+    c->add_option("--every", o->every, "A sample every so many milliseconds, and at the end")
+        ->check(CLI::Range(std::size_t{1}, std::size_t{10'000'000}))
+        ->capture_default_str();
+    c->add_flag("--converge", o->converge, "Solve each sample to convergence instead of as far as a millisecond goes");
+    c->add_option("--json", o->json, "Write samples and figures to this file (- = standard output)");
+    c->add_option("--csv", o->csv, "Write samples to this file, one per line (- = standard output)");
+    c->final_callback([o] { runPress(*o); });
+}
+
+}  // namespace palpate::apps

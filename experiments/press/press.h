@@ -1,0 +1,70 @@
+#pragma once
+
+#include <chainmail/elastic.h>
+#include <datasets/scene.h>
+#include <experiments/press/path_file.h>
+#include <haptics/session_model.h>
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace palpate::experiments {
+
+struct PressOptions {
+    datasets::ToolSpec tool;
+    std::size_t every = 1;  // a sample in every n-th tick, and in the last; at least 1
+    bool converge = false;  // ticks with a sample are solved to convergence
+};
+
+/// The elastic body's answer to one pose, raw: without contact law, stabiliser and device.
+struct PressSample {
+    ToolPose pose;
+    Vec3 force{0.0};                 // of the tissue on the tool [N]
+    double contactArea = 0;          // [m^2]
+    double energy = 0;               // of tissue and contacts [J]
+    double residual = 0;             // forces out of balance before the tick's last step, share of the contacts' forces
+    double depth = 0;                // of the deepest point of tissue inside the tool [m]
+    bool doubtful = false;           // see doubtfulDepth
+    double took = 0;                 // this thread's processor time [s]
+    std::vector<Vec3> displacement;  // of the points asked for [m] (count x 1)
+};
+
+/// What all ticks say, also those without a sample.
+struct PressSummary {
+    std::size_t ticks = 0;
+    std::size_t inContact = 0;         // of them
+    std::size_t windowMoves = 0;       // in contact
+    std::size_t notConverged = 0;      // samples that were to be solved to convergence and are not
+    double p50 = 0, p99 = 0, max = 0;  // time of a tick in contact [s]
+    double peakForce = 0;              // magnitude, of ticks that are not doubtful [N]
+    ToolPose peakAt;
+    std::optional<double> doubtfulFrom;  // [s]
+};
+
+/// Tissue that is deeper inside a tool than this share of its radius is about to slip around it, and comes out on its other
+/// side: the surface gave way, the force falls and may turn round. From there on, until the tool has left the tissue,
+/// samples are doubtful; so are those of a tool whose axis is in the body and which touches nothing. In blocks and plates a
+/// surface that slipped was this deep before.
+inline constexpr double doubtfulDepth = 0.1;
+
+/// Residual to which PressOptions::converge solves, share of the contacts' forces.
+inline constexpr double pressTolerance = 1e-4;
+
+/// Windows, cycles, strain and viscosity of a tick of 1 ms, by the scene's settings: as in a session.
+chainmail::ElasticOptions tickOptions(const datasets::ElasticSettings& settings) noexcept;
+
+/// Area at rest of the surface that a tool presses [m^2].
+double contactArea(const chainmail::Elastic& elastic) noexcept;
+
+/// Drives the elastic body along the path from rest, tick by tick, and hands over the samples.
+/// @param asked  points at rest whose displacement is in each sample [m]
+/// @pre  the model's level is elastic
+/// Throws std::runtime_error for a needle that begins outside of the tissue, points outside of it, and a force that is not
+/// finite. Deterministic but for times.
+PressSummary press(const haptics::SessionModel& model, const PosePath& path, std::span<const FilePoint> asked,
+                   const PressOptions& options, const std::function<void(const PressSample&)>& sample);
+
+}  // namespace palpate::experiments
