@@ -6,15 +6,18 @@
 #include <experiments/reference_file.h>
 #include <reference/ccx.h>
 #include <reference/press_path.h>
+#include <reference/symmetry.h>
 #include <reference/verification.h>
 #include <reference/vtu.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <ctime>
 #include <exception>
@@ -34,10 +37,16 @@ struct Options {
     std::string tool = "sphere_10mm";
     std::string law = "linear";
     std::string elements = "P2/P1";
-    double speed = 20;  // [mm/s]
-    double size = 2.5;  // [mm]
-    double press = 0;   // [mm]; 0 = as far as the trial goes
+    double speed = 20;          // [mm/s]
+    double size = 2.5;          // [mm]
+    double press = 0;           // [mm]; 0 = as far as the trial goes
+    double radius = 0;          // [mm]; 0 = as the tool's name says
+    double length = 0;          // of a capsule [mm]; 0 = a sphere
+    std::vector<double> looks;  // depths [mm]; none = those of the trial
+    std::string mirrored;       // of x, y, z
+    bool retreat = false;
     bool all = false;
+    bool progress = false;
     bool verify = false;
 };
 
@@ -68,6 +77,43 @@ experiments::TrialTool toolNamed(const std::string& name)
         fmt::format("--tool {}: the reference is pressed by a sphere: {}", name, fmt::join(names, ", ")));
 }
 
+experiments::TrialTool toolOf(const Options& o)
+{
+    experiments::TrialTool tool = toolNamed(o.tool);
+    if (o.radius > 0.0) {
+        tool.radius = 1e-3 * o.radius;
+        tool.name = fmt::format("sphere_{:g}mm", o.radius);
+    }
+    if (o.length > 0.0) {
+        tool.kind = experiments::TrialKind::capsule;
+        tool.length = 1e-3 * o.length;
+        tool.name = fmt::format("capsule_{:g}mm_{:g}mm", 1e3 * tool.radius, o.length);
+    }
+    return tool;
+}
+
+// Straight in, and back out by the same looks.
+std::vector<experiments::TrialPose> posesOf(const Options& o, const experiments::TrialPath& path)
+{
+    std::vector<experiments::TrialPose> poses;
+    for (const double depth : o.looks) {
+        poses.push_back({path.gap + 1e-3 * depth, 0.0});
+    }
+    for (std::size_t look = o.looks.size(); o.retreat && look-- > 1;) {
+        poses.push_back(poses[look - 1]);
+    }
+    return poses;
+}
+
+std::array<bool, 3> planesOf(const Options& o)
+{
+    std::array<bool, 3> planes{};
+    for (int axis = 0; axis < 3; ++axis) {
+        planes[static_cast<std::size_t>(axis)] = o.mirrored.find("xyz"[axis]) != std::string::npos;
+    }
+    return planes;
+}
+
 // F.vtu with a look's number before its ending.
 std::string numbered(const std::string& file, std::size_t look)
 {
@@ -75,9 +121,10 @@ std::string numbered(const std::string& file, std::size_t look)
     return path.parent_path() / fmt::format("{}-{:02}{}", path.stem().string(), look + 1, path.extension().string());
 }
 
-json lookFigures(const reference::Solver& solver, const experiments::ReferenceState& state)
+json lookFigures(const reference::Solver& solver, const experiments::ReferenceState& state, double gap)
 {
     return {{"pressed_mm", 1e3 * state.pose.pressed},
+            {"depth_mm", 1e3 * (state.pose.pressed - gap)},
             {"dragged_mm", 1e3 * state.pose.dragged},
             {"force_n", {state.force.x, state.force.y, state.force.z}},
             {"energy_j", state.energy},
@@ -105,7 +152,9 @@ void exportLast(const std::string& file, const reference::PressProblem& problem,
     const Vec3 centre = problem.path.at(pose);
     const auto at = [&](Vec3 rest) { return solver.displacement(std::span(&rest, 1)).front(); };
     const auto touches = [&](Vec3 rest) {
-        return glm::distance(rest + at(rest), centre) - problem.path.tool.radius < touching;
+        const Vec3 away = rest + at(rest) - centre;
+        const double back = std::clamp(-glm::dot(away, problem.path.inward), 0.0, problem.path.tool.length);
+        return glm::length(away + back * problem.path.inward) - problem.path.tool.radius < touching;
     };
     exportCcx(body.mesh, materialsOf(problem, body), problem.solve, {touches, at}, file);
 }
@@ -120,15 +169,19 @@ struct Results {
 
 Results solveScene(const Options& o, const haptics::SessionModel& model, const experiments::TrialPath& path, json& figures)
 {
+    const volume::Tissue part = reference::mirroredPart(*model.tissue, planesOf(o));
     const reference::PressProblem problem{
-        *model.tissue,
+        part,
         model.surface,
         path,
         1e-3 * o.speed,
         model.scene.model.elastic.poissonCap,
         {.law = o.law == "linear" ? reference::Law::linear : reference::Law::neoHookean,
-         .elements = o.elements == "P2" ? reference::Elements::p2 : reference::Elements::p2p1}};
-    const reference::BodyMesh body = reference::meshBody(*model.tissue, reference::meshOptions(problem, 1e-3 * o.size));
+         .elements = o.elements == "P2" ? reference::Elements::p2 : reference::Elements::p2p1,
+         .progress = o.progress,
+         .mirrored = planesOf(o)},
+        posesOf(o, path)};
+    const reference::BodyMesh body = reference::meshBody(part, reference::meshOptions(problem, 1e-3 * o.size));
     const double meshed = cpuSeconds();
     say("{}: {} tetrahedra, {} mixtures, smallest angle {:.1f} degrees, {:.1f} s\n", model.scene.name,
         body.mesh.tets.size(), body.mixtures.size(), body.sharpest, meshed);
@@ -136,10 +189,10 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const e
     Results out;
     const auto sink = [&](const reference::Solver& solver, std::size_t look, std::size_t looks,
                           const experiments::ReferenceState& state) {
-        say("{}: look {} of {}: {:.2f} mm in, {:.2f} mm along: {:.4f} N, {} Newton steps, {:.0f} s\n", model.scene.name,
-            look + 1, looks, 1e3 * state.pose.pressed, 1e3 * state.pose.dragged, glm::length(state.force),
-            solver.newtonSteps(), cpuSeconds() - meshed);
-        out.looks.push_back(lookFigures(solver, state));
+        say("{}: look {} of {}: {:.2f} mm in, {:.2f} mm along: {:.5f} {:.5f} {:.5f} N, {} Newton steps, {:.0f} s\n",
+            model.scene.name, look + 1, looks, 1e3 * state.pose.pressed, 1e3 * state.pose.dragged, state.force.x,
+            state.force.y, state.force.z, solver.newtonSteps(), cpuSeconds() - meshed);
+        out.looks.push_back(lookFigures(solver, state, path.gap));
         out.info.unknowns = solver.unknowns();
         if (!o.vtu.empty() && (o.all || look + 1 == looks)) {
             out.files.emplace_back(o.all ? numbered(o.vtu, look) : o.vtu, reference::vtuText(body.mesh, solver));
@@ -153,7 +206,7 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const e
     out.info.seconds = cpuSeconds() - meshed;
     figures["mesh_seconds"] = meshed;
     figures["smallest_angle_deg"] = body.sharpest;
-    figures["regions"] = regionFigures(body, model.tissue->table());
+    figures["regions"] = regionFigures(body, part.table());
     return out;
 }
 
@@ -202,7 +255,12 @@ void run(const Options& o)
     if (o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty()) {
         throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
     }
-    const auto tool = toolNamed(o.tool);
+    if (!o.save.empty() && (!o.looks.empty() || !o.mirrored.empty())) {
+        throw std::runtime_error(
+            "--save: what `palpate accuracy` reads has all looks of the trial, in the whole body: "
+            "leave --looks and --mirrored out");
+    }
+    const auto tool = toolOf(o);
     SceneChanges changes;
     changes.model = "spring";  // the kernel's own body is not needed
     const auto model = openSession(o.scene, changes);
@@ -210,6 +268,10 @@ void run(const Options& o)
     auto path = experiments::trialPath(*model.tissue, model.surface, place, tool, 1e-3 * o.size);
     if (o.press > 0.0) {
         path.press = path.gap + 1e-3 * o.press;
+    }
+    if (!o.looks.empty()) {
+        path.press = path.gap + 1e-3 * std::ranges::max(o.looks);
+        path.drag = 0.0;
     }
     json figures;
     Results results = solveScene(o, model, path, figures);
@@ -263,6 +325,20 @@ void addOptions(CLI::App& app, Options& o)
         ->capture_default_str();
     app.add_option("--press", o.press, "How deep the sphere presses [mm] (default: as the trial)")
         ->check(CLI::Range(0.1, 50.0));
+    app.add_option("--radius-mm", o.radius, "Another radius than the tool's [mm]")->check(CLI::Range(0.5, 100.0));
+    app.add_option("--length-mm", o.length,
+                   "Makes the sphere a capsule, pressed end on: so far between its ends' middles [mm]")
+        ->check(CLI::Range(0.1, 300.0));
+    app.add_option("--looks", o.looks, "Solve at these depths under the first touch, straight in: 0.5,1,2 [mm]")
+        ->delimiter(',')
+        ->check(CLI::Range(0.001, 100.0))
+        ->excludes("--press");
+    app.add_flag("--retreat", o.retreat, "And on the way out, at the same looks")->needs("--looks");
+    app.add_option("--mirrored", o.mirrored,
+                   "Planes of symmetry of scene and press (x, z or xz: x = 0, z = 0): solves one side, reports the whole")
+        ->check(CLI::IsMember({"x", "y", "z", "xy", "xz", "yz"}))
+        ->needs("--looks");
+    app.add_flag("--progress", o.progress, "A line per load step on standard error");
     app.add_flag("--verify", o.verify, "No scene: solve problems that have a closed form (minutes)");
     app.add_option("--json", o.json, "Write figures to this file (- = standard output)");
     app.add_option("--export-ccx", o.ccx, "Write the last state as input of CalculiX (.inp)");

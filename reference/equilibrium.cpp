@@ -11,11 +11,14 @@ namespace palpate::reference {
 namespace {
 
 constexpr double onPlane = 1e-6;      // mm
-constexpr int mostSteps = 30;         // of Newton's method to one load
+constexpr int mostSteps = 30;         // of Newton's method to one load,
+constexpr int hopeSteps = 10;         // after which the residual
+constexpr double hope = 0.1;          // is to be this share of the first at most
 constexpr int mostLooks = 10;         // along one of them,
 constexpr double goodSlope = 0.3;     // until the energy's slope is that share of the first
 constexpr double mostGrowth = 1.5;    // of the residual
 constexpr int mostNearby = 50;        // iterations with an old factor: a new one costs about as much
+constexpr double nothing = 1e-9;      // residual of a body that no tool touches, by rounding [mN]
 constexpr double linearBest = 1e-4;   // residual of a linear system at last,
 constexpr double linearWorst = 1e-2;  // and at first
 
@@ -206,16 +209,17 @@ bool Equilibrium::find(double tolerance)
 {
     fem.findContact(state);
     evaluate();
+    const double first = unbalanced();
     for (int step = 0; finite(); ++step) {
         const auto there = [&](std::size_t i) { return state[driven[i]] == goal[i]; };
         std::size_t arrived = 0;
         while (arrived < driven.size() && there(arrived)) {
             ++arrived;
         }
-        if (arrived == driven.size() && unbalanced() <= tolerance * holding()) {
+        if (arrived == driven.size() && unbalanced() <= std::max(tolerance * holding(), nothing)) {
             return true;
         }
-        if (step == mostSteps) {
+        if (step == mostSteps || (driven.empty() && step == hopeSteps && unbalanced() > hope * first)) {
             return false;
         }
         ++steps;

@@ -5,6 +5,7 @@
 #include <getfem/getfem_mesh_fem.h>
 #include <getfem/getfem_mesh_im.h>
 #include <gmm/gmm_iter_solvers.h>
+#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -23,9 +24,10 @@ constexpr double perPascal = 1e-3;  // kPa
 // The contact's r in moduli per face's edge: without multipliers a pressure of half a modulus would sink a 200th of an edge
 // in, and each update of theirs takes that down some eighty times.
 constexpr double contactStiffness = 100.0;
-constexpr double onPlane = 1e-9;  // m
-constexpr double reach = 0.25;    // faces this many radii away are looked at
-constexpr int facesRule = 8;      // degree of quadrature on faces: contact ends within one
+constexpr double mostStretch = 30.0;  // of a face's area, that r grows by
+constexpr double onPlane = 1e-9;      // m
+constexpr double reach = 0.25;        // faces this many radii away are looked at
+constexpr int facesRule = 8;          // degree of quadrature on faces: contact ends within one
 
 Vec3 at(const std::vector<double>& state, std::size_t node)
 {
@@ -49,13 +51,15 @@ std::string testedStress(const SolveOptions& options)
     return "(" + shape + "+" + pressure + "*Id(3)):Test_s";
 }
 
-constexpr const char* contactEnergyText = "half_sqr_pos_part(lambda-r*(Norm(X+u-c)-R))/r";
-// Its second derivative, but for the pressure in the sphere's curvature: a guess may lie far inside the sphere and have a
-// pressure there that is out of all proportion, and would make the tissue lose its stiffness. The multiplier is what the
-// pressure comes to.
+// With Q from the nearest point of the tool's middle line to where a point is.
+constexpr const char* contactEnergyText = "half_sqr_pos_part(lambda-r*(Norm(Q)-R))/r";
+// Its second derivative, but for the pressure in the tool's curvature where it is over twice the multiplier: a guess may
+// lie far inside the tool and have a pressure there that is out of all proportion, and would make the tissue lose its
+// stiffness. The multiplier is about what the pressure comes to. Along its shaft the tool does not curve.
 constexpr const char* contactTangentText =
-    "Heaviside(lambda-r*(Norm(X+u-c)-R))*((r+C)*(N.Test_u)*(N.Test2_u)-C*(Test_u.Test2_u))";
-constexpr const char* contactPressureText = "pos_part(lambda-r*(Norm(X+u-c)-R))*Test_v";
+    "Heaviside(lambda-r*(Norm(Q)-R))*((r+C)*(N.Test_u)*(N.Test2_u)"
+    "-C*(Test_u.Test2_u-Heaviside(T)*Heaviside(1-T)*(a.Test_u)*(S.Test2_u)))";
+constexpr const char* contactPressureText = "pos_part(lambda-r*(Norm(Q)-R))*Test_v";
 
 }  // namespace
 
@@ -94,7 +98,8 @@ struct FiniteElements::Impl {
     getfem::mesh mesh;
     getfem::mesh_fem uField, pField, cellField, vertexField;
     getfem::mesh_im volumeRule, faceRule;
-    std::vector<double> mu, bulk, stiffening, contactR;  // of each tetrahedron
+    std::vector<double> mu, bulk, stiffening;  // of each tetrahedron
+    std::vector<double> restR, contactR;       // of each, at rest and now
     bool stiffens = false;
     Matrix linear;  // second derivative of the tissue's energy, with small strain
 
@@ -109,6 +114,7 @@ struct FiniteElements::Impl {
 
     Obstacle obstacle;
     std::vector<double> centre = std::vector<double>(3), radius = std::vector<double>(1);
+    std::vector<double> shaft = std::vector<double>(3), alongShaft = std::vector<double>(3);
     std::vector<double> multipliers;  // (vertex x 1) [kPa]
     getfem::mesh_region touching;
 };
@@ -184,6 +190,7 @@ void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Mat
         const std::size_t cell = cellField.ind_basic_dof_of_element(face.tet)[0];
         contactR[cell] = contactStiffness * perPascal * materials[from.tissue[face.tet]].youngsModulus / edge;
     }
+    restR = contactR;
 }
 
 void FiniteElements::Impl::addState(getfem::ga_workspace& space, const Fields& fields, As as) const
@@ -221,6 +228,10 @@ void FiniteElements::Impl::addContact(getfem::ga_workspace& space, const Fields&
     space.add_fem_constant("r", cellField, contactR);
     space.add_fixed_size_constant("c", centre);
     space.add_fixed_size_constant("R", radius);
+    space.add_fixed_size_constant("S", shaft);
+    space.add_fixed_size_constant("a", alongShaft);
+    space.add_macro("T", "((X+u-c).a)");
+    space.add_macro("Q", "(X+u-c-(pos_part(T)-pos_part(T-1))*S)");
 }
 
 const Matrix& FiniteElements::Impl::linearTissue()
@@ -279,7 +290,7 @@ double FiniteElements::energy(const std::vector<double>& state) const
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addTissue(space, fields);
-    space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule);
+    space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule, getfem::mesh_region::all_convexes(), 0);
     space.assembly(0);
     return space.assembled_potential();
 }
@@ -294,7 +305,7 @@ std::vector<double> FiniteElements::tissueForces(const std::vector<double>& stat
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addTissue(space, fields);
-    space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule);
+    space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule, getfem::mesh_region::all_convexes(), 1);
     space.set_assembled_vector(forces);
     space.assembly(1);
     return forces;
@@ -316,8 +327,8 @@ SymmetricMatrix FiniteElements::tangent(const std::vector<double>& state) const
         Matrix contact(state.size(), state.size());
         getfem::ga_workspace space;
         impl_->addContact(space, fields);
-        space.add_macro("N", "((X+u-c)/Norm(X+u-c))");
-        space.add_macro("C", "(pos_part(lambda)/Norm(X+u-c))");
+        space.add_macro("N", "(Q/Norm(Q))");
+        space.add_macro("C", "(min(pos_part(lambda-r*(Norm(Q)-R)),2*pos_part(lambda))/Norm(Q))");
         space.add_expression(contactTangentText, impl_->faceRule, impl_->touching);
         space.set_assembled_matrix(contact);
         space.assembly(2);
@@ -343,6 +354,9 @@ void FiniteElements::setObstacle(const Obstacle& obstacle)
     impl_->obstacle = obstacle;
     impl_->centre = {obstacle.centre.x, obstacle.centre.y, obstacle.centre.z};
     impl_->radius = {obstacle.radius};
+    impl_->shaft = {obstacle.shaft.x, obstacle.shaft.y, obstacle.shaft.z};
+    const Vec3 along = obstacle.shares();
+    impl_->alongShaft = {along.x, along.y, along.z};
 }
 
 void FiniteElements::findContact(const std::vector<double>& state)
@@ -351,19 +365,32 @@ void FiniteElements::findContact(const std::vector<double>& state)
     if (impl_->obstacle.radius <= 0.0) {
         return;
     }
-    const double far = (1.0 + reach) * impl_->obstacle.radius;
+    const double far = reach * impl_->obstacle.radius;
     for (std::size_t f = 0; f < impl_->faces.size(); ++f) {
         const Impl::Face& face = impl_->faces[f];
         const auto& six = impl_->faceNodes[f];
         const auto vertices = impl_->vertexField.ind_basic_dof_of_face_of_element(face.tet, face.side);
         const bool near = std::any_of(six.begin(), six.end(), [&](std::uint32_t n) {
-            return glm::distance(impl_->nodes[n] + at(state, n), impl_->obstacle.centre) < far;
+            return impl_->obstacle.distance(impl_->nodes[n] + at(state, n)) < far;
         });
         const bool pressed =
             std::any_of(vertices.begin(), vertices.end(), [&](size_type v) { return impl_->multipliers[v] != 0.0; });
         if (impl_->freeFaces[f] != 0 && (near || pressed)) {
             impl_->touching.add(face.tet, face.side);
         }
+    }
+}
+
+void FiniteElements::stiffenContact(const std::vector<double>& state)
+{
+    const auto area = [&](const std::array<std::uint32_t, 6>& six, double share) {
+        const auto corner = [&](std::size_t c) { return impl_->nodes[six[c]] + share * at(state, six[c]); };
+        return glm::length(glm::cross(corner(2) - corner(0), corner(5) - corner(0)));
+    };
+    for (std::size_t f = 0; f < impl_->faces.size(); ++f) {
+        const double ratio = area(impl_->faceNodes[f], 1.0) / area(impl_->faceNodes[f], 0.0);
+        const std::size_t cell = impl_->cellField.ind_basic_dof_of_element(impl_->faces[f].tet)[0];
+        impl_->contactR[cell] = impl_->restR[cell] * std::clamp(ratio, 1.0, mostStretch);
     }
 }
 
@@ -375,7 +402,7 @@ double FiniteElements::contactEnergy(const std::vector<double>& state) const
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addContact(space, fields);
-    space.add_expression(contactEnergyText, impl_->faceRule, impl_->touching);
+    space.add_expression(contactEnergyText, impl_->faceRule, impl_->touching, 0);
     space.assembly(0);
     return space.assembled_potential();
 }
@@ -389,7 +416,7 @@ std::vector<double> FiniteElements::contactForces(const std::vector<double>& sta
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addContact(space, fields);
-    space.add_expression(contactEnergyText, impl_->faceRule, impl_->touching);
+    space.add_expression(contactEnergyText, impl_->faceRule, impl_->touching, 1);
     space.set_assembled_vector(forces);
     space.assembly(1);
     return forces;

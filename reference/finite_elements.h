@@ -1,6 +1,7 @@
 #pragma once
 
 #include <reference/factor.h>
+#include <reference/obstacle.h>
 #include <reference/solve.h>
 
 #include <memory>
@@ -8,12 +9,6 @@
 #include <vector>
 
 namespace palpate::reference {
-
-/// A rigid sphere in the units of FiniteElements.
-struct Obstacle {
-    Vec3 centre{0.0};   // [mm]
-    double radius = 0;  // 0: none [mm]
-};
 
 /// The body as GetFEM sees it: quadratic displacement, and linear pressure where asked for, the energy of tissue and
 /// contact, and its derivatives. Not SI but mm, kPa, mN and uJ, in which the numbers are near 1.
@@ -27,8 +22,8 @@ struct Obstacle {
 /// Tissue stiffens by the isochoric I, which is never negative: pressure alone does not stiffen it. The kernel takes I_C -
 /// 3 where it is positive; where nothing changes its volume, they are the same.
 ///
-/// The sphere pushes by the augmented Lagrangian  (lambda - r gap)_+^2 / 2r  per area at rest, lambda linear on faces, gap
-/// measured from where a point is to the sphere itself, at small strain too.
+/// The tool pushes by the augmented Lagrangian  (lambda - r gap)_+^2 / 2r  per area at rest, lambda linear on faces, gap
+/// measured from where a point is to the tool itself, at small strain too.
 /// Sources: Y. Renard, K. Poulios, "GetFEM: Automated FE Modeling of Multiphysics Problems Based on a Generic Weak Form
 /// Language", ACM Trans. Math. Softw. 47, 2020; P. Alart, A. Curnier, "A mixed formulation for frictional contact
 /// problems prone to Newton like solution methods", Comput. Methods Appl. Mech. Eng. 92, 1991.
@@ -41,7 +36,7 @@ public:
     std::size_t displacements() const noexcept;  // head of a state
     /// Where the displacement's nodes are at rest [mm].
     const std::vector<Vec3>& nodes() const noexcept;
-    /// Nodes of each of TetMesh::faces (count x 6).
+    /// Nodes of each of TetMesh::faces (count x 6): corners are the first, the third and the last.
     const std::vector<std::array<std::uint32_t, 6>>& faceNodes() const noexcept;
 
     /// Whether a face is a free surface: neither held nor on a plane of symmetry (faces x 1).
@@ -56,6 +51,9 @@ public:
     void setObstacle(const Obstacle& obstacle);
     /// Looks which faces may touch: those within a quarter of the radius of the obstacle, and where multipliers are.
     void findContact(const std::vector<double>& state);
+    /// Lets r grow with the area of the faces: it counts per area at rest, and under a deep tool that is many times as
+    /// large.
+    void stiffenContact(const std::vector<double>& state);
     double contactEnergy(const std::vector<double>& state) const;  // [uJ]
     /// Derivative of the contact's energy [mN]; its sum over nodes is the force on the obstacle.
     std::vector<double> contactForces(const std::vector<double>& state) const;

@@ -26,7 +26,10 @@ constexpr double strainedVolume = 1e-7;  // [m^3]
 // Poses at which errors are measured, in the order in which the tool takes them.
 std::vector<TrialPose> looksOf(const PressProblem& problem)
 {
-    std::vector<TrialPose> poses;
+    std::vector<TrialPose> poses = problem.looks;
+    if (!poses.empty()) {
+        return poses;
+    }
     for (const auto& tick : schedule(problem.path, problem.speed)) {
         if (tick.look && (poses.empty() || poses.back() != tick.pose)) {
             poses.push_back(tick.pose);
@@ -73,6 +76,19 @@ ReferenceState stateOf(const Solver& solver, const experiments::TrialLoad& load,
     return state;
 }
 
+// Of the whole body, given that of one side of its planes of symmetry.
+ReferenceState ofAll(ReferenceState part, const SolveOptions& options)
+{
+    for (int axis = 0; axis < 3; ++axis) {
+        if (options.mirrored[static_cast<std::size_t>(axis)]) {
+            part.force *= 2.0;
+            part.force[axis] = 0.0;
+            part.energy *= 2.0;
+        }
+    }
+    return part;
+}
+
 }  // namespace
 
 std::vector<Material> materialsOf(const PressProblem& problem, const BodyMesh& body)
@@ -115,7 +131,9 @@ MeshOptions meshOptions(const PressProblem& problem, double size)
     MeshOptions options;
     std::tie(options.from, options.to) = contactEnds(problem);
     options.size = size;
-    options.radius = problem.path.tool.radius;
+    // A shallow press touches less: of a half-space, a circle of radius sqrt(R depth).
+    const double touched = std::sqrt(problem.path.tool.radius * (problem.path.press - problem.path.gap));
+    options.radius = std::min(problem.path.tool.radius, 2.0 * touched);
     return options;
 }
 
@@ -127,14 +145,19 @@ experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& bo
     const std::vector<Vec3> points(out.position.begin(), out.position.end());
     const auto materials = materialsOf(problem, body);
     Solver solver(body.mesh, materials, problem.solve);
+    const auto& tool = problem.path.tool;
+    const auto press = [&](TrialPose pose) {
+        solver.press({problem.path.at(pose), tool.radius, -tool.length * problem.path.inward});
+    };
+    press({});
     out.nodes = solver.unknowns() / 3;
     out.residual = problem.solve.tolerance;
     const auto poses = looksOf(problem);
     for (std::size_t look = 0; look < poses.size(); ++look) {
         experiments::TrialLoad load(problem.path);
         load.set(poses[look]);
-        solver.press({problem.path.at(poses[look]), problem.path.tool.radius});
-        out.states.push_back(stateOf(solver, load, points, cells));
+        press(poses[look]);
+        out.states.push_back(ofAll(stateOf(solver, load, points, cells), problem.solve));
         const ReferenceState& state = out.states.back();
         out.peakForce = std::max(out.peakForce, glm::length(state.force));
         out.strain = std::max(out.strain, state.strain);

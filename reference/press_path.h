@@ -9,7 +9,7 @@
 
 namespace palpate::reference {
 
-/// A sphere's path through a body.
+/// A sphere's path through a body, or a capsule's, whose shaft points back along the press.
 struct PressProblem {
     const volume::Tissue& tissue;
     const volume::DistanceField& surface;  // of the body at rest [m]
@@ -17,6 +17,7 @@ struct PressProblem {
     double speed = 20e-3;      // the looks are those of schedule(path, speed) [m/s]
     double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-]
     SolveOptions solve;
+    std::vector<experiments::TrialPose> looks{};  // where to solve; none: as speed says
 };
 
 /// Where to look at the solution: the points of a lattice 2 mm apart within 30 mm of the contact's path, and of one 6 mm
@@ -33,7 +34,8 @@ std::vector<Material> materialsOf(const PressProblem& problem, const BodyMesh& b
 using LookSink =
     std::function<void(const Solver&, std::size_t look, std::size_t looks, const experiments::ReferenceState&)>;
 
-/// Solves all looks of the path in order. Throws std::runtime_error where that does not converge.
+/// Solves all looks of the path in order, from the path's start. Of a body that is mirrored, force and energy are of all of
+/// it. Throws std::runtime_error where that does not converge.
 experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink);
 
 }  // namespace palpate::reference

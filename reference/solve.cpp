@@ -22,10 +22,13 @@ constexpr double perMetre = 1e3;      // mm
 constexpr double newtonPer = 1e-3;    // of a mN
 constexpr double pascalPer = 1e3;     // of a kPa
 constexpr double joulePer = 1e-6;     // of a uJ
-constexpr double coarse = 1e-3;       // residual while multipliers still move
+constexpr double coarse = 1e-3;       // residual while multipliers still move, at first,
+constexpr double finer = 0.3;         // and from one update of theirs to the next
 constexpr int mostUpdates = 10;       // of the multipliers
-constexpr double sinks = 1e-4;        // how deep a sphere may sink in, share of the way it has pressed
-constexpr double stepOfRadius = 0.2;  // load step of a sphere, in its radius
+constexpr double sinks = 1e-4;        // how deep a tool may sink in, share of the way it has pressed
+constexpr double stepOfRadius = 0.2;  // load step of a tool at the start of a way, in its radius, at most
+constexpr double leastStride = 0.02;  // and at least
+constexpr int easySteps = 7;          // of Newton's method: the next load step may be longer
 constexpr double shortest = 1e-4;     // share of a load that a step must take
 
 void checkMesh(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options)
@@ -87,71 +90,105 @@ struct Solver::Impl {
     {
     }
 
+    // The free face that is nearest to a point at rest: its normal, out of the body, and how deep the point is under it.
+    struct Above {
+        Vec3 normal{0.0};
+        double depth = -std::numeric_limits<double>::infinity();  // [mm]
+    };
+    Above above(Vec3 p) const;
+    Vec3 areaNormal(std::size_t face) const;
     Obstacle retreat(const Obstacle& from) const;
     double sunk(const Obstacle& at) const;
     bool balance(double depth, bool last);
     void extrapolate(const Obstacle& to);
-    bool moveSphere(const Obstacle& to, bool last);
+    bool moveTool(const Obstacle& to, bool last);
     std::vector<double> prescribed(const Patch& patch);
     void say(double share) const;
     Vec3 force() const;
 
     TetMesh mesh;
     Equilibrium body;
-    std::optional<Obstacle> sphere;
-    std::vector<double> lastChange;  // of the state, by the last step of the sphere
-    Vec3 lastWay{0.0};               // of the sphere [mm]
+    std::optional<Obstacle> tool;
+    std::vector<double> lastChange;  // of the state, by the last step of the tool
+    Vec3 lastWay{0.0};               // of the tool [mm]
+    double stride = 0;               // of the tool, that Newton's method can be expected to follow [mm]
 };
 
-// Where the sphere is when it has just left the body at rest, straight out of the faces that it presses.
+// Twice the face's area, out of the body [m^2].
+Vec3 Solver::Impl::areaNormal(std::size_t face) const
+{
+    const auto& p = mesh.faces[face].points;
+    return glm::cross(mesh.points[p[1]] - mesh.points[p[0]], mesh.points[p[2]] - mesh.points[p[0]]);
+}
+
+Solver::Impl::Above Solver::Impl::above(Vec3 p) const
+{
+    Above nearest;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+        for (const std::uint32_t n : body.fem.faceNodes()[f]) {
+            const Vec3 away = body.fem.nodes()[n] - p;
+            if (body.fem.freeFaces()[f] != 0 && glm::length(away) < least) {
+                least = glm::length(away);
+                nearest.normal = glm::normalize(areaNormal(f));
+                nearest.depth = std::copysign(least, glm::dot(away, nearest.normal));
+            }
+        }
+    }
+    return nearest;
+}
+
+// Where the tool is when it has just left the body at rest, straight out of the faces that it presses, or, where it lies
+// under the surface altogether, of the one above it.
 Obstacle Solver::Impl::retreat(const Obstacle& from) const
 {
     Vec3 out(0.0);
     for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
         const auto& six = body.fem.faceNodes()[f];
-        const bool in = std::any_of(six.begin(), six.end(), [&](std::uint32_t n) {
-            return glm::distance(body.fem.nodes()[n], from.centre) < from.radius;
-        });
+        const bool in =
+            std::any_of(six.begin(), six.end(), [&](std::uint32_t n) { return from.distance(body.fem.nodes()[n]) < 0.0; });
         if (in && body.fem.freeFaces()[f] != 0) {
-            const auto& p = mesh.faces[f].points;
-            out += glm::cross(mesh.points[p[1]] - mesh.points[p[0]], mesh.points[p[2]] - mesh.points[p[0]]);
+            out += areaNormal(f);
         }
     }
     if (glm::length(out) == 0.0) {
-        return from;
+        const Above face = above(from.centre);
+        if (face.depth <= 0.0) {
+            return from;
+        }
+        out = face.normal;
     }
     out = glm::normalize(out);
     double way = 0.0;
-    for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-        for (const std::uint32_t n : body.fem.faceNodes()[f]) {
-            const Vec3 d = body.fem.nodes()[n] - from.centre;
-            const double along = glm::dot(d, out);
-            const double across = glm::dot(d, d) - along * along;
-            if (across < from.radius * from.radius) {
-                way = std::max(way, along + std::sqrt(from.radius * from.radius - across));
+    const int spheres = 1 + static_cast<int>(std::ceil(2.0 * glm::length(from.shaft) / from.radius));
+    for (int s = 0; s < spheres; ++s) {
+        const Vec3 centre = from.centre + (static_cast<double>(s) / std::max(1, spheres - 1)) * from.shaft;
+        for (const auto& six : body.fem.faceNodes()) {
+            for (const std::uint32_t n : six) {
+                const Vec3 d = body.fem.nodes()[n] - centre;
+                const double along = glm::dot(d, out);
+                const double across = glm::dot(d, d) - along * along;
+                if (across < from.radius * from.radius) {
+                    way = std::max(way, along + std::sqrt(from.radius * from.radius - across));
+                }
             }
         }
     }
-    return {from.centre + way * out, from.radius};
+    return {from.centre + way * out, from.radius, from.shaft};
 }
 
-// How deep the sphere lies in the body at rest.
+// How deep the tool's front lies in the body at rest.
 double Solver::Impl::sunk(const Obstacle& at) const
 {
-    double deepest = 0.0;
-    for (const auto& six : body.fem.faceNodes()) {
-        for (const std::uint32_t n : six) {
-            deepest = std::max(deepest, at.radius - glm::distance(body.fem.nodes()[n], at.centre));
-        }
-    }
-    return deepest;
+    return at.radius + above(at.centre).depth;
 }
 
-// Equilibrium with the sphere where it is; in between, the multipliers need only follow.
+// Equilibrium with the tool where it is; in between, the multipliers need only follow.
 bool Solver::Impl::balance(double depth, bool last)
 {
-    for (int update = 0; update < mostUpdates; ++update) {
-        if (!body.find(coarse)) {
+    double tolerance = coarse;
+    for (int update = 0; update < mostUpdates; ++update, tolerance *= finer) {
+        if (!body.find(std::max(tolerance, body.options.tolerance))) {
             return false;
         }
         std::vector<double> before = body.fem.multipliers();
@@ -170,7 +207,7 @@ bool Solver::Impl::balance(double depth, bool last)
 // Goes on as in the last step, if that is nearer to equilibrium.
 void Solver::Impl::extrapolate(const Obstacle& to)
 {
-    const Vec3 way = to.centre - sphere->centre;
+    const Vec3 way = to.centre - tool->centre;
     const double straight = glm::dot(way, lastWay);
     if (lastChange.empty() || straight <= 0.9 * glm::length(way) * glm::length(lastWay)) {
         return;
@@ -192,23 +229,24 @@ void Solver::Impl::extrapolate(const Obstacle& to)
 }
 
 // One load step; leaves everything as it was where it fails.
-bool Solver::Impl::moveSphere(const Obstacle& to, bool last)
+bool Solver::Impl::moveTool(const Obstacle& to, bool last)
 {
     const std::vector<double> state = body.state;
     const std::vector<double> multipliers = body.fem.multipliers();
     body.fem.setObstacle(to);
+    body.fem.stiffenContact(body.state);
     extrapolate(to);
     if (balance(std::max(sunk(to), sinks * to.radius), last)) {
-        lastWay = to.centre - sphere->centre;
+        lastWay = to.centre - tool->centre;
         lastChange.resize(state.size());
         std::transform(body.state.begin(), body.state.end(), state.begin(), lastChange.begin(), std::minus<>());
-        sphere = to;
+        tool = to;
         return true;
     }
     body.state = state;
     body.factor.reset();
     body.fem.setMultipliers(multipliers);
-    body.fem.setObstacle(*sphere);
+    body.fem.setObstacle(*tool);
     body.fem.findContact(body.state);
     body.evaluate();
     return false;
@@ -269,18 +307,18 @@ Solver::~Solver() = default;
 
 namespace {
 
-// Calls step(from, to) for shares of a load from 0 to 1, shorter where it fails.
+// Calls step(to) for shares of a load from 0 to 1, shorter where it fails; longer where it was `easy`.
+// @param length  of the first step, and then of the next one
 // @returns  how far it got
-template <typename Step>
-double takeSteps(double first, int most, Step&& step)
+template <typename Step, typename Easy>
+double takeSteps(double& length, int most, Step&& step, Easy&& easy)
 {
     double done = 0.0;
-    double length = first;
     for (int count = 0; done < 1.0 && length >= shortest && count < most; ++count) {
         const double to = done + length > 1.0 - shortest ? 1.0 : done + length;
         if (step(to)) {
             done = to;
-            length *= 1.5;
+            length *= easy() ? 1.5 : 1.0;
         } else {
             length *= 0.5;
         }
@@ -290,29 +328,38 @@ double takeSteps(double first, int most, Step&& step)
 
 }  // namespace
 
-void Solver::press(const RigidSphere& sphere)
+void Solver::press(const RigidTool& tool)
 {
     Impl& s = *impl_;
-    const Obstacle to{perMetre * sphere.centre, perMetre * sphere.radius};
+    const Obstacle to{perMetre * tool.centre, perMetre * tool.radius, perMetre * tool.shaft};
     if (!s.body.driven.empty()) {
-        throw std::runtime_error("sphere: displacements are prescribed already: take a new solver");
+        throw std::runtime_error("tool: displacements are prescribed already: take a new solver");
     }
-    if (!s.sphere || s.sphere->radius != to.radius) {
-        s.sphere = s.retreat(to);
+    if (!s.tool || s.tool->radius != to.radius || s.tool->shaft != to.shaft) {
+        s.tool = s.retreat(to);
         s.lastChange.clear();
+        s.stride = stepOfRadius * to.radius;
     }
-    const Vec3 from = s.sphere->centre;
+    const Vec3 from = s.tool->centre;
     const double way = glm::distance(from, to.centre);
     s.body.steps = 0;
-    const double first = std::min(1.0, stepOfRadius * to.radius / std::max(way, 1e-9));
-    const double done = takeSteps(first, s.body.options.mostSteps, [&](double share) {
-        const bool moved = s.moveSphere({from + share * (to.centre - from), to.radius}, share == 1.0);
-        s.say(share);
-        return moved;
-    });
+    double length = s.stride / std::max(way, 1e-9);
+    int before = 0;
+    const double done = takeSteps(
+        length, s.body.options.mostSteps,
+        [&](double share) {
+            before = s.body.steps;
+            const bool moved = s.moveTool({from + share * (to.centre - from), to.radius, to.shaft}, share == 1.0);
+            s.say(share);
+            return moved;
+        },
+        [&] { return s.body.steps - before <= easySteps; });
+    if (way > 0.0) {
+        s.stride = std::clamp(length * way, leastStride * to.radius, stepOfRadius * to.radius);
+    }
     if (done < 1.0) {
         throw std::runtime_error(fmt::format(
-            "sphere: does not converge at {:.3f} mm of {:.3f} mm: press less deep, or make the elements smaller there",
+            "tool: does not converge at {:.3f} mm of {:.3f} mm: press less deep, or make the elements smaller there",
             done * way, way));
     }
 }
@@ -320,7 +367,7 @@ void Solver::press(const RigidSphere& sphere)
 void Solver::prescribe(const Patch& patch)
 {
     Impl& s = *impl_;
-    s.sphere.reset();
+    s.tool.reset();
     s.body.fem.setObstacle({});
     s.body.fem.setMultipliers(std::vector<double>(s.body.fem.multipliers().size()));
     s.body.state.assign(s.body.fem.size(), 0.0);
@@ -329,7 +376,8 @@ void Solver::prescribe(const Patch& patch)
     if (s.body.driven.empty()) {
         throw std::runtime_error("patch: no free face lies in it: make it larger, or the elements smaller");
     }
-    const double done = takeSteps(1.0, s.body.options.mostSteps, [&](double share) {
+    double length = 1.0;
+    const auto step = [&](double share) {
         const std::vector<double> state = s.body.state;
         s.body.goal.clear();
         for (const std::uint32_t i : s.body.driven) {
@@ -341,7 +389,8 @@ void Solver::prescribe(const Patch& patch)
         }
         s.body.state = state;
         return false;
-    });
+    };
+    const double done = takeSteps(length, s.body.options.mostSteps, step, [] { return true; });
     if (done < 1.0) {
         double largest = 0.0;
         for (const double g : goal) {

@@ -20,10 +20,11 @@ struct Material {
     double stiffening = 0;     // b, with finite strain: the shear modulus grows as 1 + b (I_C - 3) [-]
 };
 
-/// A rigid sphere that tissue cannot enter; without friction.
-struct RigidSphere {
-    Vec3 centre{0.0};   // [m]
+/// A rigid sphere or capsule that tissue cannot enter; without friction.
+struct RigidTool {
+    Vec3 centre{0.0};   // of the sphere, or of the capsule's front end [m]
     double radius = 0;  // [m]
+    Vec3 shaft{0.0};    // of a capsule, from there to the middle of its other end [m]
 };
 
 /// Displacements that are prescribed where `at` gives one, on free faces only: returns false where nothing is.
@@ -50,9 +51,9 @@ public:
     Solver(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options);
     ~Solver();
 
-    /// Presses the sphere: goes there from the last state in load steps, halved where Newton's method fails. Contact by
+    /// Presses the tool: goes there from the last state in load steps, halved where Newton's method fails. Contact by
     /// augmented Lagrangian. Throws std::runtime_error ("does not converge at ... mm of ... mm: what to do").
-    void press(const RigidSphere& sphere);
+    void press(const RigidTool& tool);
     /// Prescribes displacements, in load steps from rest.
     void prescribe(const Patch& patch);
 

@@ -1,4 +1,5 @@
 #include <reference/press_path.h>
+#include <reference/symmetry.h>
 #include <reference/vtu.h>
 #include <tests/experiments/small_block.h>
 
@@ -13,6 +14,7 @@
 
 #include <algorithm>
 #include <set>
+#include <stdexcept>
 
 namespace palpate::reference {
 namespace {
@@ -83,6 +85,30 @@ TEST(PressPath, ForceGrowsWithDepth)
     const auto& last = p.reference.states[3];
     EXPECT_NEAR(last.largest, 0.8e-3, 0.35e-3);
     EXPECT_GT(last.strain, 0.02);
+}
+
+// A quarter of the block, on a mesh of its own, says of the whole what the whole says.
+TEST(PressPath, AQuarterSpeaksForTheWhole)
+{
+    const auto& p = pressed();
+    const volume::Tissue quarter = mirroredPart(*p.model.tissue, {true, false, true});
+    EXPECT_EQ(4 * quarter.labels().values.size(), p.model.tissue->labels().values.size());
+    PressProblem problem{quarter, p.model.surface, p.path, 20e-3, 0.45, {.mirrored = {true, false, true}}};
+    problem.looks = {p.reference.states[3].pose};
+    const auto reference = solvePath(problem, meshBody(quarter, meshOptions(problem, 2e-3)),
+                                     [](const Solver&, std::size_t, std::size_t, const auto&) {});
+    const auto& whole = p.reference.states[3];
+    const auto& part = reference.states.back();
+    EXPECT_EQ(reference.states.size(), 1U);
+    EXPECT_EQ(part.force.x, 0.0);
+    EXPECT_EQ(part.force.z, 0.0);
+    EXPECT_NEAR(part.force.y, whole.force.y, 0.05 * glm::length(whole.force));
+    EXPECT_NEAR(part.energy, whole.energy, 0.05 * whole.energy);
+}
+
+TEST(PressPath, RefusesAPlaneThatIsNone)
+{
+    EXPECT_THROW(mirroredPart(*pressed().model.tissue, {false, true, false}), std::runtime_error);
 }
 
 TEST(Vtu, HasTheDisplacementsOfTheSolution)

@@ -219,7 +219,7 @@ TEST(Solve, TheSpheresForceGoesThroughTheLowestLayer)
 TEST(Solve, TheSurfaceLiesOnTheSphere)
 {
     Solver solver(halfBlock(1e-3), std::vector<Material>{{modulus, 0.45, 0.0}}, halved(Law::neoHookean));
-    const RigidSphere sphere{{0.0, 0.0, 5e-3 - 2e-3}, 5e-3};
+    const RigidTool sphere{{0.0, 0.0, 5e-3 - 2e-3}, 5e-3};
     solver.press(sphere);
     std::vector<Vec3> rest;
     for (int i = 0; i <= 40; ++i) {
@@ -254,6 +254,77 @@ TEST(Solve, TheWayDoesNotMatter)
     EXPECT_NEAR(straight.energy(), around.energy(), 1e-3 * straight.energy());
 }
 
+// A quarter of a block, x = 0 and y = 0 its planes of symmetry, top at z = 0, deep enough for a sphere of 5 mm.
+TetMesh deepBlock()
+{
+    const std::vector<double> across = gradedCells(0.0, 5e-3, 18e-3, 2.5e-3, 1.8);
+    BoxMeshOptions options;
+    options.held = [](Vec3 p) { return p.z < -20e-3 + 1e-9; };
+    return boxMesh(across, across, gradedDown(-20e-3, -4e-3, 0.0, 2.5e-3, 1.8), options);
+}
+
+Solver deepSolver()
+{
+    SolveOptions options;
+    options.law = Law::neoHookean;
+    options.mirrored = {true, true, false};
+    return {deepBlock(), std::vector<Material>{{modulus, 0.4, 0.0}}, options};
+}
+
+// Radius of 5 mm, its foremost point so many radii under the surface.
+RigidTool sphereAt(double radii)
+{
+    return {{0.0, 0.0, 5e-3 * (1.0 - radii)}, 5e-3};
+}
+
+// Tissue in front of a sphere never pulls it in, however deep: the force grows all the way, on the way out is what it was
+// on the way in, and a sphere that is asked for under the surface at once has come in through it.
+TEST(Solve, ASphereTwoRadiiDeepIsPushedOutAllTheWay)
+{
+    Solver solver = deepSolver();
+    std::vector<double> in{0.0};
+    for (const double radii : {0.7, 1.4, 2.1}) {
+        solver.press(sphereAt(radii));
+        in.push_back(solver.force().z);
+        EXPECT_GT(in.back(), 1.3 * in[in.size() - 2]) << radii << " radii";
+    }
+    solver.press(sphereAt(0.7));
+    EXPECT_NEAR(solver.force().z, in[1], 2e-3 * in[1]);
+    Solver atOnce = deepSolver();
+    atOnce.press(sphereAt(2.1));
+    EXPECT_NEAR(atOnce.force().z, in.back(), 2e-3 * in.back());
+}
+
+// What touches it is a hemisphere.
+TEST(Solve, ACapsuleEndOnIsASphereAsDeepAsItsRadius)
+{
+    const RigidTool sphere = sphereAt(0.8);
+    Solver one = deepSolver();
+    one.press(sphere);
+    Solver other = deepSolver();
+    other.press({sphere.centre, sphere.radius, Vec3(0.0, 0.0, 20e-3)});
+    EXPECT_NEAR(other.force().z, one.force().z, 1e-6 * one.force().z);
+}
+
+// The work of the tool goes into the tissue, along the shaft as at its ends; and a longer tool meets more of it.
+TEST(Solve, ALyingCapsulesForceIsTheEnergysSlope)
+{
+    const double radius = 4e-3, depth = 2e-3, step = 4e-5;
+    const std::vector<Material> tissue{{modulus, 0.45, 0.0}};
+    Solver solver(halfBlock(1.5e-3), tissue, halved(Law::neoHookean));
+    const auto energyAt = [&](double d) {
+        solver.press({{-3e-3, 0.0, radius - d}, radius, Vec3(6e-3, 0.0, 0.0)});
+        return solver.energy();
+    };
+    const double low = energyAt(depth - step);
+    energyAt(depth);
+    const double force = solver.force().z;
+    EXPECT_NEAR(force, (energyAt(depth + step) - low) / (2.0 * step), 3e-3 * force);
+    Solver sphere(halfBlock(1.5e-3), tissue, halved(Law::neoHookean));
+    sphere.press({{0.0, 0.0, radius - depth}, radius});
+    EXPECT_GT(force, 1.3 * sphere.force().z);
+}
+
 // A sphere that has left the tissue leaves nothing behind.
 TEST(Solve, ASphereThatHasLeftPushesNothing)
 {
@@ -276,7 +347,7 @@ TEST(Solve, MirroringHalvesTheForce)
     const std::vector<Material> tissue{{modulus, 0.45, 0.0}};
     Solver all(boxMesh(whole, whole, z, held), tissue, {});
     Solver mirrored(boxMesh(whole, half, z, held), tissue, halved(Law::linear));
-    const RigidSphere sphere{{0.0, 0.0, 10e-3 - 2e-3}, 10e-3};
+    const RigidTool sphere{{0.0, 0.0, 10e-3 - 2e-3}, 10e-3};
     all.press(sphere);
     mirrored.press(sphere);
     // Diagonals of bricks are not symmetric.
