@@ -98,7 +98,7 @@ chainmail::Focus PoseLoad::focusOf(const ToolPose& pose) const noexcept
     return chainmail::focusAt(surface, at - surface.distance(at) * surface.normal(at));
 }
 
-void PoseLoad::set(const ToolPose& pose, const chainmail::Elastic& elastic) noexcept
+void PoseLoad::set(const ToolPose& pose) noexcept
 {
     load_.focus = focusOf(pose);
     for (std::size_t i = 0; i < ties_.size(); ++i) {
@@ -106,13 +106,9 @@ void PoseLoad::set(const ToolPose& pose, const chainmail::Elastic& elastic) noex
         ties_[i].axis = pose.axis;
     }
     surface_.shape = {onShaft(pose, tool_.length), pose.position, tool_.radius, tool_.radius};
-    // As far as the tissue that it touches was displaced at most.
-    surface_.carried = Vec3(0.0);
-    for (const chainmail::ContactSite& site : elastic.sites()) {
-        if (!site.isTie && glm::length(site.u) > glm::length(surface_.carried)) {
-            surface_.carried = site.u;
-        }
-    }
+    const Vec3 at = deepest(pose);
+    const double depth = tool_.radius - model_.surface.distance(at);
+    surface_.pushed = depth > 0.0 ? -depth * model_.surface.normal(at) : Vec3(0.0);
 }
 
 Vec3 PoseLoad::force(const chainmail::Elastic& elastic) const noexcept

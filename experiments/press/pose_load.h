@@ -25,8 +25,7 @@ public:
 
     /// False for a needle whose tip is not in tissue at `first`: then it may not be used.
     bool holds() const noexcept { return !isNeedle() || !ties_.empty(); }
-    /// @param elastic  as the last call left it: how far it carries the tissue along
-    void set(const ToolPose& pose, const chainmail::Elastic& elastic) noexcept;
+    void set(const ToolPose& pose) noexcept;
     const chainmail::ElasticLoad& load() const noexcept { return load_; }
     /// Of the tissue on the tool in the last call [N].
     Vec3 force(const chainmail::Elastic& elastic) const noexcept;

@@ -88,7 +88,7 @@ private:
     PressSample solve(const ToolPose& pose, bool converge)
     {
         const double start = threadSeconds();
-        load_.set(pose, elastic_);
+        load_.set(pose);
         const ElasticResult result =
             converge ? elastic_.relax(load_.load(), mostCycles, pressTolerance) : elastic_.relax(load_.load());
         PressSample s;
@@ -163,7 +163,8 @@ double contactArea(const Elastic& elastic) noexcept
     double area = 0.0;
     for (const chainmail::ContactSite& site : elastic.sites()) {
         if (!site.isTie && site.active()) {
-            area += static_cast<double>(elastic.body().points[site.point].area);
+            area += chainmail::areaRatio(elastic.body(), elastic.stack().windows(), site) *
+                    static_cast<double>(elastic.body().points[site.point].area);
         }
     }
     return area;

@@ -56,7 +56,7 @@ inline constexpr double pressTolerance = 1e-4;
 /// Windows, cycles, strain and viscosity of a tick of 1 ms, by the scene's settings: as in a session.
 chainmail::ElasticOptions tickOptions(const datasets::ElasticSettings& settings) noexcept;
 
-/// Area at rest of the surface that a tool presses [m^2].
+/// Area of the surface that a tool presses, as it is stretched [m^2].
 double contactArea(const chainmail::Elastic& elastic) noexcept;
 
 /// Drives the elastic body along the path from rest, tick by tick, and hands over the samples.
