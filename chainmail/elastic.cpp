@@ -26,7 +26,8 @@ constexpr int newtonSteps = 3;         // of a line search: contacts open and cl
 constexpr int mostShortenings = 8;     // of a step that raises the energy
 constexpr double mostBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
 constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
-constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew
+constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew ...
+constexpr int freePeriod = 8;          // ... and where tissue springs back: its energy falls to next to nothing
 constexpr double rounding = 1e-6;      // relative: sums of single-precision products are no better
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
@@ -177,23 +178,28 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 }
 
 // Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells resolve. Both
-// are kept while a call solves, so that a call keeps one energy.
+// are kept while a call solves, so that a call keeps one energy. The size of the patch is that of the moments of its
+// pressure, (sum p)^2 / sum p^2, 8/9 of the area under Hertz's: points that come and go at its edge hardly count.
 void Elastic::spreadPressure() noexcept
 {
+    constexpr double hertz = 9.0 / 8.0;
     const auto& body = stack_.body();
-    std::array<double, mostTools> area{};
+    std::array<double, mostTools> first{};
+    std::array<double, mostTools> second{};
     for (ContactSite& s : active()) {
         if (!s.isTie) {
             const double ratio = options_.finiteStrain ? areaRatio(body, stack_.windows(), s) : 1.0;
+            const double area = ratio * static_cast<double>(body.points[s.point].area);
+            const double depth = std::max(-shapes_[s.owner].distance(s.rest + s.u), 0.0);
             s.stiffness = s.atRest * ratio;
-            area[s.owner] += shapes_[s.owner].distance(s.rest + s.u) < 0.0
-                                 ? ratio * static_cast<double>(body.points[s.point].area)
-                                 : 0.0;
+            first[s.owner] += area * depth;
+            second[s.owner] += area * depth * depth;
         }
     }
     std::array<double, mostTools> share{};
     for (std::size_t i = 0; i < shapes_.size(); ++i) {
-        share[i] = resolvedShare(std::sqrt(area[i] / std::numbers::pi) / body.levels.front().nodes.spacing);
+        const double patch = second[i] > 0.0 ? hertz * first[i] * first[i] / second[i] : 0.0;
+        share[i] = resolvedShare(std::sqrt(patch / std::numbers::pi) / body.levels.front().nodes.spacing);
     }
     for (ContactSite& s : active()) {
         s.stiffness *= s.isTie ? 1.0 : share[s.owner];
@@ -435,15 +441,17 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     multigrid_.clearContacts();
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
-    if (!touched() && (memory_ == 0.0 || energy_ < leastEnergy)) {
+    const bool isTouched = touched();
+    if (!isTouched && (memory_ == 0.0 || energy_ < leastEnergy)) {
         settle();
         return result;
     }
     atRest_ = false;
-    if (result.moved || ++sinceRefresh_ >= refreshPeriod) {
+    if (result.moved || ++sinceRefresh_ >= (isTouched ? refreshPeriod : freePeriod)) {
         refreshForces();
         sinceRefresh_ = 0;
     }
+    result.start = energy_ + contactEnergy() / (1.0 - memory_);
     if (memory_ > 0.0) {
         stack_.copy(Field::a, Field::v);
     }

@@ -21,6 +21,7 @@ struct ElasticOptions {
 
 struct ElasticResult {
     double energy = 0;           // of tissue and contacts [J]
+    double start = 0;            // the same when the call began, the tools where they are now [J]
     double residual = 0;         // forces out of balance before the last step, Euclidean norm over degrees of freedom [N]
     double depth = 0;            // of the deepest point of tissue inside a tool [m]
     double behind = 0;           // by how much the deepest tool is held back, see Elastic [m]

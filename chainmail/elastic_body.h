@@ -51,7 +51,8 @@ struct ElasticBody {
     bool held = true;  // false: the body had nothing fixed, and was laid on its back
 };
 
-/// @param cells        centres of the finest level's cells; the cells at its border must be empty
+/// @param cells        centres of the finest level's cells; two layers of cells at its border must be empty: a surface that
+///                     lies on the border of the last has half of its points
 /// @param surface      signed distance to the body's surface at rest [m]
 /// @param poissonCap   Poisson's ratios above are lowered to this [-], under 0.5
 /// @param toolRadius   of the smallest tool that will press: the surface has points closer than that; 0: of any that is

@@ -102,11 +102,11 @@ double areaRatio(const ElasticBody& body, std::span<const Window> windows, const
 
 /// Share of the contact's stiffness that a patch of radius a has on cells of side h.
 ///
-///     1 / (1 + 3.3 (1 - (a / 1.8 h)^2))    for a < 1.8 h, else 1
+///     1 / (1 + 3.6 (1 - (a / 1.8 h)^2))    for a < 1.8 h, else 1
 ///
-/// Cells do not give way under a patch smaller than themselves as tissue does: a sphere on a half-space was 32 % too stiff
-/// at a = h / 2 and 10 % at a = h. What they lack is a compliance of about 0.15 h / E per area up to a = h, and nothing
-/// from 1.8 h on: the numbers are those of Hertz's problem, mean over places in the grid.
+/// Cells do not give way under a patch smaller than themselves as tissue does: a sphere on a half-space was 46 % too stiff at
+/// a = h / 2 and 10 % at a = h, mean over places in the grid. What they lack is a compliance of about 0.15 h / E per area up
+/// to a = h, and nothing from 1.8 h on. The two numbers are those of Hertz's problem; `palpate accuracy --verify` has it.
 double resolvedShare(double radiusInCells) noexcept;
 
 /// Value of a field at a site.

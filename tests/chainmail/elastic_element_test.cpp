@@ -47,23 +47,13 @@ double bending(int length, int side, double nu)
 }
 
 // A brick integrated in full would be stiffer by a share of 1 / (1 - 2 nu), 500 times at nu 0.499. Ours bends as the beam
-// to 2 % with four cells across, whatever Poisson's ratio.
+// with two cells across as with eight, whatever Poisson's ratio: what is left is rounding.
 TEST(ElasticElement, BendsAsABeamUpToPoissonsRatioOfOneHalf)
 {
-    for (const double nu : {0.3, 0.45, 0.49, 0.499}) {
-        EXPECT_NEAR(bending(16, 4, nu), 1.0, 0.02) << "nu " << nu;
-    }
-}
-
-// With order two in what it is off.
-TEST(ElasticElement, BendingConvergesUnderRefinement)
-{
-    for (const double nu : {0.3, 0.49}) {
-        const double two = bending(8, 2, nu);
-        const double four = bending(16, 4, nu);
-        const double eight = bending(32, 8, nu);
-        EXPECT_LT(std::abs(four - 1.0), 0.4 * std::abs(two - 1.0)) << "nu " << nu;
-        EXPECT_LT(std::abs(eight - 1.0), 0.4 * std::abs(four - 1.0)) << "nu " << nu;
+    for (const double nu : {0.0, 0.3, 0.45, 0.49, 0.499}) {
+        for (const int side : {2, 4, 8}) {
+            EXPECT_NEAR(bending(4 * side, side, nu), 1.0, 1e-3) << "nu " << nu << ", " << side;
+        }
     }
 }
 

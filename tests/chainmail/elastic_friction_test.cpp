@@ -161,7 +161,10 @@ TEST(ElasticFriction, ClosedPathsTakeEnergyOut)
         drag.go(0.0, Vec3(0.0));
         return std::array{drag.work() / stored, 2.0 * mu * normal * way / stored};
     };
-    EXPECT_NEAR(loop(0.0, 2e-3)[0], 0.0, 0.02);
+    // What the contacts' stiffness takes that goes with the area under the tool: never a gain.
+    const double without = loop(0.0, 2e-3)[0];
+    EXPECT_GT(without, -0.005);
+    EXPECT_LT(without, 0.05);
     double before = 0.0;
     for (const double way : {0.2e-3, 1e-3, 3e-3}) {
         const auto [work, most] = loop(0.3, way);
