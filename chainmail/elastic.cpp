@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace palpate::chainmail {
 
@@ -177,32 +176,22 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
 }
 
-// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells resolve. Both
-// are kept while a call solves, so that a call keeps one energy. The size of the patch is that of the moments of its
-// pressure, (sum p)^2 / sum p^2, 8/9 of the area under Hertz's: points that come and go at its edge hardly count.
+// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells resolve, by
+// Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves, so that a call keeps one energy.
 void Elastic::spreadPressure() noexcept
 {
-    constexpr double hertz = 9.0 / 8.0;
     const auto& body = stack_.body();
-    std::array<double, mostTools> first{};
-    std::array<double, mostTools> second{};
+    std::array<double, mostTools> share{};
+    for (std::size_t i = 0; i < tools_.size(); ++i) {
+        const double radius = std::max(tools_[i].shape.radiusA, tools_[i].shape.radiusB);
+        const double depth = glm::length(tools_[i].pushed);
+        share[i] = depth > 0.0 ? resolvedShare(std::sqrt(radius * depth) / body.levels.front().nodes.spacing) : 1.0;
+    }
     for (ContactSite& s : active()) {
         if (!s.isTie) {
             const double ratio = options_.finiteStrain ? areaRatio(body, stack_.windows(), s) : 1.0;
-            const double area = ratio * static_cast<double>(body.points[s.point].area);
-            const double depth = std::max(-shapes_[s.owner].distance(s.rest + s.u), 0.0);
-            s.stiffness = s.atRest * ratio;
-            first[s.owner] += area * depth;
-            second[s.owner] += area * depth * depth;
+            s.stiffness = share[s.owner] * ratio * s.atRest;
         }
-    }
-    std::array<double, mostTools> share{};
-    for (std::size_t i = 0; i < shapes_.size(); ++i) {
-        const double patch = second[i] > 0.0 ? hertz * first[i] * first[i] / second[i] : 0.0;
-        share[i] = resolvedShare(std::sqrt(patch / std::numbers::pi) / body.levels.front().nodes.spacing);
-    }
-    for (ContactSite& s : active()) {
-        s.stiffness *= s.isTie ? 1.0 : share[s.owner];
     }
 }
 
@@ -510,7 +499,7 @@ void Elastic::measure(ElasticResult& result) noexcept
             result.depth = std::max(result.depth, s.depth);
             HeldTool& held = held_[s.owner];
             held.depth = std::max(held.depth, s.depth);
-            held.stretch = std::max(held.stretch, s.stiffness / s.atRest);
+            held.stretch = std::max(held.stretch, areaRatio(stack_.body(), stack_.windows(), s));
         }
     }
 }

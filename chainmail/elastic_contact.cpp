@@ -12,7 +12,7 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr double penalty = 20.0;    // contact stiffness per area, in E / h
-constexpr double unresolved = 3.6;  // compliance that cells lack under a point, in that of the contact
+constexpr double unresolved = 3.3;  // compliance that cells lack under a point, in that of the contact
 constexpr double resolved = 1.8;    // radius of a patch that lacks none, in cells
 constexpr double leastRatio = 0.3;  // of areas: bounds far beyond what tissue bears
 constexpr double mostRatio = 30.0;

@@ -13,7 +13,7 @@ namespace palpate::chainmail {
 /// A rigid tool that tissue cannot enter.
 struct ElasticTool {
     occupancy::RoundCone shape;  // where it is now [m]
-    Vec3 pushed{0.0};            // its way there from where it would lie on the surface at rest [m]
+    Vec3 pushed{0.0};  // its way there from where it would lie on the surface at rest; 0: nothing is known of its depth [m]
     double stiffest = 1e4;  // of the whole contact [N/m], bone is no stiffer: the force on a hand is held by the stabiliser
     double friction = 0;    // Coulomb [-]
 };
@@ -102,11 +102,12 @@ double areaRatio(const ElasticBody& body, std::span<const Window> windows, const
 
 /// Share of the contact's stiffness that a patch of radius a has on cells of side h.
 ///
-///     1 / (1 + 3.6 (1 - (a / 1.8 h)^2))    for a < 1.8 h, else 1
+///     1 / (1 + 3.3 (1 - (a / 1.8 h)^2))    for a < 1.8 h, else 1
 ///
-/// Cells do not give way under a patch smaller than themselves as tissue does: a sphere on a half-space was 46 % too stiff at
-/// a = h / 2 and 10 % at a = h, mean over places in the grid. What they lack is a compliance of about 0.15 h / E per area up
-/// to a = h, and nothing from 1.8 h on. The two numbers are those of Hertz's problem; `palpate accuracy --verify` has it.
+/// Cells do not give way under a patch smaller than themselves as tissue does: a sphere on a half-space was 46 % too stiff
+/// at a = h / 2 and 10 % at a = h, mean over places in the grid. What they lack is a compliance of about 0.15 h / E per
+/// area up to a = h, and nothing from 1.8 h on. The two numbers are those of Hertz's problem; `palpate accuracy --verify`
+/// has it.
 double resolvedShare(double radiusInCells) noexcept;
 
 /// Value of a field at a site.

@@ -93,7 +93,9 @@ constexpr double ballDepth = 3e-3;
 
 ElasticTool slid(Vec3 direction, double way)
 {
-    return tests::ball(middleOfTop + Vec3(0.0, ballDepth - ballRadius, 0.0) + way * direction, ballRadius, 1000.0);
+    auto tool = tests::ball(middleOfTop + Vec3(0.0, ballDepth - ballRadius, 0.0) + way * direction, ballRadius, 1000.0);
+    tool.pushed = Vec3(0.0, ballDepth, 0.0);
+    return tool;
 }
 
 // Force across a slide of 6 mm at one depth, at equilibrium in every place: ripple is (max - min) / mean.
