@@ -111,7 +111,7 @@ json sampleFigures(const PressSample& s)
             {"energy_mj", 1e3 * s.energy},
             {"residual", s.residual},
             {"depth_mm", 1e3 * s.depth},
-            {"doubtful", s.doubtful},
+            {"behind_mm", 1e3 * s.behind},
             {"us", 1e6 * s.took}};
 }
 
@@ -148,7 +148,7 @@ json pressFigures(const Options& o, const Run& run)
              {"windows_moved", s.windowMoves},
              {"tick_us", {{"p50", 1e6 * s.p50}, {"p99", 1e6 * s.p99}, {"max", 1e6 * s.max}}},
              {"peak_force_n", s.peakForce},
-             {"doubtful_from_s", s.doubtfulFrom ? json(*s.doubtfulFrom) : json()},
+             {"held_from_s", s.heldFrom ? json(*s.heldFrom) : json()},
              {"samples", json::array()},
              {"displacement", json::array()}};
     for (const PressSample& sample : run.samples) {
@@ -164,7 +164,7 @@ json pressFigures(const Options& o, const Run& run)
 std::string pressTable(const Run& run)
 {
     std::string text =
-        "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,doubtful,us";
+        "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,behind_mm,us";
     for (std::size_t i = 1; i <= run.points.size(); ++i) {
         text += fmt::format(",u{0}_x_mm,u{0}_y_mm,u{0}_z_mm", i);
     }
@@ -172,9 +172,9 @@ std::string pressTable(const Run& run)
     for (const PressSample& s : run.samples) {
         const Vec3 p = 1e3 * s.pose.position;
         fmt::format_to(
-            out, "\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:d},{:.1f}",
+            out, "\n{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.10g},{:.4g},{:.10g},{:.10g},{:.1f}",
             s.pose.seconds, p.x, p.y, p.z, s.force.x, s.force.y, s.force.z, 1e6 * s.contactArea, 1e3 * s.energy, s.residual,
-            1e3 * s.depth, s.doubtful, 1e6 * s.took);
+            1e3 * s.depth, 1e3 * s.behind, 1e6 * s.took);
         for (const Vec3& u : s.displacement) {
             fmt::format_to(out, ",{:.10g},{:.10g},{:.10g}", 1e3 * u.x, 1e3 * u.y, 1e3 * u.z);
         }
@@ -188,8 +188,7 @@ void print(const Options& o, const Run& run)
     fmt::print("{}: {} in {}, setting {}, {:g} mm\n", o.scene, kindName(run.press.tool.kind), o.path,
                run.model.scene.model.setting, 1e3 * run.model.lattice.grid.spacing);
     if (s.inContact == 0) {
-        fmt::print("{} ticks; the tool never touches the tissue's surface{}\n", s.ticks,
-                   s.doubtfulFrom ? ": it is inside of it" : "");
+        fmt::print("{} ticks; the tool never touches the tissue's surface\n", s.ticks);
         return;
     }
     const Vec3 p = 1e3 * s.peakAt.position;
@@ -197,11 +196,10 @@ void print(const Options& o, const Run& run)
                p.z);
     fmt::print("{} ticks, {} in contact; one takes {:.0f} us (p50), {:.0f} us (p99); windows moved {} times\n", s.ticks,
                s.inContact, 1e6 * s.p50, 1e6 * s.p99, s.windowMoves);
-    if (s.doubtfulFrom) {
+    if (s.heldFrom) {
         fmt::print(
-            "from {:.3f} s on the tissue's surface slips around the tool: it is too deep for its radius, and forces "
-            "are doubtful\n",
-            *s.doubtfulFrom);
+            "from {:.3f} s on the tool is deeper than the model bears, and held back: column behind_mm says by how much\n",
+            *s.heldFrom);
     }
     if (s.notConverged > 0) {
         fmt::print("{} of {} samples are not solved to convergence: column residual says which\n", s.notConverged,

@@ -2,6 +2,7 @@
 
 #include <haptics/contact_law.h>
 #include <haptics/events.h>
+#include <haptics/surface_proxy.h>
 
 #include <glm/geometric.hpp>
 
@@ -14,8 +15,6 @@ namespace {
 
 // A sharp tip bites: it slips only when dragged flatter than 27 degrees over the skin.
 constexpr double tipFriction = 2.0;
-constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
-constexpr int slipSteps = 8;
 constexpr double mouth = 1e-3;  // a path that is open this deep is one to go in by [m]
 
 struct Tip {
@@ -46,46 +45,30 @@ struct Tip {
             return;
         }
         state.phase = Phase::contact;
-        state.proxy = ontoSurface(occupancy::restPoint(body, way.point));
-        state.normal = model.surface.normal(state.proxy);
+        take(touching(model.surface, proxyTool(), occupancy::restPoint(body, way.point)));
         const auto touched = reader.tissue(state.proxy - (offset() + 0.5e-3) * state.normal);
         addEvent(record, {EventKind::contact, 0xFF, touched, glm::distance(way.point, device.position)});
     }
 
-    Vec3 ontoSurface(Vec3 p) const noexcept
-    {
-        for (int i = 0; i < 3; ++i) {
-            p += (offset() - model.surface.distance(p)) * model.surface.normal(p);
-        }
-        return p;
-    }
+    // The force laws know one proxy, that of the tip: a capsule is its front end. A sphere slips without friction.
+    ProxyTool proxyTool() const noexcept { return {offset(), 0.0, device.axis, needle() ? tipFriction : 0.0}; }
 
-    // Lets the proxy slip over the surface until the force is inside the cone of friction. Bounded steps.
-    void slip() noexcept
+    void take(const SurfaceProxy& proxy) noexcept
     {
-        const double friction = needle() ? tipFriction : 0.0;
-        for (int i = 0; i < slipSteps; ++i) {
-            const Vec3 away = device.position - state.proxy;
-            const double depth = -glm::dot(away, state.normal);
-            const Vec3 across = away + depth * state.normal;
-            const double excess = glm::length(across) - friction * std::max(depth, 0.0);
-            if (excess <= 1e-9) {
-                return;
-            }
-            state.proxy = ontoSurface(state.proxy + std::min(excess, longestSlip) * glm::normalize(across));
-            state.normal = model.surface.normal(state.proxy);
-        }
+        state.proxy = proxy.front;
+        state.normal = proxy.normal;
     }
 
     Vec3 press() noexcept
     {
-        slip();
-        const Vec3 away = device.position - state.proxy;
-        const double depth = -glm::dot(away, state.normal);
-        if (depth <= 0.0) {
+        SurfaceProxy proxy{state.proxy, state.normal};
+        slip(model.surface, proxyTool(), device.position, proxy);
+        take(proxy);
+        if (depthUnder(proxy, device.position) <= 0.0) {
             release();
             return Vec3(0.0);
         }
+        const Vec3 away = device.position - state.proxy;
         const Vec3 under = state.proxy - offset() * state.normal;
         const auto local = tissueUnder(model, reader, under, -state.normal, model.scene.tool.radius);
         const double way = glm::length(away);

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace palpate::experiments {
 
@@ -13,10 +12,9 @@ using datasets::ToolKind;
 
 namespace {
 
-constexpr double tieSpacing = 4e-3;   // along a needle's shaft [m]
-constexpr double tieStiffness = 8.0;  // in E h
-constexpr double axisStep = 1e-3;     // along a capsule's axis, where its deepest place is looked for [m]
-constexpr double asDeep = 0.25e-3;    // places of a capsule that are less apart in depth count as one [m]
+constexpr double tieSpacing = 4e-3;    // along a needle's shaft [m]
+constexpr double tieStiffness = 8.0;   // in E h
+constexpr double touchStep = 0.25e-3;  // at most so deep a tool is found that comes to the surface [m]
 
 }  // namespace
 
@@ -66,49 +64,73 @@ double PoseLoad::tieStiffnessAt(Vec3 rest) const noexcept
     return tieStiffness * chainmail::youngsModulusOf(mu) * level.nodes.spacing;
 }
 
-// The place on the tool's axis that is deepest in the body at rest, or nearest to it; the middle of several.
-Vec3 PoseLoad::deepest(const ToolPose& pose) const noexcept
+// Where the front end is when the tool first touches the surface at rest on this way.
+std::optional<Vec3> PoseLoad::firstTouch(const haptics::ProxyTool& tool, Vec3 from, Vec3 to) const noexcept
 {
-    const auto steps = static_cast<int>(std::ceil(tool_.length / axisStep));
-    const auto placeAt = [&](int i) { return onShaft(pose, steps > 0 ? tool_.length * i / steps : 0.0); };
-    double least = std::numeric_limits<double>::max();
-    for (int i = 0; i <= steps; ++i) {
-        least = std::min(least, model_.surface.distance(placeAt(i)));
-    }
-    Vec3 sum(0.0);
-    int count = 0;
-    for (int i = 0; i <= steps; ++i) {
-        if (const Vec3 place = placeAt(i); model_.surface.distance(place) <= least + asDeep) {
-            sum += place;
-            ++count;
+    const double length = glm::distance(from, to);
+    for (double gone = 0.0;;) {
+        const Vec3 at = length > 0.0 ? glm::mix(from, to, gone / length) : to;
+        const double gap = haptics::deepestPlace(model_.surface, tool, at).distance - tool.radius;
+        if (gap < 0.0) {
+            return at;
         }
+        if (gone >= length) {
+            return std::nullopt;
+        }
+        gone = std::min(length, gone + std::max(gap, touchStep));
     }
-    return sum / static_cast<double>(count);
 }
 
-// For a tool that presses, around the point of the surface under it; for a needle, around the middle of what it holds.
-chainmail::Focus PoseLoad::focusOf(const ToolPose& pose) const noexcept
+void PoseLoad::moveProxy(const ToolPose& pose) noexcept
+{
+    const haptics::ProxyTool tool = proxyTool(pose);
+    if (!proxy_) {
+        if (const auto touched = firstTouch(tool, last_.value_or(pose.position), pose.position)) {
+            proxy_ = haptics::touching(model_.surface, tool, *touched);
+        }
+    } else if (tool.length > 0.0) {
+        // It may have turned.
+        proxy_ = haptics::touching(model_.surface, tool, proxy_->front);
+    }
+    if (proxy_) {
+        haptics::slip(model_.surface, tool, pose.position, *proxy_);
+        if (haptics::depthUnder(*proxy_, pose.position) <= 0.0) {
+            proxy_.reset();
+        }
+    }
+    last_ = pose.position;
+}
+
+// Around the point of the surface under the tool.
+chainmail::Focus PoseLoad::focusOf(const haptics::ProxyTool& tool, Vec3 front) const noexcept
 {
     const volume::DistanceField& surface = model_.surface;
-    if (isNeedle()) {
-        return chainmail::focusAt(surface, 0.5 * (ties_.front().rest + ties_.back().rest));
-    }
     const volume::NodeGrid& grid = surface.grid;
-    const Vec3 at = glm::clamp(deepest(pose), grid.position(Index3(0)), grid.position(grid.size - 1));
+    const Vec3 deepest = haptics::deepestPlace(surface, tool, front).at;
+    const Vec3 at = glm::clamp(deepest, grid.position(Index3(0)), grid.position(grid.size - 1));
     return chainmail::focusAt(surface, at - surface.distance(at) * surface.normal(at));
+}
+
+chainmail::Focus PoseLoad::focusAt(const ToolPose& pose) const noexcept
+{
+    if (isNeedle()) {
+        return chainmail::focusAt(model_.surface, 0.5 * (ties_.front().rest + ties_.back().rest));
+    }
+    return focusOf(proxyTool(pose), proxy_ ? proxy_->front : pose.position);
 }
 
 void PoseLoad::set(const ToolPose& pose) noexcept
 {
-    load_.focus = focusOf(pose);
     for (std::size_t i = 0; i < ties_.size(); ++i) {
         ties_[i].u = onShaft(pose, behind_[i]) - onShaft(first_, behind_[i]);
         ties_[i].axis = pose.axis;
     }
-    surface_.shape = {onShaft(pose, tool_.length), pose.position, tool_.radius, tool_.radius};
-    const Vec3 at = deepest(pose);
-    const double depth = tool_.radius - model_.surface.distance(at);
-    surface_.pushed = depth > 0.0 ? -depth * model_.surface.normal(at) : Vec3(0.0);
+    if (!isNeedle()) {
+        moveProxy(pose);
+        surface_.shape = {onShaft(pose, tool_.length), pose.position, tool_.radius, tool_.radius};
+        surface_.pushed = proxy_ ? pose.position - proxy_->front : Vec3(0.0);
+    }
+    load_.focus = focusAt(pose);
 }
 
 Vec3 PoseLoad::force(const chainmail::Elastic& elastic) const noexcept

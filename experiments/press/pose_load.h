@@ -4,15 +4,19 @@
 #include <datasets/scene.h>
 #include <experiments/press/path_file.h>
 #include <haptics/session_model.h>
+#include <haptics/surface_proxy.h>
 
+#include <optional>
 #include <vector>
 
 namespace palpate::experiments {
 
-/// What a tool at a pose does to an elastic body. Sphere and capsule press with their surface. A needle has hold of the
-/// tissue where it is at its first pose: the tip of the point that lies there, and its shaft, from the surface to the tip,
-/// of one point every 4 mm behind it. Later poses carry these points along as parts of one rigid needle, on springs of 8 E
-/// h (E of the cell that the point lies in). Points where there is no tissue are not held.
+/// What a tool does to an elastic body as it goes from pose to pose. Sphere and capsule press with their surface, from
+/// where they first touch the surface at rest until their proxy is clear of them; a capsule's proxy is the whole capsule,
+/// which touches at the deepest place of its axis. A needle has hold of the tissue where it is at its first pose: the tip
+/// of the point that lies there, and its shaft, from the surface to the tip, of one point every 4 mm behind it. Later poses
+/// carry these points along as parts of one rigid needle, on springs of 8 E h (E of the cell that the point lies in).
+/// Points where there is no tissue are not held.
 ///
 /// Not to be copied: the load refers to it. The model must outlive it.
 class PoseLoad {
@@ -25,25 +29,32 @@ public:
 
     /// False for a needle whose tip is not in tissue at `first`: then it may not be used.
     bool holds() const noexcept { return !isNeedle() || !ties_.empty(); }
+    /// @param pose  the next on the way
     void set(const ToolPose& pose) noexcept;
     const chainmail::ElasticLoad& load() const noexcept { return load_; }
     /// Of the tissue on the tool in the last call [N].
     Vec3 force(const chainmail::Elastic& elastic) const noexcept;
-    /// Signed distance from the surface at rest to the deepest place on the tool's axis, negative inside [m].
-    double axisOutside(const ToolPose& pose) const noexcept { return model_.surface.distance(deepest(pose)); }
-    /// Where windows shall be while the tool is there.
-    chainmail::Focus focusOf(const ToolPose& pose) const noexcept;
+    /// The tool presses on the surface.
+    bool inContact() const noexcept { return proxy_.has_value(); }
+    /// Where windows shall be while the tool is there: at the surface under its proxy, or under itself where it has none;
+    /// for a needle, around the middle of what it holds.
+    chainmail::Focus focusAt(const ToolPose& pose) const noexcept;
 
 private:
     bool isNeedle() const noexcept { return tool_.kind == datasets::ToolKind::needle; }
     void hold(double behind);
     Vec3 onShaft(const ToolPose& pose, double behind) const noexcept { return pose.position - behind * pose.axis; }
-    Vec3 deepest(const ToolPose& pose) const noexcept;
+    void moveProxy(const ToolPose& pose) noexcept;
+    std::optional<Vec3> firstTouch(const haptics::ProxyTool& tool, Vec3 from, Vec3 to) const noexcept;
+    chainmail::Focus focusOf(const haptics::ProxyTool& tool, Vec3 front) const noexcept;
+    haptics::ProxyTool proxyTool(const ToolPose& pose) const noexcept { return {tool_.radius, tool_.length, pose.axis}; }
     double tieStiffnessAt(Vec3 rest) const noexcept;
 
     const haptics::SessionModel& model_;
     datasets::ToolSpec tool_;
     chainmail::ElasticTool surface_;
+    std::optional<haptics::SurfaceProxy> proxy_;  // while the tool presses
+    std::optional<Vec3> last_;                    // its front end in the last pose [m]
     ToolPose first_;
     std::vector<chainmail::Tie> ties_;
     std::vector<double> behind_;  // the tip, along the shaft: where each tie is held [m]

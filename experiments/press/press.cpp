@@ -39,15 +39,23 @@ std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const 
     return anchors;
 }
 
-// Which way is in, for the windows, is decided where the path comes nearest to the body.
-chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& model, const PoseLoad& load)
+// Which way is in, for the windows, is decided where the tool first touches, or where it comes nearest to the body.
+chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& model, const PressOptions& options)
 {
-    const auto distance = [&](const ToolPose& pose) { return model.surface.distance(pose.position); };
+    PoseLoad load(model, options.tool, path.poses.front());
     if (!load.holds()) {
         throw std::runtime_error(
             path.origin + ": the needle's tip is not in tissue at the first pose: begin where it has hold of the tissue");
     }
-    return load.focusOf(*std::ranges::min_element(path.poses, {}, distance));
+    const bool presses = options.tool.kind != datasets::ToolKind::needle;
+    for (std::size_t tick = 0; presses && tick < path.ticks(); ++tick) {
+        load.set(path.at(tick));
+        if (load.inContact()) {
+            return load.load().focus;
+        }
+    }
+    const auto distance = [&](const ToolPose& pose) { return model.surface.distance(pose.position); };
+    return load.focusAt(*std::ranges::min_element(path.poses, {}, distance));
 }
 
 class Press {
@@ -58,7 +66,7 @@ public:
           path_(path),
           anchors_(anchorsOf(model, asked)),
           load_(model, options.tool, path.poses.front()),
-          elastic_(*model.elastic, tickOptions(model.scene.model.elastic), startOf(path, model, load_))
+          elastic_(*model.elastic, tickOptions(model.scene.model.elastic), startOf(path, model, options))
     {
     }
 
@@ -99,7 +107,7 @@ private:
         s.energy = result.energy;
         s.residual = shareLeft(elastic_, result);
         s.depth = result.depth;
-        s.doubtful = doubtful_ = isDoubtful(s);
+        s.behind = result.behind;
         if (!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy)) {
             throw std::runtime_error(
                 fmt::format("{}: {:.3f} s: the force is no number: lead the tool less deep or more slowly", path_.origin,
@@ -110,19 +118,10 @@ private:
         return s;
     }
 
-    bool isDoubtful(const PressSample& s) const
-    {
-        if (options_.tool.kind == datasets::ToolKind::needle) {
-            return false;
-        }
-        return elastic_.atRest() ? load_.axisOutside(s.pose) < 0.0
-                                 : doubtful_ || s.depth > doubtfulDepth * options_.tool.radius;
-    }
-
     void count(const PressSample& s, const ElasticResult& result)
     {
-        if (s.doubtful && !summary_.doubtfulFrom) {
-            summary_.doubtfulFrom = s.pose.seconds;
+        if (s.behind > 0.0 && !summary_.heldFrom) {
+            summary_.heldFrom = s.pose.seconds;
         }
         if (elastic_.atRest()) {
             return;
@@ -130,7 +129,7 @@ private:
         ++summary_.inContact;
         summary_.windowMoves += result.moved ? 1 : 0;
         seconds_.push_back(s.took);
-        if (const double force = glm::length(s.force); force > summary_.peakForce && !s.doubtful) {
+        if (const double force = glm::length(s.force); force > summary_.peakForce) {
             summary_.peakForce = force;
             summary_.peakAt = s.pose;
         }
@@ -142,7 +141,6 @@ private:
     PoseLoad load_;
     Elastic elastic_;
     PressSummary summary_;
-    bool doubtful_ = false;
     std::vector<double> seconds_;  // of ticks in contact
 };
 

@@ -27,7 +27,7 @@ struct PressSample {
     double energy = 0;               // of tissue and contacts [J]
     double residual = 0;             // forces out of balance before the tick's last step, share of the contacts' forces
     double depth = 0;                // of the deepest point of tissue inside the tool [m]
-    bool doubtful = false;           // see doubtfulDepth
+    double behind = 0;               // by how much the tool is held back, see chainmail::Elastic [m]
     double took = 0;                 // this thread's processor time [s]
     std::vector<Vec3> displacement;  // of the points asked for [m] (count x 1)
 };
@@ -39,16 +39,10 @@ struct PressSummary {
     std::size_t windowMoves = 0;       // in contact
     std::size_t notConverged = 0;      // samples that were to be solved to convergence and are not
     double p50 = 0, p99 = 0, max = 0;  // time of a tick in contact [s]
-    double peakForce = 0;              // magnitude, of ticks that are not doubtful [N]
+    double peakForce = 0;              // magnitude [N]
     ToolPose peakAt;
-    std::optional<double> doubtfulFrom;  // [s]
+    std::optional<double> heldFrom;  // when the tool is first held back [s]
 };
-
-/// Tissue that is deeper inside a tool than this share of its radius is about to slip around it, and comes out on its other
-/// side: the surface gave way, the force falls and may turn round. From there on, until the tool has left the tissue,
-/// samples are doubtful; so are those of a tool whose axis is in the body and which touches nothing. In blocks and plates a
-/// surface that slipped was this deep before.
-inline constexpr double doubtfulDepth = 0.1;
 
 /// Residual to which PressOptions::converge solves, share of the contacts' forces.
 inline constexpr double pressTolerance = 1e-4;

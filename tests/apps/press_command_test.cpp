@@ -31,14 +31,14 @@ TEST_F(PressCommand, FiguresHaveTheTissuesForceAndTheWayOfThePoints)
     EXPECT_EQ(j.at("setting"), "fast");
     EXPECT_EQ(j.at("tool").at("kind"), "sphere");
     EXPECT_EQ(j.at("ticks"), 201);
-    EXPECT_TRUE(j.at("doubtful_from_s").is_null());
+    EXPECT_TRUE(j.at("held_from_s").is_null());
     EXPECT_GT(j.at("tick_us").at("p99").get<double>(), 0.0);
     ASSERT_EQ(j.at("samples").size(), 201U);
     double peak = 0.0;
     for (const auto& s : j.at("samples")) {
         ASSERT_EQ(s.at("position_mm").size(), 3U);
         ASSERT_EQ(s.at("force_n").size(), 3U);
-        for (const char* key : {"seconds", "contact_mm2", "energy_mj", "residual", "depth_mm", "us"}) {
+        for (const char* key : {"seconds", "contact_mm2", "energy_mj", "residual", "depth_mm", "behind_mm", "us"}) {
             EXPECT_TRUE(s.at(key).is_number()) << key;
         }
         peak = std::max(peak, -s.at("force_n").at(1).get<double>());
@@ -55,6 +55,17 @@ TEST_F(PressCommand, FiguresHaveTheTissuesForceAndTheWayOfThePoints)
     EXPECT_EQ(j.at("displacement").at(1).at("by_mm"), nlohmann::json({0.0, 0.0, 0.0}));
 }
 
+TEST_F(PressCommand, AToolThatIsHeldBackIsSaidToBe)
+{
+    writeText(path, "x_mm,y_mm,z_mm\n0,0,0\n0,0,0\n");
+    const Outcome outcome = palpate({"press", scene, "--path", path});
+    EXPECT_NE(outcome.out.find("from 0.000 s on the tool is deeper than the model bears"), std::string::npos)
+        << outcome.out;
+    const auto j = figures({"press", scene, "--path", path});
+    EXPECT_EQ(j.at("held_from_s"), 0.0);
+    EXPECT_GT(j.at("samples").at(0).at("behind_mm").get<double>(), 1.0);
+}
+
 TEST_F(PressCommand, TheTableHasOneRowPerSampleAndAColumnPerName)
 {
     const std::string csv = folder / "out.csv";
@@ -66,7 +77,7 @@ TEST_F(PressCommand, TheTableHasOneRowPerSampleAndAColumnPerName)
     std::string line;
     ASSERT_TRUE(std::getline(in, line));
     EXPECT_EQ(line,
-              "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,doubtful,us,"
+              "seconds,x_mm,y_mm,z_mm,force_x_n,force_y_n,force_z_n,contact_mm2,energy_mj,residual,depth_mm,behind_mm,us,"
               "u1_x_mm,u1_y_mm,u1_z_mm,u2_x_mm,u2_y_mm,u2_z_mm");
     const auto columns = std::ranges::count(line, ',');
     std::size_t rows = 0;

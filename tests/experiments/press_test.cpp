@@ -164,7 +164,7 @@ TEST(Press, ForcesAreThoseOfATrialBitForBit)
     EXPECT_LT(forces.back().y, -0.05);
     EXPECT_EQ(own.summary.ticks, forces.size());
     EXPECT_GT(own.summary.inContact, forces.size() / 2);
-    EXPECT_FALSE(own.summary.doubtfulFrom);
+    EXPECT_FALSE(own.summary.heldFrom);
 }
 
 TEST(Press, TheWayOutEndsAtRest)
@@ -178,7 +178,8 @@ TEST(Press, TheWayOutEndsAtRest)
     EXPECT_EQ(p.samples.back().energy, 0.0);
 }
 
-// E(b) - E(a) = -integral of F over the way, here by the trapezoidal rule over steps of 0.1 mm.
+// E(b) - E(a) = -integral of F over the way, here by the trapezoidal rule over steps of 0.1 mm; and what contacts gain as
+// they grow stiffer with their area, 3 % where a ball presses on few cells.
 TEST(Press, WorkOnTheToolIsTheEnergyThatTheTissueLoses)
 {
     const Pressed p = pressed(read(in3mm), {ball, 5, true});
@@ -190,7 +191,8 @@ TEST(Press, WorkOnTheToolIsTheEnergyThatTheTissueLoses)
     }
     EXPECT_EQ(p.summary.notConverged, 0U);
     EXPECT_GT(p.samples.back().energy, 1e-5);
-    EXPECT_NEAR(-work, p.samples.back().energy, 0.01 * p.samples.back().energy);
+    EXPECT_LT(-work, 1.01 * p.samples.back().energy);
+    EXPECT_GT(-work, 0.96 * p.samples.back().energy);
 }
 
 TEST(Press, FewerSamplesChangeNoForce)
@@ -281,22 +283,20 @@ TEST(Press, ANeedleThatBeginsOutsideOfTheTissueIsRefused)
     }
 }
 
-// A ball that is suddenly there, to its middle, has tissue in it that no surface holds back.
-TEST(Press, ATooDeepToolIsDoubtfulUntilItHasLeft)
+// It goes in from the surface, as far as a tick lets it; solved to convergence no tool is held back, and it touches
+// nothing.
+TEST(Press, AToolThatBeginsInsideIsHeldBackAtTheSurface)
 {
-    const Pressed p = pressed(read("seconds,x_mm,y_mm,z_mm\n0,0,0,0\n0.02,0,-20,0\n"), {ball});
-    ASSERT_TRUE(p.summary.doubtfulFrom);
-    EXPECT_EQ(*p.summary.doubtfulFrom, 0.0);
-    EXPECT_TRUE(p.samples.front().doubtful);
-    EXPECT_FALSE(p.samples.back().doubtful);
-}
-
-TEST(Press, AToolInsideOfTheTissueThatTouchesNothingIsDoubtful)
-{
-    const Pressed p = pressed(read("x_mm,y_mm,z_mm\n0,8,0\n"), {toolOf(ToolKind::sphere, 1e-3, 0.0)});
-    EXPECT_EQ(p.summary.inContact, 0U);
-    EXPECT_TRUE(p.samples.front().doubtful);
-    EXPECT_FALSE(pressed(read("x_mm,y_mm,z_mm\n0,8,0\n"), {toolOf(ToolKind::needle, 0.0, 0.0)}).samples.front().doubtful);
+    const PosePath path = read("seconds,x_mm,y_mm,z_mm\n0,0,8,0\n0.01,0,8,0\n");
+    const ToolSpec small = toolOf(ToolKind::sphere, 2e-3, 0.0);
+    const Pressed p = pressed(path, {small});
+    ASSERT_TRUE(p.summary.heldFrom);
+    EXPECT_GT(p.samples.back().behind, 5e-3);
+    EXPECT_LT(p.samples.back().force.y, -0.01);
+    const Pressed converged = pressed(path, {small, 1, true});
+    EXPECT_EQ(converged.summary.inContact, 0U);
+    EXPECT_FALSE(converged.summary.heldFrom);
+    EXPECT_FALSE(pressed(path, {toolOf(ToolKind::needle, 0.0, 0.0)}).summary.heldFrom);
 }
 
 }  // namespace
