@@ -23,8 +23,11 @@ constexpr double rounding = 1e-9;  // of the cap
 constexpr double slewPerSecond = 50.0;
 constexpr std::array<int, 4> rates{500, 1000, 2000, 4000};
 // A body of each sort: all others are these again, turned or thicker.
-constexpr std::array<const char*, 8> scenes{"plate-1mm",   "outer-60deg",     "inner-60deg", "slide-30deg-20mm_s",
-                                            "tumour-step", "puncture-energy", "wall-rest",   "let-go"};
+constexpr std::array<const char*, 11> scenes{"plate-1mm",   "outer-60deg",     "inner-60deg", "slide-30deg-20mm_s",
+                                             "tumour-step", "puncture-energy", "wall-rest",   "let-go",
+                                             "deep-press",  "capsule-retreat", "thin-pinch"};
+constexpr double leastPull = 0.01;   // of the cap
+constexpr double flatWithin = 0.95;  // cosine between normals of a face that is flat
 
 struct Session {
     Cell cell;
@@ -46,18 +49,17 @@ Session sessionOf(Random& random)
 // A hand that does what no hand does.
 class Hostile {
 public:
-    Hostile(Random& random, double period) : random_(random), period_(period)
+    Hostile(Random& random, double period, const StabilityScene& scene)
+        : random_(random), period_(period), radius_(scene.session.tool.radius), presses_(chance(0.5))
     {
         position_ = Vec3(random_.between(-12, 12), random_.between(-6, 6), random_.between(-6, 6)) * 1e-3;
-        sample_.axis = Vec3(0, 1, 0);
+        sample_.axis = scene.axis;
         sample_.buttons = haptics::buttonDeadMan;
     }
 
     haptics::DeviceSample next()
     {
-        velocity_ += random_.between(0.0, 2.0) * std::sqrt(period_) * random_.direction();
-        velocity_ -= 40.0 * period_ * position_ + 2.0 * period_ * velocity_;
-        position_ += period_ * velocity_;
+        presses_ ? press() : wander();
         if (chance(0.01)) {
             position_ = random_.between(0.0, 0.04) * random_.direction();
         }
@@ -84,6 +86,31 @@ public:
 private:
     bool chance(double share) { return random_.between(0, 1) < share; }
 
+    void wander()
+    {
+        velocity_ += random_.between(0.0, 2.0) * std::sqrt(period_) * random_.direction();
+        velocity_ -= 40.0 * period_ * position_ + 2.0 * period_ * velocity_;
+        position_ += period_ * velocity_;
+    }
+
+    // To four radii below the face across y, out of it, and aside while deep, at 30 mm/s to 3 m/s.
+    void press()
+    {
+        const double step = speed_ * period_, left = glm::distance(position_, goal_);
+        if (step < left) {
+            position_ += step / left * (goal_ - position_);
+            return;
+        }
+        position_ = goal_;
+        if (chance(0.1)) {
+            const bool out = chance(0.3), aside = chance(0.4);
+            goal_.y = out ? -random_.between(1.0, 3.0) * radius_ : random_.between(-1.0, 3.0) * radius_;
+            goal_.x = aside ? random_.between(-10e-3, 10e-3) : goal_.x;
+            goal_.z = aside ? random_.between(-10e-3, 10e-3) : goal_.z;
+            speed_ = 0.03 * std::pow(100.0, random_.between(0, 1));
+        }
+    }
+
     void flicker(std::uint32_t button, double off, double on)
     {
         const bool down = (sample_.buttons & button) != 0;
@@ -101,11 +128,34 @@ private:
     }
 
     Random& random_;
-    double period_;
-    Vec3 position_{0.0}, velocity_{0.0};
+    double period_, radius_;
+    bool presses_;
+    Vec3 position_{0.0}, velocity_{0.0}, goal_{0.0};
+    double speed_ = 0.1;
     haptics::DeviceSample sample_;
     int stale_ = 0;
 };
+
+// Whether tissue pulls a ball or a finger inwards, by the normal of the surface at rest under it. Without friction a
+// surface cannot: it pushes. Level `elastic`, where the face is flat as far as the tool's radius to all sides: at edges
+// the face that pushes is another one.
+bool pullsIn(const haptics::SessionModel& model, const haptics::TickRecord& record, Vec3 force, double cap)
+{
+    const auto& tool = model.scene.tool;
+    if (model.scene.model.level != datasets::ModelLevel::elastic || model.scene.model.elastic.friction > 0.0 ||
+        tool.kind == datasets::ToolKind::needle || record.phase != haptics::Phase::contact) {
+        return false;
+    }
+    const Vec3 out = model.surface.normal(record.proxy), foot = record.proxy - tool.radius * out;
+    const Vec3 along = glm::normalize(glm::cross(out, std::abs(out.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
+    const Vec3 across = glm::cross(out, along);
+    for (const Vec3 aside : {Vec3(0.0), along, -along, across, -across}) {
+        if (glm::dot(model.surface.normal(foot + tool.radius * aside), out) < flatWithin) {
+            return false;
+        }
+    }
+    return -glm::dot(force, out) > leastPull * cap;
+}
 
 FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
 {
@@ -119,7 +169,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
     r.runs = 1;
     try {
         const RunningMethod running = method.start(at);
-        Hostile hand(random, at.period);
+        Hostile hand(random, at.period, scene);
         const double cap = capOf(at);
         const double mostStep = slewPerSecond * cap * at.period;
         const double stiffest = haptics::stableLimits({at.device, at.period, cap}).stiffness;
@@ -134,6 +184,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
             // Switched off is switched off at once, and a spring that is let go may fall with the motion.
             const double fall = size < glm::length(before) ? stiffest * glm::distance(sample.position, position) : 0.0;
             r.overSlew += size > 0.0 && glm::distance(force, before) > mostStep + fall + rounding * cap ? 1 : 0;
+            r.pulled += pullsIn(at.model, *running.record(), running.tissue(), cap) ? 1 : 0;
             before = finite ? force : Vec3(0.0);
             position = sample.position;
             ++r.ticks;
@@ -141,7 +192,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
     } catch (const std::exception&) {
         r.crashes = 1;
     }
-    if (r.crashes + r.overCap + r.overSlew + r.nonFinite > 0) {
+    if (r.crashes + r.overCap + r.overSlew + r.nonFinite + r.pulled > 0) {
         r.failed.push_back(seed);
     }
     return r;
@@ -170,6 +221,7 @@ FuzzResult fuzz(StabilityModels& models, std::uint64_t seed, std::uint64_t runs,
         sum.overCap += r.overCap;
         sum.overSlew += r.overSlew;
         sum.nonFinite += r.nonFinite;
+        sum.pulled += r.pulled;
         if (!r.failed.empty() && sum.failed.size() < 10) {
             sum.failed.push_back(r.failed.front());
         }

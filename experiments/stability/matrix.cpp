@@ -229,6 +229,7 @@ Trace runSession(const Cell& cell, const StabilityScene& scene, const StabilityM
         trace.speed.push_back(glm::length(arm.velocity()));
         trace.work.push_back(arm.work() - arm.friction());
         trace.force.push_back(force);
+        trace.tissue.push_back(running.tissue ? running.tissue() : force);
         if (visit) {
             visit(sample, force, running);
         }

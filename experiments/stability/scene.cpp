@@ -20,7 +20,7 @@ constexpr double thickBall = 6;       // of the tool that presses deep, as a fin
 constexpr double thinBall = 0.5;      // of the tool that stabs
 constexpr double leastEnergy = 1e-3;  // what a hand does not notice [J]
 constexpr Bounded noEnergy{Figure::energyMade, leastEnergy};
-constexpr Bounded noPull{Figure::pull, 1.0};
+constexpr Bounded noPull{Figure::pull, 0.0};
 constexpr double stepBound = 5.0;    // of the cap per ms
 constexpr double rippleBound = 5.0;  // of the force; the least that is felt is 7 to 10 %
 

@@ -44,7 +44,7 @@ enum class Figure : std::uint8_t {
     energyMade,  // most energy that the hand has got out, less what it put in [J]
     residue,     // largest displacement that is left when the tool is away [voxels]
     peakForce,   // largest force, of the cap [%]
-    pull,        // largest component of the force into the body, along y, of the cap [%]
+    pull,        // largest component of the tissue's force into the body, along y, of the cap [%]
 };
 std::string_view name(Figure figure) noexcept;
 std::string_view unit(Figure figure) noexcept;

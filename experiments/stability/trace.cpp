@@ -83,12 +83,12 @@ double peakForce(const Trace& t, Window w)
     return most;
 }
 
-// Bodies lie behind their face across y. Only what the hand is drawn into the body with counts.
+// Bodies lie behind their face across y. What a controller adds against the motion on the way out is no pull.
 double pull(const Trace& t, Window w)
 {
     double most = 0.0;
     for (std::size_t i = w.first; i < w.last; ++i) {
-        most = std::max(most, t.force[i].y);
+        most = std::max(most, t.tissue[i].y);
     }
     return 100.0 * most / t.cap;
 }
