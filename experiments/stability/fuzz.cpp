@@ -26,8 +26,9 @@ constexpr std::array<int, 4> rates{500, 1000, 2000, 4000};
 constexpr std::array<const char*, 11> scenes{"plate-1mm",   "outer-60deg",     "inner-60deg", "slide-30deg-20mm_s",
                                              "tumour-step", "puncture-energy", "wall-rest",   "let-go",
                                              "deep-press",  "capsule-retreat", "thin-pinch"};
-constexpr double leastPull = 0.01;   // of the cap
-constexpr double flatWithin = 0.95;  // cosine between normals of a face that is flat
+constexpr double leastPull = 0.01;    // of the cap
+constexpr double fastestHand = 10.0;  // [m/s]
+constexpr double flatWithin = 0.95;   // cosine between normals of a face that is flat
 
 struct Session {
     Cell cell;
@@ -136,26 +137,56 @@ private:
     int stale_ = 0;
 };
 
-// Whether tissue pulls a ball or a finger inwards, by the normal of the surface at rest under it. Without friction a
-// surface cannot: it pushes. Level `elastic`, where the face is flat as far as the tool's radius to all sides: at edges
-// the face that pushes is another one.
-bool pullsIn(const haptics::SessionModel& model, const haptics::TickRecord& record, Vec3 force, double cap)
+// Whether the face under a blunt tool is flat as far as the tool's radius to all sides; at an edge it is not clear which
+// face pushes. `out` is its normal.
+bool isFlat(const haptics::SessionModel& model, Vec3 proxy, Vec3 out)
 {
-    const auto& tool = model.scene.tool;
-    if (model.scene.model.level != datasets::ModelLevel::elastic || model.scene.model.elastic.friction > 0.0 ||
-        tool.kind == datasets::ToolKind::needle || record.phase != haptics::Phase::contact) {
-        return false;
-    }
-    const Vec3 out = model.surface.normal(record.proxy), foot = record.proxy - tool.radius * out;
+    const double radius = model.scene.tool.radius;
+    const Vec3 foot = proxy - radius * out;
     const Vec3 along = glm::normalize(glm::cross(out, std::abs(out.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
     const Vec3 across = glm::cross(out, along);
-    for (const Vec3 aside : {Vec3(0.0), along, -along, across, -across}) {
-        if (glm::dot(model.surface.normal(foot + tool.radius * aside), out) < flatWithin) {
+    const std::array<Vec3, 4> sides{along, -along, across, -across};
+    return std::ranges::all_of(
+        sides, [&](Vec3 side) { return glm::dot(model.surface.normal(foot + radius * side), out) >= flatWithin; });
+}
+
+// Watches whether tissue pulls a ball or a finger into the body, along the normal of the surface at rest under it. Without
+// friction a surface pushes. What counts is the force of level `elastic` before the controller, whose damping may well
+// hold back a tool on its way out, where what is sent pulls too. A tool that was somewhere else in the tick before has not
+// pressed the tissue that it is in: it counts again when it has been free.
+class PullWatch {
+public:
+    explicit PullWatch(const haptics::SessionModel& model, double period) : model_(model), furthest_(fastestHand * period)
+    {
+        const auto& settings = model.scene.model;
+        watches_ = settings.level == datasets::ModelLevel::elastic && settings.elastic.friction <= 0.0 &&
+                   model.scene.tool.kind != datasets::ToolKind::needle;
+    }
+
+    bool pulls(const haptics::TickRecord& record, Vec3 tissue, double cap)
+    {
+        const Vec3 tip = record.device.position, back = tip - model_.scene.tool.length * record.device.axis;
+        const bool jumped =
+            glm::distance(tip, tip_) > furthest_ ||
+            (model_.scene.tool.kind == datasets::ToolKind::capsule && glm::distance(back, back_) > furthest_);
+        tip_ = tip;
+        back_ = back;
+        pressed_ = !jumped && (pressed_ || record.phase == haptics::Phase::free);
+        if (!watches_ || !pressed_ || record.phase != haptics::Phase::contact) {
             return false;
         }
+        const Vec3 out = model_.surface.normal(record.proxy);
+        const double least = leastPull * cap;
+        return -glm::dot(tissue, out) > least && -glm::dot(record.total, out) > least && isFlat(model_, record.proxy, out);
     }
-    return -glm::dot(force, out) > leastPull * cap;
-}
+
+private:
+    const haptics::SessionModel& model_;
+    double furthest_;
+    bool watches_ = false;
+    bool pressed_ = false;  // what it is in contact with, it has come to from outside
+    Vec3 tip_{0.0}, back_{0.0};
+};
 
 FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
 {
@@ -173,6 +204,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
         const double cap = capOf(at);
         const double mostStep = slewPerSecond * cap * at.period;
         const double stiffest = haptics::stableLimits({at.device, at.period, cap}).stiffness;
+        PullWatch watch(at.model, at.period);
         Vec3 before(0.0), position(0.0);
         for (int i = 0; i < session.ticks; ++i) {
             const haptics::DeviceSample sample = hand.next();
@@ -184,7 +216,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
             // Switched off is switched off at once, and a spring that is let go may fall with the motion.
             const double fall = size < glm::length(before) ? stiffest * glm::distance(sample.position, position) : 0.0;
             r.overSlew += size > 0.0 && glm::distance(force, before) > mostStep + fall + rounding * cap ? 1 : 0;
-            r.pulled += pullsIn(at.model, *running.record(), running.tissue(), cap) ? 1 : 0;
+            r.pulled += watch.pulls(*running.record(), running.tissue(), cap) ? 1 : 0;
             before = finite ? force : Vec3(0.0);
             position = sample.position;
             ++r.ticks;

@@ -14,7 +14,7 @@ struct FuzzResult {
     std::uint64_t overCap = 0;          // ticks with a force over the cap
     std::uint64_t overSlew = 0;         // ticks in which the force changed faster than it may
     std::uint64_t nonFinite = 0;        // ticks with a force that is no number
-    std::uint64_t pulled = 0;           // ticks in which tissue pulls a blunt tool into the body: see pullsIn() in fuzz.cpp
+    std::uint64_t pulled = 0;           // ticks in which tissue pulls a blunt tool into the body: see PullWatch in fuzz.cpp
     std::vector<std::uint64_t> failed;  // seeds of sessions with any of them, the first ten
 };
 
