@@ -204,8 +204,8 @@ TEST(StabilityMethods, TicksAllocateNothing)
     }
 }
 
-// The most of the force against the way in, and the figure: pressed to 2.5 radii and more (the tool's middle lies one
-// radius above its front) and drawn back, soft tissue pushes at least 0.3 N and never pulls.
+// Pressed to 2.5 radii (a ball's middle to 9 mm) or by 9 mm (the others' to 3 mm) and drawn back, tissue that pushed with
+// over 0.3 N never pulls.
 TEST(StabilityMatrix, TissueNeverPullsADeepToolIn)
 {
     for (const std::string sceneName : {"deep-retreat", "capsule-retreat", "thin-retreat"}) {
