@@ -105,7 +105,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     clock.done(Task::h3);
     const Vec3 law = moveTip(model_, reader_, body_, tool_, way, stabiliserOptions_.period, tip_, record_);
     clock.done(Task::h4);
-    const Vec3 basic = contactForce(law, deform());
+    const Vec3 basic = tissueForce_ = contactForce(law, deform());
     clock.done(Task::deform);
     const auto near = monitor(model_, body_, tip_, position, monitor_, record_);
     record_.ahead = lookAhead(model_, reader_, body_, tip_, tool_, stabiliserOptions_.period, monitor_);

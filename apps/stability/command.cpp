@@ -77,7 +77,7 @@ void checkOurs(const json& figures, const StabilityModels& models)
                                              fmt::join(failed, ", "), more));
     }
     const json& fuzzed = figures.at("fuzz");
-    for (const char* const key : {"crashes", "over_cap", "over_slew", "non_finite"}) {
+    for (const char* const key : {"crashes", "over_cap", "over_slew", "non_finite", "pulled"}) {
         if (fuzzed.at(key) != 0) {
             throw std::runtime_error(fmt::format("hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
                                                  fuzzed.at(key).dump()));

@@ -48,8 +48,8 @@ json cellEntry(const CellResult& r)
 
 json fuzzEntry(const FuzzResult& r)
 {
-    return {{"runs", r.runs},          {"ticks", r.ticks},          {"crashes", r.crashes},    {"over_cap", r.overCap},
-            {"over_slew", r.overSlew}, {"non_finite", r.nonFinite}, {"failed_seeds", r.failed}};
+    return {{"runs", r.runs},          {"ticks", r.ticks},          {"crashes", r.crashes}, {"over_cap", r.overCap},
+            {"over_slew", r.overSlew}, {"non_finite", r.nonFinite}, {"pulled", r.pulled},   {"failed_seeds", r.failed}};
 }
 
 void addTheory(json& figures)

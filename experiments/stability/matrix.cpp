@@ -122,8 +122,9 @@ const StabilityMethod& StabilityModels::method(const std::string& name) const
 // Scenes that share a body and a tool share their models.
 std::string StabilityModels::bodyOf(const StabilityScene& scene)
 {
-    return fmt::format("{} {} {:a}", static_cast<const void*>(scene.tissue.get()),
-                       static_cast<int>(scene.session.tool.kind), scene.session.tool.radius);
+    const auto& tool = scene.session.tool;
+    return fmt::format("{} {} {:a} {:a}", static_cast<const void*>(scene.tissue.get()), static_cast<int>(tool.kind),
+                       tool.radius, tool.length);
 }
 
 const haptics::SessionModel& StabilityModels::model(const StabilityScene& scene, ModelLevel level) const
@@ -209,7 +210,7 @@ Trace runSession(const Cell& cell, const StabilityScene& scene, const StabilityM
     trace.handSpring = std::sqrt(scene.grip.stiffness * (device.mass + scene.grip.mass));
     const auto ticks = static_cast<std::size_t>(std::ceil(scene.hand.seconds() / period));
     haptics::DeviceSample sample;
-    sample.axis = Vec3(0, 1, 0);
+    sample.axis = scene.axis;
     sample.buttons = haptics::buttonDeadMan;
     bool gone = false;
     for (std::size_t i = 0; i < ticks; ++i) {
@@ -228,6 +229,7 @@ Trace runSession(const Cell& cell, const StabilityScene& scene, const StabilityM
         trace.speed.push_back(glm::length(arm.velocity()));
         trace.work.push_back(arm.work() - arm.friction());
         trace.force.push_back(force);
+        trace.tissue.push_back(running.tissue ? running.tissue() : force);
         if (visit) {
             visit(sample, force, running);
         }

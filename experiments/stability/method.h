@@ -24,6 +24,7 @@ struct RunningMethod {
     std::function<Vec3(const haptics::DeviceSample&)> tick;  // the force on the hand, capped [N]
     std::function<double()> residue;                         // largest displacement of its tissue now [m]
     std::function<const haptics::TickRecord*()> record;      // of a Simulation: its last tick; else empty
+    std::function<Vec3()> tissue = {};                       // of a Simulation: force before its controller; else empty
 };
 
 /// Ours, or one that a user might take instead, as its authors would write it: no stabiliser but the cap.

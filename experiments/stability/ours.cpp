@@ -41,7 +41,8 @@ RunningMethod running(const MethodScene& scene)
 {
     auto ours = std::make_shared<Ours>(Ours{simulationOf(scene)});
     return {[ours](const haptics::DeviceSample& sample) { return ours->tick(sample); },
-            [ours] { return furthestNode(*ours->simulation); }, [ours] { return ours->last; }};
+            [ours] { return furthestNode(*ours->simulation); }, [ours] { return ours->last; },
+            [ours] { return ours->simulation->tissueForce(); }};
 }
 
 // The force of the last update, held until the next.

@@ -16,9 +16,11 @@ namespace {
 
 // Lengths of bodies and paths are in mm here, speeds in mm/s; toMetres() ends that.
 constexpr double ball = 3;            // radius of the tool
+constexpr double thickBall = 6;       // of the tool that presses deep, as a fingertip
 constexpr double thinBall = 0.5;      // of the tool that stabs
 constexpr double leastEnergy = 1e-3;  // what a hand does not notice [J]
 constexpr Bounded noEnergy{Figure::energyMade, leastEnergy};
+constexpr Bounded noPull{Figure::pull, 0.0};
 constexpr double stepBound = 5.0;    // of the cap per ms
 constexpr double rippleBound = 5.0;  // of the force; the least that is felt is 7 to 10 %
 
@@ -289,17 +291,110 @@ void addRest(std::vector<StabilityScene>& out)
     out.push_back(std::move(anchored));
 }
 
+// A session once more, for another figure.
+StabilityScene again(const StabilityScene& s, const std::string& name, Bounded held, Bounded letGo)
+{
+    StabilityScene other = s;
+    other.name = other.session.name = name;
+    other.held = held;
+    other.released = letGo;
+    other.quick = false;
+    return other;
+}
+
+// A block of fat, so thick that a ball of 6 mm hardly feels the bone under it.
+std::shared_ptr<const volume::Tissue> fatBlock()
+{
+    constexpr double half = 32, thickness = 40;
+    return smallBody({-half - 2, -8, -half - 2}, {half + 2, thickness + 5, half + 2}, [=](Vec3 p) {
+        const bool inside = p.y > 0 && p.y < thickness + 4 && std::abs(p.x) < half && std::abs(p.z) < half;
+        return !inside ? BodyLabel{} : p.y < thickness ? bodyFat : bodyBase;
+    });
+}
+
+void addDeep(std::vector<StabilityScene>& out, const std::shared_ptr<const volume::Tissue>& block)
+{
+    constexpr double deepest = 2 * thickBall;  // of the ball's middle: three radii of its front
+    const Vec3 above(0, -thickBall - 2, 0), deep(0, deepest, 0);
+    auto press = scene("deep-press", "deep", "fat pressed to three radii of a ball of 6 mm, and held", block, thickBall,
+                       {above, 0, {{deep, 60, 0.3}}});
+    press.held = press.released = {Figure::forceStep, stepBound};
+    press.letGo = press.hand.end(0) - 0.2;
+    press.quick = true;
+    out.push_back(std::move(press));
+
+    auto retreat =
+        scene("deep-retreat", "deep", "fat pressed to three radii, drawn back, pressed again and drawn back", block,
+              thickBall, {above, 0, {{deep, 60, 0.2}, {above, 60, 0.1}, {deep, 60, 0.1}, {above, 60, 0.1}}});
+    retreat.held = retreat.released = noPull;
+    retreat.letGo = retreat.hand.end(2) - 0.1;
+    retreat.quick = true;
+    out.push_back(retreat);
+    out.push_back(again(retreat, "deep-energy", noEnergy, noEnergy));
+
+    // The hand's spring gives way by some of the last millimetre.
+    const Vec3 aside(7.5, 0, 0), middle(0, 0.5 * thickBall + 1, 0);
+    auto drag = scene("deep-drag", "deep", "dragged through fat for 15 mm, one and a half radii deep", block, thickBall,
+                      {above - aside, 0, {{middle - aside, 60, 0.1}, {middle + aside, 20, 0.2}, {above + aside, 60, 0.1}}});
+    drag.held = drag.released = {Figure::forceStep, stepBound};
+    drag.letGo = drag.hand.end(0) + 0.4;
+    drag.quick = true;
+    out.push_back(std::move(drag));
+}
+
+// A fingertip that lies flat on the block's skin, at 30 degrees.
+void addCapsule(std::vector<StabilityScene>& out, const std::shared_ptr<const volume::Tissue>& block)
+{
+    const double angle = 30 * std::numbers::pi / 180;
+    constexpr double long30 = 30 - 2 * thickBall;  // between the middles of its ends
+    const Vec3 above(0, -thickBall - 2, 0), deep(0, 10 - thickBall, 0);
+    auto retreat = scene("capsule-retreat", "capsule", "a finger of 6 mm radius pressed 9 mm into fat, and drawn back",
+                         block, thickBall, {above, 0, {{deep, 60, 0.3}, {above, 60, 0.1}}});
+    retreat.session.tool.kind = datasets::ToolKind::capsule;
+    retreat.session.tool.length = long30 * 1e-3;
+    retreat.axis = {0, std::sin(angle), std::cos(angle)};
+    retreat.held = retreat.released = noPull;
+    retreat.letGo = retreat.hand.end(0) - 0.1;
+    retreat.quick = true;
+    out.push_back(retreat);
+    out.push_back(again(retreat, "capsule-energy", noEnergy, noEnergy));
+}
+
+// A plate of fat, held all around, with 3 mm of air between it and bone.
+void addThin(std::vector<StabilityScene>& out)
+{
+    constexpr double thickness = 6, support = 9, half = 24;
+    const auto body = smallBody({-half - 2, -8, -half - 2}, {half + 2, support + 5, half + 2}, [=](Vec3 p) {
+        const double aside = std::max(std::abs(p.x), std::abs(p.z));
+        const bool inside = p.y > 0 && p.y < support + 4 && aside < half;
+        return !inside                             ? BodyLabel{}
+               : aside > half - 4 || p.y > support ? bodyBase
+               : p.y < thickness                   ? bodyFat
+                                                   : BodyLabel{};
+    });
+    const Vec3 above(0, -thickBall - 2, 0), deep(0, 9, 0);
+    auto pinch = scene("thin-pinch", "thin", "6 mm of fat, free on both sides, pressed onto bone, and drawn back", body,
+                       thickBall, {above, 0, {{deep, 60, 0.3}, {above, 60, 0.1}}});
+    pinch.farFace = thickness * 1e-3;
+    pinch.held = pinch.released = {Figure::popThrough, 0.0};
+    pinch.letGo = pinch.hand.end(0) - 0.1;
+    pinch.quick = true;
+    out.push_back(pinch);
+    out.push_back(again(pinch, "thin-retreat", noPull, noPull));
+}
+
 struct FigureText {
     std::string_view name, unit;
 };
-constexpr std::array<FigureText, 8> figureTexts{{{"pop-through depth", "mm"},
+constexpr std::array<FigureText, 9> figureTexts{{{"pop-through depth", "mm"},
                                                  {"ripple", "% of the force"},
                                                  {"force step", "% of the cap per ms"},
                                                  {"peak to peak at rest", "encoder steps"},
                                                  {"speed after puncture", "% of the hand's spring"},
                                                  {"energy made", "J"},
                                                  {"residue", "voxels"},
-                                                 {"peak force", "% of the cap"}}};
+                                                 {"peak force", "% of the cap"},
+                                                 {"pull into the body", "% of the cap"}}};
 
 }  // namespace
 
@@ -361,6 +456,10 @@ std::vector<StabilityScene> stabilityScenes()
     addPunctures(out);
     addLate(out);
     addRest(out);
+    const auto block = fatBlock();
+    addDeep(out, block);
+    addCapsule(out, block);
+    addThin(out);
     return out;
 }
 

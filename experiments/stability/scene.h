@@ -44,6 +44,7 @@ enum class Figure : std::uint8_t {
     energyMade,  // most energy that the hand has got out, less what it put in [J]
     residue,     // largest displacement that is left when the tool is away [voxels]
     peakForce,   // largest force, of the cap [%]
+    pull,        // largest component of the tissue's force into the body, along y, of the cap [%]
 };
 std::string_view name(Figure figure) noexcept;
 std::string_view unit(Figure figure) noexcept;
@@ -62,6 +63,7 @@ struct StabilityScene {
     std::shared_ptr<const volume::Tissue> tissue;
     HandPath hand;
     haptics::Grip grip;
+    Vec3 axis{0, 1, 0};       // of the tool, towards its tip
     double from = 0, to = 0;  // what is measured [s]
     double letGo = 0;         // when a hand that lets go does so [s]
     Bounded held, released;   // of a hand that holds on, and of one that lets go

@@ -83,6 +83,16 @@ double peakForce(const Trace& t, Window w)
     return most;
 }
 
+// Bodies lie behind their face across y. What a controller adds against the motion on the way out is no pull.
+double pull(const Trace& t, Window w)
+{
+    double most = 0.0;
+    for (std::size_t i = w.first; i < w.last; ++i) {
+        most = std::max(most, t.tissue[i].y);
+    }
+    return 100.0 * most / t.cap;
+}
+
 // A force F that gives way sets a mass on a spring going at F / sqrt(K m), beside the speed of the hand.
 double kick(const Trace& t, const StabilityScene& scene, Window w)
 {
@@ -130,6 +140,8 @@ double figureOf(Figure figure, const Trace& t, const StabilityScene& scene)
             return t.residue / sceneVoxel;
         case Figure::peakForce:
             return 100.0 * peakForce(t, w) / t.cap;
+        case Figure::pull:
+            return pull(t, w);
     }
     return std::numeric_limits<double>::quiet_NaN();
 }

@@ -18,6 +18,7 @@ struct Trace {
     std::vector<double> speed;   // true [m/s]
     std::vector<double> work;    // of the motors on device and hand so far [J]
     std::vector<Vec3> force;     // sent at that tick and held for a period [N]
+    std::vector<Vec3> tissue;    // before a controller, where there is one: else the same [N]
 
     double time(std::size_t tick) const noexcept { return static_cast<double>(tick) * period; }
 };

@@ -25,6 +25,7 @@ Trace traceOf(Force force, Position position)
     for (std::size_t i = 0; i < 1000; ++i) {
         const double time = t.time(i);
         t.force.push_back(force(time));
+        t.tissue.push_back(t.force.back());
         t.position.push_back(position(time));
         t.speed.push_back(0.0);
         t.work.push_back(0.0);
@@ -94,6 +95,18 @@ TEST(StabilityFigures, RestCycleIsPeakToPeakInEncoderSteps)
     const auto trace =
         traceOf(still, [](double t) { return Vec3(0.0, 45e-6 * std::sin(50 * t), 1e-5 * std::cos(50 * t)); });
     EXPECT_NEAR(figureOf(Figure::restCycle, trace, second()), 3.0, 0.02);
+}
+
+// Tissue that pushes out with up to 2 N and draws in with 0.4 N pulls 5 % of a cap of 8 N, whatever a controller makes of
+// it.
+TEST(StabilityFigures, PullIsTheLargestForceOfTissueIntoTheBody)
+{
+    auto trace = traceOf([](double t) { return Vec3(3.0, t < 0.5 ? -2.0 : 0.4, 0.0); }, still);
+    EXPECT_NEAR(figureOf(Figure::pull, trace, second()), 5.0, 1e-12);
+    trace.force.assign(trace.force.size(), Vec3(0.0, 8.0, 0.0));
+    EXPECT_NEAR(figureOf(Figure::pull, trace, second()), 5.0, 1e-12);
+    trace.tissue.assign(trace.tissue.size(), Vec3(1.0, -1.0, 0.0));
+    EXPECT_EQ(figureOf(Figure::pull, trace, second()), 0.0);
 }
 
 TEST(StabilityFigures, AForceThatIsNoNumberFailsEveryBound)
@@ -191,6 +204,43 @@ TEST(StabilityMethods, TicksAllocateNothing)
     }
 }
 
+// Pressed to 2.5 radii (a ball's middle to 9 mm) or by 9 mm (the others' to 3 mm) and drawn back, tissue that pushed with
+// over 0.3 N never pulls.
+TEST(StabilityMatrix, TissueNeverPullsADeepToolIn)
+{
+    for (const std::string sceneName : {"deep-retreat", "capsule-retreat", "thin-retreat"}) {
+        const Cell cell{sceneName, "elastic", "premium", true, 500};
+        models().prepare({cell});
+        const auto& scene = models().scene(sceneName);
+        const auto& method = models().method("elastic");
+        const Trace trace = runSession(cell, scene, method, models().model(scene, method.level));
+        double deepest = -1.0, push = 0.0;
+        for (std::size_t i = 0; i < trace.position.size(); ++i) {
+            deepest = std::max(deepest, trace.position[i].y);
+            push = std::max(push, -trace.tissue[i].y);
+        }
+        EXPECT_GT(deepest, sceneName == "deep-retreat" ? 9e-3 : 3e-3) << sceneName;
+        EXPECT_GT(push, 0.3) << sceneName;
+        EXPECT_EQ(figureOf(Figure::pull, trace, scene), 0.0) << sceneName;
+    }
+}
+
+// The axis of a scene's tool reaches the method: a finger at 30 degrees has its back end above the fat.
+TEST(StabilityMatrix, AFingerLiesAtItsAngle)
+{
+    const Cell cell{"capsule-retreat", "spring", "premium", true, 500};
+    models().prepare({cell});
+    const auto& scene = models().scene(cell.scene);
+    const auto& method = models().method(cell.method);
+    std::size_t ticks = 0;
+    runSession(cell, scene, method, models().model(scene, method.level),
+               [&](const haptics::DeviceSample& sample, Vec3, const RunningMethod&) {
+                   EXPECT_NEAR(sample.axis.y, 0.5, 1e-12);
+                   ++ticks;
+               });
+    EXPECT_GT(ticks, 500U);
+}
+
 TEST(StabilityMatrix, FiguresDoNotDependOnThreads)
 {
     const auto cells = matrixCells(
@@ -236,7 +286,7 @@ TEST(StabilityFuzz, HostileSessionsNeverHurtAHand)
     EXPECT_EQ(one.runs, 24U);
     EXPECT_GT(one.ticks, 24U * 100U);
     EXPECT_EQ(one.ticks, two.ticks);
-    EXPECT_EQ(one.crashes + one.overCap + one.overSlew + one.nonFinite, 0U);
+    EXPECT_EQ(one.crashes + one.overCap + one.overSlew + one.nonFinite + one.pulled, 0U);
 }
 
 }  // namespace
