@@ -106,7 +106,7 @@ void addLooks(std::span<const Felt> felt, const DeepCase& what, std::size_t plac
     const auto add = [&](PressWay way, const DeepReference& r) {
         const Vec3 force = way == PressWay::hold ? std::ranges::find(felt.rbegin(), felt.rend(), way, &Felt::way)->force
                                                  : forceAt(felt, way, r.depth);
-        out.looks.push_back({place, way, r.depth, force, r.force});
+        out.looks.push_back({place, way, r.depth, force, r.force, r.edges});
     };
     for (const DeepReference& r : what.references) {
         add(r.way, r);

@@ -11,8 +11,8 @@
 
 namespace palpate::experiments {
 
-/// A place of the contact in the grid of cells: how far the grid lies to the side of where it would, in cells. On a flat
-/// surface that shifts no tissue and no tool, so one reference holds for all.
+/// A place of the contact in the grid of cells: how far the grid is shifted to the side. Tissue and tool stay where they
+/// are, so that one reference holds for all.
 struct GridPlace {
     double across = 0, along = 0;  // in x and z [cells]
     int weight = 1;                // of places that are like it by symmetry, of a cell with 4 x 4 places
@@ -27,6 +27,7 @@ struct DeepLook {
     double depth = 0;     // [m]
     Vec3 force{0.0};      // on the tool [N]
     Vec3 reference{0.0};  // [N]
+    double edges = 0;     // of its mesh at the contact [m]
 
     double errorPercent() const noexcept;      // of the magnitude, signed
     double directionDegrees() const noexcept;  // between both
@@ -59,7 +60,7 @@ struct DeepOptions {
 /// Presses from 0.5 mm above the surface to the deepest reference, holds for 0.2 s, and draws back to where it began, one
 /// tick per ms as a session has them. A depth between two ticks is interpolated. References of the way in are those of the
 /// way out, too, where that has none of its own: tissue without friction and viscosity has one force for a depth.
-/// @param tissue, surface  of the case's scene
+/// @param model  of the case's scene; level and setting are not its own
 /// Throws std::runtime_error when there is no soft tissue under the entry, or a force is not finite.
 DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, const datasets::ElasticSettings& settings,
                     const DeepOptions& options);

@@ -54,6 +54,7 @@ json entryOf(const DeepCase& what, const std::string& setting, double spacing, c
             {"zone", nameOf(zoneOf(look.depth, what.tool.radius, spacing))},
             {"force_n", vectorOf(look.force)},
             {"reference_n", vectorOf(look.reference)},
+            {"reference_edges_mm", 1e3 * look.edges},
             {"error_pct", look.errorPercent()},
             {"direction_deg", look.directionDegrees()}};
 }
@@ -122,26 +123,42 @@ std::string errorCells(const json* entry)
                        entry->at("worst_pct").get<double>(), entry->at("direction_worst_deg").get<double>());
 }
 
+// Errors after the hold, where the tool is deepest.
+const json* heldEntry(const json& summary)
+{
+    for (const json& z : summary.at("zones")) {
+        if (z.at("way") == wayName(PressWay::hold)) {
+            return &z;
+        }
+    }
+    return nullptr;
+}
+
+void printCase(const json& s)
+{
+    std::string what = s.at("scene").get<std::string>() + ", " + s.at("tool").get<std::string>();
+    std::string setting = s.at("setting");
+    std::string costs = fmt::format(" {:>8.2g} {:>6.0f} {:>6.0f}", s.at("pull_n").get<double>(),
+                                    s.at("us_p50").get<double>(), s.at("us_p99").get<double>());
+    const auto row = [&](const char* depth, const json* in, const json* out) {
+        if (in != nullptr || out != nullptr) {
+            fmt::print("{:<29} {:<8} {:<12} {} {}{}\n", what, setting, depth, errorCells(in), errorCells(out), costs);
+            what = setting = costs = "";
+        }
+    };
+    for (const auto& [zone, shown] : zones) {
+        row(shown, zoneEntry(s, zone, wayName(PressWay::in)), zoneEntry(s, zone, wayName(PressWay::out)));
+    }
+    row("held", heldEntry(s), nullptr);
+}
+
 void print(const json& figures)
 {
-    fmt::print("{:<27} {:<8} {:<12} {:^22} {:^22} {:>8} {:>13}\n", "", "", "", "way in", "way out", "pull", "us a tick");
-    fmt::print("{:<27} {:<8} {:<12} {:>7} {:>7} {:>6} {:>7} {:>7} {:>6} {:>8} {:>6} {:>6}\n", "case", "setting", "depth",
+    fmt::print("{:<29} {:<8} {:<12} {:^22} {:^22} {:>8} {:>13}\n", "", "", "", "way in", "way out", "pull", "us a tick");
+    fmt::print("{:<29} {:<8} {:<12} {:>7} {:>7} {:>6} {:>7} {:>7} {:>6} {:>8} {:>6} {:>6}\n", "case", "setting", "depth",
                "median%", "worst%", "deg", "median%", "worst%", "deg", "N", "p50", "p99");
     for (const json& s : figures.at("summary")) {
-        bool first = true;
-        for (const auto& [zone, shown] : zones) {
-            const json *in = zoneEntry(s, zone, "in"), *out = zoneEntry(s, zone, "out");
-            if (in == nullptr && out == nullptr) {
-                continue;
-            }
-            const std::string what = s.at("scene").get<std::string>() + ", " + s.at("tool").get<std::string>();
-            const std::string costs = first ? fmt::format(" {:>8.2g} {:>6.0f} {:>6.0f}", s.at("pull_n").get<double>(),
-                                                          s.at("us_p50").get<double>(), s.at("us_p99").get<double>())
-                                            : "";
-            fmt::print("{:<27} {:<8} {:<12} {} {}{}\n", first ? what : "", first ? s.at("setting").get<std::string>() : "",
-                       shown, errorCells(in), errorCells(out), costs);
-            first = false;
-        }
+        printCase(s);
     }
 }
 
