@@ -22,7 +22,8 @@ struct KernelVerification {
     bool holds() const noexcept;
 };
 
-/// Solves the problems that have a closed form at spacings of 2, 1 and 0.5 mm (`quick`: without the last). Cost: minutes.
+/// Solves the problems that have a closed form at spacings of 2, 1 and 0.5 mm (`quick`: without the last), and first touch,
+/// contacts of half a cell to two cells at several places in the grid, at 2 mm. Cost: minutes.
 /// @param progress  is told what comes next
 std::vector<KernelVerification> verifyKernel(bool quick, const std::function<void(const std::string&)>& progress);
 

@@ -1,5 +1,6 @@
 #include <apps/accuracy/command.h>
 
+#include <apps/accuracy/deep.h>
 #include <apps/accuracy/figures.h>
 #include <apps/accuracy/log.h>
 #include <apps/accuracy/references.h>
@@ -35,7 +36,9 @@ struct Options {
     std::vector<std::string> laws{"linear", "neo-hookean"};
     std::string folder, references, json;
     double mostSeconds = 60;  // per case
-    bool quick = false, verify = false;
+    bool quick = false, verify = false, depth = false;
+    std::vector<std::string> settings = DeepCommand{}.settings;  // of --depth
+    double speed = DeepCommand{}.speed;                          // the same [mm/s]
 };
 
 // A subject with its references, one per law.
@@ -212,6 +215,10 @@ void accuracyCommand(Options o)
         verifyCommand(o.quick, o.json);
         return;
     }
+    if (o.depth) {
+        deepCommand({o.scenes, o.settings, o.speed, o.quick, o.folder, o.json});
+        return;
+    }
     if (o.quick) {
         o.mostSeconds = std::min(o.mostSeconds, quickSeconds);
     }
@@ -259,6 +266,16 @@ void addAccuracy(CLI::App& app)
     accuracy->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     accuracy->add_flag("--quick", o->quick, "Few methods, scenes block and plate: a minute");
     accuracy->add_flag("--verify", o->verify, "No charts: our kernel and the reference against closed forms");
+    auto* depth = accuracy->add_flag(
+        "--depth", o->depth, "The force alone: first touch, two radii deep and back, against stored finite elements");
+    accuracy->add_option("--settings", o->settings, "With --depth: settings of level elastic")
+        ->delimiter(',')
+        ->capture_default_str()
+        ->needs(depth);
+    accuracy->add_option("--speed", o->speed, "With --depth: of the tool [mm/s]")
+        ->check(CLI::Range(1.0, 1000.0))
+        ->capture_default_str()
+        ->needs(depth);
     accuracy->final_callback([o] { accuracyCommand(*o); });
 }
 

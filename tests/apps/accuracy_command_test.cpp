@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <sstream>
 
@@ -146,6 +147,42 @@ TEST(AccuracyCommand, RefusesWhatThereIsNot)
     writeText(damaged, "no reference");
     expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--quick"},
                   damaged.filename().string());
+}
+
+// The coarsest setting alone, at two places in the grid: from first touch to two radii and back.
+TEST(AccuracyCommand, DepthComparesForcesOnTheWayInAndOut)
+{
+    const Folder folder;
+    const std::string out = folder / "deep";
+    const json all = figures({"accuracy", "--depth", "--quick", "--settings", "fast", "--speed", "40", "-o", out});
+    ASSERT_EQ(all["summary"].size(), 1U);
+    EXPECT_EQ(all["summary"][0]["pull_n"], 0.0);
+    EXPECT_GT(all["summary"][0]["us_p99"], 0.0);
+    std::size_t deep = 0;
+    for (const json& e : all["depth"]) {
+        for (const char* key : {"scene", "tool", "setting", "way", "depth_mm", "force_n", "reference_n", "error_pct",
+                                "direction_deg", "place_cells", "zone", "reference_edges_mm"}) {
+            EXPECT_TRUE(e.contains(key)) << key;
+        }
+        if (e["depth_mm"] > 4.0) {
+            ++deep;
+            EXPECT_LT(std::abs(e["error_pct"].get<double>()), 8.0) << e;
+        }
+    }
+    EXPECT_EQ(deep, 2U * (6U + 1U + 5U));  // in, hold, out
+    const std::filesystem::path made(out);
+    EXPECT_EQ(linesOf(made / "depth.csv").size(), 1U + all["depth"].size());
+    EXPECT_TRUE(std::filesystem::exists(made / "depth.html"));
+    for (const char* part : {"touch", "press", "retreat"}) {
+        const auto picture = made / ("depth-block-sphere-10-mm-" + std::string(part) + ".png");
+        EXPECT_TRUE(readText(picture).starts_with("\x89PNG")) << picture;
+    }
+}
+
+TEST(AccuracyCommand, DepthRefusesWhatThereIsNot)
+{
+    expectRefusal({"accuracy", "--depth", "--scenes", "breast"}, "there are of block, find-lump, pair, plate");
+    expectRefusal({"accuracy", "--depth", "--settings", "finest"}, "there are fast, default, fine");
 }
 
 }  // namespace
