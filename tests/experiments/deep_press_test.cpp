@@ -100,8 +100,8 @@ TEST(DeepPress, PlacesStandForAWholeCell)
     EXPECT_EQ(sum, 16);
 }
 
-// 3 % at 1 and 1.5 radii, on the way in and out, and no pull anywhere. With contact stiffness by the area at rest the force
-// at 1.5 radii is far lower.
+// 3 % at 1 and 1.5 radii, on the way in and out, and no pull in any tick. A surface that slips around the sphere pulls it
+// inwards here, by more than a newton.
 TEST(DeepPress, TheBlocksForceIsThatOfFiniteElementsToOneAndAHalfRadii)
 {
     auto scene = datasets::builtInScene("block").value();
