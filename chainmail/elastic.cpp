@@ -13,11 +13,6 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t mostTools = 16;
-constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
-constexpr double mostStretch = 6.5;    // of the area under a tool: from 8 on cells there have more than one equilibrium
-constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this share of its radius ...
-constexpr double sinkSpacings = 0.15;  // ... and of the spacing
-constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of mostStretch
 constexpr double reach = 0.6;          // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
 constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
@@ -90,26 +85,13 @@ void Elastic::settle() noexcept
     hasIncrement_ = false;
 }
 
-// The tools, held back where the body does not bear them, as deep as the last call lets them go.
+// The tools, held back where the body does not bear them.
 std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept
 {
-    const double h = stack_.body().levels.front().nodes.spacing;
     held_.resize(tools.size());
-    tools_.assign(tools.begin(), tools.end());
+    tools_.clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
-        ElasticTool& tool = tools_[i];
-        HeldTool& held = held_[i];
-        const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
-        const double depth = glm::length(tool.pushed);
-        const double most = options_.finiteStrain ? depth : std::min(depth, smallStrain * radius);
-        const double further =
-            std::min(sinkRadii * radius + sinkSpacings * h - held.depth, ease * radius * (mostStretch - held.stretch));
-        held.given = holdsBack ? std::clamp(held.given + further, 0.0, most) : depth;
-        held.behind = depth - held.given;
-        const Vec3 back = depth > 0.0 ? held.behind / depth * tool.pushed : Vec3(0.0);
-        tool.shape.a -= back;
-        tool.shape.b -= back;
-        tool.pushed -= back;
+        tools_.push_back(held_[i].place(tools[i], stack_.body().levels.front(), options_.finiteStrain, holdsBack));
     }
     return tools_;
 }
@@ -522,7 +504,7 @@ Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept
             sum -= balance_ * s.force;
         }
     }
-    return isTie || owner >= held_.size() ? sum : held_[owner].force() * sum;
+    return isTie || owner >= held_.size() ? sum : held_[owner].force(sum);
 }
 
 }  // namespace palpate::chainmail

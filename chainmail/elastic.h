@@ -1,6 +1,6 @@
 #pragma once
 
-#include <chainmail/elastic_contact.h>
+#include <chainmail/held_tool.h>
 #include <chainmail/multigrid.h>
 #include <chainmail/window_stack.h>
 
@@ -24,7 +24,7 @@ struct ElasticResult {
     double start = 0;            // the same when the call began, the tools where they are now [J]
     double residual = 0;         // forces out of balance before the last step, Euclidean norm over degrees of freedom [N]
     double depth = 0;            // of the deepest point of tissue inside a tool [m]
-    double behind = 0;           // by how much the deepest tool is held back, see Elastic [m]
+    double behind = 0;           // by how much the tool that is held back most is, see HeldTool [m]
     std::uint32_t contacts = 0;  // points that a tool presses
     std::uint32_t cycles = 0;
     std::uint32_t shortened = 0;  // steps that would have raised the energy
@@ -44,11 +44,7 @@ struct ElasticResult {
 /// a + c (a - v), v the force after the call before and c the viscous time in calls. Divided by 1 + c this is the same
 /// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node.
 ///
-/// A tool presses only as deep as the cells bear: where the surface under it is stretched to six times its area, where it
-/// sinks into the tool by more than a bound, or where small strain is pressed by more than a radius, the tool that the body
-/// feels is held back on its way, ElasticTool::pushed. From there the force grows by the slope that Hertz's law has where
-/// it is, 3/2 F/d: a contact that cannot grow wider is a flat punch, whose force is linear. The same holds back a tool that
-/// would jump through a thin part in one call.
+/// A tool presses only as deep as the cells bear, see HeldTool.
 ///
 /// Sources: S. F. McCormick, "Multilevel Adaptive Methods for Partial Differential Equations", 1989 (composite grids);
 /// A. V. Knyazev, "Toward the optimal preconditioned eigensolver", SIAM J. Sci. Comput. 23, 2001 (locally optimal steps).
@@ -104,14 +100,6 @@ private:
         int cycles;
         double first, further, far;
         bool holdsBack = true;
-    };
-    // A tool as the body feels it.
-    struct HeldTool {
-        double given = 0;    // how deep it is [m]
-        double behind = 0;   // how much deeper the real one is [m]
-        double depth = 0;    // to which the surface sank into it in the last call [m]
-        double stretch = 0;  // largest area under it in the last call, over that at rest [-]
-        double force() const noexcept { return given > 0.0 ? 1.0 + 1.5 * behind / given : 1.0; }
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     std::span<const ElasticTool> heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept;

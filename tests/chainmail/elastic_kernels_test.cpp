@@ -85,28 +85,32 @@ double linearDivergence(int n, int i, Vec3 s, double share)
     return (1.0 - share) * 0.5 * d[i] * (d[j] * s[j] + d[k] * s[k]);
 }
 
+// Adds weight (2 mu e:e + lambda of the linear divergence) at one point of [-1/2, 1/2]^3.
+void addAssumed(Matrix24& k, Vec3 s, double weight, double mu, double lambda)
+{
+    const double share = lambda / (lambda + 2.0 * mu);
+    for (std::size_t a = 0; a < 24; ++a) {
+        const auto ea = assumedStrain(static_cast<int>(a / 3), static_cast<int>(a % 3), s, share);
+        const double da = linearDivergence(static_cast<int>(a / 3), static_cast<int>(a % 3), s, share);
+        for (std::size_t b = 0; b < 24; ++b) {
+            const auto eb = assumedStrain(static_cast<int>(b / 3), static_cast<int>(b % 3), s, share);
+            double sum = lambda * da * linearDivergence(static_cast<int>(b / 3), static_cast<int>(b % 3), s, share);
+            for (std::size_t c = 0; c < 6; ++c) {
+                sum += (c < 3 ? 2.0 : 1.0) * mu * ea[c] * eb[c];
+            }
+            k[a][b] += weight * sum;
+        }
+    }
+}
+
 // The brick of edge 1 m with assumed strain, by 2 x 2 x 2 Gauss points; of the divergence the mean, and what grows along
 // one axis.
 Matrix24 byQuadrature(double mu, double lambda)
 {
     Matrix24 k{};
     const double off = 0.5 / std::sqrt(3.0);
-    const double share = lambda / (lambda + 2.0 * mu);
     for (int g = 0; g < 8; ++g) {
-        const Vec3 s = off * (2.0 * Vec3(g & 1, (g >> 1) & 1, g >> 2) - 1.0);
-        for (std::size_t a = 0; a < 24; ++a) {
-            const int na = static_cast<int>(a / 3), ia = static_cast<int>(a % 3);
-            const auto ea = assumedStrain(na, ia, s, share);
-            for (std::size_t b = 0; b < 24; ++b) {
-                const int nb = static_cast<int>(b / 3), ib = static_cast<int>(b % 3);
-                const auto eb = assumedStrain(nb, ib, s, share);
-                double sum = lambda * linearDivergence(na, ia, s, share) * linearDivergence(nb, ib, s, share);
-                for (std::size_t c = 0; c < 6; ++c) {
-                    sum += (c < 3 ? 2.0 : 1.0) * mu * ea[c] * eb[c];
-                }
-                k[a][b] += 0.125 * sum;
-            }
-        }
+        addAssumed(k, off * (2.0 * Vec3(g & 1, (g >> 1) & 1, g >> 2) - 1.0), 0.125, mu, lambda);
     }
     addPoint(k, Vec3(0.5), 1.0, 0.0, lambda);
     return k;

@@ -1,0 +1,74 @@
+#include <chainmail/held_tool.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
+constexpr double mostStretch = 6.5;    // of the area under a tool
+constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this share of its radius ...
+constexpr double sinkSpacings = 0.15;  // ... and of the spacing,
+constexpr double mostSink = 0.25;      // but not over this share of the radius
+constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of mostStretch
+constexpr int mostSteps = 256;         // along a way through the tissue
+
+bool isHeld(const CellLevel& level, Vec3 at) noexcept
+{
+    const Index3 node(glm::round((at - level.nodes.origin) / level.nodes.spacing));
+    return level.nodes.contains(node) && level.fixed[level.nodes.offset(node)] != 0;
+}
+
+// How far the foremost point of the real tool is inside of what is held in space, on its way from where the body's is [m].
+double insideHeld(const CellLevel& level, Vec3 from, Vec3 inward, double way) noexcept
+{
+    const double step = std::max(0.25 * level.nodes.spacing, way / mostSteps);
+    for (double t = 0.0; t < way; t += step) {
+        if (isHeld(level, from + t * inward)) {
+            return way - t;
+        }
+    }
+    return 0.0;
+}
+
+}  // namespace
+
+ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bool finiteStrain, bool holdsBack) noexcept
+{
+    const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
+    const double wanted = glm::length(tool.pushed);
+    const double most = finiteStrain ? wanted : std::min(wanted, smallStrain * radius);
+    const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, mostSink * radius);
+    const double further = std::min(sink - depth, ease * radius * (mostStretch - stretch));
+    given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
+    behind = wanted - given;
+    friction = tool.friction;
+    inward = wanted > 0.0 ? tool.pushed / wanted : Vec3(0.0);
+    stopped = 0.0;
+    if (behind > 0.0) {
+        const bool aFirst =
+            glm::dot(tool.shape.a, inward) + tool.shape.radiusA > glm::dot(tool.shape.b, inward) + tool.shape.radiusB;
+        const Vec3 front =
+            (aFirst ? tool.shape.a : tool.shape.b) + (aFirst ? tool.shape.radiusA : tool.shape.radiusB) * inward;
+        stopped = tool.stiffest * insideHeld(finest, front - behind * inward, inward, behind);
+    }
+    ElasticTool felt = tool;
+    felt.shape.a -= behind * inward;
+    felt.shape.b -= behind * inward;
+    felt.pushed = given * inward;
+    return felt;
+}
+
+Vec3 HeldTool::force(Vec3 felt) const noexcept
+{
+    const Vec3 sum = (given > 0.0 ? 1.0 + 1.5 * behind / given : 1.0) * felt - stopped * inward;
+    const double into = glm::dot(sum, inward);
+    return friction > 0.0 || into <= 0.0 ? sum : sum - into * inward;
+}
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <chainmail/elastic_contact.h>
+
+namespace palpate::chainmail {
+
+/// A tool as an elastic body feels it: it presses only as deep as the cells bear. It is held back on its way,
+/// ElasticTool::pushed, where
+///
+///     - the surface under it is stretched to six and a half times its area: from eight on, cells there have more than one
+///       equilibrium, and the surface slips around the tool
+///     - the surface sinks into it by more than a bound
+///     - small strain is pressed by more than a radius
+///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
+///
+/// From there its force grows by the slope that Hertz's law has where it is, 3/2 F/d: a contact that cannot grow wider is a
+/// flat punch, whose force is linear. What is held in space stops the real tool: it does not get into bone.
+struct HeldTool {
+    double given = 0;     // how deep it is [m]
+    double behind = 0;    // how much deeper the real one is [m]
+    double depth = 0;     // to which the surface sank into it in the last call [m]
+    double stretch = 0;   // largest area under it in the last call, over that at rest [-]
+    double friction = 0;  // Coulomb [-]
+    Vec3 inward{0.0};     // unit vector along its way; or zero
+    double stopped = 0;   // force by which what is held in space stops the real tool [N]
+
+    /// The tool for this call, as deep as the last one lets it go.
+    /// @param holdsBack  false: as it is
+    ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool finiteStrain, bool holdsBack) noexcept;
+    /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
+    /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
+    Vec3 force(Vec3 felt) const noexcept;
+};
+
+}  // namespace palpate::chainmail
