@@ -13,8 +13,8 @@ namespace palpate::chainmail {
 ///     - small strain is pressed by more than a radius
 ///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
 ///
-/// From there its force grows by the slope that Hertz's law has where it is, 3/2 F/d: a contact that cannot grow wider is a
-/// flat punch, whose force is linear. What is held in space stops the real tool: it does not get into bone.
+/// From there its force goes on by Hertz's law, with the depth to the power of 3/2. What is held in space stops the real
+/// tool: it does not get into bone.
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]

@@ -133,6 +133,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
     if (grip.kind == Grip::Kind::press) {
         reaction.force = elastic_.toolForce(0);
+        reaction.behind = last_.behind;
     }
     return reaction;
 }

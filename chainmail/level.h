@@ -33,6 +33,7 @@ struct Reaction {
     std::uint32_t moved = 0;    // nodes that are not at rest
     double residual = 0;        // of the level's own: largest violated link [m]
     std::optional<Vec3> force;  // of the tissue on the tool; none where the level does not know it [N]
+    double behind = 0;          // by how much the level holds the tool back, see HeldTool [m]
 };
 
 /// A level of the model ladder: leaves the displaced lattice behind for collision, distances and the viewer. Bounded work,

@@ -69,6 +69,7 @@ double sphereForce(const ElasticBody& body, double radius, double depth, Vec3 be
     const Vec3 centre = beside + (depth - radius) * inward;
     ElasticTool tool;
     tool.shape = {centre, centre, radius, radius};
+    tool.pushed = depth * inward;
     tool.stiffest = 1e6;
     const ElasticLoad load{{&tool, 1}, {}, {beside, inward, 0.0}};
     Elastic elastic(body, {.window = window, .maxSites = 1U << 16}, load.focus);

@@ -232,10 +232,17 @@ chainmail::Reaction Simulation::deform() noexcept
     return reaction;
 }
 
-// Where level `elastic` knows the force of a tool that presses, it is the force, at any depth; else it is the law's.
+// Where level `elastic` knows the force of a tool that presses, it is the force, at any depth; else it is the law's. A tool
+// that is faster than the body can follow has left most of its way to be made up for: there it feels at least the law's
+// share of that way, so that it does not get through a thin part unhindered.
 Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) const noexcept
 {
-    return tip_.phase != Phase::free && reaction.force ? *reaction.force : law;
+    if (tip_.phase == Phase::free || !reaction.force) {
+        return law;
+    }
+    const double depth = glm::distance(tool_.position, tip_.proxy);
+    const Vec3 least = depth > 0.0 ? std::min(reaction.behind / depth, 1.0) * law : Vec3(0.0);
+    return glm::length(*reaction.force) >= glm::length(least) ? *reaction.force : least;
 }
 
 // The gun fires once per press of its button, and only a needle that is inside takes a core.
