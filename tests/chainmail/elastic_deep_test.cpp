@@ -206,7 +206,7 @@ TEST(ElasticDeep, DraggedDeepTheForceIsEven)
     EXPECT_LE(way.pull, 0.0);
 }
 
-// A tool that comes by a radius per tick does not get through a plate of one cell.
+// A tool that comes by a radius per tick does not get through a plate of one cell: what holds it never lets go.
 TEST(ElasticDeep, AFastToolDoesNotJumpThroughAPlate)
 {
     const auto rim = [](Index3 c) { return c.x < 2 || c.z < 2 || c.x > 21 || c.z > 21; };
@@ -217,9 +217,10 @@ TEST(ElasticDeep, AFastToolDoesNotJumpThroughAPlate)
     double before = 0.0;
     for (int i = 1; i <= 12; ++i) {
         way.tick(i * 3e-3, 0.0);
-        EXPECT_GT(way.force(), before) << i;
+        EXPECT_GT(way.force(), 0.9 * before) << i;
         before = way.force();
     }
+    EXPECT_GT(before, 0.3);
 }
 
 // Force of a ball of 20 mm over Hertz's with the depth's factor (Dimitriadis), mean over places in the grid: cells of 2 mm
