@@ -140,8 +140,9 @@ TEST(PressPath, AFileThatIsNotThereIsRefused)
     EXPECT_THROW(loadPoints(folder / "none.csv"), std::runtime_error);
 }
 
-// The trial sets up its tools, its windows and its contacts by itself.
-TEST(Press, ForcesAreThoseOfATrialBitForBit)
+// The trial sets up its tools, its windows and its contacts by itself; where a tool would lie at rest, a path knows to some
+// micrometres.
+TEST(Press, ForcesAreThoseOfATrial)
 {
     const auto& model = block();
     const TrialPlace place = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
@@ -159,7 +160,7 @@ TEST(Press, ForcesAreThoseOfATrialBitForBit)
     const Pressed own = pressed(path, {ball});
     ASSERT_EQ(own.samples.size(), forces.size());
     for (std::size_t i = 0; i < forces.size(); ++i) {
-        EXPECT_EQ(own.samples[i].force, forces[i]) << i;
+        EXPECT_LT(glm::distance(own.samples[i].force, forces[i]), 2e-3 * glm::length(forces.back())) << i;
     }
     EXPECT_LT(forces.back().y, -0.05);
     EXPECT_EQ(own.summary.ticks, forces.size());
