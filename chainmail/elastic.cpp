@@ -71,7 +71,7 @@ void Elastic::settle() noexcept
 {
     siteCount_ = 0;
     for (HeldTool& held : held_) {
-        held.depth = held.stretch = 0.0;
+        held.depth = held.stretch = held.load = 0.0;
     }
     if (atRest_) {
         return;
@@ -472,7 +472,7 @@ void Elastic::measure(ElasticResult& result) noexcept
 {
     result.energy = energy_ + contactEnergy() / (1.0 - memory_);
     for (HeldTool& held : held_) {
-        held.depth = held.stretch = 0.0;
+        held.depth = held.stretch = held.load = 0.0;
         result.behind = std::max(result.behind, held.behind);
     }
     for (const ContactSite& s : sites()) {
@@ -481,6 +481,7 @@ void Elastic::measure(ElasticResult& result) noexcept
             result.depth = std::max(result.depth, s.depth);
             HeldTool& held = held_[s.owner];
             held.depth = std::max(held.depth, s.depth);
+            held.load += glm::length(s.force);
             held.stretch = std::max(held.stretch, areaRatio(stack_.body(), stack_.windows(), s));
         }
     }

@@ -15,6 +15,7 @@ constexpr double mostStretch = 6.5;    // of the area under a tool
 constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this share of its radius ...
 constexpr double sinkSpacings = 0.15;  // ... and of the spacing,
 constexpr double mostSink = 0.25;      // but not over this share of the radius
+constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness
 constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of mostStretch
 constexpr int mostSteps = 256;         // along a way through the tissue
 
@@ -44,7 +45,8 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     const double wanted = glm::length(tool.pushed);
     const double most = finiteStrain ? wanted : std::min(wanted, smallStrain * radius);
     const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, mostSink * radius);
-    const double further = std::min(sink - depth, ease * radius * (mostStretch - stretch));
+    const double bears = sink + onBone * load / tool.stiffest;
+    const double further = std::min(bears - depth, ease * radius * (mostStretch - stretch));
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
     friction = tool.friction;

@@ -9,7 +9,7 @@ namespace palpate::chainmail {
 ///
 ///     - the surface under it is stretched to six and a half times its area: from eight on, cells there have more than one
 ///       equilibrium, and the surface slips around the tool
-///     - the surface sinks into it by more than a bound
+///     - the surface sinks into it by more than a bound, and than a contact that is as stiff as may be
 ///     - small strain is pressed by more than a radius
 ///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
 ///
@@ -19,6 +19,7 @@ struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
     double depth = 0;     // to which the surface sank into it in the last call [m]
+    double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
