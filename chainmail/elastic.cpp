@@ -45,7 +45,6 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
     tools_.reserve(mostTools);
     shapes_.reserve(mostTools);
     foundFor_.reserve(mostTools);
-    friction_.reserve(mostTools);
     toolAt_.reserve(mostTools);
     slip_.assign(body.points.size(), Vec3f(0.0F));
 }
@@ -71,7 +70,7 @@ void Elastic::settle() noexcept
 {
     siteCount_ = 0;
     for (HeldTool& held : held_) {
-        held.depth = held.stretch = held.load = 0.0;
+        held.forgetContacts();
     }
     if (atRest_) {
         return;
@@ -124,10 +123,8 @@ bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
 void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 {
     shapes_.clear();
-    friction_.clear();
     for (const ElasticTool& tool : load.tools) {
         shapes_.emplace_back(tool.shape);
-        friction_.push_back(tool.friction);
     }
     ties_ = load.ties;
     if (!sitesHold(load, moved)) {
@@ -165,13 +162,16 @@ void Elastic::spreadPressure() noexcept
     const auto& body = stack_.body();
     std::array<double, mostTools> share{};
     for (std::size_t i = 0; i < tools_.size(); ++i) {
-        const double radius = std::max(tools_[i].shape.radiusA, tools_[i].shape.radiusB);
         const double depth = glm::length(tools_[i].pushed);
-        share[i] = depth > 0.0 ? resolvedShare(std::sqrt(radius * depth) / body.levels.front().nodes.spacing) : 1.0;
+        share[i] = depth > 0.0
+                       ? resolvedShare(std::sqrt(tools_[i].shape.widest() * depth) / body.levels.front().nodes.spacing)
+                       : 1.0;
     }
     for (ContactSite& s : active()) {
         if (!s.isTie) {
-            const double ratio = options_.finiteStrain ? areaRatio(body, stack_.windows(), s) : 1.0;
+            // What moved last was measured then.
+            const bool isKnown = s.stretch > 0.0;
+            const double ratio = !options_.finiteStrain ? 1.0 : isKnown ? s.stretch : areaRatio(body, stack_.windows(), s);
             s.stiffness = share[s.owner] * ratio * s.atRest;
         }
     }
@@ -310,7 +310,7 @@ void Elastic::letSlip() noexcept
 
 double Elastic::frictionOf(const ContactSite& site) const noexcept
 {
-    return site.isTie ? 0.0 : friction_[site.owner];
+    return site.isTie ? 0.0 : tools_[site.owner].friction;
 }
 
 // Goes along the direction that look() saw, whose image under -A is known, as far as lowers the energy. A step after which
@@ -472,17 +472,19 @@ void Elastic::measure(ElasticResult& result) noexcept
 {
     result.energy = energy_ + contactEnergy() / (1.0 - memory_);
     for (HeldTool& held : held_) {
-        held.depth = held.stretch = held.load = 0.0;
+        held.forgetContacts();
         result.behind = std::max(result.behind, held.behind);
     }
-    for (const ContactSite& s : sites()) {
+    for (ContactSite& s : active()) {
+        s.stretch = 0.0;
         if (!s.isTie && s.active()) {
             ++result.contacts;
             result.depth = std::max(result.depth, s.depth);
             HeldTool& held = held_[s.owner];
             held.depth = std::max(held.depth, s.depth);
             held.load += glm::length(s.force);
-            held.stretch = std::max(held.stretch, areaRatio(stack_.body(), stack_.windows(), s));
+            s.stretch = areaRatio(stack_.body(), stack_.windows(), s);
+            held.stretch = std::max(held.stretch, s.stretch);
         }
     }
 }

@@ -135,8 +135,7 @@ private:
     std::vector<occupancy::RoundCone> foundFor_;  // the tools when the sites were looked for
     std::size_t tiesFound_ = 0;
     std::vector<HeldTool> held_;      // of each tool
-    std::vector<ElasticTool> tools_;  // where the body feels them
-    std::vector<double> friction_;    // of each tool
+    std::vector<ElasticTool> tools_;  // as the body feels them
     std::vector<Vec3> toolAt_;        // in the last call [m]
     std::vector<Vec3f> slip_;         // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;

@@ -21,7 +21,7 @@ constexpr double mostRatio = 30.0;
 // quarter of the tool's cross-section, what a shallow press touches.
 double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
 {
-    const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
+    const double radius = tool.shape.widest();
     const double cap = tool.stiffest / (0.25 * std::numbers::pi * radius * radius);
     return std::min(penalty * youngsModulusOf(p.mu) / spacing, cap) * static_cast<double>(p.area);
 }
@@ -49,7 +49,7 @@ public:
     {
         const auto& grid = body_.levels.front().nodes;
         const auto& s = tool.shape;
-        const double radius = std::max(s.radiusA, s.radiusB) + near_ + grid.spacing;
+        const double radius = s.widest() + near_ + grid.spacing;
         const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.pushed) - radius;
         const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.pushed) + radius;
         // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.

@@ -52,15 +52,16 @@ struct ContactSite {
     double stiffness = 0;  // the same, by its area in this call; of a tie along its axis [N/m]
     double across = 0;     // of a tie, across its axis [N/m]
 
-    Vec3 u{0.0};        // its displacement [m]
-    Vec3 p{0.0};        // and that of the search direction
-    Vec3 z{0.0};        // of the part of it that is new
-    double depth = 0;   // of a surface point inside the tool [m]
-    Vec3 normal{0.0};   // out of the tool there; of a tie, its axis
-    Vec3 force{0.0};    // on the tissue [N]
-    Vec3 slip{0.0};     // how far the tool went on since it took hold of the point, while they touch [m]
-    double limit = 0;   // of the slip along the surface that friction holds [m]
-    double energy = 0;  // [J]
+    Vec3 u{0.0};         // its displacement [m]
+    Vec3 p{0.0};         // and that of the search direction
+    Vec3 z{0.0};         // of the part of it that is new
+    double depth = 0;    // of a surface point inside the tool [m]
+    Vec3 normal{0.0};    // out of the tool there; of a tie, its axis
+    Vec3 force{0.0};     // on the tissue [N]
+    Vec3 slip{0.0};      // how far the tool went on since it took hold of the point, while they touch [m]
+    double limit = 0;    // of the slip along the surface that friction holds [m]
+    double energy = 0;   // [J]
+    double stretch = 0;  // areaRatio() at the end of the last call; 0: not known
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }

@@ -25,6 +25,13 @@ bool isHeld(const CellLevel& level, Vec3 at) noexcept
     return level.nodes.contains(node) && level.fixed[level.nodes.offset(node)] != 0;
 }
 
+Vec3 foremost(const occupancy::RoundCone& shape, Vec3 inward) noexcept
+{
+    const Vec3 a = shape.a + shape.radiusA * inward;
+    const Vec3 b = shape.b + shape.radiusB * inward;
+    return glm::dot(a, inward) > glm::dot(b, inward) ? a : b;
+}
+
 // How far the foremost point of the real tool is inside of what is held in space, on its way from where the body's is [m].
 double insideHeld(const CellLevel& level, Vec3 from, Vec3 inward, double way) noexcept
 {
@@ -41,7 +48,7 @@ double insideHeld(const CellLevel& level, Vec3 from, Vec3 inward, double way) no
 
 ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bool finiteStrain, bool holdsBack) noexcept
 {
-    const double radius = std::max(tool.shape.radiusA, tool.shape.radiusB);
+    const double radius = tool.shape.widest();
     const double wanted = glm::length(tool.pushed);
     const double most = finiteStrain ? wanted : std::min(wanted, smallStrain * radius);
     const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, mostSink * radius);
@@ -52,17 +59,13 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     friction = tool.friction;
     inward = wanted > 0.0 ? tool.pushed / wanted : Vec3(0.0);
     stopped = 0.0;
-    if (behind > 0.0) {
-        const bool aFirst =
-            glm::dot(tool.shape.a, inward) + tool.shape.radiusA > glm::dot(tool.shape.b, inward) + tool.shape.radiusB;
-        const Vec3 front =
-            (aFirst ? tool.shape.a : tool.shape.b) + (aFirst ? tool.shape.radiusA : tool.shape.radiusB) * inward;
-        stopped = tool.stiffest * insideHeld(finest, front - behind * inward, inward, behind);
-    }
     ElasticTool felt = tool;
     felt.shape.a -= behind * inward;
     felt.shape.b -= behind * inward;
     felt.pushed = given * inward;
+    if (behind > 0.0) {
+        stopped = tool.stiffest * insideHeld(finest, foremost(felt.shape, inward), inward, behind);
+    }
     return felt;
 }
 

@@ -25,6 +25,8 @@ struct HeldTool {
     Vec3 inward{0.0};     // unit vector along its way; or zero
     double stopped = 0;   // force by which what is held in space stops the real tool [N]
 
+    /// Nothing is known yet of this call's contacts.
+    void forgetContacts() noexcept { depth = load = stretch = 0.0; }
     /// The tool for this call, as deep as the last one lets it go.
     /// @param holdsBack  false: as it is
     ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool finiteStrain, bool holdsBack) noexcept;

@@ -24,6 +24,8 @@ struct RoundCone {
     Vec3 b{0.0};
     double radiusA = 0;
     double radiusB = 0;
+
+    double widest() const noexcept { return std::max(radiusA, radiusB); }
 };
 
 inline RoundCone roundCone(const Capsule& tool) noexcept
