@@ -1,13 +1,14 @@
 #include <experiments/deep_references.h>
 
+#include <experiments/csv_cells.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
-#include <cmath>
 #include <fstream>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 
@@ -21,24 +22,11 @@ constexpr double longest = 200.0;  // of a tool and its way [mm]
 constexpr double strongest = 1e3;  // [N]
 constexpr double mostElements = 1e8;
 
-std::string_view trimmed(std::string_view text)
-{
-    const auto first = text.find_first_not_of(" \t\r");
-    return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
 // A line of the table.
 class Row {
 public:
-    Row(std::string_view line, std::string where) : where_(std::move(where))
+    Row(std::string_view line, std::string where) : cells_(csvCells(line)), where_(std::move(where))
     {
-        for (std::size_t comma = 0; comma != std::string_view::npos; line.remove_prefix(comma + 1)) {
-            comma = line.find(',');
-            cells_.push_back(trimmed(line.substr(0, comma)));
-            if (comma == std::string_view::npos) {
-                break;
-            }
-        }
         if (cells_.size() != columns.size()) {
             throw std::runtime_error(fmt::format("{}: {} values: must be {}: {}", where_, cells_.size(), columns.size(),
                                                  fmt::join(columns, ",")));
@@ -63,13 +51,12 @@ public:
     double number(std::size_t column, double least, double most) const
     {
         const std::string_view cell = cells_[column];
-        double value = 0.0;
-        const auto [rest, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-        if (error != std::errc() || rest != cell.data() + cell.size() || !(value >= least && value <= most)) {
+        const std::optional<double> value = numberIn(cell);
+        if (!value || !(*value >= least && *value <= most)) {
             throw std::runtime_error(fmt::format("{}: {} = '{}': must be a number from {:g} to {:g}", where_,
                                                  columns[column], cell, least, most));
         }
-        return value;
+        return *value;
     }
 
 private:

@@ -1,12 +1,13 @@
 #include <experiments/press/path_file.h>
 
+#include <experiments/csv_cells.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <optional>
@@ -32,25 +33,6 @@ const std::vector<std::string> pathColumns{"x_mm", "y_mm", "z_mm", "seconds", "a
 constexpr std::size_t seconds = 3, axis = 4;  // their places; positions come first
 const std::vector<std::string> pointColumns{"x_mm", "y_mm", "z_mm"};
 
-std::string_view trimmed(std::string_view text)
-{
-    const auto first = text.find_first_not_of(" \t\r");
-    return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-std::vector<std::string_view> cellsOf(std::string_view line)
-{
-    std::vector<std::string_view> cells;
-    for (std::size_t comma = 0; comma != std::string_view::npos; line.remove_prefix(comma + 1)) {
-        comma = line.find(',');
-        cells.push_back(trimmed(line.substr(0, comma)));
-        if (comma == std::string_view::npos) {
-            break;
-        }
-    }
-    return cells;
-}
-
 // A CSV file of numbers, row by row.
 class NumberFile {
 public:
@@ -61,7 +43,7 @@ public:
             throw std::runtime_error(
                 fmt::format("{}: holds no line of column names: begin with {}", origin_, fmt::join(known_, ",")));
         }
-        for (const std::string_view name : cellsOf(line_)) {
+        for (const std::string_view name : csvCells(line_)) {
             addColumn(name);
         }
         for (const char* name : {"x_mm", "y_mm", "z_mm"}) {
@@ -84,7 +66,7 @@ public:
         if (!next()) {
             return false;
         }
-        cells_ = cellsOf(line_);
+        cells_ = csvCells(line_);
         if (cells_.size() != count_) {
             throw std::runtime_error(
                 fmt::format("{}: {} values: must be {}, one per column", where(), cells_.size(), count_));
@@ -95,16 +77,15 @@ public:
     double number(std::size_t column, double most, const char* unit) const
     {
         const std::string_view cell = cells_[*place_[column]];
-        double value = 0.0;
-        const auto [rest, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-        if (error != std::errc() || rest != cell.data() + cell.size() || !std::isfinite(value)) {
+        const std::optional<double> value = numberIn(cell);
+        if (!value || !std::isfinite(*value)) {
             throw std::runtime_error(fmt::format("{}: {} = '{}': must be a number", where(), known_[column], cell));
         }
-        if (std::abs(value) > most) {
+        if (std::abs(*value) > most) {
             throw std::runtime_error(
-                fmt::format("{}: {} = {:g}: must be {:g} to {:g}{}", where(), known_[column], value, -most, most, unit));
+                fmt::format("{}: {} = {:g}: must be {:g} to {:g}{}", where(), known_[column], *value, -most, most, unit));
         }
-        return value;
+        return *value;
     }
 
     Vec3 position() const
