@@ -2,7 +2,7 @@
 
 #include <chainmail/elastic.h>
 #include <experiments/kernel_trial.h>
-#include <experiments/press/press.h>
+#include <haptics/simulation.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -19,7 +19,6 @@ using namespace chainmail;
 
 namespace {
 
-constexpr double tick = 1e-3;  // [s]
 constexpr int holdTicks = 200;
 constexpr std::size_t mostNodes = 4U << 20;
 
@@ -45,7 +44,7 @@ ElasticBody bodyAt(const haptics::SessionModel& model, const datasets::ElasticSe
 // In, hold, out.
 std::vector<std::pair<PressWay, double>> wayOf(const TrialPath& path, double speed)
 {
-    const int in = std::max(1, static_cast<int>(std::lround(path.press / (speed * tick))));
+    const int in = std::max(1, static_cast<int>(std::lround(path.press / (speed * haptics::tickSeconds))));
     std::vector<std::pair<PressWay, double>> pressed;
     for (int t = 1; t <= in; ++t) {
         pressed.emplace_back(PressWay::in, path.press * t / in);
@@ -169,7 +168,7 @@ DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, co
         TrialPath path = trialPath(*model.tissue, model.surface, entry, what.tool, out.spacing);
         path.press = path.gap + what.deepest();
         path.drag = 0.0;
-        Elastic elastic(body, tickOptions(settings), TrialLoad(path).load().focus);
+        Elastic elastic(body, haptics::elasticOptions(settings), TrialLoad(path).load().focus);
         addLooks(feel(elastic, path, options.speed, out, seconds), what, i, out);
     }
     std::ranges::sort(seconds);

@@ -52,13 +52,8 @@ private:
 std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model, chainmail::DisplacedLattice& shape,
                                                       int window, double period)
 {
-    const auto& settings = model.scene.model.elastic;
-    chainmail::ElasticOptions options;
+    chainmail::ElasticOptions options = elasticOptions(model.scene.model.elastic, period);
     options.window = window;
-    // A tick that is longer has time for more.
-    options.cycles = static_cast<int>(std::lround(settings.cycles * std::max(1.0, period / tickSeconds)));
-    options.finiteStrain = settings.strain == datasets::Strain::finite;
-    options.viscosity = settings.viscosity / period;
     return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
 }
 
@@ -69,6 +64,16 @@ bool isPose(const DeviceSample& device) noexcept
 }
 
 }  // namespace
+
+chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settings, double period) noexcept
+{
+    chainmail::ElasticOptions options;
+    options.window = settings.window;
+    options.cycles = static_cast<int>(std::lround(settings.cycles * std::max(1.0, period / tickSeconds)));
+    options.finiteStrain = settings.strain == datasets::Strain::finite;
+    options.viscosity = settings.viscosity / period;
+    return options;
+}
 
 Simulation::Simulation(const SessionModel& model, const SimulationOptions& options)
     : model_(model),

@@ -23,6 +23,10 @@ struct SimulationOptions {
     std::optional<DeviceParameters> device;  // that the stabiliser keeps stable; none: the scene's
 };
 
+/// Windows, cycles, strain and viscosity of a tick of level `elastic`, by the scene's settings.
+/// @param period  of a tick [s]; longer than the usual one it has time for more cycles
+chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settings, double period = tickSeconds) noexcept;
+
 /// The mutable half of a session. tick() is a pure function of the model and of the samples so far: the same samples give
 /// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
 class Simulation {

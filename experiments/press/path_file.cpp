@@ -1,6 +1,7 @@
 #include <experiments/press/path_file.h>
 
 #include <experiments/csv_cells.h>
+#include <haptics/tick.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -17,9 +18,10 @@
 
 namespace palpate::experiments {
 
+using haptics::tickSeconds;
+
 namespace {
 
-constexpr double tickSeconds = 1e-3;
 constexpr double farthest = 10.0;    // from the origin along each axis [m]
 constexpr double latest = 1e9;       // more than any clock says [s]
 constexpr double mostTicks = 10e6;   // nearly three hours

@@ -2,6 +2,7 @@
 
 #include <experiments/kernel_trial.h>
 #include <experiments/press/pose_load.h>
+#include <haptics/simulation.h>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
@@ -19,7 +20,6 @@ using chainmail::ElasticResult;
 
 namespace {
 
-constexpr double tickSeconds = 1e-3;
 constexpr int mostCycles = 500;  // of a pose that is solved to convergence
 
 // Where the tissue is that was asked for.
@@ -66,7 +66,7 @@ public:
           path_(path),
           anchors_(anchorsOf(model, asked)),
           load_(model, options.tool, path.poses.front()),
-          elastic_(*model.elastic, tickOptions(model.scene.model.elastic), startOf(path, model, options))
+          elastic_(*model.elastic, haptics::elasticOptions(model.scene.model.elastic), startOf(path, model, options))
     {
     }
 
@@ -145,16 +145,6 @@ private:
 };
 
 }  // namespace
-
-chainmail::ElasticOptions tickOptions(const datasets::ElasticSettings& settings) noexcept
-{
-    chainmail::ElasticOptions options;
-    options.window = settings.window;
-    options.cycles = settings.cycles;
-    options.finiteStrain = settings.strain == datasets::Strain::finite;
-    options.viscosity = settings.viscosity / tickSeconds;
-    return options;
-}
 
 double contactArea(const Elastic& elastic) noexcept
 {

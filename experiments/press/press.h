@@ -47,9 +47,6 @@ struct PressSummary {
 /// Residual to which PressOptions::converge solves, share of the contacts' forces.
 inline constexpr double pressTolerance = 1e-4;
 
-/// Windows, cycles, strain and viscosity of a tick of 1 ms, by the scene's settings: as in a session.
-chainmail::ElasticOptions tickOptions(const datasets::ElasticSettings& settings) noexcept;
-
 /// Area of the surface that a tool presses, as it is stretched [m^2].
 double contactArea(const chainmail::Elastic& elastic) noexcept;
 

@@ -2,6 +2,7 @@
 
 #include <experiments/press/pose_load.h>
 #include <experiments/trial_path.h>
+#include <haptics/simulation.h>
 
 #include <tests/experiments/small_block.h>
 #include <tests/folder.h>
@@ -148,7 +149,7 @@ TEST(Press, ForcesAreThoseOfATrial)
     const TrialPlace place = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     const TrialPath trial = trialPath(*model.tissue, model.surface, place, trialTools()[0], 2e-3);
     TrialLoad load(trial);
-    chainmail::Elastic elastic(*model.elastic, tickOptions(model.scene.model.elastic), load.load().focus);
+    chainmail::Elastic elastic(*model.elastic, haptics::elasticOptions(model.scene.model.elastic), load.load().focus);
     PosePath path;
     std::vector<Vec3> forces;
     for (const TrialTick& t : schedule(trial, 20e-3)) {
@@ -250,7 +251,7 @@ TEST(Press, ANeedlesTipPullsAsATieOfEightModuliTimesSpacing)
     const double k = 8.0 * chainmail::youngsModulusOf(level.mu[cell]) * level.nodes.spacing;
     chainmail::Tie tie{rest, Vec3(0.0), Vec3(0, 1, 0), k, k};
     chainmail::ElasticLoad load{{}, {&tie, 1}, chainmail::focusAt(model.surface, rest)};
-    chainmail::Elastic elastic(*model.elastic, tickOptions(model.scene.model.elastic), load.focus);
+    chainmail::Elastic elastic(*model.elastic, haptics::elasticOptions(model.scene.model.elastic), load.focus);
     for (std::size_t i = 0; i < path.ticks(); ++i) {
         tie.u = path.at(i).position - rest;
         elastic.relax(load);
