@@ -89,9 +89,9 @@ ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
     return grip.kind == Grip::Kind::point ? tie(grip) : ElasticLoad{{}, {}, focusAt(surface_, grip.position)};
 }
 
-double ElasticLevel::tieStiffnessAt(Vec3 rest) const noexcept
+double tieStiffnessAt(const ElasticBody& body, Vec3 rest) noexcept
 {
-    const auto& level = elastic_.body().levels.front();
+    const CellLevel& level = body.levels.front();
     const Index3 cell(glm::floor((rest - level.nodes.origin) / level.nodes.spacing));
     const float mu = level.nodes.contains(cell) ? level.mu[level.nodes.offset(cell)] : 0.0F;
     return tieStiffness * youngsModulusOf(mu) * level.nodes.spacing;
@@ -104,7 +104,7 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
     const double h = elastic_.body().levels.front().nodes.spacing;
     const double under = std::max(0.0, 0.5 * h + surface_.distance(grip.proxy));
     const Vec3 rest = grip.proxy - under * surface_.normal(grip.proxy);
-    const double stiffness = tieStiffnessAt(rest);
+    const double stiffness = tieStiffnessAt(elastic_.body(), rest);
     ties_[0] = {rest, grip.position - grip.proxy, grip.axis, stiffness, stiffness};
     std::size_t count = 1;
     const double inserted = glm::distance(grip.entry, grip.proxy);
@@ -113,7 +113,7 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
         const double back = inserted * (static_cast<double>(i) + 1.0) / (static_cast<double>(pieces) + 1.0);
         const Vec3 at = glm::mix(grip.proxy, grip.entry, back / inserted);
         const Vec3 way = grip.position - back * grip.axis - at;
-        const double held = tieStiffnessAt(at);
+        const double held = tieStiffnessAt(elastic_.body(), at);
         ties_[count++] = {at, way + (grip.drag - glm::dot(way, grip.axis)) * grip.axis, grip.axis, held, held};
     }
     return {{}, std::span(ties_).first(count), focusAt(surface_, grip.proxy)};

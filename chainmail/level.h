@@ -69,6 +69,10 @@ private:
     std::vector<Seed> seeds_;
 };
 
+/// Of a tie that holds the point `rest`: 8 E h, with E of the finest cell that the point lies in; 0 where that is empty
+/// [N/m].
+double tieStiffnessAt(const ElasticBody& body, Vec3 rest) noexcept;
+
 /// Level 2: elastic equilibrium on nested windows; forces of a pressing tool come from its energy, from first touch on.
 ///
 /// The lattice gets the windows' displacement at the middles of their cells: around the tool in every call, further out by
@@ -87,7 +91,6 @@ private:
 
     ElasticLoad load(const Grip& grip) noexcept;
     ElasticLoad tie(const Grip& grip) noexcept;
-    double tieStiffnessAt(Vec3 rest) const noexcept;
     Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
     void writeFinest(Vec3 around) noexcept;
     void writeBox(Index3 low, Index3 high) noexcept;

@@ -1,5 +1,7 @@
 #include <experiments/press/pose_load.h>
 
+#include <chainmail/level.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -13,7 +15,6 @@ using datasets::ToolKind;
 namespace {
 
 constexpr double tieSpacing = 4e-3;    // along a needle's shaft [m]
-constexpr double tieStiffness = 8.0;   // in E h
 constexpr double touchStep = 0.25e-3;  // at most so deep a tool is found that comes to the surface [m]
 
 }  // namespace
@@ -50,18 +51,10 @@ void PoseLoad::hold(double behind)
     const Vec3 at = onShaft(first_, behind);
     const double under = std::max(0.0, 0.5 * h + model_.surface.distance(at));
     const Vec3 rest = at - under * model_.surface.normal(at);
-    if (const double stiffness = tieStiffnessAt(rest); stiffness > 0.0) {
+    if (const double stiffness = chainmail::tieStiffnessAt(*model_.elastic, rest); stiffness > 0.0) {
         ties_.push_back({rest, Vec3(0.0), first_.axis, stiffness, stiffness});
         behind_.push_back(behind);
     }
-}
-
-double PoseLoad::tieStiffnessAt(Vec3 rest) const noexcept
-{
-    const chainmail::CellLevel& level = model_.elastic->levels.front();
-    const Index3 cell(glm::floor((rest - level.nodes.origin) / level.nodes.spacing));
-    const float mu = level.nodes.contains(cell) ? level.mu[level.nodes.offset(cell)] : 0.0F;
-    return tieStiffness * chainmail::youngsModulusOf(mu) * level.nodes.spacing;
 }
 
 // Where the front end is when the tool first touches the surface at rest on this way.

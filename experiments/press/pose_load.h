@@ -48,7 +48,6 @@ private:
     std::optional<Vec3> firstTouch(const haptics::ProxyTool& tool, Vec3 from, Vec3 to) const noexcept;
     chainmail::Focus focusOf(const haptics::ProxyTool& tool, Vec3 front) const noexcept;
     haptics::ProxyTool proxyTool(const ToolPose& pose) const noexcept { return {tool_.radius, tool_.length, pose.axis}; }
-    double tieStiffnessAt(Vec3 rest) const noexcept;
 
     const haptics::SessionModel& model_;
     datasets::ToolSpec tool_;
