@@ -1,6 +1,7 @@
 #include <experiments/deep_press.h>
 
 #include <chainmail/elastic.h>
+#include <experiments/kernel_rivals.h>
 #include <experiments/kernel_trial.h>
 #include <haptics/simulation.h>
 
@@ -31,15 +32,6 @@ struct Felt {
     double depth;  // below the first touch; negative above it [m]
     Vec3 force;    // [N]
 };
-
-ElasticBody bodyAt(const haptics::SessionModel& model, const datasets::ElasticSettings& settings, const GridPlace& place,
-                   double& spacing)
-{
-    volume::NodeGrid cells = volume::affordableGrid(model.tissue->box(), settings.spacing, mostNodes);
-    spacing = cells.spacing;
-    cells.origin += cells.spacing * Vec3(place.across, 0.0, place.along);
-    return elasticBody(cells, model.tissue->materialOn(cells), model.surface, settings.poissonCap);
-}
 
 // In, hold, out.
 std::vector<std::pair<PressWay, double>> wayOf(const TrialPath& path, double speed)
@@ -164,11 +156,14 @@ DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, co
     std::vector<double> seconds;
     const TrialPlace entry = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     for (std::size_t i = 0; i < options.places.size(); ++i) {
-        const ElasticBody body = bodyAt(model, settings, options.places[i], out.spacing);
+        const GridPlace& at = options.places[i];
+        const TrialBody body = trialBody(*model.tissue, model.surface, settings.spacing, settings.poissonCap, mostNodes,
+                                         Vec3(at.across, 0.0, at.along));
+        out.spacing = body.cells.spacing;
         TrialPath path = trialPath(*model.tissue, model.surface, entry, what.tool, out.spacing);
         path.press = path.gap + what.deepest();
         path.drag = 0.0;
-        Elastic elastic(body, haptics::elasticOptions(settings), TrialLoad(path).load().focus);
+        Elastic elastic(body.body, haptics::elasticOptions(settings), TrialLoad(path).load().focus);
         addLooks(feel(elastic, path, options.speed, out, seconds), what, i, out);
     }
     std::ranges::sort(seconds);

@@ -40,9 +40,10 @@ Grip gripOf(const TrialLoad& load)
 }  // namespace
 
 TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& surface, double wanted, double poissonCap,
-                    std::size_t mostNodes)
+                    std::size_t mostNodes, Vec3 shift)
 {
-    const auto cells = volume::affordableGrid(tissue.box(), wanted, mostNodes);
+    auto cells = volume::affordableGrid(tissue.box(), wanted, mostNodes);
+    cells.origin += cells.spacing * shift;
     return {cells, elasticBody(cells, tissue.materialOn(cells), surface, poissonCap)};
 }
 

@@ -15,8 +15,9 @@ struct TrialBody {
 };
 
 /// @param wanted    spacing of the finest nodes; widened where the body would need over `mostNodes` [m]
+/// @param shift     of the grid of cells, while tissue and surface stay where they are [cells]
 TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& surface, double wanted, double poissonCap,
-                    std::size_t mostNodes);
+                    std::size_t mostNodes, Vec3 shift = Vec3(0.0));
 
 /// The trial with windows around the tool, or with the whole grid, by its options.
 TrialResult elasticTrial(const chainmail::ElasticBody& body, const TrialPath& path, double speed,
