@@ -146,7 +146,7 @@ json pressFigures(const Options& o, const Run& run)
              {"ticks", s.ticks},
              {"ticks_in_contact", s.inContact},
              {"windows_moved", s.windowMoves},
-             {"tick_us", {{"p50", 1e6 * s.p50}, {"p99", 1e6 * s.p99}, {"max", 1e6 * s.max}}},
+             {"tick_us", {{"p50", 1e6 * s.times.p50}, {"p99", 1e6 * s.times.p99}, {"max", 1e6 * s.times.max}}},
              {"peak_force_n", s.peakForce},
              {"held_from_s", s.heldFrom ? json(*s.heldFrom) : json()},
              {"samples", json::array()},
@@ -195,7 +195,7 @@ void print(const Options& o, const Run& run)
     fmt::print("peak force {:.3f} N after {:.3f} s at {:.2f}, {:.2f}, {:.2f} mm\n", s.peakForce, s.peakAt.seconds, p.x, p.y,
                p.z);
     fmt::print("{} ticks, {} in contact; one takes {:.0f} us (p50), {:.0f} us (p99); windows moved {} times\n", s.ticks,
-               s.inContact, 1e6 * s.p50, 1e6 * s.p99, s.windowMoves);
+               s.inContact, 1e6 * s.times.p50, 1e6 * s.times.p99, s.windowMoves);
     if (s.heldFrom) {
         fmt::print(
             "from {:.3f} s on the tool is deeper than the model bears, and held back: column behind_mm says by how much\n",

@@ -2,7 +2,6 @@
 
 #include <chainmail/elastic.h>
 #include <experiments/kernel_rivals.h>
-#include <experiments/kernel_trial.h>
 #include <haptics/simulation.h>
 
 #include <fmt/format.h>
@@ -166,12 +165,8 @@ DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, co
         Elastic elastic(body.body, haptics::elasticOptions(settings), TrialLoad(path).load().focus);
         addLooks(feel(elastic, path, options.speed, out, seconds), what, i, out);
     }
-    std::ranges::sort(seconds);
     out.ticks = seconds.size();
-    if (!seconds.empty()) {
-        out.p50 = seconds[seconds.size() / 2];
-        out.p99 = seconds[seconds.size() * 99 / 100];
-    }
+    out.times = tickTimes(std::move(seconds));
     return out;
 }
 

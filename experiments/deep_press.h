@@ -2,6 +2,7 @@
 
 #include <datasets/scene.h>
 #include <experiments/deep_references.h>
+#include <experiments/kernel_trial.h>
 #include <haptics/session_model.h>
 
 #include <cstddef>
@@ -47,9 +48,9 @@ DeepZone zoneOf(double depth, double radius, double spacing) noexcept;
 struct DeepPress {
     double spacing = 0;  // of the finest nodes [m]
     std::vector<DeepLook> looks;
-    double pull = 0;          // largest force into the body in any tick [N]
-    double p50 = 0, p99 = 0;  // processor time of a tick in contact [s]
-    std::size_t ticks = 0;    // in contact
+    double pull = 0;        // largest force into the body in any tick [N]
+    TickTimes times;        // processor time of ticks in contact
+    std::size_t ticks = 0;  // in contact
 };
 
 struct DeepOptions {

@@ -173,13 +173,11 @@ public:
         const auto ticks = static_cast<double>(std::max<std::size_t>(out_.ticks, 1));
         out_.meanTouched /= ticks;
         out_.meanCycles /= ticks;
-        std::ranges::sort(seconds_);
         out_.mean = meanOf(seconds_);
         out_.cpu = meanOf(cpuSeconds_);
-        if (!seconds_.empty()) {
-            out_.p50 = seconds_[seconds_.size() / 2];
-            out_.p99 = seconds_[seconds_.size() * 99 / 100];
-        }
+        const TickTimes times = tickTimes(std::move(seconds_));
+        out_.p50 = times.p50;
+        out_.p99 = times.p99;
         return std::move(out_);
     }
 
@@ -356,6 +354,15 @@ double median(std::vector<double> values)
     std::ranges::sort(values);
     const std::size_t n = values.size();
     return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
+}
+
+TickTimes tickTimes(std::vector<double> seconds)
+{
+    if (seconds.empty()) {
+        return {};
+    }
+    std::ranges::sort(seconds);
+    return {seconds[seconds.size() / 2], seconds[seconds.size() * 99 / 100], seconds.back()};
 }
 
 FullSolve fullSolve(const ElasticBody& body, const TrialPath& path, double speed, bool finiteStrain)

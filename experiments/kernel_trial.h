@@ -115,6 +115,13 @@ TrialErrors atRest(const TrialResult& result);
 /// Median of values in any order; 0 of none.
 double median(std::vector<double> values);
 
+/// What ticks take [s].
+struct TickTimes {
+    double p50 = 0, p99 = 0, max = 0;
+};
+/// Of times in any order; 0 of none.
+TickTimes tickTimes(std::vector<double> seconds);
+
 /// Time of one tick that is solved on the whole grid to a thousandth of the force, in the middle of the press.
 struct FullSolve {
     double warm = 0;      // from the tick before: median of a few [s]

@@ -98,8 +98,8 @@ void addCase(const DeepCase& what, const std::string& setting, const DeepPress& 
                                   {"spacing_mm", 1e3 * press.spacing},
                                   {"deepest_radii", what.deepest() / what.tool.radius},
                                   {"pull_n", press.pull},
-                                  {"us_p50", 1e6 * press.p50},
-                                  {"us_p99", 1e6 * press.p99},
+                                  {"us_p50", 1e6 * press.times.p50},
+                                  {"us_p99", 1e6 * press.times.p99},
                                   {"ticks", press.ticks},
                                   {"zones", ways}});
 }

@@ -1,6 +1,5 @@
 #include <experiments/press/press.h>
 
-#include <experiments/kernel_trial.h>
 #include <experiments/press/pose_load.h>
 #include <haptics/simulation.h>
 
@@ -83,12 +82,7 @@ public:
                 sample(s);
             }
         }
-        std::ranges::sort(seconds_);
-        if (!seconds_.empty()) {
-            summary_.p50 = seconds_[seconds_.size() / 2];
-            summary_.p99 = seconds_[seconds_.size() * 99 / 100];
-            summary_.max = seconds_.back();
-        }
+        summary_.times = tickTimes(std::move(seconds_));
         return summary_;
     }
 

@@ -2,6 +2,7 @@
 
 #include <chainmail/elastic.h>
 #include <datasets/scene.h>
+#include <experiments/kernel_trial.h>
 #include <experiments/press/path_file.h>
 #include <haptics/session_model.h>
 
@@ -35,11 +36,11 @@ struct PressSample {
 /// What all ticks say, also those without a sample.
 struct PressSummary {
     std::size_t ticks = 0;
-    std::size_t inContact = 0;         // of them
-    std::size_t windowMoves = 0;       // in contact
-    std::size_t notConverged = 0;      // samples that were to be solved to convergence and are not
-    double p50 = 0, p99 = 0, max = 0;  // time of a tick in contact [s]
-    double peakForce = 0;              // magnitude [N]
+    std::size_t inContact = 0;     // of them
+    std::size_t windowMoves = 0;   // in contact
+    std::size_t notConverged = 0;  // samples that were to be solved to convergence and are not
+    TickTimes times;               // of ticks in contact
+    double peakForce = 0;          // magnitude [N]
     ToolPose peakAt;
     std::optional<double> heldFrom;  // when the tool is first held back [s]
 };
