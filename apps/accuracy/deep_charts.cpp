@@ -3,6 +3,7 @@
 #include <apps/chart/chart.h>
 #include <apps/command.h>
 #include <apps/outputs.h>
+#include <experiments/kernel_trial.h>
 
 #include <fmt/format.h>
 
@@ -71,14 +72,11 @@ Chart chartOf(const json& figures, const std::string& what, const Panel& panel)
         middle.name = setting + ", median";
         worst.name = setting + ", worst place";
         middle.line = worst.line = true;
-        for (auto& [radii, errors] : errorsOf(figures, what, setting, panel)) {
-            std::vector<double> sorted = errors;
-            std::ranges::sort(sorted);
-            const std::size_t n = sorted.size();
+        for (const auto& [radii, errors] : errorsOf(figures, what, setting, panel)) {
             middle.x.push_back(radii);
-            middle.y.push_back(0.5 * (sorted[(n - 1) / 2] + sorted[n / 2]));
+            middle.y.push_back(experiments::median(errors));
             worst.x.push_back(radii);
-            worst.y.push_back(sorted.back());
+            worst.y.push_back(std::ranges::max(errors));
         }
         if (!middle.x.empty()) {
             chart.series.push_back(std::move(middle));
