@@ -17,11 +17,13 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::apps {
 
 using datasets::ToolKind;
+using datasets::toolKinds;
 using datasets::ToolSpec;
 using experiments::FilePoint;
 using experiments::PosePath;
@@ -31,10 +33,9 @@ using nlohmann::json;
 
 namespace {
 
-const std::vector<std::string> toolKinds{"sphere", "needle", "capsule"};  // in the order of ToolKind
-constexpr double leastRadius = 0.1, mostRadius = 100.0;                   // [mm]
-constexpr double mostLength = 500.0;                                      // [mm]
-constexpr std::size_t progressEvery = 200;                                // ticks
+constexpr double leastRadius = 0.1, mostRadius = 100.0;  // [mm]
+constexpr double mostLength = 500.0;                     // [mm]
+constexpr std::size_t progressEvery = 200;               // ticks
 
 struct Options {
     std::string scene, path, at, csv, json;
@@ -64,7 +65,7 @@ double inRange(const std::string& option, double value, double least, double mos
     return 1e-3 * value;
 }
 
-std::string kindName(ToolKind kind)
+std::string_view kindName(ToolKind kind)
 {
     return toolKinds[static_cast<std::size_t>(kind)];
 }

@@ -18,6 +18,8 @@ namespace palpate::datasets {
 /// `sphere`: its centre is the device's position. `capsule`: a rod with hemispherical ends, like a finger; the middle of
 /// its front end is the device's position, that of the other end lies `length` behind, along the device's axis.
 enum class ToolKind : std::uint8_t { sphere, needle, capsule };
+/// Their names in scenes, records and on the command line, in the order of the enum.
+inline constexpr std::array<std::string_view, 3> toolKinds{"sphere", "needle", "capsule"};
 
 struct ToolSpec {
     ToolKind kind = ToolKind::needle;

@@ -16,7 +16,6 @@ constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr std::size_t mostSteps = 1000;  // of a script
 
-constexpr std::array<std::string_view, 3> toolKinds{"sphere", "needle", "capsule"};
 constexpr std::array<std::string_view, 2> taskNames{"biopsy", "find"};
 constexpr std::size_t mostInserts = 32;
 constexpr std::array<std::string_view, 3> dffbModes{"off", "thesis", "field"};
