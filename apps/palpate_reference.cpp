@@ -13,7 +13,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
-#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -144,18 +143,14 @@ json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& t
     return regions;
 }
 
-// The last state as a problem that CalculiX can solve: what touches the sphere goes where it is, the rest follows.
+// The last state as a problem that CalculiX can solve: what touches the tool goes where it is, the rest follows.
 void exportLast(const std::string& file, const reference::PressProblem& problem, const reference::BodyMesh& body,
                 const reference::Solver& solver, experiments::TrialPose pose)
 {
     constexpr double touching = 2e-5;  // [m]
-    const Vec3 centre = problem.path.at(pose);
+    const reference::RigidTool tool = toolAt(problem, pose);
     const auto at = [&](Vec3 rest) { return solver.displacement(std::span(&rest, 1)).front(); };
-    const auto touches = [&](Vec3 rest) {
-        const Vec3 away = rest + at(rest) - centre;
-        const double back = std::clamp(-glm::dot(away, problem.path.inward), 0.0, problem.path.tool.length);
-        return glm::length(away + back * problem.path.inward) - problem.path.tool.radius < touching;
-    };
+    const auto touches = [&](Vec3 rest) { return tool.distance(rest + at(rest)) < touching; };
     exportCcx(body.mesh, materialsOf(problem, body), problem.solve, {touches, at}, file);
 }
 

@@ -137,6 +137,12 @@ MeshOptions meshOptions(const PressProblem& problem, double size)
     return options;
 }
 
+RigidTool toolAt(const PressProblem& problem, TrialPose pose)
+{
+    const auto& tool = problem.path.tool;
+    return {problem.path.at(pose), tool.radius, -tool.length * problem.path.inward};
+}
+
 experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink)
 {
     experiments::Reference out;
@@ -145,18 +151,14 @@ experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& bo
     const std::vector<Vec3> points(out.position.begin(), out.position.end());
     const auto materials = materialsOf(problem, body);
     Solver solver(body.mesh, materials, problem.solve);
-    const auto& tool = problem.path.tool;
-    const auto press = [&](TrialPose pose) {
-        solver.press({problem.path.at(pose), tool.radius, -tool.length * problem.path.inward});
-    };
-    press({});
+    solver.press(toolAt(problem, {}));
     out.nodes = solver.unknowns() / 3;
     out.residual = problem.solve.tolerance;
     const auto poses = looksOf(problem);
     for (std::size_t look = 0; look < poses.size(); ++look) {
         experiments::TrialLoad load(problem.path);
         load.set(poses[look]);
-        press(poses[look]);
+        solver.press(toolAt(problem, poses[look]));
         out.states.push_back(ofAll(stateOf(solver, load, points, cells), problem.solve));
         const ReferenceState& state = out.states.back();
         out.peakForce = std::max(out.peakForce, glm::length(state.force));

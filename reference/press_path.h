@@ -30,6 +30,9 @@ MeshOptions meshOptions(const PressProblem& problem, double size);
 /// By row of the tissue table, then of the mixtures.
 std::vector<Material> materialsOf(const PressProblem& problem, const BodyMesh& body);
 
+/// The tool in a pose of the path.
+RigidTool toolAt(const PressProblem& problem, experiments::TrialPose pose);
+
 /// Called after every look: its number from 0, of how many, and the state.
 using LookSink =
     std::function<void(const Solver&, std::size_t look, std::size_t looks, const experiments::ReferenceState&)>;

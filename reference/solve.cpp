@@ -328,6 +328,11 @@ double takeSteps(double& length, int most, Step&& step, Easy&& easy)
 
 }  // namespace
 
+double RigidTool::distance(Vec3 p) const noexcept
+{
+    return Obstacle{centre, radius, shaft}.distance(p);  // in whatever unit its lengths are
+}
+
 void Solver::press(const RigidTool& tool)
 {
     Impl& s = *impl_;

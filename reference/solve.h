@@ -25,6 +25,9 @@ struct RigidTool {
     Vec3 centre{0.0};   // of the sphere, or of the capsule's front end [m]
     double radius = 0;  // [m]
     Vec3 shaft{0.0};    // of a capsule, from there to the middle of its other end [m]
+
+    /// To its surface, negative inside [m].
+    double distance(Vec3 p) const noexcept;
 };
 
 /// Displacements that are prescribed where `at` gives one, on free faces only: returns false where nothing is.
