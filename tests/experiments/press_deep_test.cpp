@@ -3,6 +3,8 @@
 
 #include <datasets/tables.h>
 
+#include <tests/experiments/pressed.h>
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
@@ -19,7 +21,6 @@ namespace palpate::experiments {
 namespace {
 
 using datasets::ToolKind;
-using datasets::ToolSpec;
 using Label = std::uint16_t;
 
 constexpr Label air = 0, fat = 1, muscle = 2, bone = 3;
@@ -78,15 +79,6 @@ Label shelf(Vec3 q)
     return std::abs(q.x) > 26e-3 ? bone : fat;
 }
 
-ToolSpec toolOf(ToolKind kind, double radius, double length)
-{
-    ToolSpec tool;
-    tool.kind = kind;
-    tool.radius = radius;
-    tool.length = length;
-    return tool;
-}
-
 const PressOptions ball{toolOf(ToolKind::sphere, 10e-3, 0.0)};
 const PressOptions rod{toolOf(ToolKind::capsule, 6e-3, 20e-3)};
 
@@ -102,18 +94,6 @@ PosePath inAndOut(Vec3 at, Vec3 axis, double radius, double depth, const Mat3& t
         path.poses.push_back({turn * p, turn * axis, t});
     }
     return path;
-}
-
-struct Pressed {
-    std::vector<PressSample> samples;
-    PressSummary summary;
-};
-
-Pressed pressed(const haptics::SessionModel& model, const PosePath& path, const PressOptions& options)
-{
-    Pressed out;
-    out.summary = press(model, path, {}, options, [&](const PressSample& s) { out.samples.push_back(s); });
-    return out;
 }
 
 // The largest force along +y, into the body.

@@ -4,6 +4,7 @@
 #include <experiments/trial_path.h>
 #include <haptics/simulation.h>
 
+#include <tests/experiments/pressed.h>
 #include <tests/experiments/small_block.h>
 #include <tests/folder.h>
 
@@ -47,27 +48,11 @@ std::string refusal(const std::string& text)
     return "none";
 }
 
-ToolSpec toolOf(ToolKind kind, double radius, double length)
-{
-    ToolSpec tool;
-    tool.kind = kind;
-    tool.radius = radius;
-    tool.length = length;
-    return tool;
-}
-
 const ToolSpec ball = toolOf(ToolKind::sphere, 5e-3, 0.0);
-
-struct Pressed {
-    std::vector<PressSample> samples;
-    PressSummary summary;
-};
 
 Pressed pressed(const PosePath& path, const PressOptions& options, std::span<const FilePoint> asked = {})
 {
-    Pressed out;
-    out.summary = press(block(), path, asked, options, [&](const PressSample& s) { out.samples.push_back(s); });
-    return out;
+    return pressed(block(), path, options, asked);
 }
 
 // A ball of 5 mm goes 3 mm into the block's face y = 0 in 20 mm/s, from just above.
