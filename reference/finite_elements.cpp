@@ -394,19 +394,6 @@ void FiniteElements::stiffenContact(const std::vector<double>& state)
     }
 }
 
-double FiniteElements::contactEnergy(const std::vector<double>& state) const
-{
-    if (impl_->touching.size() == 0) {
-        return 0.0;
-    }
-    const Impl::Fields fields = impl_->split(state);
-    getfem::ga_workspace space;
-    impl_->addContact(space, fields);
-    space.add_expression(contactEnergyText, impl_->faceRule, impl_->touching, 0);
-    space.assembly(0);
-    return space.assembled_potential();
-}
-
 std::vector<double> FiniteElements::contactForces(const std::vector<double>& state) const
 {
     std::vector<double> forces(state.size());

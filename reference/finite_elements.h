@@ -54,7 +54,6 @@ public:
     /// Lets r grow with the area of the faces: it counts per area at rest, and under a deep tool that is many times as
     /// large.
     void stiffenContact(const std::vector<double>& state);
-    double contactEnergy(const std::vector<double>& state) const;  // [uJ]
     /// Derivative of the contact's energy [mN]; its sum over nodes is the force on the obstacle.
     std::vector<double> contactForces(const std::vector<double>& state) const;
     /// Moves the multipliers to the pressures that act now (Uzawa's method).
