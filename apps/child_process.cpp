@@ -1,17 +1,14 @@
 #include <apps/child_process.h>
 
-#include <signal.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
+#include <base/process.h>
 
-#include <cerrno>
+#include <signal.h>
+#include <sys/wait.h>
+
 #include <chrono>
 #include <cstring>
 #include <stdexcept>
 #include <thread>
-
-extern char** environ;
 
 namespace palpate::apps {
 
@@ -22,22 +19,14 @@ std::filesystem::path programFolder()
 
 ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy)
 {
-    std::vector<char*> argv{const_cast<char*>(program.c_str())};
-    for (const auto& a : arguments) {
-        argv.push_back(const_cast<char*>(a.c_str()));
-    }
-    argv.push_back(nullptr);
-
     // A group of its own: Ctrl-C ends this program, and the other then ends with it.
-    posix_spawnattr_t attributes;
-    posix_spawnattr_init(&attributes);
-    posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    const int error = posix_spawnp(&pid_, program.c_str(), nullptr, &attributes, argv.data(), environ);
-    posix_spawnattr_destroy(&attributes);
+    base::Program started{{program}, {-1, -1, -1}, true};
+    started.words.insert(started.words.end(), arguments.begin(), arguments.end());
+    const auto [pid, error] = base::start(started);
     if (error != 0) {
-        pid_ = -1;
         throw std::runtime_error(program + ": cannot be started (" + std::strerror(error) + "); " + remedy);
     }
+    pid_ = pid;
 }
 
 ChildProcess::~ChildProcess()

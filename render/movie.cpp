@@ -1,11 +1,12 @@
 #include <render/movie.h>
 
+#include <base/process.h>
+
 #include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkWindowToImageFilter.h>
 
 #include <fcntl.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <csignal>
@@ -17,34 +18,8 @@
 #include <string>
 #include <system_error>
 #include <utility>
-#include <vector>
-
-extern char** environ;
 
 namespace palpate::render {
-namespace {
-
-// `input` becomes ffmpeg's standard input. A group of its own: Ctrl-C ends this program, which then finishes the film.
-// Returns what posix_spawnp() returns.
-int startFfmpeg(std::vector<std::string> words, int input, pid_t& id)
-{
-    std::vector<char*> argv;
-    for (std::string& word : words)
-        argv.push_back(word.data());
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t files;
-    ::posix_spawn_file_actions_init(&files);
-    ::posix_spawn_file_actions_adddup2(&files, input, STDIN_FILENO);
-    posix_spawnattr_t attributes;
-    ::posix_spawnattr_init(&attributes);
-    ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
-    const int error = ::posix_spawnp(&id, argv[0], &files, &attributes, argv.data(), environ);
-    ::posix_spawnattr_destroy(&attributes);
-    ::posix_spawn_file_actions_destroy(&files);
-    return error;
-}
-
-}  // namespace
 
 MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     : file_(std::move(file)), partial_(file_.string() + ".part"), window_(window)
@@ -57,18 +32,20 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     const int* size = window.GetSize();
     const std::string extent = std::to_string(size[0]) + "x" + std::to_string(size[1]);
     // OpenGL counts rows from below; the codec wants even sides.
-    const int error = startFfmpeg({"ffmpeg",   "-loglevel", "error",    "-y",
-                                   "-f",       "rawvideo",  "-pix_fmt", "rgb24",
-                                   "-s",       extent,      "-r",       std::to_string(static_cast<int>(rate)),
-                                   "-i",       "-",         "-vf",      "vflip,pad=ceil(iw/2)*2:ceil(ih/2)*2",
-                                   "-c:v",     "libx264",   "-preset",  "veryfast",
-                                   "-pix_fmt", "yuv420p",   "-f",       "mp4",
-                                   partial_},
-                                  ends[0], ffmpeg_);
+    base::Program ffmpeg{{"ffmpeg",   "-loglevel", "error",    "-y",
+                          "-f",       "rawvideo",  "-pix_fmt", "rgb24",
+                          "-s",       extent,      "-r",       std::to_string(static_cast<int>(rate)),
+                          "-i",       "-",         "-vf",      "vflip,pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                          "-c:v",     "libx264",   "-preset",  "veryfast",
+                          "-pix_fmt", "yuv420p",   "-f",       "mp4",
+                          partial_}};
+    ffmpeg.streams[0] = ends[0];
+    ffmpeg.ownGroup = true;  // Ctrl-C ends this program, which then finishes the film
+    const auto [pid, error] = base::start(ffmpeg);
+    ffmpeg_ = pid;
     ::close(ends[0]);
     pipe_ = ends[1];
     if (error != 0) {
-        ffmpeg_ = -1;
         closeAndWait();
         throw std::runtime_error(file_.string() + ": needs the program ffmpeg (" + std::strerror(error) +
                                  "): install the package ffmpeg, or write pictures with --offscreen DIR");

@@ -9,17 +9,18 @@ import sys
 
 # A folder may include itself and these.
 ARROWS = {
+    "base": set(),
     "volume": set(),
     "occupancy": {"volume"},
     "chainmail": {"volume", "occupancy"},
     "datasets": {"volume"},
-    "render/channel": set(),
-    "render": {"render/channel"},
+    "render/channel": {"base"},
+    "render": {"base", "render/channel"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "render/channel"},
     "haptics/falcon": {"volume", "datasets", "haptics"},
     "experiments": {"volume", "occupancy", "chainmail", "datasets", "haptics"},
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "experiments"},
-    "apps": {"volume", "datasets", "haptics", "haptics/falcon", "render", "render/channel", "experiments", "reference"},
+    "apps": {"base", "volume", "datasets", "haptics", "haptics/falcon", "render", "render/channel", "experiments", "reference"},
 }
 # Third-party headers that stay in one folder.
 OWNERS = {

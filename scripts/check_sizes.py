@@ -10,7 +10,7 @@ import pathlib
 import re
 import sys
 
-FOLDERS = ("volume", "datasets", "occupancy", "chainmail", "render", "haptics", "experiments", "apps", "tests")
+FOLDERS = ("base", "volume", "datasets", "occupancy", "chainmail", "render", "haptics", "experiments", "apps", "tests")
 MOST_FILE_LINES = 520
 MOST_FUNCTION_LINES = 80
 DEEPEST = 3

@@ -1,23 +1,19 @@
 #include <apps/accuracy/references.h>
 
 #include <apps/child_process.h>
+#include <base/process.h>
 
 #include <fmt/format.h>
 
-#include <spawn.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <optional>
 #include <set>
 #include <sstream>
 #include <stdexcept>
-
-extern char** environ;
 
 namespace palpate::apps {
 
@@ -155,26 +151,13 @@ fs::path referenceProgram()
 
 int runReferenceProgram(const std::vector<std::string>& arguments)
 {
-    std::vector<std::string> words{referenceProgram().string()};
-    words.insert(words.end(), arguments.begin(), arguments.end());
-    std::vector<char*> argv;
-    for (std::string& word : words) {
-        argv.push_back(word.data());
-    }
-    argv.push_back(nullptr);
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-    pid_t pid = -1;
-    const int error = posix_spawn(&pid, argv[0], &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
+    base::Program program{{referenceProgram().string()}, {-1, STDERR_FILENO, -1}};
+    program.words.insert(program.words.end(), arguments.begin(), arguments.end());
+    const auto [pid, error] = base::start(program);
     if (error != 0) {
-        throw std::runtime_error(fmt::format("{}: cannot be started ({})", words[0], std::strerror(error)));
+        throw std::runtime_error(fmt::format("{}: cannot be started ({})", program.words[0], std::strerror(error)));
     }
-    int status = 0;
-    while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-    }
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return base::exitStatus(pid);
 }
 
 }  // namespace palpate::apps

@@ -1,13 +1,10 @@
 #include <apps/chart/axis.h>
 #include <apps/chart/chart.h>
 #include <apps/outputs.h>
+#include <base/process.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -19,8 +16,6 @@
 #include <stdexcept>
 #include <string_view>
 #include <utility>
-
-extern char** environ;
 
 namespace palpate::apps {
 
@@ -237,25 +232,14 @@ std::string contents(std::FILE* in)
 int runGnuplot(const std::array<std::FILE*, 3>& streams, const std::filesystem::path& file)
 {
     // The settings of whoever runs this must not change the picture.
-    std::array<char[24], 2> words{"gnuplot", "--default-settings"};
-    std::array<char*, 3> argv{words[0], words[1], nullptr};
-    posix_spawn_file_actions_t actions;
-    posix_spawn_file_actions_init(&actions);
-    for (int i = 0; i < 3; ++i) {
-        posix_spawn_file_actions_adddup2(&actions, fileno(streams[static_cast<std::size_t>(i)]), i);
-    }
-    pid_t pid = -1;
-    const int error = posix_spawnp(&pid, argv[0], &actions, nullptr, argv.data(), environ);
-    posix_spawn_file_actions_destroy(&actions);
+    const auto [pid, error] =
+        base::start({{"gnuplot", "--default-settings"}, {fileno(streams[0]), fileno(streams[1]), fileno(streams[2])}});
     if (error != 0) {
         throw std::runtime_error(
             fmt::format("{}: gnuplot, which draws it, cannot be started ({}): apt-get install gnuplot-nox", file.string(),
                         std::strerror(error)));
     }
-    int status = 0;
-    while (waitpid(pid, &status, 0) < 0 && errno == EINTR) {
-    }
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    return base::exitStatus(pid);
 }
 
 // gnuplot's first line that says something; it shows the command before, and a caret under it.

@@ -1,5 +1,7 @@
 #include <apps/sweep/lock.h>
 
+#include <base/process.h>
+
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -14,7 +16,6 @@
 #include <ctime>
 #include <fstream>
 #include <random>
-#include <sstream>
 #include <stdexcept>
 #include <system_error>
 
@@ -40,20 +41,8 @@ std::string textOf(const fs::path& file)
 // Since the machine started [clock ticks]; empty: there is no such process.
 std::string startOf(long pid)
 {
-    const std::string stat = textOf(fmt::format("/proc/{}/stat", pid));
-    const auto name = stat.rfind(')');
-    if (name == std::string::npos) {
-        return "";
-    }
-    std::istringstream fields(stat.substr(name + 1));
-    std::string field;
-    for (int i = 3; i <= 22; ++i) {
-        fields >> field;
-        if (i == 3 && (field == "Z" || field == "X")) {
-            return "";  // dead, and not yet taken in by its parent
-        }
-    }
-    return field;
+    const std::uint64_t start = base::processStart(static_cast<std::uint64_t>(pid));
+    return start == 0 ? "" : std::to_string(start);
 }
 
 // Where process numbers mean something: this boot of this machine, and in it this container.

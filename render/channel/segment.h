@@ -1,5 +1,6 @@
 #pragma once
 
+#include <base/process.h>
 #include <render/channel/layout.h>
 
 #include <array>
@@ -146,8 +147,7 @@ std::string segmentName(const std::string& session);
 /// Where the system keeps the segments (Linux).
 inline constexpr const char* segmentFolder = "/dev/shm";
 
-/// Start time of process `pid` [clock ticks since boot]; 0 when it is not there or dead and only not yet reaped.
-std::uint64_t processStart(std::uint64_t pid) noexcept;
+using base::processStart;
 
 /// Process `pid` as one word that no other process has, dead or alive (pids have 22 bits at most).
 inline std::uint64_t handOf(std::uint64_t pid) noexcept

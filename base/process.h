@@ -1,0 +1,33 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace palpate::base {
+
+/// Start time of process `pid` [clock ticks since boot]: a recycled number has another. 0 when it is not there or dead and
+/// only not yet reaped.
+std::uint64_t processStart(std::uint64_t pid) noexcept;
+
+/// A program to be started.
+struct Program {
+    std::vector<std::string> words;          // a path, or a name to be looked for in PATH; then its arguments
+    std::array<int, 3> streams{-1, -1, -1};  // that become its standard input, output and error; -1: this program's
+    bool ownGroup = false;                   // Ctrl-C in the terminal does not reach it
+};
+
+struct StartedProgram {
+    pid_t pid = -1;
+    int error = 0;  // errno when it could not be started; else 0
+};
+/// @pre  at least one word
+StartedProgram start(const Program& program);
+
+/// Waits for the end of a child. Returns its exit status; -1 when it was killed.
+int exitStatus(pid_t child) noexcept;
+
+}  // namespace palpate::base
