@@ -14,10 +14,10 @@ namespace palpate::experiments {
 
 namespace {
 
-// Lengths of bodies and paths are in mm here, speeds in mm/s; toMetres() ends that.
-constexpr double ball = 3;            // radius of the tool
-constexpr double thickBall = 6;       // of the tool that presses deep, as a fingertip
-constexpr double thinBall = 0.5;      // of the tool that stabs
+// Bodies and paths are written in mm.
+constexpr double ball = 3;            // radius of the tool [mm]
+constexpr double thickBall = 6;       // of the tool that presses deep, as a fingertip [mm]
+constexpr double thinBall = 0.5;      // of the tool that stabs [mm]
 constexpr double leastEnergy = 1e-3;  // what a hand does not notice [J]
 constexpr Bounded noEnergy{Figure::energyMade, leastEnergy};
 constexpr Bounded noPull{Figure::pull, 0.0};
@@ -30,19 +30,30 @@ constexpr haptics::Grip firm{0.1, 5.0, 400.0};
 // Goes where it wants to, whatever resists.
 constexpr haptics::Grip rigid{0.1, 60.0, 2e4};
 
-HandPath toMetres(HandPath path)
+// A HandLeg in mm.
+struct MmLeg {
+    Vec3 to{0.0};      // [mm]
+    double speed = 0;  // [mm/s]
+    double wait = 0;   // [s]
+};
+
+// A HandPath in mm.
+struct MmPath {
+    Vec3 start{0.0};  // [mm]
+    std::vector<MmLeg> legs;
+};
+
+HandPath handPath(const MmPath& path)
 {
-    path.start *= 1e-3;
-    path.wait = sceneSettled;
-    for (HandLeg& leg : path.legs) {
-        leg.to *= 1e-3;
-        leg.speed *= 1e-3;
+    HandPath out{1e-3 * path.start, sceneSettled, {}};
+    for (const MmLeg& leg : path.legs) {
+        out.legs.push_back({1e-3 * leg.to, 1e-3 * leg.speed, leg.wait});
     }
-    return path;
+    return out;
 }
 
 StabilityScene scene(std::string name, std::string kind, std::string meaning, std::shared_ptr<const volume::Tissue> tissue,
-                     double radius, const HandPath& hand)
+                     double radiusMm, const MmPath& hand)
 {
     StabilityScene s;
     s.name = std::move(name);
@@ -51,12 +62,12 @@ StabilityScene scene(std::string name, std::string kind, std::string meaning, st
     s.tissue = std::move(tissue);
     s.session.name = s.name;
     s.session.tool.kind = datasets::ToolKind::sphere;
-    s.session.tool.radius = radius * 1e-3;
+    s.session.tool.radius = radiusMm * 1e-3;
     s.session.dffb.mode = datasets::DffbMode::off;
     s.session.target = "base";
     s.session.entry = Vec3(0.0);
     s.session.aim = Vec3(0, 10e-3, 0);
-    s.hand = toMetres(hand);
+    s.hand = handPath(hand);
     s.grip = firm;
     s.from = sceneSettled;
     s.to = s.letGo = s.hand.seconds();
@@ -88,7 +99,7 @@ void addPlates(std::vector<StabilityScene>& out)
     for (const int thickness : {1, 2, 3}) {
         auto s = scene(fmt::format("plate-{}mm", thickness), "plate",
                        fmt::format("a plate of skin, {} mm thick, pressed until the device can do no more", thickness),
-                       plate(thickness), ball, {{0, -4, 0}, 0, {{{0, 45, 0}, 80, 0.25}}});
+                       plate(thickness), ball, {{0, -4, 0}, {{{0, 45, 0}, 80, 0.25}}});
         s.farFace = thickness * 1e-3;
         s.held = s.released = {Figure::popThrough, 0.0};
         s.letGo = s.hand.end(0) - 0.1;
@@ -98,7 +109,7 @@ void addPlates(std::vector<StabilityScene>& out)
     for (const int speed : {1000, 2000, 4000}) {
         auto s = scene(fmt::format("stab-{}mm_s", speed), "stab",
                        fmt::format("a plate of skin, 1 mm thick, stabbed at {} mm/s with a ball of 0.5 mm radius", speed),
-                       plate(1), thinBall, {{0, -60, 0}, 0, {{{0, 25, 0}, static_cast<double>(speed), 0.1}}});
+                       plate(1), thinBall, {{0, -60, 0}, {{{0, 25, 0}, static_cast<double>(speed), 0.1}}});
         s.grip = rigid;
         s.farFace = 1e-3;
         s.held = s.released = {Figure::popThrough, 0.0};
@@ -132,7 +143,7 @@ StabilityScene cornerScene(int degrees, bool outer)
     const Vec3 start = outer ? left - 8.0 * Vec3(std::cos(half), std::sin(half), 0) : Vec3(0, -20, 0);
     auto s = scene(fmt::format("{}-{}deg", outer ? "outer" : "inner", degrees), outer ? "outer" : "inner",
                    fmt::format("dragged across {} of {} degrees", outer ? "a ridge" : "a groove", degrees),
-                   corner(degrees, outer), ball, {start, 0, {{left, 40, 0.05}, {middle, 40, 0}, {right, 40, 0.1}}});
+                   corner(degrees, outer), ball, {start, {{left, 40, 0.05}, {middle, 40, 0}, {right, 40, 0.1}}});
     s.held = {Figure::forceStep, stepBound};
     s.letGo = s.hand.end(1);
     s.released = {Figure::forceStep, stepBound};
@@ -166,7 +177,7 @@ void addSlides(std::vector<StabilityScene>& out)
             const Vec3 from = -0.5 * slid * along + (4.5 - ball) * inward;
             auto s = scene(fmt::format("slide-{}deg-{}mm_s", degrees, speed), "slide",
                            fmt::format("slid at {} mm/s over a staircase of voxels of {} degrees", speed, degrees), tissue,
-                           ball, {from - 8.0 * inward, 0, {{from, 40, 0.1}, {from + slid * along, double(speed), 0}}});
+                           ball, {from - 8.0 * inward, {{from, 40, 0.1}, {from + slid * along, double(speed), 0}}});
             s.hand.ease = 0.1;
             // While the goal goes at its speed, but for the first third: until then the hand comes to rest beside it.
             const double begins = s.hand.end(0) + s.hand.ease, ends = s.hand.end(1) - s.hand.ease;
@@ -186,7 +197,7 @@ void addTissueSteps(std::vector<StabilityScene>& out)
         const bool inside = p.y > 0 && p.y < 21 && std::abs(p.x) < 16 && std::abs(p.z) < 12;
         return !inside ? BodyLabel{} : p.y > 17 ? bodyBase : p.x < 0 ? bodyFat : bodyTumour;
     });
-    const HandPath path{{-9, -8, 0}, 0, {{{-9, 3, 0}, 40, 0.05}, {{9, 3, 0}, 40, 0.4}}};
+    const MmPath path{{-9, -8, 0}, {{{-9, 3, 0}, 40, 0.05}, {{9, 3, 0}, 40, 0.4}}};
     auto step = scene("tumour-step", "tumour", "slid from fat onto a tumour that is 13 times as stiff", tissue, ball, path);
     step.held = step.released = {Figure::forceStep, stepBound};
     step.letGo = step.hand.end(1) - 0.3;
@@ -213,7 +224,7 @@ void addPunctures(std::vector<StabilityScene>& out)
         return !inside ? BodyLabel{} : p.y < 2 ? bodySkin : p.y < 14 ? bodyFat : p.y < 38 ? bodyGland : bodyBase;
     });
     auto kick = scene("puncture-kick", "puncture", "a needle through skin, fat and gland", tissue, 1.05,
-                      {{0, -5, 0}, 0, {{{0, 32, 0}, 40, 0.1}}});
+                      {{0, -5, 0}, {{{0, 32, 0}, 40, 0.1}}});
     kick.session.tool = datasets::ToolSpec{};
     kick.pierced = true;
     kick.held = {Figure::kick, 100.0};
@@ -238,7 +249,7 @@ void addPunctures(std::vector<StabilityScene>& out)
 void addLate(std::vector<StabilityScene>& out)
 {
     const auto tissue = flatBody(bodySkin, 18);
-    HandPath path{{0, -7, 0}, 0, {}};
+    MmPath path{{0, -7, 0}, {}};
     for (int i = 0; i < 4; ++i) {
         path.legs.push_back({{0, 3, 0}, 80, 0});
         path.legs.push_back({{0, -2, 0}, 80, 0});
@@ -261,7 +272,7 @@ void addLate(std::vector<StabilityScene>& out)
 void addRest(std::vector<StabilityScene>& out)
 {
     auto wall =
-        scene("wall-rest", "wall", "resting on bone", flatBody(bodyBase, 6), ball, {{0, -7, 0}, 0, {{{0, 2, 0}, 20, 1.0}}});
+        scene("wall-rest", "wall", "resting on bone", flatBody(bodyBase, 6), ball, {{0, -7, 0}, {{{0, 2, 0}, 20, 1.0}}});
     wall.held = {Figure::restCycle, 1.0};
     wall.from = wall.to - 0.3;
     wall.letGo = wall.to - 0.3;
@@ -270,21 +281,21 @@ void addRest(std::vector<StabilityScene>& out)
 
     const auto skin = flatBody(bodySkin, 18);
     auto letGo = scene("let-go", "let-go", "pressed as hard as the device can, and let go", skin, ball,
-                       {{0, -6, 0}, 0, {{{0, 34, 0}, 80, 0.5}}});
+                       {{0, -6, 0}, {{{0, 34, 0}, 80, 0.5}}});
     letGo.onlyReleased = letGo.quick = true;
     letGo.letGo = letGo.to - 0.35;
     out.push_back(std::move(letGo));
 
-    auto detour = scene(
-        "detour", "detour", "pressed, dragged aside, lifted, come back over the first place", flatBody(bodyFat, 18), ball,
-        {{-4, -6, 0}, 0, {{{-4, 3, 0}, 40, 0}, {{4, 3, 2}, 40, 0}, {{4, -6, 2}, 80, 0}, {{-4, -6, 0}, 80, 0.3}}});
+    auto detour =
+        scene("detour", "detour", "pressed, dragged aside, lifted, come back over the first place", flatBody(bodyFat, 18),
+              ball, {{-4, -6, 0}, {{{-4, 3, 0}, 40, 0}, {{4, 3, 2}, 40, 0}, {{4, -6, 2}, 80, 0}, {{-4, -6, 0}, 80, 0.3}}});
     detour.held = {Figure::residue, 0.1};
     detour.letGo = detour.hand.end(1);
     detour.quick = true;
     out.push_back(std::move(detour));
 
     auto anchored = scene("anchored", "anchored", "5 mm of fat on bone, pressed far beyond the bone", flatBody(bodyFat, 5),
-                          ball, {{0, -6, 0}, 0, {{{0, 20, 0}, 60, 0}, {{8, 20, 8}, 60, 0.1}}});
+                          ball, {{0, -6, 0}, {{{0, 20, 0}, 60, 0}, {{8, 20, 8}, 60, 0.1}}});
     anchored.held = anchored.released = {Figure::peakForce, 100.0};
     anchored.letGo = anchored.hand.end(0);
     anchored.quick = true;
@@ -317,15 +328,14 @@ void addDeep(std::vector<StabilityScene>& out, const std::shared_ptr<const volum
     constexpr double deepest = 2 * thickBall;  // of the ball's middle: three radii of its front
     const Vec3 above(0, -thickBall - 2, 0), deep(0, deepest, 0);
     auto press = scene("deep-press", "deep", "fat pressed to three radii of a ball of 6 mm, and held", block, thickBall,
-                       {above, 0, {{deep, 60, 0.3}}});
+                       {above, {{deep, 60, 0.3}}});
     press.held = press.released = {Figure::forceStep, stepBound};
     press.letGo = press.hand.end(0) - 0.2;
     press.quick = true;
     out.push_back(std::move(press));
 
-    auto retreat =
-        scene("deep-retreat", "deep", "fat pressed to three radii, drawn back, pressed again and drawn back", block,
-              thickBall, {above, 0, {{deep, 60, 0.2}, {above, 60, 0.1}, {deep, 60, 0.1}, {above, 60, 0.1}}});
+    auto retreat = scene("deep-retreat", "deep", "fat pressed to three radii, drawn back, pressed again and drawn back",
+                         block, thickBall, {above, {{deep, 60, 0.2}, {above, 60, 0.1}, {deep, 60, 0.1}, {above, 60, 0.1}}});
     retreat.held = retreat.released = noPull;
     retreat.letGo = retreat.hand.end(2) - 0.1;
     retreat.quick = true;
@@ -335,7 +345,7 @@ void addDeep(std::vector<StabilityScene>& out, const std::shared_ptr<const volum
     // The hand's spring gives way by some of the last millimetre.
     const Vec3 aside(7.5, 0, 0), middle(0, 0.5 * thickBall + 1, 0);
     auto drag = scene("deep-drag", "deep", "dragged through fat for 15 mm, one and a half radii deep", block, thickBall,
-                      {above - aside, 0, {{middle - aside, 60, 0.1}, {middle + aside, 20, 0.2}, {above + aside, 60, 0.1}}});
+                      {above - aside, {{middle - aside, 60, 0.1}, {middle + aside, 20, 0.2}, {above + aside, 60, 0.1}}});
     drag.held = drag.released = {Figure::forceStep, stepBound};
     drag.letGo = drag.hand.end(0) + 0.4;
     drag.quick = true;
@@ -349,7 +359,7 @@ void addCapsule(std::vector<StabilityScene>& out, const std::shared_ptr<const vo
     constexpr double long30 = 30 - 2 * thickBall;  // between the middles of its ends
     const Vec3 above(0, -thickBall - 2, 0), deep(0, 10 - thickBall, 0);
     auto retreat = scene("capsule-retreat", "capsule", "a finger of 6 mm radius pressed 9 mm into fat, and drawn back",
-                         block, thickBall, {above, 0, {{deep, 60, 0.3}, {above, 60, 0.1}}});
+                         block, thickBall, {above, {{deep, 60, 0.3}, {above, 60, 0.1}}});
     retreat.session.tool.kind = datasets::ToolKind::capsule;
     retreat.session.tool.length = long30 * 1e-3;
     retreat.axis = {0, std::sin(angle), std::cos(angle)};
@@ -374,7 +384,7 @@ void addThin(std::vector<StabilityScene>& out)
     });
     const Vec3 above(0, -thickBall - 2, 0), deep(0, 9, 0);
     auto pinch = scene("thin-pinch", "thin", "6 mm of fat, free on both sides, pressed onto bone, and drawn back", body,
-                       thickBall, {above, 0, {{deep, 60, 0.3}, {above, 60, 0.1}}});
+                       thickBall, {above, {{deep, 60, 0.3}, {above, 60, 0.1}}});
     pinch.farFace = thickness * 1e-3;
     pinch.held = pinch.released = {Figure::popThrough, 0.0};
     pinch.letGo = pinch.hand.end(0) - 0.1;
