@@ -10,8 +10,10 @@ nlohmann::json scoreFigures(const haptics::Score& score)
     for (const Measure& m : measures()) {
         out[m.key] = m.value(score);
     }
-    const haptics::ScoreParts p = haptics::parts(score);
-    out["points"] = {{"core", p.core}, {"vital", p.vital}, {"technique", p.technique}};
+    const haptics::ScoreParts points = haptics::parts(score);
+    for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
+        out["points"][part.key] = points.*part.points;
+    }
     return out;
 }
 

@@ -1,35 +1,55 @@
 #include <haptics/measures.h>
 
+#include <fmt/format.h>
+
 #include <array>
+#include <cmath>
 
 namespace palpate::haptics {
 
 namespace {
 
+using Listed = Measure::Listed;
+
 constexpr std::array<Measure, 23> all{{
-    {"total", "total", 0, [](const Score& s) { return s.total; }},
-    {"passes", "passes", 0, [](const Score& s) { return static_cast<double>(s.passes); }},
-    {"targeting_error_mm", "target mm", 1, [](const Score& s) { return s.targetingError * 1e3; }},
-    {"best_target_pct", "core %", 0, [](const Score& s) { return s.bestTargetFraction * 100; }},
-    {"best_target_length_mm", "core mm", 1, [](const Score& s) { return s.bestTargetLength * 1e3; }},
-    {"vital_contacts", "vital", 0, [](const Score& s) { return static_cast<double>(s.vitalContacts); }},
-    {"vital_s", "vital s", 2, [](const Score& s) { return s.vitalSeconds; }},
-    {"vital_depth_mm", "vital mm", 1, [](const Score& s) { return s.vitalDepth * 1e3; }},
-    {"vital_margin_mm", "margin mm", 1, [](const Score& s) { return s.vitalMargin * 1e3; }},
-    {"warnings", "warnings", 0, [](const Score& s) { return static_cast<double>(s.warnings); }},
-    {"skin_contacts", "skin", 0, [](const Score& s) { return static_cast<double>(s.skinContacts); }},
-    {"redirects", "redirects", 0, [](const Score& s) { return static_cast<double>(s.redirects); }},
-    {"seconds", "time s", 1, [](const Score& s) { return s.seconds; }},
-    {"path_mm", "path mm", 0, [](const Score& s) { return s.pathLength * 1e3; }},
-    {"inserted_path_mm", "inside mm", 0, [](const Score& s) { return s.insertedPath * 1e3; }},
-    {"deepest_mm", "deepest mm", 1, [](const Score& s) { return s.deepest * 1e3; }},
-    {"jerk_m_s3", "jerk m/s3", 1, [](const Score& s) { return s.jerk; }},
-    {"tissue_work_mj", "work mJ", 0, [](const Score& s) { return s.tissueWork * 1e3; }},
-    {"peak_force_n", "peak N", 2, [](const Score& s) { return s.peakForce; }},
-    {"mean_force_n", "mean N", 2, [](const Score& s) { return s.meanForce; }},
-    {"marks", "marks", 0, [](const Score& s) { return static_cast<double>(s.marks); }},
-    {"mark_error_mm", "mark mm", 1, [](const Score& s) { return s.markError * 1e3; }},
-    {"mark_size_error_mm", "size mm", 1, [](const Score& s) { return s.markSizeError * 1e3; }},
+    {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
+    {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
+    {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
+     [](const Score& s) { return s.targetingError * 1e3; }},
+    {"best_target_pct", "core %", "Target in best core", "%", 0, Listed::ifFired,
+     [](const Score& s) { return s.bestTargetFraction * 100; }},
+    {"best_target_length_mm", "core mm", "Length in target", "mm", 1, Listed::ifFired,
+     [](const Score& s) { return s.bestTargetLength * 1e3; }},
+    {"vital_contacts", "vital", "Vital contacts", "", 0, Listed::always,
+     [](const Score& s) { return static_cast<double>(s.vitalContacts); }},
+    {"vital_s", "vital s", "Time in vital structures", "s", 2, Listed::always,
+     [](const Score& s) { return s.vitalSeconds; }},
+    {"vital_depth_mm", "vital mm", "Depth in vital structures", "mm", 1, Listed::always,
+     [](const Score& s) { return s.vitalDepth * 1e3; }},
+    {"vital_margin_mm", "margin mm", "Nearest to a vital structure", "mm", 1, Listed::always,
+     [](const Score& s) { return s.vitalMargin * 1e3; }},
+    {"warnings", "warnings", "Warnings", "", 0, Listed::always,
+     [](const Score& s) { return static_cast<double>(s.warnings); }},
+    {"skin_contacts", "skin", "Skin contacts", "", 0, Listed::always,
+     [](const Score& s) { return static_cast<double>(s.skinContacts); }},
+    {"redirects", "redirects", "Redirects", "", 0, Listed::always,
+     [](const Score& s) { return static_cast<double>(s.redirects); }},
+    {"seconds", "time s", "Time", "s", 1, Listed::always, [](const Score& s) { return s.seconds; }},
+    {"path_mm", "path mm", "Path of the tip", "mm", 0, Listed::always, [](const Score& s) { return s.pathLength * 1e3; }},
+    {"inserted_path_mm", "inside mm", "Path inside", "mm", 0, Listed::always,
+     [](const Score& s) { return s.insertedPath * 1e3; }},
+    {"deepest_mm", "deepest mm", "Deepest insertion", "mm", 1, Listed::always,
+     [](const Score& s) { return s.deepest * 1e3; }},
+    {"jerk_m_s3", "jerk m/s3", "Jerk (root mean square)", "m/s3", 1, Listed::always, [](const Score& s) { return s.jerk; }},
+    {"tissue_work_mj", "work mJ", "Work on the tissue", "mJ", 0, Listed::always,
+     [](const Score& s) { return s.tissueWork * 1e3; }},
+    {"peak_force_n", "peak N", "Peak force", "N", 2, Listed::always, [](const Score& s) { return s.peakForce; }},
+    {"mean_force_n", "mean N", "Mean force in contact", "N", 2, Listed::always, [](const Score& s) { return s.meanForce; }},
+    {"marks", "marks", "Marks", "", 0, Listed::never, [](const Score& s) { return static_cast<double>(s.marks); }},
+    {"mark_error_mm", "mark mm", "Marked beside the middle by", "mm", 1, Listed::ifMarked,
+     [](const Score& s) { return s.markError * 1e3; }},
+    {"mark_size_error_mm", "size mm", "Size marked wrong by", "mm", 1, Listed::ifMarked,
+     [](const Score& s) { return s.markSizeError * 1e3; }},
 }};
 
 }  // namespace
@@ -37,6 +57,40 @@ constexpr std::array<Measure, 23> all{{
 std::span<const Measure> measures() noexcept
 {
     return all;
+}
+
+LabelledValues describeTotal(const Score& score)
+{
+    LabelledValues lines{{"Total", fmt::format("{:.0f} of 100", score.total)}};
+    const ScoreParts points = parts(score);
+    for (const PartOfTotal& part : partsOfTotal) {
+        lines.emplace_back(part.label, fmt::format("{:.0f} of {:.0f}", points.*part.points, part.most));
+    }
+    return lines;
+}
+
+LabelledValues describeMeasures(const Score& score)
+{
+    LabelledValues lines;
+    for (const Measure& m : all) {
+        if (m.listed == Listed::never || (m.listed == Listed::ifMarked && score.marks == 0)) {
+            continue;
+        }
+        const double value = m.value(score);
+        const bool none = !std::isfinite(value) || (m.listed == Listed::ifFired && score.passes == 0);
+        const char* const space = *m.unit == 0 ? "" : " ";
+        lines.emplace_back(m.label, none ? "-" : fmt::format("{:.{}f}{}{}", value, m.decimals, space, m.unit));
+    }
+    return lines;
+}
+
+LabelledValues describe(const Score& score)
+{
+    LabelledValues lines = describeTotal(score);
+    for (auto& line : describeMeasures(score)) {
+        lines.push_back(std::move(line));
+    }
+    return lines;
 }
 
 }  // namespace palpate::haptics

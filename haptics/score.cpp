@@ -316,42 +316,4 @@ Score scoreOf(const Record& record)
     return scorer.score();
 }
 
-std::vector<std::pair<std::string, std::string>> describe(const Score& s)
-{
-    const ScoreParts p = parts(s);
-    const bool fired = s.passes > 0;
-    std::vector<std::pair<std::string, std::string>> lines{
-        {"Total", fmt::format("{:.0f} of 100", s.total)},
-        {"Core", fmt::format("{:.0f} of 50", p.core)},
-        {"Vital structures", fmt::format("{:.0f} of 25", p.vital)},
-        {"Technique", fmt::format("{:.0f} of 25", p.technique)},
-        {"Passes", fmt::format("{}", s.passes)},
-        {"Targeting error",
-         fired && std::isfinite(s.targetingError) ? fmt::format("{:.1f} mm", s.targetingError * 1e3) : "-"},
-        {"Target in best core", fired ? fmt::format("{:.0f} %", s.bestTargetFraction * 100) : "-"},
-        {"Length in target", fired ? fmt::format("{:.1f} mm", s.bestTargetLength * 1e3) : "-"},
-        {"Vital contacts", fmt::format("{}", s.vitalContacts)},
-        {"Time in vital structures", fmt::format("{:.2f} s", s.vitalSeconds)},
-        {"Depth in vital structures", fmt::format("{:.1f} mm", s.vitalDepth * 1e3)},
-        {"Nearest to a vital structure",
-         std::isfinite(s.vitalMargin) ? fmt::format("{:.1f} mm", s.vitalMargin * 1e3) : "-"},
-        {"Warnings", fmt::format("{}", s.warnings)},
-        {"Time", fmt::format("{:.1f} s", s.seconds)},
-        {"Skin contacts", fmt::format("{}", s.skinContacts)},
-        {"Redirects", fmt::format("{}", s.redirects)},
-        {"Path of the tip", fmt::format("{:.0f} mm", s.pathLength * 1e3)},
-        {"Path inside", fmt::format("{:.0f} mm", s.insertedPath * 1e3)},
-        {"Deepest insertion", fmt::format("{:.1f} mm", s.deepest * 1e3)},
-        {"Jerk (root mean square)", fmt::format("{:.1f} m/s3", s.jerk)},
-        {"Work on the tissue", fmt::format("{:.0f} mJ", s.tissueWork * 1e3)},
-        {"Peak force", fmt::format("{:.2f} N", s.peakForce)},
-        {"Mean force in contact", fmt::format("{:.2f} N", s.meanForce)},
-    };
-    if (s.marks > 0) {
-        lines.emplace_back("Marked beside the middle by", fmt::format("{:.1f} mm", s.markError * 1e3));
-        lines.emplace_back("Size marked wrong by", fmt::format("{:.1f} mm", s.markSizeError * 1e3));
-    }
-    return lines;
-}
-
 }  // namespace palpate::haptics

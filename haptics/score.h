@@ -129,7 +129,4 @@ private:
 /// Scores a whole record.
 Score scoreOf(const Record& record);
 
-/// Label and value pairs in the units of screens (mm, N, s, %), for reports and for printing.
-std::vector<std::pair<std::string, std::string>> describe(const Score& score);
-
 }  // namespace palpate::haptics

@@ -1,5 +1,7 @@
 #include <apps/report/html.h>
 
+#include <haptics/measures.h>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -176,18 +178,14 @@ std::string scoreCard(const haptics::Score& score)
 {
     const haptics::ScoreParts p = haptics::parts(score);
     std::string out = "<section class=\"card\"><h2>Score</h2><div class=\"parts\">";
-    const auto part = [&](std::string_view name, double points, double of) {
+    for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
         out += fmt::format(
             "<div><span>{} <b>{:.0f} of {:.0f}</b></span><div class=\"meter\"><i style=\"width:{:.1f}%\"></i></div></div>",
-            name, points, of, 100 * points / of);
-    };
-    part("Core", p.core, 50);
-    part("Vital structures", p.vital, 25);
-    part("Technique", p.technique, 25);
+            part.label, p.*part.points, part.most, 100 * p.*part.points / part.most);
+    }
     out += "</div><dl class=\"figures\">";
-    const auto rows = haptics::describe(score);
-    for (std::size_t i = 4; i < rows.size(); ++i) {  // the total and its three parts are shown above
-        out += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", escape(rows[i].first), escape(rows[i].second));
+    for (const auto& [label, value] : haptics::describeMeasures(score)) {
+        out += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", escape(label), escape(value));
     }
     return out + "</dl></section>";
 }

@@ -1,5 +1,7 @@
 #include <haptics/score.h>
 
+#include <haptics/measures.h>
+
 #include <tests/haptics/synthetic_session.h>
 
 #include <gtest/gtest.h>
