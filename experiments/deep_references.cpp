@@ -1,6 +1,6 @@
 #include <experiments/deep_references.h>
 
-#include <experiments/csv_cells.h>
+#include <experiments/split.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

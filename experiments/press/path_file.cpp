@@ -1,6 +1,6 @@
 #include <experiments/press/path_file.h>
 
-#include <experiments/csv_cells.h>
+#include <experiments/split.h>
 #include <haptics/tick.h>
 
 #include <fmt/format.h>

@@ -1,5 +1,7 @@
 #include <experiments/stability/matrix.h>
 
+#include <experiments/split.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
@@ -172,14 +174,8 @@ std::vector<Cell> matrixCells(const StabilityModels& models, const MatrixChoice&
 
 Cell cellOf(const StabilityModels& models, const std::string& id)
 {
-    std::vector<std::string> parts(1);
-    for (const char c : id) {
-        if (c == '/') {
-            parts.emplace_back();
-        } else {
-            parts.back() += c;
-        }
-    }
+    const auto found = splitAt('/', id);
+    const std::vector<std::string> parts(found.begin(), found.end());
     const bool grip = parts.size() == 5 && (parts[3] == "grip" || parts[3] == "released");
     const int rate = grip ? std::atoi(parts[4].c_str()) : 0;
     if (rate < 100 || rate > 20000) {

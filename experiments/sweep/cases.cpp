@@ -2,6 +2,7 @@
 
 #include <datasets/scene_text.h>
 #include <datasets/toml_fields.h>
+#include <experiments/split.h>
 #include <experiments/sweep/formula.h>
 #include <haptics/trainee.h>
 
@@ -31,21 +32,8 @@ constexpr std::array<datasets::Field<Procedure>, 6> procedureFields{{
     {"seconds", "s", 0.01, 3600, 1, &Procedure::seconds},
 }};
 
-std::vector<std::string> split(const std::string& key)
-{
-    std::vector<std::string> parts(1);
-    for (const char c : key) {
-        if (c == '.') {
-            parts.emplace_back();
-        } else {
-            parts.back() += c;
-        }
-    }
-    return parts;
-}
-
 // A number as TOML wants it: keys of whole numbers take no fraction.
-void insertValue(toml::table& table, const std::string& key, const KeyValue& value)
+void insertValue(toml::table& table, std::string_view key, const KeyValue& value)
 {
     std::visit(
         [&](const auto& v) {
@@ -61,7 +49,7 @@ void insertValue(toml::table& table, const std::string& key, const KeyValue& val
 }
 
 // The element of a list that a part of a key names: by its own name, or by its number.
-toml::table& elementOf(toml::array& list, const std::string& part, const std::string& key)
+toml::table& elementOf(toml::array& list, std::string_view part, const std::string& key)
 {
     std::vector<std::string> names;
     std::size_t number = list.size();
@@ -77,7 +65,7 @@ toml::table& elementOf(toml::array& list, const std::string& part, const std::st
     throw std::runtime_error(fmt::format("key '{}': there is no {}; there are: {}", key, part, fmt::join(names, ", ")));
 }
 
-void setCoordinate(toml::array& point, const std::string& part, const std::string& key, const KeyValue& value)
+void setCoordinate(toml::array& point, std::string_view part, const std::string& key, const KeyValue& value)
 {
     const std::size_t axis = part == "x" ? 0 : part == "y" ? 1 : part == "z" ? 2 : 3;
     const auto* const number = std::get_if<double>(&value);
@@ -98,7 +86,7 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value)
         }
     }
     toml::table* table = &root;
-    const auto parts = split(key);
+    const auto parts = splitAt('.', key);
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
         toml::node* const next = table->get(parts[i]);
         if (next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script")) {

@@ -16,14 +16,24 @@ inline std::string_view trimmed(std::string_view text)
     return first == std::string_view::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-/// What stands between the commas of a line, trimmed. They refer to the line's text.
+/// What stands between the characters `at`, of which there is one less. The parts refer to the text.
+inline std::vector<std::string_view> splitAt(char at, std::string_view text)
+{
+    std::vector<std::string_view> parts;
+    for (std::size_t end = 0; end != std::string_view::npos;) {
+        end = text.find(at);
+        parts.push_back(text.substr(0, end));
+        text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    }
+    return parts;
+}
+
+/// The cells of a line, trimmed. They refer to the line's text.
 inline std::vector<std::string_view> csvCells(std::string_view line)
 {
-    std::vector<std::string_view> cells;
-    for (std::size_t comma = 0; comma != std::string_view::npos;) {
-        comma = line.find(',');
-        cells.push_back(trimmed(line.substr(0, comma)));
-        line.remove_prefix(comma == std::string_view::npos ? line.size() : comma + 1);
+    std::vector<std::string_view> cells = splitAt(',', line);
+    for (std::string_view& cell : cells) {
+        cell = trimmed(cell);
     }
     return cells;
 }
