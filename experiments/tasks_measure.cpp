@@ -1,5 +1,6 @@
 #include <experiments/tasks_measure.h>
 
+#include <experiments/quantiles.h>
 #include <haptics/servo.h>
 #include <haptics/simulation.h>
 
@@ -31,31 +32,17 @@ constexpr double outside = 15e-3;      // [m]
 constexpr double wayIn = 0.1;          // speed of the needle into the block [m/s]
 
 /// What one tick took [s].
-struct TickTimes {
+struct TaskTimes {
     std::array<double, taskCount> task{};
     double publish = 0;
 };
 
-using Rig = std::function<TickTimes(const DeviceSample&)>;
+using Rig = std::function<TaskTimes(const DeviceSample&)>;
 
 double secondsSince(Clock::time_point& last) noexcept
 {
     const auto now = Clock::now();
     return std::chrono::duration<double>(now - std::exchange(last, now)).count();
-}
-
-double median(std::vector<double> values)
-{
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
-double quantile(std::vector<double> values, double share)
-{
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), at, values.end());
-    return *at;
 }
 
 // A tool that goes to and fro along its axis.
@@ -108,7 +95,7 @@ public:
         }
     }
 
-    void add(const TickTimes& t)
+    void add(const TaskTimes& t)
     {
         counted_.push_back(countedWork(event_, t.task, t.publish));
         all_.push_back(std::accumulate(t.task.begin(), t.task.end(), t.publish));
@@ -126,10 +113,10 @@ public:
         for (auto from = counted_.begin(); from != counted_.end(); from += frameTicks) {
             frames.push_back(std::accumulate(from, from + frameTicks, 0.0) / static_cast<double>(frameTicks));
         }
-        out.process = median(std::move(frames));
-        out.p50 = quantile(all_, 0.5);
-        out.p99 = quantile(all_, 0.99);
-        std::ranges::transform(tasks_, out.tasks.begin(), median);
+        out.process = upperMedian(std::move(frames));
+        out.p50 = lowerQuantile(all_, 0.5);
+        out.p99 = lowerQuantile(all_, 0.99);
+        std::ranges::transform(tasks_, out.tasks.begin(), upperMedian);
         out.publish = publish_ / static_cast<double>(all_.size());
         return out;
     }
@@ -153,7 +140,7 @@ EventTimes timeEvent(const TaskEvent& event, const EventOptions& options, const 
         auto last = Clock::now();
         const DeviceSample sample = path.at(n);
         const double read = secondsSince(last);
-        TickTimes t = rig(sample);
+        TaskTimes t = rig(sample);
         t.task[static_cast<std::size_t>(Task::h2)] = read;
         // The first frame warms the caches.
         if (n >= frameTicks) {
@@ -208,10 +195,10 @@ public:
     }
 
 private:
-    TickTimes tick(Simulation& simulation, const TaskEvent& event, const DeviceSample& sample)
+    TaskTimes tick(Simulation& simulation, const TaskEvent& event, const DeviceSample& sample)
     {
         const TickRecord& record = simulation.tick(sample);
-        TickTimes t;
+        TaskTimes t;
         std::copy(record.seconds.begin(), record.seconds.end(), t.task.begin());
         auto last = Clock::now();
         sent_ = record.total;
@@ -223,9 +210,9 @@ private:
         return t;
     }
 
-    TickTimes idleTick(const TaskEvent& event, const DeviceSample& sample)
+    TaskTimes idleTick(const TaskEvent& event, const DeviceSample& sample)
     {
-        TickTimes t;
+        TaskTimes t;
         auto last = Clock::now();
         if (event.additional) {
             sent_ = additionalForce(model_.scene.dffb, model_.structures.size(), far_, sample.position, false, tickSeconds,
@@ -278,9 +265,9 @@ public:
     }
 
 private:
-    TickTimes tick(const TaskEvent& event, const DeviceSample& sample)
+    TaskTimes tick(const TaskEvent& event, const DeviceSample& sample)
     {
-        TickTimes t;
+        TaskTimes t;
         auto last = Clock::now();
         const auto done = [&](Task task) { t.task[static_cast<std::size_t>(task)] = secondsSince(last); };
         std::size_t touched = ObjectScene::none;

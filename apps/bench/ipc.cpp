@@ -8,6 +8,7 @@
 #include <apps/outputs.h>
 #include <apps/session.h>
 #include <apps/trainer.h>
+#include <experiments/quantiles.h>
 #include <render/channel/layout.h>
 
 #include <fmt/format.h>
@@ -38,20 +39,11 @@ struct IpcOptions {
 constexpr double setUp = 0.2;        // [s]
 constexpr double staleAfter = 5e-3;  // a position is old news [s]
 
-double quantile(std::vector<double> values, double share)
-{
-    if (values.empty()) {
-        return 0.0;
-    }
-    std::sort(values.begin(), values.end());
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
-}
-
 nlohmann::json spread(const std::vector<double>& values, double unit)
 {
-    return {{"p50", quantile(values, 0.5) * unit},
-            {"p99", quantile(values, 0.99) * unit},
-            {"max", quantile(values, 1.0) * unit}};
+    return {{"p50", experiments::lowerQuantile(values, 0.5) * unit},
+            {"p99", experiments::lowerQuantile(values, 0.99) * unit},
+            {"max", experiments::lowerQuantile(values, 1.0) * unit}};
 }
 
 nlohmann::json transferFigures(const Transfer& t, const Transfer& late)

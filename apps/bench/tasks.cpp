@@ -7,6 +7,7 @@
 #include <apps/outputs.h>
 #include <apps/progress.h>
 #include <datasets/phantom_random.h>
+#include <experiments/quantiles.h>
 #include <experiments/tasks_scene.h>
 
 #include <fmt/format.h>
@@ -61,12 +62,6 @@ double seconds(Clock::time_point t)
     return std::chrono::duration<double>(t.time_since_epoch()).count();
 }
 
-double median(std::vector<double> values)
-{
-    std::ranges::sort(values);
-    return values[values.size() / 2];
-}
-
 ViewerTimes viewerTimes(const std::vector<TimelinePicture>& pictures, Clock::time_point started)
 {
     std::vector<double> read, picture;
@@ -74,7 +69,8 @@ ViewerTimes viewerTimes(const std::vector<TimelinePicture>& pictures, Clock::tim
         read.push_back(p.read - p.published);
         picture.push_back(p.done - p.read);
     }
-    return {pictures.front().done - seconds(started), median(std::move(read)), median(std::move(picture)), pictures.size()};
+    return {pictures.front().done - seconds(started), experiments::upperMedian(std::move(read)),
+            experiments::upperMedian(std::move(picture)), pictures.size()};
 }
 
 // Events with graphics on, beside a viewer. Returns why there are none, or nothing.
