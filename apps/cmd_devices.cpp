@@ -1,6 +1,7 @@
 #include <apps/command.h>
+#include <command/json.h>
 
-#include <apps/falcon.h>
+#include <session/falcon.h>
 
 #include <haptics/falcon/usb.h>
 
@@ -30,7 +31,7 @@ namespace fs = std::filesystem;
 constexpr double slow = 400.0;  // exchanges per second, below which a hub or a cable is in the way
 
 struct DevicesOptions {
-    FalconOptions falcon;
+    session::FalconOptions falcon;
     bool installUdev = false;
     fs::path rules = "/etc/udev/rules.d";
     std::uint64_t exchanges = 0;
@@ -99,7 +100,7 @@ State look()
 Exchanges exchange(const DevicesOptions& o)
 {
     const auto wire = falcon::usbTransport();
-    falcon::Link link(*wire, linkOptions(o.falcon), sayForFalcon);
+    falcon::Link link(*wire, session::linkOptions(o.falcon), session::sayForFalcon);
     const std::atomic<bool> never{false};
     link.connect(never);
     Exchanges done;
@@ -217,7 +218,7 @@ void devices(const DevicesOptions& o)
         }
     }
     if (!o.json.empty()) {
-        writeJson(o.json, figures);
+        command::writeJson(o.json, figures);
     }
 }
 

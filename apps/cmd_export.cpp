@@ -1,10 +1,11 @@
 #include <apps/command.h>
-#include <apps/deformed_state.h>
-#include <apps/outputs.h>
-#include <apps/progress.h>
-#include <apps/quantities.h>
-#include <apps/session.h>
+#include <base/outputs.h>
+#include <base/quantities.h>
+#include <command/json.h>
+#include <command/progress.h>
 #include <datasets/label_map.h>
+#include <session/deformed_state.h>
+#include <session/open.h>
 #include <volume/export.h>
 
 #include <fmt/format.h>
@@ -74,15 +75,15 @@ void checkOptions(Options& o)
     if (!isVtu(o.output)) {
         volume::checkExportName(o.output);
     }
-    checkOutput(o.output);
-    checkOutput(o.map);
-    checkOutput(o.json);
+    base::checkOutput(o.output);
+    base::checkOutput(o.map);
+    base::checkOutput(o.json);
 }
 
 double timeFrom(const std::string& text)
 {
-    const auto plain = timeOf(text + "s");
-    const auto time = plain ? plain : timeOf(text);
+    const auto plain = base::timeOf(text + "s");
+    const auto time = plain ? plain : base::timeOf(text);
     if (!time) {
         throw std::runtime_error(fmt::format("--at {}: must be a time, 3.2s or 3200ms", text));
     }
@@ -115,8 +116,8 @@ void writeMap(const Options& o, const volume::Tissue& tissue)
     }
     datasets::LabelMap map{
         o.volume.empty() ? fs::path(o.record).stem().string() : o.volume.stem().string(), namesOf(tissue), {}};
-    writeWhole(o.map, fmt::format("# Names and tissues of the labels in {}: palpate import --map.\n{}",
-                                  o.output.filename().string(), datasets::labelMapText(map)));
+    base::writeWhole(o.map, fmt::format("# Names and tissues of the labels in {}: palpate import --map.\n{}",
+                                        o.output.filename().string(), datasets::labelMapText(map)));
 }
 
 std::vector<float> stiffnessOf(const volume::Tissue& tissue)
@@ -132,7 +133,7 @@ std::vector<float> stiffnessOf(const volume::Tissue& tissue)
 
 void exportVolume(const Options& o, const volume::ExportOptions& how)
 {
-    const volume::Tissue tissue = loadVolume(o.volume);
+    const volume::Tissue tissue = session::loadVolume(o.volume);
     const volume::VoxelGrid grid{tissue.size(), tissue.affine()};
     if (o.what == "labels") {
         volume::exportLabels(o.output, tissue.labels(), namesOf(tissue), how);
@@ -147,10 +148,11 @@ void exportVolume(const Options& o, const volume::ExportOptions& how)
 }
 
 // What to say of it behind the file's name.
-std::string exportState(const Options& o, const volume::ExportOptions& how, Progress& progress, nlohmann::json& figures)
+std::string exportState(const Options& o, const volume::ExportOptions& how, command::Progress& progress,
+                        nlohmann::json& figures)
 {
-    const DeformedState state(o.record, timeFrom(o.at),
-                              [&](double share) { progress.show("computing the session again", share); });
+    const session::DeformedState state(o.record, timeFrom(o.at),
+                                       [&](double share) { progress.show("computing the session again", share); });
     const auto& lattice = state.model().lattice;
     if (o.what == "labels") {
         volume::exportLabels(o.output, state.labels(), namesOf(*state.model().tissue), how);
@@ -173,7 +175,7 @@ std::string exportState(const Options& o, const volume::ExportOptions& how, Prog
 void runExport(Options o)
 {
     checkOptions(o);
-    Progress progress(Progress::Clock::ticking);
+    command::Progress progress(command::Progress::Clock::ticking);
     progress.show("reading");
     volume::ExportOptions how;
     how.nifti2 = o.nifti2;
@@ -190,7 +192,7 @@ void runExport(Options o)
         fmt::print("{} -> {} ({}{})\n", o.record.empty() ? o.volume.string() : o.record, o.output.string(), o.what, more);
     }
     if (!o.json.empty()) {
-        writeJson(o.json, figures);
+        command::writeJson(o.json, figures);
     }
 }
 

@@ -1,16 +1,18 @@
 #include <apps/command.h>
-#include <apps/outputs.h>
-#include <apps/prepare/mapping.h>
-#include <apps/prepare/steps.h>
-#include <apps/progress.h>
-#include <apps/quantities.h>
-#include <apps/report/volume.h>
+#include <base/outputs.h>
+#include <base/quantities.h>
+#include <command/json.h>
+#include <command/progress.h>
 #include <datasets/label_map.h>
 #include <datasets/tables.h>
+#include <report/volume.h>
 #include <volume/fnv.h>
 #include <volume/import.h>
+#include <volume/prepare/mapping.h>
+#include <volume/prepare/steps.h>
 #include <volume/resample.h>
 
+#include <base/build.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -32,15 +34,15 @@ struct Options {
     fs::path input, output, tissues, image, json;
     std::string stiffness, imageUnit;
     volume::ImportOptions reading;
-    MappingOptions mapping;
-    PreparationOptions steps;
+    prepare::MappingOptions mapping;
+    prepare::PreparationOptions steps;
     std::string voxel, closeSkinHoles, addSkin, pad, cropMargin;
 };
 
 void readLengths(Options& o)
 {
     const auto set = [](double& target, const std::string& option, const std::string& text, double least, double most) {
-        target = text.empty() ? target : lengthFrom(option, text, least, most);
+        target = text.empty() ? target : base::lengthFrom(option, text, least, most);
     };
     set(o.steps.voxel, "--voxel", o.voxel, 0.05e-3, 50e-3);
     set(o.steps.addSkin, "--add-skin", o.addSkin, 0.05e-3, 50e-3);
@@ -53,7 +55,7 @@ void readLengths(Options& o)
 
 // The image on the voxels of the labels.
 volume::CompanionImage readImage(const Options& o, const volume::LabelImage& labels, const volume::TissueTable& table,
-                                 std::vector<std::string>& notes, Progress& progress)
+                                 std::vector<std::string>& notes, command::Progress& progress)
 {
     volume::ImportOptions reading;
     reading.series = o.reading.series;
@@ -95,14 +97,14 @@ volume::CompanionImage readImage(const Options& o, const volume::LabelImage& lab
 }
 
 volume::Provenance provenanceOf(const Options& o, const volume::LabelImage& image, const std::vector<std::string>& notes,
-                                const std::vector<PreparationStep>& steps)
+                                const std::vector<prepare::PreparationStep>& steps)
 {
     volume::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
     hash.addAll(image.values);
     volume::Provenance provenance = {{"source", o.input.filename().string()},
                                      {"label hash", fmt::format("{:016x}", hash.value)},
                                      {"imported", fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr)))},
-                                     {"program", PALPATE_BUILD}};
+                                     {"program", std::string(base::build())}};
     std::error_code none;
     if (fs::is_regular_file(o.input, none)) {
         provenance.insert(provenance.begin() + 1, {"bytes", std::to_string(fs::file_size(o.input))});
@@ -113,11 +115,11 @@ volume::Provenance provenanceOf(const Options& o, const volume::LabelImage& imag
     if (!o.stiffness.empty()) {
         provenance.emplace_back("stiffness", fmt::format("scaled by the image, map {}", o.stiffness));
     }
-    for (const PreparationStep& step : steps) {
-        provenance.emplace_back(stepKey, step.text);
+    for (const prepare::PreparationStep& step : steps) {
+        provenance.emplace_back(report::stepKey, step.text);
     }
     for (const std::string& note : notes) {
-        provenance.emplace_back(warningKey, note);
+        provenance.emplace_back(report::warningKey, note);
     }
     return provenance;
 }
@@ -140,10 +142,10 @@ void noteOverlaps(const volume::ImportedLabels& labels, std::vector<std::string>
 }
 
 nlohmann::json figuresOf(const volume::Tissue& tissue, const volume::ImportedLabels& labels,
-                         const std::vector<PreparationStep>& steps)
+                         const std::vector<prepare::PreparationStep>& steps)
 {
-    nlohmann::json figures = volumeFigures(tissue);
-    figures["steps"] = stepFigures(steps);
+    nlohmann::json figures = report::volumeFigures(tissue);
+    figures["steps"] = prepare::stepFigures(steps);
     figures["overlaps"] = nlohmann::json::array();
     for (const volume::Overlap& o : labels.overlaps) {
         figures["overlaps"].push_back({{"kept", o.kept}, {"lost", o.lost}, {"voxels", o.voxels}});
@@ -165,9 +167,9 @@ void checkOptions(const Options& o)
     if (!o.imageUnit.empty() && o.image.empty()) {
         throw std::runtime_error("--image-unit: needs the image: add --image FILE");
     }
-    checkOutput(o.output);
-    checkOutput(o.mapping.writeMap);
-    checkOutput(o.json);
+    base::checkOutput(o.output);
+    base::checkOutput(o.mapping.writeMap);
+    base::checkOutput(o.json);
 }
 
 void runImport(Options o)
@@ -175,23 +177,24 @@ void runImport(Options o)
     readLengths(o);
     checkOptions(o);
     const volume::TissueTable table = o.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(o.tissues);
-    Progress progress(Progress::Clock::ticking);
+    command::Progress progress(command::Progress::Clock::ticking);
     progress.show("checking the file");
     o.reading.sheared = o.steps.voxel > 0;
     o.reading.progress = [&](double share) { progress.show("reading", share); };
     volume::ImportedLabels labels = volume::importLabels(o.input, o.reading);
     progress.show("counting labels");
-    const LabelCounts counts = countLabels(labels.image);
+    const prepare::LabelCounts counts = prepare::countLabels(labels.image);
     if (!o.mapping.writeMap.empty()) {
-        const std::size_t open = writeLabelMap(o.mapping, o.input, labels, counts, table);
+        const std::size_t open = prepare::writeLabelMap(o.mapping, o.input, labels, counts, table);
         progress.clear();
         fmt::print("{}: {} labels, {} of them to be filled in\n", o.mapping.writeMap.string(), counts.size(), open);
         return;
     }
     std::vector<std::string> notes = labels.warnings;
     noteOverlaps(labels, notes);
-    std::vector<volume::LabelName> named = mapLabels(o.mapping, o.input, labels, counts, table, notes);
-    const auto steps = prepare(labels.image, named, table, o.steps, [&](const std::string& what) { progress.show(what); });
+    std::vector<volume::LabelName> named = prepare::mapLabels(o.mapping, o.input, labels, counts, table, notes);
+    const auto steps =
+        prepare::prepare(labels.image, named, table, o.steps, [&](const std::string& what) { progress.show(what); });
     std::optional<volume::CompanionImage> image;
     if (!o.image.empty()) {
         image = readImage(o, labels.image, table, notes, progress);
@@ -207,10 +210,10 @@ void runImport(Options o)
     progress.clear();
     if (o.json != "-") {
         fmt::print("{} -> {}\n\n", o.input.string(), o.output.string());
-        printVolume(tissue);
+        report::printVolume(tissue);
     }
     if (!o.json.empty()) {
-        writeJson(o.json, figuresOf(tissue, labels, steps));
+        command::writeJson(o.json, figuresOf(tissue, labels, steps));
     }
 }
 

@@ -1,6 +1,7 @@
 #include <apps/command.h>
-#include <apps/report/volume.h>
-#include <apps/session.h>
+#include <command/json.h>
+#include <report/volume.h>
+#include <session/open.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -18,13 +19,13 @@ struct InfoOptions {
 
 void runInfo(const InfoOptions& options)
 {
-    const volume::Tissue tissue = loadVolume(options.file);
+    const volume::Tissue tissue = session::loadVolume(options.file);
     if (options.json != "-") {
         fmt::print("{}\n\n", options.file.string());
-        printVolume(tissue);
+        report::printVolume(tissue);
     }
     if (!options.json.empty()) {
-        writeJson(options.json, volumeFigures(tissue));
+        command::writeJson(options.json, report::volumeFigures(tissue));
     }
 }
 

@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <command/json.h>
 #include <datasets/phantom.h>
 #include <datasets/tables.h>
 
@@ -120,7 +121,7 @@ void runPhantom(PhantomOptions& options)
         printSummary(options, tissue, seconds);
     }
     if (!options.json.empty()) {
-        writeJson(options.json, figures(tissue, seconds));
+        command::writeJson(options.json, figures(tissue, seconds));
     }
 }
 

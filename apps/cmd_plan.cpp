@@ -1,11 +1,12 @@
 #include <apps/command.h>
+#include <command/json.h>
 
-#include <apps/bench/costs.h>
-#include <apps/outputs.h>
-#include <apps/progress.h>
-#include <apps/quantities.h>
-#include <apps/session.h>
-#include <experiments/planner.h>
+#include <base/outputs.h>
+#include <base/quantities.h>
+#include <command/progress.h>
+#include <planner/costs.h>
+#include <planner/planner.h>
+#include <session/open.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -21,8 +22,8 @@ namespace {
 
 using datasets::ModelLevel;
 using datasets::Strain;
-using experiments::Plan;
-using experiments::PlanCandidate;
+using planner::Plan;
+using planner::PlanCandidate;
 
 struct Options {
     std::string scene;
@@ -69,7 +70,7 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
     return out;
 }
 
-nlohmann::json planFigures(const Options& o, const Plan& plan, const experiments::PlanRequest& request)
+nlohmann::json planFigures(const Options& o, const Plan& plan, const planner::PlanRequest& request)
 {
     auto candidates = nlohmann::json::array();
     for (const PlanCandidate& c : plan.candidates) {
@@ -153,7 +154,7 @@ void printToml(const PlanCandidate& c)
     }
 }
 
-void printReference(const Plan& plan, const experiments::PlanCosts& costs, const std::string& origin)
+void printReference(const Plan& plan, const planner::PlanCosts& costs, const std::string& origin)
 {
     fmt::print(
         "errors are worst values over a push and a drag, against {} strain solved on {} nodes of {:g} mm; local strain "
@@ -171,28 +172,28 @@ void printReference(const Plan& plan, const experiments::PlanCosts& costs, const
 
 void planScene(const Options& o)
 {
-    checkOutput(o.json);
-    experiments::PlanRequest request;
-    request.error = parseShare("--error", o.error);
+    base::checkOutput(o.json);
+    planner::PlanRequest request;
+    request.error = base::parseShare("--error", o.error);
     if (!o.forceError.empty()) {
-        request.forceError = parseShare("--force-error", o.forceError);
+        request.forceError = base::parseShare("--force-error", o.forceError);
     }
-    request.budget = parseTime("--budget", o.budget);
+    request.budget = base::parseTime("--budget", o.budget);
     request.speed = 1e-3 * o.speed;
     request.all = o.all;
     if (!o.costs.empty()) {
-        request.costs = loadCosts(o.costs);
+        request.costs = planner::loadCosts(o.costs);
     }
 
-    Progress progress;
+    command::Progress progress;
     progress.show(o.scene + ": volume");
-    SceneChanges changes;
+    session::SceneChanges changes;
     changes.model = "spring";  // the bodies are made here, one per spacing
-    const auto model = openSession(o.scene, changes);
-    const Plan plan = experiments::planModel(model, request, [&](const std::string& what) { progress.show(what); });
+    const auto model = session::openSession(o.scene, changes);
+    const Plan plan = planner::planModel(model, request, [&](const std::string& what) { progress.show(what); });
     progress.clear();
     if (!o.json.empty()) {
-        writeJson(o.json, planFigures(o, plan, request));
+        command::writeJson(o.json, planFigures(o, plan, request));
     }
     const bool tell = o.json != "-";
     if (tell) {

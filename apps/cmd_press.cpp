@@ -1,10 +1,12 @@
 #include <apps/command.h>
+#include <command/json.h>
+#include <command/options.h>
 
-#include <apps/outputs.h>
-#include <apps/progress.h>
-#include <apps/session.h>
-#include <experiments/press/pose_load.h>
-#include <experiments/press/press.h>
+#include <base/outputs.h>
+#include <command/progress.h>
+#include <session/open.h>
+#include <studies/press/pose_load.h>
+#include <studies/press/press.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -25,11 +27,11 @@ namespace palpate::apps {
 using datasets::ToolKind;
 using datasets::toolKinds;
 using datasets::ToolSpec;
-using experiments::FilePoint;
-using experiments::PosePath;
-using experiments::PressSample;
-using experiments::PressSummary;
 using nlohmann::json;
+using studies::FilePoint;
+using studies::PosePath;
+using studies::PressSample;
+using studies::PressSummary;
 
 namespace {
 
@@ -39,7 +41,7 @@ constexpr std::size_t progressEvery = 200;               // ticks
 
 struct Options {
     std::string scene, path, at, csv, json;
-    SceneChanges changes;
+    session::SceneChanges changes;
     std::string level = "elastic";
     std::optional<std::string> tool;
     std::optional<double> radius, length;  // [mm]
@@ -52,7 +54,7 @@ struct Run {
     haptics::SessionModel model;
     PosePath path;
     std::vector<FilePoint> points;
-    experiments::PressOptions press;
+    studies::PressOptions press;
     std::vector<PressSample> samples;
     PressSummary summary;
 };
@@ -213,33 +215,33 @@ void write(const Options& o, const Run& run)
     if (o.csv == "-") {
         std::fputs(pressTable(run).c_str(), stdout);
     } else if (!o.csv.empty()) {
-        writeWhole(o.csv, pressTable(run));
+        base::writeWhole(o.csv, pressTable(run));
     }
     if (!o.json.empty()) {
-        writeJson(o.json, pressFigures(o, run));
+        command::writeJson(o.json, pressFigures(o, run));
     }
 }
 
 void runPress(const Options& o)
 {
-    checkOutput(o.json);
-    checkOutput(o.csv);
+    base::checkOutput(o.json);
+    base::checkOutput(o.csv);
     if (o.json == "-" && o.csv == "-") {
         throw std::runtime_error("--json -, --csv -: standard output takes one of them: give the other a file");
     }
-    Progress progress;
+    command::Progress progress;
     progress.show(o.scene + ": volume");
-    SceneChanges changes = o.changes;
+    session::SceneChanges changes = o.changes;
     changes.model = o.level;
-    Run run{openSession(o.scene, changes), {}, {}, {}, {}, {}};
+    Run run{session::openSession(o.scene, changes), {}, {}, {}, {}, {}};
     run.press = {toolOf(o, run.model.scene.tool), o.every, o.converge};
-    run.path = experiments::loadPosePath(o.path, experiments::plannedAxis(run.model));
+    run.path = studies::loadPosePath(o.path, studies::plannedAxis(run.model));
     if (!o.at.empty()) {
-        run.points = experiments::loadPoints(o.at);
+        run.points = studies::loadPoints(o.at);
     }
     const auto ticks = static_cast<double>(run.path.ticks());
     try {
-        run.summary = experiments::press(run.model, run.path, run.points, run.press, [&](const PressSample& s) {
+        run.summary = studies::press(run.model, run.path, run.points, run.press, [&](const PressSample& s) {
             if (run.samples.size() % progressEvery == 0) {
                 progress.show(o.scene, 1e3 * (s.pose.seconds - run.path.poses.front().seconds) / ticks);
             }
@@ -266,7 +268,7 @@ void addPress(CLI::App& app)
     c->add_option("--path", o->path, "Poses of the tool: CSV with x_mm,y_mm,z_mm and perhaps seconds, axis_x,axis_y,axis_z")
         ->type_name("FILE")
         ->required();
-    addSetting(*c, o->changes);
+    command::addSetting(*c, o->changes);
     c->add_option("--model", o->level, "Tissue model; only elastic has forces of its own")
         ->check(CLI::IsMember({"elastic"}))
         ->capture_default_str();

@@ -1,8 +1,9 @@
 #include <apps/command.h>
+#include <command/json.h>
 
-#include <apps/figures.h>
-#include <apps/session.h>
 #include <haptics/replay.h>
+#include <session/figures.h>
+#include <session/open.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -23,20 +24,20 @@ struct Options {
 void replayRecord(const Options& o)
 {
     const haptics::Record record(o.file);
-    const auto model = reopenSession(o.file, record.info());
+    const auto model = session::reopenSession(o.file, record.info());
     const auto result = haptics::replay(record, model);
 
     nlohmann::json figures{{"ticks", result.ticks},
                            {"identical", result.identical},
                            {"first_difference_tick", nullptr},
                            {"largest_difference_n", result.largestDifference},
-                           {"force_hash", hexadecimal(result.forceHash)},
+                           {"force_hash", session::hexadecimal(result.forceHash)},
                            {"complete", record.complete()}};
     if (result.firstDifference) {
         figures["first_difference_tick"] = *result.firstDifference;
     }
     if (!o.json.empty()) {
-        writeJson(o.json, figures);
+        command::writeJson(o.json, figures);
     }
     const bool tell = o.json != "-";
     if (tell && !record.complete()) {
@@ -50,7 +51,7 @@ void replayRecord(const Options& o)
     }
     if (tell) {
         fmt::print("{} ticks replayed: every force is the same, bit for bit ({})\n", result.ticks,
-                   hexadecimal(result.forceHash));
+                   session::hexadecimal(result.forceHash));
     }
 }
 

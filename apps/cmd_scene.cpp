@@ -1,11 +1,12 @@
 #include <apps/command.h>
-#include <apps/outputs.h>
-#include <apps/progress.h>
-#include <apps/quantities.h>
-#include <apps/session.h>
+#include <base/outputs.h>
+#include <base/quantities.h>
+#include <command/json.h>
+#include <command/progress.h>
 #include <datasets/approach.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
+#include <session/open.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -161,7 +162,7 @@ void writeScene(Scene scene, const Options& o, const Found& found, const Proposa
         o.choose, found.ways.size(), 1e3 * way.length, clearanceText(way), found.needle, 1e3 * scene.tool.length);
     const std::string text = comment + datasets::sceneText(scene);
     datasets::parseScene(text, o.output);  // what cannot be read back is not written
-    writeWhole(o.output, text);
+    base::writeWhole(o.output, text);
 }
 
 nlohmann::json figuresOf(const Scene& scene, const Found& found, const Options& o)
@@ -204,21 +205,21 @@ void printWays(const Scene& scene, const Found& found, const Options& o)
 
 void runScene(const Options& o)
 {
-    checkOutput(o.output);
-    checkOutput(o.json);
+    base::checkOutput(o.output);
+    base::checkOutput(o.json);
     std::optional<double> margin;
     if (!o.margin.empty()) {
-        margin = lengthFrom("--margin", o.margin, 0, 6e-3);
+        margin = base::lengthFrom("--margin", o.margin, 0, 6e-3);
     }
-    Progress progress;
+    command::Progress progress;
     progress.show("loading the volume");
-    volume::Tissue tissue = loadVolume(o.volume);
+    volume::Tissue tissue = session::loadVolume(o.volume);
     std::optional<datasets::Insert> lesion;
     if (!o.lesionIn.empty()) {
         checkStructure(tissue, "--lesion-in", o.lesionIn);
         datasets::Insert shape;
         shape.tissue = o.lesionTissue;
-        shape.diameter = lengthFrom("--lesion", o.lesionSize.empty() ? "15mm" : o.lesionSize, 1e-3, 0.1);
+        shape.diameter = base::lengthFrom("--lesion", o.lesionSize.empty() ? "15mm" : o.lesionSize, 1e-3, 0.1);
         shape.seed = o.seed;
         lesion = datasets::placeLesionIn(tissue, o.lesionIn, shape);
         tissue = datasets::withInserts(tissue, std::vector<datasets::Insert>{*lesion});
@@ -239,7 +240,7 @@ void runScene(const Options& o)
         fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose, o.output.string());
     }
     if (!o.json.empty()) {
-        writeJson(o.json, figuresOf(scene, found, o));
+        command::writeJson(o.json, figuresOf(scene, found, o));
     }
 }
 

@@ -1,7 +1,8 @@
 #include <apps/command.h>
-#include <apps/measures.h>
-#include <apps/report/groups.h>
-#include <apps/report/report.h>
+#include <command/json.h>
+#include <report/groups.h>
+#include <report/report.h>
+#include <session/figures.h>
 
 #include <haptics/score.h>
 
@@ -73,25 +74,25 @@ Group parseGroup(const std::string& text, std::vector<Session>& sessions)
     return group;
 }
 
-ScoredGroup scored(const Group& group, const std::vector<Session>& sessions)
+report::ScoredGroup scored(const Group& group, const std::vector<Session>& sessions)
 {
-    ScoredGroup out{group.name, {}};
+    report::ScoredGroup out{group.name, {}};
     for (const std::size_t i : group.sessions) {
         out.scores.push_back(sessions[i].score);
     }
     return out;
 }
 
-std::vector<double> valuesOf(const Group& group, const std::vector<Session>& sessions, const Measure& measure)
+std::vector<double> valuesOf(const Group& group, const std::vector<Session>& sessions, const haptics::Measure& measure)
 {
-    return apps::valuesOf(scored(group, sessions), measure);
+    return report::valuesOf(scored(group, sessions), measure);
 }
 
 json effectSize(const Group& a, const Group& b, const std::vector<Session>& sessions)
 {
     json out = {{"kind", "cliffs_delta"}, {"of", a.name}, {"over", b.name}};
-    for (const Measure& m : measures()) {
-        out[m.key] = cliffsDelta(valuesOf(a, sessions, m), valuesOf(b, sessions, m));
+    for (const haptics::Measure& m : haptics::measures()) {
+        out[m.key] = report::cliffsDelta(valuesOf(a, sessions, m), valuesOf(b, sessions, m));
     }
     return out;
 }
@@ -100,7 +101,7 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
 {
     json out = {{"sessions", json::array()}};
     for (const Session& s : sessions) {
-        json one = scoreFigures(s.score);
+        json one = session::scoreFigures(s.score);
         one.update({{"file", s.file.string()},
                     {"scene", s.scene},
                     {"model", s.model},
@@ -111,11 +112,11 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
     out["groups"] = json::array();
     for (const Group& g : groups) {
         json medians, lower, upper;
-        for (const Measure& m : measures()) {
+        for (const haptics::Measure& m : haptics::measures()) {
             const auto values = valuesOf(g, sessions, m);
-            medians[m.key] = quantile(values, 0.5);
-            lower[m.key] = quantile(values, 0.25);
-            upper[m.key] = quantile(values, 0.75);
+            medians[m.key] = report::quantile(values, 0.5);
+            lower[m.key] = report::quantile(values, 0.25);
+            upper[m.key] = report::quantile(values, 0.75);
         }
         out["groups"].push_back({{"name", g.name},
                                  {"n", g.sessions.size()},
@@ -156,8 +157,8 @@ void printTable(const std::vector<std::string>& heads, const std::vector<std::ve
     for (std::size_t c = 0; c < heads.size(); ++c) {
         text += fmt::format("  {:>{}}", heads[c], widths[c]);
     }
-    for (std::size_t m = 0; m < measures().size(); ++m) {
-        text += fmt::format("\n{:<12}", measures()[m].title);
+    for (std::size_t m = 0; m < haptics::measures().size(); ++m) {
+        text += fmt::format("\n{:<12}", haptics::measures()[m].title);
         for (std::size_t c = 0; c < heads.size(); ++c) {
             text += fmt::format("  {:>{}}", columns[c][m], widths[c]);
         }
@@ -179,7 +180,7 @@ void printSessions(const std::vector<Session>& sessions)
         for (const Session& s : sessions) {
             heads.push_back(s.file.filename().string());
             columns.emplace_back();
-            for (const Measure& m : measures()) {
+            for (const haptics::Measure& m : haptics::measures()) {
                 columns.back().push_back(cell(m.value(s.score), m.decimals));
             }
         }
@@ -199,12 +200,12 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
     for (const Group& g : groups) {
         heads.push_back(fmt::format("{} (n={})", g.name, g.sessions.size()));
         columns.emplace_back();
-        for (const Measure& m : measures()) {
+        for (const haptics::Measure& m : haptics::measures()) {
             const auto values = valuesOf(g, sessions, m);
             const int decimals = m.decimals + (m.decimals == 0 ? 1 : 0);
-            columns.back().push_back(fmt::format("{} ({} to {})", cell(quantile(values, 0.5), decimals),
-                                                 cell(quantile(values, 0.25), decimals),
-                                                 cell(quantile(values, 0.75), decimals)));
+            columns.back().push_back(fmt::format("{} ({} to {})", cell(report::quantile(values, 0.5), decimals),
+                                                 cell(report::quantile(values, 0.25), decimals),
+                                                 cell(report::quantile(values, 0.75), decimals)));
         }
     }
     std::printf("\nMedians (quartiles)%s\n",
@@ -213,8 +214,9 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
         for (std::size_t b = a + 1; b < groups.size(); ++b) {
             heads.push_back(groups[a].name + " over " + groups[b].name);
             columns.emplace_back();
-            for (const Measure& m : measures()) {
-                const double delta = cliffsDelta(valuesOf(groups[a], sessions, m), valuesOf(groups[b], sessions, m));
+            for (const haptics::Measure& m : haptics::measures()) {
+                const double delta =
+                    report::cliffsDelta(valuesOf(groups[a], sessions, m), valuesOf(groups[b], sessions, m));
                 columns.back().push_back(fmt::format("{:+.2f}", delta));
             }
         }
@@ -237,20 +239,20 @@ void run(const Options& options)
     }
     if (!options.report.empty()) {
         if (!groups.empty()) {
-            std::vector<ScoredGroup> all;
+            std::vector<report::ScoredGroup> all;
             for (const Group& g : groups) {
                 all.push_back(scored(g, sessions));
             }
-            writeGroupReport(options.report, all);
+            report::writeGroupReport(options.report, all);
         } else if (sessions.size() == 1) {
-            writeReport(options.report, haptics::Record(sessions[0].file), options.pictures);
+            report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures);
         } else {
             throw std::runtime_error(options.report.string() +
                                      ": a report is of one record or of groups: give one file, or --group NAME=FILE,FILE");
         }
     }
     if (!options.json.empty()) {
-        writeJson(options.json, figures(sessions, groups));
+        command::writeJson(options.json, figures(sessions, groups));
     }
     if (options.json != "-") {
         printSessions(sessions);

@@ -1,14 +1,15 @@
 #include <apps/command.h>
+#include <command/json.h>
+#include <command/options.h>
 
-#include <apps/child_process.h>
-#include <apps/falcon.h>
-#include <apps/faults.h>
-#include <apps/figures.h>
-#include <apps/measures.h>
-#include <apps/outputs.h>
-#include <apps/report/report.h>
-#include <apps/session.h>
-#include <apps/trainer.h>
+#include <base/child_process.h>
+#include <base/outputs.h>
+#include <report/report.h>
+#include <session/falcon.h>
+#include <session/faults.h>
+#include <session/figures.h>
+#include <session/open.h>
+#include <session/trainer.h>
 
 #include <haptics/trainee.h>
 
@@ -44,9 +45,9 @@ constexpr double picturesTimeout = 60.0;    // after the end of a session [s]
 struct Options {
     std::string scene = "breast";
     bool sceneGiven = false;
-    SceneChanges changes;
+    session::SceneChanges changes;
     std::string device = "hand";
-    FalconOptions falcon;
+    session::FalconOptions falcon;
     std::string trainee;
     std::string task, lesionFrom;
     double lesionDiameter = 10;  // [mm]
@@ -59,10 +60,10 @@ struct Options {
     std::string session;
     std::string record, report, json, pictures;
     std::vector<std::string> inject;
-    Faults faults;  // what `inject` says
+    session::Faults faults;  // what `inject` says
 };
 
-nlohmann::json coreFigures(const TrainResult& result, const haptics::SessionInfo& info)
+nlohmann::json coreFigures(const session::TrainResult& result, const haptics::SessionInfo& info)
 {
     auto cores = nlohmann::json::array();
     for (const auto& core : result.cores) {
@@ -81,9 +82,9 @@ nlohmann::json coreFigures(const TrainResult& result, const haptics::SessionInfo
     return cores;
 }
 
-nlohmann::json figuresOf(const TrainResult& result, const haptics::SessionInfo& info)
+nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info)
 {
-    auto figures = timingFigures(result.timing);
+    auto figures = session::timingFigures(result.timing);
     figures["scene"] = info.scene;
     figures["model"] = info.model;
     figures["device"] = info.device;
@@ -98,10 +99,10 @@ nlohmann::json figuresOf(const TrainResult& result, const haptics::SessionInfo& 
         nearest[info.structures[i]] = 1e3 * result.nearest[i];
     }
     figures["nearest_mm"] = nearest;
-    figures["score"] = scoreFigures(result.score);
+    figures["score"] = session::scoreFigures(result.score);
     figures["core"] = coreFigures(result, info);
-    figures["force_hash"] = hexadecimal(result.forceHash);
-    figures["peak_memory_mb"] = peakMemoryMb();
+    figures["force_hash"] = session::hexadecimal(result.forceHash);
+    figures["peak_memory_mb"] = session::peakMemoryMb();
     figures["lost_records"] = result.lostRecords;
     figures["warnings"] = result.warnings;
     return figures;
@@ -132,7 +133,7 @@ std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSe
         100 * share, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
 }
 
-void summarise(const TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
+void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
 {
     const auto tick = result.timing.work.percentiles();
     const auto late = result.timing.lateness.percentiles();
@@ -181,32 +182,45 @@ std::string deviceInWords(const Options& o)
 // What would strike nothing would show nothing.
 void checkFaults(const Options& o)
 {
-    const auto need = [&](std::initializer_list<FaultKind> kinds, bool there, const char* hint) {
-        for (const FaultKind kind : kinds) {
-            if (has(o.faults, kind) && !there) {
+    const auto need = [&](std::initializer_list<session::FaultKind> kinds, bool there, const char* hint) {
+        for (const session::FaultKind kind : kinds) {
+            if (session::has(o.faults, kind) && !there) {
                 throw std::runtime_error(fmt::format("--inject: {}", hint));
             }
         }
     };
-    need({FaultKind::gap, FaultKind::late}, !o.unpaced, "gap and late strike the clock: leave out --unpaced");
-    need({FaultKind::stallViewer}, wantsWindow(o) || !o.pictures.empty(),
+    need({session::FaultKind::gap, session::FaultKind::late}, !o.unpaced,
+         "gap and late strike the clock: leave out --unpaced");
+    need({session::FaultKind::stallViewer}, wantsWindow(o) || !o.pictures.empty(),
          "stall-viewer stops the viewers that the session starts: add --view or --pictures");
-    need({FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
+    need({session::FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
 }
 
 void checkDevice(const Options& o)
 {
+    const session::DeviceKind& device = session::deviceKind(o.device);
     if (!o.trainee.empty() && o.device != "hand") {
         throw std::runtime_error("--trainee " + o.trainee +
                                  ": needs --device hand; mouse, falcon and record bring their own hand");
     }
-    if ((o.device == "mouse" || o.device == "falcon") && o.unpaced) {
+    if (device.somebodyHolds && o.unpaced) {
         throw std::runtime_error("--device " + o.device + ": somebody holds it: leave out --unpaced");
     }
-    if (o.device == "mouse" && !wantsWindow(o) && o.session.empty()) {
-        throw std::runtime_error(
-            "--device mouse: needs a window to move it in: add --view, or --session NAME and open palpate-view on it");
+    if (device.needsViewer && !wantsWindow(o) && o.session.empty()) {
+        throw std::runtime_error(fmt::format(
+            "--device {}: needs a window to move it in: add --view, or --session NAME and open palpate-view on it",
+            o.device));
     }
+}
+
+// "hand (a scripted trainee), mouse (of the viewer's window), ... or a record (.db) whose poses are played"
+std::string devicesInWords()
+{
+    std::string words;
+    for (const session::DeviceKind& kind : session::deviceKinds()) {
+        words += fmt::format("{}{}{}", words.empty() ? "" : ", ", kind.name.empty() ? "or " : "", kind.what);
+    }
+    return words;
 }
 
 // The tasks are built-in scenes; that of the scene itself goes with any.
@@ -228,18 +242,18 @@ void applyTask(Options& o)
         lesion.diameter = o.lesionDiameter * 1e-3;
         lesion.spiculated = !o.sphere;
         lesion.seed = o.changes.seed.value_or(1);
-        o.changes.lesion = LesionFrom{o.lesionFrom, lesion};
+        o.changes.lesion = session::LesionFrom{o.lesionFrom, lesion};
     }
 }
 
 // Everything that would fail at the end of a session for a reason that is there at its beginning.
 void checkOutputs(const Options& o)
 {
-    checkOutput(o.json);
-    checkOutput(o.report);
-    checkOutputFolder(o.pictures);
+    base::checkOutput(o.json);
+    base::checkOutput(o.report);
+    base::checkOutputFolder(o.pictures);
     const auto record = recordFile(o);
-    checkOutput(record);
+    base::checkOutput(record);
     if (!record.empty() && fs::exists(record)) {
         throw std::runtime_error(record.string() + ": exists already; choose another name or remove it" +
                                  (o.record.empty() ? " (the record beside the report)" : ""));
@@ -253,7 +267,7 @@ void checkOutputs(const Options& o)
 class Viewers {
 public:
     Viewers(const Options& o, const std::string& session)
-        : session_(session), layout_(o.layout), handIsHere_(o.device == "mouse")
+        : session_(session), layout_(o.layout), handIsHere_(session::deviceKind(o.device).needsViewer)
     {
         if (wantsWindow(o)) {
             openWindow();
@@ -295,7 +309,7 @@ public:
         }
     }
 
-    std::optional<ChildProcess> window, camera;
+    std::optional<base::ChildProcess> window, camera;
 
 private:
     void openWindow()
@@ -304,10 +318,10 @@ private:
         opened_ = std::chrono::steady_clock::now();
     }
 
-    void start(std::optional<ChildProcess>& viewer, std::vector<std::string> arguments) const
+    void start(std::optional<base::ChildProcess>& viewer, std::vector<std::string> arguments) const
     {
         arguments.insert(arguments.end(), {"--session", session_, "--wait", "30"});
-        viewer.emplace(programFolder() / "palpate-view", arguments,
+        viewer.emplace(base::programFolder() / "palpate-view", arguments,
                        "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
     }
 
@@ -318,7 +332,7 @@ private:
 };
 
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`.
-void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& viewers, TrainResult& result)
+void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& viewers, session::TrainResult& result)
 {
     const auto blame = [&result](const std::string& what) {
         result.problem += result.problem.empty() ? what : "; " + what;
@@ -334,18 +348,18 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& v
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
     }
     if (!o.json.empty()) {
-        attempt([&] { writeJson(o.json, figuresOf(result, info)); });
+        attempt([&] { command::writeJson(o.json, figuresOf(result, info)); });
     }
     if (!o.report.empty()) {
         const fs::path pictures = fs::is_directory(o.pictures) ? o.pictures : "";  // not there when the viewer failed
-        attempt([&] { writeReport(o.report, haptics::Record(recordFile(o)), pictures); });
+        attempt([&] { report::writeReport(o.report, haptics::Record(recordFile(o)), pictures); });
     }
 }
 
 void train(Options o)
 {
     for (const auto& text : o.inject) {
-        const auto faults = parseFaults(text);
+        const auto faults = session::parseFaults(text);
         o.faults.insert(o.faults.end(), faults.begin(), faults.end());
     }
     checkDevice(o);
@@ -355,16 +369,15 @@ void train(Options o)
     applyTask(o);
     std::shared_ptr<falcon::Driver> falcon;
     if (o.device == "falcon") {
-        falcon = openFalcon(o.falcon);
-        o.changes.arm = o.changes.arm.value_or("falcon");
+        falcon = session::openFalcon(o.falcon);
     }
-    const auto model = openSession(o.scene, o.changes);
-    const auto info = describeSession(model, o.scene, deviceInWords(o));
-    TrainOptions options;
-    options.device = o.device;
-    options.falcon = std::move(falcon);
-    options.trainee = o.trainee;
-    options.seed = o.changes.seed.value_or(1);
+    if (const auto arm = session::deviceKind(o.device).arm; !arm.empty()) {
+        o.changes.arm = o.changes.arm.value_or(std::string(arm));
+    }
+    const auto model = session::openSession(o.scene, o.changes);
+    const auto info = session::describeSession(model, o.scene, deviceInWords(o));
+    session::TrainOptions options;
+    options.device = {o.device, o.trainee, o.changes.seed.value_or(1), std::move(falcon)};
     options.session = sessionName(o);
     options.record = record;
     options.servo = {!o.unpaced, o.seconds};
@@ -376,8 +389,8 @@ void train(Options o)
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };
     }
-    Trainer trainer(model, info, options);
-    TrainResult result = trainer.run();
+    session::Trainer trainer(model, info, options);
+    session::TrainResult result = trainer.run();
     writeOutputs(o, info, viewers, result);
 
     if (o.json != "-") {
@@ -428,20 +441,16 @@ void addTrain(CLI::App& app)
         ->check(CLI::Range(2.0, 50.0))
         ->capture_default_str();
     c->add_flag("--lesion-sphere", o->sphere, "A ball instead of lobes and spikes");
-    c->add_option(
-         "--device", o->device,
-         "hand (a scripted trainee), mouse (of the viewer's window), falcon (Novint Falcon), or a record (.db) whose "
-         "poses are played")
-        ->capture_default_str();
-    addFalconOptions(*c, o->falcon);
+    c->add_option("--device", o->device, devicesInWords())->capture_default_str();
+    command::addFalconOptions(*c, o->falcon);
     c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
         ->check(CLI::IsMember(haptics::skillNames()));
     c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
-    addSetting(*c, o->changes);
+    command::addSetting(*c, o->changes);
     c->add_option("--arm", o->changes.arm, "Haptic device that the stabiliser reckons with and the hand holds")
         ->check(CLI::IsMember(haptics::deviceNames()));
     c->add_option("--dffb", o->changes.dffb, "Differential force feedback; fade: its gain falls over the session or trials")
-        ->check(CLI::IsMember(dffbChoices));
+        ->check(CLI::IsMember(session::dffbChoices));
     c->add_option("--trial", o->changes.trial,
                   "With --dffb fade: K/N, trial K of N; all guidance in the first, none in the last");
     c->add_option("--target", o->changes.target, "Structure to sample");
@@ -464,7 +473,7 @@ void addTrain(CLI::App& app)
         ->take_all();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
     c->final_callback([o, scene, c] {
-        checkFalconOptions(*c, o->device == "falcon");
+        command::checkFalconOptions(*c, o->device == "falcon");
         o->sceneGiven = scene->count() > 0;
         train(*o);
     });

@@ -2,10 +2,6 @@
 
 #include <CLI/App.hpp>
 
-#include <nlohmann/json_fwd.hpp>
-
-#include <filesystem>
-
 namespace palpate::apps {
 
 // Each command lives in its own file, adds itself to the program here, and does its work in CLI11's final callback.
@@ -23,8 +19,5 @@ void addPlan(CLI::App& app);
 void addPress(CLI::App& app);
 void addBench(CLI::App& app);
 void addDevices(CLI::App& app);
-
-/// Writes figures where `--json FILE` asked for them ("-" = standard output). Throws std::runtime_error.
-void writeJson(const std::filesystem::path& file, const nlohmann::json& figures);
 
 }  // namespace palpate::apps

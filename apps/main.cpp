@@ -1,7 +1,8 @@
-#include <apps/accuracy/command.h>
 #include <apps/command.h>
-#include <apps/stability/command.h>
-#include <apps/sweep/command.h>
+#include <base/build.h>
+#include <studies/accuracy/command.h>
+#include <studies/stability/command.h>
+#include <sweep/command.h>
 
 #include <CLI/CLI.hpp>
 
@@ -12,7 +13,7 @@
 int main(int argc, char** argv)
 {
     CLI::App app("Palpate: feel inside a segmented volume", "palpate");
-    app.set_version_flag("--version", PALPATE_BUILD);
+    app.set_version_flag("--version", std::string(palpate::base::build()));
     app.require_subcommand(1);
     app.failure_message([](const CLI::App* program, const CLI::Error& e) {
         // CLI11 notices a missing command before a wrong word in its place.
@@ -23,6 +24,7 @@ int main(int argc, char** argv)
         return "palpate: " + what + " (palpate --help lists what there is)\n";
     });
 
+    using namespace palpate;
     using namespace palpate::apps;
     addTrain(app);
     addImport(app);
@@ -36,9 +38,9 @@ int main(int argc, char** argv)
     addPress(app);
     addBench(app);
     addDevices(app);
-    addAccuracy(app);
-    addStability(app);
-    addSweep(app);
+    studies::addAccuracy(app);
+    studies::addStability(app);
+    sweep::addSweep(app);
 
     try {
         app.parse(argc, argv);

@@ -1,14 +1,16 @@
 // palpate-reference: the finite-element reference of one scene. A program of its own: what it links is under the GPL, see
 // reference/NOTICE.
 #include <apps/command.h>
-#include <apps/outputs.h>
-#include <apps/session.h>
-#include <experiments/reference_file.h>
+#include <base/build.h>
+#include <base/outputs.h>
+#include <command/json.h>
 #include <reference/ccx.h>
 #include <reference/press_path.h>
 #include <reference/symmetry.h>
 #include <reference/verification.h>
 #include <reference/vtu.h>
+#include <session/open.h>
+#include <studies/accuracy/reference_file.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -61,14 +63,14 @@ void say(fmt::format_string<Args...> format, Args&&... args)
     std::fflush(stderr);
 }
 
-experiments::TrialTool toolNamed(const std::string& name)
+studies::TrialTool toolNamed(const std::string& name)
 {
     std::vector<std::string> names;
-    for (const auto& tool : experiments::trialTools()) {
-        if (tool.kind == experiments::TrialKind::sphere && tool.name == name) {
+    for (const auto& tool : studies::trialTools()) {
+        if (tool.kind == studies::TrialKind::sphere && tool.name == name) {
             return tool;
         }
-        if (tool.kind == experiments::TrialKind::sphere) {
+        if (tool.kind == studies::TrialKind::sphere) {
             names.push_back(tool.name);
         }
     }
@@ -76,15 +78,15 @@ experiments::TrialTool toolNamed(const std::string& name)
         fmt::format("--tool {}: the reference is pressed by a sphere: {}", name, fmt::join(names, ", ")));
 }
 
-experiments::TrialTool toolOf(const Options& o)
+studies::TrialTool toolOf(const Options& o)
 {
-    experiments::TrialTool tool = toolNamed(o.tool);
+    studies::TrialTool tool = toolNamed(o.tool);
     if (o.radius > 0.0) {
         tool.radius = 1e-3 * o.radius;
         tool.name = fmt::format("sphere_{:g}mm", o.radius);
     }
     if (o.length > 0.0) {
-        tool.kind = experiments::TrialKind::capsule;
+        tool.kind = studies::TrialKind::capsule;
         tool.length = 1e-3 * o.length;
         tool.name = fmt::format("capsule_{:g}mm_{:g}mm", 1e3 * tool.radius, o.length);
     }
@@ -92,9 +94,9 @@ experiments::TrialTool toolOf(const Options& o)
 }
 
 // Straight in, and back out by the same looks.
-std::vector<experiments::TrialPose> posesOf(const Options& o, const experiments::TrialPath& path)
+std::vector<studies::TrialPose> posesOf(const Options& o, const studies::TrialPath& path)
 {
-    std::vector<experiments::TrialPose> poses;
+    std::vector<studies::TrialPose> poses;
     for (const double depth : o.looks) {
         poses.push_back({path.gap + 1e-3 * depth, 0.0});
     }
@@ -120,7 +122,7 @@ std::string numbered(const std::string& file, std::size_t look)
     return path.parent_path() / fmt::format("{}-{:02}{}", path.stem().string(), look + 1, path.extension().string());
 }
 
-json lookFigures(const reference::Solver& solver, const experiments::ReferenceState& state, double gap)
+json lookFigures(const reference::Solver& solver, const studies::ReferenceState& state, double gap)
 {
     return {{"pressed_mm", 1e3 * state.pose.pressed},
             {"depth_mm", 1e3 * (state.pose.pressed - gap)},
@@ -145,7 +147,7 @@ json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& t
 
 // The last state as a problem that CalculiX can solve: what touches the tool goes where it is, the rest follows.
 void exportLast(const std::string& file, const reference::PressProblem& problem, const reference::BodyMesh& body,
-                const reference::Solver& solver, experiments::TrialPose pose)
+                const reference::Solver& solver, studies::TrialPose pose)
 {
     constexpr double touching = 2e-5;  // [m]
     const reference::RigidTool tool = toolAt(problem, pose);
@@ -158,11 +160,11 @@ void exportLast(const std::string& file, const reference::PressProblem& problem,
 struct Results {
     std::vector<std::pair<std::string, std::string>> files;  // name, text
     json looks = json::array();
-    experiments::Reference reference;
-    experiments::ReferenceInfo info;
+    studies::Reference reference;
+    studies::ReferenceInfo info;
 };
 
-Results solveScene(const Options& o, const haptics::SessionModel& model, const experiments::TrialPath& path, json& figures)
+Results solveScene(const Options& o, const haptics::SessionModel& model, const studies::TrialPath& path, json& figures)
 {
     const volume::Tissue part = reference::mirroredPart(*model.tissue, planesOf(o));
     const reference::PressProblem problem{
@@ -183,7 +185,7 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const e
 
     Results out;
     const auto sink = [&](const reference::Solver& solver, std::size_t look, std::size_t looks,
-                          const experiments::ReferenceState& state) {
+                          const studies::ReferenceState& state) {
         say("{}: look {} of {}: {:.2f} mm in, {:.2f} mm along: {:.5f} {:.5f} {:.5f} N, {} Newton steps, {:.0f} s\n",
             model.scene.name, look + 1, looks, 1e3 * state.pose.pressed, 1e3 * state.pose.dragged, state.force.x,
             state.force.y, state.force.z, solver.newtonSteps(), cpuSeconds() - meshed);
@@ -208,7 +210,7 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const e
 // Figures beside closed forms; throws when one is off by more than its bound.
 void verify(const Options& o)
 {
-    checkOutput(o.json);
+    base::checkOutput(o.json);
     json rows = json::array();
     std::size_t over = 0;
     for (const auto& row :
@@ -227,7 +229,7 @@ void verify(const Options& o)
                         {"source", row.source}});
     }
     if (!o.json.empty()) {
-        writeJson(o.json, {{"verification", rows}});
+        command::writeJson(o.json, {{"verification", rows}});
     }
     if (over > 0) {
         throw std::runtime_error(fmt::format("{} of {} figures are off by more than their bounds", over, rows.size()));
@@ -243,10 +245,10 @@ void run(const Options& o)
     if (o.scene.empty()) {
         throw std::runtime_error("no scene: name one, or --verify");
     }
-    checkOutput(o.vtu);
-    checkOutput(o.json);
-    checkOutput(o.save);
-    checkOutput(o.ccx);
+    base::checkOutput(o.vtu);
+    base::checkOutput(o.json);
+    base::checkOutput(o.save);
+    base::checkOutput(o.ccx);
     if (o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty()) {
         throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
     }
@@ -256,11 +258,11 @@ void run(const Options& o)
             "leave --looks and --mirrored out");
     }
     const auto tool = toolOf(o);
-    SceneChanges changes;
+    session::SceneChanges changes;
     changes.model = "spring";  // the kernel's own body is not needed
-    const auto model = openSession(o.scene, changes);
-    const auto place = experiments::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
-    auto path = experiments::trialPath(*model.tissue, model.surface, place, tool, 1e-3 * o.size);
+    const auto model = session::openSession(o.scene, changes);
+    const auto place = studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
+    auto path = studies::trialPath(*model.tissue, model.surface, place, tool, 1e-3 * o.size);
     if (o.press > 0.0) {
         path.press = path.gap + 1e-3 * o.press;
     }
@@ -271,18 +273,18 @@ void run(const Options& o)
     json figures;
     Results results = solveScene(o, model, path, figures);
     auto& info = results.info;
-    info.key = experiments::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, model.scene.model.elastic.poissonCap);
+    info.key = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, model.scene.model.elastic.poissonCap);
     info.scene = model.scene.name;
     info.tool = tool.name;
     info.law = o.law;
     info.elements = o.elements;
     info.speed = 1e-3 * o.speed;
-    info.program = PALPATE_BUILD;
+    info.program = std::string(base::build());
     for (const auto& [file, text] : results.files) {
-        writeWhole(file, text);
+        base::writeWhole(file, text);
     }
     if (!o.save.empty()) {
-        experiments::saveReference(o.save, results.reference, info);
+        studies::saveReference(o.save, results.reference, info);
     }
     if (!o.json.empty()) {
         figures.update({{"scene", info.scene},
@@ -295,7 +297,7 @@ void run(const Options& o)
                         {"points", results.reference.position.size()},
                         {"seconds", info.seconds},
                         {"looks", results.looks}});
-        writeJson(o.json, figures);
+        command::writeJson(o.json, figures);
     }
 }
 
@@ -347,7 +349,7 @@ void addOptions(CLI::App& app, Options& o)
 int main(int argc, char** argv)
 {
     CLI::App app("The finite-element reference of a scene: mesh, solution, and files of both", "palpate-reference");
-    app.set_version_flag("--version", PALPATE_BUILD);
+    app.set_version_flag("--version", std::string(palpate::base::build()));
     app.failure_message([](const CLI::App*, const CLI::Error& e) {
         return std::string("palpate-reference: ") + e.what() + " (palpate-reference --help lists what there is)\n";
     });

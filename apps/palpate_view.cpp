@@ -1,5 +1,5 @@
-#include <apps/command.h>
 #include <apps/replay_player.h>
+#include <command/json.h>
 #include <render/viewer.h>
 
 #include <CLI/CLI.hpp>
@@ -35,7 +35,7 @@ void writeFigures(const std::string& file, const palpate::render::ViewerFigures&
                               {"frame_ms_p90", figures.frameP90 * ms},
                               {"delay_ms_p50", figures.delayP50 * ms},
                               {"delay_ms_p99", figures.delayP99 * ms}};
-    palpate::apps::writeJson(file, json);
+    palpate::command::writeJson(file, json);
 }
 
 // One line per picture, with nanoseconds.

@@ -1,9 +1,9 @@
 #include <apps/replay_player.h>
 
-#include <apps/session.h>
+#include <channel/channel.h>
 #include <haptics/broadcast.h>
 #include <haptics/simulation.h>
-#include <render/channel/channel.h>
+#include <session/open.h>
 
 #include <fmt/format.h>
 
@@ -77,7 +77,7 @@ struct ReplayPlayer::Impl {
     explicit Impl(const std::string& recordFile)
         : file(recordFile),
           record(recordFile),
-          model(reopenSession(recordFile, record.info())),
+          model(session::reopenSession(recordFile, record.info())),
           period(1.0 / record.info().rate),
           film(ticksOf(record, recordFile)),
           session(fmt::format("replay-{}", getpid())),

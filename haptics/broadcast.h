@@ -1,9 +1,9 @@
 #pragma once
 
+#include <channel/channel.h>
 #include <haptics/session_model.h>
 #include <haptics/simulation.h>
 #include <haptics/timing.h>
-#include <render/channel/channel.h>
 
 #include <optional>
 #include <string>

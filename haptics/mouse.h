@@ -1,9 +1,9 @@
 #pragma once
 
+#include <channel/layout.h>
 #include <haptics/arm.h>
 #include <haptics/device.h>
 #include <haptics/session_model.h>
-#include <render/channel/layout.h>
 
 #include <functional>
 #include <optional>

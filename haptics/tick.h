@@ -11,6 +11,8 @@
 namespace palpate::haptics {
 
 inline constexpr double tickSeconds = 1e-3;  // the usual period of the loop [s]
+/// Forces are ramped up after the start of a session: a prescribed path touches nothing before [s].
+inline constexpr double settledAfter = 0.6;
 
 inline constexpr std::size_t maxStructures = 16;  // target first, then the lookup table of vital structures
 inline constexpr std::size_t maxTissues = 64;

@@ -1,6 +1,6 @@
 #include <reference/press_path.h>
 
-#include <experiments/trial_errors.h>
+#include <studies/kernel/trial_errors.h>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -12,8 +12,8 @@
 
 namespace palpate::reference {
 
-using experiments::ReferenceState;
-using experiments::TrialPose;
+using studies::ReferenceState;
+using studies::TrialPose;
 
 namespace {
 
@@ -41,7 +41,7 @@ std::vector<TrialPose> looksOf(const PressProblem& problem)
 // First and last point of the surface that the tool presses on.
 std::pair<Vec3, Vec3> contactEnds(const PressProblem& problem)
 {
-    experiments::TrialLoad load(problem.path);
+    studies::TrialLoad load(problem.path);
     load.set({problem.path.gap, 0.0});
     const Vec3 first = load.load().focus.point;
     load.set({problem.path.press, problem.path.drag});
@@ -49,19 +49,19 @@ std::pair<Vec3, Vec3> contactEnds(const PressProblem& problem)
 }
 
 // ReferenceState::strain, among the cubes of the fine lattice.
-double localStrain(const std::vector<Vec3f>& u, const experiments::PositionCells& cells)
+double localStrain(const std::vector<Vec3f>& u, const studies::PositionCells& cells)
 {
     std::vector<double> strains;
     for (const auto& corners : cells.corners) {
         std::array<Vec3, 8> at;
         std::ranges::transform(corners, at.begin(), [&](std::uint32_t c) { return Vec3(u[c]); });
-        strains.push_back(experiments::equivalentStrain(experiments::meanGradient(at, cells.side)));
+        strains.push_back(studies::equivalentStrain(studies::meanGradient(at, cells.side)));
     }
-    return experiments::exceededStrain(std::move(strains), cells.side);
+    return studies::exceededStrain(std::move(strains), cells.side);
 }
 
-ReferenceState stateOf(const Solver& solver, const experiments::TrialLoad& load, const std::vector<Vec3>& points,
-                       const experiments::PositionCells& cells)
+ReferenceState stateOf(const Solver& solver, const studies::TrialLoad& load, const std::vector<Vec3>& points,
+                       const studies::PositionCells& cells)
 {
     ReferenceState state;
     state.pose = load.pose();
@@ -143,11 +143,11 @@ RigidTool toolAt(const PressProblem& problem, TrialPose pose)
     return {problem.path.at(pose), tool.radius, -tool.length * problem.path.inward};
 }
 
-experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink)
+studies::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink)
 {
-    experiments::Reference out;
+    studies::Reference out;
     out.position = referencePoints(problem);
-    const auto cells = experiments::positionCells(out.position);
+    const auto cells = studies::positionCells(out.position);
     const std::vector<Vec3> points(out.position.begin(), out.position.end());
     const auto materials = materialsOf(problem, body);
     Solver solver(body.mesh, materials, problem.solve);
@@ -156,7 +156,7 @@ experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& bo
     out.residual = problem.solve.tolerance;
     const auto poses = looksOf(problem);
     for (std::size_t look = 0; look < poses.size(); ++look) {
-        experiments::TrialLoad load(problem.path);
+        studies::TrialLoad load(problem.path);
         load.set(poses[look]);
         solver.press(toolAt(problem, poses[look]));
         out.states.push_back(ofAll(stateOf(solver, load, points, cells), problem.solve));

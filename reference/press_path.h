@@ -1,8 +1,8 @@
 #pragma once
 
-#include <experiments/kernel_trial.h>
 #include <reference/mesher.h>
 #include <reference/solve.h>
+#include <studies/kernel/kernel_trial.h>
 
 #include <functional>
 #include <string>
@@ -13,11 +13,11 @@ namespace palpate::reference {
 struct PressProblem {
     const volume::Tissue& tissue;
     const volume::DistanceField& surface;  // of the body at rest [m]
-    const experiments::TrialPath& path;
+    const studies::TrialPath& path;
     double speed = 20e-3;      // the looks are those of schedule(path, speed) [m/s]
     double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-]
     SolveOptions solve;
-    std::vector<experiments::TrialPose> looks{};  // where to solve; none: as speed says
+    std::vector<studies::TrialPose> looks{};  // where to solve; none: as speed says
 };
 
 /// Where to look at the solution: the points of a lattice 2 mm apart within 30 mm of the contact's path, and of one 6 mm
@@ -31,14 +31,13 @@ MeshOptions meshOptions(const PressProblem& problem, double size);
 std::vector<Material> materialsOf(const PressProblem& problem, const BodyMesh& body);
 
 /// The tool in a pose of the path.
-RigidTool toolAt(const PressProblem& problem, experiments::TrialPose pose);
+RigidTool toolAt(const PressProblem& problem, studies::TrialPose pose);
 
 /// Called after every look: its number from 0, of how many, and the state.
-using LookSink =
-    std::function<void(const Solver&, std::size_t look, std::size_t looks, const experiments::ReferenceState&)>;
+using LookSink = std::function<void(const Solver&, std::size_t look, std::size_t looks, const studies::ReferenceState&)>;
 
 /// Solves all looks of the path in order, from the path's start. Of a body that is mirrored, force and energy are of all of
 /// it. Throws std::runtime_error where that does not converge.
-experiments::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink);
+studies::Reference solvePath(const PressProblem& problem, const BodyMesh& body, const LookSink& sink);
 
 }  // namespace palpate::reference

@@ -1,9 +1,9 @@
 #include <reference/verification.h>
 
-#include <experiments/contact_formulas.h>
-#include <experiments/elastic_formulas.h>
 #include <reference/box_mesh.h>
 #include <reference/solve.h>
+#include <studies/accuracy/contact_formulas.h>
+#include <studies/accuracy/elastic_formulas.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -116,7 +116,7 @@ Rows bars()
             Solver stretched(mesh, std::vector<Material>{{modulus, poisson, stiffening}},
                              mirroredIn({true, true, true}, Law::neoHookean, elements));
             stretched.prescribe(pulledTop(side, 0.5 * side));
-            const double stress = experiments::neoHookeanTension(modulus, poisson, stiffening, 1.5);
+            const double stress = studies::neoHookeanTension(modulus, poisson, stiffening, 1.5);
             rows.push_back(rowOf("bar pulled to 1.5", "force [N]", -stretched.force().z, stress * side * side, 1e-4));
             rows.back().source = "uniaxial stretch of its energy density (Ogden 1984)";
             rows.back().setting =
@@ -137,7 +137,7 @@ Rows pointForce(Fineness fineness)
         Vec3 u(0.0);
         for (int image = 0; image < 8; ++image) {
             const Vec3 sign(image & 1 ? -1.0 : 1.0, image & 2 ? -1.0 : 1.0, image & 4 ? -1.0 : 1.0);
-            u += experiments::kelvinDisplacement(shear, poisson, sign * Vec3(0.02, 0.01, 0.03), x - sign * away);
+            u += studies::kelvinDisplacement(shear, poisson, sign * Vec3(0.02, 0.01, 0.03), x - sign * away);
         }
         return u;
     };
@@ -157,7 +157,7 @@ Rows pointForce(Fineness fineness)
         rows.push_back(fieldRow("point forces around a cube", points, exact, errors.back(), 0.1));
         rows.back().source = "Kelvin 1848";
         rows.back().setting = fmt::format("linear, {}, {} cells a side", nameOf(elements), cells.back());
-        const double order = experiments::convergenceOrder(sizes, errors);
+        const double order = studies::convergenceOrder(sizes, errors);
         rows.push_back(rowOf("point forces around a cube", "order of convergence [-]", order, 3.0, 15.0));
         rows.back().source = "quadratic elements, a smooth field";
         rows.back().setting =
@@ -170,8 +170,8 @@ Rows inclusion(Fineness fineness)
 {
     constexpr double ball = 10e-3, side = 30e-3, poisson = 0.45;
     constexpr double ratio = 10.0;
-    const experiments::Inclusion problem{ball, poisson, ratio, ratio, 0.01};
-    const auto exact = [&](Vec3 x) { return experiments::inclusionDisplacement(problem, x); };
+    const studies::Inclusion problem{ball, poisson, ratio, ratio, 0.01};
+    const auto exact = [&](Vec3 x) { return studies::inclusionDisplacement(problem, x); };
     const std::vector<Vec3> points = samples(side);
     const int cells = fineness == Fineness::quick ? 3 : 5;
     Rows rows;
@@ -213,7 +213,7 @@ VerificationRow sphere(const SphereCase& c, double radius, double depth, Finenes
     Solver solver(discInSlab(shape), std::vector<Material>{{modulus, c.poisson, 0.0}},
                   mirroredIn({true, true, false}, Law::linear, c.elements));
     solver.press({{0.0, 0.0, radius - depth}, radius});
-    const double force = experiments::hertzForce(modulus, c.poisson, radius, depth) * c.factor;
+    const double force = studies::hertzForce(modulus, c.poisson, radius, depth) * c.factor;
     VerificationRow row = rowOf(c.problem, "force [mN]", 1e3 * 4.0 * solver.force().z, 1e3 * force, quick ? 2.0 : 1.0);
     row.source = c.source;
     row.setting = fmt::format("linear, {}, nu {}, {} cells in the contact's radius", nameOf(c.elements), c.poisson, cells);
@@ -225,13 +225,13 @@ Rows spheres(Fineness fineness)
     // So shallow that the sphere is a paraboloid and the strain small; the contact's radius is 1 mm.
     constexpr double radius = 40e-3, depth = 0.025e-3, contact = 1e-3;
     const auto bonded = [&](double poisson, double thickness) {
-        return experiments::bondedLayerFactor(poisson, contact / thickness);
+        return studies::bondedLayerFactor(poisson, contact / thickness);
     };
     const std::array<SphereCase, 3> cases{
         {{"sphere on a thick layer", 15e-3, 0.45, Elements::p2, bonded(0.45, 15e-3),
           "Hertz 1882, depth by Dimitriadis et al. 2002"},
          {"sphere on a bonded layer, chi 0.125", 8e-3, 0.45, Elements::p2, bonded(0.45, 8e-3), "Dimitriadis et al. 2002"},
-         {"sphere on a bonded layer, chi 0.25", 4e-3, 0.4999, Elements::p2p1, experiments::incompressibleLayerFactor(0.25),
+         {"sphere on a bonded layer, chi 0.25", 4e-3, 0.4999, Elements::p2p1, studies::incompressibleLayerFactor(0.25),
           "Garcia, Garcia 2018"}}};
     Rows rows;
     for (const SphereCase& c : cases) {
@@ -255,17 +255,17 @@ VerificationRow punch(double perThickness, double poisson, Fineness fineness)
     patch.u = [](Vec3) { return Vec3(0.0, 0.0, -depth); };
     patch.components = {false, false, true};
     solver.prescribe(patch);
-    const double plain = experiments::flatPunchForce(modulus, poisson, radius, depth);
+    const double plain = studies::flatPunchForce(modulus, poisson, radius, depth);
     const double ours = 4.0 * solver.force().z;
     if (perThickness < 0.2) {
-        const double factor = experiments::deepPunchFactor(poisson, perThickness);
+        const double factor = studies::deepPunchFactor(poisson, perThickness);
         VerificationRow row =
             rowOf("flat punch on a thick layer", "force [mN]", 1e3 * ours, 1e3 * plain * factor, quick ? 3.0 : 1.0);
         row.source = "Sneddon 1965, finite depth to first order";
         row.setting = fmt::format("linear, P2, nu {}, a/h {:g}", poisson, perThickness);
         return row;
     }
-    const double factor = experiments::thinLayerPunchFactor(poisson, perThickness);
+    const double factor = studies::thinLayerPunchFactor(poisson, perThickness);
     VerificationRow row =
         rowOf("flat punch on a thin bonded layer", "force, half-spaces [-]", ours / plain, factor, quick ? 4.0 : 1.0);
     row.source = "Hayes et al. 1972, table";

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <render/channel/layout.h>
+#include <channel/layout.h>
 
 #include <cstdint>
 #include <string>

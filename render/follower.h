@@ -1,6 +1,6 @@
 #pragma once
 
-#include <render/channel/channel.h>
+#include <channel/channel.h>
 #include <render/overlay.h>
 #include <render/picture.h>
 #include <render/viewer.h>

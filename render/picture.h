@@ -1,7 +1,7 @@
 #pragma once
 
+#include <channel/channel.h>
 #include <render/canvas.h>
-#include <render/channel/channel.h>
 #include <render/deformation.h>
 #include <render/overlay.h>
 #include <render/screen_plan.h>

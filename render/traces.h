@@ -1,7 +1,7 @@
 #pragma once
 
+#include <channel/layout.h>
 #include <render/canvas.h>
-#include <render/channel/layout.h>
 #include <render/events.h>
 #include <render/screen_plan.h>
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <render/channel/layout.h>
+#include <channel/layout.h>
 #include <render/deformation.h>
 #include <render/leap_grid.h>
 #include <render/ray_budget.h>

@@ -11,16 +11,25 @@ import sys
 ARROWS = {
     "base": set(),
     "volume": set(),
+    "volume/prepare": {"base", "volume", "datasets"},
     "occupancy": {"volume"},
     "chainmail": {"volume", "occupancy"},
     "datasets": {"volume"},
-    "render/channel": {"base"},
-    "render": {"base", "render/channel"},
-    "haptics": {"volume", "occupancy", "chainmail", "datasets", "render/channel"},
+    "channel": {"base"},
+    "render": {"base", "channel"},
+    "haptics": {"volume", "occupancy", "chainmail", "datasets", "channel"},
     "haptics/falcon": {"volume", "datasets", "haptics"},
-    "experiments": {"volume", "occupancy", "chainmail", "datasets", "haptics"},
-    "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "experiments"},
-    "apps": {"base", "volume", "datasets", "haptics", "haptics/falcon", "render", "render/channel", "experiments", "reference"},
+    "session": {"base", "volume", "datasets", "chainmail", "haptics", "haptics/falcon", "channel"},
+    "report": {"base", "volume", "datasets", "haptics", "session"},
+    "command": {"base", "datasets", "session"},
+    "studies": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "report", "command", "channel"},
+    "planner": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "command", "studies"},
+    "sweep": {"base", "volume", "datasets", "haptics", "session", "report", "command"},
+    "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
+    "apps": {
+        "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
+        "studies", "planner", "sweep", "render", "reference",
+    },
 }
 # Third-party headers that stay in one folder.
 OWNERS = {
@@ -30,7 +39,7 @@ OWNERS = {
     "itk": {"tests"},  # an independent reader to compare with
     "vtk": {"render", "reference"},
     "GLFW/": {"render"},
-    "sqlite3": {"haptics", "apps"},
+    "sqlite3": {"haptics", "sweep"},
     "libusb": {"haptics"},
     "CGAL/": {"reference"},
     "getfem/": {"reference"},

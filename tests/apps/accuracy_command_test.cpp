@@ -1,6 +1,6 @@
-#include <experiments/accuracy.h>
-#include <experiments/kernel_rivals.h>
-#include <experiments/reference_file.h>
+#include <studies/accuracy/accuracy.h>
+#include <studies/accuracy/reference_file.h>
+#include <studies/kernel/kernel_rivals.h>
 
 #include <tests/apps/program.h>
 
@@ -15,7 +15,7 @@
 namespace palpate::apps {
 namespace {
 
-using namespace experiments;
+using namespace studies;
 using nlohmann::json;
 
 const char* const sceneText =

@@ -1,4 +1,4 @@
-#include <render/channel/channel.h>
+#include <channel/channel.h>
 #include <tests/apps/desktop.h>
 
 #include <gtest/gtest.h>

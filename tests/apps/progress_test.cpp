@@ -1,4 +1,4 @@
-#include <apps/progress.h>
+#include <command/progress.h>
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -53,7 +53,7 @@ TEST(Progress, ATerminalSeesTheClockGoOnAndTheLineTakenAway)
     ASSERT_GE(screen, 0);
     {
         const Redirected redirected(screen);
-        Progress progress(Progress::Clock::ticking);
+        command::Progress progress(command::Progress::Clock::ticking);
         progress.show("counting");
         // Said once; the seconds come from the clock.
         EXPECT_NE(readUntil(terminal, "1 s: counting").find("1 s: counting"), std::string::npos);
@@ -75,7 +75,7 @@ TEST(Progress, AFileSeesNothing)
     ASSERT_EQ(::pipe(ends), 0);
     {
         const Redirected redirected(ends[1]);
-        Progress progress(Progress::Clock::ticking);
+        command::Progress progress(command::Progress::Clock::ticking);
         progress.show("counting");
         ::usleep(1500000);
         progress.show("reading", 1);

@@ -1,5 +1,5 @@
-#include <apps/command.h>
 
+#include <apps/command.h>
 #include <haptics/score.h>
 
 #include <tests/haptics/synthetic_session.h>

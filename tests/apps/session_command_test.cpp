@@ -1,8 +1,8 @@
 #include <tests/apps/program.h>
 
+#include <channel/channel.h>
 #include <datasets/scene.h>
 #include <haptics/recorder.h>
-#include <render/channel/channel.h>
 
 #include <gtest/gtest.h>
 

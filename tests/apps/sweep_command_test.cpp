@@ -1,4 +1,4 @@
-#include <experiments/sweep/plan.h>
+#include <sweep/plan.h>
 #include <tests/apps/program.h>
 #include <tests/apps/sweep_plan.h>
 
@@ -234,7 +234,7 @@ TEST_F(Sweep, TheExampleOfTheDocumentIsAPlan)
     const std::string page = readText(PALPATE_SOURCE_DIR "/docs/sweeps.md");
     const auto begin = page.find("```toml\n") + 8;
     const std::string text = page.substr(begin, page.find("```", begin) - begin);
-    const auto example = experiments::parsePlan(text, "example.toml", experiments::namedScene);
+    const auto example = sweep::parsePlan(text, "example.toml", sweep::namedScene);
     EXPECT_EQ(example.cases(), 12U);
     EXPECT_EQ(example.marks.size(), 1U);
 }

@@ -1,5 +1,5 @@
-#include <render/channel/channel.h>
-#include <render/channel/segment.h>
+#include <channel/channel.h>
+#include <channel/segment.h>
 #include <tests/channel/example.h>
 
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 #include <reference/press_path.h>
 #include <reference/symmetry.h>
 #include <reference/vtu.h>
-#include <tests/experiments/small_block.h>
+#include <tests/studies/small_block.h>
 
 #include <gtest/gtest.h>
 #include <vtkCellData.h>
@@ -21,25 +21,24 @@ namespace {
 
 // The block under the 5 mm sphere, pressed 1 mm and not dragged, on a coarse mesh.
 struct Pressed {
-    haptics::SessionModel model = experiments::smallBlock();
-    experiments::TrialPlace place =
-        experiments::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
-    experiments::TrialPath path = shortPath();
+    haptics::SessionModel model = studies::smallBlock();
+    studies::TrialPlace place = studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
+    studies::TrialPath path = shortPath();
     PressProblem problem{*model.tissue, model.surface, path, 20e-3, 0.45, {}};
     BodyMesh body = meshBody(*model.tissue, meshOptions(problem, 3e-3));
     std::string vtu;
     std::vector<Vec3> corners;  // displacements of the mesh's points at the last look
-    experiments::Reference reference = solvePath(
-        problem, body, [&](const Solver& solver, std::size_t look, std::size_t looks, const experiments::ReferenceState&) {
+    studies::Reference reference = solvePath(
+        problem, body, [&](const Solver& solver, std::size_t look, std::size_t looks, const studies::ReferenceState&) {
             if (look + 1 == looks) {
                 vtu = vtuText(body.mesh, solver);
                 corners = solver.displacement(body.mesh.points);
             }
         });
 
-    experiments::TrialPath shortPath() const
+    studies::TrialPath shortPath() const
     {
-        auto p = experiments::trialPath(*model.tissue, model.surface, place, experiments::trialTools()[0], 2e-3);
+        auto p = studies::trialPath(*model.tissue, model.surface, place, studies::trialTools()[0], 2e-3);
         p.press = p.gap + 1e-3;
         p.drag = 0.1e-3;
         return p;

@@ -1,6 +1,6 @@
-#include <experiments/elastic_formulas.h>
 #include <reference/box_mesh.h>
 #include <reference/verification.h>
+#include <studies/accuracy/elastic_formulas.h>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
@@ -101,7 +101,7 @@ TEST(BoxMesh, GradedCellsGrowFromTheFineOnes)
 // Displacement and tractions go on through the ball's surface: the stress of the formula is found by differences.
 TEST(ElasticFormulas, TheInclusionsFieldIsContinuousAndInEquilibrium)
 {
-    const experiments::Inclusion problem{1.0, 0.3, 4.0, 7.0, 0.01};
+    const studies::Inclusion problem{1.0, 0.3, 4.0, 7.0, 0.01};
     const double mu = 1.0, lambda = 2.0 * mu * 0.3 / (1.0 - 0.6);
     const double bulk = lambda + 2.0 / 3.0 * mu;
     const auto traction = [&](Vec3 x, Vec3 n, double shear, double volume) {
@@ -110,8 +110,7 @@ TEST(ElasticFormulas, TheInclusionsFieldIsContinuousAndInEquilibrium)
         for (int j = 0; j < 3; ++j) {
             Vec3 step(0.0);
             step[j] = h;
-            g[j] = (experiments::inclusionDisplacement(problem, x + step) -
-                    experiments::inclusionDisplacement(problem, x - step)) /
+            g[j] = (studies::inclusionDisplacement(problem, x + step) - studies::inclusionDisplacement(problem, x - step)) /
                    (2.0 * h);
         }
         const double trace = g[0][0] + g[1][1] + g[2][2];
@@ -124,8 +123,8 @@ TEST(ElasticFormulas, TheInclusionsFieldIsContinuousAndInEquilibrium)
         return t;
     };
     for (const Vec3 n : {Vec3(0, 0, 1), glm::normalize(Vec3(1, 2, 3)), glm::normalize(Vec3(3, -1, 0.5))}) {
-        const Vec3 in = experiments::inclusionDisplacement(problem, (1.0 - 1e-9) * n);
-        const Vec3 out = experiments::inclusionDisplacement(problem, (1.0 + 1e-9) * n);
+        const Vec3 in = studies::inclusionDisplacement(problem, (1.0 - 1e-9) * n);
+        const Vec3 out = studies::inclusionDisplacement(problem, (1.0 + 1e-9) * n);
         EXPECT_LT(glm::distance(in, out), 1e-9);
         const Vec3 pulled = traction((1.0 - 1e-4) * n, n, 4.0 * mu, 7.0 * bulk);
         const Vec3 held = traction((1.0 + 1e-4) * n, n, mu, bulk);
@@ -136,17 +135,16 @@ TEST(ElasticFormulas, TheInclusionsFieldIsContinuousAndInEquilibrium)
 // At small strain E times it; without change of volume mu (a - 1/a^2).
 TEST(ElasticFormulas, TensionOfANeoHookeanBar)
 {
-    EXPECT_NEAR(experiments::neoHookeanTension(3000.0, 0.4, 0.0, 1.0 + 1e-6), 3000.0 * 1e-6, 1e-7);
-    EXPECT_NEAR(experiments::neoHookeanTension(3000.0, 0.4999999, 0.0, 1.5), 1000.0 * (1.5 - 1.0 / 2.25), 0.01);
-    EXPECT_GT(experiments::neoHookeanTension(3000.0, 0.45, 1.0, 1.5),
-              experiments::neoHookeanTension(3000.0, 0.45, 0.0, 1.5));
+    EXPECT_NEAR(studies::neoHookeanTension(3000.0, 0.4, 0.0, 1.0 + 1e-6), 3000.0 * 1e-6, 1e-7);
+    EXPECT_NEAR(studies::neoHookeanTension(3000.0, 0.4999999, 0.0, 1.5), 1000.0 * (1.5 - 1.0 / 2.25), 0.01);
+    EXPECT_GT(studies::neoHookeanTension(3000.0, 0.45, 1.0, 1.5), studies::neoHookeanTension(3000.0, 0.45, 0.0, 1.5));
 }
 
 TEST(ElasticFormulas, OrderOfExactPowers)
 {
     const std::array<double, 3> sizes{1.0, 0.5, 0.25};
     const std::array<double, 3> errors{8.0, 1.0, 0.125};
-    EXPECT_NEAR(experiments::convergenceOrder(sizes, errors), 3.0, 1e-12);
+    EXPECT_NEAR(studies::convergenceOrder(sizes, errors), 3.0, 1e-12);
 }
 
 TEST(Verification, EveryClosedFormIsMetOnCoarseMeshes)

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <render/channel/channel.h>
+#include <channel/channel.h>
 
 #include <cstdint>
 #include <vector>

@@ -1,5 +1,5 @@
 // Publishes the made-up body: publish_body SESSION play | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not shipped.
-#include <render/channel/channel.h>
+#include <channel/channel.h>
 #include <tests/render/body.h>
 
 #include <chrono>

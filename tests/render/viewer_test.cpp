@@ -1,4 +1,4 @@
-#include <render/channel/channel.h>
+#include <channel/channel.h>
 #include <render/deformation.h>
 #include <render/screen_plan.h>
 #include <render/view_frame.h>

@@ -29,7 +29,7 @@ FAULTS = [
     ("check_arrows", "volume/geometry.h", "#include <haptics/tick.h>\n", "volume/ must not include haptics/"),
     ("check_arrows", "chainmail/lattice.h", '#include "haptics/tick.h"\n', "chainmail/ must not include haptics/"),
     ("check_arrows", "render/picture.cpp", "#  include <haptics/tick.h>\n", "render/ must not include haptics/"),
-    ("check_arrows", "render/channel/layout.h", "#include <render/viewer.h>\n", "render/channel/ must not include render/"),
+    ("check_arrows", "channel/layout.h", "#include <render/viewer.h>\n", "channel/ must not include render/"),
     ("check_arrows", "haptics/servo.cpp", "#include <vtkActor.h>\n", "vtkActor.h belongs in reference, render/ only"),
     ("check_arrows", "apps/main.cpp", "#include <openvdb/openvdb.h>\n", "openvdb/openvdb.h belongs in volume/ only"),
     ("check_arrows", "haptics/dffb.cpp", "#include <apps/command.h>\n", "haptics/ must not include apps/"),

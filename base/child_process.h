@@ -1,0 +1,40 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::base {
+
+/// Another program running as a process of its own. Nothing that happens to it reaches the simulation.
+class ChildProcess {
+public:
+    /// Starts `program`, a path or a name to be looked for in PATH; its messages go to standard error. Throws
+    /// std::runtime_error, which ends in `remedy`, when it cannot be started.
+    ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy);
+    ChildProcess(const ChildProcess&) = delete;
+    ChildProcess& operator=(const ChildProcess&) = delete;
+    /// Asks it to end (SIGTERM) if it still runs, and after two seconds no longer asks (SIGKILL).
+    ~ChildProcess();
+
+    /// Waits up to `seconds` for it to end by itself. Returns its exit status; -1 when it was killed or still runs.
+    int wait(double seconds);
+    /// Whether a signal has killed it.
+    bool killed();
+    /// Stops it (SIGSTOP), or lets it go on (SIGCONT), if it still runs.
+    void stall(bool stopped) noexcept;
+
+private:
+    bool look();
+
+    pid_t pid_ = -1;
+    int status_ = -1;
+    bool killed_ = false;
+};
+
+/// Folder of the running program.
+std::filesystem::path programFolder();
+
+}  // namespace palpate::base

@@ -1,0 +1,74 @@
+#include <base/outputs.h>
+
+#include <fmt/format.h>
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <system_error>
+
+namespace palpate::base {
+
+namespace fs = std::filesystem;
+
+void checkOutput(const fs::path& file)
+{
+    if (file.empty() || file == "-") {
+        return;
+    }
+    std::error_code none;
+    if (fs::is_directory(file, none) || !file.has_filename()) {
+        throw std::runtime_error(file.string() + ": is a folder: give the name of a file");
+    }
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+    if (!fs::is_directory(folder, none)) {
+        throw std::runtime_error(
+            fmt::format("{}: cannot be written: there is no folder {}: make it first", file.string(), folder.string()));
+    }
+    if (access(fs::exists(file, none) ? file.c_str() : folder.c_str(), W_OK) != 0) {
+        throw std::runtime_error(
+            fmt::format("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno)));
+    }
+}
+
+void checkOutputFolder(const fs::path& folder)
+{
+    if (folder.empty()) {
+        return;
+    }
+    std::error_code none;
+    fs::path there = fs::absolute(folder);
+    while (!fs::exists(there, none) && there != there.root_path()) {
+        there = there.parent_path();
+    }
+    if (!fs::is_directory(there, none)) {
+        throw std::runtime_error(fmt::format("{}: cannot be made: {} is no folder", folder.string(), there.string()));
+    }
+    if (access(there.c_str(), W_OK) != 0) {
+        throw std::runtime_error(
+            fmt::format("{}: cannot be written ({}): choose another place", folder.string(), std::strerror(errno)));
+    }
+}
+
+void writeWhole(const fs::path& file, std::string_view bytes)
+{
+    fs::path half = file;
+    half += ".part";
+    std::ofstream out(half, std::ios::binary);
+    out << bytes;
+    out.close();
+    std::error_code failed;
+    if (out) {
+        fs::rename(half, file, failed);
+    }
+    if (!out || failed) {
+        std::error_code ignored;
+        fs::remove(half, ignored);
+        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
+    }
+}
+
+}  // namespace palpate::base

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace palpate::base {
+
+/// Checks before the work begins that it will be possible to write `file` ("" = not asked for, "-" = standard output).
+/// Throws std::runtime_error ("FILE: what is wrong and what to do").
+void checkOutput(const std::filesystem::path& file);
+
+/// As checkOutput() for a folder that is made, with those above it, when it is not there.
+void checkOutputFolder(const std::filesystem::path& folder);
+
+/// Writes a file that appears whole or not at all; one that is there is replaced. Throws std::runtime_error.
+void writeWhole(const std::filesystem::path& file, std::string_view bytes);
+
+}  // namespace palpate::base

@@ -1,0 +1,84 @@
+#include <base/quantities.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <initializer_list>
+#include <stdexcept>
+#include <utility>
+
+namespace palpate::base {
+
+namespace {
+
+// A number and what stands behind it, without the blanks between.
+std::optional<std::pair<double, std::string_view>> split(std::string_view text)
+{
+    double number = 0.0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || !std::isfinite(number)) {
+        return std::nullopt;
+    }
+    std::string_view unit = text.substr(static_cast<std::size_t>(end - text.data()));
+    unit.remove_prefix(std::min(unit.find_first_not_of(' '), unit.size()));
+    return std::pair(number, unit);
+}
+
+std::optional<double> scaled(std::string_view text, std::initializer_list<std::pair<std::string_view, double>> units)
+{
+    const auto parts = split(text);
+    for (const auto& [unit, scale] : units) {
+        if (parts && parts->second == unit) {
+            return scale * parts->first;
+        }
+    }
+    return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<double> timeOf(std::string_view text)
+{
+    return scaled(text, {{"us", 1e-6}, {"ms", 1e-3}, {"s", 1.0}});
+}
+
+std::optional<double> lengthOf(std::string_view text)
+{
+    return scaled(text, {{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1.0}});
+}
+
+double parseShare(const std::string& option, const std::string& text)
+{
+    const auto parts = split(text);
+    if (parts && (parts->second.empty() || parts->second == "%")) {
+        const double share = parts->second.empty() ? parts->first : parts->first / 100.0;
+        if (share > 0.0 && share < 1.0) {
+            return share;
+        }
+    }
+    throw std::runtime_error(fmt::format("{}: {}: must be over 0 % and under 100 %, as 3% or 0.03", option, text));
+}
+
+double parseTime(const std::string& option, const std::string& text)
+{
+    const auto seconds = timeOf(text);
+    if (seconds && *seconds > 0.0 && *seconds <= 1.0) {
+        return *seconds;
+    }
+    throw std::runtime_error(fmt::format("{}: {}: must be over 0 and up to 1 s, as 400us or 0.4ms", option, text));
+}
+
+double lengthFrom(const std::string& option, const std::string& text, double least, double most)
+{
+    const auto plain = lengthOf(text + "mm");
+    const auto length = plain ? plain : lengthOf(text);
+    if (!length || !(*length >= least && *length <= most)) {
+        throw std::runtime_error(
+            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
+    }
+    return *length;
+}
+
+}  // namespace palpate::base

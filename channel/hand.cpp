@@ -1,0 +1,82 @@
+#include <channel/channel.h>
+#include <channel/segment.h>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <bit>
+#include <utility>
+
+namespace palpate::channel {
+namespace {
+
+InputBlock& blockAt(void* page) noexcept
+{
+    return *static_cast<InputBlock*>(page);
+}
+
+// One that is dead is no holder.
+bool hold(InputBlock& block) noexcept
+{
+    const std::uint64_t mine = handOf(static_cast<std::uint64_t>(::getpid()));
+    std::uint64_t holder = block.holder.load(std::memory_order_acquire);
+    return !holderLives(holder) && block.holder.compare_exchange_strong(holder, mine, std::memory_order_acq_rel);
+}
+
+}  // namespace
+
+std::optional<ViewersHand> ViewersHand::take(const Subscriber& session)
+{
+    const int file = session.scenery().viewersHand != 0 ? session.openToWrite() : -1;
+    if (file < 0)
+        return std::nullopt;
+    void* mapped = ::mmap(nullptr, sizeof(InputBlock), PROT_READ | PROT_WRITE, MAP_SHARED, file,
+                          static_cast<off_t>(session.inputOffset()));
+    ::close(file);
+    if (mapped == MAP_FAILED)
+        return std::nullopt;
+    if (!hold(blockAt(mapped))) {
+        ::munmap(mapped, sizeof(InputBlock));
+        return std::nullopt;
+    }
+    ViewersHand hand;
+    hand.page_ = mapped;
+    return hand;
+}
+
+ViewersHand::ViewersHand(ViewersHand&& other) noexcept : page_(std::exchange(other.page_, nullptr)) {}
+
+ViewersHand& ViewersHand::operator=(ViewersHand&& other) noexcept
+{
+    if (this != &other) {
+        release();
+        page_ = std::exchange(other.page_, nullptr);
+    }
+    return *this;
+}
+
+ViewersHand::~ViewersHand()
+{
+    release();
+}
+
+void ViewersHand::release() noexcept
+{
+    if (page_ == nullptr)
+        return;
+    blockAt(page_).holder.store(0, std::memory_order_release);
+    ::munmap(page_, sizeof(InputBlock));
+    page_ = nullptr;
+}
+
+void ViewersHand::set(Input input) noexcept
+{
+    InputBlock& block = blockAt(page_);
+    constexpr std::size_t beat = offsetof(Input, beat) / sizeof(std::uint64_t);
+    auto words = std::bit_cast<std::array<std::uint64_t, inputWords>>(input);
+    words[beat] = block.words[beat].load(std::memory_order_relaxed) + 1;
+    writeLocked(block, words);
+}
+
+}  // namespace palpate::channel

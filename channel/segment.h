@@ -1,0 +1,201 @@
+#pragma once
+
+#include <base/process.h>
+#include <channel/layout.h>
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+/// The bytes of the segment, for its ends, publisher.cpp, subscriber.cpp and hand.cpp, and for their tests. Not part of the
+/// interface.
+namespace palpate::channel {
+
+/// Shared words are atomics so that a torn copy is a value to be thrown away and never a data race.
+using Word = std::atomic<std::uint64_t>;
+static_assert(Word::is_always_lock_free && sizeof(Word) == sizeof(std::uint64_t));
+
+inline constexpr std::size_t stateWords = sizeof(State) / sizeof(std::uint64_t);
+inline constexpr std::size_t inputWords = sizeof(Input) / sizeof(std::uint64_t);
+inline constexpr std::size_t displacementWords = sizeof(Displacement) / sizeof(std::uint64_t);
+inline constexpr std::size_t displacedSlots = 4;
+static_assert(sizeof(State) % sizeof(std::uint64_t) == 0 && sizeof(Input) % sizeof(std::uint64_t) == 0 &&
+              sizeof(Displacement) % sizeof(std::uint64_t) == 0);
+
+/// `magic` is written last: who reads it (acquire) sees all that is written once.
+struct Header {
+    Word magic;
+    std::uint64_t version = 0;
+    std::uint64_t layoutHash = 0;
+    std::uint64_t bytes = 0;  // of the segment
+    std::uint64_t ownerPid = 0;
+    std::uint64_t ownerStart = 0;  // start time of the owner [clock ticks since boot]: a recycled pid has another
+    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, imageOffset = 0, imageBytes = 0, stateOffset = 0,
+                  inputOffset = 0, displacedOffset = 0;
+    Word closed;  // 1: the owner has ended the session itself
+};
+
+/// Sequence lock: odd while the writer is inside. One writer, any number of readers.
+struct StateBlock {
+    alignas(64) Word sequence;
+    alignas(64) std::array<Word, stateWords> words;
+};
+
+/// The only part that a viewer writes: whoever holds it maps this page for writing, and the rest for reading only.
+struct InputBlock {
+    alignas(64) Word holder;    // handOf() the viewer; 0: nobody
+    alignas(64) Word sequence;  // as StateBlock's
+    alignas(64) std::array<Word, inputWords> words;
+};
+
+struct DisplacedSlot {
+    alignas(64) Word sequence;  // as StateBlock's
+    Word tick, publication, count;
+    std::array<Word, maxDisplaced * displacementWords> words;
+};
+
+/// Publication n (from 1) lies in slot n % displacedSlots. The writer fills the slot after the latest one and so never
+/// waits; a reader that is lapped notices by the slot's sequence and starts again at the latest.
+struct DisplacedBlock {
+    alignas(64) Word latest;
+    std::array<DisplacedSlot, displacedSlots> slot;
+};
+
+/// FNV-1a over what a reader compiled elsewhere must agree on.
+constexpr std::uint64_t layoutHash() noexcept
+{
+    std::uint64_t hash = 14695981039346656037ULL;
+    for (const std::size_t value : {sizeof(Header),
+                                    sizeof(Grid),
+                                    sizeof(TissueLook),
+                                    sizeof(GreyWindow),
+                                    sizeof(Scenery),
+                                    sizeof(State),
+                                    sizeof(Input),
+                                    sizeof(Displacement),
+                                    sizeof(StateBlock),
+                                    sizeof(InputBlock),
+                                    sizeof(DisplacedSlot),
+                                    sizeof(DisplacedBlock),
+                                    maxTissues,
+                                    maxStructures,
+                                    maxWindows,
+                                    maxDisplaced,
+                                    nameLength,
+                                    displacedSlots,
+                                    offsetof(Header, imageOffset),
+                                    offsetof(Header, ownerPid),
+                                    offsetof(Header, closed),
+                                    offsetof(Grid, origin),
+                                    offsetof(Grid, spacing),
+                                    offsetof(TissueLook, colour),
+                                    offsetof(TissueLook, opacity),
+                                    offsetof(Scenery, lattice),
+                                    offsetof(Scenery, tissues),
+                                    offsetof(Scenery, tissue),
+                                    offsetof(Scenery, structure),
+                                    offsetof(Scenery, warnDistance),
+                                    offsetof(Scenery, tool),
+                                    offsetof(Scenery, toolRadius),
+                                    offsetof(Scenery, entry),
+                                    offsetof(Scenery, aim),
+                                    offsetof(Scenery, forceCap),
+                                    offsetof(Scenery, window),
+                                    offsetof(Scenery, imageUnit),
+                                    offsetof(Scenery, imageLow),
+                                    offsetof(State, time),
+                                    offsetof(State, tip),
+                                    offsetof(State, bend),
+                                    offsetof(State, proxy),
+                                    offsetof(State, basic),
+                                    offsetof(State, total),
+                                    offsetof(State, phase),
+                                    offsetof(State, warning),
+                                    offsetof(State, tissue),
+                                    offsetof(State, inserted),
+                                    offsetof(State, distance),
+                                    offsetof(State, ahead),
+                                    offsetof(State, aheadTissue),
+                                    offsetof(State, coreTarget),
+                                    offsetof(State, missed),
+                                    offsetof(State, published),
+                                    offsetof(Input, axis),
+                                    offsetof(Input, held),
+                                    offsetof(Input, fires),
+                                    offsetof(Input, beat),
+                                    offsetof(Displacement, u)})
+        for (int byte = 0; byte < 8; ++byte)
+            hash = (hash ^ ((value >> (8 * byte)) & 0xFF)) * 1099511628211ULL;
+    return hash;
+}
+
+/// Display voxels of a scenery; 0 where its grid has a side without any.
+inline std::uint64_t voxelsOf(const Scenery& scenery) noexcept
+{
+    std::uint64_t count = 1;
+    for (const std::int32_t n : scenery.labels.size)
+        count *= n > 0 ? static_cast<std::uint64_t>(n) : 0;
+    return count;
+}
+
+/// "/palpate-SESSION". Throws std::runtime_error for a name that is not made of letters, digits, '-' and '_'.
+std::string segmentName(const std::string& session);
+
+/// Where the system keeps the segments (Linux).
+inline constexpr const char* segmentFolder = "/dev/shm";
+
+using base::processStart;
+
+/// Process `pid` as one word that no other process has, dead or alive (pids have 22 bits at most).
+inline std::uint64_t handOf(std::uint64_t pid) noexcept
+{
+    return pid << 42U | (processStart(pid) & ((1ULL << 42U) - 1));
+}
+
+inline bool holderLives(std::uint64_t hand) noexcept
+{
+    return hand != 0 && handOf(hand >> 42U) == hand;
+}
+
+/// A write, and the writer's half of a sequence lock without fences (H.-J. Boehm, "Can seqlocks get along with programming
+/// language memory models?", MSPC 2012): a reader that sees a word of this write (acquire) also sees the odd sequence
+/// before it, and throws its copy away. Goes on after a writer that died inside.
+template <class Block, std::size_t count>
+void writeLocked(Block& block, const std::array<std::uint64_t, count>& words) noexcept
+{
+    const std::uint64_t inside = block.sequence.load(std::memory_order_relaxed) | 1U;
+    block.sequence.store(inside, std::memory_order_relaxed);
+    for (std::size_t i = 0; i < count; ++i)
+        block.words[i].store(words[i], std::memory_order_release);
+    block.sequence.store(inside + 1, std::memory_order_release);
+}
+
+/// The reader's half: the words come before the second look at the sequence because their loads are acquires. Nothing when
+/// there has been no write, or none of `tries` copies was whole.
+template <std::size_t count, class Block>
+std::optional<std::array<std::uint64_t, count>> readLocked(const Block& block, int tries) noexcept
+{
+    std::array<std::uint64_t, count> words{};
+    for (int attempt = 0; attempt < tries; ++attempt) {
+        const std::uint64_t before = block.sequence.load(std::memory_order_acquire);
+        if (before == 0)
+            return std::nullopt;
+        if (before % 2 != 0)
+            continue;
+        for (std::size_t i = 0; i < count; ++i)
+            words[i] = block.words[i].load(std::memory_order_acquire);
+        if (block.sequence.load(std::memory_order_relaxed) == before)
+            return words;
+    }
+    return std::nullopt;
+}
+
+inline bool ownerLives(const Header& header) noexcept
+{
+    return header.ownerStart != 0 && processStart(header.ownerPid) == header.ownerStart;
+}
+
+}  // namespace palpate::channel

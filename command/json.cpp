@@ -1,0 +1,30 @@
+#include <command/json.h>
+
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+
+namespace palpate::command {
+
+// The text is there before the file is opened: figures that cannot be written down leave the file as it was. A name that is
+// not UTF-8 (a file's may be anything) is no reason to fail.
+void writeJson(const std::filesystem::path& file, const nlohmann::json& figures)
+{
+    const std::string text = figures.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
+    if (file == "-") {
+        if (!(std::cout << text << std::flush)) {
+            throw std::runtime_error("standard output: the figures cannot be written");
+        }
+        return;
+    }
+    std::ofstream out(file);
+    out << text;
+    out.close();
+    if (!out) {
+        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
+    }
+}
+
+}  // namespace palpate::command

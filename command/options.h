@@ -1,0 +1,17 @@
+#pragma once
+
+#include <session/falcon.h>
+#include <session/open.h>
+
+#include <CLI/App.hpp>
+
+namespace palpate::command {
+
+/// The option --setting of a command.
+void addSetting(CLI::App& command, session::SceneChanges& changes);
+
+void addFalconOptions(CLI::App& command, session::FalconOptions& options);
+/// Throws std::runtime_error when one of them was given without the Falcon.
+void checkFalconOptions(const CLI::App& command, bool falcon);
+
+}  // namespace palpate::command

@@ -1,0 +1,294 @@
+#include <planner/planner.h>
+
+#include <studies/kernel/kernel_rivals.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace palpate::planner {
+
+using datasets::ElasticSettings;
+using datasets::ModelLevel;
+using datasets::Strain;
+
+namespace {
+
+// The ladder. Windows fill whole vectors: a row of 15 or 31 nodes takes as long as one of 16 or 32.
+constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
+constexpr std::array windows{9, 13, 15, 21, 31};
+constexpr std::array cycles{1, 2};
+constexpr std::size_t mostReferenceCells = 400000;  // both references take some seconds
+constexpr std::size_t mostCells = 4U << 20;         // of any other grid
+constexpr std::size_t mostWindowNodes = 300000;     // no budget under 5 ms pays for more
+constexpr std::size_t mostPoints = 60000;           // at which errors are looked at
+// What a candidate is taken to need before it is tried: less than it will, so that none is passed over.
+constexpr double leastCycles = 0.8;  // many ticks need none
+constexpr double leastTouched = 50;
+constexpr double leastMoved = 200;
+
+studies::TrialTool sceneTool(const datasets::ToolSpec& tool)
+{
+    switch (tool.kind) {
+        case datasets::ToolKind::sphere:
+            return {"sphere", studies::TrialKind::sphere, tool.radius, 0.0};
+        case datasets::ToolKind::capsule:
+            return {"capsule", studies::TrialKind::capsule, tool.radius, tool.length};
+        default:
+            return {"needle", studies::TrialKind::needle, 0.0, 0.0};
+    }
+}
+
+// A twentieth of the least error that is asked for in earnest.
+studies::ReferenceOptions optionsOf(bool finiteStrain)
+{
+    return {.finiteStrain = finiteStrain, .tolerance = 5e-4, .mostCycles = 60, .mostPoints = mostPoints};
+}
+
+class Planner {
+public:
+    Planner(const haptics::SessionModel& model, const PlanRequest& request,
+            const std::function<void(const std::string&)>& progress)
+        : model_(model),
+          request_(request),
+          progress_(progress),
+          place_(studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim))
+    {
+    }
+
+    Plan run()
+    {
+        solve();
+        collect();
+        std::size_t tried = 0;
+        while (const auto next = mayBeCheapest()) {
+            PlanCandidate& c = plan_.candidates[*next];
+            progress_(fmt::format("{} of {}: {}", ++tried, plan_.candidates.size(), c.name()));
+            attempt(c);
+        }
+        std::ranges::stable_sort(plan_.candidates, {}, &PlanCandidate::microseconds);
+        plan_.choice = cheapest();
+        findNearest();
+        return std::move(plan_);
+    }
+
+private:
+    // The cheapest that holds both.
+    std::optional<std::size_t> cheapest() const
+    {
+        std::optional<std::size_t> best;
+        for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+            const PlanCandidate& c = plan_.candidates[i];
+            if (c.holdsError && c.holdsBudget && (!best || c.microseconds < plan_.candidates[*best].microseconds)) {
+                best = i;
+            }
+        }
+        return best;
+    }
+
+    // The one to try next; nothing when the rest cannot be cheaper than the best so far, or is over the budget for certain.
+    std::optional<std::size_t> mayBeCheapest() const
+    {
+        const auto best = request_.all ? std::nullopt : cheapest();
+        double bound = best ? plan_.candidates[*best].microseconds : 1e6 * request_.budget;
+        std::optional<std::size_t> next;
+        for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+            const PlanCandidate& c = plan_.candidates[i];
+            if (!c.tried && c.microseconds <= bound) {
+                bound = c.microseconds;
+                next = i;
+            }
+        }
+        return next;
+    }
+
+    const studies::TrialBody& bodyAt(double spacing)
+    {
+        const auto found = bodies_.find(spacing);
+        return found != bodies_.end() ? found->second
+                                      : bodies_
+                                            .emplace(spacing, studies::trialBody(*model_.tissue, model_.surface, spacing,
+                                                                                 poissonCap(), mostCells))
+                                            .first->second;
+    }
+
+    double poissonCap() const { return model_.scene.model.elastic.poissonCap; }
+
+    void solve()
+    {
+        progress_("the converged solution");
+        const studies::TrialBody finest =
+            studies::trialBody(*model_.tissue, model_.surface, spacings.back(), poissonCap(), mostReferenceCells);
+        path_ =
+            studies::trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
+        const std::array speeds{request_.speed};
+        reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(false));
+        plan_.strain = reference_.strain;
+        plan_.finiteReference = reference_.strain > largeStrain;
+        if (plan_.finiteReference) {
+            progress_("the converged solution at finite strain");
+            reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(true));
+        }
+        plan_.referenceSpacing = finest.cells.spacing;
+        plan_.referenceNodes = reference_.nodes;
+    }
+
+    void collect()
+    {
+        add({});
+        for (const double spacing : {spacings[2], spacings[0]}) {
+            PlanCandidate c;
+            c.level = ModelLevel::chainmail;
+            c.spacing = spacing;
+            c.touched = leastMoved;
+            add(c);
+        }
+        for (const double spacing : spacings) {
+            for (const int window : windows) {
+                addElastic(spacing, window);
+            }
+        }
+    }
+
+    void addElastic(double spacing, int window)
+    {
+        // Finer than the reference there is nothing to be told about errors.
+        if (spacing < 0.99 * plan_.referenceSpacing) {
+            return;
+        }
+        const studies::TrialBody& body = bodyAt(spacing);
+        PlanCandidate c;
+        c.level = ModelLevel::elastic;
+        c.elastic = model_.scene.model.elastic;
+        c.elastic.spacing = spacing;
+        c.elastic.window = window;
+        c.touched = leastTouched;
+        c.meanCycles = leastCycles;
+        const chainmail::Elastic elastic(body.body, {.window = window}, studies::TrialLoad(path_).load().focus);
+        c.nodes = elastic.nodes();
+        c.slots = slotsOf(elastic.stack());
+        if (c.nodes > mostWindowNodes) {
+            return;
+        }
+        for (const int n : cycles) {
+            c.elastic.cycles = n;
+            c.elastic.strain = Strain::small;
+            add(c);
+            if (plan_.finiteReference) {
+                c.elastic.strain = Strain::finite;
+                add(c);
+            }
+        }
+    }
+
+    void add(PlanCandidate c)
+    {
+        c.microseconds = predictedTime(c, request_.costs);
+        c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
+        plan_.candidates.push_back(std::move(c));
+    }
+
+    studies::TrialResult push(const PlanCandidate& c)
+    {
+        if (c.level == ModelLevel::spring) {
+            return studies::runTrial(studies::nothingModel(), path_, request_.speed, reference_);
+        }
+        if (c.level == ModelLevel::chainmail) {
+            const auto cells = volume::coveringGrid(model_.tissue->box(), c.spacing, 2.0 * c.spacing);
+            const chainmail::Lattice lattice(cells, model_.tissue->tissueOn(cells), model_.tissue->table());
+            return studies::chainMailTrial(lattice, path_, request_.speed, reference_, model_.scene.model.maxMoves);
+        }
+        return studies::elasticTrial(
+            bodyAt(c.elastic.spacing).body, path_, request_.speed, reference_,
+            {.window = c.elastic.window, .cycles = c.elastic.cycles, .finiteStrain = c.elastic.strain == Strain::finite});
+    }
+
+    void attempt(PlanCandidate& c)
+    {
+        const studies::TrialResult result = push(c);
+        c.tried = true;
+        c.touched = c.level == ModelLevel::spring ? 0.0 : result.meanTouched;
+        c.meanCycles = result.meanCycles;
+        c.microseconds = predictedTime(c, request_.costs);
+        c.rms = studies::spreadOf(result.looks, &studies::TrialErrors::rms).worst;
+        c.near = studies::spreadOf(result.looks, &studies::TrialErrors::near).worst;
+        c.error = std::hypot(c.near, referenceError);
+        if (c.level == ModelLevel::elastic) {
+            c.force = studies::spreadOf(result.looks, &studies::TrialErrors::force).worst;
+        }
+        c.holdsError = overError(c) <= 1.0;
+        c.holdsBudget = c.microseconds <= 1e6 * request_.budget;
+    }
+
+    // By what factor the worse of both errors is over what may be.
+    double overError(const PlanCandidate& c) const
+    {
+        const double force = request_.forceError ? c.force.value_or(0.0) / (100.0 * *request_.forceError) : 0.0;
+        return std::max(c.error / (100.0 * request_.error), force);
+    }
+
+    void findNearest()
+    {
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < plan_.candidates.size(); ++i) {
+            const PlanCandidate& c = plan_.candidates[i];
+            const double over = std::max(overError(c), c.microseconds / (1e6 * request_.budget));
+            if (c.tried && over < least) {
+                least = over;
+                plan_.nearest = i;
+            }
+        }
+    }
+
+    const haptics::SessionModel& model_;
+    const PlanRequest& request_;
+    const std::function<void(const std::string&)>& progress_;
+    studies::TrialPlace place_;
+    studies::TrialPath path_;
+    studies::Reference reference_;
+    std::map<double, studies::TrialBody> bodies_;
+    Plan plan_;
+};
+
+}  // namespace
+
+std::string PlanCandidate::name() const
+{
+    switch (level) {
+        case ModelLevel::spring:
+            return "spring";
+        case ModelLevel::chainmail:
+            return fmt::format("chainmail, {:g} mm", 1e3 * spacing);
+        default:
+            return fmt::format("elastic, {:g} mm, window {}, {} cycle{}{}", 1e3 * elastic.spacing, elastic.window,
+                               elastic.cycles, elastic.cycles == 1 ? "" : "s",
+                               elastic.strain == Strain::finite ? ", finite strain" : "");
+    }
+}
+
+double predictedTime(const PlanCandidate& c, const PlanCosts& costs) noexcept
+{
+    constexpr double microsecond = 1e-3;  // in nanoseconds
+    switch (c.level) {
+        case ModelLevel::spring:
+            return costs.usPerTick;
+        case ModelLevel::chainmail:
+            return costs.usPerTick + microsecond * costs.nsPerMove * c.touched;
+        default:
+            break;
+    }
+    const LawCosts& law = c.elastic.strain == Strain::finite ? costs.finite : costs.small;
+    return costs.usPerTick + tickTime(law, {static_cast<double>(c.slots), c.meanCycles, c.touched});
+}
+
+Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
+               const std::function<void(const std::string&)>& progress)
+{
+    return Planner(model, request, progress).run();
+}
+
+}  // namespace palpate::planner

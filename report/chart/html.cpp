@@ -1,0 +1,75 @@
+#include <base/outputs.h>
+#include <report/chart/axis.h>
+#include <report/chart/chart.h>
+#include <report/html.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace palpate::report {
+
+namespace {
+
+using nlohmann::json;
+
+json column(const std::vector<double>& values)
+{
+    json out = json::array();
+    for (const double v : values) {
+        out.push_back(std::isfinite(v) ? json(v) : json());
+    }
+    return out;
+}
+
+json axis(const std::string& label, bool log, AxisRange range)
+{
+    return {{"label", label}, {"log", log}, {"range", {range.low, range.high}}};
+}
+
+json chartData(const DrawableChart& drawn)
+{
+    const Chart& c = drawn.chart;
+    json series = json::array(), lines = json::array();
+    for (const ChartSeries& s : c.series) {
+        series.push_back({{"label", s.name},
+                          {"line", s.line},
+                          {"markers", s.markers},
+                          {"points", s.label},
+                          {"x", column(s.x)},
+                          {"y", column(s.y)}});
+    }
+    for (const ChartLine& b : c.bounds) {
+        lines.push_back({{"at", b.y}, {"label", b.name}, {"colour", "soft"}});
+    }
+    return {{"scatter", true},
+            {"x", axis(c.xLabel, c.logX, drawn.x)},
+            {"y", axis(c.yLabel, c.logY, drawn.y)},
+            {"series", std::move(series)},
+            {"lines", std::move(lines)}};
+}
+
+}  // namespace
+
+void writeChartHtml(std::span<const Chart> charts, const std::string& title, const std::filesystem::path& file,
+                    const std::string& below)
+{
+    if (charts.empty() && below.empty()) {
+        throw std::runtime_error(file.string() + ": there is no chart to draw");
+    }
+    json data = {{"charts", json::object()}};
+    std::string body = "<header><div><p class=\"eyebrow\">Palpate</p><h1>" + escape(title) + "</h1></div></header>";
+    for (std::size_t i = 0; i < charts.size(); ++i) {
+        const DrawableChart drawn = drawableChart(charts[i], file);
+        const std::string id = "chart" + std::to_string(i);
+        body += chartCard(id, escape(drawn.chart.title), escape(drawn.chart.note));
+        data["charts"][id] = chartData(drawn);
+    }
+    body +=
+        "<p class=\"note\">Drag to look closer, click twice to see all; a name in the legend hides its points. The pointer "
+        "shows the values of the point below it.</p>";
+    base::writeWhole(file, page(title, body + below, data));
+}
+
+}  // namespace palpate::report

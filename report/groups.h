@@ -1,0 +1,34 @@
+#pragma once
+
+// A page that compares groups of sessions, measure by measure.
+
+#include <haptics/measures.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::report {
+
+/// Sessions of one kind of trainee.
+struct ScoredGroup {
+    std::string name;
+    std::vector<haptics::Score> scores;
+};
+
+std::vector<double> valuesOf(const ScoredGroup& group, const haptics::Measure& measure);
+
+/// The value below which a share of the values lies, straight between neighbours. Infinity sorts last: the targeting error
+/// of a session that never fired is worse than any other.
+double quantile(std::vector<double> values, double share);
+
+/// How much more often a value of `a` is above one of `b` than below it, -1 to 1. It needs no distribution.
+/// Source: N. Cliff, "Dominance statistics: ordinal analyses to answer ordinal questions", Psychological Bulletin 114,
+/// 1993.
+double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b);
+
+/// Writes the page: every session as a dot, medians and quartiles of each group, Cliff's delta of the first group over the
+/// others. Needs no other file. Throws std::runtime_error.
+void writeGroupReport(const std::filesystem::path& html, const std::vector<ScoredGroup>& groups);
+
+}  // namespace palpate::report

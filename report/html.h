@@ -1,0 +1,41 @@
+#pragma once
+
+// The page of a report, and its parts that are text and tables.
+
+#include <report/data.h>
+
+#include <haptics/recorder.h>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <string>
+#include <string_view>
+
+namespace palpate::report {
+
+/// Text as it may stand in HTML, also in an attribute.
+std::string escape(std::string_view text);
+
+/// JSON that may stand in a script element: no "</script" and nothing that is not UTF-8.
+std::string embedded(const nlohmann::json& data);
+
+/// A whole page that needs no other file: `body` between the style and the scripts that draw data["charts"], each in the
+/// place that chartCard() made for its key.
+///
+/// @param title  plain text
+/// @param body   HTML
+std::string page(std::string_view title, std::string_view body, const nlohmann::json& data);
+
+/// A few words for a mark in a chart; not escaped.
+std::string eventLabel(const haptics::Event& event, const haptics::SessionInfo& info);
+
+std::string header(const ReportData& data, const haptics::Record& record);
+std::string scoreCard(const haptics::Score& score);
+std::string coresCard(const ReportData& data, const haptics::SessionInfo& info);
+/// An empty place for a chart; the page's script fills it. `title` and `note` are HTML.
+std::string chartCard(std::string_view id, std::string_view title, std::string_view note);
+std::string timingCard(const ReportData& data, const haptics::Record& record);
+std::string eventsCard(const ReportData& data, const haptics::SessionInfo& info);
+std::string sessionCard(const haptics::Record& record);
+
+}  // namespace palpate::report

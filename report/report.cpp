@@ -1,0 +1,279 @@
+#include <report/report.h>
+
+#include <base/outputs.h>
+#include <report/data.h>
+#include <report/html.h>
+#include <report/path.h>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+namespace palpate::report {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t maxPictures = 8;
+constexpr std::size_t shownVitals = 7;  // at first; the legend switches the others on
+constexpr double thesisCap = 8.5;       // [N]
+
+// Four decimals are under a tenth of what a chart can show, and halve the page.
+json columnsOf(const std::vector<std::vector<double>>& columns)
+{
+    json out = json::array();
+    for (const std::vector<double>& column : columns) {
+        json values = json::array();
+        for (const double v : column) {
+            values.push_back(std::isfinite(v) ? json(std::round(v * 1e4) / 1e4) : json());
+        }
+        out.push_back(std::move(values));
+    }
+    return out;
+}
+
+json axis(std::string_view name, std::string_view unit)
+{
+    return {{"name", name}, {"unit", unit}, {"label", std::string(name) + " [" + std::string(unit) + "]"}};
+}
+
+double capOf(const haptics::SessionInfo& info)
+{
+    for (const auto& [key, value] : info.extra) {
+        const double cap = key == "force_cap_n" ? std::strtod(value.c_str(), nullptr) : 0;
+        if (cap > 0) {
+            return cap;
+        }
+    }
+    return thesisCap;
+}
+
+// The cap, where forces come anywhere near it: on a chart of small ones it would leave them no room.
+json capLine(const ReportData& d, double cap)
+{
+    const bool near = d.score.peakForce > 0.5 * cap;
+    return near ? json::array({{{"at", cap}, {"label", "cap"}, {"colour", "c4"}}}) : json::array();
+}
+
+json forceChart(const ReportData& d, double cap)
+{
+    return {{"columns", columnsOf(d.forces)},
+            {"x", axis("time", "s")},
+            {"y", axis("force", "N")},
+            {"sync", "time"},
+            {"events", true},
+            {"lines", capLine(d, cap)},
+            {"series",
+             {{{"label", "basic"}, {"colour", "c1"}},
+              {{"label", "additional"}, {"colour", "c2"}},
+              {{"label", "total"}, {"colour", "c0"}, {"width", 2}}}}};
+}
+
+json depthChart(const ReportData& d, double cap)
+{
+    return {{"columns", columnsOf({d.profile.depth, d.profile.in, d.profile.peak, d.profile.out})},
+            {"x", axis("inserted", "mm")},
+            {"y", axis("total force", "N")},
+            {"lines", capLine(d, cap)},
+            {"series",
+             {{{"label", "going in, mean"}, {"colour", "c0"}, {"width", 2}},
+              {{"label", "going in, largest"}, {"colour", "c6"}},
+              {{"label", "coming out, mean"}, {"colour", "c1"}, {"width", 2}}}}};
+}
+
+json energyChart(const ReportData& d)
+{
+    return {{"columns", columnsOf(d.energy)},
+            {"x", axis("time", "s")},
+            {"y", axis("energy", "mJ")},
+            {"sync", "time"},
+            {"events", true},
+            {"series",
+             {{{"label", "given to the hand, net"}, {"colour", "c0"}, {"width", 2}},
+              {{"label", "taken by damping"}, {"colour", "c1"}}}}};
+}
+
+// The vital structures that came nearest are shown at first.
+std::vector<bool> shownAtFirst(const ReportData& d, std::size_t structures)
+{
+    std::vector<std::pair<double, std::size_t>> nearest;
+    for (std::size_t i = 1; i < structures; ++i) {
+        double least = std::numeric_limits<double>::infinity();
+        for (const double v : d.distances[2 + i]) {
+            least = v < least ? v : least;
+        }
+        nearest.emplace_back(least, i);
+    }
+    std::ranges::sort(nearest);
+    std::vector<bool> shown(structures, false);
+    for (std::size_t n = 0; n < nearest.size() && n < shownVitals; ++n) {
+        shown[nearest[n].second] = true;
+    }
+    if (structures > 0) {
+        shown[0] = true;
+    }
+    return shown;
+}
+
+json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
+{
+    const std::size_t structures = std::min(info.structures.size(), haptics::maxStructures);
+    const std::vector<bool> shown = shownAtFirst(d, structures);
+    json series = {{{"label", "inserted"}, {"colour", "c7"}, {"fill", true}, {"width", 1}}};
+    json lines = json::array();
+    for (std::size_t i = 0; i < structures; ++i) {
+        const std::string colour = "c" + std::to_string(i % 7);
+        json one = {{"label", info.structures[i]},
+                    {"colour", colour},
+                    {"width", i == 0 ? 2.2 : 1.6},
+                    {"show", shown[i] ? true : false}};
+        if (i >= 7) {
+            one["dash"] = {6, 3};
+        }
+        series.push_back(std::move(one));
+        const double warning = i < info.warnDistances.size() ? info.warnDistances[i] * 1e3 : 0;
+        if (i > 0 && warning > 0 && shown[i]) {
+            lines.push_back({{"at", warning}, {"label", "warning: " + info.structures[i]}, {"colour", colour}});
+        }
+    }
+    return {{"columns", columnsOf(d.distances)},
+            {"x", axis("time", "s")},
+            {"y", axis("distance", "mm")},
+            {"sync", "time"},
+            {"events", true},
+            {"lines", lines},
+            {"series", series}};
+}
+
+// As distanceChart(), by the length inside.
+json nearestChart(const ReportData& d, const haptics::SessionInfo& info)
+{
+    json chart = distanceChart(d, info);
+    chart["columns"] = columnsOf(d.nearest);
+    chart["x"] = axis("inserted", "mm");
+    chart["y"] = axis("least distance", "mm");
+    chart.erase("sync");
+    chart.erase("events");
+    chart["series"].erase(0);
+    return chart;
+}
+
+std::string base64(std::string_view bytes)
+{
+    constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string out;
+    out.reserve((bytes.size() + 2) / 3 * 4);
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        std::uint32_t group = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+        }
+        for (std::size_t k = 0; k < 4; ++k) {
+            out += i + k <= bytes.size() ? alphabet[group >> (18 - 6 * k) & 63U] : '=';
+        }
+    }
+    return out;
+}
+
+// At most eight, evenly picked in the order of their names.
+std::vector<std::filesystem::path> picturesIn(const std::filesystem::path& folder)
+{
+    std::vector<std::filesystem::path> all;
+    std::error_code failed;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
+        if (entry.is_regular_file() && entry.path().extension() == ".png") {
+            all.push_back(entry.path());
+        }
+    }
+    if (failed) {
+        throw std::runtime_error(folder.string() + ": pictures cannot be read: " + failed.message());
+    }
+    std::ranges::sort(all);
+    if (all.size() <= maxPictures) {
+        return all;
+    }
+    std::vector<std::filesystem::path> some;
+    for (std::size_t i = 0; i < maxPictures; ++i) {
+        some.push_back(all[i * (all.size() - 1) / (maxPictures - 1)]);
+    }
+    return some;
+}
+
+std::string picturesCard(const std::filesystem::path& folder)
+{
+    const auto files = folder.empty() ? std::vector<std::filesystem::path>{} : picturesIn(folder);
+    if (files.empty()) {
+        return {};
+    }
+    std::string out = "<section class=\"card\"><h2>Pictures</h2><div class=\"pictures\">";
+    for (const std::filesystem::path& file : files) {
+        std::ifstream in(file, std::ios::binary);
+        const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+        const std::string name = escape(file.stem().string());
+        out += "<figure><img alt=\"" + name + "\" src=\"data:image/png;base64," + base64(bytes) + "\"><figcaption>" + name +
+               "</figcaption></figure>";
+    }
+    return out + "</div></section>";
+}
+
+std::string sessionPage(const haptics::Record& record, const std::filesystem::path& pictures)
+{
+    const ReportData d = collect(record);
+    const haptics::SessionInfo& info = record.info();
+    const double cap = capOf(info);
+    json events = json::array();
+    for (const MarkedEvent& e : d.events) {
+        events.push_back(
+            {{"seconds", e.seconds}, {"kind", haptics::name(e.event.kind)}, {"label", eventLabel(e.event, info)}});
+    }
+    const json data = {{"events", events},
+                       {"charts",
+                        {{"forces", forceChart(d, cap)},
+                         {"energy", energyChart(d)},
+                         {"depth", depthChart(d, cap)},
+                         {"distances", distanceChart(d, info)},
+                         {"nearest", nearestChart(d, info)}}}};
+
+    std::string out = header(d, record) + scoreCard(d.score) + coresCard(d, info);
+    out +=
+        chartCard("forces", "Force against time",
+                  "Basic force of the tissue, additional force that warns, and the total as sent to the hand. Drag to look "
+                  "closer, click twice to see all; a name in the legend hides its line.");
+    out +=
+        chartCard("distances", "Distances against time",
+                  "From the tip to the target and the vital structures, in the deformed tissue. Dashed lines are where a "
+                  "warning begins; the shaded area is the length inserted.");
+    if (d.profile.depth.size() > 1) {
+        out += chartCard("depth", "Force against depth",
+                         "Total force by the length of the shaft inside, in bins of half a millimetre.");
+        out += chartCard("nearest", "Distances against depth",
+                         "The least distance from the tip to target and vital structures at each length inside.");
+    }
+    out += pathCard(d, info) + picturesCard(pictures);
+    out += chartCard(
+        "energy", "Energy",
+        "What all forces so far gave to the hand, less what it put in: below zero the tissue has taken energy, as it "
+        "should. And what the stabiliser's damping took from it.");
+    out += eventsCard(d, info) + timingCard(d, record) + sessionCard(record);
+    return page(info.scene + " - Palpate session", out, data);
+}
+
+}  // namespace
+
+void writeReport(const std::filesystem::path& html, const haptics::Record& record, const std::filesystem::path& pictures)
+{
+    base::writeWhole(html, sessionPage(record, pictures));
+}
+
+}  // namespace palpate::report

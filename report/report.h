@@ -1,0 +1,18 @@
+#pragma once
+
+#include <haptics/recorder.h>
+
+#include <filesystem>
+
+namespace palpate::report {
+
+/// Writes one HTML file about a session that needs nothing else and no network: outcome, score, cores, forces, distances,
+/// timing, scene and build.
+///
+/// @param pictures  a folder of which up to eight PNG files are put in, or empty
+///
+/// The file appears whole or not at all; one that is there is replaced. Throws std::runtime_error.
+void writeReport(const std::filesystem::path& html, const haptics::Record& record,
+                 const std::filesystem::path& pictures = {});
+
+}  // namespace palpate::report

@@ -1,0 +1,132 @@
+#include <session/deformed_state.h>
+
+#include <session/open.h>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace palpate::session {
+
+namespace {
+
+// Whether material that was at `rest` is at `p` now, and not the tool or air.
+bool holds(const occupancy::Body& body, Vec3 rest, Vec3 p)
+{
+    return glm::length(rest + occupancy::displacementAt(body, rest) - p) < 0.5 * body.grid.spacing;
+}
+
+// The box in which something is not at rest, and where it was [m]; low > high when all is at rest.
+volume::Box disturbed(const chainmail::DisplacedLattice& shape)
+{
+    const volume::NodeGrid& grid = shape.lattice().grid;
+    volume::Box box{Vec3(std::numeric_limits<double>::max()), Vec3(std::numeric_limits<double>::lowest())};
+    for (const chainmail::Node n : shape.moved()) {
+        const Vec3 rest = grid.position(grid.node(n));
+        const Vec3 now = rest + Vec3(shape.u()[n]);
+        box.low = glm::min(box.low, glm::min(rest, now) - 2.0 * grid.spacing);
+        box.high = glm::max(box.high, glm::max(rest, now) + 2.0 * grid.spacing);
+    }
+    return box;
+}
+
+bool inside(const volume::Box& box, Vec3 p)
+{
+    return p.x >= box.low.x && p.y >= box.low.y && p.z >= box.low.z && p.x <= box.high.x && p.y <= box.high.y &&
+           p.z <= box.high.z;
+}
+
+}  // namespace
+
+DeformedState::DeformedState(const std::string& file, double at, const std::function<void(double)>& progress)
+    : record_(file), model_(reopenSession(file, record_.info()))
+{
+    const double rate = record_.info().rate;
+    const std::uint64_t ticks = record_.ticks();
+    if (ticks == 0) {
+        throw std::runtime_error(file + ": no tick was recorded: there is no state to export");
+    }
+    const double last = static_cast<double>(ticks - 1) / rate;
+    if (!(at >= 0 && at <= last + 1e-9)) {
+        throw std::runtime_error(fmt::format("{}: --at {:g}s: the record runs from 0 s to {:g} s", file, at, last));
+    }
+    tick_ = static_cast<std::uint64_t>(std::floor(at * rate + 1e-6));
+    simulation_ = std::make_unique<haptics::Simulation>(model_, haptics::SimulationOptions{1.0 / rate, {}});
+    std::uint64_t next = 0;
+    record_.each([&](const haptics::TickRecord& then) {
+        if (next > tick_) {
+            return;
+        }
+        if (then.tick != next) {
+            throw std::runtime_error(
+                fmt::format("{}: tick {} is missing in the record: what comes after it cannot be "
+                            "computed",
+                            file, next));
+        }
+        if (simulation_->tick(then.device).total != then.total) {
+            throw std::runtime_error(
+                fmt::format("{}: the force differs from tick {} on: the record was made by another build "
+                            "({}) or machine",
+                            file, next, record_.info().build));
+        }
+        if (progress && next % 256 == 0) {
+            progress(static_cast<double>(next) / static_cast<double>(tick_ + 1));
+        }
+        ++next;
+    });
+}
+
+volume::LabelImage DeformedState::labels() const
+{
+    volume::LabelImage image = model_.tissue->labels();
+    const volume::Box box = disturbed(shape());
+    const occupancy::Body body = shape().body(model_.surface);
+    tbb::parallel_for(0, image.size.z, [&](int z) {
+        const volume::Tissue::Reader reader(*model_.tissue);
+        volume::forEachIndex(Index3(0, 0, z), Index3(image.size.x - 1, image.size.y - 1, z), [&](Index3 n) {
+            const Vec3 p = image.affine.toPatient(Vec3(n));
+            if (inside(box, p)) {
+                const Vec3 rest = occupancy::restPoint(body, p);
+                image.values[image.offset(n)] = holds(body, rest, p) ? reader.label(rest) : std::uint16_t{0};
+            }
+        });
+    });
+    return image;
+}
+
+std::vector<Vec3f> DeformedState::displacement() const
+{
+    std::vector<Vec3f> out(shape().u().begin(), shape().u().end());
+    for (Vec3f& u : out) {
+        u *= 1e3F;
+    }
+    return out;
+}
+
+std::vector<Vec3f> DeformedState::inverse() const
+{
+    const volume::NodeGrid& grid = model_.lattice.grid;
+    const volume::Box box = disturbed(shape());
+    const occupancy::Body body = shape().body(model_.surface);
+    std::vector<Vec3f> out(grid.count(), Vec3f(0.0F));
+    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+        const Vec3 p = grid.position(grid.node(i));
+        if (inside(box, p)) {
+            out[i] = Vec3f(1e3 * (occupancy::restPoint(body, p) - p));
+        }
+    });
+    return out;
+}
+
+volume::VoxelGrid DeformedState::grid() const
+{
+    const volume::NodeGrid& grid = model_.lattice.grid;
+    return {grid.size, {Mat3(grid.spacing), grid.origin}};
+}
+
+}  // namespace palpate::session

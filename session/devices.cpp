@@ -1,0 +1,99 @@
+#include <session/devices.h>
+
+#include <haptics/falcon/device.h>
+#include <haptics/hand.h>
+#include <haptics/mouse.h>
+#include <haptics/palpator.h>
+#include <haptics/replay.h>
+#include <haptics/trainee.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <stdexcept>
+
+namespace palpate::session {
+
+namespace {
+
+using haptics::Broadcast;
+using haptics::Device;
+using haptics::SessionModel;
+
+constexpr double startDistance = 30e-3;  // a device begins this far outside the body [m]
+
+std::unique_ptr<Device> openHand(const SessionModel& model, const DeviceRequest& request, const Broadcast*)
+{
+    if (model.scene.task == datasets::SessionTask::find) {
+        const std::string& who = request.trainee.empty() ? "expert" : request.trainee;
+        return std::make_unique<haptics::Palpator>(model, haptics::skillCalled(who), request.seed, startDistance);
+    }
+    if (!request.trainee.empty()) {
+        return std::make_unique<haptics::Trainee>(model, haptics::skillCalled(request.trainee), request.seed,
+                                                  startDistance);
+    }
+    return std::make_unique<haptics::HandDevice>(haptics::handBefore(model, startDistance));
+}
+
+std::unique_ptr<Device> openMouse(const SessionModel& model, const DeviceRequest&, const Broadcast* broadcast)
+{
+    assert(broadcast != nullptr);
+    return std::make_unique<haptics::MouseDevice>(haptics::mouseBefore(
+        model, [broadcast] { return broadcast->input(); }, startDistance));
+}
+
+std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceRequest& request, const Broadcast*)
+{
+    assert(request.falcon);
+    return falcon::falconBefore(model, request.falcon, startDistance);
+}
+
+std::unique_ptr<Device> openRecord(const SessionModel&, const DeviceRequest& request, const Broadcast*)
+{
+    return std::make_unique<haptics::ReplayDevice>(haptics::Record(request.name));
+}
+
+// A new device is a line here. The last stands for all other names.
+constexpr std::array kinds{
+    DeviceKind{"hand", "hand (a scripted trainee)", "", false, false, openHand},
+    DeviceKind{"mouse", "mouse (of the viewer's window)", "", true, true, openMouse},
+    DeviceKind{"falcon", "falcon (Novint Falcon)", "falcon", true, false, openFalcon},
+    DeviceKind{"", "a record (.db) whose poses are played", "", false, false, openRecord},
+};
+
+void checkTool(const DeviceRequest& request, const datasets::Scene& scene)
+{
+    const bool needle = scene.tool.kind == datasets::ToolKind::needle;
+    if (needle && scene.task == datasets::SessionTask::find) {
+        throw std::runtime_error(scene.name +
+                                 ": task \"find\" with a needle: give [tool] kind = \"capsule\" or \"sphere\"");
+    }
+    if (!needle && scene.task == datasets::SessionTask::biopsy && !request.trainee.empty()) {
+        throw std::runtime_error(
+            fmt::format("{}: --trainee {} takes a biopsy and the tool is no needle: choose another scene, or add --palpate",
+                        scene.name, request.trainee));
+    }
+}
+
+}  // namespace
+
+std::span<const DeviceKind> deviceKinds() noexcept
+{
+    return kinds;
+}
+
+const DeviceKind& deviceKind(std::string_view name) noexcept
+{
+    const auto* const found = std::ranges::find(kinds, name, &DeviceKind::name);
+    return found != kinds.end() ? *found : kinds.back();
+}
+
+std::unique_ptr<Device> openDevice(const SessionModel& model, const DeviceRequest& request, const Broadcast* broadcast)
+{
+    checkTool(request, model.scene);
+    return deviceKind(request.name).open(model, request, broadcast);
+}
+
+}  // namespace palpate::session

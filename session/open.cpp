@@ -1,0 +1,211 @@
+#include <session/open.h>
+
+#include <base/build.h>
+#include <datasets/insert.h>
+#include <datasets/scene_text.h>
+#include <haptics/replay.h>
+#include <haptics/score.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cstdio>
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::session {
+
+namespace {
+
+using datasets::Scene;
+
+// The share of guidance in trial K of N: all in the first, none in the last.
+double gainOfTrial(const std::string& trial)
+{
+    int k = 0, n = 0, read = 0;
+    const bool two = std::sscanf(trial.c_str(), "%5d/%5d%n", &k, &n, &read) == 2;
+    if (!two || static_cast<std::size_t>(read) != trial.size() || n < 2 || k < 1 || k > n) {
+        throw std::runtime_error(
+            fmt::format("--trial {}: must be K/N, trial K of N, with N 2 or more and K from 1 to N", trial));
+    }
+    return static_cast<double>(n - k) / (n - 1);
+}
+
+void changeDffb(datasets::DffbParameters& dffb, const std::string& choice, const std::optional<std::string>& trial)
+{
+    using datasets::DffbMode;
+    if (choice == "off" || choice == "thesis") {
+        dffb.mode = choice == "off" ? DffbMode::off : DffbMode::thesis;
+    } else if (choice == "field" || dffb.mode == DffbMode::off) {
+        dffb.mode = DffbMode::field;
+    }
+    if (choice == "fade" && trial) {
+        dffb.gain *= gainOfTrial(*trial);
+        dffb.fade = 0.0;
+    } else if (choice == "fade" && dffb.fade <= 0.0) {
+        dffb.fade = fadeSeconds;
+    }
+}
+
+// A fingertip looks for the target instead of a needle.
+void palpated(Scene& scene)
+{
+    scene.task = datasets::SessionTask::find;
+    scene.dffb.mode = datasets::DffbMode::off;
+    scene.script.clear();
+    if (scene.tool.kind == datasets::ToolKind::needle) {
+        scene.tool.kind = datasets::ToolKind::capsule;
+        scene.tool.radius = 6e-3;
+        scene.tool.length = 30e-3;
+    }
+}
+
+void change(Scene& scene, const SceneChanges& changes)
+{
+    if (changes.model) {
+        const auto* const at = std::find(datasets::modelLevels.begin(), datasets::modelLevels.end(), *changes.model);
+        assert(at != datasets::modelLevels.end());
+        scene.model.level = static_cast<datasets::ModelLevel>(at - datasets::modelLevels.begin());
+    }
+    if (changes.setting) {
+        scene.model.setting = *changes.setting;
+        scene.model.elastic = datasets::elasticSetting(*changes.setting, scene.model.elastic);
+    }
+    if (changes.trial && changes.dffb != "fade") {
+        throw std::runtime_error("--trial: says how far a study's guidance has faded: add --dffb fade");
+    }
+    if (changes.dffb) {
+        changeDffb(scene.dffb, *changes.dffb, changes.trial);
+    }
+    if (changes.arm) {
+        scene.device = *changes.arm;
+    }
+    scene.source.inserts.insert(scene.source.inserts.end(), changes.inserts.begin(), changes.inserts.end());
+    if (changes.palpate) {
+        palpated(scene);
+    }
+    if (changes.target) {
+        scene.target = *changes.target;
+    }
+    if (changes.seed) {
+        scene.source.phantom.seed = *changes.seed;
+    }
+    if (changes.voxelsPerSide) {
+        scene.source.phantom.numbers["voxels_per_side"] = *changes.voxelsPerSide;
+    }
+}
+
+std::string_view levelOf(const Scene& scene)
+{
+    return datasets::modelLevels[static_cast<std::size_t>(scene.model.level)];
+}
+
+bool anyOf(const SceneChanges& c)
+{
+    return c.model || c.setting || c.arm || c.dffb || c.trial || c.target || c.seed || c.voxelsPerSide || c.palpate ||
+           !c.inserts.empty();
+}
+
+// The text must stay the scene: a replay is built from it.
+Scene changed(Scene scene, const SceneChanges& changes, const std::string& origin)
+{
+    if (!anyOf(changes)) {
+        return scene;
+    }
+    const bool idleSeed = changes.seed && !changes.seedElsewhere;
+    if (!scene.source.file.empty() && (idleSeed || changes.voxelsPerSide)) {
+        throw std::runtime_error(
+            fmt::format("{}: the volume is no phantom: {} changes nothing", origin, idleSeed ? "--seed" : "--voxels"));
+    }
+    change(scene, changes);
+    if (changes.setting && scene.model.level != datasets::ModelLevel::elastic) {
+        throw std::runtime_error(fmt::format("{}: the tissue model is {}: --setting changes nothing; add --model elastic",
+                                             origin, levelOf(scene)));
+    }
+    return datasets::parseScene(datasets::sceneText(scene), origin);
+}
+
+Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissue, const SceneChanges& changes)
+{
+    return datasets::sceneForVolume(std::filesystem::absolute(file), tissue, changes.target.value_or(""));
+}
+
+}  // namespace
+
+volume::Tissue loadVolume(const std::filesystem::path& file)
+{
+    if (std::filesystem::is_directory(file)) {
+        throw std::runtime_error(file.string() + ": is a folder: give a volume (.vdb)");
+    }
+    return volume::Tissue::load(file);
+}
+
+namespace {
+
+// The volume with the lesion of --lesion-from in it, which becomes the target where no other is asked for.
+volume::Tissue withLesion(volume::Tissue tissue, SceneChanges& changes)
+{
+    if (!changes.lesion) {
+        return tissue;
+    }
+    changes.inserts.push_back(datasets::placeLesion(tissue, changes.lesion->from, changes.lesion->shape));
+    changes.target = changes.target.value_or(changes.lesion->shape.name);
+    return datasets::withInserts(tissue, changes.inserts);
+}
+
+}  // namespace
+
+haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
+{
+    const std::filesystem::path path(what);
+    if (path.extension() == ".vdb") {
+        auto alone = loadVolume(path);
+        auto tissue = std::make_shared<const volume::Tissue>(withLesion(std::move(alone), changes));
+        auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
+        return haptics::buildModel(std::move(scene), std::move(tissue));
+    }
+    if (changes.lesion) {
+        throw std::runtime_error(
+            fmt::format("{}: --lesion-from {}: needs the phantom's volume (.vdb) for SCENE; `palpate import` makes it",
+                        what, changes.lesion->from.string()));
+    }
+    auto builtIn = datasets::builtInScene(what);
+    if (!builtIn && std::filesystem::is_directory(path)) {
+        throw std::runtime_error(what + ": is a folder: give a scene (.toml) or a volume (.vdb)");
+    }
+    if (!builtIn && !std::filesystem::exists(path)) {
+        throw std::runtime_error(fmt::format("{}: no such scene or volume; built-in scenes are: {}", what,
+                                             fmt::join(datasets::builtInScenes(), ", ")));
+    }
+    auto scene = changed(builtIn ? *builtIn : datasets::loadScene(path), changes, what);
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    return haptics::buildModel(std::move(scene), std::move(tissue));
+}
+
+haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)
+{
+    auto scene = datasets::parseScene(info.sceneText, info.sceneOrigin);
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    auto model = haptics::buildModel(std::move(scene), std::move(tissue));
+    if (haptics::modelHash(model) != info.volumeHash) {
+        throw std::runtime_error(file +
+                                 ": the volume or the tissue table of this session has changed since it was "
+                                 "recorded; replay it with those it was recorded with");
+    }
+    return model;
+}
+
+haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
+                                     const std::string& device)
+{
+    haptics::SessionInfo info = haptics::infoOf(model);
+    info.sceneOrigin = origin;
+    info.device = device;
+    info.build = std::string(base::build());
+    info.seed = model.scene.source.phantom.seed;
+    return info;
+}
+
+}  // namespace palpate::session

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <datasets/scene.h>
+#include <haptics/recorder.h>
+#include <haptics/session_model.h>
+#include <volume/tissue.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::session {
+
+/// What --dffb takes: `on` is the scene's own mode, or `field` where it has none; `fade` is `on` with a gain that falls to
+/// nothing, over the trials of a study (--trial) or else over the session (the scene's fade_s, or fadeSeconds).
+inline const std::vector<std::string> dffbChoices{"on", "off", "thesis", "field", "fade"};
+inline constexpr double fadeSeconds = 120.0;
+
+/// A lesion at one of the places that a file names.
+struct LesionFrom {
+    std::filesystem::path from;  // see datasets::loadLocations()
+    datasets::Insert shape;      // its place is chosen by its seed
+};
+
+/// What the command line changes in a scene.
+struct SceneChanges {
+    std::optional<std::string> model;    // one of datasets::modelLevels
+    std::optional<std::string> setting;  // of level `elastic`: one of datasets::elasticSettings()
+    std::optional<std::string> dffb;     // one of dffbChoices
+    std::optional<std::string> trial;    // with "fade": "K/N"
+    std::optional<std::string> arm;      // haptic device: one of haptics::deviceNames()
+    std::optional<std::string> target;   // structure
+    std::optional<std::uint64_t> seed;   // of a phantom
+    bool seedElsewhere = false;          // it decides more than a phantom: no error where there is none
+    std::optional<double> voxelsPerSide;
+    std::optional<LesionFrom> lesion;  // only of a volume (.vdb)
+    bool palpate = false;              // find the target with a fingertip instead of taking a core of it
+    std::vector<datasets::Insert> inserts;
+};
+
+/// Loads a volume (.vdb). Throws std::runtime_error, also for a folder.
+volume::Tissue loadVolume(const std::filesystem::path& file);
+
+/// The scene called `what`: a built-in one by name, a TOML file, or a volume (.vdb) with the standard biopsy on it. Loads
+/// the volume and builds the model. Throws std::runtime_error, also for a change that has nothing to change.
+haptics::SessionModel openSession(const std::string& what, SceneChanges changes);
+
+/// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now.
+haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info);
+
+/// What a record says about this session.
+haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
+                                     const std::string& device);
+
+}  // namespace palpate::session

@@ -1,0 +1,263 @@
+#include <session/trainer.h>
+
+#include <channel/channel.h>
+#include <haptics/broadcast.h>
+#include <haptics/simulation.h>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <thread>
+
+namespace palpate::session {
+
+namespace {
+
+using namespace haptics;
+
+constexpr std::size_t mostCores = 64;
+constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
+
+std::atomic<bool> interrupted{false};
+
+void onSignal(int)
+{
+    interrupted = true;
+}
+
+// Ctrl-C and a polite kill end the session in good order, and end the program again once the session is over.
+class GoodOrder {
+public:
+    GoodOrder()
+    {
+        struct sigaction action {};
+        action.sa_handler = onSignal;
+        sigaction(SIGINT, &action, &interrupt_);
+        sigaction(SIGTERM, &action, &terminate_);
+    }
+    ~GoodOrder()
+    {
+        sigaction(SIGINT, &interrupt_, nullptr);
+        sigaction(SIGTERM, &terminate_, nullptr);
+    }
+    GoodOrder(const GoodOrder&) = delete;
+    GoodOrder& operator=(const GoodOrder&) = delete;
+
+private:
+    struct sigaction interrupt_ {
+    }, terminate_{};
+};
+
+std::unique_ptr<Device> openWithFaults(const TrainOptions& options, const SessionModel& model, const Broadcast& broadcast)
+{
+    std::unique_ptr<Device> device = openDevice(model, options.device, &broadcast);
+    return options.faults.empty() ? std::move(device) : std::make_unique<FaultyDevice>(std::move(device), options.faults);
+}
+
+void sleepThroughGap(const Faults& faults, std::uint64_t tick) noexcept
+{
+    if (const double seconds = gapAfter(faults, tick); seconds > 0.0) {
+        std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+    }
+}
+
+// One line on the terminal that tells how the session goes.
+void showProgress(const channel::State& s)
+{
+    constexpr std::array phases{"free", "touching", "inserted"};
+    const Vec3 force(s.total[0], s.total[1], s.total[2]);
+    fmt::print(stderr, "\r{:6.1f} s  {:<8} {:5.1f} mm inside  {:5.2f} N  target {:5.1f} mm  ", s.time,
+               phases[static_cast<std::size_t>(s.phase)], 1e3 * s.inserted, glm::length(force), 1e3 * s.distance[0]);
+}
+
+// What there is to do outside the loop while it runs. The progress is read as a viewer reads it.
+void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
+{
+    const bool terminal = isatty(STDERR_FILENO) != 0;
+    const auto viewer = channel::Subscriber::attach(options.session);
+    while (!done) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        const auto state = terminal && viewer ? viewer->state() : std::nullopt;
+        if (state) {
+            showProgress(*state);
+        }
+        if (options.lookAfter && !options.lookAfter()) {
+            interrupted = true;
+        }
+    }
+    if (terminal) {
+        fmt::print(stderr, "\r{:70}\r", "");
+    }
+}
+
+// Takes in what the session's figures need, tick by tick, in the servo thread.
+struct Tally {
+    explicit Tally(const SessionInfo& info) : scorer(info)
+    {
+        result.cores.reserve(mostCores);
+        result.nearest.fill(std::numeric_limits<double>::infinity());
+    }
+
+    void add(const TickRecord& r) noexcept
+    {
+        scorer.add(r);
+        hash.add(r);
+        result.peakBasic = std::max(result.peakBasic, glm::length(r.basic));
+        result.peakAdditional = std::max(result.peakAdditional, glm::length(r.additional));
+        result.peakTotal = std::max(result.peakTotal, glm::length(r.total));
+        result.energyMade = std::max(result.energyMade, r.energy);
+        result.energyDamped = r.damped;
+        for (std::size_t i = 0; i < maxStructures; ++i) {
+            result.nearest[i] = std::min(result.nearest[i], r.distance[i]);
+        }
+        for (std::uint32_t i = 0; i < r.eventCount; ++i) {
+            result.contacts += r.events[i].kind == EventKind::contact ? 1 : 0;
+            result.punctures += r.events[i].kind == EventKind::puncture ? 1 : 0;
+        }
+        if (r.fired && result.cores.size() < mostCores) {
+            result.cores.push_back(r.core);
+        }
+        faulted = faulted || r.faulted;
+    }
+
+    Scorer scorer;
+    ForceHash hash;
+    TrainResult result;
+    bool faulted = false;
+};
+
+}  // namespace
+
+struct Trainer::Impl {
+    Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
+        : options(o),
+          broadcast(o.session, model, deviceKind(o.device.name).needsViewer),
+          device(openWithFaults(o, model, broadcast)),
+          simulation(model),
+          tally(info)
+    {
+        if (!o.record.empty()) {
+            recorder.emplace(o.record, info);
+        }
+        if (has(o.faults, FaultKind::stallViewer) || has(o.faults, FaultKind::diskFull)) {
+            around.emplace(o.faults, o.record, o.stallViewers);
+        }
+    }
+
+    // The servo thread: nothing in the sink allocates, locks or does I/O.
+    void servo(std::vector<std::string>& warnings)
+    {
+        if (options.servo.paced) {
+            warnings = claimRealTime();
+        }
+        const auto sink = [this](const TickRecord& record, const ServoTiming& timing) {
+            tally.add(record);
+            if (recorder) {
+                recorder->push(record);
+                // Faster than real time the loop would outrun the writer: it waits, as nobody holds the device.
+                if (!options.servo.paced && record.tick % flushPeriod == 0) {
+                    recorder->flush();
+                }
+            }
+            broadcast.publish(record, timing, simulation);
+            if (around) {
+                around->tell(record.tick);
+            }
+            sleepThroughGap(options.faults, record.tick);
+        };
+        tally.result.timing = runServo(*device, simulation, options.servo, sink, interrupted);
+        broadcast.finish();
+    }
+
+    void conclude(TrainResult& result)
+    {
+        result.score = tally.scorer.score();
+        result.forceHash = tally.hash.value();
+        if (recorder) {
+            const auto late = result.timing.lateness.percentiles();
+            const auto work = result.timing.work.percentiles();
+            const auto& timing = result.timing;
+            recorder->finish({{"missed_ticks", fmt::format("{}", timing.missed)},
+                              {"overruns", fmt::format("{}", timing.overruns)},
+                              {"gaps", fmt::format("{}", timing.gaps)},
+                              {"longest_gap_ms", fmt::format("{}", timing.longestGap)},
+                              {"tick_us_p50", fmt::format("{:.2f}", 1e6 * work.p50)},
+                              {"tick_us_p99", fmt::format("{:.2f}", 1e6 * work.p99)},
+                              {"lateness_us_p50", fmt::format("{:.2f}", 1e6 * late.p50)},
+                              {"lateness_us_p99", fmt::format("{:.2f}", 1e6 * late.p99)},
+                              {"force_hash", fmt::format("{:016x}", result.forceHash)},
+                              {"score_total", fmt::format("{:.1f}", result.score.total)}});
+            result.lostRecords = recorder->lost();
+            result.problem = recorder->error();
+            if (result.lostRecords > 0 && result.problem.empty()) {
+                result.problem = fmt::format("{}: {} ticks were lost by the recorder: record to a faster disk",
+                                             options.record.string(), result.lostRecords);
+            }
+        }
+        if (result.problem.empty()) {
+            result.problem = device->problem();
+        }
+        if (tally.faulted && result.problem.empty()) {
+            result.problem = "a force or a pose was not finite: the force was switched off (event 'fault' in the record)";
+        }
+    }
+
+    TrainOptions options;
+    Broadcast broadcast;
+    std::unique_ptr<Device> device;
+    Simulation simulation;
+    std::optional<Recorder> recorder;
+    std::optional<FaultsAround> around;
+    Tally tally;
+};
+
+Trainer::Trainer(const SessionModel& model, const SessionInfo& info, const TrainOptions& options)
+    : impl_(std::make_unique<Impl>(model, info, options))
+{
+}
+
+Trainer::~Trainer() = default;
+
+TrainResult Trainer::run()
+{
+    const GoodOrder untilItsEnd;
+    std::vector<std::string> warnings;
+    std::atomic<bool> done{false};
+    std::thread servo([&] {
+        impl_->servo(warnings);
+        done = true;
+    });
+    if (isatty(STDERR_FILENO) != 0 || impl_->options.lookAfter) {
+        try {
+            waitFor(impl_->options, done);
+        } catch (...) {
+            interrupted = true;
+            servo.join();
+            throw;
+        }
+    }
+    servo.join();
+    for (const auto& warning : warnings) {
+        fmt::print(stderr, "palpate: {}\n", warning);
+    }
+    TrainResult result = std::move(impl_->tally.result);
+    result.warnings = warnings;
+    impl_->conclude(result);
+    // The record is closed before a disk that is full on purpose has room again.
+    impl_->recorder.reset();
+    impl_->around.reset();
+    return result;
+}
+
+}  // namespace palpate::session

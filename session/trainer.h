@@ -1,0 +1,61 @@
+#pragma once
+
+#include <haptics/recorder.h>
+#include <haptics/replay.h>
+#include <haptics/score.h>
+#include <haptics/servo.h>
+#include <haptics/session_model.h>
+#include <session/devices.h>
+#include <session/faults.h>
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace palpate::session {
+
+struct TrainOptions {
+    DeviceRequest device;
+    std::string session;           // name for viewers
+    std::filesystem::path record;  // empty: none
+    haptics::ServoOptions servo;
+    Faults faults;                           // on purpose
+    std::function<void(bool)> stallViewers;  // stops them (true) or lets them go on; called from a thread of its own
+    // Called ten times a second while the session runs, from the thread of run(); false ends the session.
+    std::function<bool()> lookAfter;
+};
+
+/// What a session came to.
+struct TrainResult {
+    haptics::ServoTiming timing;
+    haptics::Score score;
+    std::vector<haptics::CoreSample> cores;
+    std::array<double, haptics::maxStructures> nearest{};  // least distance to each structure [m]
+    std::uint64_t contacts = 0, punctures = 0;
+    double peakBasic = 0, peakAdditional = 0, peakTotal = 0;  // [N]
+    double energyMade = 0, energyDamped = 0;  // most that the hand was ever given net; taken by the controller [J]
+    std::uint64_t forceHash = 0;
+    std::uint64_t lostRecords = 0;
+    std::vector<std::string> warnings;
+    std::string problem;  // not empty: the session ran, but not everything that was asked for was done
+};
+
+/// A session with everything around it: device, servo thread, viewers' channel, recorder, score.
+class Trainer {
+public:
+    /// Opens device, channel and record. Throws std::runtime_error. The model must outlive it.
+    Trainer(const haptics::SessionModel& model, const haptics::SessionInfo& info, const TrainOptions& options);
+    ~Trainer();
+
+    /// Runs the session to its end, or to Ctrl-C (SIGINT, SIGTERM), which ends it in good order.
+    TrainResult run();
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::session

@@ -1,0 +1,249 @@
+#include <studies/accuracy/deep.h>
+
+#include <base/build.h>
+#include <base/outputs.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <session/open.h>
+#include <studies/accuracy/deep_press.h>
+#include <studies/accuracy/references.h>
+#include <studies/kernel/kernel_trial.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+namespace palpate::studies {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::array<std::pair<const char*, const char*>, 5> zones{
+    {{"faint", "a < h/2"}, {"touch", "a h/2..1.5h"}, {"middle", "to 1 R"}, {"deep", "to 1.5 R"}, {"deepest", "to 2 R"}}};
+constexpr std::size_t quickPlaces = 2;
+
+json vectorOf(Vec3 v)
+{
+    return {v.x, v.y, v.z};
+}
+
+const char* nameOf(DeepZone zone)
+{
+    return zones.at(static_cast<std::size_t>(zone)).first;
+}
+
+json entryOf(const DeepCase& what, const std::string& setting, double spacing, const DeepLook& look)
+{
+    const GridPlace& place = gridPlaces()[look.place];
+    return {{"scene", what.scene},
+            {"tool", what.tool.name},
+            {"setting", setting},
+            {"way", wayName(look.way)},
+            {"place_cells", {place.across, place.along}},
+            {"depth_mm", 1e3 * look.depth},
+            {"depth_radii", look.depth / what.tool.radius},
+            {"contact_cells", std::sqrt(what.tool.radius * look.depth) / spacing},
+            {"zone", nameOf(zoneOf(look.depth, what.tool.radius, spacing))},
+            {"force_n", vectorOf(look.force)},
+            {"reference_n", vectorOf(look.reference)},
+            {"reference_edges_mm", 1e3 * look.edges},
+            {"error_pct", look.errorPercent()},
+            {"direction_deg", look.directionDegrees()}};
+}
+
+// Median and worst of these looks. The worst error keeps its sign.
+json errorsOf(std::span<const DeepLook* const> looks)
+{
+    std::vector<double> errors, sizes;
+    double worst = 0.0, direction = 0.0;
+    for (const DeepLook* look : looks) {
+        const double error = look->errorPercent();
+        errors.push_back(error);
+        sizes.push_back(std::abs(error));
+        worst = std::abs(error) > std::abs(worst) ? error : worst;
+        direction = std::max(direction, look->directionDegrees());
+    }
+    return {{"looks", looks.size()},
+            {"bias_pct", median(errors)},
+            {"median_pct", median(sizes)},
+            {"worst_pct", worst},
+            {"direction_worst_deg", direction}};
+}
+
+void addCase(const DeepCase& what, const std::string& setting, const DeepPress& press, json& figures)
+{
+    std::map<std::pair<DeepZone, PressWay>, std::vector<const DeepLook*>> groups;
+    for (const DeepLook& look : press.looks) {
+        figures["depth"].push_back(entryOf(what, setting, press.spacing, look));
+        groups[{zoneOf(look.depth, what.tool.radius, press.spacing), look.way}].push_back(&look);
+    }
+    json ways = json::array();
+    for (const auto& [key, looks] : groups) {
+        json entry = errorsOf(looks);
+        entry["zone"] = nameOf(key.first);
+        entry["way"] = wayName(key.second);
+        ways.push_back(std::move(entry));
+    }
+    figures["summary"].push_back({{"scene", what.scene},
+                                  {"tool", what.tool.name},
+                                  {"setting", setting},
+                                  {"spacing_mm", 1e3 * press.spacing},
+                                  {"deepest_radii", what.deepest() / what.tool.radius},
+                                  {"pull_n", press.pull},
+                                  {"us_p50", 1e6 * press.times.p50},
+                                  {"us_p99", 1e6 * press.times.p99},
+                                  {"ticks", press.ticks},
+                                  {"zones", ways}});
+}
+
+const json* zoneEntry(const json& summary, const char* zone, const char* way)
+{
+    for (const json& z : summary.at("zones")) {
+        if (z.at("zone") == zone && z.at("way") == way) {
+            return &z;
+        }
+    }
+    return nullptr;
+}
+
+std::string errorCells(const json* entry)
+{
+    if (entry == nullptr) {
+        return fmt::format("{:>7} {:>7} {:>6}", "-", "-", "-");
+    }
+    return fmt::format("{:>7.1f} {:>+7.1f} {:>6.2f}", entry->at("median_pct").get<double>(),
+                       entry->at("worst_pct").get<double>(), entry->at("direction_worst_deg").get<double>());
+}
+
+// Errors after the hold, where the tool is deepest.
+const json* heldEntry(const json& summary)
+{
+    for (const json& z : summary.at("zones")) {
+        if (z.at("way") == wayName(PressWay::hold)) {
+            return &z;
+        }
+    }
+    return nullptr;
+}
+
+void printCase(const json& s)
+{
+    std::string what = s.at("scene").get<std::string>() + ", " + s.at("tool").get<std::string>();
+    std::string setting = s.at("setting");
+    std::string costs = fmt::format(" {:>8.2g} {:>6.0f} {:>6.0f}", s.at("pull_n").get<double>(),
+                                    s.at("us_p50").get<double>(), s.at("us_p99").get<double>());
+    const auto row = [&](const char* depth, const json* in, const json* out) {
+        if (in != nullptr || out != nullptr) {
+            fmt::print("{:<29} {:<8} {:<12} {} {}{}\n", what, setting, depth, errorCells(in), errorCells(out), costs);
+            what = setting = costs = "";
+        }
+    };
+    for (const auto& [zone, shown] : zones) {
+        row(shown, zoneEntry(s, zone, wayName(PressWay::in)), zoneEntry(s, zone, wayName(PressWay::out)));
+    }
+    row("held", heldEntry(s), nullptr);
+}
+
+void print(const json& figures)
+{
+    fmt::print("{:<29} {:<8} {:<12} {:^22} {:^22} {:>8} {:>13}\n", "", "", "", "way in", "way out", "pull", "us a tick");
+    fmt::print("{:<29} {:<8} {:<12} {:>7} {:>7} {:>6} {:>7} {:>7} {:>6} {:>8} {:>6} {:>6}\n", "case", "setting", "depth",
+               "median%", "worst%", "deg", "median%", "worst%", "deg", "N", "p50", "p99");
+    for (const json& s : figures.at("summary")) {
+        printCase(s);
+    }
+}
+
+std::filesystem::path referenceFile()
+{
+    const auto folders = referenceFolders("").others;
+    for (const auto& folder : folders) {
+        if (auto file = folder / "deep.csv"; std::filesystem::exists(file)) {
+            return file;
+        }
+    }
+    return folders.back() / "deep.csv";
+}
+
+std::vector<DeepCase> chosen(const DeepCommand& c)
+{
+    std::vector<DeepCase> cases = loadDeepCases(referenceFile());
+    std::set<std::string> scenes;
+    for (const DeepCase& one : cases) {
+        scenes.insert(one.scene);
+    }
+    for (const std::string& scene : c.scenes) {
+        if (!scenes.contains(scene)) {
+            throw std::runtime_error(
+                fmt::format("--scenes {}: there are no forces of it; there are of {}", scene, fmt::join(scenes, ", ")));
+        }
+    }
+    const std::vector<std::string> wanted = c.scenes.empty() && c.quick ? std::vector<std::string>{"block"} : c.scenes;
+    std::erase_if(cases, [&](const DeepCase& one) {
+        return !wanted.empty() && std::ranges::find(wanted, one.scene) == wanted.end();
+    });
+    return cases;
+}
+
+json runAll(const DeepCommand& c)
+{
+    std::vector<std::pair<std::string, datasets::ElasticSettings>> settings;
+    for (const std::string& name : c.settings) {
+        settings.emplace_back(name, datasets::elasticSetting(name));
+    }
+    DeepOptions options;
+    options.speed = 1e-3 * c.speed;
+    options.places = gridPlaces().first(c.quick ? quickPlaces : gridPlaces().size());
+    json figures{{"build", std::string(base::build())},
+                 {"speed_mm_s", c.speed},
+                 {"depth", json::array()},
+                 {"summary", json::array()}};
+    command::Progress progress;
+    for (const DeepCase& what : chosen(c)) {
+        progress.show(what.scene + ": volume");
+        session::SceneChanges changes;
+        changes.model = "spring";  // each setting makes its own body
+        const haptics::SessionModel model = session::openSession(what.scene, changes);
+        for (auto& [name, setting] : settings) {
+            progress.show(fmt::format("{}, {}: {}", what.scene, what.tool.name, name));
+            addCase(what, name, pressDeep(model, what, setting, options), figures);
+        }
+    }
+    return figures;
+}
+
+}  // namespace
+
+void deepCommand(const DeepCommand& c)
+{
+    const json figures = runAll(c);
+    if (c.json != "-") {
+        print(figures);
+    }
+    if (!c.folder.empty()) {
+        const auto pictures = writeDeepFolder(c.folder, figures);
+        if (c.json != "-") {
+            fmt::print("\n{}: depth.html, depth.csv, depth.json, {} pictures\n", c.folder.string(), pictures.size());
+        }
+    }
+    if (!c.json.empty()) {
+        command::writeJson(c.json, figures);
+    }
+    for (const json& s : figures.at("summary")) {
+        if (s.at("pull_n").get<double>() > 0.0) {
+            throw std::runtime_error(fmt::format("{}, {}, {}: the tissue pulls the tool inwards by {:.2g} N",
+                                                 s.at("scene").get<std::string>(), s.at("tool").get<std::string>(),
+                                                 s.at("setting").get<std::string>(), s.at("pull_n").get<double>()));
+        }
+    }
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,86 @@
+#include <studies/accuracy/elastic_formulas.h>
+
+#include <glm/geometric.hpp>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace palpate::studies {
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+}  // namespace
+
+Vec3 inclusionDisplacement(const Inclusion& inclusion, Vec3 x)
+{
+    const double nu = inclusion.poisson;
+    const double trace = (1.0 - 2.0 * nu) * inclusion.stretch;
+    const Vec3 far = inclusion.stretch * Vec3(-nu, -nu, 1.0);  // principal strains
+    const Vec3 deviator = far - Vec3(trace / 3.0);
+    const double shear = 2.0 * (4.0 - 5.0 * nu) / (15.0 * (1.0 - nu));  // Eshelby's numbers of a ball
+    const double bulk = (1.0 + nu) / (3.0 * (1.0 - nu));
+    const double s = 1.0 / (1.0 + shear * (inclusion.shearRatio - 1.0));
+    const double t = 1.0 / (1.0 + bulk * (inclusion.bulkRatio - 1.0));
+    const Vec3 ex = deviator * x;
+    const double r = glm::length(x);
+    if (r < inclusion.radius) {
+        return s * ex + t * trace / 3.0 * x;
+    }
+    const double q = inclusion.radius / r;
+    const double q3 = q * q * q;
+    const double c1 = 3.0 * (s - 1.0) / (4.0 * (4.0 - 5.0 * nu));
+    const double c2 = 5.0 * c1 / 3.0;
+    const Vec3 radial = glm::dot(x, ex) / (r * r) * x;
+    return far * x + (t - 1.0) * trace / 3.0 * q3 * x + c1 * q3 * q * q * (2.0 * ex - 5.0 * radial) +
+           c2 * q3 * (2.0 * (1.0 - 2.0 * nu) * ex + 3.0 * radial);
+}
+
+Vec3 kelvinDisplacement(double shearModulus, double poisson, Vec3 force, Vec3 x)
+{
+    const double r = glm::length(x);
+    return ((3.0 - 4.0 * poisson) * force + glm::dot(x, force) / (r * r) * x) /
+           (16.0 * pi * shearModulus * (1.0 - poisson) * r);
+}
+
+double neoHookeanTension(double youngsModulus, double poisson, double stiffening, double stretch)
+{
+    const double mu = youngsModulus / (2.0 * (1.0 + poisson));
+    const double bulk = youngsModulus / (3.0 * (1.0 - 2.0 * poisson));
+    // Of the energy by the logarithm of a stretch: `along` it and `across`.
+    const auto slopes = [&](double across) {
+        const double j = stretch * across * across;
+        const double scaled = std::pow(j, -2.0 / 3.0);
+        const double i = scaled * (stretch * stretch + 2.0 * across * across) - 3.0;
+        const double shape = mu * (1.0 + stiffening * i) * scaled * (stretch * stretch - across * across) / 3.0;
+        const double pressure = bulk * (j - 1.0) * j;
+        return std::array<double, 2>{2.0 * shape + pressure, pressure - shape};
+    };
+    // The stress across rises with the width.
+    double low = 0.1 / std::sqrt(stretch);
+    double high = 10.0 / std::sqrt(stretch);
+    for (int halved = 0; halved < 200; ++halved) {
+        const double middle = 0.5 * (low + high);
+        (slopes(middle)[1] > 0.0 ? high : low) = middle;
+    }
+    return slopes(low)[0] / stretch;
+}
+
+double convergenceOrder(std::span<const double> sizes, std::span<const double> errors)
+{
+    const auto count = static_cast<double>(sizes.size());
+    double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+        const double a = std::log(sizes[i]);
+        const double b = std::log(errors[i]);
+        x += a;
+        y += b;
+        xx += a * a;
+        xy += a * b;
+    }
+    return (count * xy - x * y) / (count * xx - x * x);
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,339 @@
+#include <studies/accuracy/reference_file.h>
+
+#include <volume/fnv.h>
+
+#include <fmt/format.h>
+#include <zlib.h>
+#include <glm/common.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+// The file is one CBOR map in a zlib stream. Numbers that belong to positions are kept one component after the other, as
+// differences from position to position, the bytes of equal rank together: on a lattice most of them are zero.
+namespace palpate::studies {
+
+namespace {
+
+using nlohmann::json;
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr int format = 1;
+constexpr double quanta = 32000.0;
+constexpr std::size_t mostBytes = 1UL << 30U;  // unpacked: a damaged file shall not fill the memory
+
+template <typename Word>
+Bytes packed(const std::vector<Word>& words)
+{
+    using Unsigned = std::make_unsigned_t<Word>;
+    Bytes out(words.size() * sizeof(Word));
+    Unsigned before = 0;
+    for (std::size_t i = 0; i < words.size(); ++i) {
+        const auto word = static_cast<Unsigned>(words[i]);
+        const auto step = static_cast<Unsigned>(word - before);
+        before = word;
+        for (std::size_t b = 0; b < sizeof(Word); ++b) {
+            out[b * words.size() + i] = static_cast<std::uint8_t>(step >> (8 * b));
+        }
+    }
+    return out;
+}
+
+template <typename Word>
+std::vector<Word> unpacked(const json& binary, std::size_t count)
+{
+    using Unsigned = std::make_unsigned_t<Word>;
+    const auto& bytes = binary.get_binary();
+    if (bytes.size() != count * sizeof(Word)) {
+        throw std::runtime_error("lists of different lengths");
+    }
+    std::vector<Word> words(count);
+    Unsigned before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        Unsigned step = 0;
+        for (std::size_t b = 0; b < sizeof(Word); ++b) {
+            step =
+                static_cast<Unsigned>(step | static_cast<Unsigned>(static_cast<Unsigned>(bytes[b * count + i]) << (8 * b)));
+        }
+        before = static_cast<Unsigned>(before + step);
+        words[i] = static_cast<Word>(before);
+    }
+    return words;
+}
+
+json vectorJson(Vec3 v)
+{
+    return {v.x, v.y, v.z};
+}
+
+Vec3 vectorOf(const json& v)
+{
+    return {v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
+}
+
+json positionJson(const std::vector<Vec3f>& position)
+{
+    std::vector<std::uint32_t> bits;
+    for (int c = 0; c < 3; ++c) {
+        for (const Vec3f& p : position) {
+            bits.push_back(std::bit_cast<std::uint32_t>(p[c]));
+        }
+    }
+    return json::binary(packed(bits));
+}
+
+std::vector<Vec3f> positionOf(const json& binary, std::size_t count)
+{
+    const auto bits = unpacked<std::uint32_t>(binary, 3 * count);
+    std::vector<Vec3f> position(count);
+    for (std::size_t i = 0; i < 3 * count; ++i) {
+        position[i % count][static_cast<int>(i / count)] = std::bit_cast<float>(bits[i]);
+    }
+    return position;
+}
+
+json stateJson(const ReferenceState& s)
+{
+    float most = 0.0F;
+    for (const Vec3f& u : s.u) {
+        most = std::max({most, std::abs(u.x), std::abs(u.y), std::abs(u.z)});
+    }
+    const double quantum = most > 0.0F ? static_cast<double>(most) / quanta : 1.0;
+    std::vector<std::int16_t> words;
+    for (int c = 0; c < 3; ++c) {
+        for (const Vec3f& u : s.u) {
+            words.push_back(static_cast<std::int16_t>(std::lround(static_cast<double>(u[c]) / quantum)));
+        }
+    }
+    return {{"pressed", s.pose.pressed},
+            {"dragged", s.pose.dragged},
+            {"focus", vectorJson(s.focus)},
+            {"force", vectorJson(s.force)},
+            {"energy", s.energy},
+            {"largest", s.largest},
+            {"strain", s.strain},
+            {"residual", s.residual},
+            {"sites", s.sites},
+            {"quantum", quantum},
+            {"u", json::binary(packed(words))}};
+}
+
+ReferenceState stateOf(const json& in, std::size_t count)
+{
+    ReferenceState s;
+    s.pose = {in.at("pressed").get<double>(), in.at("dragged").get<double>()};
+    s.focus = vectorOf(in.at("focus"));
+    s.force = vectorOf(in.at("force"));
+    s.energy = in.at("energy").get<double>();
+    s.largest = in.at("largest").get<double>();
+    s.strain = in.at("strain").get<double>();
+    s.residual = in.at("residual").get<double>();
+    s.sites = in.at("sites").get<std::uint32_t>();
+    const auto quantum = in.at("quantum").get<double>();
+    const auto words = unpacked<std::int16_t>(in.at("u"), 3 * count);
+    s.u.resize(count);
+    for (std::size_t i = 0; i < 3 * count; ++i) {
+        s.u[i % count][static_cast<int>(i / count)] = static_cast<float>(quantum * words[i]);
+    }
+    return s;
+}
+
+json infoJson(const ReferenceInfo& i)
+{
+    return {{"key", i.key},           {"scene", i.scene},    {"tool", i.tool}, {"law", i.law},
+            {"elements", i.elements}, {"speed", i.speed},    {"tets", i.tets}, {"unknowns", i.unknowns},
+            {"seconds", i.seconds},   {"program", i.program}};
+}
+
+ReferenceInfo infoOf(const json& in)
+{
+    ReferenceInfo i;
+    for (const auto& [name, text] :
+         {std::pair("key", &i.key), std::pair("scene", &i.scene), std::pair("tool", &i.tool), std::pair("law", &i.law),
+          std::pair("elements", &i.elements), std::pair("program", &i.program)}) {
+        *text = in.at(name).get<std::string>();
+    }
+    i.speed = in.at("speed").get<double>();
+    i.tets = in.at("tets").get<std::size_t>();
+    i.unknowns = in.at("unknowns").get<std::size_t>();
+    i.seconds = in.at("seconds").get<double>();
+    return i;
+}
+
+std::string deflated(const Bytes& bytes)
+{
+    uLongf size = compressBound(bytes.size());
+    std::string out(size, '\0');
+    if (compress2(reinterpret_cast<Bytef*>(out.data()), &size, bytes.data(), bytes.size(), Z_BEST_COMPRESSION) != Z_OK) {
+        throw std::runtime_error("reference: it cannot be packed: there is not enough memory");
+    }
+    out.resize(size);
+    return out;
+}
+
+Bytes inflated(const std::string& bytes)
+{
+    z_stream stream{};
+    if (inflateInit(&stream) != Z_OK) {
+        throw std::runtime_error("not enough memory");
+    }
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream.avail_in = static_cast<uInt>(bytes.size());
+    Bytes out;
+    Bytes part(1U << 20U);
+    int status = Z_OK;
+    while (status == Z_OK && out.size() < mostBytes) {
+        stream.next_out = part.data();
+        stream.avail_out = static_cast<uInt>(part.size());
+        status = inflate(&stream, Z_NO_FLUSH);
+        out.insert(out.end(), part.begin(), part.end() - static_cast<std::ptrdiff_t>(stream.avail_out));
+    }
+    inflateEnd(&stream);
+    if (status != Z_STREAM_END) {
+        throw std::runtime_error("cut short, or not a reference");
+    }
+    return out;
+}
+
+std::pair<Reference, ReferenceInfo> parsed(const std::string& bytes)
+{
+    const json in = json::from_cbor(inflated(bytes));
+    if (const int is = in.at("palpate_reference").get<int>(); is != format) {
+        throw std::runtime_error(fmt::format("it has format {}, this program reads {}", is, format));
+    }
+    Reference r;
+    const auto count = in.at("count").get<std::size_t>();
+    if (count > mostBytes / sizeof(Vec3f)) {
+        throw std::runtime_error("lists of different lengths");
+    }
+    r.position = positionOf(in.at("position"), count);
+    for (const json& state : in.at("states")) {
+        r.states.push_back(stateOf(state, count));
+    }
+    r.nodes = in.at("nodes").get<std::size_t>();
+    r.peakForce = in.at("peak_force").get<double>();
+    r.strain = in.at("strain").get<double>();
+    r.residual = in.at("residual").get<double>();
+    return {std::move(r), infoOf(in.at("info"))};
+}
+
+// Lengths to the micrometre, directions to 1e-5: as well as another machine's rounding leaves them.
+void addLength(volume::Fnv& hash, double metres)
+{
+    hash.add(std::llround(1e6 * metres));
+}
+
+void addVector(volume::Fnv& hash, Vec3 v, double unit)
+{
+    for (int c = 0; c < 3; ++c) {
+        hash.add(std::llround(v[c] / unit));
+    }
+}
+
+void addTissue(volume::Fnv& hash, const volume::Tissue& tissue, double poissonCap)
+{
+    for (const volume::Structure& s : tissue.structures()) {
+        const volume::TissueRow& row = tissue.table().rows[s.tissue];
+        hash.add(s.tissue);
+        hash.add(std::array{row.youngsModulus, std::min(row.poissonRatio, poissonCap), row.stiffening,
+                            row.fixed ? 1.0 : 0.0, static_cast<double>(row.role)});
+    }
+    addVector(hash, tissue.affine().origin, 1e-7);
+    for (int axis = 0; axis < 3; ++axis) {
+        addVector(hash, tissue.affine().linear[axis], 1e-9);
+    }
+    const volume::Tissue::Reader reader(tissue);
+    std::uint8_t row = 0;
+    std::uint64_t length = 0;
+    volume::forEachIndex(Index3(0), tissue.size() - 1, [&](Index3 voxel) {
+        const std::uint8_t here = reader.tissue(tissue.affine().toPatient(Vec3(voxel)));
+        if (here != row) {
+            hash.add(row);
+            hash.add(length);
+            row = here;
+            length = 0;
+        }
+        ++length;
+    });
+    hash.add(row);
+    hash.add(length);
+}
+
+}  // namespace
+
+void saveReference(const std::filesystem::path& file, const Reference& reference, const ReferenceInfo& info)
+{
+    json states = json::array();
+    for (const ReferenceState& s : reference.states) {
+        states.push_back(stateJson(s));
+    }
+    const json out{{"palpate_reference", format},        {"info", infoJson(info)},
+                   {"count", reference.position.size()}, {"position", positionJson(reference.position)},
+                   {"states", std::move(states)},        {"nodes", reference.nodes},
+                   {"peak_force", reference.peakForce},  {"strain", reference.strain},
+                   {"residual", reference.residual}};
+    const std::filesystem::path half = file.string() + ".part";
+    std::ofstream stream(half, std::ios::binary);
+    stream << deflated(json::to_cbor(out));
+    stream.close();
+    std::error_code failed;
+    if (stream) {
+        std::filesystem::rename(half, file, failed);
+    }
+    if (!stream || failed) {
+        std::error_code ignored;
+        std::filesystem::remove(half, ignored);
+        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
+    }
+}
+
+std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    if (!in || std::filesystem::is_directory(file)) {
+        throw std::runtime_error(file.string() + ": cannot be read: check its name and its permissions");
+    }
+    const std::string bytes{std::istreambuf_iterator<char>(in), {}};
+    try {
+        return parsed(bytes);
+    } catch (const std::exception& e) {
+        throw std::runtime_error(
+            fmt::format("{}: is no reference that can be used ({}): make it anew with palpate-reference --save",
+                        file.string(), e.what()));
+    }
+}
+
+std::string referenceKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
+                         double poissonCap)
+{
+    volume::Fnv hash;
+    hash.add(referenceVersion);
+    hash.addText(law);
+    addLength(hash, speed);
+    hash.add(path.tool.kind);
+    for (const double length : {path.tool.radius, path.tool.length, path.press, path.drag, path.gap}) {
+        addLength(hash, length);
+    }
+    addVector(hash, path.start, 1e-6);
+    addVector(hash, path.inward, 1e-5);
+    addVector(hash, path.sideways, 1e-5);
+    for (const chainmail::Tie& tie : path.ties) {
+        addVector(hash, tie.rest, 1e-6);
+        addVector(hash, Vec3(tie.along, tie.across, 0.0), 1e-3);
+    }
+    addTissue(hash, tissue, poissonCap);
+    return fmt::format("{:016x}", hash.value);
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,162 @@
+#include <studies/accuracy/references.h>
+
+#include <base/child_process.h>
+#include <base/process.h>
+
+#include <fmt/format.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+namespace palpate::studies {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::vector<fs::path> referencesIn(const fs::path& folder)
+{
+    std::vector<fs::path> files;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder, none)) {
+        if (entry.path().extension() == ".ref") {
+            files.push_back(entry.path());
+        }
+    }
+    std::ranges::sort(files);
+    return files;
+}
+
+std::optional<SolvedReference> find(const std::string& key, const ReferenceFolders& folders)
+{
+    std::vector<fs::path> all{folders.own};
+    all.insert(all.end(), folders.others.begin(), folders.others.end());
+    for (const fs::path& folder : all) {
+        for (const fs::path& file : referencesIn(folder)) {
+            if (file.stem().string().ends_with(key)) {
+                return loadReference(file);
+            }
+        }
+    }
+    return std::nullopt;
+}
+
+// Scenes of the references that come with the program, by their files' names: SCENE-LAW-KEY.ref.
+std::string scenesWith(const std::string& law, const ReferenceFolders& folders)
+{
+    std::set<std::string> scenes;
+    for (const fs::path& folder : folders.others) {
+        for (const fs::path& file : referencesIn(folder)) {
+            const std::string name = file.stem();
+            const std::size_t at = name.find("-" + law + "-");
+            if (at != std::string::npos) {
+                scenes.insert(name.substr(0, at));
+            }
+        }
+    }
+    std::string out;
+    for (const std::string& scene : scenes) {
+        out += (out.empty() ? "" : ", ") + scene;
+    }
+    return out.empty() ? "none" : out;
+}
+
+void solve(const std::string& what, const AccuracySubject& subject, const std::string& law, const fs::path& file)
+{
+    const fs::path folder = file.parent_path();
+    std::error_code failed;
+    fs::create_directories(folder, failed);
+    if (failed) {
+        throw std::runtime_error(fmt::format("{}: cannot be made ({}): name another folder with --references",
+                                             folder.string(), failed.message()));
+    }
+    const int status = runReferenceProgram({what, "--law", law, "--tool", subject.path.tool.name, "--speed",
+                                            fmt::format("{:g}", 1e3 * subject.speed), "--save", file.string()});
+    if (status != 0) {
+        throw std::runtime_error(
+            fmt::format("{}: palpate-reference did not solve its {} reference (exit status {}): its message is above", what,
+                        law, status));
+    }
+}
+
+}  // namespace
+
+ReferenceFolders referenceFolders(const fs::path& own)
+{
+    ReferenceFolders out;
+    out.own = own;
+    const char* const cache = std::getenv("XDG_CACHE_HOME");
+    const char* const home = std::getenv("HOME");
+    if (own.empty()) {
+        const fs::path base = cache != nullptr && *cache != '\0' ? fs::path(cache)
+                              : home != nullptr                  ? fs::path(home) / ".cache"
+                                                                 : fs::temp_directory_path();
+        out.own = base / "palpate" / "references";
+    }
+    out.others = {base::programFolder().parent_path() / "share" / "palpate" / "references", PALPATE_REFERENCES};
+    return out;
+}
+
+SolvedReference solvedReference(const std::string& what, const AccuracySubject& subject, const std::string& law,
+                                const ReferenceFolders& folders, const std::function<void(const std::string&)>& tell)
+{
+    const std::string key = referenceKey(*subject.model->tissue, subject.path, subject.speed, law, subject.poissonCap());
+    if (auto found = find(key, folders)) {
+        return std::move(*found);
+    }
+    const std::string& scene = subject.model->scene.name;
+    if (referenceProgram().empty()) {
+        throw std::runtime_error(
+            fmt::format("{}: there is no {} reference for it (key {}), and palpate-reference, which solves one, was not "
+                        "built: build with -DPALPATE_REFERENCE=ON, or take scenes that have one: {}",
+                        what, law, key, scenesWith(law, folders)));
+    }
+    tell(fmt::format("{}: {} reference by finite elements", what, law));
+    const fs::path file = folders.own / fmt::format("{}-{}-{}.ref", scene, law, key);
+    solve(what, subject, law, file);
+    SolvedReference made = loadReference(file);
+    if (made.second.key != key) {
+        throw std::runtime_error(
+            fmt::format("{}: palpate-reference solved another problem (key {} instead of {}): both "
+                        "programs must be of one build",
+                        what, made.second.key, key));
+    }
+    return made;
+}
+
+fs::path referenceProgram()
+{
+    const fs::path beside = base::programFolder() / "palpate-reference";
+    if (access(beside.c_str(), X_OK) == 0) {
+        return beside;
+    }
+    const char* const path = std::getenv("PATH");
+    std::istringstream folders(path != nullptr ? path : "");
+    for (std::string folder; std::getline(folders, folder, ':');) {
+        const fs::path file = fs::path(folder) / "palpate-reference";
+        if (!folder.empty() && access(file.c_str(), X_OK) == 0) {
+            return file;
+        }
+    }
+    return {};
+}
+
+int runReferenceProgram(const std::vector<std::string>& arguments)
+{
+    base::Program program{{referenceProgram().string()}, {-1, STDERR_FILENO, -1}};
+    program.words.insert(program.words.end(), arguments.begin(), arguments.end());
+    const auto [pid, error] = base::start(program);
+    if (error != 0) {
+        throw std::runtime_error(fmt::format("{}: cannot be started ({})", program.words[0], std::strerror(error)));
+    }
+    return base::exitStatus(pid);
+}
+
+}  // namespace palpate::studies

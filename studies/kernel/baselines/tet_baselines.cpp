@@ -1,0 +1,55 @@
+#include <studies/kernel/baselines/baseline.h>
+#include <studies/kernel/baselines/factored.h>
+#include <studies/kernel/baselines/xpbd.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace palpate::studies {
+
+namespace {
+
+constexpr std::size_t mostFactored = 30000;  // points: minutes to factor
+constexpr std::size_t mostStepped = 400000;
+constexpr double unlocked = 0.45;  // Poisson's ratio at which linear tetrahedra do not lock yet
+
+LatticeTets meshOf(const BaselineScene& scene, double spacing, double poissonCap, std::size_t mostPoints)
+{
+    return latticeTets(scene.tissue, scene.surface, spacing, poissonCap, mostPoints);
+}
+
+}  // namespace
+
+std::vector<Baseline> tetBaselines(const BaselineScene& scene)
+{
+    std::vector<Baseline> out;
+    const auto named = [](double spacing, const std::string& more, double poissonCap) {
+        return fmt::format("{:g} mm{}, Poisson {:g}", 1e3 * spacing, more, poissonCap);
+    };
+    const auto factored = [&](double spacing, double poissonCap) {
+        out.push_back({"tets_prefactored", named(spacing, "", poissonCap),
+                       [=] { return factoredModel(meshOf(scene, spacing, poissonCap, mostFactored), scene.path); }});
+    };
+    const auto xpbd = [&](double spacing, int substeps, double poissonCap) {
+        out.push_back({"xpbd", named(spacing, fmt::format(", {} substeps", substeps), poissonCap),
+                       [=] { return xpbdModel(meshOf(scene, spacing, poissonCap, mostStepped), {.substeps = substeps}); }});
+    };
+    const double gentle = std::min(unlocked, scene.poissonCap);
+    for (const double spacing : {6e-3, 4e-3, 3e-3}) {
+        factored(spacing, gentle);
+    }
+    for (const double spacing : {6e-3, 4e-3}) {
+        for (const int substeps : {2, 5, 10, 20}) {
+            xpbd(spacing, substeps, gentle);
+        }
+    }
+    xpbd(3e-3, 5, gentle);
+    if (scene.poissonCap > unlocked) {
+        factored(4e-3, scene.poissonCap);
+        xpbd(4e-3, 10, scene.poissonCap);
+    }
+    return out;
+}
+
+}  // namespace palpate::studies

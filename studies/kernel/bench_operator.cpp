@@ -1,0 +1,148 @@
+#include <studies/kernel/bench_operator.h>
+
+#include <chainmail/window.h>
+#include <studies/kernel/plain_operator.h>
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <stdexcept>
+
+namespace palpate::studies {
+
+using namespace chainmail;
+
+namespace {
+
+constexpr double spacing = 2e-3;  // [m]
+constexpr int tries = 15;
+constexpr double nodesPerTry = 2e6;
+constexpr const char* plainName = "plain loops";
+
+// A cube of fat with random displacements.
+struct Cube {
+    explicit Cube(int window) : layout(Layout::of(window, window, window))
+    {
+        mu.assign(layout.count + Layout::lanes, 0.0F);
+        lambda = mu;
+        u.assign(layout.fieldSize(), 0.0F);
+        out = u;
+        scratch.assign(std::max(layout.scratchSize(), plainScratch(layout)), 0.0F);
+        std::mt19937 random(1);
+        std::uniform_real_distribution<float> shift(-1e-4F, 1e-4F);
+        constexpr float scaled = static_cast<float>(1e3 * spacing / 32.0);
+        volume::forEachIndex(Index3(0), Index3(window - 1), [&](Index3 n) {
+            const std::size_t at = layout.at(n.x, n.y, n.z);
+            if (n.x + 1 < window && n.y + 1 < window && n.z + 1 < window) {
+                mu[at] = scaled;
+                lambda[at] = 49.0F * scaled;
+            }
+            for (std::size_t c = 0; c < 3; ++c) {
+                u[c * layout.count + at] = shift(random);
+            }
+        });
+    }
+
+    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data()}; }
+    double nodes() const noexcept
+    {
+        return static_cast<double>(layout.nx) * static_cast<double>(layout.ny) * static_cast<double>(layout.nz);
+    }
+    double cells() const noexcept
+    {
+        return static_cast<double>(layout.nx - 1) * static_cast<double>(layout.ny - 1) * static_cast<double>(layout.nz - 1);
+    }
+
+    Layout layout;
+    Floats mu, lambda, u, out, scratch;
+};
+
+// The best of a few tries, each of many calls.
+template <typename Call>
+double secondsPerNode(const Cube& cube, Call&& call)
+{
+    using Clock = std::chrono::steady_clock;
+    const int calls = std::max(1, static_cast<int>(nodesPerTry / cube.nodes()));
+    double best = 1.0;
+    for (int i = 0; i < tries; ++i) {
+        const auto start = Clock::now();
+        for (int c = 0; c < calls; ++c) {
+            call();
+        }
+        best = std::min(best, std::chrono::duration<double>(Clock::now() - start).count() / calls);
+    }
+    return best / cube.nodes();
+}
+
+OperatorCase timed(const std::string& set, bool finite, Cube& cube, const MachineRates& rates, double seconds)
+{
+    const OperatorCost cost = operatorCost(finite);
+    const double share = cube.cells() / cube.nodes();
+    const double least = leastTime(cost, rates);
+    return {set, finite, cube.layout.nx, seconds, share * least, least <= cost.bytes / rates.bytes};
+}
+
+void timeSet(const Kernels& k, const MachineRates& rates, Cube& cube, std::vector<OperatorCase>& cases)
+{
+    constexpr float inverse = static_cast<float>(1.0 / spacing);
+    const double linear = secondsPerNode(
+        cube, [&] { k.apply(cube.layout, cube.stiffness(), cube.u.data(), cube.out.data(), cube.scratch.data()); });
+    cases.push_back(timed(k.name, false, cube, rates, linear));
+    const double finite = secondsPerNode(cube, [&] {
+        k.applyFinite(cube.layout, cube.stiffness(), inverse, cube.u.data(), cube.out.data(), cube.scratch.data());
+    });
+    cases.push_back(timed(k.name, true, cube, rates, finite));
+}
+
+}  // namespace
+
+// Linear: planes of nodes 24 + 0, modes 21 + 0, law 8 + 10, modes that bend 5 + 15, sums over layers 30 + 0 and rows 27 +
+// 0 additions and multiplications. Finite strain has another law: 51 + 86. Eight floats go in and out.
+OperatorCost operatorCost(bool finiteStrain) noexcept
+{
+    constexpr double shared = 24 + 21 + 5 + 30 + 27;
+    constexpr double bytes = 8 * sizeof(float);
+    return finiteStrain ? OperatorCost{shared + 51, 15 + 86, bytes} : OperatorCost{shared + 8, 15 + 10, bytes};
+}
+
+double leastTime(const OperatorCost& cost, const MachineRates& rates) noexcept
+{
+    return std::max(
+        {cost.additions / rates.additions, cost.multiplications / rates.multiplications,
+         (cost.additions + cost.multiplications) / std::max({rates.both, rates.additions, rates.multiplications}),
+         cost.bytes / rates.bytes});
+}
+
+OperatorBench benchOperator(const std::vector<int>& windows)
+{
+    OperatorBench bench;
+    for (const Kernels* k : supportedKernels()) {
+        bench.sets.push_back({k->name, machineRates(k->name)});
+    }
+    for (const int window : windows) {
+        Cube cube(window);
+        const bool avx2 = __builtin_cpu_supports("avx2") != 0;
+        if (avx2) {
+            const double seconds = secondsPerNode(cube, [&] {
+                plainApply(cube.layout, cube.stiffness(), cube.u.data(), cube.out.data(), cube.scratch.data());
+            });
+            bench.cases.push_back(timed(plainName, false, cube, machineRates("AVX2"), seconds));
+        }
+        for (std::size_t i = 0; i < bench.sets.size(); ++i) {
+            timeSet(*supportedKernels()[i], bench.sets[i].rates, cube, bench.cases);
+        }
+    }
+    return bench;
+}
+
+const OperatorCase& caseOf(const OperatorBench& bench, const std::string& set, bool finiteStrain, int window)
+{
+    for (const OperatorCase& c : bench.cases) {
+        if (c.set == set && c.finiteStrain == finiteStrain && c.window == window) {
+            return c;
+        }
+    }
+    throw std::out_of_range("operator: there is no such case");
+}
+
+}  // namespace palpate::studies

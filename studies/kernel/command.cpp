@@ -1,0 +1,232 @@
+#include <studies/kernel/command.h>
+
+#include <base/outputs.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <session/open.h>
+#include <studies/kernel/bench_kernel.h>
+#include <studies/kernel/figures.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::studies {
+
+namespace {
+
+struct Options {
+    std::vector<std::string> scenes;
+    std::vector<std::string> settings = datasets::elasticSettings();
+    std::vector<std::string> tools;
+    std::vector<std::string> volumes;
+    std::vector<double> speeds{20, 100};  // [mm/s]
+    std::string folder, json;
+    bool quick = false;
+};
+
+std::vector<std::string> toolNames()
+{
+    std::vector<std::string> names;
+    for (const auto& tool : trialTools()) {
+        names.push_back(tool.name);
+    }
+    return names;
+}
+
+void printHead()
+{
+    fmt::print(
+        "errors in % of the largest displacement and of the force: median (worst) over the looks; tick in us\n"
+        "{:<10} {:<12} {:>5} {:<8} {:>7} {:>7} {:>7} {:>15} {:>15} {:>15} {:>15} {:>6}\n",
+        "scene", "tool", "mm/s", "setting", "nodes", "p50", "p99", "rms", "near", "max", "force", "rest");
+}
+
+void printCase(const KernelCase& c)
+{
+    const auto cell = [&](double TrialErrors::*figure) {
+        const auto spread = spreadOf(c.result.looks, figure);
+        return fmt::format("{:.2f} ({:.2f})", spread.median, spread.worst);
+    };
+    fmt::print("{:<10} {:<12} {:>5g} {:<8} {:>7} {:>7.1f} {:>7.1f} {:>15} {:>15} {:>15} {:>15} {:>6.2f}\n", c.scene, c.tool,
+               1e3 * c.speed, c.setting, c.nodes, 1e6 * c.result.p50, 1e6 * c.result.p99, cell(&TrialErrors::rms),
+               cell(&TrialErrors::near), cell(&TrialErrors::max), cell(&TrialErrors::force), atRest(c.result).rms);
+    std::fflush(stdout);
+}
+
+void printOperator(const OperatorBench& bench)
+{
+    const auto [linear, finite] = std::pair(operatorCost(false), operatorCost(true));
+    fmt::print(
+        "\nthe operator does {:g} additions and {:g} multiplications per cell ({:g} and {:g} at finite strain), and has "
+        "to move {:g} bytes\n",
+        linear.additions, linear.multiplications, finite.additions, finite.multiplications, linear.bytes);
+    for (const auto& set : bench.sets) {
+        fmt::print("{:<12} {:.1f} additions, {:.1f} multiplications, {:.1f} of both per ns; copies {:.0f} GB/s\n", set.name,
+                   1e-9 * set.rates.additions, 1e-9 * set.rates.multiplications, 1e-9 * set.rates.both,
+                   1e-9 * set.rates.bytes);
+    }
+    fmt::print("{:<12} {:<7} {:>6} {:>12} {:>12} {:>7}\n", "operator", "strain", "window", "ns per node", "bound", "share");
+    for (const auto& c : bench.cases) {
+        fmt::print("{:<12} {:<7} {:>6} {:>12.2f} {:>12.2f} {:>6.0f}%\n", c.set, c.finiteStrain ? "finite" : "small",
+                   c.window, 1e9 * c.secondsPerNode, 1e9 * c.boundPerNode, 100.0 * c.boundFraction());
+    }
+}
+
+// Each case with rivals, for people.
+void printRivals(const std::vector<KernelCase>& cases)
+{
+    fmt::print("\nthe same pushes at {} without windows\n{:<10} {:<12} {:>12} {:>12} {:>22} {:>10} {:>10} {:>22}\n",
+               "default", "scene", "tool", "full, warm", "from rest", "one grid at equal rms", "chainmail", "nothing",
+               "force, no increment");
+    for (const auto& c : cases) {
+        if (!c.rivals) {
+            continue;
+        }
+        const auto error = [](const TrialResult& r) {
+            return fmt::format("{:.1f}%", spreadOf(r.looks, &TrialErrors::rms).median);
+        };
+        fmt::print("{:<10} {:<12} {:>11.0f}x {:>11.0f}x {:>21.1f}x {:>10} {:>10} {:>21.1f}%\n", c.scene, c.tool,
+                   c.rivals->full.warm / c.result.mean, c.rivals->full.fromRest / c.result.mean,
+                   singleGridRatio(c, &TrialErrors::rms), error(c.rivals->chainMail), error(c.rivals->nothing),
+                   spreadOf(c.rivals->standing.looks, &TrialErrors::force).median);
+    }
+}
+
+void checkNames(const Options& o)
+{
+    const auto known = toolNames();
+    for (const std::string& tool : o.tools) {
+        if (std::ranges::find(known, tool) == known.end()) {
+            throw std::runtime_error(fmt::format("--tools {}: there is none; there are {}", tool, fmt::join(known, ", ")));
+        }
+    }
+    for (const std::string& setting : o.settings) {
+        datasets::elasticSetting(setting);
+    }
+    for (const double speed : o.speeds) {
+        if (!(speed >= 1.0 && speed <= 1000.0)) {
+            throw std::runtime_error(fmt::format("--speeds {:g}: must be 1 to 1000 mm/s", speed));
+        }
+    }
+}
+
+KernelRequest requestOf(const Options& o)
+{
+    KernelRequest request;
+    request.settings = o.settings;
+    for (const auto& tool : trialTools()) {
+        if (o.tools.empty() || std::ranges::find(o.tools, tool.name) != o.tools.end()) {
+            request.tools.push_back(tool);
+        }
+    }
+    for (const double speed : o.speeds) {
+        request.speeds.push_back(1e-3 * speed);
+    }
+    const bool standard = std::ranges::find(o.settings, "default") != o.settings.end();
+    request.rivalsOf = standard ? "default" : o.settings.back();
+    request.rivalCycles = o.quick ? 1 : 4;
+    return request;
+}
+
+// One scene, tool and speed, and settings of few nodes: seconds.
+void shorten(Options& o)
+{
+    const auto first = [](auto& list, auto standard) {
+        if (list.empty()) {
+            list.push_back(standard);
+        }
+        list.resize(1);
+    };
+    if (o.scenes.empty() && o.volumes.empty()) {
+        o.scenes = {"block"};
+    }
+    o.scenes.resize(std::min<std::size_t>(o.scenes.size(), 1));
+    o.volumes.resize(std::min<std::size_t>(o.volumes.size(), o.scenes.empty() ? 1 : 0));
+    first(o.tools, std::string("sphere_5mm"));
+    first(o.speeds, 20.0);
+    std::erase(o.settings, "fine");
+    if (o.settings.empty()) {
+        o.settings = {"default"};
+    }
+}
+
+void benchKernelCommand(Options o)
+{
+    base::checkOutput(o.json);
+    base::checkOutputFolder(o.folder);
+    checkNames(o);
+    if (o.quick) {
+        shorten(o);
+    } else if (o.scenes.empty() && o.volumes.empty()) {
+        o.scenes = {"block", "layered", "plate", "pair", "breast"};
+    }
+    const bool tell = o.json != "-";
+    if (tell) {
+        printHead();
+    }
+    const auto request = requestOf(o);
+    std::vector<KernelCase> cases;
+    std::vector<std::string> subjects = o.scenes;
+    subjects.insert(subjects.end(), o.volumes.begin(), o.volumes.end());
+    command::Progress progress;
+    for (const std::string& subject : subjects) {
+        progress.show(subject + ": volume");
+        session::SceneChanges changes;
+        changes.model = "spring";  // the bodies are made here, one per setting
+        const auto model = session::openSession(subject, changes);
+        benchKernel(
+            model, request, [&](const std::string& what) { progress.show(what); },
+            [&](const KernelCase& c) {
+                progress.clear();
+                if (tell) {
+                    printCase(c);
+                }
+                cases.push_back(c);
+            });
+    }
+    progress.show("operator");
+    const auto operators = benchOperator(operatorWindows(o.quick ? std::vector<std::string>{} : request.settings));
+    progress.clear();
+    if (tell) {
+        printRivals(cases);
+        printOperator(operators);
+    }
+    const auto figures = kernelFigures(cases, operators, request.rivalsOf);
+    if (tell) {
+        printSummary(figures);
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, figures);
+    }
+    if (!o.folder.empty()) {
+        writeKernelFolder(o.folder, figures, cases);
+    }
+}
+
+}  // namespace
+
+void addBenchKernel(CLI::App& bench)
+{
+    auto o = std::make_shared<Options>();
+    auto* kernel = bench.add_subcommand("kernel", "Error and time of level elastic, against the whole grid solved");
+    kernel->add_option("--scenes", o->scenes, "Scenes: built-in names or files (default: all built-in)")->delimiter(',');
+    kernel->add_option("--volume", o->volumes, "Volumes (.vdb)")->delimiter(',');
+    kernel->add_option("--settings", o->settings, "Settings of level elastic")->delimiter(',')->capture_default_str();
+    kernel->add_option("--tools", o->tools, fmt::format("Of {} (default: all)", fmt::join(toolNames(), ", ")))
+        ->delimiter(',');
+    kernel->add_option("--speeds", o->speeds, "Speeds of the tool [mm/s]")->delimiter(',')->capture_default_str();
+    kernel->add_option("-o,--output", o->folder, "Folder for kernel.json and the chart (PNG, HTML)");
+    kernel->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    kernel->add_flag("--quick", o->quick, "One scene, tool and speed, without setting fine: seconds");
+    kernel->final_callback([o] { benchKernelCommand(*o); });
+}
+
+}  // namespace palpate::studies

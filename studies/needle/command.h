@@ -1,0 +1,10 @@
+#pragma once
+
+#include <CLI/App.hpp>
+
+namespace palpate::studies {
+
+/// `palpate bench needle`.
+void addBenchNeedle(CLI::App& bench);
+
+}  // namespace palpate::studies

@@ -1,0 +1,249 @@
+#include <studies/press/path_file.h>
+
+#include <base/split.h>
+#include <haptics/tick.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+
+namespace palpate::studies {
+
+using haptics::tickSeconds;
+
+namespace {
+
+constexpr double farthest = 10.0;    // from the origin along each axis [m]
+constexpr double latest = 1e9;       // more than any clock says [s]
+constexpr double mostTicks = 10e6;   // nearly three hours
+constexpr double leastAxis = 1e-6;   // shorter ones have no direction
+constexpr double halfTurn = -0.999;  // cosine between axes of which neither way round is the shorter
+constexpr double rounding = 1e-6;    // of a tick
+
+constexpr std::string_view byteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write one
+
+const std::vector<std::string> pathColumns{"x_mm", "y_mm", "z_mm", "seconds", "axis_x", "axis_y", "axis_z"};
+constexpr std::size_t seconds = 3, axis = 4;  // their places; positions come first
+const std::vector<std::string> pointColumns{"x_mm", "y_mm", "z_mm"};
+
+// A CSV file of numbers, row by row.
+class NumberFile {
+public:
+    NumberFile(std::istream& in, std::string origin, const std::vector<std::string>& known)
+        : in_(in), origin_(std::move(origin)), known_(known), place_(known.size())
+    {
+        if (!next()) {
+            throw std::runtime_error(
+                fmt::format("{}: holds no line of column names: begin with {}", origin_, fmt::join(known_, ",")));
+        }
+        for (const std::string_view name : base::csvCells(line_)) {
+            addColumn(name);
+        }
+        for (const char* name : {"x_mm", "y_mm", "z_mm"}) {
+            require(name);
+        }
+    }
+
+    bool has(std::size_t column) const { return place_[column].has_value(); }
+
+    void require(const std::string& name) const
+    {
+        if (!has(static_cast<std::size_t>(std::ranges::find(known_, name) - known_.begin()))) {
+            throw std::runtime_error(
+                fmt::format("{}: column {} is missing: the columns are {}", where(), name, fmt::join(known_, ", ")));
+        }
+    }
+
+    bool nextRow()
+    {
+        if (!next()) {
+            return false;
+        }
+        cells_ = base::csvCells(line_);
+        if (cells_.size() != count_) {
+            throw std::runtime_error(
+                fmt::format("{}: {} values: must be {}, one per column", where(), cells_.size(), count_));
+        }
+        return true;
+    }
+
+    double number(std::size_t column, double most, const char* unit) const
+    {
+        const std::string_view cell = cells_[*place_[column]];
+        const std::optional<double> value = base::numberIn(cell);
+        if (!value || !std::isfinite(*value)) {
+            throw std::runtime_error(fmt::format("{}: {} = '{}': must be a number", where(), known_[column], cell));
+        }
+        if (std::abs(*value) > most) {
+            throw std::runtime_error(
+                fmt::format("{}: {} = {:g}: must be {:g} to {:g}{}", where(), known_[column], *value, -most, most, unit));
+        }
+        return *value;
+    }
+
+    Vec3 position() const
+    {
+        constexpr double most = 1e3 * farthest;
+        return 1e-3 * Vec3(number(0, most, " mm"), number(1, most, " mm"), number(2, most, " mm"));
+    }
+
+    std::string where() const { return fmt::format("{}:{}", origin_, number_); }
+
+private:
+    // The next line that counts.
+    bool next()
+    {
+        while (std::getline(in_, line_)) {
+            if (++number_ == 1 && line_.starts_with(byteOrderMark)) {
+                line_.erase(0, byteOrderMark.size());
+            }
+            if (const auto text = base::trimmed(line_); !text.empty() && text.front() != '#') {
+                return true;
+            }
+        }
+        if (in_.bad()) {
+            throw std::runtime_error(origin_ + ": cannot be read to its end");
+        }
+        return false;
+    }
+
+    void addColumn(std::string_view name)
+    {
+        const auto at = std::ranges::find(known_, name);
+        if (at == known_.end()) {
+            throw std::runtime_error(
+                fmt::format("{}: column '{}' is not known: the columns are {}", where(), name, fmt::join(known_, ", ")));
+        }
+        auto& place = place_[static_cast<std::size_t>(at - known_.begin())];
+        if (place) {
+            throw std::runtime_error(fmt::format("{}: column {} is there twice", where(), name));
+        }
+        place = count_++;
+    }
+
+    std::istream& in_;
+    std::string origin_;
+    const std::vector<std::string>& known_;
+    std::vector<std::optional<std::size_t>> place_;  // of each known column in the file
+    std::string line_;
+    std::vector<std::string_view> cells_;
+    std::size_t count_ = 0;
+    int number_ = 0;
+};
+
+std::ifstream opened(const std::filesystem::path& file, const char* what)
+{
+    std::error_code none;
+    if (std::filesystem::is_directory(file, none)) {
+        throw std::runtime_error(fmt::format("{}: is a folder: give {}", file.string(), what));
+    }
+    std::ifstream in(file);
+    if (!in) {
+        throw std::runtime_error(fmt::format("{}: cannot be read: give {}", file.string(), what));
+    }
+    return in;
+}
+
+Vec3 axisOf(const NumberFile& file)
+{
+    constexpr double most = 1e6;
+    const Vec3 along(file.number(axis, most, ""), file.number(axis + 1, most, ""), file.number(axis + 2, most, ""));
+    const double length = glm::length(along);
+    if (length < leastAxis) {
+        throw std::runtime_error(file.where() + ": the axis is zero: it must say where the tool points to");
+    }
+    return along / length;
+}
+
+void checkFollows(const NumberFile& file, const ToolPose& before, const ToolPose& pose)
+{
+    if (!(pose.seconds > before.seconds)) {
+        throw std::runtime_error(fmt::format("{}: seconds = {:g}: must be after {:g}, the row before", file.where(),
+                                             pose.seconds, before.seconds));
+    }
+    if (glm::dot(before.axis, pose.axis) < halfTurn) {
+        throw std::runtime_error(
+            file.where() + ": the axis turns by half a turn from the row before: add a row between that says which way");
+    }
+}
+
+}  // namespace
+
+std::size_t PosePath::ticks() const noexcept
+{
+    const double span = poses.back().seconds - poses.front().seconds;
+    return 1 + static_cast<std::size_t>(std::max(0.0, std::ceil(span / tickSeconds - rounding)));
+}
+
+ToolPose PosePath::at(std::size_t tick) const noexcept
+{
+    const double t = poses.front().seconds + static_cast<double>(tick) * tickSeconds;
+    const auto after = std::ranges::upper_bound(poses, t, {}, &ToolPose::seconds);
+    ToolPose pose = after == poses.begin() ? poses.front() : *(after - 1);
+    if (after != poses.begin() && after != poses.end()) {
+        const double share = (t - pose.seconds) / (after->seconds - pose.seconds);
+        pose.position = glm::mix(pose.position, after->position, share);
+        pose.axis = glm::normalize(glm::mix(pose.axis, after->axis, share));
+    }
+    pose.seconds = t;
+    return pose;
+}
+
+PosePath readPosePath(std::istream& in, const std::string& origin, Vec3 standardAxis)
+{
+    NumberFile file(in, origin, pathColumns);
+    const bool timed = file.has(seconds);
+    const bool turned = file.has(axis) || file.has(axis + 1) || file.has(axis + 2);
+    for (std::size_t c = axis; turned && c < pathColumns.size(); ++c) {
+        file.require(pathColumns[c]);
+    }
+    PosePath path;
+    path.origin = origin;
+    while (file.nextRow()) {
+        ToolPose pose{file.position(), turned ? axisOf(file) : standardAxis};
+        pose.seconds = timed ? file.number(seconds, latest, " s") : tickSeconds * static_cast<double>(path.poses.size());
+        if (!path.poses.empty()) {
+            checkFollows(file, path.poses.back(), pose);
+        }
+        path.poses.push_back(pose);
+        if (const double span = pose.seconds - path.poses.front().seconds; span > mostTicks * tickSeconds) {
+            throw std::runtime_error(fmt::format("{}: {:g} s after the first row: a path may take {:g} s at most",
+                                                 file.where(), span, mostTicks * tickSeconds));
+        }
+    }
+    if (path.poses.empty()) {
+        throw std::runtime_error(origin + ": holds no pose: write at least one row under the column names");
+    }
+    return path;
+}
+
+PosePath loadPosePath(const std::filesystem::path& file, Vec3 standardAxis)
+{
+    std::ifstream in = opened(file, "a path (CSV with the columns x_mm,y_mm,z_mm)");
+    return readPosePath(in, file.string(), standardAxis);
+}
+
+std::vector<FilePoint> loadPoints(const std::filesystem::path& file)
+{
+    std::ifstream in = opened(file, "points (CSV with the columns x_mm,y_mm,z_mm)");
+    NumberFile table(in, file.string(), pointColumns);
+    std::vector<FilePoint> points;
+    while (table.nextRow()) {
+        points.push_back({table.position(), table.where()});
+    }
+    if (points.empty()) {
+        throw std::runtime_error(file.string() + ": holds no point: write at least one row under the column names");
+    }
+    return points;
+}
+
+}  // namespace palpate::studies

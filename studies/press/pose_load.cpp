@@ -1,0 +1,141 @@
+#include <studies/press/pose_load.h>
+
+#include <chainmail/level.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::studies {
+
+using datasets::ToolKind;
+
+namespace {
+
+constexpr double tieSpacing = 4e-3;    // along a needle's shaft [m]
+constexpr double touchStep = 0.25e-3;  // at most so deep a tool is found that comes to the surface [m]
+
+}  // namespace
+
+Vec3 plannedAxis(const haptics::SessionModel& model) noexcept
+{
+    const Vec3 way = model.approach.aim - model.approach.entry;
+    return glm::length(way) > 0.0 ? glm::normalize(way) : -model.surface.normal(model.approach.entry);
+}
+
+PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec& tool, const ToolPose& first)
+    : model_(model), tool_(tool), first_(first)
+{
+    tool_.length = tool.kind == ToolKind::sphere ? 0.0 : tool.length;
+    if (!isNeedle()) {
+        surface_.friction = model.scene.model.elastic.friction;
+        load_.tools = {&surface_, 1};
+        return;
+    }
+    if (model.surface.distance(first.position) < 0.0) {
+        hold(0.0);
+    }
+    for (double s = tieSpacing; holds() && s <= tool_.length && model.surface.distance(onShaft(first, s)) < 0.0;
+         s += tieSpacing) {
+        hold(s);
+    }
+    load_.ties = ties_;
+}
+
+// Near the surface the cell around a point may be half empty: the tie holds the tissue just under it, as in a session.
+void PoseLoad::hold(double behind)
+{
+    const double h = model_.elastic->levels.front().nodes.spacing;
+    const Vec3 at = onShaft(first_, behind);
+    const double under = std::max(0.0, 0.5 * h + model_.surface.distance(at));
+    const Vec3 rest = at - under * model_.surface.normal(at);
+    if (const double stiffness = chainmail::tieStiffnessAt(*model_.elastic, rest); stiffness > 0.0) {
+        ties_.push_back({rest, Vec3(0.0), first_.axis, stiffness, stiffness});
+        behind_.push_back(behind);
+    }
+}
+
+// Where the front end is when the tool first touches the surface at rest on this way.
+std::optional<Vec3> PoseLoad::firstTouch(const haptics::ProxyTool& tool, Vec3 from, Vec3 to) const noexcept
+{
+    const double length = glm::distance(from, to);
+    for (double gone = 0.0;;) {
+        const Vec3 at = length > 0.0 ? glm::mix(from, to, gone / length) : to;
+        const double gap = haptics::deepestPlace(model_.surface, tool, at).distance - tool.radius;
+        if (gap < 0.0) {
+            return at;
+        }
+        if (gone >= length) {
+            return std::nullopt;
+        }
+        gone = std::min(length, gone + std::max(gap, touchStep));
+    }
+}
+
+void PoseLoad::moveProxy(const ToolPose& pose) noexcept
+{
+    const haptics::ProxyTool tool = proxyTool(pose);
+    if (!proxy_) {
+        if (const auto touched = firstTouch(tool, last_.value_or(pose.position), pose.position)) {
+            proxy_ = haptics::touching(model_.surface, tool, *touched);
+        }
+    } else if (tool.length > 0.0) {
+        // It may have turned.
+        proxy_ = haptics::touching(model_.surface, tool, proxy_->front);
+    }
+    if (proxy_) {
+        haptics::slip(model_.surface, tool, pose.position, *proxy_);
+        if (haptics::depthUnder(*proxy_, pose.position) <= 0.0) {
+            proxy_.reset();
+        }
+    }
+    last_ = pose.position;
+}
+
+// Around the point of the surface under the tool.
+chainmail::Focus PoseLoad::focusOf(const haptics::ProxyTool& tool, Vec3 front) const noexcept
+{
+    const volume::DistanceField& surface = model_.surface;
+    const volume::NodeGrid& grid = surface.grid;
+    const Vec3 deepest = haptics::deepestPlace(surface, tool, front).at;
+    const Vec3 at = glm::clamp(deepest, grid.position(Index3(0)), grid.position(grid.size - 1));
+    return chainmail::focusAt(surface, at - surface.distance(at) * surface.normal(at));
+}
+
+chainmail::Focus PoseLoad::focusAt(const ToolPose& pose) const noexcept
+{
+    if (isNeedle()) {
+        return chainmail::focusAt(model_.surface, 0.5 * (ties_.front().rest + ties_.back().rest));
+    }
+    return focusOf(proxyTool(pose), proxy_ ? proxy_->front : pose.position);
+}
+
+void PoseLoad::set(const ToolPose& pose) noexcept
+{
+    for (std::size_t i = 0; i < ties_.size(); ++i) {
+        ties_[i].u = onShaft(pose, behind_[i]) - onShaft(first_, behind_[i]);
+        ties_[i].axis = pose.axis;
+    }
+    if (!isNeedle()) {
+        moveProxy(pose);
+        surface_.shape = {onShaft(pose, tool_.length), pose.position, tool_.radius, tool_.radius};
+        surface_.pushed = proxy_ ? pose.position - proxy_->front : Vec3(0.0);
+    }
+    load_.focus = focusAt(pose);
+}
+
+Vec3 PoseLoad::force(const chainmail::Elastic& elastic) const noexcept
+{
+    if (!isNeedle()) {
+        return elastic.toolForce(0);
+    }
+    Vec3 sum(0.0);
+    for (std::size_t i = 0; i < ties_.size(); ++i) {
+        sum += elastic.tieForce(i);
+    }
+    return sum;
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,162 @@
+#include <studies/press/press.h>
+
+#include <haptics/simulation.h>
+#include <studies/press/pose_load.h>
+
+#include <fmt/format.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <stdexcept>
+
+namespace palpate::studies {
+
+using chainmail::Elastic;
+using chainmail::ElasticResult;
+
+namespace {
+
+constexpr int mostCycles = 500;  // of a pose that is solved to convergence
+
+// Where the tissue is that was asked for.
+std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const FilePoint> asked)
+{
+    const chainmail::CellLevel& level = model.elastic->levels.front();
+    std::vector<Vec3> anchors;
+    for (const FilePoint& point : asked) {
+        const double outside = model.surface.distance(point.at);
+        if (outside > 0.5 * level.nodes.spacing) {
+            throw std::runtime_error(fmt::format(
+                "{}: the point lies {:.2f} mm outside of the tissue: it must lie inside, as the tissue is at rest",
+                point.where, 1e3 * outside));
+        }
+        anchors.push_back(nearestTissue(level, point.at));
+    }
+    return anchors;
+}
+
+// Which way is in, for the windows, is decided where the tool first touches, or where it comes nearest to the body.
+chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& model, const PressOptions& options)
+{
+    PoseLoad load(model, options.tool, path.poses.front());
+    if (!load.holds()) {
+        throw std::runtime_error(
+            path.origin + ": the needle's tip is not in tissue at the first pose: begin where it has hold of the tissue");
+    }
+    const bool presses = options.tool.kind != datasets::ToolKind::needle;
+    for (std::size_t tick = 0; presses && tick < path.ticks(); ++tick) {
+        load.set(path.at(tick));
+        if (load.inContact()) {
+            return load.load().focus;
+        }
+    }
+    const auto distance = [&](const ToolPose& pose) { return model.surface.distance(pose.position); };
+    return load.focusAt(*std::ranges::min_element(path.poses, {}, distance));
+}
+
+class Press {
+public:
+    Press(const haptics::SessionModel& model, const PosePath& path, std::span<const FilePoint> asked,
+          const PressOptions& options)
+        : options_(options),
+          path_(path),
+          anchors_(anchorsOf(model, asked)),
+          load_(model, options.tool, path.poses.front()),
+          elastic_(*model.elastic, haptics::elasticOptions(model.scene.model.elastic), startOf(path, model, options))
+    {
+    }
+
+    PressSummary run(const std::function<void(const PressSample&)>& sample)
+    {
+        summary_.ticks = path_.ticks();
+        for (std::size_t tick = 0; tick < summary_.ticks; ++tick) {
+            const bool wanted = tick % options_.every == 0 || tick + 1 == summary_.ticks;
+            PressSample s = solve(path_.at(tick), wanted && options_.converge);
+            if (wanted) {
+                for (const Vec3& anchor : anchors_) {
+                    s.displacement.push_back(elastic_.displacement(anchor));
+                }
+                sample(s);
+            }
+        }
+        summary_.times = tickTimes(std::move(seconds_));
+        return summary_;
+    }
+
+private:
+    PressSample solve(const ToolPose& pose, bool converge)
+    {
+        const double start = threadSeconds();
+        load_.set(pose);
+        const ElasticResult result =
+            converge ? elastic_.relax(load_.load(), mostCycles, pressTolerance) : elastic_.relax(load_.load());
+        PressSample s;
+        s.took = threadSeconds() - start;
+        s.pose = pose;
+        s.force = load_.force(elastic_);
+        s.contactArea = contactArea(elastic_);
+        s.energy = result.energy;
+        s.residual = shareLeft(elastic_, result);
+        s.depth = result.depth;
+        s.behind = result.behind;
+        if (!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy)) {
+            throw std::runtime_error(
+                fmt::format("{}: {:.3f} s: the force is no number: lead the tool less deep or more slowly", path_.origin,
+                            pose.seconds));
+        }
+        summary_.notConverged += converge && s.residual > pressTolerance ? 1 : 0;
+        count(s, result);
+        return s;
+    }
+
+    void count(const PressSample& s, const ElasticResult& result)
+    {
+        if (s.behind > 0.0 && !summary_.heldFrom) {
+            summary_.heldFrom = s.pose.seconds;
+        }
+        if (elastic_.atRest()) {
+            return;
+        }
+        ++summary_.inContact;
+        summary_.windowMoves += result.moved ? 1 : 0;
+        seconds_.push_back(s.took);
+        if (const double force = glm::length(s.force); force > summary_.peakForce) {
+            summary_.peakForce = force;
+            summary_.peakAt = s.pose;
+        }
+    }
+
+    const PressOptions& options_;
+    const PosePath& path_;
+    std::vector<Vec3> anchors_;
+    PoseLoad load_;
+    Elastic elastic_;
+    PressSummary summary_;
+    std::vector<double> seconds_;  // of ticks in contact
+};
+
+}  // namespace
+
+double contactArea(const Elastic& elastic) noexcept
+{
+    double area = 0.0;
+    for (const chainmail::ContactSite& site : elastic.sites()) {
+        if (!site.isTie && site.active()) {
+            area += chainmail::areaRatio(elastic.body(), elastic.stack().windows(), site) *
+                    static_cast<double>(elastic.body().points[site.point].area);
+        }
+    }
+    return area;
+}
+
+PressSummary press(const haptics::SessionModel& model, const PosePath& path, std::span<const FilePoint> asked,
+                   const PressOptions& options, const std::function<void(const PressSample&)>& sample)
+{
+    assert(model.elastic && !path.poses.empty() && options.every > 0);
+    return Press(model, path, asked, options).run(sample);
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,42 @@
+#include <studies/stability/body.h>
+
+#include <datasets/tables.h>
+#include <volume/label_image.h>
+
+#include <glm/common.hpp>
+
+#include <array>
+
+namespace palpate::studies {
+
+std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label)
+{
+    constexpr double metres = 1e-3;
+    volume::LabelImage image;
+    image.size = Index3(glm::round(high - low));
+    image.affine.linear = Mat3(metres);
+    image.affine.origin = metres * (low + 0.5);
+    image.values.resize(static_cast<std::size_t>(image.size.x) * static_cast<std::size_t>(image.size.y) *
+                        static_cast<std::size_t>(image.size.z));
+    std::array<bool, bodyTumour + 1> there{};
+    volume::forEachIndex(Index3(0), image.size - 1, [&](Index3 n) {
+        const BodyLabel at = label(low + Vec3(n) + 0.5);
+        image.values[image.offset(n)] = at;
+        there[at] = true;
+    });
+    std::vector<volume::LabelName> names{{0, "air", "air"}};
+    const std::array<volume::LabelName, 5> known{{{bodySkin, "skin", "skin"},
+                                                  {bodyFat, "fat", "fat"},
+                                                  {bodyGland, "gland", "gland"},
+                                                  {bodyBase, "base", "bone"},
+                                                  {bodyTumour, "tumour", "idc_high_grade"}}};
+    for (const auto& entry : known) {
+        if (there[entry.value]) {
+            names.push_back(entry);
+        }
+    }
+    return std::make_shared<const volume::Tissue>(
+        volume::Tissue::fromLabels(image, datasets::defaultTissues(), names, {{"made by", "palpate stability"}}));
+}
+
+}  // namespace palpate::studies

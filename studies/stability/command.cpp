@@ -1,0 +1,180 @@
+#include <studies/stability/command.h>
+
+#include <base/outputs.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <studies/stability/figures.h>
+#include <studies/stability/record.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace palpate::studies {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t mostNamed = 6;  // failed cells in the last line
+
+struct Options {
+    std::string folder, json, cell, record;
+    MatrixChoice choice;
+    std::uint64_t seed = 1, fuzz = 0;
+    int jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    bool fuzzOnly = false;
+};
+
+json runCells(const Options& o, StabilityModels& models, command::Progress& progress)
+{
+    const auto cells = matrixCells(models, o.choice);
+    if (cells.empty()) {
+        throw std::runtime_error("no cell is left: those scenes ask for a method that a needle can pierce");
+    }
+    progress.show("models of the scenes");
+    models.prepare(cells);
+    std::vector<CellResult> results(cells.size());
+    onThreads(
+        cells.size(), o.jobs, [&](std::size_t i) { results[i] = runCell(cells[i], models); },
+        [&](std::size_t done) { progress.show(fmt::format("{} of {} cells", done, cells.size())); });
+    json out = json::array();
+    for (const CellResult& r : results) {
+        out.push_back(cellEntry(r));
+    }
+    return out;
+}
+
+json runFuzz(const Options& o, StabilityModels& models, command::Progress& progress)
+{
+    const auto told = [&](std::size_t done) { progress.show(fmt::format("{} of {} hostile sessions", done, o.fuzz)); };
+    return fuzzEntry(fuzz(models, o.seed, o.fuzz, o.jobs, told));
+}
+
+// Cells of the default method that fail, and hostile sessions that do.
+void checkOurs(const json& figures, const StabilityModels& models)
+{
+    const std::string& ours = models.methods().front().name;
+    std::vector<std::string> failed;
+    for (const json& cell : figures.at("cells")) {
+        if (cell.at("method") == ours && !cell.at("pass").get<bool>()) {
+            failed.push_back(cell.at("id"));
+        }
+    }
+    if (!failed.empty()) {
+        const std::size_t count = failed.size();
+        const std::string more = count > mostNamed ? fmt::format(" and {} more", count - mostNamed) : "";
+        failed.resize(std::min(count, mostNamed));
+        throw std::runtime_error(fmt::format("{} cell{} of the default method failed: {}{}", count, count == 1 ? "" : "s",
+                                             fmt::join(failed, ", "), more));
+    }
+    const json& fuzzed = figures.at("fuzz");
+    for (const char* const key : {"crashes", "over_cap", "over_slew", "non_finite", "pulled"}) {
+        if (fuzzed.at(key) != 0) {
+            throw std::runtime_error(fmt::format("hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
+                                                 fuzzed.at(key).dump()));
+        }
+    }
+}
+
+void recordOne(const Options& o, StabilityModels& models)
+{
+    const Cell cell = cellOf(models, o.cell);
+    base::checkOutput(o.record);
+    models.prepare({cell});
+    const CellResult r = o.record.empty() ? runCell(cell, models) : recordCell(cell, models, o.record);
+    if (!o.json.empty()) {
+        command::writeJson(o.json, {{"cells", json::array({cellEntry(r)})}});
+    }
+    if (o.json != "-") {
+        fmt::print("{}: {} {:.4g} {}, bound {:g}: {}\n", o.cell, name(r.bounded.figure), r.figure, unit(r.bounded.figure),
+                   r.bounded.bound, r.pass() ? "pass" : "FAIL");
+    }
+}
+
+void stabilityCommand(const Options& o)
+{
+    base::checkOutput(o.json);
+    base::checkOutputFolder(o.folder);
+    if (o.cell.empty() && !o.record.empty()) {
+        throw std::runtime_error("--record: which cell? add --case SCENE/METHOD/DEVICE/GRIP/RATE");
+    }
+    StabilityModels models;
+    if (!o.cell.empty()) {
+        recordOne(o, models);
+        return;
+    }
+    command::Progress progress;
+    json figures{{"cells", json::array()},
+                 {"theory", json::array()},
+                 {"limits", json::array()},
+                 {"fuzz", fuzzEntry({})},
+                 {"seed", o.seed}};
+    if (!o.fuzzOnly) {
+        figures["cells"] = runCells(o, models, progress);
+        progress.show("limits against formulas");
+        addTheory(figures);
+    }
+    if (o.fuzz > 0) {
+        figures["fuzz"] = runFuzz(o, models, progress);
+    }
+    progress.clear();
+    if (o.json != "-") {
+        printStability(figures);
+        if (o.fuzz > 0) {
+            fmt::print("\nhostile sessions: {}\n", figures["fuzz"].dump());
+        }
+    }
+    if (!o.folder.empty()) {
+        writeStabilityFolder(o.folder, figures);
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, figures);
+    }
+    checkOurs(figures, models);
+}
+
+}  // namespace
+
+void addStability(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    auto* c = app.add_subcommand("stability",
+                                 "Where haptic methods fail: scenes, methods, devices, grips and rates, against bounds");
+    c->add_option("-o,--output", o->folder, "Folder for stability.html, .json, .csv and charts (PNG)");
+    c->add_option("--scenes", o->choice.scenes, "Scenes or kinds of scenes by name, e.g. plate,slide (default: all)")
+        ->delimiter(',');
+    c->add_option("--methods", o->choice.methods, "Methods by name, e.g. elastic,god_object (default: all)")
+        ->delimiter(',');
+    c->add_option("--devices", o->choice.devices, "Simulated devices: premium, touch, falcon (default: all)")
+        ->delimiter(',');
+    auto* rates = c->add_option("--rates", o->choice.rates, "Rates of the force loop [Hz]")
+                      ->delimiter(',')
+                      ->check(CLI::Range(100, 20000))
+                      ->capture_default_str();
+    c->add_flag("--quick", o->choice.quick, "Some scenes, one device, 1 kHz: under a minute");
+    auto* fuzzed = c->add_option("--fuzz", o->fuzz, "So many hostile sessions of Palpate's own levels");
+    c->add_flag("--fuzz-only", o->fuzzOnly, "Only those")->needs(fuzzed);
+    c->add_option("--seed", o->seed, "Of the hostile sessions")->capture_default_str();
+    c->add_option("--case", o->cell, "One cell again, by its id");
+    c->add_option("--record", o->record, "With --case: record it as a session (.db), its volume beside it (.vdb)");
+    c->add_option("--jobs", o->jobs, "Threads; the figures do not depend on it")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    c->final_callback([o, rates] {
+        if (o->choice.quick && rates->count() == 0) {
+            o->choice.rates = {1000};
+        }
+        stabilityCommand(*o);
+    });
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <haptics/arm.h>
+
+#include <string>
+#include <vector>
+
+namespace palpate::studies {
+
+/// A limit of stability: a formula against the simulated device.
+struct TheoryRow {
+    std::string name;      // with the unit
+    double predicted = 0;  // by the formula
+    double simulated = 0;  // where the simulation goes from decay to growth
+
+    double errorPct() const noexcept { return 100.0 * (simulated - predicted) / predicted; }
+};
+
+/// A virtual spring K with damper B (backward difference), sampled and held, on haptics::Arm:
+///
+/// - 2 b / T, with a hand of 0, 1 and 3 N s/m (Colgate and Schenkel, "Passivity of a class of sampled-data systems", 1997);
+/// - (b + B) / (T / 2 + t_d) at delays of 0 to 16 ms, with and without B (Gil et al., "Stability analysis of a 1 DOF haptic
+///   interface using the Routh-Hurwitz criterion", 2004);
+/// - the energy that the worst motion draws from a wall: 2 b / T by a long stroke, 2 c / D by one of an encoder step D
+///   (Abbott and Okamura, "Effects of position quantization and sampling rate on virtual-wall passivity", 2005);
+/// - with Coulomb friction c, the release amplitude 4 c / (pi (K T / 2 - b) sqrt(K / m)) above which an oscillation grows
+///   (describing function).
+///
+/// Each limit by bisection. Takes about a second.
+std::vector<TheoryRow> theoryRows();
+
+/// The largest stiffness K [N/m] at which an oscillation of 1 mm decays, by bisection between a fifth and five times
+/// `about`. @param damping  B [N s/m]    @param period  T [s]
+double stableStiffness(const haptics::DeviceParameters& device, const haptics::Grip& grip, double damping, double period,
+                       double about);
+
+/// A device of 75 g with that friction b [N s/m], ideal otherwise.
+haptics::DeviceParameters idealDevice(double viscous);
+
+}  // namespace palpate::studies

@@ -1,0 +1,215 @@
+#include <studies/thesis/command.h>
+
+#include <base/child_process.h>
+#include <base/outputs.h>
+#include <base/quantiles.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <datasets/phantom_random.h>
+#include <studies/thesis/figures.h>
+#include <studies/thesis/tasks_scene.h>
+#include <studies/transfer/timeline.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+namespace palpate::studies {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+    std::vector<std::size_t> objects;
+    std::string level = "elastic", setting = "default";
+    int voxels = 0;  // along a side of the block
+    int frames = 6;
+    std::uint64_t seed = 1;
+    bool noView = false;
+    std::string folder, chart, json;
+};
+
+constexpr double objectStiffness = 500.0;  // of the loop's spheres [N/m]
+
+std::vector<std::size_t> standardObjects()
+{
+    std::vector<std::size_t> objects(thesisObjects.begin(), thesisObjects.end());
+    objects.insert(objects.end(), {1'000, 10'000, 100'000, 1'000'000});
+    return objects;
+}
+
+datasets::ModelSettings settingsOf(const Options& o)
+{
+    datasets::ModelSettings settings;
+    const auto* const at = std::ranges::find(datasets::modelLevels, o.level);
+    settings.level = static_cast<datasets::ModelLevel>(at - datasets::modelLevels.begin());
+    settings.setting = o.setting;
+    settings.elastic = datasets::elasticSetting(o.setting);
+    return settings;
+}
+
+double seconds(Clock::time_point t)
+{
+    return std::chrono::duration<double>(t.time_since_epoch()).count();
+}
+
+ViewerTimes viewerTimes(const std::vector<TimelinePicture>& pictures, Clock::time_point started)
+{
+    std::vector<double> read, picture;
+    for (const auto& p : pictures) {
+        read.push_back(p.read - p.published);
+        picture.push_back(p.done - p.read);
+    }
+    return {pictures.front().done - seconds(started), base::upperMedian(std::move(read)),
+            base::upperMedian(std::move(picture)), pictures.size()};
+}
+
+// Events with graphics on, beside a viewer. Returns why there are none, or nothing.
+std::string timeGraphics(haptics::SessionModel& model, const EventOptions& options, TasksCase& result)
+{
+    const auto program = base::programFolder() / "palpate-view";
+    if (!std::filesystem::exists(program)) {
+        return "palpate-view is not beside palpate: build it with -DPALPATE_VIEWER=ON";
+    }
+    const ScratchFolder scratch;
+    const auto timeline = scratch / "timeline.csv";
+    const std::string session = fmt::format("bench-tasks-{}", getpid());
+    haptics::Broadcast broadcast(session, model, true);
+    const auto started = Clock::now();
+    base::ChildProcess viewer(
+        program, {"--session", session, "--hidden", "--size", "640x480", "--wait", "1", "--timeline", timeline.string()},
+        "build it with -DPALPATE_VIEWER=ON");
+    const Graphics graphics{broadcast, [&] { return viewer.wait(-1.0) >= 0 || viewer.killed(); }};
+    const auto times = timeEvents(model, eventsWith(taskEvents, true), &graphics, options);
+    broadcast.finish();
+    constexpr double patience = 20.0;  // [s]
+    if (times.empty() || viewer.wait(patience) != 0) {
+        return "no viewer could draw (its message is above)";
+    }
+    result.viewer = viewerTimes(readTimeline(timeline), started);
+    result.events.insert(result.events.end(), times.begin(), times.end());
+    return "";
+}
+
+TasksCase measure(const Options& o, std::size_t objects, std::string& graphics)
+{
+    const InclusionSpec spec{objects, o.voxels, o.seed};
+    const EventOptions options{o.frames};
+    TasksCase result;
+    result.objects = objects;
+    const auto scene = inclusionScene(settingsOf(o));
+    {
+        const ObjectScene loop(inclusionsOf(spec), objectStiffness);
+        const std::vector<TaskEvent> events{taskEvents[1], taskEvents[3], taskEvents[7], taskEvents[9]};
+        result.loop = timeEvents(loop, scene.dffb, events, {(o.frames + 1) / 2});
+    }
+    const auto start = Clock::now();
+    auto model = haptics::buildModel(scene, inclusionTissue(spec));
+    result.build = std::chrono::duration<double>(Clock::now() - start).count();
+    const auto size = model.tissue->size();
+    result.voxels = static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
+    result.events = timeEvents(model, eventsWith(taskEvents, false), nullptr, options);
+    if (graphics.empty()) {
+        graphics = timeGraphics(model, options, result);
+    }
+    const auto order = [](const auto& t) {
+        return std::ranges::find(taskEvents, t.event, &TaskEvent::name) - taskEvents.begin();
+    };
+    std::ranges::sort(result.events, {}, order);
+    return result;
+}
+
+// In an order of chance, so that a machine that gets slower with time does not look like objects that cost time.
+std::vector<std::size_t> shuffled(std::vector<std::size_t> objects, std::uint64_t seed)
+{
+    datasets::Random random(seed);
+    for (std::size_t i = 0; i + 1 < objects.size(); ++i) {
+        std::swap(objects[i], objects[i + random.bits() % (objects.size() - i)]);
+    }
+    return objects;
+}
+
+void benchTasks(const Options& o)
+{
+    base::checkOutput(o.json);
+    base::checkOutput(o.chart);
+    base::checkOutputFolder(o.folder);
+    auto objects = o.objects;
+    std::ranges::sort(objects);
+    objects.erase(std::ranges::unique(objects).begin(), objects.end());
+    if (objects.size() < 3) {
+        throw std::runtime_error("--objects: a line with its errors needs three different numbers or more");
+    }
+    if (const int least = voxelsFor(objects.back()); o.voxels != 0 && o.voxels < least) {
+        throw std::runtime_error(fmt::format("--voxels {}: {} objects need {} or more", o.voxels, objects.back(), least));
+    }
+    command::Progress progress;
+    TasksResult result;
+    result.level = o.level == "elastic" ? fmt::format("elastic, {}", o.setting) : o.level;
+    std::string without = o.noView ? "--no-view" : "";
+    for (const std::size_t n : shuffled(objects, o.seed)) {
+        progress.show(fmt::format("{} of {}: {} objects", result.cases.size() + 1, objects.size(), n));
+        result.cases.push_back(measure(o, n, without));
+    }
+    progress.clear();
+    std::ranges::sort(result.cases, {}, &TasksCase::objects);
+    result.graphics = without.empty() ? "measured" : "left out: " + without;
+    const auto figures = tasksFigures(result);
+    if (o.json != "-") {
+        printTasks(figures);
+    }
+    if (!o.chart.empty()) {
+        writeTasksChart(figures, o.chart);
+    }
+    if (!o.folder.empty()) {
+        writeTasksFolder(o.folder, figures);
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, figures);
+    }
+}
+
+}  // namespace
+
+void addBenchTasks(CLI::App& bench)
+{
+    auto o = std::make_shared<Options>();
+    o->objects = standardObjects();
+    auto* c = bench.add_subcommand("tasks",
+                                   "Time of the thesis's tasks and events against the number of objects, beside its own "
+                                   "figures and a loop over objects as it had");
+    c->add_option("--objects", o->objects,
+                  "Numbers of objects, three or more (default: 25 to 600 as in its Table 2, and on to 10^6)")
+        ->delimiter(',')
+        ->check(CLI::Range(1, 8'000'000));
+    c->add_option("--voxels", o->voxels,
+                  "Along a side of the block, whatever the objects (0: as few as tell them apart, 64 at least)")
+        ->check(CLI::Range(0, 800))
+        ->capture_default_str();
+    c->add_option("--model", o->level, "Level of the tissue model")
+        ->check(CLI::IsMember(datasets::modelLevels))
+        ->capture_default_str();
+    c->add_option("--setting", o->setting, "Of level elastic")
+        ->check(CLI::IsMember(datasets::elasticSettings()))
+        ->capture_default_str();
+    c->add_option("--frames", o->frames, "Of 33 ticks, for each event and number of objects")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
+    c->add_option("--seed", o->seed, "Of the objects' places, and of the order in which their numbers are measured")
+        ->capture_default_str();
+    c->add_flag("--no-view", o->noView, "Without a viewer, and so without the events that have graphics on");
+    c->add_option("-o,--output", o->folder, "Folder for tasks.json, tasks.html and tasks.png");
+    c->add_option("--chart", o->chart, "Write the chart to this file (PNG)");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    c->final_callback([o] { benchTasks(*o); });
+}
+
+}  // namespace palpate::studies

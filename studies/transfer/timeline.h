@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::studies {
+
+/// A picture of a viewer, by the clock CLOCK_MONOTONIC; see render::Shown.
+struct TimelinePicture {
+    std::uint64_t tick = 0;
+    double published = 0, read = 0, done = 0;  // [s]
+};
+
+/// What `palpate-view --timeline FILE` wrote. Throws std::runtime_error for fewer than two pictures.
+std::vector<TimelinePicture> readTimeline(const std::filesystem::path& file);
+
+/// A folder for what this program's children write, removed at its end. Throws std::runtime_error.
+class ScratchFolder {
+public:
+    ScratchFolder();
+    ScratchFolder(const ScratchFolder&) = delete;
+    ScratchFolder& operator=(const ScratchFolder&) = delete;
+    ~ScratchFolder();
+    std::filesystem::path operator/(const std::string& name) const { return folder_ / name; }
+
+private:
+    std::filesystem::path folder_;
+};
+
+}  // namespace palpate::studies

@@ -1,0 +1,334 @@
+#include <sweep/command.h>
+
+#include <base/build.h>
+#include <base/outputs.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <sweep/local.h>
+#include <sweep/report.h>
+#include <sweep/slurm.h>
+#include <sweep/table.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace palpate::sweep {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+namespace {
+
+constexpr std::size_t barWidth = 30;
+constexpr double fileBlock = 4096;  // what a small file takes on a disk
+
+struct Options {
+    std::string plan, folder, report, json, work;
+    SlurmSettings slurm;
+    int jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    bool dry = false, onSlurm = false, retry = false, anyBuild = false, list = false;
+};
+
+std::atomic<int> interrupts{0};
+
+void onSignal(int)
+{
+    ++interrupts;
+}
+
+// Ctrl-C once: what runs is finished; twice: it is abandoned.
+void heedSignals()
+{
+    struct sigaction action {};
+    action.sa_handler = onSignal;
+    sigaction(SIGINT, &action, nullptr);
+    sigaction(SIGTERM, &action, nullptr);
+    sigaction(SIGHUP, &action, nullptr);
+}
+
+std::string duration(double seconds)
+{
+    const auto s = static_cast<long>(seconds + 0.5);
+    return s < 120    ? fmt::format("{} s", s)
+           : s < 7200 ? fmt::format("{} min", s / 60)
+                      : fmt::format("{:.1f} h", seconds / 3600);
+}
+
+std::string plural(std::size_t count, const char* what)
+{
+    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
+}
+
+// "[######......] 412 of 1000 cases, 8.1 a second, 72 s left".
+std::string bar(std::size_t before, std::size_t done, std::size_t all, Clock::time_point begin)
+{
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    const double rate = seconds > 0 ? static_cast<double>(done) / seconds : 0.0;
+    const std::size_t filled = (before + done) * barWidth / all;
+    std::string out = fmt::format("[{:#<{}}{:.<{}}] {} of {} cases", "", filled, "", barWidth - filled, before + done, all);
+    if (done > 0) {
+        out += fmt::format(", {:.3g} a {}, {} left", rate >= 0.5 ? rate : 60 * rate, rate >= 0.5 ? "second" : "minute",
+                           duration(static_cast<double>(all - before - done) / rate));
+    }
+    return out;
+}
+
+void listAll()
+{
+    fmt::print("ready plans:\n");
+    for (const std::string& name : builtInPlans()) {
+        const auto [text, origin] = planText(name);
+        const SweepPlan plan = parsePlan(text, origin, namedScene);
+        fmt::print("  {:<14} {:5} cases  {}\n", name, plan.cases(), plan.about);
+    }
+    for (std::size_t kind = 0; kind < procedureNames.size(); ++kind) {
+        fmt::print("outputs of procedure {}:\n", procedureNames[kind]);
+        for (const OutputInfo& o : outputsOf(static_cast<ProcedureKind>(kind))) {
+            fmt::print("  {:<24} {}\n", o.name, o.meaning);
+        }
+    }
+}
+
+// What a case costs, by some that are run: the first one also builds what all share.
+void dryRun(const Options& o)
+{
+    const auto [text, origin] = o.plan.empty() ? planText((fs::path(o.folder) / "plan.toml").string()) : planText(o.plan);
+    const bool own = o.plan.empty();
+    const SweepPlan plan = own ? SweepFolder(o.folder, "", false).plan() : parsePlan(text, origin, namedScene);
+    CaseRunner runner(plan, std::string(base::build()));
+    const fs::path record =
+        plan.records ? fs::temp_directory_path() / fmt::format("palpate-sweep-{}.db", getpid()) : fs::path();
+    double seconds = 0, bytes = fileBlock;
+    std::set<std::size_t> measured{0, plan.cases() / 2, plan.cases() - 1};
+    for (const std::size_t i : measured) {
+        const auto begin = Clock::now();
+        try {
+            runner.run(i, record);
+        } catch (const std::runtime_error& e) {
+            fmt::print(stderr, "palpate: case {} fails: {}\n", i, e.what());
+        }
+        const double took = std::chrono::duration<double>(Clock::now() - begin).count();
+        seconds = i == 0 ? took : std::max(took, i == plan.cases() / 2 ? 0.0 : seconds);
+        std::error_code none;
+        const auto size = record.empty() ? 0 : fs::file_size(record, none);
+        bytes = std::max(bytes, fileBlock + (none ? 0.0 : static_cast<double>(size)));
+        fs::remove(record, none);
+    }
+    const double all = seconds * static_cast<double>(plan.cases()) / o.jobs;
+    const double disk = bytes * static_cast<double>(plan.cases());
+    fmt::print("{}: {} = {} x {}; axes: ", plan.name, plural(plan.cases(), "case"), plural(plan.points.size(), "point"),
+               plural(plan.repeats, "repeat"));
+    for (const Axis& a : plan.axes) {
+        fmt::print("{}{}", &a == &plan.axes[0] ? "" : ", ", a.name);
+    }
+    fmt::print("\nabout {:.3g} s a case, measured on {}: {} on {}; {:.3g} MB on the disk\n", seconds,
+               plural(measured.size(), "case"), duration(all),
+               o.jobs == 1 ? std::string("one process") : fmt::format("{} processes", o.jobs), disk / 1e6);
+    if (!o.json.empty()) {
+        command::writeJson(o.json,
+                           {{"cases", plan.cases()}, {"case_s", seconds}, {"estimated_s", all}, {"disk_mb", disk / 1e6}});
+    }
+}
+
+// Which cases are still to be run.
+std::vector<std::size_t> remaining(const Options& o, const SweepFolder& folder)
+{
+    const auto rows = folder.rows();
+    std::vector<std::size_t> cases;
+    std::set<std::string> others;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (!rows[i] || (o.retry && rows[i]->failed())) {
+            folder.forget(i);
+            cases.push_back(i);
+        } else if (rows[i]->build != std::string(base::build())) {
+            others.insert(rows[i]->build);
+        }
+    }
+    if (!others.empty() && !cases.empty() && !o.anyBuild) {
+        throw std::runtime_error(
+            fmt::format("{}: holds cases of {} and this is {}: go on with that, or add --any-build (the table says which "
+                        "case is whose)",
+                        folder.path().string(), fmt::join(others, ", "), std::string(base::build())));
+    }
+    return cases;
+}
+
+SlurmSettings merged(const Options& o, const SweepPlan& plan)
+{
+    SlurmSettings s = plan.slurm;
+    for (const auto member :
+         {&SlurmSettings::partition, &SlurmSettings::time, &SlurmSettings::account, &SlurmSettings::memory}) {
+        s.*member = (o.slurm.*member).empty() ? s.*member : o.slurm.*member;
+    }
+    s.options.insert(s.options.end(), o.slurm.options.begin(), o.slurm.options.end());
+    s.chunk = o.slurm.chunk > 0 ? o.slurm.chunk : s.chunk;
+    return s;
+}
+
+PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std::size_t>& cases)
+{
+    command::Progress progress;
+    const auto begin = Clock::now();
+    const std::size_t all = folder.plan().cases(), before = all - cases.size();
+    if (o.onSlurm) {
+        const auto told = [&](std::size_t done, std::size_t running, std::size_t waiting) {
+            progress.show(
+                fmt::format("{}; {} running, {} waiting", bar(before, done, all, begin), plural(running, "task"), waiting));
+            return interrupts == 0;
+        };
+        runOnSlurm(folder, cases, merged(o, folder.plan()), std::string(base::build()), told);
+        const auto there =
+            static_cast<std::size_t>(std::ranges::count_if(cases, [&](std::size_t i) { return folder.has(i); }));
+        return {there, std::chrono::duration<double>(Clock::now() - begin).count(), 0.0};
+    }
+    const auto told = [&](std::size_t done, std::size_t running) {
+        folder.lock().beat();
+        progress.show(interrupts > 0 ? fmt::format("finishing {}; Ctrl-C again leaves them", plural(running, "case"))
+                                     : bar(before, done, all, begin));
+        return interrupts == 0;
+    };
+    return runLocally(folder, cases, o.jobs, std::string(base::build()), told, [] { return interrupts > 1; });
+}
+
+// Table and figures of what there is; how many cases are done.
+std::size_t conclude(const Options& o, const SweepFolder& folder, const PoolResult& run, std::size_t begun)
+{
+    const auto rows = folder.rows();
+    const SweepTable table = tableOf(folder.plan(), rows);
+    base::writeWhole(folder.path() / "table.csv", csvText(table));
+    writeDatabase(folder.path() / "table.db", table, folder.plan());
+    const auto failed =
+        static_cast<std::size_t>(std::ranges::count_if(rows, [](const auto& r) { return r && r->failed(); }));
+    const auto processes = static_cast<double>(std::min(begun, static_cast<std::size_t>(o.jobs)));
+    const double share = run.seconds > 0 && processes > 0 ? run.cpuSeconds / (run.seconds * processes) : 0.0;
+    const fs::path file = folder.path() / "table.csv";
+    if (!o.json.empty()) {
+        command::writeJson(o.json, {{"cases", rows.size()},
+                                    {"done", table.rows.size()},
+                                    {"failed", failed},
+                                    {"seconds", run.seconds},
+                                    {"cpu_fraction", share},
+                                    {"table", file.string()}});
+    }
+    if (o.json != "-") {
+        fmt::print("{} of {}, {} failed; {} now in {:.3g} s{}\ntable: {}, {}\n", table.rows.size(),
+                   plural(rows.size(), "case"), failed, run.done, run.seconds,
+                   run.cpuSeconds > 0
+                       ? fmt::format(", {:.0f} % of {}", 100 * share, plural(static_cast<std::size_t>(processes), "core"))
+                       : "",
+                   file.string(), (folder.path() / "table.db").string());
+    }
+    if (failed == rows.size()) {
+        const auto first = std::ranges::find_if(rows, [](const auto& r) { return r && r->failed(); });
+        throw std::runtime_error("every case failed: " + (*first)->error);
+    }
+    return table.rows.size();
+}
+
+void run(const Options& o)
+{
+    base::checkOutput(o.json);
+    heedSignals();
+    SweepFolder folder(o.folder, o.plan, true);
+    folder.clean();
+    const auto cases = remaining(o, folder);
+    const PoolResult result = cases.empty() ? PoolResult() : runCases(o, folder, cases);
+    const std::size_t done = conclude(o, folder, result, cases.size());
+    if (done < folder.plan().cases()) {
+        throw std::runtime_error(fmt::format("stopped: {} of {} cases are done; the same command goes on with the others",
+                                             done, folder.plan().cases()));
+    }
+}
+
+void report(const Options& o)
+{
+    const SweepFolder folder(o.report, "", false);
+    const auto rows = folder.rows();
+    if (std::ranges::none_of(rows, [](const auto& r) { return r && !r->failed(); })) {
+        throw std::runtime_error(o.report + ": no case is done yet: run the sweep first");
+    }
+    const fs::path file = folder.path() / "report.html";
+    base::writeWhole(file, sweepPage(folder.plan(), rows));
+    if (!o.json.empty()) {
+        command::writeJson(o.json, sensitivity(folder.plan(), rows));
+    }
+    if (o.json != "-") {
+        fmt::print("report: {}\n", file.string());
+    }
+}
+
+void sweepCommand(const Options& o)
+{
+    // Of each process one core; and processes are forked from one thread.
+    const auto alone = oneThread();
+    if (o.list) {
+        listAll();
+    } else if (!o.work.empty()) {
+        const char* const cores = std::getenv("SLURM_CPUS_PER_TASK");
+        workOnChunk(o.work, cores != nullptr ? std::max(1, std::atoi(cores)) : 1, std::string(base::build()));
+    } else if (!o.report.empty()) {
+        report(o);
+    } else if (o.folder.empty() && !o.dry) {
+        throw std::runtime_error("sweep: where to? add -o DIR");
+    } else if (o.dry) {
+        if (o.plan.empty() && o.folder.empty()) {
+            throw std::runtime_error("sweep --dry-run: of what? give a plan, or -o DIR");
+        }
+        dryRun(o);
+    } else {
+        run(o);
+    }
+}
+
+}  // namespace
+
+void addSweep(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    auto* c = app.add_subcommand("sweep", "Many cases of a scene, on all cores or a cluster: a table, and a report");
+    c->add_option(
+        "PLAN", o->plan,
+        fmt::format("What varies and what is measured (.toml, docs/sweeps.md); ready: {}; without it, that of the "
+                    "folder",
+                    fmt::join(builtInPlans(), ", ")));
+    c->add_option("-o,--output", o->folder, "Folder of the sweep; one that was stopped goes on");
+    c->add_flag("--dry-run", o->dry, "Say how many cases, how long and how much disk; run three of them to know");
+    c->add_option("--jobs", o->jobs, "Processes, one core each; the table does not depend on it")
+        ->check(CLI::Range(1, 1024))
+        ->capture_default_str();
+    auto* slurm = c->add_flag("--slurm", o->onSlurm, "As a Slurm job array: submit, watch, submit again what was lost");
+    c->add_option("--partition", o->slurm.partition, "Of the cluster")->needs(slurm);
+    c->add_option("--time", o->slurm.time, "Limit of a task, as sbatch takes it")->needs(slurm);
+    c->add_option("--account", o->slurm.account, "To be charged")->needs(slurm);
+    c->add_option("--memory", o->slurm.memory, "Of a task, such as 2G")->needs(slurm);
+    c->add_option("--chunk", o->slurm.chunk, "Cases per task (default: about a hundred tasks)")
+        ->needs(slurm)
+        ->check(CLI::PositiveNumber);
+    c->add_option("--sbatch", o->slurm.options, "Another option for sbatch, such as --sbatch=--qos=long")
+        ->needs(slurm)
+        ->allow_extra_args(false);
+    c->add_flag("--retry", o->retry, "Run cases that failed again");
+    c->add_flag("--any-build", o->anyBuild, "Go on with a sweep that another build began");
+    c->add_option("--report", o->report, "Write report.html in this folder of a sweep");
+    c->add_flag("--list", o->list, "Ready plans, and outputs of each procedure");
+    c->add_option("--work", o->work, "What a task of a job array does")->group("");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
+    c->final_callback([o] { sweepCommand(*o); });
+}
+
+}  // namespace palpate::sweep

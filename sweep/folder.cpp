@@ -1,0 +1,273 @@
+#include <sweep/folder.h>
+
+#include <base/outputs.h>
+#include <datasets/scene_text.h>
+#include <sweep/lock.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
+#include <system_error>
+
+namespace palpate::sweep {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t perFolder = 1000;
+constexpr const char* unfinished = ".part";
+
+std::string textOf(const fs::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    std::string text((std::istreambuf_iterator<char>(in)), {});
+    if (!in && text.empty()) {
+        throw std::runtime_error(file.string() + ": cannot be read: check its name and permissions");
+    }
+    return text;
+}
+
+std::string hashOf(const fs::path& file)
+{
+    const std::string bytes = textOf(file);
+    std::uint64_t hash = 0xcbf29ce484222325U;
+    for (const char c : bytes) {
+        hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+    }
+    return fmt::format("{} bytes, {:016x}", bytes.size(), hash);
+}
+
+json inputsOf(const datasets::Scene& scene)
+{
+    json inputs = json::object();
+    for (const std::string& file : {scene.source.file.string(), scene.tissues}) {
+        if (!file.empty()) {
+            inputs[file] = hashOf(file);
+        }
+    }
+    return inputs;
+}
+
+// The folder's own base scene, whatever the plan calls it.
+datasets::Scene sceneOfFolder(const std::string&, const fs::path& origin)
+{
+    const fs::path file = origin.parent_path() / "scene.toml";
+    return datasets::parseScene(textOf(file), file);
+}
+
+double cpuSeconds()
+{
+    timespec t{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+std::optional<SweepRow> parseRow(const std::string& text, std::size_t index, const SweepPlan& plan)
+{
+    const json entry = json::parse(text, nullptr, false);
+    if (!entry.is_object() || entry.value("case", json()) != index || !entry.contains("build")) {
+        return std::nullopt;
+    }
+    SweepRow row;
+    row.index = index;
+    row.error = entry.value("error", "");
+    row.build = entry.value("build", "");
+    row.machine = entry.value("machine", "");
+    row.tickTime = 1e-6 * entry.value("tick_us", 0.0);
+    row.seconds = entry.value("case_s", 0.0);
+    for (const auto& output : plan.outputs) {
+        const json value = entry.value("outputs", json::object()).value(output.name, json());
+        row.outputs.push_back(value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN());
+    }
+    return row;
+}
+
+}  // namespace
+
+std::pair<std::string, fs::path> planText(const std::string& given)
+{
+    const auto ready = builtInPlan(given);
+    if (!ready.empty()) {
+        return {std::string(ready), given + ".toml"};
+    }
+    if (fs::is_directory(given)) {
+        throw std::runtime_error(given + ": is a folder: give a plan (.toml), and the folder with -o");
+    }
+    if (!fs::exists(given)) {
+        throw std::runtime_error(
+            fmt::format("{}: no such plan; ready plans are: {}", given, fmt::join(builtInPlans(), ", ")));
+    }
+    return {textOf(given), fs::absolute(given)};
+}
+
+void SweepFolder::begin()
+{
+    std::error_code failed;
+    fs::create_directories(folder_ / "cases", failed);
+    if (failed) {
+        throw std::runtime_error(fmt::format("{}: cannot be made ({})", folder_.string(), failed.message()));
+    }
+    base::writeWhole(folder_ / "scene.toml", datasets::sceneText(plan_.base));
+    const json about{{"name", plan_.name}, {"inputs", inputsOf(plan_.base)}};
+    base::writeWhole(folder_ / "sweep.json", about.dump(1));
+    base::writeWhole(folder_ / "plan.toml", plan_.text);  // the last: it makes the folder a sweep
+}
+
+SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
+    : folder_(fs::absolute(std::move(folder)).lexically_normal())
+{
+    folder_ = folder_.has_filename() ? folder_ : folder_.parent_path();
+    const fs::path file = folder_ / "plan.toml";
+    std::pair<std::string, fs::path> text;
+    if (!given.empty()) {
+        text = planText(given);
+    }
+    if (!fs::exists(file)) {
+        if (given.empty()) {
+            throw std::runtime_error(folder_.string() + ": holds no sweep: give a plan");
+        }
+        if (fs::exists(folder_) && (!fs::is_directory(folder_) || !fs::is_empty(folder_))) {
+            throw std::runtime_error(folder_.string() + ": is not empty and holds no sweep: choose another folder");
+        }
+        plan_ = parsePlan(text.first, text.second, namedScene);
+        base::checkOutputFolder(folder_);
+        fs::create_directories(folder_);
+    }
+    if (hold) {
+        lock_.emplace(folder_);
+    }
+    if (!fs::exists(file)) {
+        begin();
+        return;
+    }
+    plan_ = parsePlan(textOf(file), file, sceneOfFolder);
+    if (!given.empty() && text.first != plan_.text) {
+        throw std::runtime_error(
+            fmt::format("{}: holds another plan than {}: choose another folder, or leave the plan out to go on with the "
+                        "folder's own",
+                        folder_.string(), given));
+    }
+    const json about = json::parse(textOf(folder_ / "sweep.json"), nullptr, false);
+    if (!about.is_object()) {
+        throw std::runtime_error(folder_.string() + "/sweep.json: is damaged: begin in another folder");
+    }
+    plan_.name = about.value("name", plan_.name);
+    if (const json now = inputsOf(plan_.base); about.value("inputs", json()) != now) {
+        throw std::runtime_error(
+            fmt::format("{}: a file that its scene reads has changed since the sweep began ({}): bring "
+                        "it back, or begin in another folder",
+                        folder_.string(), now.dump()));
+    }
+}
+
+fs::path SweepFolder::caseFile(std::size_t index) const
+{
+    return folder_ / "cases" / fmt::format("{:03}", index / perFolder) / fmt::format("{}.json", index);
+}
+
+bool SweepFolder::has(std::size_t index) const
+{
+    std::error_code none;
+    const auto size = fs::file_size(caseFile(index), none);
+    return !none && size > 0;
+}
+
+std::vector<std::optional<SweepRow>> SweepFolder::rows() const
+{
+    std::vector<std::optional<SweepRow>> rows(plan_.cases());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (has(i)) {
+            rows[i] = parseRow(textOf(caseFile(i)), i, plan_);
+        }
+    }
+    return rows;
+}
+
+void SweepFolder::write(const SweepRow& row) const
+{
+    json outputs = json::object();
+    for (std::size_t i = 0; i < row.outputs.size(); ++i) {
+        outputs[plan_.outputs[i].name] = std::isfinite(row.outputs[i]) ? json(row.outputs[i]) : json();
+    }
+    const json entry{{"case", row.index},    {"error", row.error},     {"outputs", std::move(outputs)},
+                     {"build", row.build},   {"machine", row.machine}, {"tick_us", 1e6 * row.tickTime},
+                     {"case_s", row.seconds}};
+    const fs::path file = caseFile(row.index);
+    std::error_code failed;
+    fs::create_directories(file.parent_path(), failed);
+    // Named after the process: two may write the same row, and either is whole.
+    const fs::path half = file.parent_path() / fmt::format("{}.{}.{}{}", row.index, machineName(), getpid(), unfinished);
+    std::ofstream out(half, std::ios::binary);
+    out << entry.dump(-1, ' ', false, json::error_handler_t::replace) << '\n';
+    out.close();
+    if (out && !failed) {
+        fs::rename(half, file, failed);
+    }
+    if (!out || failed) {
+        std::error_code ignored;
+        fs::remove(half, ignored);
+        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
+    }
+}
+
+void SweepFolder::forget(std::size_t index) const
+{
+    std::error_code ignored;
+    fs::remove(caseFile(index), ignored);
+}
+
+void SweepFolder::clean() const
+{
+    std::error_code none;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_ / "cases", none)) {
+        if (entry.path().extension() == unfinished) {
+            fs::remove(entry.path(), none);
+        }
+    }
+}
+
+fs::path SweepFolder::record(std::size_t index) const
+{
+    std::error_code failed;
+    const fs::path file = folder_ / "records" / fmt::format("{}.db", index);
+    fs::create_directories(file.parent_path(), failed);
+    for (const char* const rest : {"", "-wal", "-shm"}) {
+        fs::remove(file.string() + rest, failed);
+    }
+    return file;
+}
+
+SweepRow runCase(CaseRunner& runner, const SweepFolder& folder, std::size_t index, const std::string& build)
+{
+    SweepRow row;
+    row.index = index;
+    row.build = build;
+    row.machine = machineName();
+    const double before = cpuSeconds();
+    try {
+        auto result = runner.run(index, folder.plan().records ? folder.record(index) : fs::path());
+        row.outputs = std::move(result.outputs);
+        row.tickTime = result.tickTime;
+    } catch (const RecordFailed&) {
+        throw;
+    } catch (const std::exception& e) {
+        row.error = e.what();
+        std::replace(row.error.begin(), row.error.end(), '\n', ' ');
+    }
+    row.seconds = cpuSeconds() - before;
+    return row;
+}
+
+}  // namespace palpate::sweep

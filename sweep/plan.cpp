@@ -1,0 +1,449 @@
+#include <sweep/plan.h>
+
+#include <datasets/embedded.h>
+#include <datasets/scene_text.h>
+#include <datasets/tables.h>
+#include <datasets/toml_section.h>
+#include <haptics/trainee.h>
+#include <sweep/formula.h>
+#include <volume/tissue.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <stdexcept>
+
+namespace palpate::sweep {
+
+using datasets::Section;
+
+namespace {
+
+constexpr std::int64_t mostSamples = 1'000'000;
+constexpr std::int64_t mostCases = 10'000'000;
+constexpr std::int64_t mostSteps = 100'000;
+constexpr double furthest = 1e12;
+constexpr std::size_t probes = 60;  // cases whose scene is tried before a sweep begins
+
+KeyValue valueOf(Section& section, std::string_view key, const toml::node& node)
+{
+    if (const auto v = node.value_exact<std::int64_t>()) {
+        return *v;
+    }
+    if (const auto v = node.value_exact<double>(); v && std::isfinite(*v)) {
+        return *v;
+    }
+    if (const auto v = node.value_exact<bool>()) {
+        return *v;
+    }
+    if (const auto v = node.value_exact<std::string>()) {
+        return *v;
+    }
+    section.refuse(key, "a value must be a number, text, true or false");
+}
+
+std::vector<std::string> wordsOf(Section& section, std::string_view key)
+{
+    std::vector<std::string> out;
+    const toml::node* const node = section.node(key);
+    if (node == nullptr) {
+        return out;
+    }
+    const toml::array* const list = node->as_array();
+    for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+        const auto word = list->get(i)->value_exact<std::string>();
+        if (!word || word->empty()) {
+            section.refuse(key, "expected a list of texts in quotes");
+        }
+        out.push_back(*word);
+    }
+    if (list == nullptr) {
+        section.refuse(key, "expected a list of texts in quotes");
+    }
+    return out;
+}
+
+void readRange(Section& section, std::string_view key, Axis& axis)
+{
+    const toml::array* const list = section.node(key)->as_array();
+    const auto number = [&](std::size_t i) {
+        return list != nullptr && list->size() == 2 ? list->get(i)->value<double>() : std::nullopt;
+    };
+    if (!number(0) || !number(1) || !(*number(0) < *number(1)) || std::abs(*number(0)) > furthest ||
+        std::abs(*number(1)) > furthest) {
+        section.refuse(key, "expected [low, high], two numbers, the lower one first");
+    }
+    axis.low = *number(0);
+    axis.high = *number(1);
+    if (axis.log && axis.low <= 0) {
+        section.refuse(key, "a logarithmic range must be above 0");
+    }
+}
+
+Axis readAxis(Section& section, DesignKind design)
+{
+    Axis axis;
+    axis.key = section.word("key").value_or("");
+    axis.name = section.word("name").value_or(columnOf(axis.key));
+    if (axis.name.empty()) {
+        section.missing("key", "what varies, such as \"tissue.fat.youngs_kpa\"; or name, for formulas alone");
+    }
+    if (!isVariable(axis.name)) {
+        section.refuse("name", "must be letters, digits and _, and begin with a letter");
+    }
+    const int ways = (section.has("values") ? 1 : 0) + (section.has("range") ? 1 : 0) + (section.has("log_range") ? 1 : 0);
+    if (ways != 1) {
+        section.missing("values", "one of values = [..], range = [low, high], log_range = [low, high]");
+    }
+    if (section.has("values")) {
+        const toml::node* const node = section.node("values");
+        const toml::array* const list = node->as_array();
+        for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
+            axis.values.push_back(valueOf(section, "values", *list->get(i)));
+        }
+        if (axis.values.empty()) {
+            section.refuse("values", "expected a list of values");
+        }
+    } else {
+        axis.log = section.has("log_range");
+        readRange(section, axis.log ? "log_range" : "range", axis);
+        axis.whole = section.flag("whole").value_or(false);
+        const auto steps = section.integer("steps", "", 2, mostSteps);
+        if (!steps && design == DesignKind::grid) {
+            section.missing("steps", "how many values of the range a grid has");
+        }
+        axis.steps = static_cast<std::size_t>(steps.value_or(0));
+    }
+    section.finish();
+    return axis;
+}
+
+// Leaves of nested tables: a."b.c" and a.b.c alike.
+void flatten(Section& section, std::string_view key, const toml::table& table, const std::string& path,
+             std::vector<Setting>& out)
+{
+    for (const auto& [k, node] : table) {
+        const std::string here = path.empty() ? std::string(k.str()) : fmt::format("{}.{}", path, k.str());
+        if (const toml::table* inner = node.as_table()) {
+            flatten(section, key, *inner, here, out);
+        } else {
+            out.push_back({here, valueOf(section, key, node)});
+        }
+    }
+}
+
+std::vector<Setting> readSettings(Section& top, std::string_view key)
+{
+    std::vector<Setting> out;
+    if (const toml::node* node = top.node(key)) {
+        if (!node->is_table()) {
+            top.refuse(key, "expected a table of keys and values");
+        }
+        flatten(top, key, *node->as_table(), "", out);
+    }
+    return out;
+}
+
+void readDesign(Section& top, SweepPlan& plan)
+{
+    auto section = top.section("design");
+    if (!section) {
+        return;
+    }
+    if (const auto kind = section->choice("kind", designNames)) {
+        plan.design = static_cast<DesignKind>(*kind);
+    }
+    const auto samples = section->integer("samples", "", 1, mostSamples);
+    if ((plan.design == DesignKind::grid) == samples.has_value()) {
+        section->missing("samples", samples ? "a grid has none: leave it out" : "how many");
+    }
+    plan.samples = static_cast<std::size_t>(samples.value_or(0));
+    section->finish();
+}
+
+void readSlurm(Section& top, SlurmSettings& slurm)
+{
+    if (auto section = top.section("slurm")) {
+        slurm.partition = section->word("partition").value_or("");
+        slurm.time = section->word("time").value_or("");
+        slurm.account = section->word("account").value_or("");
+        slurm.memory = section->word("memory").value_or("");
+        slurm.options = wordsOf(*section, "options");
+        slurm.chunk = section->integer("chunk", "", 1, mostCases).value_or(0);
+        section->finish();
+    }
+}
+
+void readMarks(Section& top, SweepPlan& plan)
+{
+    for (Section& section : top.sections("mark")) {
+        OutputMark mark;
+        mark.output = section.word("output").value_or("");
+        const auto at = section.number("at", "", -furthest, furthest);
+        if (mark.output.empty() || !at) {
+            section.missing(at ? "output" : "at", "a mark has output, at and label");
+        }
+        mark.at = *at;
+        mark.label = section.word("label").value_or(fmt::format("{:g}", mark.at));
+        section.finish();
+        const bool known = std::ranges::any_of(plan.outputs, [&](const auto& o) { return o.name == mark.output; });
+        if (!known) {
+            section.refuse("output", "is none of the plan's outputs");
+        }
+        plan.marks.push_back(std::move(mark));
+    }
+}
+
+// The kind of procedure that all cases share: which outputs there are follows from it.
+ProcedureKind kindOf(const std::vector<Setting>& settings, Section& top)
+{
+    for (const Setting& s : settings) {
+        if (s.key == "procedure.kind") {
+            const auto* const name = std::get_if<std::string>(&s.value);
+            const auto* const at =
+                name != nullptr ? std::find(procedureNames.begin(), procedureNames.end(), *name) : procedureNames.end();
+            if (at != procedureNames.end()) {
+                return static_cast<ProcedureKind>(at - procedureNames.begin());
+            }
+            top.refuse("procedure", fmt::format("kind must be one of {}", fmt::join(procedureNames, ", ")));
+        }
+    }
+    return ProcedureKind::session;
+}
+
+void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
+{
+    std::set<std::string> there;
+    for (const OutputInfo& o : outputsOf(kind)) {
+        there.insert(o.name);
+        if (!plan.reference.empty()) {
+            there.insert("reference_" + o.name);
+            there.insert(o.name + "_change_pct");
+        }
+    }
+    auto words = wordsOf(top, "outputs");
+    if (words.empty()) {
+        for (const OutputInfo& o : outputsOf(kind)) {
+            words.push_back(o.name);
+        }
+    }
+    for (const std::string& word : words) {
+        const auto equals = word.find('=');
+        SweepOutput output{
+            word.substr(0, word.find_last_not_of(' ', equals == std::string::npos ? equals : equals - 1) + 1), {}};
+        if (equals != std::string::npos) {
+            output.formula = word.substr(equals + 1);
+        } else if (!there.contains(output.name)) {
+            top.refuse("outputs", fmt::format("there is no {}; there are {}", output.name, fmt::join(there, ", ")));
+        }
+        if (!isVariable(output.name)) {
+            top.refuse("outputs",
+                       fmt::format("'{}': a name must be letters, digits and _, and begin with a letter", output.name));
+        }
+        plan.outputs.push_back(std::move(output));
+    }
+}
+
+void checkColumns(Section& top, const SweepPlan& plan)
+{
+    std::set<std::string> columns{"case",  "point", "repeat",  "seed",    "status",
+                                  "error", "build", "machine", "tick_us", "case_s"};
+    for (const Axis& a : plan.axes) {
+        if (!columns.insert(a.name).second) {
+            top.refuse("axis", fmt::format("'{}' is a column already: give it another name", a.name));
+        }
+    }
+    for (const SweepOutput& o : plan.outputs) {
+        if (!columns.insert(o.name).second) {
+            top.refuse("outputs", fmt::format("'{}' is a column already: give it another name", o.name));
+        }
+    }
+}
+
+UnitPoints gridPoints(const std::vector<Axis>& axes, Section& top)
+{
+    double count = 1;
+    for (const Axis& a : axes) {
+        count *= static_cast<double>(a.levels());
+    }
+    if (count > static_cast<double>(mostCases)) {
+        top.refuse("axis", fmt::format("a grid of {:.0f} points: {} at most; take samples instead", count, mostCases));
+    }
+    UnitPoints points(static_cast<std::size_t>(count), std::vector<double>(axes.size()));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        std::size_t rest = i;
+        for (std::size_t a = axes.size(); a-- > 0;) {
+            points[i][a] = static_cast<double>(rest % axes[a].levels());
+            rest /= axes[a].levels();
+        }
+    }
+    return points;
+}
+
+UnitPoints pointsOf(const SweepPlan& plan, Section& top)
+{
+    switch (plan.design) {
+        case DesignKind::latinHypercube:
+            return latinHypercube(plan.samples, plan.axes.size(), plan.seed);
+        case DesignKind::sobol:
+            return sobolPoints(plan.samples, plan.axes.size(), plan.seed);
+        case DesignKind::saltelli:
+            return saltelliPoints(plan.samples, plan.axes.size(), plan.seed);
+        case DesignKind::morris:
+            return morrisPoints(plan.samples, plan.axes.size(), plan.seed);
+        case DesignKind::grid:
+            break;
+    }
+    return gridPoints(plan.axes, top);
+}
+
+void applyConstraints(SweepPlan& plan, Section& top)
+{
+    if (plan.constraints.empty()) {
+        return;
+    }
+    if (plan.design == DesignKind::saltelli || plan.design == DesignKind::morris) {
+        top.refuse("constraints", "a design for sensitivity is whole or none: leave them out, or choose sobol");
+    }
+    UnitPoints kept;
+    const UnitPoints all = std::move(plan.points);
+    for (const auto& point : all) {
+        plan.points = {point};
+        const auto variables = sweepPoint(plan, 0).variables;
+        try {
+            const bool meets = std::ranges::all_of(
+                plan.constraints, [&](const std::string& formula) { return evaluate(formula, variables) != 0; });
+            if (meets) {
+                kept.push_back(point);
+            }
+        } catch (const std::runtime_error& e) {
+            top.refuse("constraints", e.what());
+        }
+    }
+    plan.points = std::move(kept);
+    if (plan.points.empty()) {
+        top.refuse("constraints", "no point is left");
+    }
+}
+
+// Formulas see all that the first case has; 1 stands for what it would measure.
+void probeOutputs(const SweepPlan& plan, const SweepCase& first, const std::string& file)
+{
+    std::map<std::string, double> numbers = first.variables;
+    for (const OutputInfo& o : outputsOf(first.procedure.kind)) {
+        numbers[o.name] = 1;
+        if (!plan.reference.empty()) {
+            numbers["reference_" + o.name] = numbers[o.name + "_change_pct"] = 1;
+        }
+    }
+    for (const SweepOutput& output : plan.outputs) {
+        try {
+            numbers[output.name] = output.formula.empty() ? 1 : evaluate(output.formula, numbers);
+        } catch (const std::runtime_error& e) {
+            throw std::runtime_error(fmt::format("{}: outputs: {}", file, e.what()));
+        }
+    }
+}
+
+// A wrong key or value is known before the first case runs.
+void probe(const SweepPlan& plan, const std::string& file)
+{
+    const std::size_t count = std::min(plan.cases(), probes);
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t index = count > 1 ? i * (plan.cases() - 1) / (count - 1) : 0;
+        try {
+            const SweepCase c = sweepCase(plan, index);
+            if (i == 0 && c.scene.source.file.empty()) {
+                const auto& table = c.scene.tissues;
+                datasets::withChanges(table.empty() ? datasets::defaultTissues() : datasets::loadTissues(table),
+                                      c.scene.tissueChanges);
+            }
+        } catch (const std::runtime_error& e) {
+            throw std::runtime_error(fmt::format("{}: case {}: {}", file, index, e.what()));
+        }
+    }
+}
+
+}  // namespace
+
+SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin, SceneSource baseScene)
+{
+    const toml::table root = datasets::parseToml(text, origin.string());
+    Section top(root, origin.string(), "");
+    SweepPlan plan;
+    plan.text = text;
+    plan.name = top.word("name").value_or(origin.stem().string());
+    plan.about = top.word("about").value_or("");
+    const auto scene = top.word("scene");
+    if (!scene) {
+        top.missing("scene", "a built-in scene, a scene file or a volume");
+    }
+    plan.base = baseScene(*scene, origin);
+    plan.seed =
+        static_cast<std::uint64_t>(top.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
+    plan.repeats = static_cast<std::size_t>(top.integer("repeats", "", 1, mostSamples).value_or(1));
+    plan.commonSeeds = top.flag("common_seeds").value_or(false);
+    plan.records = top.flag("records").value_or(false);
+    readDesign(top, plan);
+    for (Section& section : top.sections("axis")) {
+        plan.axes.push_back(readAxis(section, plan.design));
+    }
+    if (plan.axes.empty()) {
+        top.missing("[[axis]]", "what varies");
+    }
+    plan.settings = readSettings(top, "set");
+    plan.reference = readSettings(top, "reference");
+    auto procedure = readSettings(top, "procedure");
+    for (Setting& s : procedure) {
+        s.key = "procedure." + s.key;
+    }
+    const ProcedureKind kind = kindOf(procedure, top);
+    plan.settings.insert(plan.settings.begin(), procedure.begin(), procedure.end());
+    plan.constraints = wordsOf(top, "constraints");
+    readOutputs(top, kind, plan);
+    readMarks(top, plan);
+    readSlurm(top, plan.slurm);
+    top.finish();
+    checkColumns(top, plan);
+    plan.points = pointsOf(plan, top);
+    applyConstraints(plan, top);
+    if (static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(mostCases)) {
+        top.refuse("repeats", fmt::format("over {} cases", mostCases));
+    }
+    probe(plan, origin.string());
+    probeOutputs(plan, sweepCase(plan, 0), origin.string());
+    return plan;
+}
+
+datasets::Scene namedScene(const std::string& what, const std::filesystem::path& origin)
+{
+    if (auto scene = datasets::builtInScene(what)) {
+        return *scene;
+    }
+    const std::filesystem::path path = origin.parent_path() / what;
+    if (path.extension() == ".vdb") {
+        const auto file = std::filesystem::absolute(path).lexically_normal();
+        return datasets::sceneForVolume(file, volume::Tissue::load(file));
+    }
+    if (!std::filesystem::exists(path)) {
+        throw std::runtime_error(fmt::format("{}: scene = \"{}\": no such file; built-in scenes are: {}", origin.string(),
+                                             what, fmt::join(datasets::builtInScenes(), ", ")));
+    }
+    return datasets::loadScene(path);
+}
+
+std::vector<std::string> builtInPlans()
+{
+    return {"palpation", "guidance", "needle-force", "voxel-size", "model-ladder"};
+}
+
+std::string_view builtInPlan(const std::string& name)
+{
+    return datasets::embeddedFile("sweeps/" + name + ".toml");
+}
+
+}  // namespace palpate::sweep

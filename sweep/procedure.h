@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate::sweep {
+
+/// What is done in a case. `session`: what `palpate train` does, with a simulated hand. `press`, `needle`: the tool goes
+/// along a prescribed way and what it feels is measured.
+enum class ProcedureKind : std::uint8_t { session, press, needle };
+inline constexpr std::array<std::string_view, 3> procedureNames{"session", "press", "needle"};
+
+struct Procedure {
+    ProcedureKind kind = ProcedureKind::session;
+    // session
+    std::string trainee;                // whose hand, see haptics/trainee.h; empty: one that follows the scene's script
+    std::optional<std::uint64_t> seed;  // of the trainee's errors; nothing: the case's own
+    double delay = 0;                   // from computing a force to the hand, of which the stabiliser knows nothing [s]
+    double seconds = 120;               // of the session, at most
+    // press, needle
+    double depth = 5e-3;   // of the tool's foremost point below the surface at rest [m]
+    double speed = 20e-3;  // [m/s]
+    double hold = 0.1;     // at the depth [s]
+    double aside = 0;      // press: from the scene's entry along the surface, to the patient's left [m]
+};
+
+/// One number that a procedure gives.
+struct OutputInfo {
+    std::string name;  // ends in its unit
+    std::string meaning;
+};
+/// In the order of its results. Those that measure time (`timing`) are not the same on every run.
+std::vector<OutputInfo> outputsOf(ProcedureKind kind);
+inline constexpr std::string_view tickTime = "tick_us";  // mean processor time of a tick in contact: a timing
+
+}  // namespace palpate::sweep

@@ -1,0 +1,143 @@
+#include <sweep/case.h>
+
+#include <datasets/scene_text.h>
+#include <haptics/recorder.h>
+#include <haptics/replay.h>
+#include <haptics/score.h>
+#include <sweep/formula.h>
+#include <sweep/procedures.h>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+namespace palpate::sweep {
+
+namespace {
+
+constexpr std::size_t modelsKept = 2;       // a case's and its reference's
+constexpr std::size_t referencesKept = 64;  // numbers only
+constexpr std::uint64_t ticksPerFlush = 256;
+
+// The value of `key`, made where it is not there; the least recently used goes.
+template <class Value, class Make>
+const Value& kept(std::list<std::pair<std::string, Value>>& all, const std::string& key, std::size_t most, const Make& make)
+{
+    for (auto i = all.begin(); i != all.end(); ++i) {
+        if (i->first == key) {
+            all.splice(all.begin(), all, i);
+            return all.front().second;
+        }
+    }
+    Value made = make();
+    all.emplace_front(key, std::move(made));
+    if (all.size() > most) {
+        all.pop_back();
+    }
+    return all.front().second;
+}
+
+haptics::SessionInfo describe(const haptics::SessionModel& model, const Procedure& procedure, std::uint64_t seed,
+                              const std::string& build)
+{
+    haptics::SessionInfo info = haptics::infoOf(model);
+    info.sceneOrigin = "sweep";
+    info.device = fmt::format("{} {}", procedureNames[static_cast<std::size_t>(procedure.kind)], procedure.trainee);
+    info.build = build;
+    info.seed = seed;
+    return info;
+}
+
+std::string procedureText(const Procedure& p)
+{
+    return fmt::format("{} {} {} {} {} {} {} {} {}", static_cast<int>(p.kind), p.trainee, p.seed.value_or(0), p.delay,
+                       p.seconds, p.depth, p.speed, p.hold, p.aside);
+}
+
+}  // namespace
+
+CaseRunner::CaseRunner(const SweepPlan& plan, std::string build) : plan_(plan), build_(std::move(build)) {}
+
+CaseRunner::~CaseRunner() = default;
+
+std::shared_ptr<const volume::Tissue> CaseRunner::volumeOf(const datasets::Scene& scene)
+{
+    datasets::Scene alone;
+    alone.source = scene.source;
+    alone.tissues = scene.tissues;
+    alone.tissueChanges = scene.tissueChanges;
+    return kept(volumes_, datasets::sceneText(alone), modelsKept,
+                [&] { return std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene)); });
+}
+
+std::shared_ptr<const haptics::SessionModel> CaseRunner::modelOf(const datasets::Scene& scene)
+{
+    return kept(models_, scene.text, modelsKept,
+                [&] { return std::make_shared<const haptics::SessionModel>(haptics::buildModel(scene, volumeOf(scene))); });
+}
+
+CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Procedure& procedure, std::uint64_t seed,
+                                         const std::filesystem::path& record)
+{
+    const auto model = modelOf(scene);
+    if (record.empty()) {
+        auto result = carryOut(*model, procedure, seed, {});
+        return {std::move(result.values), result.tickTime};
+    }
+    haptics::Recorder recorder(record, describe(*model, procedure, procedure.seed.value_or(seed), build_));
+    auto result = carryOut(*model, procedure, seed, [&](const haptics::TickRecord& tick) {
+        recorder.push(tick);
+        if (tick.tick % ticksPerFlush == 0) {
+            recorder.flush();
+        }
+    });
+    recorder.finish({});
+    if (!recorder.error().empty()) {
+        throw RecordFailed(fmt::format("{}: {}", record.string(), recorder.error()));
+    }
+    return {std::move(result.values), result.tickTime};
+}
+
+const CaseRunner::Measured& CaseRunner::referenceOf(const SweepCase& c)
+{
+    const bool seeded = c.referenceProcedure.kind == ProcedureKind::session;
+    const std::string key =
+        fmt::format("{}\n{}\n{}", seeded ? c.seed : 0, procedureText(c.referenceProcedure), c.reference.text);
+    return kept(references_, key, referencesKept, [&] { return measure(c.reference, c.referenceProcedure, c.seed, {}); });
+}
+
+CaseRow CaseRunner::run(std::size_t index, const std::filesystem::path& record)
+{
+    const SweepCase c = sweepCase(plan_, index);
+    const Measured own = measure(c.scene, c.procedure, c.seed, record);
+    const Measured* const reference = plan_.reference.empty() ? nullptr : &referenceOf(c);
+    std::map<std::string, double> numbers = c.variables;
+    const auto infos = outputsOf(c.procedure.kind);
+    for (std::size_t i = 0; i < infos.size(); ++i) {
+        numbers[infos[i].name] = own.values[i];
+        if (reference != nullptr) {
+            const double before = reference->values[i];
+            numbers["reference_" + infos[i].name] = before;
+            numbers[infos[i].name + "_change_pct"] = 100.0 * (own.values[i] - before) / std::abs(before);
+        }
+    }
+    CaseRow row;
+    row.tickTime = own.tickTime;
+    for (const SweepOutput& output : plan_.outputs) {
+        row.outputs.push_back(output.formula.empty() ? numbers.at(output.name) : evaluate(output.formula, numbers));
+        numbers[output.name] = row.outputs.back();
+    }
+    return row;
+}
+
+std::shared_ptr<void> oneThread()
+{
+    return std::make_shared<tbb::global_control>(tbb::global_control::max_allowed_parallelism, 1);
+}
+
+}  // namespace palpate::sweep

@@ -1,0 +1,159 @@
+#include <sweep/report.h>
+
+#include <sweep/sensitivity.h>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace palpate::sweep {
+
+using nlohmann::json;
+
+namespace {
+
+json number(double v)
+{
+    return std::isfinite(v) ? json(v) : json();
+}
+
+// Mean over the repeats of each point; not finite where none was done.
+std::vector<double> meansOf(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& rows, std::size_t output)
+{
+    std::vector<double> sum(plan.points.size(), 0.0), count(plan.points.size(), 0.0);
+    for (const auto& row : rows) {
+        if (row && !row->failed() && std::isfinite(row->outputs[output])) {
+            sum[row->index / plan.repeats] += row->outputs[output];
+            count[row->index / plan.repeats] += 1;
+        }
+    }
+    for (std::size_t i = 0; i < sum.size(); ++i) {
+        sum[i] = count[i] > 0 ? sum[i] / count[i] : std::numeric_limits<double>::quiet_NaN();
+    }
+    return sum;
+}
+
+struct Ranking {
+    std::string method;
+    std::vector<std::string> measures;
+    // For an output's means: the measures of each axis; empty: none can be had. The first one decides the order.
+    std::vector<std::vector<double>> (*of)(const SweepPlan&, const std::vector<double>&);
+};
+
+std::vector<std::vector<double>> bySobol(const SweepPlan& plan, const std::vector<double>& means)
+{
+    std::vector<std::vector<double>> out;
+    for (const SobolIndex& i : sobolIndices(means, plan.axes.size())) {
+        out.push_back({i.total, i.totalError, i.first, i.firstError});
+    }
+    return out;
+}
+
+std::vector<std::vector<double>> byMorris(const SweepPlan& plan, const std::vector<double>& means)
+{
+    std::vector<std::vector<double>> out;
+    for (const MorrisEffect& e : morrisEffects(plan.points, means)) {
+        out.push_back({e.absolute, e.mean, e.spread});
+    }
+    return out;
+}
+
+std::vector<std::vector<double>> byShare(const SweepPlan& plan, const std::vector<double>& means)
+{
+    std::vector<std::vector<double>> out;
+    const bool whole = std::ranges::all_of(means, [](double v) { return std::isfinite(v); });
+    for (std::size_t a = 0; whole && a < plan.axes.size(); ++a) {
+        std::vector<std::size_t> level;
+        for (const auto& point : plan.points) {
+            level.push_back(static_cast<std::size_t>(point[a]));
+        }
+        out.push_back({mainEffect(means, level)});
+    }
+    return out;
+}
+
+double coordinate(const SweepPlan& plan, std::size_t point, std::size_t axis)
+{
+    const KeyValue value = sweepPoint(plan, point * plan.repeats).parameters[axis];
+    if (const auto* const v = std::get_if<double>(&value)) {
+        return *v;
+    }
+    if (const auto* const v = std::get_if<std::int64_t>(&value)) {
+        return static_cast<double>(*v);
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+}
+
+std::vector<std::vector<double>> byRank(const SweepPlan& plan, const std::vector<double>& means)
+{
+    std::vector<std::vector<double>> out;
+    for (std::size_t a = 0; a < plan.axes.size(); ++a) {
+        std::vector<double> x, y;
+        for (std::size_t p = 0; p < means.size(); ++p) {
+            const double at = coordinate(plan, p, a);
+            if (std::isfinite(at) && std::isfinite(means[p])) {
+                x.push_back(at);
+                y.push_back(means[p]);
+            }
+        }
+        const double r = x.size() > 2 ? rankCorrelation(x, y) : std::numeric_limits<double>::quiet_NaN();
+        out.push_back({std::abs(r), r});
+    }
+    return out;
+}
+
+Ranking rankingOf(const SweepPlan& plan)
+{
+    switch (plan.design) {
+        case DesignKind::saltelli:
+            return {
+                "Sobol's indices: shares of the variance, with all that an axis has a part in (total) and by itself "
+                "(first); "
+                "errors: half of a 95 % interval",
+                {"total", "total_error", "first", "first_error"},
+                bySobol};
+        case DesignKind::morris:
+            return {"Morris's elementary effects over the whole range: mean size, mean, spread",
+                    {"mu_star", "mu", "sigma"},
+                    byMorris};
+        case DesignKind::grid:
+            if (plan.constraints.empty()) {
+                return {"Share of the variance over the grid that an axis makes by itself", {"share"}, byShare};
+            }
+            break;
+        case DesignKind::latinHypercube:
+        case DesignKind::sobol:
+            break;
+    }
+    return {"Spearman's rank correlation of axis and output: its size, and with its sign", {"size", "correlation"}, byRank};
+}
+
+}  // namespace
+
+json sensitivity(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& rows)
+{
+    const Ranking ranking = rankingOf(plan);
+    json outputs = json::object();
+    for (std::size_t o = 0; o < plan.outputs.size(); ++o) {
+        const auto values = ranking.of(plan, meansOf(plan, rows, o));
+        std::vector<std::pair<double, json>> ranked;
+        for (std::size_t a = 0; a < values.size(); ++a) {
+            json of = json::array();
+            std::ranges::transform(values[a], std::back_inserter(of), number);
+            ranked.emplace_back(std::isfinite(values[a][0]) ? values[a][0] : -1.0,
+                                json{{"axis", plan.axes[a].name}, {"values", std::move(of)}});
+        }
+        std::ranges::stable_sort(ranked, std::greater(), &std::pair<double, json>::first);
+        json list = json::array();
+        for (auto& [size, entry] : ranked) {
+            list.push_back(std::move(entry));
+        }
+        outputs[plan.outputs[o].name] = std::move(list);
+    }
+    return {{"method", ranking.method}, {"measures", ranking.measures}, {"outputs", std::move(outputs)}};
+}
+
+}  // namespace palpate::sweep

@@ -1,0 +1,286 @@
+#include <sweep/slurm.h>
+
+#include <base/child_process.h>
+#include <base/outputs.h>
+#include <sweep/local.h>
+#include <sweep/lock.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <nlohmann/json.hpp>
+
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+namespace palpate::sweep {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+constexpr std::size_t usualTasks = 100;
+constexpr std::size_t mostTasks = 1000;  // of an array: what a cluster allows by default (MaxArraySize 1001)
+constexpr int mostLosses = 3;
+constexpr auto lookEvery = std::chrono::milliseconds(500);
+constexpr auto settleTime = std::chrono::seconds(2);  // for files of another machine to be seen here
+constexpr int mostSilence = 600;                      // looks in a row that the controller may leave unanswered
+
+struct Answer {
+    int status = 0;
+    std::string text;  // standard output and error
+};
+
+std::string shellWord(const std::string& word)
+{
+    std::string out = "'";
+    for (const char c : word) {
+        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
+    }
+    return out + "'";
+}
+
+Answer ask(const std::vector<std::string>& words)
+{
+    std::string line;
+    for (const std::string& word : words) {
+        line += shellWord(word) + " ";
+    }
+    const auto closed = [](FILE* f) { pclose(f); };
+    std::unique_ptr<FILE, decltype(closed)> pipe(popen((line + "2>&1").c_str(), "r"), closed);
+    if (!pipe) {
+        throw std::runtime_error(words[0] + ": cannot be started");
+    }
+    Answer answer;
+    std::array<char, 4096> part{};
+    while (const std::size_t n = std::fread(part.data(), 1, part.size(), pipe.get())) {
+        answer.text.append(part.data(), n);
+    }
+    const int status = pclose(pipe.release());
+    answer.status = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    while (!answer.text.empty() && answer.text.back() == '\n') {
+        answer.text.pop_back();
+    }
+    return answer;
+}
+
+std::string oneLine(std::string text)
+{
+    std::replace(text.begin(), text.end(), '\n', ';');
+    return text;
+}
+
+using Chunk = std::vector<std::size_t>;
+
+// A job array and the chunks that its tasks still work on.
+struct Submission {
+    std::string job;
+    std::map<std::size_t, Chunk> tasks;
+};
+
+class Cluster {
+public:
+    Cluster(SweepFolder& folder, const SlurmSettings& settings) : folder_(folder), settings_(settings)
+    {
+        std::error_code failed;
+        fs::create_directories(folder.path() / "slurm", failed);
+    }
+    ~Cluster() { cancel(); }
+    Cluster(const Cluster&) = delete;
+    Cluster& operator=(const Cluster&) = delete;
+
+    void submit(const std::vector<std::size_t>& cases)
+    {
+        const std::size_t usual = (cases.size() + usualTasks - 1) / usualTasks;
+        const std::size_t wanted = settings_.chunk > 0 ? static_cast<std::size_t>(settings_.chunk) : usual;
+        const std::size_t chunk = std::max(wanted, (cases.size() + mostTasks - 1) / mostTasks);
+        Submission s;
+        json chunks = json::array();
+        for (std::size_t at = 0; at < cases.size(); at += chunk) {
+            const Chunk part(cases.begin() + static_cast<std::ptrdiff_t>(at),
+                             cases.begin() + static_cast<std::ptrdiff_t>(std::min(at + chunk, cases.size())));
+            s.tasks[chunks.size()] = part;
+            chunks.push_back(part);
+        }
+        const std::string name = fmt::format("{}-{}", folder_.lock().id(), ++submissions_);
+        const fs::path file = folder_.path() / "slurm" / (name + ".json");
+        const fs::path script = folder_.path() / "slurm" / (name + ".sh");
+        base::writeWhole(
+            file, json{{"folder", folder_.path().string()}, {"lock", folder_.lock().id()}, {"chunks", chunks}}.dump());
+        base::writeWhole(script, scriptText(file, chunks.size()));
+        const Answer answer = ask({"sbatch", "--parsable", script.string()});
+        if (answer.status != 0) {
+            throw std::runtime_error(
+                "sbatch: " + (answer.status == 127 ? "there is no Slurm here: run without --slurm" : oneLine(answer.text)));
+        }
+        s.job = answer.text.substr(answer.text.rfind('\n') + 1);
+        s.job = s.job.substr(0, s.job.find(';'));
+        jobs_.push_back(std::move(s));
+    }
+
+    // Asks which tasks are there; gives the cases of those that have ended without a row for each.
+    std::vector<std::size_t> look()
+    {
+        running = waiting = 0;
+        std::vector<std::size_t> lost;
+        for (Submission& s : jobs_) {
+            const Answer answer = ask({"squeue", "-h", "-r", "-j", s.job, "-o", "%K %T"});
+            const bool gone = answer.text.find("Invalid job id") != std::string::npos;
+            if (answer.status != 0 && !gone) {
+                if (++silence_ > mostSilence) {
+                    throw std::runtime_error("squeue: " + oneLine(answer.text));
+                }
+                running += s.tasks.size();
+                continue;
+            }
+            silence_ = 0;
+            takeIn(s, gone ? "" : answer.text, lost);
+        }
+        std::erase_if(jobs_, [](const Submission& s) { return s.tasks.empty(); });
+        return lost;
+    }
+
+    bool idle() const { return jobs_.empty(); }
+    void cancel()
+    {
+        for (const Submission& s : jobs_) {
+            ask({"scancel", s.job});
+        }
+        jobs_.clear();
+    }
+
+    std::size_t running = 0, waiting = 0;  // tasks, at the last look
+
+private:
+    std::string scriptText(const fs::path& file, std::size_t tasks) const
+    {
+        std::string out = "#!/bin/sh\n";
+        const auto option = [&](const std::string& text) { out += "#SBATCH " + text + "\n"; };
+        option("--job-name=palpate-sweep");
+        option(fmt::format("--array=0-{}", tasks - 1));
+        option("--ntasks=1");
+        option(fmt::format("--output={}", (folder_.path() / "slurm" / "%A_%a.log").string()));
+        for (const auto& [name, value] : {std::pair<const char*, const std::string&>{"partition", settings_.partition},
+                                          {"time", settings_.time},
+                                          {"account", settings_.account},
+                                          {"mem", settings_.memory}}) {
+            if (!value.empty()) {
+                option(fmt::format("--{}={}", name, value));
+            }
+        }
+        for (const std::string& more : settings_.options) {
+            option(more);
+        }
+        return out +
+               fmt::format("exec {} sweep --work {}\n", shellWord(base::programFolder() / "palpate"), shellWord(file));
+    }
+
+    void takeIn(Submission& s, const std::string& queue, std::vector<std::size_t>& lost)
+    {
+        std::set<std::size_t> there;
+        std::istringstream lines(queue);
+        std::string state;
+        for (std::size_t task = 0; lines >> task >> state;) {
+            there.insert(task);
+            ++(state == "PENDING" ? waiting : running);
+        }
+        for (auto task = s.tasks.begin(); task != s.tasks.end();) {
+            const bool done = std::ranges::all_of(task->second, [&](std::size_t i) { return folder_.has(i); });
+            if (!done && there.contains(task->first)) {
+                ++task;
+                continue;
+            }
+            const auto now = std::chrono::steady_clock::now();
+            const auto gone = seenGone_.try_emplace({s.job, task->first}, now).first->second;
+            if (!done && now - gone < settleTime) {
+                ++task;
+                continue;
+            }
+            std::ranges::copy_if(task->second, std::back_inserter(lost), [&](std::size_t i) { return !folder_.has(i); });
+            task = s.tasks.erase(task);
+        }
+    }
+
+    SweepFolder& folder_;
+    const SlurmSettings& settings_;
+    std::vector<Submission> jobs_;
+    std::map<std::pair<std::string, std::size_t>, std::chrono::steady_clock::time_point> seenGone_;
+    int submissions_ = 0, silence_ = 0;
+};
+
+}  // namespace
+
+bool runOnSlurm(SweepFolder& folder, const std::vector<std::size_t>& cases, const SlurmSettings& settings,
+                const std::string& build, const SlurmTold& told)
+{
+    Cluster cluster(folder, settings);
+    std::map<std::size_t, int> losses;
+    std::vector<std::size_t> left = cases;
+    cluster.submit(cases);
+    while (!cluster.idle()) {
+        std::this_thread::sleep_for(lookEvery);
+        folder.lock().beat();
+        std::vector<std::size_t> again;
+        for (const std::size_t i : cluster.look()) {
+            if (++losses[i] < mostLosses) {
+                again.push_back(i);
+                continue;
+            }
+            SweepRow row;
+            row.index = i;
+            row.build = build;
+            row.error = fmt::format("lost {} times: its task was killed, timed out or its node failed; see slurm/*.log",
+                                    mostLosses);
+            folder.write(row);
+        }
+        if (!again.empty()) {
+            cluster.submit(again);
+        }
+        std::erase_if(left, [&](std::size_t i) { return folder.has(i); });
+        if (!told(cases.size() - left.size(), cluster.running, cluster.waiting)) {
+            cluster.cancel();
+            return false;
+        }
+    }
+    return true;
+}
+
+void workOnChunk(const fs::path& file, int jobs, const std::string& build)
+{
+    std::ifstream in(file);
+    const json submission = json::parse(in, nullptr, false);
+    const char* const task = std::getenv("SLURM_ARRAY_TASK_ID");
+    const std::size_t number = task != nullptr ? static_cast<std::size_t>(std::strtoul(task, nullptr, 10)) : 0;
+    if (!submission.is_object() || !submission.contains("chunks") || number >= submission["chunks"].size()) {
+        throw std::runtime_error(file.string() + ": holds no chunk for this task");
+    }
+    const SweepFolder folder(submission.at("folder").get<std::string>(), "", false);
+    const auto lock = submission.at("lock").get<std::string>();
+    std::vector<std::size_t> cases;
+    for (const std::size_t i : submission["chunks"][number]) {
+        if (!folder.has(i)) {
+            cases.push_back(i);
+        }
+    }
+    const auto told = [&](std::size_t, std::size_t) {
+        if (FolderLock::holder(folder.path()) != lock) {
+            throw std::runtime_error(folder.path().string() + ": the run that asked for this task is over: it ends");
+        }
+        return true;
+    };
+    runLocally(folder, cases, jobs, build, told, [] { return false; });
+}
+
+}  // namespace palpate::sweep

@@ -1,0 +1,163 @@
+#include <planner/planner.h>
+#include <studies/accuracy/accuracy.h>
+#include <studies/accuracy/reference_file.h>
+#include <studies/kernel/kernel_rivals.h>
+
+#include <tests/studies/small_block.h>
+
+#include <gtest/gtest.h>
+
+namespace palpate::planner {
+namespace {
+
+using datasets::ModelLevel;
+using datasets::Strain;
+
+Plan planned(double error, double budget, bool all = false)
+{
+    static const haptics::SessionModel model = studies::smallBlock();
+    PlanRequest request;
+    request.error = error;
+    request.budget = budget;
+    request.speed = 0.05;
+    request.all = all;
+    return planModel(model, request, [](const std::string&) {});
+}
+
+// 1000 slots x (2 + 1.5 x 10) ns + 100 points x (50 + 1.5 x 100) ns + 20 us.
+TEST(Planner, TimeIsCountedAndNotMeasured)
+{
+    PlanCandidate c;
+    EXPECT_DOUBLE_EQ(predictedTime(c, {}), 20.0);
+    c.level = ModelLevel::elastic;
+    c.slots = 1000;
+    c.touched = 100;
+    c.meanCycles = 1.5;
+    c.elastic.strain = Strain::small;
+    const PlanCosts costs{.small = {2, 10, 50, 100}, .finite = {4, 20, 50, 100}, .nsPerMove = 200, .usPerTick = 20};
+    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 17.0 + 20.0, 1e-9);
+    c.elastic.strain = Strain::finite;
+    EXPECT_NEAR(predictedTime(c, costs), 20.0 + 34.0 + 20.0, 1e-9);
+    c.level = ModelLevel::chainmail;
+    EXPECT_NEAR(predictedTime(c, costs), 40.0, 1e-9);
+}
+
+// Times that follow the law are explained by it, whatever mixture of models they come from; a cost that is nowhere is zero.
+TEST(TickCosts, TheFitFindsTheCostsThatMadeTheTimes)
+{
+    const LawCosts made{1.5, 9.0, 60.0, 0.0};
+    std::vector<TickSample> samples;
+    for (const double slots : {4000.0, 9000.0, 30000.0}) {
+        for (const double cycles : {0.7, 1.3, 2.0}) {
+            for (const double contacts : {40.0, 300.0}) {
+                samples.push_back({"", {slots, cycles, contacts}, false, 0.0});
+                samples.back().microseconds = tickTime(made, samples.back().work);
+            }
+        }
+    }
+    const LawCosts found = fitCosts(samples);
+    EXPECT_NEAR(found.perSlot, made.perSlot, 0.02);
+    EXPECT_NEAR(found.perSlotCycle, made.perSlotCycle, 0.02);
+    EXPECT_NEAR(found.perContact, made.perContact, 1.0);
+    EXPECT_NEAR(found.perContactCycle, 0.0, 1.0);
+    EXPECT_THROW(fitCosts(std::span(samples).first(3)), std::runtime_error);
+}
+
+// Whoever asks for little gets the rigid body; the tighter the error, the dearer the model.
+TEST(Planner, PicksTheCheapestThatHoldsBoth)
+{
+    const Plan loose = planned(0.9, 1e-3);
+    ASSERT_TRUE(loose.choice);
+    EXPECT_EQ(loose.candidates[*loose.choice].level, ModelLevel::spring);
+    const Plan tight = planned(0.04, 1e-3);
+    ASSERT_TRUE(tight.choice);
+    const PlanCandidate& c = tight.candidates[*tight.choice];
+    EXPECT_EQ(c.level, ModelLevel::elastic);
+    EXPECT_LE(c.error, 4.0);
+    EXPECT_LE(c.microseconds, 1e3);
+    for (std::size_t i = 0; i < *tight.choice; ++i) {
+        EXPECT_TRUE(tight.candidates[i].tried);
+        EXPECT_FALSE(tight.candidates[i].holdsError && tight.candidates[i].holdsBudget);
+    }
+}
+
+// The search leaves most candidates out, and finds what trying every one of them finds.
+TEST(Planner, ChoosesWhatAnExhaustiveSearchChooses)
+{
+    const Plan whole = planned(0.01, 3e-4, true);
+    for (const double error : {0.02, 0.04, 0.08, 0.2}) {
+        const Plan quick = planned(error, 3e-4);
+        const auto cheapest = std::ranges::find_if(whole.candidates, [&](const PlanCandidate& c) {
+            return c.tried && c.error <= 100.0 * error && c.microseconds <= 300.0;
+        });
+        ASSERT_EQ(quick.choice.has_value(), cheapest != whole.candidates.end());
+        if (quick.choice) {
+            EXPECT_LE(quick.candidates[*quick.choice].microseconds, 1.1 * cheapest->microseconds);
+        }
+        const auto tried = [](const Plan& plan) { return std::ranges::count_if(plan.candidates, &PlanCandidate::tried); };
+        EXPECT_LE(tried(quick), tried(whole));
+    }
+}
+
+// What the planner predicts from test pushes against its own solution, outside finite elements find too: within a
+// factor 1.5.
+TEST(Planner, PredictsTheErrorAgainstOutsideFiniteElements)
+{
+    auto scene = *datasets::builtInScene("plate");
+    scene.model.level = ModelLevel::spring;
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    const auto model = std::make_shared<const haptics::SessionModel>(haptics::buildModel(scene, tissue));
+    const studies::AccuracySubject subject = studies::accuracySubject(model);
+    const std::string key = studies::referenceKey(*tissue, subject.path, subject.speed, "neo-hookean");
+    const auto [outside, info] =
+        studies::loadReference(std::filesystem::path(PALPATE_REFERENCES) / ("plate-neo-hookean-" + key + ".ref"));
+    for (const double error : {0.015}) {
+        PlanRequest request;
+        request.error = error;
+        request.speed = subject.speed;
+        const Plan plan = planModel(*model, request, [](const std::string&) {});
+        ASSERT_TRUE(plan.choice);
+        const PlanCandidate& c = plan.candidates[*plan.choice];
+        ASSERT_EQ(c.level, ModelLevel::elastic);
+        const studies::TrialBody body =
+            studies::trialBody(*tissue, model->surface, c.elastic.spacing, subject.poissonCap(), 4U << 20);
+        const studies::TrialResult found = studies::elasticTrial(
+            body.body, subject.path, subject.speed, outside,
+            {.window = c.elastic.window, .cycles = c.elastic.cycles, .finiteStrain = c.elastic.strain == Strain::finite});
+        const double ratio = studies::spreadOf(found.looks, &studies::TrialErrors::near).worst / c.error;
+        EXPECT_GT(ratio, 1.0 / 1.5) << c.name();
+        EXPECT_LT(ratio, 1.5) << c.name();
+    }
+}
+
+// A 4 mm deep dent of a 5 mm sphere strains fat by far more than small strain is for: both laws are candidates then.
+TEST(Planner, LargeStrainIsHeldAgainstFiniteStrain)
+{
+    const Plan plan = planned(0.9, 1e-3);
+    EXPECT_GT(plan.strain, largeStrain);
+    EXPECT_TRUE(plan.finiteReference);
+    EXPECT_TRUE(std::ranges::any_of(plan.candidates, [](const PlanCandidate& c) {
+        return c.level == ModelLevel::elastic && c.elastic.strain == Strain::finite;
+    }));
+}
+
+TEST(Planner, SaysTheNearestWhenNothingHoldsBoth)
+{
+    const Plan plan = planned(1e-5, 3e-5);
+    EXPECT_FALSE(plan.choice);
+    EXPECT_TRUE(plan.candidates[plan.nearest].tried);
+}
+
+TEST(Planner, TheSameSceneGetsTheSamePlan)
+{
+    const Plan a = planned(0.04, 5e-4), b = planned(0.04, 5e-4);
+    ASSERT_EQ(a.candidates.size(), b.candidates.size());
+    EXPECT_EQ(a.choice, b.choice);
+    for (std::size_t i = 0; i < a.candidates.size(); ++i) {
+        EXPECT_EQ(a.candidates[i].rms, b.candidates[i].rms);
+        EXPECT_EQ(a.candidates[i].microseconds, b.candidates[i].microseconds);
+    }
+}
+
+}  // namespace
+}  // namespace palpate::planner

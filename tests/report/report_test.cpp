@@ -1,0 +1,237 @@
+#include <report/data.h>
+#include <report/html.h>
+#include <report/report.h>
+
+#include <tests/haptics/synthetic_session.h>
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <random>
+
+namespace palpate::report {
+namespace {
+
+using haptics::Record;
+namespace synthetic = haptics::synthetic;
+
+std::string textOf(const std::filesystem::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+std::string between(const std::string& text, const std::string& from, const std::string& to)
+{
+    const std::size_t start = text.find(from);
+    const std::size_t end = text.find(to, start + from.size());
+    return start == std::string::npos || end == std::string::npos
+               ? ""
+               : text.substr(start + from.size(), end - start - from.size());
+}
+
+// However few rows stay, the least and the largest value of every column are among them, the ends stay, and the abscissa
+// still rises.
+TEST(Decimator, KeepsExtremesEndsAndOrder)
+{
+    std::mt19937 random(2);
+    std::normal_distribution<double> noise(0, 1);
+    for (const std::size_t rows : {1U, 2U, 17U, 4000U, 50000U}) {
+        Decimator decimator(4, rows, 400);
+        std::vector<std::vector<double>> all;
+        for (std::size_t i = 0; i < rows; ++i) {
+            all.push_back({static_cast<double>(i), noise(random), noise(random), noise(random)});
+            decimator.add(all.back());
+        }
+        const auto kept = decimator.finish();
+        ASSERT_EQ(kept.size(), 4U);
+        EXPECT_LE(kept[0].size(), 402U);
+        EXPECT_EQ(kept[0].front(), 0);
+        EXPECT_EQ(kept[0].back(), static_cast<double>(rows - 1));
+        EXPECT_TRUE(std::ranges::is_sorted(kept[0]));
+        for (std::size_t c = 1; c < 4; ++c) {
+            const auto column = [c](const std::vector<double>& row) { return row[c]; };
+            EXPECT_EQ(std::ranges::max(kept[c]), std::ranges::max(all, {}, column)[c]);
+            EXPECT_EQ(std::ranges::min(kept[c]), std::ranges::min(all, {}, column)[c]);
+        }
+    }
+}
+
+TEST(Decimator, FewRowsStayAsTheyAre)
+{
+    Decimator decimator(2, 100, 4000);
+    for (int i = 0; i < 100; ++i) {
+        decimator.add({i * 1.0, std::sin(i)});
+    }
+    EXPECT_EQ(decimator.finish()[0].size(), 100U);
+}
+
+// Force k d while going in and k d / 2 while coming out: each bin's mean is that of its middle.
+TEST(ReportData, ProfileSeparatesGoingInFromComingOut)
+{
+    const synthetic::Folder folder;
+    std::vector<haptics::TickRecord> ticks(40000);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        const bool in = n < 20000;
+        const double depth = 0.04 * (in ? static_cast<double>(n) : static_cast<double>(40000 - n)) / 20000;
+        ticks[n].tick = n;
+        ticks[n].phase = haptics::Phase::inserted;
+        ticks[n].inserted = depth;
+        ticks[n].total.y = (in ? 1.0 : 0.5) * 100 * depth;
+    }
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    const DepthProfile p = collect(Record(folder / "a")).profile;
+    ASSERT_GE(p.depth.size(), 80U);
+    for (std::size_t i = 2; i < 78; ++i) {
+        EXPECT_NEAR(p.in[i], 0.1 * p.depth[i], 0.002);
+        EXPECT_NEAR(p.out[i], 0.05 * p.depth[i], 0.002);
+        EXPECT_NEAR(p.peak[i], 0.1 * (p.depth[i] + 0.25), 0.002);
+    }
+}
+
+// Task k takes k + 1 us in every tick but each 50th, in which it takes ten times that: p50 and p99 are those two.
+TEST(ReportData, TaskTimesArePercentiles)
+{
+    const synthetic::Folder folder;
+    std::vector<haptics::TickRecord> ticks(5000);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        for (std::size_t k = 0; k < haptics::taskCount; ++k) {
+            ticks[n].seconds[k] = static_cast<float>(static_cast<double>(k + 1) * (n % 50 == 0 ? 1e-5 : 1e-6));
+        }
+    }
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    const ReportData d = collect(Record(folder / "a"));
+    for (std::size_t k = 0; k < haptics::taskCount; ++k) {
+        EXPECT_NEAR(d.tasks[k].p50, static_cast<double>(k + 1), 1e-3);
+        EXPECT_NEAR(d.tasks[k].p99, 10 * static_cast<double>(k + 1), 1e-3);
+    }
+    EXPECT_NEAR(d.tick.p50, 28, 1e-3);
+}
+
+// Nothing is loaded: no address of a network, no link, no source but data in the page. Text of the record stays text.
+TEST(Report, IsOneFileAndEscapesTheRecord)
+{
+    const synthetic::Folder folder;
+    synthetic::record(folder / "a", synthetic::info(), synthetic::procedure(5, 0.5, 1),
+                      {{"<i>key</i>", "<i>value</i>"}, {"missed_ticks", "17"}});
+    std::filesystem::create_directory(folder / "pictures");
+    std::ofstream(folder / "pictures/one.png") << "Man";
+    std::ofstream(folder / "pictures/two.png") << "Ma";
+    std::ofstream(folder / "pictures/notes.txt") << "secret";
+    writeReport(folder / "r.html", Record(folder / "a"), folder / "pictures");
+    const std::string html = textOf(folder / "r.html");
+
+    EXPECT_NE(html.find("breast &lt;phantom&gt; &amp; &quot;more&quot;"), std::string::npos);
+    EXPECT_EQ(html.find("<phantom>"), std::string::npos);
+    EXPECT_EQ(html.find("<b>not markup"), std::string::npos);
+    EXPECT_EQ(html.find("<i>value"), std::string::npos);
+    EXPECT_NE(html.find("Missed ticks: 17."), std::string::npos);
+    for (const std::string outside : {"src=\"http", "href=", "@import", "url(", "<link"}) {
+        EXPECT_EQ(html.find(outside), std::string::npos) << outside;
+    }
+    EXPECT_NE(html.find("data:image/png;base64,TWFu\""), std::string::npos);
+    EXPECT_NE(html.find("data:image/png;base64,TWE=\""), std::string::npos);
+    EXPECT_EQ(html.find("secret"), std::string::npos);
+    EXPECT_NE(html.find("var uPlot"), std::string::npos);
+    EXPECT_FALSE(std::filesystem::exists(folder / "r.html.part"));
+}
+
+// The charts' data are the record's: length, peak of the force, and nothing where a distance is not finite.
+TEST(Report, ChartsHoldTheRecord)
+{
+    const synthetic::Folder folder;
+    haptics::SessionInfo info = synthetic::info();
+    info.structures[1] = "</script><script>alert(1)</script>";
+    info.extra = {{"force_cap_n", "6.5"}};
+    auto ticks = synthetic::procedure(10, 0.3, 1);
+    ticks[3000].additional = {0, 0, 7.25};
+    ticks[3000].distance[1] = std::numeric_limits<double>::infinity();
+    synthetic::record(folder / "a", info, ticks);
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const std::string html = textOf(folder / "r.html");
+    const auto data = nlohmann::json::parse(between(html, "id=\"data\">", "</script>"));
+    const auto& forces = data["charts"]["forces"]["columns"];
+    EXPECT_LE(forces[0].size(), 4002U);
+    EXPECT_DOUBLE_EQ(forces[0].back().get<double>(), 9.999);
+    EXPECT_DOUBLE_EQ(std::ranges::max(forces[2].get<std::vector<double>>()), 7.25);
+    EXPECT_DOUBLE_EQ(data["charts"]["forces"]["lines"][0]["at"].get<double>(), 6.5);
+    EXPECT_EQ(data["charts"]["distances"]["series"][2]["label"], info.structures[1]);
+    EXPECT_EQ(data["charts"]["distances"]["columns"].size(), 5U);
+    EXPECT_TRUE(std::ranges::any_of(data["events"], [](const auto& e) { return e["kind"] == "fire"; }));
+}
+
+// Each task's row has its own time: task k takes k + 1 us.
+TEST(Report, TimesStandBesideTheirTasks)
+{
+    const synthetic::Folder folder;
+    std::vector<haptics::TickRecord> ticks(100);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        ticks[n].tick = n;
+        for (std::size_t k = 0; k < haptics::taskCount; ++k) {
+            ticks[n].seconds[k] = static_cast<float>(static_cast<double>(k + 1) * 1e-6);
+        }
+    }
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const std::string html = textOf(folder / "r.html");
+    for (std::size_t k = 0; k < haptics::taskCount; ++k) {
+        const std::string code(haptics::taskNames[k]);
+        EXPECT_EQ(between(html, "<th>" + code + "</th>", ".0</td>").back(), static_cast<char>('1' + k)) << code;
+    }
+}
+
+// Energy in mJ as recorded; a touch says how fast it was: the way of one tick times the rate.
+TEST(Report, EnergyIsTheRecords)
+{
+    const synthetic::Folder folder;
+    auto ticks = synthetic::procedure(10, 0.3, 1);
+    ticks[4000].energy = -0.0125;
+    ticks[4000].damped = 0.25;
+    synthetic::record(folder / "a", synthetic::info(), ticks);
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const std::string html = textOf(folder / "r.html");
+    const auto data = nlohmann::json::parse(between(html, "id=\"data\">", "</script>"));
+    const auto& energy = data["charts"]["energy"]["columns"];
+    EXPECT_DOUBLE_EQ(std::ranges::min(energy[1].get<std::vector<double>>()), -12.5);
+    EXPECT_DOUBLE_EQ(std::ranges::max(energy[2].get<std::vector<double>>()), 250.0);
+}
+
+TEST(Report, SessionsWithoutAnythingToShowAreTold)
+{
+    const synthetic::Folder folder;
+    synthetic::record(folder / "none", synthetic::info(), {});
+    writeReport(folder / "none.html", Record(folder / "none"));
+    EXPECT_NE(textOf(folder / "none.html").find("The tool never touched the body."), std::string::npos);
+    EXPECT_EQ(textOf(folder / "none.html").find("id=\"depth\""), std::string::npos);
+    auto ticks = synthetic::procedure(3, 0.5, 1);
+    for (auto& tick : ticks) {
+        tick.fired = false;
+        tick.eventCount = 0;
+    }
+    synthetic::record(folder / "dry", synthetic::info(), ticks);
+    writeReport(folder / "dry.html", Record(folder / "dry"));
+    EXPECT_NE(textOf(folder / "dry.html").find("The gun was not fired"), std::string::npos);
+    EXPECT_NE(textOf(folder / "dry.html").find("id=\"depth\""), std::string::npos);
+}
+
+TEST(Report, RefusesAFolderThatIsNotThereOnOneLine)
+{
+    const synthetic::Folder folder;
+    synthetic::record(folder / "a", synthetic::info(), {});
+    const auto html = folder / "no/r.html";
+    try {
+        writeReport(html, Record(folder / "a"));
+        FAIL();
+    } catch (const std::runtime_error& e) {
+        EXPECT_EQ(e.what(), html.string() + ": cannot be written: check the folder and the space on the disk");
+    }
+}
+
+}  // namespace
+}  // namespace palpate::report

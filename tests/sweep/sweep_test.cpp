@@ -1,0 +1,282 @@
+#include <sweep/case.h>
+#include <sweep/plan.h>
+
+#include <datasets/scene_text.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace palpate::sweep {
+namespace {
+
+// A ball on a small block with a lump: some milliseconds a case.
+const std::string small =
+    "scene = \"find-lump\"\n"
+    "[procedure]\nkind = \"press\"\ndepth_mm = 4\nspeed_mm_s = 40\nhold_ms = 40\n"
+    "[set]\ntool.kind = \"sphere\"\nvolume.voxel_mm = 2\nvolume.parameters.width_mm = 48\nvolume.parameters.thickness_mm = "
+    "28\n"
+    "model.setting = \"fast\"\n"
+    "insert.lump.centre_mm.x = 0\ninsert.lump.centre_mm.z = 0\n";
+
+// `set`: more lines of the table [set].
+SweepPlan planOf(const std::string& more, const std::string& set = "")
+{
+    const auto table = small.find("[procedure]");
+    return parsePlan(small.substr(0, table) + more + small.substr(table) + set, "plan.toml", namedScene);
+}
+
+std::string refusal(const std::string& text)
+{
+    try {
+        parsePlan(text, "plan.toml", namedScene);
+        return "";
+    } catch (const std::runtime_error& e) {
+        return e.what();
+    }
+}
+
+const std::string depths = "[[axis]]\nname = \"depth_mm\"\nvalues = [4, 8]\n";
+
+TEST(SweepPlan, AnAxisReachesWhatItNames)
+{
+    const SweepPlan plan = parsePlan(
+        "scene = \"behind-rib\"\n"
+        "[[axis]]\nkey = \"tissue.liver.youngs_kpa\"\nvalues = [7]\n"
+        "[[axis]]\nkey = \"tissue.liver.poisson\"\nvalues = [0.3]\n"
+        "[[axis]]\nkey = \"insert.lesion.tissue\"\nvalues = [\"dcis\"]\n"
+        "[[axis]]\nkey = \"insert.lesion.diameter_mm\"\nvalues = [9]\n"
+        "[[axis]]\nkey = \"insert.lesion.centre_mm.y\"\nvalues = [31]\n"
+        "[[axis]]\nkey = \"volume.voxel_mm\"\nvalues = [2]\n"
+        "[[axis]]\nkey = \"volume.seed\"\nvalues = [12]\n"
+        "[[axis]]\nkey = \"model.level\"\nvalues = [\"chainmail\"]\n"
+        "[[axis]]\nkey = \"model.setting\"\nvalues = [\"fine\"]\n"
+        "[[axis]]\nkey = \"model.elastic.cycles\"\nvalues = [5]\n"
+        "[[axis]]\nkey = \"safety.device\"\nvalues = [\"touch\"]\n"
+        "[[axis]]\nkey = \"dffb.structure.force_n\"\nvalues = [0.5]\n"
+        "[[axis]]\nkey = \"vital.rib.gain\"\nvalues = [2]\n"
+        "[[axis]]\nkey = \"procedure.trainee\"\nvalues = [\"novice\"]\n"
+        "[[axis]]\nkey = \"procedure.delay_ms\"\nvalues = [3]\n"
+        "[[axis]]\nkey = \"procedure.seed\"\nvalues = [99]\n",
+        "plan.toml", namedScene);
+    ASSERT_EQ(plan.cases(), 1U);
+    const SweepCase c = sweepCase(plan, 0);
+    ASSERT_EQ(c.scene.tissueChanges.size(), 1U);
+    EXPECT_EQ(c.scene.tissueChanges[0].tissue, "liver");
+    const std::map<std::string, double> values(c.scene.tissueChanges[0].values.begin(),
+                                               c.scene.tissueChanges[0].values.end());
+    EXPECT_EQ(values, (std::map<std::string, double>{{"youngs_kpa", 7}, {"poisson", 0.3}}));
+    const auto lesion = std::ranges::find(c.scene.source.inserts, "lesion", &datasets::Insert::name);
+    EXPECT_EQ(lesion->tissue, "dcis");
+    EXPECT_DOUBLE_EQ(lesion->diameter, 9e-3);
+    EXPECT_DOUBLE_EQ(lesion->centre.y, 31e-3);
+    EXPECT_DOUBLE_EQ(c.scene.source.phantom.voxel, 2e-3);
+    EXPECT_EQ(c.scene.source.phantom.seed, 12U);
+    EXPECT_EQ(c.scene.model.level, datasets::ModelLevel::chainmail);
+    EXPECT_EQ(c.scene.model.elastic.spacing, datasets::elasticSetting("fine").spacing);
+    EXPECT_EQ(c.scene.model.elastic.cycles, 5);
+    EXPECT_EQ(c.scene.device, "touch");
+    EXPECT_DOUBLE_EQ(c.scene.dffb.structure.force, 0.5);
+    EXPECT_DOUBLE_EQ(c.scene.vital[0].gain, 2);
+    EXPECT_EQ(c.procedure.trainee, "novice");
+    EXPECT_DOUBLE_EQ(c.procedure.delay, 3e-3);
+    EXPECT_EQ(c.procedure.seed, 99U);
+}
+
+TEST(SweepPlan, FormulasRangesAndConstraints)
+{
+    const SweepPlan plan = planOf(
+        "constraints = [\"depth_mm + 2 * d <= 20\"]\n"
+        "[[axis]]\nname = \"depth_mm\"\nrange = [4, 12]\nsteps = 5\n"
+        "[[axis]]\nname = \"d\"\nlog_range = [1, 100]\nsteps = 3\n"
+        "[[axis]]\nname = \"n\"\nrange = [1, 4]\nsteps = 2\nwhole = true\n");
+    std::vector<std::array<double, 3>> points;
+    for (std::size_t i = 0; i < plan.cases(); ++i) {
+        const auto v = sweepPoint(plan, i).variables;
+        points.push_back({v.at("depth_mm"), v.at("d"), v.at("n")});
+    }
+    // d = 1 with each of 4, 6, .. 12; d = 10 with none below 20 - 20; d = 100 with none.
+    std::vector<std::array<double, 3>> expected;
+    for (const double depth : {4.0, 6.0, 8.0, 10.0, 12.0}) {
+        expected.push_back({depth, 1.0, 1.0});
+        expected.push_back({depth, 1.0, 4.0});
+    }
+    EXPECT_EQ(points, expected);
+}
+
+TEST(SweepPlan, RefusesWhatCannotBe)
+{
+    const std::string scene = "scene = \"block\"\n";
+    const auto axis = [](const std::string& key, const std::string& values) {
+        return "[[axis]]\nkey = \"" + key + "\"\nvalues = " + values + "\n";
+    };
+    const std::vector<std::pair<std::string, std::string>> wrong{
+        {"[[axis]]\nname = \"a\"\nvalues = [1]\n", "scene is missing"},
+        {scene, "[[axis]] is missing"},
+        {scene + axis("dffb.gian", "[1]"), "did you mean gain?"},
+        {scene + axis("dffb.gain", "[0, 7]"), "must be 0 to 1"},
+        {scene + axis("tissue.fat.youngs_kpa", "[\"a\"]"), "expected a number"},
+        {scene + axis("tissue.fatt.youngs_kpa", "[3]"), "it has: skin, fat"},
+        {scene + axis("insert.nose.diameter_mm", "[1]"), "the scene has no [[insert]]"},
+        {scene + axis("script.2.too_mm", "[1]"), "did you mean to_mm?"},
+        {scene + "nmae = \"a\"\n" + axis("dffb.gain", "[1]"), "did you mean name?"},
+        {scene + axis("dffb.gain", "[]"), "expected a list"},
+        {scene + "[[axis]]\nkey = \"dffb.gain\"\nrange = [0, 1]\n", "steps is missing"},
+        {scene + "[[axis]]\nkey = \"dffb.gain\"\nrange = [1, 0]\nsteps = 3\n", "the lower one first"},
+        {scene + "[[axis]]\nkey = \"dffb.gain\"\nlog_range = [0, 1]\nsteps = 3\n", "above 0"},
+        {scene + "[design]\nsamples = 3\n" + axis("dffb.gain", "[1]"), "a grid has none"},
+        {scene + "[design]\nkind = \"sobol\"\n" + axis("dffb.gain", "[1]"), "samples is missing"},
+        {scene + axis("dffb.gain", "[1]") + axis("dffb.gain", "[1]"), "is a column already"},
+        {scene + "outputs = [\"hapiness\"]\n" + axis("dffb.gain", "[1]"), "there is no hapiness"},
+        {scene + "outputs = [\"a = totall / 2\"]\n" + axis("dffb.gain", "[1]"), "formula"},
+        {scene + "constraints = [\"dffb_gain > \"]\n" + axis("dffb.gain", "[1]"), "formula"},
+        {scene + "constraints = [\"dffb_gain > 2\"]\n" + axis("dffb.gain", "[1]"), "no point is left"},
+        {scene + "constraints = [\"dffb_gain > 2\"]\n[design]\nkind = \"morris\"\nsamples = 2\n" + axis("dffb.gain", "[1]"),
+         "whole or none"},
+        {"scene = \"moon\"\n" + axis("dffb.gain", "[1]"), "built-in scenes are"},
+    };
+    for (const auto& [text, hint] : wrong) {
+        const std::string error = refusal(text);
+        EXPECT_NE(error.find(hint), std::string::npos) << text << "\n  gives: " << error;
+        EXPECT_TRUE(error.starts_with("plan.toml")) << error;
+        EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    }
+}
+
+TEST(SweepPlan, ReadyPlansAreWhole)
+{
+    for (const std::string& name : builtInPlans()) {
+        const std::string text(builtInPlan(name));
+        ASSERT_FALSE(text.empty()) << name;
+        const SweepPlan plan = parsePlan(text, name + ".toml", namedScene);
+        EXPECT_GE(plan.cases(), 10U) << name;
+        EXPECT_FALSE(plan.about.empty());
+    }
+}
+
+TEST(SweepCase, SeedsAreOwnOrCommonToTheRepeats)
+{
+    const SweepPlan own = planOf("repeats = 3\n" + depths), common = planOf("repeats = 3\ncommon_seeds = true\n" + depths);
+    std::vector<std::uint64_t> seeds;
+    for (std::size_t i = 0; i < own.cases(); ++i) {
+        seeds.push_back(sweepPoint(own, i).seed);
+    }
+    std::ranges::sort(seeds);
+    EXPECT_EQ(std::ranges::adjacent_find(seeds), seeds.end());
+    EXPECT_EQ(sweepPoint(common, 1).seed, sweepPoint(common, 4).seed);
+    EXPECT_NE(sweepPoint(common, 1).seed, sweepPoint(common, 2).seed);
+}
+
+TEST(TissueChanges, AreInTheSceneAndInItsTextAndRefuseWhatCannotBe)
+{
+    const std::string scene = "[volume]\nphantom = \"layered\"\n[target]\nstructure = \"tumour\"\n";
+    const auto parsed =
+        datasets::parseScene(scene + "[tissue.fat]\nyoungs_kpa = 20\n[tissue.skin]\npuncture_n = 5\n", "a.toml");
+    const auto again = datasets::parseScene(datasets::sceneText(parsed), "a.toml");
+    const auto volume = datasets::sceneVolume(again);
+    EXPECT_DOUBLE_EQ(volume.table().rows[*volume.table().find("fat")].youngsModulus, 20e3);
+    EXPECT_DOUBLE_EQ(volume.table().rows[*volume.table().find("skin")].punctureForce, 5);
+    const auto refused = [&](const std::string& more) {
+        try {
+            datasets::sceneVolume(datasets::parseScene(scene + more, "a.toml"));
+            return std::string();
+        } catch (const std::runtime_error& e) {
+            return std::string(e.what());
+        }
+    };
+    EXPECT_NE(refused("[tissue.fatt]\nyoungs_kpa = 20\n").find("it has: skin, fat"), std::string::npos);
+    EXPECT_NE(refused("[tissue.fat]\nyoung_kpa = 20\n").find("did you mean youngs_kpa?"), std::string::npos);
+    EXPECT_NE(refused("[tissue.fat]\nyoungs_kpa = 0\n").find("must be 0.01 kPa or more"), std::string::npos);
+    EXPECT_NE(refused("[tissue.fat]\npuncture_n = 0\n").find("cutting_n"), std::string::npos);
+}
+
+std::vector<std::uint64_t> bitsOf(const CaseRow& row)
+{
+    std::vector<std::uint64_t> out;
+    std::ranges::transform(row.outputs, std::back_inserter(out), [](double v) { return std::bit_cast<std::uint64_t>(v); });
+    return out;
+}
+
+// A case follows from the plan and its number: in any order, beside any others, its row has the same bits.
+TEST(CaseRunner, RowsDoNotDependOnTheOrder)
+{
+    const SweepPlan plan = planOf(
+        "outputs = [\"force_n\", \"work_mj\", \"force_n_change_pct\", \"twice = 2 * force_n\"]\n"
+        "reference.insert.lump.tissue = \"fat\"\n"
+        "[[axis]]\nkey = \"tissue.idc_high_grade.youngs_kpa\"\nvalues = [10, 40]\n"
+        "[[axis]]\nkey = \"insert.lump.centre_mm.y\"\nvalues = [11, 15]\n");
+    CaseRunner forward(plan, "test"), backward(plan, "test");
+    std::vector<std::vector<std::uint64_t>> rows(plan.cases());
+    for (std::size_t i = 0; i < plan.cases(); ++i) {
+        const CaseRow row = forward.run(i);
+        rows[i] = bitsOf(row);
+        EXPECT_GT(row.outputs[0], 0.01);
+        EXPECT_DOUBLE_EQ(row.outputs[3], 2 * row.outputs[0]);
+    }
+    for (std::size_t i = plan.cases(); i-- > 0;) {
+        EXPECT_EQ(bitsOf(backward.run(i)), rows[i]);
+    }
+    EXPECT_EQ(bitsOf(CaseRunner(plan, "test").run(2)), rows[2]);
+    EXPECT_NE(rows[0], rows[1]);
+}
+
+double contrastAt(const SweepPlan& plan, CaseRunner& runner, double youngs, double diameter, double depth)
+{
+    for (std::size_t i = 0; i < plan.cases(); ++i) {
+        const auto v = sweepPoint(plan, i).variables;
+        if (v.at("youngs_kpa") == youngs && v.at("d") == diameter && v.at("depth_mm") == depth) {
+            return runner.run(i).outputs[0];
+        }
+    }
+    throw std::logic_error("no such case");
+}
+
+// What is felt of a lump: more of a stiffer, a larger and a nearer one; nothing of one that is fat.
+TEST(CaseRunner, ForceContrastFallsWithDepthAndRisesWithSizeAndStiffness)
+{
+    const SweepPlan plan = planOf(
+        "outputs = [\"force_n_change_pct\"]\n"
+        "reference.insert.lump.tissue = \"fat\"\nreference.insert.lump.diameter_mm = 8\nreference.insert.lump.centre_mm.y "
+        "= 14\n"
+        "reference.tissue.idc_high_grade.youngs_kpa = 10\n"
+        "[[axis]]\nname = \"youngs_kpa\"\nkey = \"tissue.idc_high_grade.youngs_kpa\"\nvalues = [3.25, 10, 20, 80]\n"
+        "[[axis]]\nname = \"d\"\nkey = \"insert.lump.diameter_mm\"\nvalues = [6, 10, 14]\n"
+        "[[axis]]\nname = \"depth_mm\"\nvalues = [3, 6, 10]\n",
+        "insert.lump.centre_mm.y = \"= depth_mm + d / 2\"\ntissue.idc_high_grade.stiffening = 0\n");
+    CaseRunner runner(plan, "test");
+    const auto contrast = [&](double e, double d, double depth) { return contrastAt(plan, runner, e, d, depth); };
+    const double middle = contrast(20, 10, 6);
+    EXPECT_LT(contrast(10, 10, 6), middle);
+    EXPECT_LT(middle, contrast(80, 10, 6));
+    EXPECT_LT(contrast(20, 6, 6), middle);
+    EXPECT_LT(middle, contrast(20, 14, 6));
+    EXPECT_GT(contrast(20, 10, 3), middle);
+    EXPECT_GT(middle, contrast(20, 10, 10));
+    EXPECT_GT(contrast(10, 6, 10), 0.0);
+    EXPECT_NEAR(contrast(3.25, 10, 6), 0.0, 0.05);
+}
+
+// A late force is felt late: the same hand, another session.
+TEST(CaseRunner, DelayChangesASession)
+{
+    const SweepPlan plan = parsePlan(
+        "scene = \"block\"\noutputs = [\"peak_force_n\", \"energy_made_mj\", \"finished\"]\n"
+        "[[axis]]\nkey = \"procedure.delay_ms\"\nvalues = [0, 8]\n"
+        "[procedure]\nkind = \"session\"\nseconds = 20\n"
+        "[set]\nvolume.voxel_mm = 4\nvolume.parameters.width_mm = 40\nmodel.level = \"chainmail\"\nmodel.spacing_mm = 4\n",
+        "plan.toml", namedScene);
+    CaseRunner runner(plan, "test");
+    const auto prompt = runner.run(0), late = runner.run(1);
+    EXPECT_EQ(prompt.outputs[2], 1.0);
+    EXPECT_NE(bitsOf(prompt), bitsOf(late));
+}
+
+}  // namespace
+}  // namespace palpate::sweep

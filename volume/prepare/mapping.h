@@ -1,0 +1,39 @@
+#pragma once
+
+#include <volume/import.h>
+#include <volume/tissue_table.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace palpate::prepare {
+
+/// What the command line says about labels.
+struct MappingOptions {
+    std::string map;                 // a built-in label map's name, or a TOML file; "" = found out
+    std::vector<std::string> set;    // "NAME=TISSUE" or "VALUE=TISSUE"
+    std::string defaultTissue;       // of labels that nothing else names; "" = they are an error
+    std::filesystem::path writeMap;  // a label map to write for editing; no volume is made then
+};
+
+using LabelCounts = std::map<std::uint16_t, std::uint64_t>;  // label value, voxels
+
+LabelCounts countLabels(const volume::LabelImage& image);
+
+/// A name and a tissue for every label that is there, 0 only where it is mapped: by --set, else by the label map (by value,
+/// then by the segment's name), else by what the segment is called, else the default tissue. Appends to `notes` what was
+/// not said but found out. Throws std::runtime_error that lists the labels left over with their voxels.
+std::vector<volume::LabelName> mapLabels(const MappingOptions& options, const std::filesystem::path& file,
+                                         const volume::ImportedLabels& labels, const LabelCounts& counts,
+                                         const volume::TissueTable& table, std::vector<std::string>& notes);
+
+/// Writes what is known of the labels as a label map for the user to edit: tissues that are only suggested, or not known,
+/// are marked. Returns how many those are.
+std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::path& file,
+                          const volume::ImportedLabels& labels, const LabelCounts& counts,
+                          const volume::TissueTable& table);
+
+}  // namespace palpate::prepare
