@@ -22,6 +22,8 @@ DEEP = """int f(int a)
     return 0;
 }
 """
+TABLE = "\n| key | meaning |\n|---|---|\n| `x` | what it is |\n"
+MEANING = "\n| `--json` key | meaning |\n|---|---|\n"
 LONG = "int f()\n{\n    int a = 0;\n" + 80 * "    ++a;\n" + "    return a;\n}\n"
 
 # script, file of the tree, what is put at its end (or in a file of its own), what the check must say
@@ -38,6 +40,11 @@ FAULTS = [
     ("check_sizes", "apps/new.cpp", LONG, "a function has at most 80"),
     ("check_sizes", "apps/new.cpp", "namespace a::b {\n" + LONG + "}\n", "a function has at most 80"),
     ("check_sizes", "tests/volume/new.cpp", 530 * "// line\n", "a file has at most"),
+    ("check_tables", "docs/press.md", TABLE + "| `y` | 0.0 (0.0 to 0.1) | 0.0 | -0.71 |\n", "4 columns under a header of 2"),
+    ("check_tables", "README.md", TABLE + "| `y` |\n", "1 columns under a header of 2"),
+    ("check_tables", "docs/score.md", MEANING + "| `total` | 94.6 (90.7 to 98.1) |\n", "say in words what it is"),
+    ("check_tables", "docs/score.md", MEANING + "| `totals` | sum of the points |\n", "there is no measure `totals`"),
+    ("check_tables", "haptics/measures.cpp", '    {"new_mm", "new mm", 1, none},\n', "`new_mm` is not explained"),
 ]
 # Looks like a fault and is none.
 INNOCENT = [
@@ -45,7 +52,10 @@ INNOCENT = [
     ("check_arrows", "haptics/servo.cpp", "#include <volume/geometry.h>\n#include <vector>\n"),
     ("check_sizes", "apps/new.cpp", 'const char* text = R"(' + DEEP + ')";\n' + DEEP.replace("if (a > 1)", "")),
     ("check_sizes", "apps/new.cpp", "namespace a {\n" + 90 * "int x();\n" + "}\n"),
+    ("check_tables", "docs/score.md", TABLE + "| `y \\\\| z` | either |\n\n```\n| a | b |\n| c |\n```\n"),
 ]
+# What a check reads beside the file with the fault.
+BESIDE = {"check_tables": ["docs/score.md", "haptics/measures.cpp"]}
 
 
 def run(script, root):
@@ -56,11 +66,11 @@ def run(script, root):
 def said(script, name, text):
     """What a check says about the tree's file `name` with `text` at its end, and its exit status."""
     with tempfile.TemporaryDirectory() as folder:
-        copy = pathlib.Path(folder) / name
-        copy.parent.mkdir(parents=True)
-        if (ROOT / name).exists():
-            copy.write_bytes((ROOT / name).read_bytes())
-        with copy.open("a", encoding="utf-8") as file:
+        for one in {name, *BESIDE.get(script, [])}:
+            copy = pathlib.Path(folder) / one
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes((ROOT / one).read_bytes() if (ROOT / one).exists() else b"")
+        with (pathlib.Path(folder) / name).open("a", encoding="utf-8") as file:
             file.write(text)
         return run(script, folder)
 
