@@ -73,7 +73,7 @@ TEST(VolumeCommands, ATruncatedVolumeIsRefusedOnOneLine)
 TEST(VolumeCommands, APatientSizedPhantomIsImportedToTheVoxelAndTrainedOn)
 {
     if (!std::filesystem::exists(victre)) {
-        GTEST_SKIP() << victre << " is not there";
+        GTEST_SKIP() << "no test volumes in " << PALPATE_TEST_DATA << ": " << victre;
     }
     const Folder folder;
     const std::string file = folder / "victre.vdb", record = folder / "session.db";

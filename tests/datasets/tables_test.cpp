@@ -182,7 +182,7 @@ std::set<int> manifestLabels(const std::string& file)
 TEST(LabelMap, LabelsOfRealSegmentationsAreKnown)
 {
     if (!std::filesystem::exists(std::filesystem::path(PALPATE_TEST_DATA) / "MANIFEST.md")) {
-        GTEST_SKIP() << "no manifest in " << PALPATE_TEST_DATA;
+        GTEST_SKIP() << "no test volumes in " << PALPATE_TEST_DATA;
     }
     const std::pair<const char*, const char*> files[] = {{"victre", "p_1.mhd"},
                                                          {"totalsegmentator", "example_seg.nii.gz"},

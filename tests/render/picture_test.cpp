@@ -18,10 +18,10 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -151,15 +151,14 @@ protected:
     {
         try {
             studio = std::make_unique<Studio>();
-        } catch (const std::runtime_error& problem) {
+        } catch (const std::exception& problem) {
             why = problem.what();
         }
     }
     static void TearDownTestSuite() { studio.reset(); }
     void SetUp() override
     {
-        if (!studio)
-            GTEST_SKIP() << why;
+        ASSERT_TRUE(studio) << why;
     }
 
     static std::unique_ptr<Studio> studio;

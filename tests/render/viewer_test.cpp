@@ -317,7 +317,7 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
     for (int i = 0; i < 300 && (bars < 300 || needle < 300); ++i) {
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
         if (said("viewer").find("no display") != std::string::npos) {
-            GTEST_SKIP() << "xvfb-run gave the viewer no display";
+            FAIL() << "xvfb-run gave the viewer no display";
         }
         bars = countOnScreen(folder_ / "Xvfb_screen0", bar);
         needle = countOnScreen(folder_ / "Xvfb_screen0", onSlice);
@@ -338,9 +338,6 @@ TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
                     "--frames", "5", "--json", "-"},
                    log("viewer"));
     viewer.wait();
-    if (said("viewer").find("no display") != std::string::npos) {
-        GTEST_SKIP() << "xvfb-run gave the viewer no display";
-    }
     EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");
 }
 

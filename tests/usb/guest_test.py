@@ -1,6 +1,6 @@
 """From the command line to the hand: a Linux kernel with its USB, libusb, Palpate; and an emulated Falcon on the wire.
 
-    guest_test.py PALPATE EMULATOR KERNEL      exit status 0: all held; 77: what it needs is not here
+    guest_test.py PALPATE EMULATOR KERNEL      exit status 0: all held
 """
 import json
 import pathlib
@@ -183,12 +183,13 @@ def unplugged(guest):
 def main():
     palpate, emulator, kernel = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
     if not shutil.which("qemu-system-x86_64") or not emulator.exists():
-        print("skipped: qemu-system-x86 or the emulator is not here: run scripts/install-packages --test and build again")
-        return 77
+        print("qemu-system-x86 or the emulator is not here: run scripts/install-packages --test and build again")
+        return 1
     unpacked = subprocess.run([pathlib.Path(__file__).parent / "guest-kernel", kernel], check=False).returncode
     if unpacked != 0:
-        print("skipped: there is no kernel for the virtual machine and none could be downloaded")
-        return 77
+        # Words of tests/skips.cmake: ctest takes them for a skip.
+        print("Skipped\nthere is no kernel for the virtual machine and none could be downloaded")
+        return 1
     start = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         guest = Guest(folder, kernel, palpate, emulator, {"firmware.bin": FIRMWARE, "scene.toml": SCENE})
