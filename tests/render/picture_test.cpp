@@ -156,10 +156,7 @@ protected:
         }
     }
     static void TearDownTestSuite() { studio.reset(); }
-    void SetUp() override
-    {
-        ASSERT_TRUE(studio) << why;
-    }
+    void SetUp() override { ASSERT_TRUE(studio) << why; }
 
     static std::unique_ptr<Studio> studio;
     static std::string why;
