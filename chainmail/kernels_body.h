@@ -376,13 +376,12 @@ void apply(const Layout& layout, CellStiffness stiffness, const float* u, float*
     sweepCells(layout, stiffness, u, out, scratch, law);
 }
 
-double sumOf(Lanes v) noexcept
+// Lane by lane onto the sum, and not the lanes' own sum: that would group them by the vector's width.
+void addLanes(double& sum, Lanes v) noexcept
 {
-    double sum = 0.0;
     for (int i = 0; i < W; ++i) {
         sum += static_cast<double>(v[i]);
     }
-    return sum;
 }
 
 double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
@@ -392,7 +391,7 @@ double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse,
     sweepCells(layout, stiffness, u, out, scratch, law);
     double sum = 0.0;
     for (const Lanes& part : law.energy) {
-        sum += sumOf(part);
+        addLanes(sum, part);
     }
     return sum;
 }
@@ -415,8 +414,8 @@ void dots(const float* x, const float* a, const float* b, std::size_t n, double*
             }
         }
         for (std::size_t v = 0; v < vectors; ++v) {
-            sums[0] += sumOf(first[v]);
-            sums[1] += sumOf(second[v]);
+            addLanes(sums[0], first[v]);
+            addLanes(sums[1], second[v]);
         }
     }
 }

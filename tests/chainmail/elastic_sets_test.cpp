@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <vector>
 
@@ -111,6 +112,26 @@ TEST(ElasticSets, DotsGiveTheSameBits)
         for (const Kernels* k : supportedKernels()) {
             EXPECT_EQ(dots(*k), first) << k->name;
         }
+    }
+}
+
+// Sums of floats of one size are exact in doubles, in any order; of lanes from 2^-32 to 2^28 they are not.
+TEST(ElasticSets, DotsOfSmallAndLargeNumbersGiveTheSameBits)
+{
+    std::minstd_rand random(3);
+    constexpr std::size_t n = 8 * Layout::lanes;
+    Floats x = randomFloats(n, random);
+    const Floats ones(n + Layout::lanes, 1.0F);
+    for (std::size_t i = 0; i < n; ++i) {
+        x[i] = std::ldexp(x[i], 4 * static_cast<int>(7 * i % Layout::lanes) - 32);
+    }
+    const auto dots = [&](const Kernels& k) {
+        std::array<double, 2> sums{};
+        k.dots(x.data(), ones.data(), x.data(), n, sums.data());
+        return sums;
+    };
+    for (const Kernels* k : supportedKernels()) {
+        EXPECT_EQ(dots(*k), dots(*supportedKernels().front())) << k->name;
     }
 }
 
