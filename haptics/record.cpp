@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <exception>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <system_error>
@@ -135,6 +136,7 @@ struct Record::Impl {
     std::string file;
     std::optional<Database> database;
     SessionInfo info;
+    int version = 0;  // of the file's format
 
     explicit Impl(const std::filesystem::path& path) : file(pathOf(path))
     {
@@ -184,10 +186,9 @@ struct Record::Impl {
     void checkFormat()
     {
         std::int64_t id = 0;
-        std::int64_t version = 0;
         guarded([&] {
             id = single(*database, "PRAGMA application_id");
-            version = single(*database, "PRAGMA user_version");
+            version = static_cast<int>(single(*database, "PRAGMA user_version"));
         });
         if (id == 0 && single(*database, "SELECT count(*) FROM sqlite_master") == 0) {
             throw std::runtime_error(file + ": holds no session: its writer was stopped before it began; remove it");
@@ -196,9 +197,10 @@ struct Record::Impl {
             throw std::runtime_error(file +
                                      ": is an SQLite file, but not a session record; palpate train --record writes one");
         }
-        if (version != format::version) {
+        if (version < format::oldestVersion || version > format::version) {
             throw std::runtime_error(file + ": is a record of format " + std::to_string(version) + ", this program reads " +
-                                     std::to_string(format::version) + "; use the program that wrote it");
+                                     std::to_string(format::oldestVersion) + " to " + std::to_string(format::version) +
+                                     "; use the program that wrote it");
         }
         for (const char* table :
              {"session", "results", "structures", "tissues", "ticks", "events", "cores", "core_fractions"}) {
@@ -261,7 +263,8 @@ struct Record::Impl {
         std::optional<Sidecar> events, cores, fractions;
         guarded([&] {
             snapshot.emplace(*database);
-            ticks.emplace(*database, "SELECT " + format::columnList(info.structures.size()) + " FROM ticks ORDER BY tick");
+            ticks.emplace(*database,
+                          "SELECT " + format::columnList(info.structures.size(), version) + " FROM ticks ORDER BY tick");
             events.emplace(*database, "SELECT tick, kind, structure, tissue, value FROM events ORDER BY tick, position");
             cores.emplace(*database, "SELECT * FROM cores ORDER BY tick");
             fractions.emplace(*database, "SELECT tick, tissue, fraction FROM core_fractions ORDER BY tick");
@@ -272,7 +275,8 @@ struct Record::Impl {
             guarded([&] {
                 more = ticks->step();
                 if (more) {
-                    format::eachColumn(record, info.structures.size(), Reader{*ticks});
+                    record.tissueForce = Vec3(std::numeric_limits<double>::quiet_NaN());  // where the file has none
+                    format::eachColumn(record, info.structures.size(), Reader{*ticks}, version);
                     events->take(record.tick, [&](const Statement& row) { readEvent(row, record); });
                     cores->take(record.tick, [&](const Statement& row) { readCore(row, record.core); });
                     fractions->take(record.tick, [&](const Statement& row) { readFraction(row, record.core); });

@@ -5,14 +5,17 @@
 
 namespace palpate::haptics::format {
 
-std::string columnList(std::size_t structures)
+std::string columnList(std::size_t structures, int of)
 {
     std::string list;
     const TickRecord names;
-    eachColumn(names, structures, [&](const char* column, const auto&) {
-        list += list.empty() ? "" : ", ";
-        list += column;
-    });
+    eachColumn(
+        names, structures,
+        [&](const char* column, const auto&) {
+            list += list.empty() ? "" : ", ";
+            list += column;
+        },
+        of);
     return list;
 }
 

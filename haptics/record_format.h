@@ -15,7 +15,8 @@
 namespace palpate::haptics::format {
 
 inline constexpr int applicationId = 0x50414C50;  // "PALP", in the file's header
-inline constexpr int version = 2;                 // user_version; raise it when a table changes
+inline constexpr int version = 3;                 // user_version; raise it when a table changes
+inline constexpr int oldestVersion = 2;           // that is still read: its ticks have no tissue force
 
 inline constexpr std::uint8_t none = 0xFF;  // a structure that is not there; NULL in the file
 
@@ -43,8 +44,9 @@ struct Microseconds {
 
 /// Calls `visit(column, field)` for every column of table `ticks`, in the order of the file. One list serves the table's
 /// making, the writing (Tick = const TickRecord) and the reading (Tick = TickRecord).
+/// @param of  version of the file
 template <class Tick, class Visit>
-void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
+void eachColumn(Tick& t, std::size_t structures, Visit&& visit, int of = version)
 {
     const auto vector = [&](const char* x, const char* y, const char* z, auto& v) {
         visit(x, v.x);
@@ -57,6 +59,9 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
     visit("buttons", t.device.buttons);
     visit("fresh", t.device.fresh);
     vector("proxy_x_m", "proxy_y_m", "proxy_z_m", t.proxy);
+    if (of > oldestVersion) {
+        vector("tissue_force_x_n", "tissue_force_y_n", "tissue_force_z_n", t.tissueForce);
+    }
     vector("basic_x_n", "basic_y_n", "basic_z_n", t.basic);
     vector("additional_x_n", "additional_y_n", "additional_z_n", t.additional);
     vector("total_x_n", "total_y_n", "total_z_n", t.total);
@@ -88,7 +93,7 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit)
 }
 
 /// The names of all columns, separated by commas.
-std::string columnList(std::size_t structures);
+std::string columnList(std::size_t structures, int of = version);
 
 /// An open SQLite file. Errors come as std::runtime_error with SQLite's words and without the file's name.
 class Database {

@@ -110,7 +110,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     clock.done(Task::h3);
     const Vec3 law = moveTip(model_, reader_, body_, tool_, way, stabiliserOptions_.period, tip_, record_);
     clock.done(Task::h4);
-    const Vec3 basic = tissueForce_ = contactForce(law, deform());
+    const Vec3 tissue = contactForce(law, deform());
     clock.done(Task::deform);
     const auto near = monitor(model_, body_, tip_, position, monitor_, record_);
     record_.ahead = lookAhead(model_, reader_, body_, tip_, tool_, stabiliserOptions_.period, monitor_);
@@ -119,7 +119,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     const Vec3 additional = additionalForce(model_.scene.dffb, model_.structures.size(), near, position,
                                             tip_.phase != Phase::free, stabiliserOptions_.period, dffb_);
     const bool wasFaulted = stabiliser_.faulted;
-    const auto sent = stabilise(basic, additional, hand_, stabiliserOptions_, stabiliser_);
+    const auto sent = stabilise(tissue, additional, hand_, stabiliserOptions_, stabiliser_);
     if (sent.faulted && !wasFaulted) {
         addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
     }
@@ -128,6 +128,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     record_.tissue = tip_.tissue;
     record_.inserted = tip_.needle.inserted;
     record_.deflection = tool_.position - hand_.position;
+    record_.tissueForce = tissue;
     record_.basic = sent.basic;
     record_.additional = sent.additional;
     record_.total = sent.total();

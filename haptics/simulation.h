@@ -33,14 +33,13 @@ class Simulation {
 public:
     /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known.
     explicit Simulation(const SessionModel& model, const SimulationOptions& options = {});
+    Simulation(SessionModel&& model, const SimulationOptions& options = {}) = delete;  // a temporary would not outlive it
 
     /// H3 collide, H4 basic force, deform, H6 monitor, H7 additional force, stabilise. H2 and H5 are the servo loop's.
     const TickRecord& tick(const DeviceSample& device) noexcept;
 
     /// Nodes that are not at rest after the last tick, and the displacement of every node.
     const chainmail::DisplacedLattice& shape() const noexcept { return deformation_.shape(); }
-    /// Of the last tick, before the controller: neither coupled, damped nor capped [N].
-    Vec3 tissueForce() const noexcept { return tissueForce_; }
     /// The level in use: the scene's, or a lower one that it stepped down to.
     datasets::ModelLevel level() const noexcept { return level_; }
     /// How often it stepped down: elastic, elastic on small windows, chainmail, spring.
@@ -77,7 +76,6 @@ private:
     StabiliserState stabiliser_;
     std::uint64_t ticks_ = 0;
     Vec3 last_{0.0};  // tip in the tick before [m]
-    Vec3 tissueForce_{0.0};
     bool triggerWasDown_ = false;
     TickRecord record_;
 };

@@ -107,12 +107,13 @@ struct CoreSample {
 struct TickRecord {
     std::uint64_t tick = 0;
     DeviceSample device;
-    Vec3 proxy{0.0};       // where the tip would be without penetration [m]
-    Vec3 basic{0.0};       // F_BFFB, equation 2 [N]
-    Vec3 additional{0.0};  // F_AFFB, equations 3-8 [N]
-    Vec3 total{0.0};       // F_DFFB as sent: with the controller's damping [N]
-    double energy = 0;     // net, that all forces so far gave to the hand [J]
-    double damped = 0;     // that the controller's damping took from it so far [J]
+    Vec3 proxy{0.0};        // where the tip would be without penetration [m]
+    Vec3 tissueForce{0.0};  // what the tissue does to the tool, before the controller: not coupled, damped or capped [N]
+    Vec3 basic{0.0};        // F_BFFB, equation 2, as sent [N]
+    Vec3 additional{0.0};   // F_AFFB, equations 3-8 [N]
+    Vec3 total{0.0};        // F_DFFB as sent: with the controller's damping [N]
+    double energy = 0;      // net, that all forces so far gave to the hand [J]
+    double damped = 0;      // that the controller's damping took from it so far [J]
     Phase phase = Phase::free;
     std::uint8_t tissue = 0;           // row of the tissue table at the tip
     std::uint8_t nearestVital = 0xFF;  // index of a structure

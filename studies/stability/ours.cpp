@@ -42,7 +42,7 @@ RunningMethod running(const MethodScene& scene)
     auto ours = std::make_shared<Ours>(Ours{simulationOf(scene)});
     return {[ours](const haptics::DeviceSample& sample) { return ours->tick(sample); },
             [ours] { return furthestNode(*ours->simulation); }, [ours] { return ours->last; },
-            [ours] { return ours->simulation->tissueForce(); }};
+            [ours] { return ours->last != nullptr ? ours->last->tissueForce : Vec3(0.0); }};
 }
 
 // The force of the last update, held until the next.

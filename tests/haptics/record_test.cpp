@@ -44,6 +44,7 @@ void expectSame(const TickRecord& a, const TickRecord& b, std::size_t structures
     EXPECT_EQ(a.device.buttons, b.device.buttons);
     EXPECT_EQ(a.device.fresh, b.device.fresh);
     expectSameBits(a.proxy, b.proxy);
+    expectSameBits(a.tissueForce, b.tissueForce);
     expectSameBits(a.basic, b.basic);
     expectSameBits(a.additional, b.additional);
     expectSameBits(a.total, b.total);
@@ -365,6 +366,25 @@ TEST(Recorder, FullDiskEndsTheRecordButNotTheSession)
     record.each([&](const TickRecord& tick) { EXPECT_EQ(tick.tick, expected++); });
     EXPECT_GE(expected, 500U);
     EXPECT_LT(expected, 20000U);
+}
+
+// Format 2 had no force of the tissue alone: everything else of it is read.
+TEST(Record, OfTheFormatBeforeIsRead)
+{
+    const synthetic::Folder folder;
+    const auto ticks = synthetic::procedure(2, 1, 1);
+    synthetic::record(folder / "old", synthetic::info(), ticks);
+    for (const char axis : {'x', 'y', 'z'}) {
+        execute(folder / "old", std::string("ALTER TABLE ticks DROP COLUMN tissue_force_") + axis + "_n");
+    }
+    execute(folder / "old", "PRAGMA user_version = 2");
+    const auto read = synthetic::read(Record(folder / "old"));
+    ASSERT_EQ(read.size(), ticks.size());
+    for (std::size_t i = 0; i < read.size(); ++i) {
+        EXPECT_TRUE(std::isnan(read[i].tissueForce.x)) << i;
+        expectSameBits(read[i].total, ticks[i].total);
+        expectSameBits(read[i].proxy, ticks[i].proxy);
+    }
 }
 
 TEST(Record, RefusesWhatIsNoRecordOnOneLine)

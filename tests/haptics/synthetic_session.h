@@ -130,6 +130,7 @@ inline std::vector<TickRecord> procedure(double seconds, double skill, std::uint
         const double sign = depth >= lastDepth ? -1.0 : 1.0;
         const double force = depth <= 0 ? 0 : 0.6 + 55 * depth + (r.phase == Phase::contact ? 400 * depth : 0);
         r.basic = {0.0, sign * force, 0.02 * noise(random)};
+        r.tissueForce = 1.1 * r.basic;
         r.distance[0] = 0.050 - depth;
         r.distance[1] = 0.080 - depth;
         r.distance[2] = std::hypot(0.062 - depth, 0.001);
@@ -175,7 +176,7 @@ inline TickRecord anyTick(std::uint64_t tick, std::mt19937_64& random)
 {
     TickRecord r;
     r.tick = tick;
-    for (Vec3* v : {&r.device.position, &r.device.axis, &r.proxy, &r.basic, &r.additional, &r.total}) {
+    for (Vec3* v : {&r.device.position, &r.device.axis, &r.proxy, &r.tissueForce, &r.basic, &r.additional, &r.total}) {
         *v = {anyDouble(random), anyDouble(random), anyDouble(random)};
     }
     r.device.buttons = static_cast<std::uint32_t>(random());
