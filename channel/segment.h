@@ -1,6 +1,7 @@
 #pragma once
 
 #include <base/process.h>
+#include <base/sequence_lock.h>
 #include <channel/layout.h>
 
 #include <array>
@@ -38,7 +39,7 @@ struct Header {
     Word closed;  // 1: the owner has ended the session itself
 };
 
-/// Sequence lock: odd while the writer is inside. One writer, any number of readers.
+/// Under a sequence lock, see base/sequence_lock.h.
 struct StateBlock {
     alignas(64) Word sequence;
     alignas(64) std::array<Word, stateWords> words;
@@ -144,10 +145,17 @@ inline std::uint64_t voxelsOf(const Scenery& scenery) noexcept
 /// "/palpate-SESSION". Throws std::runtime_error for a name that is not made of letters, digits, '-' and '_'.
 std::string segmentName(const std::string& session);
 
+/// Opens the segment `name` where it is a regular file of this user's own, and never waits: others may put a pipe, or a
+/// file that they hold locked, under any name. Returns -1 otherwise, with errno (EPERM: it is not ours).
+/// @param access  O_RDONLY or O_RDWR
+int openSegment(const std::string& name, int access) noexcept;
+
 /// Where the system keeps the segments (Linux).
 inline constexpr const char* segmentFolder = "/dev/shm";
 
 using base::processStart;
+using base::readLocked;
+using base::writeLocked;
 
 /// Process `pid` as one word that no other process has, dead or alive (pids have 22 bits at most).
 inline std::uint64_t handOf(std::uint64_t pid) noexcept
@@ -158,39 +166,6 @@ inline std::uint64_t handOf(std::uint64_t pid) noexcept
 inline bool holderLives(std::uint64_t hand) noexcept
 {
     return hand != 0 && handOf(hand >> 42U) == hand;
-}
-
-/// A write, and the writer's half of a sequence lock without fences (H.-J. Boehm, "Can seqlocks get along with programming
-/// language memory models?", MSPC 2012): a reader that sees a word of this write (acquire) also sees the odd sequence
-/// before it, and throws its copy away. Goes on after a writer that died inside.
-template <class Block, std::size_t count>
-void writeLocked(Block& block, const std::array<std::uint64_t, count>& words) noexcept
-{
-    const std::uint64_t inside = block.sequence.load(std::memory_order_relaxed) | 1U;
-    block.sequence.store(inside, std::memory_order_relaxed);
-    for (std::size_t i = 0; i < count; ++i)
-        block.words[i].store(words[i], std::memory_order_release);
-    block.sequence.store(inside + 1, std::memory_order_release);
-}
-
-/// The reader's half: the words come before the second look at the sequence because their loads are acquires. Nothing when
-/// there has been no write, or none of `tries` copies was whole.
-template <std::size_t count, class Block>
-std::optional<std::array<std::uint64_t, count>> readLocked(const Block& block, int tries) noexcept
-{
-    std::array<std::uint64_t, count> words{};
-    for (int attempt = 0; attempt < tries; ++attempt) {
-        const std::uint64_t before = block.sequence.load(std::memory_order_acquire);
-        if (before == 0)
-            return std::nullopt;
-        if (before % 2 != 0)
-            continue;
-        for (std::size_t i = 0; i < count; ++i)
-            words[i] = block.words[i].load(std::memory_order_acquire);
-        if (block.sequence.load(std::memory_order_relaxed) == before)
-            return words;
-    }
-    return std::nullopt;
 }
 
 inline bool ownerLives(const Header& header) noexcept

@@ -18,7 +18,7 @@ ARROWS = {
     "channel": {"base"},
     "render": {"base", "channel"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "channel"},
-    "haptics/falcon": {"volume", "datasets", "haptics"},
+    "haptics/falcon": {"base", "volume", "datasets", "haptics"},
     "session": {"base", "volume", "datasets", "chainmail", "haptics", "haptics/falcon", "channel"},
     "report": {"base", "volume", "datasets", "haptics", "session"},
     "command": {"base", "datasets", "session"},

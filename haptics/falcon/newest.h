@@ -1,5 +1,7 @@
 #pragma once
 
+#include <base/sequence_lock.h>
+
 #include <array>
 #include <atomic>
 #include <bit>
@@ -14,43 +16,28 @@ namespace palpate::falcon {
 template <typename T>
 class Newest {
     static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint64_t) == 0);
-    using Words = std::array<std::uint64_t, sizeof(T) / sizeof(std::uint64_t)>;
+    static constexpr std::size_t wordCount = sizeof(T) / sizeof(std::uint64_t);
+    using Words = std::array<std::uint64_t, wordCount>;
 
 public:
     Newest() { write(T{}); }
 
-    void write(const T& value) noexcept
-    {
-        const auto words = std::bit_cast<Words>(value);
-        const std::uint32_t n = sequence_.load(std::memory_order_relaxed);
-        sequence_.store(n + 1, std::memory_order_relaxed);
-        std::atomic_thread_fence(std::memory_order_release);
-        for (std::size_t i = 0; i < words.size(); ++i) {
-            words_[i].store(words[i], std::memory_order_relaxed);
-        }
-        sequence_.store(n + 2, std::memory_order_release);
-    }
+    void write(const T& value) noexcept { base::writeLocked(block_, std::bit_cast<Words>(value)); }
 
     /// Puts the newest into `value`; leaves it where that cannot be had at once.
     void read(T& value) const noexcept
     {
-        for (int attempt = 0; attempt < 8; ++attempt) {
-            const std::uint32_t before = sequence_.load(std::memory_order_acquire);
-            Words words{};
-            for (std::size_t i = 0; i < words.size(); ++i) {
-                words[i] = words_[i].load(std::memory_order_relaxed);
-            }
-            std::atomic_thread_fence(std::memory_order_acquire);
-            if (before % 2 == 0 && sequence_.load(std::memory_order_relaxed) == before) {
-                value = std::bit_cast<T>(words);
-                return;
-            }
+        constexpr int tries = 8;
+        if (const auto words = base::readLocked<wordCount>(block_, tries)) {
+            value = std::bit_cast<T>(*words);
         }
     }
 
 private:
-    std::atomic<std::uint32_t> sequence_{0};
-    std::array<std::atomic<std::uint64_t>, sizeof(T) / sizeof(std::uint64_t)> words_{};
+    struct {
+        std::atomic<std::uint64_t> sequence{0};
+        std::array<std::atomic<std::uint64_t>, wordCount> words{};
+    } block_;
 };
 
 }  // namespace palpate::falcon
