@@ -41,7 +41,7 @@ bool sameFile(int descriptor, const std::string& name)
 {
     struct stat ours {
     }, named{};
-    const File other(::shm_open(name.c_str(), O_RDONLY, 0));
+    const File other(openSegment(name, O_RDONLY));
     return other.descriptor >= 0 && ::fstat(descriptor, &ours) == 0 && ::fstat(other.descriptor, &named) == 0 &&
            ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
 }
@@ -70,17 +70,18 @@ Owner ownerOf(int descriptor)
 }
 
 // Removes the segment `name` that is open as `old`. The lock on it lets only one process at a time do so, and the second
-// look at the name keeps a slower one from removing what a faster one has put there. Nobody holds the lock for longer.
+// look at the name keeps a slower one from removing what a faster one has put there. Who does not get the lock leaves it to
+// who has.
 void removeLocked(const File& old, const std::string& name)
 {
-    if (::flock(old.descriptor, LOCK_EX) == 0 && sameFile(old.descriptor, name))
+    if (::flock(old.descriptor, LOCK_EX | LOCK_NB) == 0 && sameFile(old.descriptor, name))
         ::shm_unlink(name.c_str());
 }
 
 // Removes the segment `name` if a dead process left it, or if it is not ours to understand.
 void removeLeftBehind(const std::string& session, const std::string& name)
 {
-    const File old(::shm_open(name.c_str(), O_RDWR, 0));
+    const File old(openSegment(name, O_RDWR));
     if (old.descriptor < 0 && errno == ENOENT)
         return;
     if (old.descriptor < 0)
@@ -110,7 +111,7 @@ void removeOthersLeftBehind()
         if (!file.starts_with("palpate-"))
             continue;
         const std::string name = "/" + file;
-        const File old(::shm_open(name.c_str(), O_RDWR, 0));
+        const File old(openSegment(name, O_RDWR));
         if (old.descriptor < 0)
             continue;
         const Owner owner = ownerOf(old.descriptor);

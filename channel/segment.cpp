@@ -1,6 +1,12 @@
 #include <channel/segment.h>
 
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <stdexcept>
 
 namespace palpate::channel {
@@ -15,6 +21,19 @@ std::string segmentName(const std::string& session)
         throw std::runtime_error("session \"" + session.substr(0, longest) +
                                  "\": a name is 1 to 64 letters, digits, '-' and '_'");
     return "/palpate-" + session;
+}
+
+int openSegment(const std::string& name, int access) noexcept
+{
+    const int file = ::shm_open(name.c_str(), access | O_NONBLOCK, 0);
+    if (file < 0)
+        return file;
+    struct stat status {};
+    if (::fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == ::geteuid())
+        return file;
+    ::close(file);
+    errno = EPERM;
+    return -1;
 }
 
 }  // namespace palpate::channel

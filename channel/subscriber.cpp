@@ -89,7 +89,7 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
     Subscriber subscriber;
     Impl& impl = *subscriber.impl_;
     impl.name = segmentName(session);
-    const int file = ::shm_open(impl.name.c_str(), O_RDONLY, 0);
+    const int file = openSegment(impl.name, O_RDONLY);
     if (file < 0 && errno == ENOENT)
         return std::nullopt;
     if (file < 0)
@@ -175,7 +175,7 @@ bool Subscriber::displaced(Displaced& out) const noexcept
 
 int Subscriber::openToWrite() const noexcept
 {
-    const int file = ::shm_open(impl_->name.c_str(), O_RDWR, 0);
+    const int file = openSegment(impl_->name, O_RDWR);
     struct stat named {};
     if (file < 0 || (::fstat(file, &named) == 0 && named.st_ino == impl_->inode))
         return file;
@@ -197,7 +197,7 @@ Ending Subscriber::ending() const noexcept
     if (!ownerLives(*impl_->header))
         return Ending::killed;
     struct stat named {};
-    const int file = ::shm_open(impl_->name.c_str(), O_RDONLY, 0);
+    const int file = openSegment(impl_->name, O_RDONLY);
     const bool ours = file >= 0 && ::fstat(file, &named) == 0 && named.st_ino == impl_->inode;
     if (file >= 0)
         ::close(file);

@@ -25,6 +25,12 @@ if(NOT avx2)
   list(APPEND reasons "needs AVX2")
 endif()
 
+# A user who is not root cannot try what another user could do.
+execute_process(COMMAND id -u OUTPUT_VARIABLE user OUTPUT_STRIP_TRAILING_WHITESPACE)
+if(NOT user EQUAL 0)
+  list(APPEND reasons "only root can be a second user")
+endif()
+
 # The kernel of the virtual machine is Debian's and is downloaded once: not where there is no network.
 list(APPEND reasons "there is no kernel for the virtual machine and none could be downloaded")
 

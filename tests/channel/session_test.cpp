@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -70,6 +73,59 @@ pid_t leaveSegmentOfDead(const std::string& session)
 void removeSegment(const std::string& session)
 {
     ::shm_unlink(segmentName(session).c_str());
+}
+
+// Whether `action` comes to its end at all.
+bool ends(const std::function<void()>& action)
+{
+    const pid_t child = ::fork();
+    if (child == 0) {
+        ::alarm(10);
+        action();
+        ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status);
+}
+
+// Anybody may put files into the folder of the segments. Opening a pipe for reading waits for who writes.
+TEST(Session, APipeUnderItsNameHoldsNobodyUp)
+{
+    const std::string session = sessionNamed("pipe");
+    const std::string file = segmentFolder + segmentName(session);
+    ASSERT_EQ(::mkfifo(file.c_str(), 0666), 0);
+    EXPECT_TRUE(ends([] { sessions(); }));
+    EXPECT_TRUE(ends([&] { messageOf([&] { Subscriber::attach(session); }); }));
+    EXPECT_TRUE(ends([&] { messageOf([&] { Publisher(session, smallScenery(), smallLabels()); }); }));
+    EXPECT_TRUE(ends([&] { const Publisher other(session + "-other", smallScenery(), smallLabels()); }));
+    EXPECT_NE(messageOf([&] { Subscriber::attach(session); }), "");
+    EXPECT_NE(messageOf([&] { Publisher(session, smallScenery(), smallLabels()); }).find("somebody else"),
+              std::string::npos);
+    ::unlink(file.c_str());
+}
+
+// A file that looks left behind by a dead process, writable for all, and locked by the other user for as long as he likes.
+TEST(Session, AnotherUsersLockedFileHoldsNobodyUp)
+{
+    if (::geteuid() != 0) {
+        GTEST_SKIP() << "only root can be a second user";
+    }
+    constexpr pid_t dead = 999999999;  // no process has this number
+    const std::string session = sessionNamed("other");
+    const std::string name = segmentName(session) + "." + std::to_string(dead);
+    const pid_t holder = forkAndHold([&] {
+        [[maybe_unused]] const int user = ::setuid(65534);
+        const int file = ::shm_open(name.c_str(), O_RDWR | O_CREAT, 0666);
+        ::fchmod(file, 0666);
+        ::flock(file, LOCK_EX);
+    });
+    EXPECT_TRUE(ends([&] { const Publisher mine(session, smallScenery(), smallLabels()); }));
+    EXPECT_TRUE(ends([] { sessions(); }));
+    struct stat status {};
+    EXPECT_EQ(::stat((segmentFolder + name).c_str(), &status), 0) << "what is another user's stays";
+    killAndReap(holder);
+    ::shm_unlink(name.c_str());
 }
 
 TEST(Session, NamesThatCouldLeaveTheFolderAreRefused)
