@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <command/interrupted.h>
 #include <command/json.h>
 #include <command/options.h>
 
@@ -22,6 +23,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <initializer_list>
@@ -402,6 +404,11 @@ void train(Options o)
                 fmt::print("{}: {}\n", name, file);
             }
         }
+    }
+    if (result.signal != 0) {
+        throw command::Interrupted(
+            result.signal, fmt::format("interrupted ({}): the session was ended in order{}{}", strsignal(result.signal),
+                                       result.problem.empty() ? "" : "; ", result.problem));
     }
     if (!result.problem.empty()) {
         throw std::runtime_error(result.problem);

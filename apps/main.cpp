@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/build.h>
+#include <command/interrupted.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
 #include <sweep/command.h>
@@ -48,6 +49,9 @@ int main(int argc, char** argv)
     } catch (const CLI::ParseError& e) {
         const int status = app.exit(e);
         return status == 0 ? 0 : 2;
+    } catch (const command::Interrupted& e) {
+        std::fprintf(stderr, "palpate: %s\n", e.what());
+        return e.exitStatus();
     } catch (const std::exception& e) {
         std::fprintf(stderr, "palpate: %s\n", e.what());
         return 1;

@@ -30,33 +30,40 @@ constexpr std::size_t mostCores = 64;
 constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
 
 std::atomic<bool> interrupted{false};
+std::atomic<int> signalled{0};
 
-void onSignal(int)
+void onSignal(int signal)
 {
+    signalled = signal;
     interrupted = true;
 }
 
-// Ctrl-C and a polite kill end the session in good order, and end the program again once the session is over.
-class GoodOrder {
+// Ctrl-C, a polite kill and a terminal that is closed end the session in order; they end the program again once the session
+// is over.
+class EndInOrder {
 public:
-    GoodOrder()
+    EndInOrder()
     {
+        interrupted = false;
+        signalled = 0;
         struct sigaction action {};
         action.sa_handler = onSignal;
-        sigaction(SIGINT, &action, &interrupt_);
-        sigaction(SIGTERM, &action, &terminate_);
+        for (std::size_t i = 0; i < signals.size(); ++i) {
+            sigaction(signals[i], &action, &before_[i]);
+        }
     }
-    ~GoodOrder()
+    ~EndInOrder()
     {
-        sigaction(SIGINT, &interrupt_, nullptr);
-        sigaction(SIGTERM, &terminate_, nullptr);
+        for (std::size_t i = 0; i < signals.size(); ++i) {
+            sigaction(signals[i], &before_[i], nullptr);
+        }
     }
-    GoodOrder(const GoodOrder&) = delete;
-    GoodOrder& operator=(const GoodOrder&) = delete;
+    EndInOrder(const EndInOrder&) = delete;
+    EndInOrder& operator=(const EndInOrder&) = delete;
 
 private:
-    struct sigaction interrupt_ {
-    }, terminate_{};
+    static constexpr std::array signals{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
+    std::array<struct sigaction, signals.size()> before_{};
 };
 
 std::unique_ptr<Device> openWithFaults(const TrainOptions& options, const SessionModel& model, const Broadcast& broadcast)
@@ -231,7 +238,7 @@ Trainer::~Trainer() = default;
 
 TrainResult Trainer::run()
 {
-    const GoodOrder untilItsEnd;
+    const EndInOrder untilItsEnd;
     std::vector<std::string> warnings;
     std::atomic<bool> done{false};
     std::thread servo([&] {
@@ -253,6 +260,7 @@ TrainResult Trainer::run()
     }
     TrainResult result = std::move(impl_->tally.result);
     result.warnings = warnings;
+    result.signal = signalled;
     impl_->conclude(result);
     // The record is closed before a disk that is full on purpose has room again.
     impl_->recorder.reset();

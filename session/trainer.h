@@ -40,6 +40,7 @@ struct TrainResult {
     std::uint64_t forceHash = 0;
     std::uint64_t lostRecords = 0;
     std::vector<std::string> warnings;
+    int signal = 0;       // that ended it before its time; 0: none
     std::string problem;  // not empty: the session ran, but not everything that was asked for was done
 };
 
@@ -50,7 +51,8 @@ public:
     Trainer(const haptics::SessionModel& model, const haptics::SessionInfo& info, const TrainOptions& options);
     ~Trainer();
 
-    /// Runs the session to its end, or to Ctrl-C (SIGINT, SIGTERM), which ends it in good order.
+    /// Runs the session to its end, or to SIGINT (Ctrl-C), SIGTERM, SIGHUP or SIGQUIT, which end it in order: force to
+    /// zero, record complete.
     TrainResult run();
 
 private:
