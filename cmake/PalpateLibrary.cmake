@@ -6,7 +6,7 @@
 #     PUBLIC  palpate::volume
 #     PRIVATE TBB::tbb)
 #
-# gives palpate::chainmail with its headers as <chainmail/lattice.h>, warnings, install rule, and
+# gives palpate::chainmail with its headers as <chainmail/lattice.h>, <palpate/chainmail/lattice.h> where it is installed, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
 # UNINSTALLED: for a program of ours only.
 function(palpate_library name)
@@ -20,6 +20,7 @@ function(palpate_library name)
   target_link_libraries(${target}
     PUBLIC ${arg_PUBLIC}
     PRIVATE $<BUILD_INTERFACE:palpate_flags> ${arg_PRIVATE})
+  target_include_directories(${target} INTERFACE $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(${target} PUBLIC cxx_std_20)
   set_target_properties(${target} PROPERTIES
     EXPORT_NAME ${name}

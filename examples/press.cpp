@@ -1,9 +1,8 @@
-// Presses a ball into a block of fat, 0.1 mm a tick, and prints the force at 5 mm.
-#include <datasets/scene.h>
-#include <haptics/simulation.h>
+// Presses a ball of 10 mm into a block of fat, 0.1 mm a tick, and prints the force of the tissue at every millimetre.
+#include <palpate/datasets/scene.h>
+#include <palpate/haptics/simulation.h>
 
-#include <glm/geometric.hpp>
-
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -12,7 +11,7 @@ using namespace palpate;
 
 namespace {
 
-double forceAt(double depth)
+bool press()
 {
     auto scene = *datasets::builtInScene("block");
     const double radius = scene.tool.radius;
@@ -20,20 +19,21 @@ double forceAt(double depth)
     const auto model = haptics::buildModel(std::move(scene), std::move(tissue));
     haptics::Simulation simulation(model);
 
-    // The front of the block is y = 0, its inside y > 0. A second of rest before the push: forces ramp up.
+    // The front of the block is y = 0, its inside y > 0. The position is that of the ball's middle.
     haptics::DeviceSample sample{.position = {0, -radius - 1e-3, 0}, .buttons = haptics::buttonDeadMan};
-    for (int tick = 0; tick < 1000; ++tick) {
-        simulation.tick(sample);
+    double last = 0.0;
+    bool grows = true;
+    for (int tick = 0; tick <= 60; ++tick) {
+        sample.position.y = -radius - 1e-3 + 1e-4 * tick;
+        const haptics::TickRecord& record = simulation.tick(sample);
+        if (tick % 10 == 0) {
+            const double force = -record.tissueForce.y;
+            std::printf("%4.1f mm deep: %.3f N\n", 1e3 * (sample.position.y + radius), force);
+            grows = grows && force >= last;
+            last = force;
+        }
     }
-    while (sample.position.y < depth - radius) {
-        sample.position.y += 1e-4;
-        simulation.tick(sample);
-    }
-    for (int tick = 0; tick < 100; ++tick) {
-        simulation.tick(sample);
-    }
-    const auto& record = simulation.tick(sample);
-    return record.total.y;
+    return grows && last > 0.0;
 }
 
 }  // namespace
@@ -41,11 +41,9 @@ double forceAt(double depth)
 int main()
 {
     try {
-        const double force = forceAt(5e-3);
-        std::printf("a ball of 10 mm pressed 5 mm into fat pushes back with %.2f N\n", -force);
-        return force < 0.0 ? 0 : 1;
+        return press() ? 0 : 1;
     } catch (const std::exception& e) {
-        std::fprintf(stderr, "use_palpate: %s\n", e.what());
+        std::fprintf(stderr, "press: %s\n", e.what());
         return 1;
     }
 }
