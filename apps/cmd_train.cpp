@@ -9,6 +9,7 @@
 #include <session/falcon.h>
 #include <session/faults.h>
 #include <session/figures.h>
+#include <session/machine.h>
 #include <session/open.h>
 #include <session/trainer.h>
 
@@ -84,11 +85,15 @@ nlohmann::json coreFigures(const session::TrainResult& result, const haptics::Se
     return cores;
 }
 
-nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info)
+nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
+                         const datasets::ModelSettings& model)
 {
     auto figures = session::timingFigures(result.timing);
     figures["scene"] = info.scene;
     figures["model"] = info.model;
+    if (model.level == datasets::ModelLevel::elastic) {
+        figures["setting"] = model.setting;
+    }
     figures["device"] = info.device;
     figures["build"] = info.build;
     figures["contacts"] = result.contacts;
@@ -334,7 +339,8 @@ private:
 };
 
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`.
-void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& viewers, session::TrainResult& result)
+void writeOutputs(const Options& o, const haptics::SessionInfo& info, const datasets::ModelSettings& model,
+                  Viewers& viewers, session::TrainResult& result)
 {
     const auto blame = [&result](const std::string& what) {
         result.problem += result.problem.empty() ? what : "; " + what;
@@ -350,7 +356,7 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, Viewers& v
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
     }
     if (!o.json.empty()) {
-        attempt([&] { command::writeJson(o.json, figuresOf(result, info)); });
+        attempt([&] { command::writeJson(o.json, figuresOf(result, info, model)); });
     }
     if (!o.report.empty()) {
         const fs::path pictures = fs::is_directory(o.pictures) ? o.pictures : "";  // not there when the viewer failed
@@ -376,8 +382,20 @@ void train(Options o)
     if (const auto arm = session::deviceKind(o.device).arm; !arm.empty()) {
         o.changes.arm = o.changes.arm.value_or(std::string(arm));
     }
+    // Only a session that keeps time needs ticks that fit in it.
+    std::string fitted;
+    if (!o.unpaced) {
+        o.changes.fit = [&fitted] {
+            const session::FittingSetting fitting = session::fittingHere(session::machineCache());
+            fitted = fmt::format("setting {}: {}", fitting.setting, fitting.reason);
+            return fitting.setting;
+        };
+    }
     const auto model = session::openSession(o.scene, o.changes);
-    const auto info = session::describeSession(model, o.scene, deviceInWords(o));
+    auto info = session::describeSession(model, o.scene, deviceInWords(o));
+    if (!fitted.empty()) {
+        info.extra.emplace_back("setting", fitted);
+    }
     session::TrainOptions options;
     options.device = {o.device, o.trainee, o.changes.seed.value_or(1), std::move(falcon)};
     options.session = sessionName(o);
@@ -393,10 +411,13 @@ void train(Options o)
     }
     session::Trainer trainer(model, info, options);
     session::TrainResult result = trainer.run();
-    writeOutputs(o, info, viewers, result);
+    writeOutputs(o, info, model.scene.model, viewers, result);
 
     if (o.json != "-") {
         summarise(result, info, model.scene.model);
+        if (!fitted.empty()) {
+            fmt::print("{} (--setting says otherwise)\n", fitted);
+        }
         for (const auto& [name, file] : {std::pair<const char*, std::string>{"report", o.report},
                                          {"record", record.string()},
                                          {"pictures", o.pictures}}) {

@@ -185,9 +185,12 @@ void readTool(Section& top, ToolSpec& tool)
     }
 }
 
-void readElastic(Section& model, ElasticSettings& elastic)
+// Returns whether it says anything of what a setting is about.
+bool readElastic(Section& model, ElasticSettings& elastic)
 {
+    bool named = false;
     if (std::optional<Section> section = model.section("elastic")) {
+        named = section->has("spacing_mm") || section->has("window") || section->has("cycles");
         readFields<ElasticSettings>(*section, elasticFields, elastic, Need::some);
         readChoice(*section, "strain", strains, elastic.strain);
         section->finish();
@@ -195,6 +198,7 @@ void readElastic(Section& model, ElasticSettings& elastic)
             section->refuse("window", "must be odd");
         }
     }
+    return named;
 }
 
 void readModel(Section& top, ModelSettings& model)
@@ -207,8 +211,9 @@ void readModel(Section& top, ModelSettings& model)
         if (const auto index = section->choice("setting", choices)) {
             model.setting = names[*index];
             model.elastic = elasticSetting(model.setting);
+            model.settingNamed = true;
         }
-        readElastic(*section, model.elastic);
+        model.settingNamed = readElastic(*section, model.elastic) || model.settingNamed;
         section->finish();
     }
 }

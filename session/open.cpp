@@ -109,8 +109,12 @@ bool anyOf(const SceneChanges& c)
 }
 
 // The text must stay the scene: a replay is built from it.
-Scene changed(Scene scene, const SceneChanges& changes, const std::string& origin)
+Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
 {
+    const bool elastic = changes.model.value_or(std::string(levelOf(scene))) == "elastic";
+    if (changes.fit && elastic && !changes.setting && !scene.model.settingNamed) {
+        changes.setting = changes.fit();
+    }
     if (!anyOf(changes)) {
         return scene;
     }

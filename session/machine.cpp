@@ -1,0 +1,174 @@
+#include <session/machine.h>
+
+#include <base/build.h>
+#include <base/outputs.h>
+#include <datasets/scene.h>
+#include <haptics/simulation.h>
+#include <haptics/timing.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <memory>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+namespace palpate::session {
+
+namespace {
+
+using nlohmann::json;
+
+constexpr int warmUp = 40;  // ticks before those that count
+constexpr int counted = 160;
+
+// Streams through more memory than caches hold, on another core if there is one.
+class Neighbour {
+public:
+    Neighbour()
+        : thread_([this] {
+              std::vector<std::uint64_t> memory(std::size_t{1} << 21U);
+              for (std::uint64_t i = 0; !done_; ++i) {
+                  memory[(i * 8) % memory.size()] += i;
+              }
+          })
+    {
+    }
+    ~Neighbour()
+    {
+        done_ = true;
+        thread_.join();
+    }
+    Neighbour(const Neighbour&) = delete;
+    Neighbour& operator=(const Neighbour&) = delete;
+
+private:
+    std::atomic<bool> done_{false};
+    std::thread thread_;
+};
+
+// Of this thread: the servo thread, which has real-time priority, does not wait for others either.
+double processorTime() noexcept
+{
+    timespec t{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+haptics::SessionModel smallBlock(const std::string& setting)
+{
+    datasets::Scene scene = *datasets::builtInScene("block");
+    scene.source.phantom.numbers["width_mm"] = 60;
+    scene.source.phantom.numbers["thickness_mm"] = 40;
+    scene.source.phantom.voxel = 2e-3;
+    scene.model.level = datasets::ModelLevel::elastic;
+    scene.model.elastic = datasets::elasticSetting(setting);
+    auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
+    return haptics::buildModel(std::move(scene), std::move(tissue));
+}
+
+std::string processor()
+{
+    std::ifstream in("/proc/cpuinfo");
+    for (std::string line; std::getline(in, line);) {
+        if (line.starts_with("model name")) {
+            return line.substr(line.find(':') + 1);
+        }
+    }
+    return "";
+}
+
+// What a measurement is good for: this build on this processor with so many cores.
+std::string key()
+{
+    return fmt::format("{};{};{}", base::build(), processor(), std::thread::hardware_concurrency());
+}
+
+}  // namespace
+
+FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>& timeOf)
+{
+    constexpr double fineTakes = 3.0;  // times as long as default
+    const TickTime standard = timeOf("default");
+    const std::string words =
+        fmt::format("a tick of default takes {:.2f} ms (p99 {:.2f} ms) here", 1e3 * standard.p50, 1e3 * standard.p99);
+    if (standard.p99 > fittingTick) {
+        return {"fast", fmt::format("{}, and {:.1f} ms is what there is", words, 1e3 * fittingTick)};
+    }
+    if (fineTakes * standard.p99 < fittingTick) {
+        if (const TickTime fine = timeOf("fine"); fine.p99 <= fittingTick) {
+            return {"fine",
+                    fmt::format("a tick of fine takes {:.2f} ms (p99 {:.2f} ms) here", 1e3 * fine.p50, 1e3 * fine.p99)};
+        }
+    }
+    return {"default", words};
+}
+
+TickTime measureSetting(const std::string& setting)
+{
+    const haptics::SessionModel model = smallBlock(setting);
+    haptics::Simulation simulation(model);
+    const Neighbour viewer;
+    haptics::Histogram times;
+    const double radius = model.scene.tool.radius;
+    haptics::DeviceSample sample{.position = {0, -radius, 0}, .buttons = haptics::buttonDeadMan};
+    for (int tick = 0; tick < warmUp + counted; ++tick) {
+        const double swing = 0.02 * tick;
+        sample.position = {4e-3 * std::sin(swing), 0.4 * radius * (1.0 - std::cos(swing)) - radius, 0};
+        const double start = processorTime();
+        simulation.tick(sample);
+        if (tick >= warmUp) {
+            times.add(processorTime() - start);
+        }
+    }
+    const haptics::Percentiles p = times.percentiles();
+    return {p.p50, p.p99};
+}
+
+FittingSetting fittingHere(const std::filesystem::path& cache)
+{
+    json known;
+    if (std::ifstream in(cache); in) {
+        known = json::parse(in, nullptr, false);
+    }
+    const std::string here = key();
+    const auto text = [&known](const char* name) {
+        const auto found = known.is_object() ? known.find(name) : known.end();
+        return known.is_object() && found != known.end() && found->is_string() ? found->get<std::string>() : "";
+    };
+    const auto names = datasets::elasticSettings();
+    if (text("machine") == here && std::find(names.begin(), names.end(), text("setting")) != names.end()) {
+        return {text("setting"), text("reason")};
+    }
+    FittingSetting found = fittingSetting(measureSetting);
+    if (!cache.empty()) {
+        std::error_code none;
+        std::filesystem::create_directories(cache.parent_path(), none);
+        try {
+            base::writeWhole(cache, json{{"machine", here}, {"setting", found.setting}, {"reason", found.reason}}.dump());
+        } catch (const std::exception&) {
+            // The next session measures again.
+        }
+    }
+    return found;
+}
+
+std::filesystem::path machineCache()
+{
+    const char* folder = std::getenv("XDG_CACHE_HOME");
+    if (folder != nullptr && *folder == '/') {
+        return std::filesystem::path(folder) / "palpate" / "machine.json";
+    }
+    const char* home = std::getenv("HOME");
+    return home != nullptr && *home == '/' ? std::filesystem::path(home) / ".cache" / "palpate" / "machine.json"
+                                           : std::filesystem::path();
+}
+
+}  // namespace palpate::session

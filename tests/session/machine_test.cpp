@@ -1,0 +1,81 @@
+#include <session/machine.h>
+
+#include <datasets/scene.h>
+
+#include <gtest/gtest.h>
+
+#include <tests/folder.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace palpate::session {
+namespace {
+
+// Of a machine whose ticks at the settings take these times [ms].
+struct Machine {
+    std::map<std::string, double> p99;
+    std::vector<std::string> asked = {};
+
+    std::string fits()
+    {
+        return fittingSetting([&](const std::string& setting) {
+                   asked.push_back(setting);
+                   return TickTime{0.5e-3 * p99.at(setting), 1e-3 * p99.at(setting)};
+               })
+            .setting;
+    }
+};
+
+TEST(FittingSetting, IsTheFinestWhoseTicksFit)
+{
+    EXPECT_EQ((Machine{{{"default", 0.69}}}.fits()), "default");
+    EXPECT_EQ((Machine{{{"default", 0.71}}}.fits()), "fast");
+    EXPECT_EQ((Machine{{{"default", 20.0}}}.fits()), "fast");
+    EXPECT_EQ((Machine{{{"default", 0.2}, {"fine", 0.69}}}.fits()), "fine");
+    EXPECT_EQ((Machine{{{"default", 0.2}, {"fine", 0.71}}}.fits()), "default");
+}
+
+// Fine takes three times as long and its measurement is for nothing where default leaves no such room.
+TEST(FittingSetting, AsksForFineOnlyWhereThereIsRoom)
+{
+    Machine slow{{{"default", 0.4}}};
+    EXPECT_EQ(slow.fits(), "default");
+    EXPECT_EQ(slow.asked, std::vector<std::string>{"default"});
+}
+
+TEST(FittingSetting, MeasuresPositiveTimes)
+{
+    const TickTime time = measureSetting("fast");
+    EXPECT_GT(time.p50, 0.0);
+    EXPECT_GE(time.p99, time.p50);
+}
+
+TEST(FittingSetting, IsKeptAndACacheThatIsDamagedIsMeasuredAnew)
+{
+    const tests::Folder folder;
+    const std::filesystem::path cache = folder / "below/machine.json";
+    const FittingSetting first = fittingHere(cache);
+    const auto names = datasets::elasticSettings();
+    EXPECT_NE(std::ranges::find(names, first.setting), names.end());
+    ASSERT_TRUE(std::filesystem::exists(cache));
+    const FittingSetting again = fittingHere(cache);
+    EXPECT_EQ(again.setting, first.setting);
+    EXPECT_EQ(again.reason, first.reason) << "it was measured again";
+    for (const std::string text : {"", "{", "[1]", R"({"machine": 3})"}) {
+        std::ofstream(cache) << text;
+        EXPECT_NO_THROW(fittingHere(cache)) << text;
+    }
+}
+
+TEST(FittingSetting, NeedsNoCache)
+{
+    EXPECT_FALSE(fittingHere({}).setting.empty());
+    EXPECT_FALSE(fittingHere("/proc/none/machine.json").setting.empty());
+}
+
+}  // namespace
+}  // namespace palpate::session
