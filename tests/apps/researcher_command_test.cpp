@@ -82,6 +82,47 @@ TEST_F(Researcher, SegmentsAreMappedByTheirNamesAndUnknownLabelsAreListed)
     EXPECT_EQ(figures({"import", seg, "-o", vdb, "--set", "Left lesion=ilc"}).at("labels").at(2).at("tissue"), "ilc");
 }
 
+// Sets of label values as other programs write them, without names. Each would once have become another program's organs.
+TEST_F(Researcher, ValuesAloneNeverDecide)
+{
+    const std::vector<std::pair<const char*, std::vector<std::uint16_t>>> sets{
+        {"FSL FIRST", {10, 11, 12, 13, 16, 17, 18, 26, 49, 50, 51, 52, 53, 54, 58}},
+        {"aseg without cortex", {2, 4, 5, 7, 8, 10, 11, 12, 13, 14, 15, 16, 17, 18, 24, 26, 28, 41, 43, 44, 46, 47}},
+        {"VerSe", {19, 20, 21, 22, 23, 24, 28}},
+        {"white matter", {3, 5, 20, 33, 60, 92, 105}},
+        {"tens", {10, 20, 30, 40, 50, 60}}};
+    for (const auto& [name, values] : sets) {
+        SCOPED_TRACE(name);
+        LabelImage image = patient();
+        for (std::size_t i = 0; i < image.values.size(); ++i) {
+            image.values[i] = image.values[i] != 0 ? values[i % values.size()] : std::uint16_t{0};
+        }
+        const std::string file = folder / "unnamed.nii.gz";
+        volume::exportLabels(file, image, {});
+        expectRefusal({"import", file, "-o", vdb}, "no tissue is known for " + std::to_string(values.size()));
+        expectRefusal({"import", file, "-o", vdb}, "its values would fit --map totalsegmentator (");
+        EXPECT_FALSE(std::filesystem::exists(vdb));
+        EXPECT_EQ(palpate({"import", file, "-o", vdb, "--map", "totalsegmentator"}).status, 0) << "who says so is believed";
+        std::filesystem::remove(vdb);
+    }
+}
+
+// A map of another program calls labels by other names: vertebrae would become bowel.
+TEST_F(Researcher, AMapThatContradictsTheNamesIsRefused)
+{
+    const std::vector<LabelName> names{{1, "vertebrae_L5", ""}, {2, "Left lesion", ""}, {3, "Aorta", ""}};
+    volume::exportLabels(seg, patient(), names);
+    expectRefusal({"import", seg, "-o", vdb, "--map", "totalsegmentator"},
+                  "1 is 'vertebrae_L5' (bone) in the file and 'spleen' (spleen) in the map");
+    EXPECT_FALSE(std::filesystem::exists(vdb));
+    // A map that has no names of its own, only says what the labels are made of.
+    const std::string own = folder / "own.toml";
+    writeText(own,
+              "name = \"own\"\nlabels = [\n  { value = 1, tissue = \"liver\" },\n  { value = 2, tissue = \"fat\" },\n"
+              "  { value = 3, tissue = \"vein\" },\n]\n");
+    EXPECT_EQ(tissueOf(figures({"import", seg, "-o", vdb, "--map", own}), "vertebrae_L5"), "liver");
+}
+
 // A label map that was begun by the program and filled in by hand is one that it takes.
 TEST_F(Researcher, ALabelMapIsBegunAndFilledIn)
 {

@@ -77,7 +77,9 @@ TEST(VolumeCommands, APatientSizedPhantomIsImportedToTheVoxelAndTrainedOn)
     }
     const Folder folder;
     const std::string file = folder / "victre.vdb", record = folder / "session.db";
-    const auto imported = figures({"import", victre, "-o", file});
+    // Its values would fit more than one program's, and no name says whose they are.
+    expectRefusal({"import", victre, "-o", file}, "--map victre (1 is fat");
+    const auto imported = figures({"import", victre, "--map", "victre", "-o", file});
     expectVolumeKeys(imported);
     EXPECT_EQ(voxels(imported), victreVoxels);
     EXPECT_EQ(imported.at("size"), (std::vector<int>{374, 448, 449}));

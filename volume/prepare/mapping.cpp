@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <functional>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -20,11 +21,19 @@ using datasets::LabelMap;
 using volume::LabelName;
 
 constexpr std::size_t mostListed = 40;  // labels in a message
+constexpr std::size_t mostContradictions = 8;
 
 const LabelName* find(const std::vector<LabelName>& names, std::uint16_t value)
 {
     const auto found = std::find_if(names.begin(), names.end(), [&](const LabelName& n) { return n.value == value; });
     return found == names.end() ? nullptr : &*found;
+}
+
+// Whether a name is more than the value: some programs, and our own export, write "label 3" where they know none.
+bool tells(const LabelName& label)
+{
+    const std::string number = std::to_string(label.value);
+    return !label.name.empty() && label.name != number && label.name != "label " + number;
 }
 
 bool covers(const LabelMap& map, const LabelCounts& counts)
@@ -43,34 +52,49 @@ bool namesAgree(const LabelMap& map, const std::vector<LabelName>& names, const 
     });
 }
 
-// Values that run almost without gaps from 1 on say nothing about who wrote them; 1, 2, 29, 33, 40, 88 ... do.
-bool valuesTell(const LabelCounts& counts)
-{
-    return counts.size() >= 6 && counts.rbegin()->first >= 2 * counts.size();
-}
-
-// The built-in map that the file was certainly made by, or an empty one. Maps with so many values that almost anything is
-// among them are known by names only.
+// The built-in map that the file was certainly made by, or an empty one. Names alone tell: 3, 11 and 20 are a kidney, a
+// lung and a bowel to one segmenter, and bundles of white matter to another.
 LabelMap recognise(const volume::ImportedLabels& labels, const LabelCounts& counts, std::vector<std::string>& notes)
 {
-    constexpr std::size_t tellingMap = 130;  // labels
-    std::vector<LabelMap> byValue;
     for (const std::string& name : datasets::labelMapNames()) {
         LabelMap map = datasets::labelMap(name);
         if (!labels.names.empty() && namesAgree(map, labels.names, counts)) {
             notes.push_back(fmt::format("label map '{}' recognised by the names in the file", name));
             return map;
         }
-        const bool tells = valuesTell(counts) && (map.labels.size() < tellingMap || counts.size() >= tellingMap);
-        if (labels.names.empty() && tells && covers(map, counts)) {
-            byValue.push_back(std::move(map));
+    }
+    return {};
+}
+
+// The built-in maps that have all values of a file without names, and what each makes of its largest labels: for the user
+// to choose from. Empty where there is none.
+std::string offers(const volume::ImportedLabels& labels, const LabelCounts& counts)
+{
+    constexpr std::size_t mostShown = 4;  // labels
+    std::vector<std::pair<std::uint64_t, std::uint16_t>> largest;
+    for (const auto& [value, voxels] : counts) {
+        if (const LabelName* own = find(labels.names, value); value != 0 && own != nullptr && tells(*own)) {
+            return "";
+        }
+        if (value != 0) {
+            largest.emplace_back(voxels, value);
         }
     }
-    if (byValue.size() != 1) {
-        return {};
+    std::ranges::sort(largest, std::greater<>());
+    largest.resize(std::min(largest.size(), mostShown));
+    std::vector<std::string> list;
+    for (const std::string& name : datasets::labelMapNames()) {
+        const LabelMap map = datasets::labelMap(name);
+        if (!covers(map, counts)) {
+            continue;
+        }
+        std::vector<std::string> parts;
+        for (const auto& [voxels, value] : largest) {
+            parts.push_back(fmt::format("{} is {}", value, find(map.labels, value)->name));
+        }
+        list.push_back(fmt::format("--map {} ({})", name, fmt::join(parts, ", ")));
     }
-    notes.push_back(fmt::format("label map '{}' recognised by the label values: --map says otherwise", byValue[0].name));
-    return byValue[0];
+    return list.empty() ? "" : fmt::format("; its values would fit {}: is it one of these?", fmt::join(list, ", or "));
 }
 
 // One --set: which label, by value or name, is made of what.
@@ -133,8 +157,8 @@ struct Found {
 
 class Mapper {
 public:
-    Mapper(const MappingOptions& options, const volume::ImportedLabels& labels, const LabelCounts& counts,
-           const volume::TissueTable& table, std::vector<std::string>& notes)
+    Mapper(const MappingOptions& options, const std::filesystem::path& file, const volume::ImportedLabels& labels,
+           const LabelCounts& counts, const volume::TissueTable& table, std::vector<std::string>& notes)
         : labels_(labels),
           table_(table),
           settings_(readSettings(options, table)),
@@ -151,6 +175,9 @@ public:
                 throw std::runtime_error(fmt::format("--set {}: no voxel has a label of that name or value; there are {}",
                                                      s.text, listOf(labels, counts)));
             }
+        }
+        if (!options.map.empty()) {
+            checkNames(options.map, file, counts);
         }
     }
 
@@ -188,6 +215,39 @@ public:
     }
 
 private:
+    // A map that calls a label something else than the file does, and makes something else of it, is the map of another
+    // program.
+    void checkNames(const std::string& map, const std::filesystem::path& file, const LabelCounts& counts) const
+    {
+        std::vector<std::string> list;
+        for (const auto& [value, voxels] : counts) {
+            const LabelName* own = find(labels_.names, value);
+            const LabelName* mapped = find(map_.labels, value);
+            if (value == 0 || own == nullptr || mapped == nullptr || mapped->name.empty() || mapped->name == own->name) {
+                continue;
+            }
+            Found byName;
+            searchByName(own->name, byName);
+            const bool said =
+                std::ranges::any_of(settings_, [&, v = value](const Setting& s) { return s.names(v, own->name); });
+            if (!said && byName.certain && byName.label.tissue != mapped->tissue) {
+                list.push_back(fmt::format("{} is '{}' ({}) in the file and '{}' ({}) in the map", value, own->name,
+                                           byName.label.tissue, mapped->name, mapped->tissue));
+            }
+        }
+        if (list.empty()) {
+            return;
+        }
+        const std::size_t all = list.size();
+        if (all > mostContradictions) {
+            list.resize(mostContradictions);
+            list.push_back(fmt::format("and {} more", all - mostContradictions));
+        }
+        throw std::runtime_error(fmt::format(
+            "{}: --map {} contradicts the names in it: {}: leave out --map, or give that of the program that made it",
+            file.string(), map, fmt::join(list, "; ")));
+    }
+
     void searchByName(const std::string& name, Found& found) const
     {
         const auto inTable = [&](const std::optional<std::string>& tissue) {
@@ -212,8 +272,8 @@ private:
     datasets::StructureNames names_;
 };
 
-[[noreturn]] void refuseUnknown(const std::filesystem::path& file, const std::vector<Found>& unknown,
-                                const LabelCounts& counts)
+[[noreturn]] void refuseUnknown(const std::filesystem::path& file, const volume::ImportedLabels& labels,
+                                const std::vector<Found>& unknown, const LabelCounts& counts)
 {
     std::vector<std::string> list;
     for (const Found& u : unknown) {
@@ -228,8 +288,9 @@ private:
     }
     throw std::runtime_error(
         fmt::format("{}: no tissue is known for {} of its labels: {}: give --map ({} or a TOML file), --set "
-                    "NAME=TISSUE, or --default-tissue NAME; --write-map FILE begins a label map",
-                    file.string(), unknown.size(), fmt::join(list, ", "), fmt::join(datasets::labelMapNames(), ", ")));
+                    "NAME=TISSUE, or --default-tissue NAME; --write-map FILE begins a label map{}",
+                    file.string(), unknown.size(), fmt::join(list, ", "), fmt::join(datasets::labelMapNames(), ", "),
+                    offers(labels, counts)));
 }
 
 }  // namespace
@@ -257,7 +318,7 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
         throw std::runtime_error(fmt::format("--default-tissue {}: is not in the tissue table '{}'; it has: {}",
                                              options.defaultTissue, table.name, fmt::join(tissuesOf(table), ", ")));
     }
-    const Mapper mapper(options, labels, counts, table, notes);
+    const Mapper mapper(options, file, labels, counts, table, notes);
     std::vector<LabelName> named;
     std::vector<Found> unknown;
     for (const auto& [value, voxels] : counts) {
@@ -277,7 +338,7 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
         }
     }
     if (!unknown.empty()) {
-        refuseUnknown(file, unknown, counts);
+        refuseUnknown(file, labels, unknown, counts);
     }
     return named;
 }
@@ -286,7 +347,7 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
                           const volume::ImportedLabels& labels, const LabelCounts& counts, const volume::TissueTable& table)
 {
     std::vector<std::string> notes;
-    const Mapper mapper(options, labels, counts, table, notes);
+    const Mapper mapper(options, file, labels, counts, table, notes);
     LabelMap map{file.stem().string(), {}, {}};
     std::set<std::uint16_t> open;
     for (const auto& [value, voxels] : counts) {

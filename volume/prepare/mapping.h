@@ -13,7 +13,7 @@ namespace palpate::prepare {
 
 /// What the command line says about labels.
 struct MappingOptions {
-    std::string map;                 // a built-in label map's name, or a TOML file; "" = found out
+    std::string map;                 // a built-in label map's name, or a TOML file; "" = found out by the file's names
     std::vector<std::string> set;    // "NAME=TISSUE" or "VALUE=TISSUE"
     std::string defaultTissue;       // of labels that nothing else names; "" = they are an error
     std::filesystem::path writeMap;  // a label map to write for editing; no volume is made then
@@ -25,7 +25,8 @@ LabelCounts countLabels(const volume::LabelImage& image);
 
 /// A name and a tissue for every label that is there, 0 only where it is mapped: by --set, else by the label map (by value,
 /// then by the segment's name), else by what the segment is called, else the default tissue. Appends to `notes` what was
-/// not said but found out. Throws std::runtime_error that lists the labels left over with their voxels.
+/// not said but found out. Values alone never decide. Throws std::runtime_error that lists the labels left over with their
+/// voxels, and the built-in maps that have all of their values; and for a map that contradicts names in the file.
 std::vector<volume::LabelName> mapLabels(const MappingOptions& options, const std::filesystem::path& file,
                                          const volume::ImportedLabels& labels, const LabelCounts& counts,
                                          const volume::TissueTable& table, std::vector<std::string>& notes);
