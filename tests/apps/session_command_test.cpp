@@ -80,7 +80,7 @@ TEST(Session, ForcesDependOnTheClockOnlyThroughWhatTheRecordSays)
 {
     const Folder folder;
     const std::string record = folder / "session.db";
-    const std::vector<std::string> half{"train", "layered", "--headless", "--seconds", "1.5"};
+    const std::vector<std::string> half{"train", "layered", "--headless", "--setting", "default", "--seconds", "1.5"};
     const auto paced = figures(half + std::vector<std::string>{"--record", record});
     const auto replayed = figures({"replay", record});
     EXPECT_EQ(replayed.at("identical"), true);
@@ -261,8 +261,8 @@ TEST(Session, AViewerThatIsKilledChangesNothing)
     const Folder folder;
     const std::string session = sessionName("viewer"), pictures = folder / "pictures", scene = folder / "scene.toml";
     writeText(scene, slowScene);
-    Program train("palpate", {"train", scene, "--headless", "--session", session, "--json", folder / "train.json",
-                              "--record", folder / "s.db"});
+    Program train("palpate", {"train", scene, "--headless", "--setting", "default", "--session", session, "--json",
+                              folder / "train.json", "--record", folder / "s.db"});
     Program view("palpate-view", {"--session", session, "--offscreen", pictures, "--size", "320x320", "--every", "0.1"});
     const auto drawn = [&] { return std::filesystem::exists(pictures) && !std::filesystem::is_empty(pictures); };
     ASSERT_TRUE(eventually([&] { return !train.running() || !view.running() || drawn(); }));
@@ -278,7 +278,8 @@ TEST(Session, AViewerThatIsKilledChangesNothing)
     EXPECT_EQ(figures({"replay", folder / "s.db"}).at("identical"), true);
     // What the clock did to a session is in its record; only one that kept it has the forces of one without a clock.
     if (watched.at("missed_ticks") == 0) {
-        EXPECT_EQ(watched.at("force_hash"), figures({"train", scene, "--headless", "--unpaced"}).at("force_hash"));
+        EXPECT_EQ(watched.at("force_hash"),
+                  figures({"train", scene, "--headless", "--setting", "default", "--unpaced"}).at("force_hash"));
     }
 }
 
