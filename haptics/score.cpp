@@ -89,8 +89,11 @@ ScoreParts parts(const Score& s) noexcept
     p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
              10 * ramp(s.targetingError, 0, 10e-3);
     const double economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1;
-    p.technique = 5 * (ramp(s.passes, 1, 5) + ramp(s.skinContacts, 1, 5) + ramp(s.redirects, 0, 4) + economy +
-                       ramp(s.peakForce, 4, 8.5));
+    // However well it was done: who missed has no technique to be praised for.
+    const double hit = std::min(1.0, s.bestTargetFraction / 0.1);
+    p.technique =
+        hit * 5 *
+        (ramp(s.passes, 1, 5) + ramp(s.skinContacts, 1, 5) + ramp(s.redirects, 0, 4) + economy + ramp(s.peakForce, 4, 8.5));
     return p;
 }
 

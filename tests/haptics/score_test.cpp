@@ -272,6 +272,24 @@ TEST(Score, PointsFollowTheFormula)
     EXPECT_NEAR(parts(s).technique, 13.75, 1e-12);
 }
 
+// However careful and straight: a core without target is no biopsy.
+TEST(Score, AMissKeepsNoPointsForTechnique)
+{
+    Score s;
+    s.skinContacts = 1;
+    s.passes = 1;
+    s.insertedPath = 0.06;
+    s.deepest = 0.03;
+    s.targetingError = 14e-3;
+    EXPECT_DOUBLE_EQ(parts(s).technique, 0.0);
+    EXPECT_DOUBLE_EQ(parts(s).core + parts(s).vital, 25.0);
+    s.targetingError = 0;
+    s.bestTargetFraction = 0.05;
+    EXPECT_DOUBLE_EQ(parts(s).technique, 12.5);
+    s.bestTargetFraction = 0.1;
+    EXPECT_DOUBLE_EQ(parts(s).technique, 25.0);
+}
+
 // Every point of the total falls, or stays, when a measure gets worse.
 TEST(Score, WorseMeasuresNeverGiveMorePoints)
 {
