@@ -352,6 +352,10 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, const data
             blame(e.what());
         }
     };
+    const bool wanted = o.view || session::deviceKind(o.device).needsViewer;
+    if (wanted && viewers.window && viewers.window->wait(0) > 0) {
+        blame("the window has failed, its message is above: check the display (DISPLAY), or do without by --headless");
+    }
     if (viewers.camera && viewers.camera->wait(picturesTimeout) != 0) {
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
     }

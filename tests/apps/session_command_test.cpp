@@ -182,6 +182,19 @@ TEST(Session, ARecordThatExistsIsNeverTouched)
     EXPECT_EQ(readText(record), "mine");
 }
 
+// What was asked for and did not come is no success.
+TEST(Session, AWindowThatCannotBeOpenedIsAnError)
+{
+    if (!built("palpate-view")) {
+        GTEST_SKIP() << "there is no palpate-view";
+    }
+    Program train("/usr/bin/env",
+                  {"DISPLAY=:9999", std::string(PALPATE_BIN_DIR) + "/palpate", "train", "layered", "--view"});
+    const Outcome outcome = train.wait();
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_NE(outcome.err.find("the window has failed"), std::string::npos) << outcome.err;
+}
+
 // What a shell would say of a program that the signal had killed: the exit status of an interrupted session is its own.
 TEST(Session, AnInterruptEndsItInOrder)
 {
