@@ -451,6 +451,13 @@ std::string secondsFault(const std::string& text)
                : "";
 }
 
+// Empty, or what is wrong with a value of --seed.
+std::string seedFault(const std::string& text)
+{
+    const bool digits = !text.empty() && text.size() < 20 && text.find_first_not_of("0123456789") == std::string::npos;
+    return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
+}
+
 }  // namespace
 
 void addTrain(CLI::App& app)
@@ -487,7 +494,7 @@ void addTrain(CLI::App& app)
                   "With --dffb fade: K/N, trial K of N; all guidance in the first, none in the last");
     c->add_option("--target", o->changes.target, "Structure to sample");
     c->add_option("--seed", o->changes.seed, "Every random choice: of a phantom, and of a --trainee")
-        ->check(CLI::NonNegativeNumber);
+        ->check(seedFault, "a whole number");
     c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);

@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/build.h>
+#include <base/nearest.h>
 #include <command/interrupted.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
@@ -7,9 +8,29 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <vector>
+
+namespace {
+
+// `palpate help [COMMAND]` and `palpate version`, as other programs have them. Last word first, as CLI11 takes them.
+std::vector<std::string> wordsOf(int argc, char** argv)
+{
+    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
+    if (!words.empty() && words[0] == "help") {
+        words.erase(words.begin());
+        words.emplace_back("--help");
+    } else if (!words.empty() && words[0] == "version") {
+        words[0] = "--version";
+    }
+    std::ranges::reverse(words);
+    return words;
+}
+
+}  // namespace
 
 int main(int argc, char** argv)
 {
@@ -19,9 +40,16 @@ int main(int argc, char** argv)
     app.failure_message([](const CLI::App* program, const CLI::Error& e) {
         // CLI11 notices a missing command before a wrong word in its place.
         const auto unknown = program->remaining(true);
-        const std::string what = e.get_name() == "RequiredError" && !unknown.empty()
-                                     ? unknown[0] + ": there is no such command or option"
-                                     : e.what();
+        std::string what = e.what();
+        if (e.get_name() == "RequiredError" && !unknown.empty()) {
+            std::vector<std::string> commands;
+            for (const CLI::App* command : program->get_subcommands({})) {
+                commands.push_back(command->get_name());
+            }
+            const std::string meant = palpate::base::nearest(unknown[0], commands);
+            what = unknown[0] + ": there is no such command or option" +
+                   (meant.empty() ? "" : "; did you mean " + meant + "?");
+        }
         return "palpate: " + what + " (palpate --help lists what there is)\n";
     });
 
@@ -44,7 +72,7 @@ int main(int argc, char** argv)
     sweep::addSweep(app);
 
     try {
-        app.parse(argc, argv);
+        app.parse(wordsOf(argc, argv));
         return 0;
     } catch (const CLI::ParseError& e) {
         const int status = app.exit(e);

@@ -1,4 +1,5 @@
 #include <apps/replay_player.h>
+#include <base/build.h>
 #include <command/json.h>
 #include <render/viewer.h>
 
@@ -58,6 +59,7 @@ int main(int argc, char** argv)
                  "palpate-view");
     palpate::render::ViewerOptions options;
     std::string size = "1280x960", json, layout = "trainee", slices = "tinted", timeline, replay;
+    app.set_version_flag("--version", std::string(palpate::base::build()));
     app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
     app.add_option("--offscreen", options.offscreen, "Write PNG files to this folder instead of opening a window");
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");

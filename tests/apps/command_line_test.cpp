@@ -21,6 +21,9 @@ TEST(CommandLine, EveryCommandExplainsItself)
         EXPECT_EQ(outcome.err, "");
     }
     EXPECT_EQ(palpate({"--version"}).status, 0);
+    EXPECT_EQ(palpate({"version"}).out, palpate({"--version"}).out);
+    EXPECT_EQ(palpate({"help"}).out, palpate({"--help"}).out);
+    EXPECT_EQ(palpate({"help", "bench", "tick"}).out, palpate({"bench", "tick", "--help"}).out);
 }
 
 TEST(CommandLine, TheHelpListsEveryCommand)
@@ -35,6 +38,7 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
 {
     expectRefusal({}, "--help");
     expectRefusal({"nosuch"}, "nosuch: there is no such command");
+    expectRefusal({"trian"}, "trian: there is no such command or option; did you mean train?");
     expectRefusal({"bench", "nosuch"}, "nosuch: there is no such command");
     expectRefusal({"train", "--nosuch"}, "--nosuch");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
@@ -44,6 +48,9 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
                   "block: the tissue model is spring: --setting changes nothing");
     for (const std::string seconds : {"soon", "-1", "nan", "inf", "86401"}) {
         expectRefusal({"train", "--seconds", seconds}, "--seconds: " + seconds + ": must be 0 to 86400 s");
+    }
+    for (const std::string seed : {"-1", "1.5", "x", "99999999999999999999999"}) {
+        expectRefusal({"train", "--seed", seed}, "--seed: " + seed + ": must be a whole number, 0 or more");
     }
     expectRefusal({"bench"}, "--help");
     expectRefusal({"train", "nosuch"}, "layered, block, plate, pair");
