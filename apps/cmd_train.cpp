@@ -3,7 +3,7 @@
 #include <command/json.h>
 #include <command/options.h>
 
-#include <base/child_process.h>
+#include <apps/viewers.h>
 #include <base/outputs.h>
 #include <report/report.h>
 #include <session/falcon.h>
@@ -22,14 +22,12 @@
 
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
 #include <filesystem>
 #include <initializer_list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -270,74 +268,6 @@ void checkOutputs(const Options& o)
     }
 }
 
-// The viewers that a session starts.
-class Viewers {
-public:
-    Viewers(const Options& o, const std::string& session)
-        : session_(session), layout_(o.layout), handIsHere_(session::deviceKind(o.device).needsViewer)
-    {
-        if (wantsWindow(o)) {
-            openWindow();
-        }
-        if (!o.pictures.empty()) {
-            start(camera, {"--offscreen", o.pictures});
-        }
-    }
-
-    // Opens a window that has crashed again, twice a second at most. False when the window that was the hand has been
-    // closed: nobody could move the tool any more.
-    bool lookAfter()
-    {
-        const std::lock_guard lock(guard_);
-        if (handIsHere_ && window && window->wait(0) >= 0) {
-            return false;
-        }
-        const auto now = std::chrono::steady_clock::now();
-        if (!window || !window->killed() || now - opened_ <= std::chrono::milliseconds(500)) {
-            return true;
-        }
-        try {
-            openWindow();
-        } catch (const std::exception& e) {
-            // The session goes on without it.
-            fmt::print(stderr, "palpate: {}\n", e.what());
-        }
-        return true;
-    }
-
-    // Also from another thread.
-    void stall(bool stopped)
-    {
-        const std::lock_guard lock(guard_);
-        for (auto* viewer : {&window, &camera}) {
-            if (*viewer) {
-                (*viewer)->stall(stopped);
-            }
-        }
-    }
-
-    std::optional<base::ChildProcess> window, camera;
-
-private:
-    void openWindow()
-    {
-        start(window, {"--layout", layout_});
-        opened_ = std::chrono::steady_clock::now();
-    }
-
-    void start(std::optional<base::ChildProcess>& viewer, std::vector<std::string> arguments) const
-    {
-        arguments.insert(arguments.end(), {"--session", session_, "--wait", "30"});
-        viewer.emplace(base::programFolder() / "palpate-view", arguments,
-                       "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
-    }
-
-    std::string session_, layout_;
-    bool handIsHere_;
-    std::mutex guard_;
-    std::chrono::steady_clock::time_point opened_;
-};
-
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`.
 void writeOutputs(const Options& o, const haptics::SessionInfo& info, const datasets::ModelSettings& model,
                   Viewers& viewers, session::TrainResult& result)
@@ -408,7 +338,7 @@ void train(Options o)
     options.faults = o.faults;
 
     // Before the record is made, so that a viewer that cannot be started leaves none.
-    Viewers viewers(o, options.session);
+    Viewers viewers({options.session, o.layout, o.pictures, wantsWindow(o), session::deviceKind(o.device).needsViewer});
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };

@@ -1,0 +1,63 @@
+#include <apps/viewers.h>
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <exception>
+#include <utility>
+
+namespace palpate::apps {
+
+Viewers::Viewers(ViewersWanted wanted) : wanted_(std::move(wanted))
+{
+    if (wanted_.window) {
+        openWindow();
+    }
+    if (!wanted_.pictures.empty()) {
+        start(camera, {"--offscreen", wanted_.pictures});
+    }
+}
+
+bool Viewers::lookAfter()
+{
+    const std::lock_guard lock(guard_);
+    if (wanted_.handIsHere && window && window->wait(0) >= 0) {
+        return false;
+    }
+    const auto now = std::chrono::steady_clock::now();
+    if (!window || !window->killed() || now - opened_ <= std::chrono::milliseconds(500)) {
+        return true;
+    }
+    try {
+        openWindow();
+    } catch (const std::exception& e) {
+        // The session goes on without it.
+        fmt::print(stderr, "palpate: {}\n", e.what());
+    }
+    return true;
+}
+
+void Viewers::stall(bool stopped)
+{
+    const std::lock_guard lock(guard_);
+    for (auto* viewer : {&window, &camera}) {
+        if (*viewer) {
+            (*viewer)->stall(stopped);
+        }
+    }
+}
+
+void Viewers::openWindow()
+{
+    start(window, {"--layout", wanted_.layout});
+    opened_ = std::chrono::steady_clock::now();
+}
+
+void Viewers::start(std::optional<base::ChildProcess>& viewer, std::vector<std::string> arguments) const
+{
+    arguments.insert(arguments.end(), {"--session", wanted_.session, "--wait", "30"});
+    viewer.emplace(base::programFolder() / "palpate-view", arguments,
+                   "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
+}
+
+}  // namespace palpate::apps

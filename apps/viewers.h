@@ -1,0 +1,45 @@
+#pragma once
+
+#include <base/child_process.h>
+
+#include <chrono>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::apps {
+
+/// Which viewers a session starts.
+struct ViewersWanted {
+    std::string session;   // its name
+    std::string layout;    // of the window
+    std::string pictures;  // folder of pictures to write; empty: none
+    bool window = false;
+    bool handIsHere = false;  // the window is the hand
+};
+
+/// The viewers that a session starts, each in a process of its own.
+class Viewers {
+public:
+    /// Throws std::runtime_error where one cannot be started.
+    explicit Viewers(ViewersWanted wanted);
+
+    /// Opens a window that has crashed again, twice a second at most. False when the window that was the hand has been
+    /// closed: nobody could move the tool any more.
+    bool lookAfter();
+    /// Stops them or lets them go on; also from another thread.
+    void stall(bool stopped);
+
+    std::optional<base::ChildProcess> window, camera;
+
+private:
+    void openWindow();
+    void start(std::optional<base::ChildProcess>& viewer, std::vector<std::string> arguments) const;
+
+    ViewersWanted wanted_;
+    std::mutex guard_;
+    std::chrono::steady_clock::time_point opened_;
+};
+
+}  // namespace palpate::apps
