@@ -1,10 +1,11 @@
 #include <apps/command.h>
-#include <command/interrupted.h>
-#include <command/json.h>
-#include <command/options.h>
 
 #include <apps/viewers.h>
 #include <base/outputs.h>
+#include <command/interrupted.h>
+#include <command/json.h>
+#include <command/options.h>
+#include <haptics/trainee.h>
 #include <report/report.h>
 #include <session/falcon.h>
 #include <session/faults.h>
@@ -12,8 +13,6 @@
 #include <session/machine.h>
 #include <session/open.h>
 #include <session/trainer.h>
-
-#include <haptics/trainee.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

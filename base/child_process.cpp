@@ -20,9 +20,9 @@ std::filesystem::path programFolder()
 ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy)
 {
     // A group of its own: Ctrl-C ends this program, and the other then ends with it.
-    base::Program started{{program}, {-1, -1, -1}, true};
+    Program started{{program}, {-1, -1, -1}, true};
     started.words.insert(started.words.end(), arguments.begin(), arguments.end());
-    const auto [pid, error] = base::start(started);
+    const auto [pid, error] = start(started);
     if (error != 0) {
         throw std::runtime_error(program + ": cannot be started (" + std::strerror(error) + "); " + remedy);
     }

@@ -2,6 +2,7 @@
 
 #include <base/build.h>
 #include <base/outputs.h>
+#include <base/processor_time.h>
 #include <datasets/scene.h>
 #include <haptics/simulation.h>
 #include <haptics/timing.h>
@@ -13,7 +14,6 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
-#include <ctime>
 #include <fstream>
 #include <memory>
 #include <string_view>
@@ -53,14 +53,6 @@ private:
     std::atomic<bool> done_{false};
     std::thread thread_;
 };
-
-// Of this thread: the servo thread, which has real-time priority, does not wait for others either.
-double processorTime() noexcept
-{
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 haptics::SessionModel smallBlock(const std::string& setting)
 {
@@ -122,10 +114,10 @@ TickTime measureSetting(const std::string& setting)
     for (int tick = 0; tick < warmUp + counted; ++tick) {
         const double swing = 0.02 * tick;
         sample.position = {4e-3 * std::sin(swing), 0.4 * radius * (1.0 - std::cos(swing)) - radius, 0};
-        const double start = processorTime();
+        const double start = base::processorTime();
         simulation.tick(sample);
         if (tick >= warmUp) {
-            times.add(processorTime() - start);
+            times.add(base::processorTime() - start);
         }
     }
     const haptics::Percentiles p = times.percentiles();

@@ -1,5 +1,6 @@
 #include <sweep/procedures.h>
 
+#include <base/processor_time.h>
 #include <haptics/measures.h>
 #include <haptics/replay.h>
 #include <haptics/score.h>
@@ -12,7 +13,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -30,13 +30,6 @@ constexpr double gap = 2e-3;      // between tool and surface before it sets out
 constexpr double outside = 5e-3;  // where a needle's way begins and ends [m]
 constexpr double judged = 20e-3;  // the force of a hold is the mean over its end [s]
 
-double threadTime() noexcept
-{
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
 // A simulation whose ticks in contact are timed.
 class Timed {
 public:
@@ -44,10 +37,10 @@ public:
 
     const TickRecord& tick(const DeviceSample& sample)
     {
-        const double before = threadTime();
+        const double before = base::processorTime();
         const TickRecord& record = simulation_.tick(sample);
         if (record.phase != haptics::Phase::free || record.contacts > 0) {
-            seconds_ += threadTime() - before;
+            seconds_ += base::processorTime() - before;
             ++ticks_;
         }
         if (seen_) {

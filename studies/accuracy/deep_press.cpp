@@ -1,5 +1,6 @@
 #include <studies/accuracy/deep_press.h>
 
+#include <base/processor_time.h>
 #include <chainmail/elastic.h>
 #include <haptics/simulation.h>
 #include <studies/kernel/kernel_rivals.h>
@@ -53,9 +54,9 @@ std::vector<Felt> feel(Elastic& elastic, const TrialPath& path, double speed, De
     TrialLoad load(path);
     for (const auto& [way, pressed] : wayOf(path, speed)) {
         load.set({pressed, 0.0});
-        const double start = threadSeconds();
+        const double start = base::processorTime();
         elastic.relax(load.load());
-        const double took = threadSeconds() - start;
+        const double took = base::processorTime() - start;
         const Vec3 force = elastic.toolForce(0);
         if (!std::isfinite(glm::length(force))) {
             throw std::runtime_error(

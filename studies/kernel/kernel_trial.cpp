@@ -1,5 +1,6 @@
 #include <studies/kernel/kernel_trial.h>
 
+#include <base/processor_time.h>
 #include <studies/kernel/trial_errors.h>
 
 #include <glm/common.hpp>
@@ -148,9 +149,9 @@ public:
         using Clock = std::chrono::steady_clock;
         load_.set(t.pose);
         const auto start = Clock::now();
-        const double cpuStart = threadSeconds();
+        const double cpuStart = base::processorTime();
         const ElasticResult result = model_.tick(load_);
-        const double cpu = threadSeconds() - cpuStart;
+        const double cpu = base::processorTime() - cpuStart;
         const double took = std::chrono::duration<double>(Clock::now() - start).count();
         const std::size_t touched = model_.touched();
         if (touched > 0) {
@@ -232,13 +233,6 @@ double shareLeft(const Elastic& elastic, const ElasticResult& result)
 {
     const double force = contactForces(elastic);
     return force > 0.0 ? result.residual / force : 0.0;
-}
-
-double threadSeconds()
-{
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
 ElasticOptions wholeGrid(int cycles, bool finiteStrain)

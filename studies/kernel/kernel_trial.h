@@ -38,8 +38,6 @@ struct Reference {
 Vec3 nearestTissue(const chainmail::CellLevel& level, Vec3 rest);
 /// What is left of the residual, as a share of the contacts' forces.
 double shareLeft(const chainmail::Elastic& elastic, const chainmail::ElasticResult& result);
-/// Processor time of this thread so far [s].
-double threadSeconds();
 
 /// A whole body in one window: every level covers all of it.
 chainmail::ElasticOptions wholeGrid(int cycles, bool finiteStrain);

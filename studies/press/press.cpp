@@ -1,5 +1,6 @@
 #include <studies/press/press.h>
 
+#include <base/processor_time.h>
 #include <haptics/simulation.h>
 #include <studies/press/pose_load.h>
 
@@ -89,12 +90,12 @@ public:
 private:
     PressSample solve(const ToolPose& pose, bool converge)
     {
-        const double start = threadSeconds();
+        const double start = base::processorTime();
         load_.set(pose);
         const ElasticResult result =
             converge ? elastic_.relax(load_.load(), mostCycles, pressTolerance) : elastic_.relax(load_.load());
         PressSample s;
-        s.took = threadSeconds() - start;
+        s.took = base::processorTime() - start;
         s.pose = pose;
         s.force = load_.force(elastic_);
         s.contactArea = contactArea(elastic_);
