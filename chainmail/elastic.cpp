@@ -16,21 +16,10 @@ constexpr std::size_t mostTools = 16;
 constexpr double reach = 0.6;          // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
 constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
-constexpr int newtonSteps = 3;         // of a line search: contacts open and close along it
-constexpr int mostShortenings = 8;     // of a step that raises the energy
 constexpr double mostBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
 constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
 constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew ...
 constexpr int freePeriod = 8;          // ... and where tissue springs back: its energy falls to next to nothing
-constexpr double rounding = 1e-6;      // relative: sums of single-precision products are no better
-
-// Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
-// half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
-double shorter(double alpha, double slope, double change) noexcept
-{
-    const double lowest = -0.5 * slope * alpha * alpha / (change - slope * alpha);
-    return std::isfinite(lowest) ? std::clamp(lowest / alpha, 0.1, 0.5) * alpha : 0.5 * alpha;
-}
 
 }  // namespace
 
@@ -68,6 +57,7 @@ Vec3 Elastic::displacement(Vec3 rest) const noexcept
 
 void Elastic::settle() noexcept
 {
+    products_.reset();
     siteCount_ = 0;
     for (HeldTool& held : held_) {
         held.forgetContacts();
@@ -167,11 +157,12 @@ void Elastic::spreadPressure() noexcept
                        ? resolvedShare(std::sqrt(tools_[i].shape.widest() * depth) / body.levels.front().nodes.spacing)
                        : 1.0;
     }
+    AreaRatio areaRatio(body, stack_.windows());
     for (ContactSite& s : active()) {
         if (!s.isTie) {
             // What moved last was measured then.
             const bool isKnown = s.stretch > 0.0;
-            const double ratio = !options_.finiteStrain ? 1.0 : isKnown ? s.stretch : areaRatio(body, stack_.windows(), s);
+            const double ratio = !options_.finiteStrain ? 1.0 : isKnown ? s.stretch : areaRatio(s);
             s.stiffness = share[s.owner] * ratio * s.atRest;
         }
     }
@@ -188,23 +179,22 @@ bool Elastic::touched() const noexcept
 // The tissue's forces anew, where they cannot be carried along.
 void Elastic::refreshForces() noexcept
 {
-    if (options_.finiteStrain) {
-        energy_ = stack_.applyFinite(Field::u, Field::a);
-    } else {
-        stack_.apply(Field::u, Field::a);
-        energy_ = -0.5 * stack_.dot(Field::u, Field::a);
-    }
+    products_.reset();
+    stack_.joinBorders(Field::u);
+    const auto now = stack_.evaluate(Field::u, Field::a, Field::u, options_.finiteStrain);
+    energy_ = options_.finiteStrain ? now.energy : -0.5 * now.product;
     if (hasIncrement_) {
+        stack_.joinBorders(Field::d);
         stack_.apply(Field::d, Field::e);
     }
 }
 
-// r = forces of the tissue and of the contacts.
-void Elastic::refreshResidual() noexcept
+// r = forces of the tissue and of the contacts. Returns its norm.
+double Elastic::refreshResidual(bool isCopied) noexcept
 {
     if (memory_ > 0.0) {
         stack_.combine(Field::a, -memory_, Field::v, Field::r);
-    } else {
+    } else if (!isCopied) {
         stack_.copy(Field::a, Field::r);
     }
     for (const ContactSite& s : sites()) {
@@ -217,6 +207,7 @@ void Elastic::refreshResidual() noexcept
                             (1.0 - memory_) * static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
         }
     }
+    return std::sqrt(stack_.dot(Field::r, Field::r));
 }
 
 void Elastic::prepareContacts() noexcept
@@ -237,29 +228,6 @@ void Elastic::prepareContacts() noexcept
     multigrid_.prepare();
 }
 
-void Elastic::look(Field direction) noexcept
-{
-    for (ContactSite& s : active()) {
-        s.p = gather(stack_.windows(), s, direction);
-    }
-}
-
-// How far to go: Newton on the slope of the energy, the tissue's part a parabola, contacts opening and closing on the way.
-double Elastic::lineSearch(double slope, double curvature, Along at) const noexcept
-{
-    double alpha = 0.0;
-    for (int i = 0; i < newtonSteps; ++i) {
-        at = i > 0 ? contactsAlong(sites(), alpha) : at;
-        const double stiffness = curvature + (1.0 - memory_) * at.curvature;
-        const double change = -(slope + alpha * curvature + (1.0 - memory_) * at.slope) / stiffness;
-        if (!(stiffness > 0.0) || !std::isfinite(change)) {
-            return 0.0;
-        }
-        alpha += change;
-    }
-    return alpha;
-}
-
 double Elastic::contactEnergy() const noexcept
 {
     double sum = 0.0;
@@ -269,11 +237,11 @@ double Elastic::contactEnergy() const noexcept
     return (1.0 - memory_) * sum;
 }
 
-void Elastic::moveSites(double alpha) noexcept
+void Elastic::moveSites(double length) noexcept
 {
     for (ContactSite& s : active()) {
-        s.u += alpha * s.p;
-        s.slip -= alpha * s.p;
+        s.u += length * s.p;
+        s.slip -= length * s.p;
         touch(s, shapes_, ties_);
     }
 }
@@ -313,97 +281,6 @@ double Elastic::frictionOf(const ContactSite& site) const noexcept
     return site.isTie ? 0.0 : tools_[site.owner].friction;
 }
 
-// Goes along the direction that look() saw, whose image under -A is known, as far as lowers the energy. A step after which
-// the energy is higher (the contacts' line search is of first order, and finite strain has no parabola) is shortened,
-// and taken back at last. False: nowhere.
-bool Elastic::takeStep(Field direction, Field image, ElasticResult& result) noexcept
-{
-    const auto product = stack_.dots(direction, Field::a, image);
-    const double curvature = -product[1];
-    const double viscous = memory_ > 0.0 ? memory_ * stack_.dot(direction, Field::v) : 0.0;
-    const double slope = viscous - product[0];
-    const double tissue = energy_;
-    const double before = tissue + contactEnergy();
-    const Along start = contactsAlong(sites(), 0.0);
-    const double steepness = slope + (1.0 - memory_) * start.slope;
-    double alpha = lineSearch(slope, curvature, start);
-    double gone = 0.0;
-    for (int i = 0; alpha != gone; ++i) {
-        moveSites(alpha - gone);
-        if (options_.finiteStrain) {
-            stack_.combine(Field::u, alpha - gone, direction, Field::u);
-            energy_ = stack_.applyFinite(Field::u, Field::f);
-        } else {
-            energy_ = tissue + (0.5 * curvature * alpha - product[0]) * alpha;
-        }
-        gone = alpha;
-        const double scale = std::abs(before) + std::abs(slope * alpha);
-        const double change = energy_ + viscous * alpha + contactEnergy() - before;
-        if (change <= rounding * scale) {
-            break;
-        }
-        alpha = i < mostShortenings ? shorter(alpha, steepness, change) : 0.0;
-        ++result.shortened;
-    }
-    if (alpha == 0.0) {
-        return false;
-    }
-    keepStep(direction, image, alpha);
-    return true;
-}
-
-// d and e become the increment of this call so far: of the last call's what was taken again, and the steps since.
-void Elastic::keepStep(Field direction, Field image, double alpha) noexcept
-{
-    const bool again = direction == Field::d;
-    for (ContactSite& s : active()) {
-        s.p *= again ? alpha : 1.0;
-    }
-    if (!options_.finiteStrain) {
-        stack_.advance(alpha, direction, image, again ? 0.0 : 1.0);
-        return;
-    }
-    stack_.combine(Field::d, again ? alpha - 1.0 : alpha, direction, Field::d);
-    stack_.combine(Field::f, -1.0, Field::a, Field::a);
-    if (again) {
-        stack_.copy(Field::a, Field::e);
-    } else {
-        stack_.combine(Field::e, 1.0, Field::a, Field::e);
-    }
-    stack_.copy(Field::f, Field::a);
-}
-
-// One step of preconditioned conjugate gradients, conjugate to `before`.
-bool Elastic::oneCycle(Before before, ElasticResult& result) noexcept
-{
-    prepareContacts();
-    multigrid_.solve();
-    stack_.apply(Field::z, Field::f);
-    const Field old = before == Before::increment ? Field::d : Field::p;
-    const Field oldImage = before == Before::increment ? Field::e : Field::q;
-    double beta = 0.0;
-    if (before != Before::none) {
-        const auto product = stack_.dots(oldImage, old, Field::z);
-        double own = -product[0];
-        double mixed = -product[1];
-        for (ContactSite& s : active()) {
-            const Vec3 resisted = (1.0 - memory_) * s.resist(s.p);
-            s.z = gather(stack_.windows(), s, Field::z);
-            own += glm::dot(s.p, resisted);
-            mixed += glm::dot(s.z, resisted);
-        }
-        beta = own > 0.0 && std::isfinite(mixed / own) ? -mixed / own : 0.0;
-        for (ContactSite& s : active()) {
-            s.p = s.z + beta * s.p;
-        }
-    } else {
-        look(Field::z);
-    }
-    stack_.combine(Field::z, beta, old, Field::p);
-    stack_.combine(Field::f, beta, oldImage, Field::q);
-    return takeStep(Field::p, Field::q, result);
-}
-
 ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) noexcept
 {
     ElasticResult result;
@@ -426,29 +303,38 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     if (memory_ > 0.0) {
         stack_.copy(Field::a, Field::v);
     }
-    Before before = Before::none;
-    if (hasIncrement_) {
-        look(Field::d);
-    }
-    if (hasIncrement_ && takeStep(Field::d, Field::e, result)) {
-        before = Before::increment;
+    const double start = energy_ + contactEnergy();
+    startEnergy_ = energy_;
+    bool isOpen = false;  // the tissue's force was not evaluated where it is
+    bool hasGone = false;
+    if (hasIncrement_ && memory_ == 0.0) {
+        hasGone = goOn(result);
+        isOpen = hasGone && options_.finiteStrain;
+    } else if (hasIncrement_) {
+        again(result);
     } else {
-        stack_.clear(Field::d);
-        stack_.clear(Field::e);
+        forgetIncrement();
     }
     hasIncrement_ = options_.goOn;
     const int most = effort.cycles + (result.moved ? moreAfterMove : 0);
     for (int i = 0; i < most + (effort.far > 0.0 ? 1 : 0); ++i) {
-        refreshResidual();
         const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
-        if (tolerance > 0.0) {
-            result.residual = std::sqrt(stack_.dot(Field::r, Field::r));
-            if (result.residual <= tolerance * contactForce()) {
-                break;
-            }
+        result.residual = refreshResidual(hasGone);
+        if (tolerance > 0.0 && result.residual <= tolerance * contactForce()) {
+            break;
         }
         ++result.cycles;
-        before = oneCycle(before, result) ? Before::direction : Before::none;
+        hasGone = oneCycle(isOpen ? start : 0.0, result);
+        if (!hasGone && isOpen && !confirm(start)) {
+            again(result);
+        } else if (!hasGone) {
+            refreshForces();
+            forgetStep();
+        }
+        isOpen = false;
+    }
+    if (isOpen && !confirm(start)) {
+        again(result);
     }
     letSlip();
     balance();
@@ -460,7 +346,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 void Elastic::balance() noexcept
 {
     const double held = memory_ > 0.0 ? memory_ * stack_.dot(Field::v, Field::u) : 0.0;
-    const double tissue = held - stack_.dot(Field::a, Field::u);
+    const double tissue = held - (products_ ? (*products_)[0] : stack_.dot(Field::a, Field::u));
     double contacts = 0.0;
     for (const ContactSite& s : sites()) {
         contacts += (1.0 - memory_) * glm::dot(s.force, s.u);
@@ -475,6 +361,7 @@ void Elastic::measure(ElasticResult& result) noexcept
         held.forgetContacts();
         result.behind = std::max(result.behind, held.behind);
     }
+    AreaRatio areaRatio(stack_.body(), stack_.windows());
     for (ContactSite& s : active()) {
         s.stretch = 0.0;
         if (!s.isTie && s.active()) {
@@ -483,7 +370,7 @@ void Elastic::measure(ElasticResult& result) noexcept
             HeldTool& held = held_[s.owner];
             held.depth = std::max(held.depth, s.depth);
             held.load += glm::length(s.force);
-            s.stretch = areaRatio(stack_.body(), stack_.windows(), s);
+            s.stretch = areaRatio(s);
             held.stretch = std::max(held.stretch, s.stretch);
         }
     }

@@ -4,7 +4,9 @@
 #include <chainmail/multigrid.h>
 #include <chainmail/window_stack.h>
 
+#include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -16,6 +18,7 @@ struct ElasticOptions {
     double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
     std::size_t maxSites = 4096;
     double tolerance = 0.01;  // no more once the forces out of balance are this share of the contacts' [-]
+    int heldPeriod = 3;       // of an ElasticLevel: see there
     bool goOn = true;         // begin with the last call's increment; without, a call begins where the tissue lies
 };
 
@@ -51,7 +54,7 @@ struct ElasticResult {
 /// Mathematics, pictures and figures: docs/kernel.md.
 class Elastic {
     static constexpr double furtherCycles = 1.5;  // a second cycle in a tick costs too much for what is nearly balanced
-    static constexpr double farOff = 3.0;         // and one beyond the most is worth it for what is not
+    static constexpr double farOff = 6.0;         // and one beyond the most is worth it for what is not
 
 public:
     /// @param focus  where the windows start
@@ -90,8 +93,31 @@ public:
     std::span<const ContactSite> sites() const noexcept { return std::span(sites_).first(siteCount_); }
 
 private:
-    // The step that a cycle's direction is made conjugate to.
-    enum class Before : std::uint8_t { none, increment, direction };
+    // Energy of the tissue along a direction.
+    struct Parabola {
+        double slope = 0, curvature = 0;
+        double at(double length) const noexcept { return (slope + 0.5 * curvature * length) * length; }
+        // The same where the direction has led, for what has been gone of it.
+        Parabola from(double length) const noexcept
+        {
+            return {(slope + curvature * length) * length, curvature * length * length};
+        }
+    };
+    // d, the increment; or p = z + beta d, which the first step makes.
+    struct Direction {
+        Field field = Field::p;
+        double beta = 0;
+        Parabola tissue;
+        Along contacts;      // where the step starts
+        double viscous = 0;  // slope of what viscosity holds
+    };
+
+    // What the next direction is made conjugate to: a step of this call with its image, d and e or p and q.
+    struct LastStep {
+        Field direction = Field::d;
+        Field image = Field::e;
+        Parabola tissue;  // along all of it, where it led
+    };
 
     std::span<ContactSite> active() noexcept { return std::span(sites_).first(siteCount_); }
     // At most `cycles`: the first while the residual is over `first`, others while it is over `further` times the contacts'
@@ -108,19 +134,27 @@ private:
     void spreadPressure() noexcept;
     bool touched() const noexcept;
     void refreshForces() noexcept;
-    void refreshResidual() noexcept;
+    double refreshResidual(bool isCopied) noexcept;
     void prepareContacts() noexcept;
-    void look(Field direction) noexcept;
-    double lineSearch(double slope, double curvature, Along start) const noexcept;
+    void look() noexcept;
+    double lineSearch(double slope, double curvature, Along start, int steps) const noexcept;
     double contactEnergy() const noexcept;
     bool sitesHold(const ElasticLoad& load, bool moved) noexcept;
-    void moveSites(double alpha) noexcept;
+    void moveSites(double length) noexcept;
     void drag(const ElasticLoad& load) noexcept;
     void letSlip() noexcept;
     double frictionOf(const ContactSite& site) const noexcept;
-    bool takeStep(Field direction, Field image, ElasticResult& result) noexcept;
-    void keepStep(Field direction, Field image, double alpha) noexcept;
-    bool oneCycle(Before before, ElasticResult& result) noexcept;
+    double searchParabola(const Direction& to, ElasticResult& result) noexcept;
+    bool goOn(ElasticResult& result) noexcept;
+    bool confirm(double start) noexcept;
+    void retreat() noexcept;
+    void again(ElasticResult& result) noexcept;
+    bool takeStep(const Direction& to, double limit, ElasticResult& result) noexcept;
+    bool takeLinearStep(Direction to, ElasticResult& result) noexcept;
+    void keepStep(const Direction& to, KeptStep step) noexcept;
+    void forgetIncrement() noexcept;
+    void forgetStep() noexcept;
+    bool oneCycle(double limit, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
     void balance() noexcept;
     void measure(ElasticResult& result) noexcept;
@@ -139,9 +173,14 @@ private:
     std::vector<Vec3> toolAt_;        // in the last call [m]
     std::vector<Vec3f> slip_;         // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
-    double memory_ = 0;   // share of the last call's stress that viscosity holds against this one's
-    double energy_ = 0;   // of the tissue [J]
-    double balance_ = 1;  // see toolForce()
+    double memory_ = 0;       // share of the last call's stress that viscosity holds against this one's
+    double energy_ = 0;       // of the tissue [J]
+    double startEnergy_ = 0;  // the same when the call began [J]
+    LastStep last_;
+    std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
+    double stiffness_ = 0;                           // along the last step, of tissue and contacts
+    std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
+    double balance_ = 1;                             // see toolForce()
     int sinceRefresh_ = 0;
     bool atRest_ = true;
     bool hasIncrement_ = false;

@@ -143,9 +143,9 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
             continue;
         }
         const Vec3 t = at - Vec3(cell);
-        for (int c = 0; c < 8; ++c) {
-            const Vec3 w = glm::mix(1.0 - t, t, Vec3(c & 1, (c >> 1) & 1, c >> 2));
-            site.share[static_cast<std::size_t>(c)] = static_cast<float>(w.x * w.y * w.z);
+        const std::array<Vec3, 2> w{1.0 - t, t};
+        for (std::size_t c = 0; c < 8; ++c) {
+            site.share[c] = static_cast<float>(w[c & 1].x * w[(c >> 1) & 1].y * w[c >> 2].z);
         }
         site.node = static_cast<std::uint32_t>(windows[l].at(cell));
         site.level = static_cast<std::uint16_t>(l);
@@ -154,19 +154,23 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
     site.level = static_cast<std::uint16_t>(windows.size());
 }
 
-double areaRatio(const ElasticBody& body, std::span<const Window> windows, const ContactSite& site) noexcept
+double AreaRatio::operator()(const ContactSite& site) noexcept
 {
-    const Window& w = windows[site.level];
-    const double quarter = 0.25 / body.levels[site.level].nodes.spacing;
-    std::array<Vec3, 3> f{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};  // columns of F
-    for (int c = 0; c < 8; ++c) {
-        const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
-        f[0] += (c & 1) != 0 ? u : -u;
-        f[1] += (c & 2) != 0 ? u : -u;
-        f[2] += (c & 4) != 0 ? u : -u;
+    if (site.node != node_ || site.level != level_) {
+        node_ = site.node;
+        level_ = site.level;
+        const Window& w = windows_[site.level];
+        const double quarter = 0.25 / body_.levels[site.level].nodes.spacing;
+        f_ = {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+        for (int c = 0; c < 8; ++c) {
+            const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
+            f_[0] += (c & 1) != 0 ? u : -u;
+            f_[1] += (c & 2) != 0 ? u : -u;
+            f_[2] += (c & 4) != 0 ? u : -u;
+        }
     }
-    const Vec3 n(body.points[site.point].normal);
-    const Vec3 area = n.x * glm::cross(f[1], f[2]) + n.y * glm::cross(f[2], f[0]) + n.z * glm::cross(f[0], f[1]);
+    const Vec3 n(body_.points[site.point].normal);
+    const Vec3 area = n.x * glm::cross(f_[1], f_[2]) + n.y * glm::cross(f_[2], f_[0]) + n.z * glm::cross(f_[0], f_[1]);
     return std::clamp(glm::length(area), leastRatio, mostRatio);
 }
 

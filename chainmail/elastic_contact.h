@@ -99,7 +99,19 @@ std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, 
 
 /// Area of the surface around a site now, over that at rest: |cof(F) N|, F the cell's mean deformation gradient and N the
 /// normal at rest (Nanson's formula), within bounds that keep a cell that is turned inside out from having its say.
-double areaRatio(const ElasticBody& body, std::span<const Window> windows, const ContactSite& site) noexcept;
+/// Remembers the last cell: sites of one cell follow each other.
+class AreaRatio {
+public:
+    AreaRatio(const ElasticBody& body, std::span<const Window> windows) noexcept : body_(body), windows_(windows) {}
+    double operator()(const ContactSite& site) noexcept;
+
+private:
+    const ElasticBody& body_;
+    std::span<const Window> windows_;
+    std::uint32_t node_ = 0;
+    std::uint32_t level_ = ~0U;
+    std::array<Vec3, 3> f_{};  // columns of F
+};
 
 /// Share of the contact's stiffness that a patch of radius a has on cells of side h.
 ///

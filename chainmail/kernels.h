@@ -43,6 +43,34 @@ struct StepFields {
     float* a = nullptr;
     float* d = nullptr;
     float* e = nullptr;
+    float* p = nullptr;
+    float* q = nullptr;
+    float* r = nullptr;
+};
+
+/// How a step ends: u may have gone along p already, and f is the force there; or, where the force is linear, f is that of
+/// p.
+struct KeptStep {
+    float share = 1;    // of the change of the force that is kept
+    float base = 1;     // the change is f - base a: 1, or 0 where f is the force of p
+    float further = 0;  // how much further u goes along p
+    float length = 1;   // of the step in all
+    float keep = 1;     // of d and e as they were
+};
+
+/// A damped Jacobi step: weight, reciprocal diagonal and right side.
+struct Smoother {
+    float weight = 1;
+    const float* diagonal = nullptr;
+    const float* r = nullptr;
+};
+
+/// What a step of the smoother works off: diagonal (r - q), for each of three components of `count` floats.
+struct Defect {
+    const float* diagonal = nullptr;
+    const float* r = nullptr;
+    const float* q = nullptr;
+    std::size_t count = 0;
 };
 
 /// The arithmetic of the elastic level, compiled once per instruction set. All sets do the same operations in the same
@@ -70,6 +98,13 @@ struct Kernels {
     /// out = A u: the gradient of the energy at every node [N], u in [m]. `scratch` has layout.scratchSize() floats.
     void (*apply)(const Layout& layout, CellStiffness stiffness, const float* u, float* out, float* scratch) noexcept;
 
+    /// out = open (r - A u), in the same sweep.
+    void (*residualOf)(const Layout& layout, CellStiffness stiffness, const float* open, const float* r, const float* u,
+                       float* out, float* scratch) noexcept;
+    /// out = A u, and u += weight * diagonal (r - out) behind the sweep.
+    void (*smoothOf)(const Layout& layout, CellStiffness stiffness, const Smoother& by, float* u, float* out,
+                     float* scratch) noexcept;
+
     /// As apply(), for finite strain: the mean deformation gradient F of each cell goes through the stable neo-Hookean
     /// energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim, "Stable
     /// Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite when a
@@ -84,25 +119,36 @@ struct Kernels {
     void (*dots)(const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept;
     /// out = x + a y; out may be x or y
     void (*combine)(const float* x, float a, const float* y, float* out, std::size_t n) noexcept;
-    /// u += step p,  a += step q,  d = keep d + step p,  e = keep e + step q; p may be d and q may be e
-    void (*advance)(float step, const float* p, const float* q, float keep, const StepFields& to, std::size_t n) noexcept;
+    /// d *= step,  e *= step,  u += d,  a += e,  r = a
+    void (*goOn)(float step, const StepFields& to, std::size_t n) noexcept;
+    /// p = z + beta last,  u += step p; last may be p
+    void (*direct)(const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept;
+    /// q = share (f - base a),  a += q,  e = keep e + q,  u += further p,  p *= length,  d = keep d + p,  r = a; p may be d
+    /// where length or keep is 0. sums: a . u, a . d, e . d
+    void (*keepStep)(const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept;
+    /// y = -mask y, for each of three components; @returns x . y
+    double (*negate)(const float* mask, const float* x, float* y, std::size_t count) noexcept;
     /// z = weight * diagonal r, for each of three components
     void (*smoothFirst)(float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept;
     /// z += weight * diagonal (r - q), for each of three components
     void (*smooth)(float weight, const float* diagonal, const float* r, const float* q, float* z,
                    std::size_t count) noexcept;
-    /// t = open (r - q), for each of three components
-    void (*residual)(const float* open, const float* r, const float* q, float* t, std::size_t count) noexcept;
+    /// f = shrink f + weight * diagonal (r - q),  z += f
+    void (*chebyshev)(float shrink, float weight, const Defect& by, float* f, float* z) noexcept;
     /// y = y + border (x - y), for each of three components: takes x over at a window's border
     void (*blend)(const float* border, const float* x, float* y, std::size_t count) noexcept;
     /// y += mask x, for each of three components
     void (*addMasked)(const float* mask, const float* x, float* y, std::size_t count) noexcept;
-    /// y = -mask x, for each of three components
-    void (*negate)(const float* mask, const float* x, float* y, std::size_t count) noexcept;
     /// out = (a + b) / 2
     void (*average)(const float* a, const float* b, float* out, std::size_t n) noexcept;
     /// out = b + (a + c) / 2
     void (*hat)(const float* a, const float* b, const float* c, float* out, std::size_t n) noexcept;
+    /// A row of the coarse window, spread to `nodes` nodes of the fine one, an odd number, and zeros up to the next whole
+    /// vector; reads as far beyond the row.
+    void (*spread)(const float* from, int nodes, float* to) noexcept;
+    /// The transpose: `nodes` nodes of a row of the fine window, with a zero before and from there on, added to the coarse
+    /// one's.
+    void (*gatherAdd)(const float* from, int nodes, float* to) noexcept;
 };
 
 /// The widest that this machine can run.

@@ -67,6 +67,7 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
     : shape_(shape),
       surface_(surface),
       elastic_(body, options, focusAt(surface, start)),
+      period_(options.viscosity > 0.0 ? 1 : options.heldPeriod),
       turns_(body.levels.size(), Index3(0))
 {
     const Index3 size = elastic_.stack().windows().front().size();
@@ -121,15 +122,24 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
 
 Reaction ElasticLevel::deform(const Grip& grip) noexcept
 {
+    // Of a tip that holds the tissue only the shape is asked for, not the force: solving and writing take turns.
+    const bool takesTurns = grip.kind == Grip::Kind::point && isHeld_ && period_ > 1;
+    isHeld_ = grip.kind == Grip::Kind::point;
+    turn_ = takesTurns ? (turn_ + 1) % period_ : 0;
     const bool wasAtRest = elastic_.atRest();
-    last_ = elastic_.relax(load(grip));
-    if (!wasAtRest || !elastic_.atRest()) {
-        writeFinest(grip.proxy);
+    if (turn_ == 0) {
+        last_ = elastic_.relax(load(grip));
     }
-    for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
-        writeByTurns(l);
+    const int shares = takesTurns ? period_ : 1;
+    if ((!takesTurns || turn_ == 1) && !(wasAtRest && elastic_.atRest())) {
+        writeFinest(grip.proxy, shares * layersPerCall);
     }
-    revisitMoved();
+    for (int i = 0; i < shares && (!takesTurns || turn_ == period_ - 1); ++i) {
+        for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
+            writeByTurns(l);
+        }
+        revisitMoved();
+    }
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
     if (grip.kind == Grip::Kind::press) {
         reaction.force = elastic_.toolForce(0);
@@ -153,7 +163,7 @@ Vec3f ElasticLevel::cellMean(const Window& window, Index3 cell) const noexcept
 }
 
 // The finest window: around the tool in every call, elsewhere a few layers of nodes at a time.
-void ElasticLevel::writeFinest(Vec3 around) noexcept
+void ElasticLevel::writeFinest(Vec3 around, int layers) noexcept
 {
     const Window& window = elastic_.stack().windows().front();
     const auto& grid = shape_.lattice().grid;
@@ -163,7 +173,7 @@ void ElasticLevel::writeFinest(Vec3 around) noexcept
     writeBox(glm::clamp(middle - nearNodes, low, high), glm::clamp(middle + nearNodes, low, high));
     int& layer = turns_.front().z;
     layer = layer < low.z || layer > high.z ? low.z : layer;
-    const int last = std::min(layer + layersPerCall - 1, high.z);
+    const int last = std::min(layer + layers - 1, high.z);
     writeBox({low.x, low.y, layer}, {high.x, high.y, last});
     layer = last + 1;
 }
@@ -204,6 +214,9 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
 bool ElasticLevel::keepsOrientation(Index3 low, Index3 high) noexcept
 {
     const auto& lattice = shape_.lattice();
+    if (!hasLongLink(low, high)) {
+        return true;
+    }
     bool all = true;
     volume::forEachIndex(low, high, [&](Index3 at) { markStrained(static_cast<Node>(lattice.grid.offset(at))); });
     volume::forEachIndex(low, high, [&](Index3 at) {
@@ -211,6 +224,29 @@ bool ElasticLevel::keepsOrientation(Index3 low, Index3 high) noexcept
         all = all && (strained_[n] == 0 || upright(n));
     });
     return all;
+}
+
+// Of links that begin in a box, to tissue or not. Whole rows at once: few boxes have one.
+bool ElasticLevel::hasLongLink(Index3 low, Index3 high) const noexcept
+{
+    const auto& grid = shape_.lattice().grid;
+    const float* u = &shape_.u().front().x;
+    const std::size_t row = 3 * static_cast<std::size_t>(grid.size.x);
+    const std::size_t plane = row * static_cast<std::size_t>(grid.size.y);
+    const std::size_t count = 3 * static_cast<std::size_t>(high.x - low.x + 1);
+    float longest = 0.0F;
+    volume::forEachIndex(Index3(low.x, low.y, low.z), Index3(low.x, high.y, high.z), [&](Index3 at) {
+        const float* from = u + 3 * grid.offset(at);
+        for (std::size_t i = 0; i < count; ++i) {
+            const float x = std::abs(from[i + 3] - from[i]);
+            const float y = std::abs(from[i + row] - from[i]);
+            const float z = std::abs(from[i + plane] - from[i]);
+            const float most = x > y ? x : y;
+            const float further = most > z ? most : z;
+            longest = further > longest ? further : longest;
+        }
+    });
+    return longest > static_cast<float>(grid.spacing) / 3.0F;
 }
 
 void ElasticLevel::markStrained(Node n) noexcept

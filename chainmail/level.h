@@ -76,8 +76,9 @@ double tieStiffnessAt(const ElasticBody& body, Vec3 rest) noexcept;
 /// Level 2: elastic equilibrium on nested windows; forces of a pressing tool come from its energy, from first touch on.
 ///
 /// The lattice gets the windows' displacement at the middles of their cells: around the tool in every call, further out by
-/// turns, a fixed number of nodes per call. Tissue that would turn inside out keeps the shape it had:
-/// the lattice goes towards the windows' shape only as far as every cell keeps its orientation.
+/// turns, a fixed number of nodes per call. While a tip holds the tissue, which has no force from here, solving and writing
+/// take turns too: the shape is that of up to ElasticOptions::heldPeriod calls ago. Tissue that would turn inside out keeps
+/// the shape it had: the lattice goes towards the windows' shape only as far as every cell keeps its orientation.
 class ElasticLevel {
 public:
     /// All must outlive it. The body's cells are the lattice's nodes.
@@ -92,12 +93,13 @@ private:
     ElasticLoad load(const Grip& grip) noexcept;
     ElasticLoad tie(const Grip& grip) noexcept;
     Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
-    void writeFinest(Vec3 around) noexcept;
+    void writeFinest(Vec3 around, int layers) noexcept;
     void writeBox(Index3 low, Index3 high) noexcept;
     void write(Node n) noexcept;
     void writeByTurns(std::size_t level) noexcept;
     void revisitMoved() noexcept;
     bool keepsOrientation(Index3 low, Index3 high) noexcept;
+    bool hasLongLink(Index3 low, Index3 high) const noexcept;
     void markStrained(Node n) noexcept;
     void markWithNeighbours(Node n) noexcept;
     bool upright(Node n) const noexcept;
@@ -105,6 +107,9 @@ private:
     DisplacedLattice& shape_;
     const volume::DistanceField& surface_;
     Elastic elastic_;
+    int period_;  // calls from one solution to the next while a tip holds the tissue
+    int turn_ = 0;
+    bool isHeld_ = false;
     ElasticTool tool_;
     std::array<Tie, 1 + mostShaftTies> ties_;  // the tip's, then the shaft's
     std::vector<Vec3f> before_;                // nodes of a box as they were, and as the windows have them

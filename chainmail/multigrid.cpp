@@ -9,10 +9,10 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double margin = 1.05;         // on the estimate of the largest eigenvalue
-constexpr double smoothed = 4.0;        // the smoother takes the upper three quarters of the spectrum
-constexpr int coarsestSteps = 14;       // Chebyshev steps on the coarsest level
-constexpr double coarsestSpread = 160;  // largest to smallest eigenvalue there
+constexpr double margin = 1.05;        // on the estimate of the largest eigenvalue
+constexpr double smoothed = 4.0;       // the smoother takes the upper three quarters of the spectrum
+constexpr int coarsestSteps = 4;       // Chebyshev steps on the coarsest level
+constexpr double coarsestSpread = 20;  // largest to smallest eigenvalue there
 
 }  // namespace
 
@@ -73,13 +73,20 @@ void Multigrid::prepare() noexcept
     }
 }
 
-// t = (A + contacts) z on one window.
-void Multigrid::operate(std::size_t level) noexcept
+// t = (A + contacts) z on the coarsest window.
+void Multigrid::operate(Window& w) noexcept
+{
+    stack_.kernels().apply(w.layout, w.stiffness(), w.field(Field::z), w.field(Field::t), stack_.scratch());
+    addContacts(stack_.size() - 1, 1.0);
+}
+
+// t += sign * contacts' z, at nodes that are not held.
+void Multigrid::addContacts(std::size_t level, double sign) noexcept
 {
     Window& w = stack_[level];
-    stack_.kernels().apply(w.layout, w.stiffness(), w.field(Field::z), w.field(Field::t), stack_.scratch());
     for (const Block& b : blocks_[level]) {
-        w.add(Field::t, b.node, b.stiffness * w.value(Field::z, b.node));
+        const double open = sign * static_cast<double>(w.open[b.node]);
+        w.add(Field::t, b.node, open * (b.stiffness * w.value(Field::z, b.node)));
     }
 }
 
@@ -112,14 +119,14 @@ void Multigrid::solveCoarsest() noexcept
     smoothContacts(level, Field::f, true, 1.0 / middle);
     std::memcpy(w.field(Field::z), w.field(Field::f), 3 * n * sizeof(float));
     for (int s = 1; s < coarsestSteps; ++s) {
-        operate(level);
+        operate(w);
         const double next = 1.0 / (2.0 * middle / half - rho);
         const double weight = 2.0 * next / half;
-        const auto shrink = static_cast<float>(next * rho - 1.0);
-        k.combine(w.field(Field::f), shrink, w.field(Field::f), w.field(Field::f), 3 * n);
-        k.smooth(static_cast<float>(weight), w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::f), n);
+        const auto shrink = static_cast<float>(next * rho);
+        const Defect defect{w.diagonal.data(), w.field(Field::r), w.field(Field::t), n};
+        k.chebyshev(shrink, static_cast<float>(weight), defect, w.field(Field::f), w.field(Field::z));
         smoothContacts(level, Field::f, false, weight);
-        k.combine(w.field(Field::z), 1.0F, w.field(Field::f), w.field(Field::z), 3 * n);
+        smoothContacts(level, Field::z, false, weight);
         rho = next;
     }
 }
@@ -134,8 +141,9 @@ void Multigrid::cycle(std::size_t level) noexcept
     }
     k.smoothFirst(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::z), w.layout.count);
     smoothContacts(level, Field::z, true, 1.0);
-    operate(level);
-    k.residual(w.open.data(), w.field(Field::r), w.field(Field::t), w.field(Field::t), w.layout.count);
+    k.residualOf(w.layout, w.stiffness(), w.open.data(), w.field(Field::r), w.field(Field::z), w.field(Field::t),
+                 stack_.scratch());
+    addContacts(level, -1.0);
 
     Window& coarse = stack_[level + 1];
     restrictAdd(k, w, w.field(Field::t), coarse, coarse.field(Field::r), stack_.scratch());
@@ -143,8 +151,9 @@ void Multigrid::cycle(std::size_t level) noexcept
 
     prolong(k, coarse, coarse.field(Field::z), w, w.field(Field::t));
     k.addMasked(w.open.data(), w.field(Field::t), w.field(Field::z), w.layout.count);
-    operate(level);
-    k.smooth(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::t), w.field(Field::z), w.layout.count);
+    const Smoother smoother{w.weight, w.diagonal.data(), w.field(Field::r)};
+    k.smoothOf(w.layout, w.stiffness(), smoother, w.field(Field::z), w.field(Field::t), stack_.scratch());
+    addContacts(level, 1.0);
     smoothContacts(level, Field::z, false, 1.0);
 }
 

@@ -36,7 +36,8 @@ private:
     };
 
     void cycle(std::size_t level) noexcept;
-    void operate(std::size_t level) noexcept;
+    void operate(Window& coarsest) noexcept;
+    void addContacts(std::size_t level, double sign) noexcept;
     void smoothContacts(std::size_t level, Field field, bool first, double weight) noexcept;
     void solveCoarsest() noexcept;
 

@@ -28,26 +28,6 @@ Index3 offsetIn(const Window& fine, const Window& coarse) noexcept
     return fine.low / 2 - coarse.low;
 }
 
-// A row of the coarse window, spread to the nodes of the fine one.
-void spread(const float* from, int fineNodes, float* to) noexcept
-{
-    for (int i = 0; i + 1 < fineNodes; i += 2) {
-        to[i] = from[i / 2];
-        to[i + 1] = 0.5F * (from[i / 2] + from[i / 2 + 1]);
-    }
-    to[fineNodes - 1] = from[fineNodes / 2];
-}
-
-// The transpose: a row of the fine window, gathered to the coarse one.
-void gatherAdd(const float* from, int fineNodes, float* to) noexcept
-{
-    for (int i = 0; i < fineNodes; i += 2) {
-        const float left = i > 0 ? from[i - 1] : 0.0F;
-        const float right = i + 1 < fineNodes ? from[i + 1] : 0.0F;
-        to[i / 2] += from[i] + 0.5F * (left + right);
-    }
-}
-
 }  // namespace
 
 Window::Window(Index3 size) : layout(Layout::of(size.x, size.y, size.z))
@@ -125,7 +105,7 @@ void prolong(const Kernels& k, const Window& coarse, const float* from, const Wi
         float* target = to + c * l.count;
         for (int z = 0; z < l.nz; z += 2) {
             for (int y = 0; y < l.ny; y += 2) {
-                spread(source + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2), l.nx, target + l.at(0, y, z));
+                k.spread(source + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2), l.nx, target + l.at(0, y, z));
             }
             for (int y = 1; y < l.ny; y += 2) {
                 k.average(target + l.at(0, y - 1, z), target + l.at(0, y + 1, z), target + l.at(0, y, z), l.row);
@@ -144,8 +124,9 @@ void restrictAdd(const Kernels& k, const Window& fine, const float* from, const 
     const Layout& l = fine.layout;
     float* zeros = scratch;
     float* sum = scratch + l.plane;
-    float* rows = scratch + 2 * l.plane;
+    float* rows = scratch + 2 * l.plane + Layout::lanes;
     std::memset(zeros, 0, l.plane * sizeof(float));
+    rows[-1] = 0.0F;
     for (std::size_t c = 0; c < 3; ++c) {
         const float* source = from + c * l.count;
         float* target = to + c * coarse.layout.count;
@@ -157,7 +138,7 @@ void restrictAdd(const Kernels& k, const Window& fine, const float* from, const 
                 const float* before = y > 0 ? sum + l.at(0, y - 1, 0) : zeros;
                 const float* after = y + 1 < l.ny ? sum + l.at(0, y + 1, 0) : zeros;
                 k.hat(before, sum + l.at(0, y, 0), after, rows, l.row);
-                gatherAdd(rows, l.nx, target + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2));
+                k.gatherAdd(rows, l.nx, target + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2));
             }
         }
     }

@@ -141,20 +141,24 @@ void WindowStack::transfer(Field field) noexcept
     }
 }
 
-double WindowStack::applyWith(Field x, Field y, bool finite) noexcept
+void WindowStack::joinBorders(Field x) noexcept
 {
-    const Kernels& k = *kernels_;
     for (std::size_t l = windows_.size() - 1; l-- > 0;) {
         Window& w = windows_[l];
-        prolong(k, windows_[l + 1], windows_[l + 1].field(x), w, w.field(Field::t));
-        k.blend(w.border.data(), w.field(Field::t), w.field(x), w.layout.count);
+        prolong(*kernels_, windows_[l + 1], windows_[l + 1].field(x), w, w.field(Field::t));
+        kernels_->blend(w.border.data(), w.field(Field::t), w.field(x), w.layout.count);
     }
-    double energy = 0.0;
+}
+
+WindowStack::Evaluated WindowStack::applyWith(Field x, Field y, Field along, bool finite) noexcept
+{
+    const Kernels& k = *kernels_;
+    Evaluated sum;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         Window& w = windows_[l];
         if (finite) {
             const float inverse = static_cast<float>(1.0 / body_->levels[l].nodes.spacing);
-            energy += k.applyFinite(w.layout, w.uncovered(), inverse, w.field(x), w.field(y), scratch());
+            sum.energy += k.applyFinite(w.layout, w.uncovered(), inverse, w.field(x), w.field(y), scratch());
         } else {
             k.apply(w.layout, w.uncovered(), w.field(x), w.field(y), scratch());
         }
@@ -165,9 +169,9 @@ double WindowStack::applyWith(Field x, Field y, bool finite) noexcept
             k.smoothFirst(1.0F, w.border.data(), w.field(y), w.field(Field::t), w.layout.count);
             restrictAdd(k, w, w.field(Field::t), windows_[l + 1], windows_[l + 1].field(y), scratch());
         }
-        k.negate(w.dof.data(), w.field(y), w.field(y), w.layout.count);
+        sum.product += k.negate(w.dof.data(), w.field(along), w.field(y), w.layout.count);
     }
-    return energy;
+    return sum;
 }
 
 void WindowStack::addForce(std::size_t level, std::size_t node, Vec3 force) noexcept
@@ -203,13 +207,38 @@ void WindowStack::combine(Field x, double a, Field y, Field out) noexcept
     }
 }
 
-void WindowStack::advance(double step, Field p, Field q, double keep) noexcept
+StepFields WindowStack::stepFields(Window& w, Field direction) noexcept
+{
+    return {w.field(Field::u),  w.field(Field::a), w.field(Field::d), w.field(Field::e),
+            w.field(direction), w.field(Field::q), w.field(Field::r)};
+}
+
+void WindowStack::goOn(double step) noexcept
 {
     for (Window& w : windows_) {
-        const StepFields to{w.field(Field::u), w.field(Field::a), w.field(Field::d), w.field(Field::e)};
-        kernels_->advance(static_cast<float>(step), w.field(p), w.field(q), static_cast<float>(keep), to,
-                          3 * w.layout.count);
+        kernels_->goOn(static_cast<float>(step), stepFields(w, Field::d), 3 * w.layout.count);
     }
+}
+
+void WindowStack::direct(Field last, double beta, double step) noexcept
+{
+    for (Window& w : windows_) {
+        kernels_->direct(w.field(Field::z), static_cast<float>(beta), w.field(last), static_cast<float>(step),
+                         stepFields(w, Field::p), 3 * w.layout.count);
+    }
+}
+
+std::array<double, 3> WindowStack::keepStep(Field direction, const KeptStep& step) noexcept
+{
+    std::array<double, 3> sum{};
+    for (Window& w : windows_) {
+        std::array<double, 3> part{};
+        kernels_->keepStep(step, w.field(Field::f), stepFields(w, direction), 3 * w.layout.count, part.data());
+        for (std::size_t i = 0; i < sum.size(); ++i) {
+            sum[i] += part[i];
+        }
+    }
+    return sum;
 }
 
 void WindowStack::copy(Field x, Field y) noexcept

@@ -43,10 +43,19 @@ public:
     /// @returns  true when a window moved: what was computed from u and d has to be computed again
     bool follow(const Focus& focus, bool carry) noexcept;
 
-    /// y = -A x on the degrees of freedom, over all windows; makes x continuous at the windows' borders first.
-    void apply(Field x, Field y) noexcept { applyWith(x, y, false); }
-    /// As apply(), for finite strain; returns the energy [J].
-    double applyFinite(Field x, Field y) noexcept { return applyWith(x, y, true); }
+    /// y = -A x on the degrees of freedom, over all windows. x must be continuous at the windows' borders.
+    void apply(Field x, Field y) noexcept { applyWith(x, y, x, false); }
+
+    /// The tissue's force y at displacement x, which must be continuous at the windows' borders.
+    struct Evaluated {
+        double energy = 0;   // at finite strain; else 0 [J]
+        double product = 0;  // along . y
+    };
+    Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept { return applyWith(x, y, along, finite); }
+
+    /// Gives border nodes what the next coarser window has there. Sums of continuous fields are continuous but for
+    /// rounding, and what a multigrid cycle or follow() leaves is continuous.
+    void joinBorders(Field x) noexcept;
 
     /// Adds a force at a node: to the residual of a degree of freedom; at a border node, to those it follows.
     void addForce(std::size_t level, std::size_t node, Vec3 force) noexcept;
@@ -56,8 +65,12 @@ public:
     double dot(Field x, Field a) const noexcept { return dots(x, a, a)[0]; }
     /// out = x + a y
     void combine(Field x, double a, Field y, Field out) noexcept;
-    /// u += step p and a += step q; d = keep d + step p and e = keep e + step q.
-    void advance(double step, Field p, Field q, double keep) noexcept;
+    /// d *= step, e *= step, u += d, a += e, r = a.
+    void goOn(double step) noexcept;
+    /// p = z + beta last, u += step p; last may be p.
+    void direct(Field last, double beta, double step) noexcept;
+    /// The end of a step along `direction`, p or d, see KeptStep; r = a. Returns { a . u, a . d, e . d }.
+    std::array<double, 3> keepStep(Field direction, const KeptStep& step) noexcept;
     void copy(Field x, Field y) noexcept;
     void clear(Field field) noexcept;
 
@@ -66,7 +79,8 @@ private:
     Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
     void place() noexcept;
     void transfer(Field field) noexcept;
-    double applyWith(Field x, Field y, bool finite) noexcept;
+    Evaluated applyWith(Field x, Field y, Field along, bool finite) noexcept;
+    static StepFields stepFields(Window& window, Field direction) noexcept;
 
     const ElasticBody* body_;
     const Kernels* kernels_;

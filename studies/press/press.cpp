@@ -144,10 +144,10 @@ private:
 double contactArea(const Elastic& elastic) noexcept
 {
     double area = 0.0;
+    chainmail::AreaRatio ratio(elastic.body(), elastic.stack().windows());
     for (const chainmail::ContactSite& site : elastic.sites()) {
         if (!site.isTie && site.active()) {
-            area += chainmail::areaRatio(elastic.body(), elastic.stack().windows(), site) *
-                    static_cast<double>(elastic.body().points[site.point].area);
+            area += ratio(site) * static_cast<double>(elastic.body().points[site.point].area);
         }
     }
     return area;

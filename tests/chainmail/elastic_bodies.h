@@ -153,6 +153,7 @@ inline int solve(chainmail::WindowStack& stack, chainmail::Multigrid& multigrid,
             stack.combine(Field::z, now / before, Field::p, Field::p);
         }
         before = now;
+        stack.joinBorders(Field::p);
         stack.apply(Field::p, Field::q);
         const double alpha = -now / stack.dot(Field::p, Field::q);
         stack.combine(Field::u, alpha, Field::p, Field::u);

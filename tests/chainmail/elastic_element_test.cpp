@@ -33,6 +33,7 @@ double bending(int length, int side, double nu)
         const Vec3 exact(p.x * p.y, -0.5 * (p.x * p.x + nu * (p.y * p.y - p.z * p.z)), -nu * p.y * p.z);
         tests::setAt(w, node, Field::u, held ? curvature * exact : Vec3(0.0));
     });
+    stack.joinBorders(Field::u);
     stack.apply(Field::u, Field::r);
     EXPECT_LT(tests::solve(stack, multigrid, 1e-4, 1000), 1000) << "nu " << nu;
 

@@ -339,6 +339,32 @@ TEST(ElasticLevel, PointThatIsHeldTakesTheTissueAlong)
     }
 }
 
+// A tip that holds the tissue is followed every third call: the shape is that of a pose at most three calls old, and it is
+// solved in one call of three.
+TEST(ElasticLevel, HeldPointIsSolvedByTurns)
+{
+    constexpr double step = 20e-6;  // of the tip in a call [m]
+    const Vec3 rest(27e-3, 7e-3, 23e-3);
+    Bench bench, inTurns;
+    ElasticOptions always = smallWindows();
+    always.heldPeriod = 1;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, always, top);
+    ElasticLevel byTurns(inTurns.shape, inTurns.body, inTurns.surface, smallWindows(), top);
+    const std::size_t node = bench.grid.offset(Index3(glm::round((rest - bench.grid.origin) / spacing)));
+    int solved = 0;
+    for (int i = 1; i <= 120; ++i) {
+        const Grip grip = held(rest, Vec3(0.0, step * std::min(i, 90), 0.0), true);
+        const Vec3 before = byTurns.elastic().displacement(rest);
+        level.deform(grip);
+        byTurns.deform(grip);
+        solved += byTurns.elastic().displacement(rest) != before ? 1 : 0;
+        EXPECT_LT(glm::distance(bench.shape.u()[node], inTurns.shape.u()[node]), 3.0 * step + 0.1 * step) << i;
+    }
+    EXPECT_LE(solved, 40);
+    EXPECT_GE(solved, 30);
+    EXPECT_LT(glm::distance(bench.shape.u()[node], inTurns.shape.u()[node]), 0.5 * step);
+}
+
 TEST(ElasticLevel, DeformTouchesNoHeap)
 {
     Bench bench;

@@ -73,6 +73,66 @@ TEST(ElasticSets, ApplyFiniteGivesTheSameForces)
     }
 }
 
+// In one sweep what apply() and a pass over its answer do, to the bit.
+TEST(ElasticSets, SweepsThatEndInAPassAreApplyAndThePass)
+{
+    std::minstd_rand random(5);
+    for (const Index3 size : sizes()) {
+        const Cells cells = randomCells(size, random);
+        const Layout& l = cells.layout;
+        const std::size_t n = l.count;
+        const Floats r = randomFloats(3 * n, random);
+        const Floats diagonal = randomFloats(n, random);
+        for (const Kernels* k : supportedKernels()) {
+            Cells c = cells;
+            k->apply(l, c.stiffness(), c.u.data(), c.out.data(), c.scratch.data());
+            Floats residual(l.fieldSize()), smoothed = c.u, out(l.fieldSize());
+            k->residualOf(l, c.stiffness(), diagonal.data(), r.data(), c.u.data(), residual.data(), c.scratch.data());
+            const Smoother smoother{0.4F, diagonal.data(), r.data()};
+            k->smoothOf(l, c.stiffness(), smoother, smoothed.data(), out.data(), c.scratch.data());
+            EXPECT_TRUE(sameBits(out, c.out, 3 * n)) << k->name;
+            for (std::size_t i = 0; i < 3 * n; ++i) {
+                const float off = r[i] - c.out[i];
+                ASSERT_EQ(residual[i], diagonal[i % n] * off) << k->name << " " << i;
+                ASSERT_EQ(smoothed[i], c.u[i] + 0.4F * diagonal[i % n] * off) << k->name << " " << i;
+            }
+        }
+    }
+}
+
+// A row of the coarse window is spread by linear interpolation, and gathered by the transpose.
+void expectRows(const Kernels& k, int nodes, const Floats& coarse, const float* row)
+{
+    Floats spread(64, 9.0F);
+    k.spread(coarse.data(), nodes, spread.data());
+    Floats gathered = coarse;
+    k.gatherAdd(row, nodes, gathered.data());
+    const auto count = static_cast<std::size_t>(nodes);
+    for (std::size_t i = 0; i < count; i += 2) {
+        EXPECT_EQ(spread[i], coarse[i / 2]) << k.name;
+        EXPECT_EQ(gathered[i / 2], coarse[i / 2] + (row[i] + 0.5F * (row[static_cast<int>(i) - 1] + row[i + 1]))) << k.name;
+    }
+    for (std::size_t i = 1; i < count; i += 2) {
+        EXPECT_EQ(spread[i], 0.5F * (coarse[i / 2] + coarse[i / 2 + 1])) << k.name;
+    }
+    EXPECT_EQ(gathered[count / 2 + 1], coarse[count / 2 + 1]) << k.name;
+}
+
+TEST(ElasticSets, RowsAreSpreadAndGathered)
+{
+    std::minstd_rand random(6);
+    for (int nodes = 3; nodes <= 47; nodes += 2) {
+        const Floats coarse = randomFloats(64, random);
+        Floats fine = randomFloats(80, random);
+        float* row = fine.data() + Layout::lanes;
+        row[-1] = 0.0F;
+        std::fill(row + nodes, fine.data() + fine.size(), 0.0F);
+        for (const Kernels* k : supportedKernels()) {
+            expectRows(*k, nodes, coarse, row);
+        }
+    }
+}
+
 // The energy decides whether a step is halved: another set's must not decide otherwise.
 TEST(ElasticSets, ApplyFiniteGivesTheSameEnergy)
 {
@@ -187,36 +247,140 @@ TEST(ElasticSets, VectorSumsAreElementByElement)
              [&](std::size_t i, float) { return e.b()[i] + 0.5F * (e.a()[i] + e.c()[i]); });
 }
 
-// The four fields of a step, each in turn as the one looked at; p may be d itself, and q may be e.
-TEST(ElasticSets, AdvanceMovesFourFieldsElementByElement)
+// The fields of a step, a value of its own in each.
+struct StepOf {
+    explicit StepOf(const Entry& e)
+    {
+        for (std::size_t f = 0; f < own.size(); ++f) {
+            const std::array<const float*, 3> from{e.a(), e.b(), e.c()};
+            own[f] = Floats(from[f % 3], from[f % 3] + 3 * Entry::count);
+        }
+    }
+    StepFields fields(int looked, float* y)
+    {
+        StepFields to;
+        const std::array<float**, 7> slots{&to.u, &to.a, &to.d, &to.e, &to.p, &to.q, &to.r};
+        for (std::size_t f = 0; f < slots.size(); ++f) {
+            *slots[f] = static_cast<int>(f) == looked ? y : own[f].data();
+        }
+        return to;
+    }
+    std::array<Floats, 7> own;
+};
+
+TEST(ElasticSets, GoingOnMovesItsFieldsElementByElement)
 {
     Entry e;
     const std::size_t n = 3 * Entry::count;
     const float step = 0.37F;
-    const float keep = -0.8F;
-    for (int looked = 0; looked < 4; ++looked) {
+    const StepOf was(e);
+    const auto of = [&](int f, std::size_t i, int looked, float y) {
+        return f == looked ? y : was.own[static_cast<std::size_t>(f)][i];
+    };
+    for (int looked = 0; looked < 7; ++looked) {
+        e.expect([&](const Kernels& k, float* y) { k.goOn(step, StepOf(e).fields(looked, y), n); },
+                 [&](std::size_t i, float y) {
+                     const float d = step * of(2, i, looked, y);
+                     const float force = of(1, i, looked, y) + step * of(3, i, looked, y);
+                     const std::array<float, 7> now{
+                         of(0, i, looked, y) + d, force, d, step * of(3, i, looked, y), y, y, force};
+                     return now[static_cast<std::size_t>(looked)];
+                 });
+    }
+}
+
+TEST(ElasticSets, AStepIsDirectedAndKeptElementByElement)
+{
+    Entry e;
+    const std::size_t n = 3 * Entry::count;
+    const StepOf was(e);
+    const KeptStep step{.share = 0.9F, .base = 0.8F, .further = -0.2F, .length = 1.3F, .keep = 0.7F};
+    const float* f = e.b();
+    for (int looked = 0; looked < 7; ++looked) {
+        const auto of = [&](int field, std::size_t i, float y) {
+            return field == looked ? y : was.own[static_cast<std::size_t>(field)][i];
+        };
+        e.expect([&](const Kernels& k, float* y) { k.direct(e.c(), 0.3F, e.a(), 0.6F, StepOf(e).fields(looked, y), n); },
+                 [&](std::size_t i, float y) {
+                     const float p = e.c()[i] + 0.3F * e.a()[i];
+                     return looked == 0 ? y + 0.6F * p : looked == 4 ? p : y;
+                 });
         e.expect(
             [&](const Kernels& k, float* y) {
-                std::array<Floats, 4> own;
-                StepFields to;
-                const std::array<float**, 4> slots{&to.u, &to.a, &to.d, &to.e};
-                for (std::size_t f = 0; f < 4; ++f) {
-                    own[f] = Floats(n);
-                    *slots[f] = static_cast<int>(f) == looked ? y : own[f].data();
-                }
-                k.advance(step, e.a(), e.b(), keep, to, n);
+                std::array<double, 3> sums{};
+                k.keepStep(step, f, StepOf(e).fields(looked, y), n, sums.data());
             },
             [&](std::size_t i, float y) {
-                const float by = step * (looked % 2 == 0 ? e.a()[i] : e.b()[i]);
-                return (looked < 2 ? y : keep * y) + by;
+                const float change = step.share * (f[i] - step.base * of(1, i, y));
+                const float gone = step.length * of(4, i, y);
+                const float force = of(1, i, y) + change;
+                const std::array<float, 7> now{of(0, i, y) + step.further * of(4, i, y),
+                                               force,
+                                               step.keep * of(2, i, y) + gone,
+                                               step.keep * of(3, i, y) + change,
+                                               gone,
+                                               change,
+                                               force};
+                return now[static_cast<std::size_t>(looked)];
             });
     }
-    e.expect(
-        [&](const Kernels& k, float* y) {
-            Floats u(n), a(n), last(e.b(), e.b() + n);
-            k.advance(step, y, last.data(), keep, {u.data(), a.data(), y, last.data()}, n);
-        },
-        [&](std::size_t, float y) { return keep * y + step * y; });
+}
+
+// Where the increment itself is the direction: taken again, d is the step; confirmed, d stays.
+TEST(ElasticSets, TheDirectionMayBeTheIncrement)
+{
+    Entry e;
+    const std::size_t n = 3 * Entry::count;
+    for (const float keep : {0.0F, 1.0F}) {
+        const KeptStep step{.share = 1.0F, .base = 1.0F, .further = 0.1F, .length = 1.0F - keep, .keep = keep};
+        e.expect(
+            [&](const Kernels& k, float* y) {
+                StepOf own(e);
+                StepFields to = own.fields(2, y);
+                to.p = y;
+                std::array<double, 3> sums{};
+                k.keepStep(step, e.b(), to, n, sums.data());
+            },
+            [&](std::size_t, float y) { return y; });
+    }
+}
+
+// All sets give the same sums to the bit, and a plain loop about the same.
+TEST(ElasticSets, SumsOfAStepAreThoseOfItsFields)
+{
+    Entry e;
+    const std::size_t n = 3 * Entry::count;
+    const KeptStep step{.share = 0.9F, .base = 0.8F, .further = -0.2F, .length = 1.3F, .keep = 0.7F};
+    std::array<double, 3> first{};
+    double negated = 0.0;
+    for (const Kernels* k : supportedKernels()) {
+        StepOf own(e);
+        std::array<double, 3> sums{};
+        const StepFields to = own.fields(-1, nullptr);
+        k->keepStep(step, e.b(), to, n, sums.data());
+        std::array<double, 3> plain{};
+        for (std::size_t i = 0; i < n; ++i) {
+            plain[0] += static_cast<double>(to.a[i]) * static_cast<double>(to.u[i]);
+            plain[1] += static_cast<double>(to.a[i]) * static_cast<double>(to.d[i]);
+            plain[2] += static_cast<double>(to.e[i]) * static_cast<double>(to.d[i]);
+        }
+        Floats y(e.b(), e.b() + n);
+        const double product = k->negate(e.mask(), e.a(), y.data(), Entry::count);
+        if (k == supportedKernels().front()) {
+            first = sums;
+            negated = product;
+        }
+        EXPECT_EQ(sums, first) << k->name;
+        EXPECT_EQ(product, negated) << k->name;
+        for (std::size_t i = 0; i < 3; ++i) {
+            EXPECT_NEAR(sums[i], plain[i], 1e-4) << k->name;
+        }
+        double dot = 0.0;
+        for (std::size_t i = 0; i < n; ++i) {
+            dot += static_cast<double>(e.a()[i]) * static_cast<double>(y[i]);
+        }
+        EXPECT_NEAR(product, dot, 1e-4);
+    }
 }
 
 TEST(ElasticSets, SmoothersAreElementByElement)
@@ -228,8 +392,18 @@ TEST(ElasticSets, SmoothersAreElementByElement)
              [&](std::size_t i, float) { return w * e.b()[i % n] * e.a()[i]; });
     e.expect([&](const Kernels& k, float* y) { k.smooth(w, e.b(), e.a(), e.c(), y, n); },
              [&](std::size_t i, float y) { return y + w * e.b()[i % n] * (e.a()[i] - e.c()[i]); });
-    e.expect([&](const Kernels& k, float* y) { k.residual(e.mask(), e.a(), e.c(), y, n); },
-             [&](std::size_t i, float) { return e.mask()[i % n] * (e.a()[i] - e.c()[i]); });
+    e.expect(
+        [&](const Kernels& k, float* y) {
+            Floats z(e.c(), e.c() + 3 * n);
+            k.chebyshev(0.8F, w, {e.b(), e.a(), e.c(), n}, y, z.data());
+        },
+        [&](std::size_t i, float y) { return 0.8F * y + w * e.b()[i % n] * (e.a()[i] - e.c()[i]); });
+    e.expect(
+        [&](const Kernels& k, float* y) {
+            Floats f(e.c(), e.c() + 3 * n);
+            k.chebyshev(0.8F, w, {e.b(), e.a(), e.c(), n}, f.data(), y);
+        },
+        [&](std::size_t i, float y) { return y + (0.8F * e.c()[i] + w * e.b()[i % n] * (e.a()[i] - e.c()[i])); });
 }
 
 TEST(ElasticSets, MasksChooseNodeByNode)
@@ -241,7 +415,7 @@ TEST(ElasticSets, MasksChooseNodeByNode)
     e.expect([&](const Kernels& k, float* y) { k.addMasked(e.mask(), e.a(), y, n); },
              [&](std::size_t i, float y) { return y + e.mask()[i % n] * e.a()[i]; });
     e.expect([&](const Kernels& k, float* y) { k.negate(e.mask(), e.a(), y, n); },
-             [&](std::size_t i, float) { return e.mask()[i % n] * -e.a()[i]; });
+             [&](std::size_t i, float y) { return e.mask()[i % n] * -y; });
 }
 
 }  // namespace

@@ -148,8 +148,8 @@ TEST(Elastic, ForceOfAFewCyclesIsNearTheConverged)
     Elastic quick(block, oneCycle, tests::focusUnder(top));
     Elastic exact(block, {}, tests::focusUnder(top));
     double error = 0.0, errorOfContacts = 0.0, sum = 0.0;
-    for (int i = 0; i < 60; ++i) {
-        const std::array tools{pressed(std::min(0.1e-3 * i, 2e-3), {0.1e-3 * std::max(0, i - 20), 0, 0})};
+    for (int i = 0; i < 30; ++i) {
+        const std::array tools{pressed(std::min(0.2e-3 * i, 2e-3), {0.3e-3 * std::max(0, i - 10), 0, 0})};
         quick.relax(tests::loadOf(tools, {}, tools[0].shape.a));
         exact.relax(tests::loadOf(tools, {}, tools[0].shape.a), 30, 1e-5);
         Vec3 contacts(0.0);

@@ -1,0 +1,278 @@
+// How Elastic goes along a direction: how far, and what becomes of force and energy.
+#include <chainmail/elastic.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr int newtonSteps = 3;          // of a line search: contacts open and close along it
+constexpr int mostShortenings = 8;      // of a step that raises the energy
+constexpr double rounding = 1e-6;       // relative: sums of single-precision products are no better
+constexpr double mostFurther = 4.0;     // steps that force and energy may be carried on along a parabola
+constexpr double parabolic = 0.1;       // of what a step gains: by how much the energy may be off the parabola
+constexpr double leastStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
+constexpr double mostNearness = 10.0;   // of that expectation, bounds
+
+// Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
+// half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
+double shorter(double alpha, double slope, double change) noexcept
+{
+    const double lowest = -0.5 * slope * alpha * alpha / (change - slope * alpha);
+    return std::isfinite(lowest) ? std::clamp(lowest / alpha, 0.1, 0.5) * alpha : 0.5 * alpha;
+}
+
+}  // namespace
+
+// The last call's increment is the direction that the next step is made conjugate to.
+void Elastic::look() noexcept
+{
+    for (ContactSite& s : active()) {
+        s.p = gather(stack_.windows(), s, Field::d);
+    }
+    if (!products_) {
+        const auto product = stack_.dots(Field::d, Field::a, Field::e);
+        products_ = {stack_.dot(Field::u, Field::a), product[0], product[1]};
+    }
+    last_ = {Field::d, Field::e, {-(*products_)[1], -(*products_)[2]}};
+}
+
+// How far to go: Newton on the slope of the energy, the tissue's part a parabola, contacts opening and closing on the way.
+double Elastic::lineSearch(double slope, double curvature, Along at, int steps) const noexcept
+{
+    double alpha = 0.0;
+    for (int i = 0; i < steps; ++i) {
+        at = i > 0 ? contactsAlong(sites(), alpha) : at;
+        const double stiffness = curvature + (1.0 - memory_) * at.curvature;
+        const double change = -(slope + alpha * curvature + (1.0 - memory_) * at.slope) / stiffness;
+        if (!(stiffness > 0.0) || !std::isfinite(change)) {
+            return 0.0;
+        }
+        alpha += change;
+    }
+    return alpha;
+}
+
+// How far to go along a direction that the sites know, where the tissue's energy is a parabola. A step after which the
+// energy is higher (the contacts' line search is of first order) is shortened. The sites go along; 0: nowhere.
+double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexcept
+{
+    const double start = energy_;
+    const double before = start + contactEnergy();
+    const double slope = to.viscous + to.tissue.slope;
+    const double steepness = slope + (1.0 - memory_) * to.contacts.slope;
+    double length = lineSearch(slope, to.tissue.curvature, to.contacts, newtonSteps);
+    for (int i = 0; length != 0.0; ++i) {
+        moveSites(length);
+        energy_ = start + to.tissue.at(length);
+        const double change = energy_ + to.viscous * length + contactEnergy() - before;
+        if (change <= rounding * (std::abs(before) + std::abs(slope * length))) {
+            return length;
+        }
+        moveSites(-length);
+        length = i < mostShortenings ? shorter(length, steepness, change) : 0.0;
+        ++result.shortened;
+    }
+    energy_ = start;
+    return 0.0;
+}
+
+// Goes on along the last call's increment d, whose image e is known, as far as lowers the energy. The tissue's force and
+// energy go along the parabola: the next step evaluates them, or confirm().
+bool Elastic::goOn(ElasticResult& result) noexcept
+{
+    look();
+    const double length = searchParabola({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0), 0.0}, result);
+    if (length == 0.0) {
+        forgetIncrement();
+        return false;
+    }
+    for (ContactSite& s : active()) {
+        s.p *= length;
+    }
+    stack_.goOn(length);
+    products_.reset();
+    last_.tissue = last_.tissue.from(length);
+    return true;
+}
+
+// Evaluates the tissue where goOn() led. False where that is up: then all is as when the call began.
+bool Elastic::confirm(double start) noexcept
+{
+    energy_ = stack_.evaluate(Field::u, Field::f, Field::d, true).energy;
+    if (energy_ + contactEnergy() - start > rounding * std::abs(start)) {
+        retreat();
+        return false;
+    }
+    products_ = stack_.keepStep(Field::d, {.length = 0.0F});
+    return true;
+}
+
+// Back to where the call began.
+void Elastic::retreat() noexcept
+{
+    products_.reset();
+    stack_.combine(Field::u, -1.0, Field::d, Field::u);
+    stack_.combine(Field::a, -1.0, Field::e, Field::a);
+    energy_ = startEnergy_;
+    for (ContactSite& s : active()) {
+        const Vec3 u = gather(stack_.windows(), s, Field::u);
+        s.slip += s.u - u;
+        s.u = u;
+        touch(s, shapes_, ties_);
+    }
+}
+
+// At small strain the tissue's energy is a parabola, and one operator gives its curvature.
+bool Elastic::takeLinearStep(Direction to, ElasticResult& result) noexcept
+{
+    if (to.field == Field::p) {
+        stack_.direct(last_.direction, to.beta, 0.0);
+    }
+    to.tissue.curvature = -stack_.evaluate(to.field, Field::f, to.field, false).product;
+    const double length = searchParabola(to, result);
+    if (length != 0.0) {
+        keepStep(to, {static_cast<float>(length), 0.0F, static_cast<float>(length), static_cast<float>(length)});
+    }
+    return length != 0.0;
+}
+
+// Goes along a direction that the sites know, as far as lowers the energy. The force is evaluated where the expected
+// curvature leads to. The slope there gives the curvature, and where the lowest point is near, force and energy go there
+// along the parabola. A step after which the energy is above what it was, and above `limit`, is shortened, and taken back
+// at last (the contacts' line search is of first order, and finite strain has no parabola). False: nowhere.
+bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result) noexcept
+{
+    if (!options_.finiteStrain) {
+        return takeLinearStep(to, result);
+    }
+    const double start = energy_;
+    const double before = std::max(limit, start + contactEnergy());
+    const Along& contacts = to.contacts;
+    const double slope = to.viscous + to.tissue.slope;
+    const double steepness = slope + (1.0 - memory_) * contacts.slope;
+    double length = lineSearch(slope, to.tissue.curvature, contacts, 1);
+    double gone = 0.0;
+    for (int i = 0, searches = 0; length != 0.0;) {
+        if (gone == 0.0 && to.field == Field::p) {
+            stack_.direct(last_.direction, to.beta, length);
+        } else {
+            stack_.combine(Field::u, length - gone, to.field, Field::u);
+        }
+        gone = length;
+        const auto now = stack_.evaluate(Field::u, Field::f, to.field, true);
+        const Parabola tissue{to.tissue.slope, (-now.product - to.tissue.slope) / gone};
+        const double best = lineSearch(slope, tissue.curvature, contacts, newtonSteps);
+        const double further = std::max(1.0, std::abs(best / gone));
+        const double off = std::abs(now.energy - start - tissue.at(gone)) * further * further * further;
+        const bool isNear = further <= mostFurther && off <= parabolic * std::abs(steepness * best);
+        if (!isNear && best != 0.0 && searches++ == 0) {
+            length = best;
+            continue;
+        }
+        length = isNear ? best : gone;
+        moveSites(length);
+        energy_ = now.energy + tissue.at(length) - tissue.at(gone);
+        const double scale = std::abs(before) + std::abs(slope * length);
+        const double change = energy_ + to.viscous * length + contactEnergy() - before;
+        if (change <= rounding * scale) {
+            Direction found = to;
+            found.tissue = tissue;
+            keepStep(found, {static_cast<float>(length / gone), 1.0F, static_cast<float>(length - gone),
+                             static_cast<float>(length)});
+            return true;
+        }
+        moveSites(-length);
+        length = i++ < mostShortenings && length != 0.0 ? shorter(length, steepness, change) : 0.0;
+        ++result.shortened;
+    }
+    stack_.combine(Field::u, -gone, to.field, Field::u);
+    energy_ = start;
+    return false;
+}
+
+// d and e become the increment of this call so far: of the last call's what was taken again, and the steps since.
+void Elastic::keepStep(const Direction& to, KeptStep step) noexcept
+{
+    const bool again = to.field == Field::d;
+    const double length = static_cast<double>(step.length);
+    step.keep = again ? 0.0F : 1.0F;
+    products_ = stack_.keepStep(to.field, step);
+    for (ContactSite& s : active()) {
+        s.p *= length;
+    }
+    stiffness_ = to.tissue.curvature + (1.0 - memory_) * to.contacts.curvature;
+    last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length)};
+}
+
+// One step of preconditioned conjugate gradients, conjugate to the last.
+bool Elastic::oneCycle(double limit, ElasticResult& result) noexcept
+{
+    double& nearness = nearness_[std::min<std::size_t>(result.cycles, nearness_.size()) - 1];
+    prepareContacts();
+    multigrid_.solve();
+    const auto product = stack_.dots(Field::z, Field::a, last_.image);
+    double own = last_.tissue.curvature;
+    double mixed = -product[1];
+    double work = product[0];  // of the residual along z
+    for (ContactSite& s : active()) {
+        const Vec3 resisted = (1.0 - memory_) * s.resist(s.p);
+        s.z = gather(stack_.windows(), s, Field::z);
+        own += glm::dot(s.p, resisted);
+        mixed += glm::dot(s.z, resisted);
+        work += (1.0 - memory_) * glm::dot(s.z, s.force);
+    }
+    const double beta = own > 0.0 && std::isfinite(mixed / own) ? -mixed / own : 0.0;
+    for (ContactSite& s : active()) {
+        s.p = s.z + beta * s.p;
+    }
+    Direction to{Field::p, beta, {beta * last_.tissue.slope - product[0], 0.0}, contactsAlong(sites(), 0.0), 0.0};
+    if (memory_ > 0.0) {
+        const double held = memory_ * stack_.dot(Field::z, Field::v);
+        to.viscous = held + beta * memory_ * stack_.dot(last_.direction, Field::v);
+        work -= held;
+    }
+    // Along z the stiffness is the work but for how near the preconditioner is, as in the cycle before; made conjugate, it
+    // is less by what the increment has of it.
+    const double conjugate = -beta * mixed;
+    const double contacts = (1.0 - memory_) * to.contacts.curvature;
+    const double expected = std::max(nearness * work - conjugate, leastStiffness * nearness * work);
+    to.tissue.curvature = std::max(expected - contacts, leastStiffness * expected);
+    const bool stepped = takeStep(to, limit, result);
+    if (const double found = (stiffness_ + conjugate) / work; stepped && std::isfinite(found)) {
+        nearness = 0.5 * (nearness + std::clamp(found, 1.0 / mostNearness, mostNearness));
+    }
+    return stepped;
+}
+
+// Steps along the last call's increment. With the tissue's force evaluated it is sure not to go up.
+void Elastic::again(ElasticResult& result) noexcept
+{
+    look();
+    const double viscous = memory_ > 0.0 ? memory_ * stack_.dot(Field::d, Field::v) : 0.0;
+    if (!takeStep({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0), viscous}, 0.0, result)) {
+        forgetIncrement();
+    }
+}
+
+void Elastic::forgetIncrement() noexcept
+{
+    products_.reset();
+    stack_.clear(Field::d);
+    stack_.clear(Field::e);
+    forgetStep();
+}
+
+void Elastic::forgetStep() noexcept
+{
+    last_ = {};
+    for (ContactSite& s : active()) {
+        s.p = Vec3(0.0);
+    }
+}
+
+}  // namespace palpate::chainmail

@@ -1,0 +1,421 @@
+// The operator: sweeps over cells. Only kernels_body.h includes it.
+
+#include <chainmail/kernels.h>
+
+namespace palpate::chainmail {
+
+namespace {
+
+// Modes of one component in a cell, eight times their size; the constant mode carries no energy.
+struct Modes {
+    Lanes x, y, z, xy, yz, zx, xyz;
+};
+
+// The same in one plane of nodes: sums (s) and differences (d) along x, then y.
+struct Plane {
+    Lanes ss, ds, sd, dd;
+};
+
+inline Plane planeOf(const float* u, std::size_t row) noexcept
+{
+    const Lanes a0 = load(u);
+    const Lanes a1 = load(u + 1);
+    const Lanes b0 = load(u + row);
+    const Lanes b1 = load(u + row + 1);
+    const Lanes as = a0 + a1;
+    const Lanes ad = a1 - a0;
+    const Lanes bs = b0 + b1;
+    const Lanes bd = b1 - b0;
+    return {as + bs, ad + bd, bs - as, bd - ad};
+}
+
+inline Plane loadPlane(const float* p, std::size_t plane) noexcept
+{
+    return {load(p), load(p + plane), load(p + 2 * plane), load(p + 3 * plane)};
+}
+
+inline void storePlane(float* p, std::size_t plane, const Plane& v) noexcept
+{
+    store(p, v.ss);
+    store(p + plane, v.ds);
+    store(p + 2 * plane, v.sd);
+    store(p + 3 * plane, v.dd);
+}
+
+inline Modes modesOf(const Plane& low, const Plane& high) noexcept
+{
+    return {low.ds + high.ds, low.sd + high.sd, high.ss - low.ss, low.dd + high.dd,
+            high.sd - low.sd, high.ds - low.ds, high.dd - low.dd};
+}
+
+// What the modes' gradient gives to the lower and to the upper plane of nodes.
+inline Plane lower(const Modes& g) noexcept
+{
+    return {-g.z, g.x - g.zx, g.y - g.yz, g.xy - g.xyz};
+}
+
+inline Plane upper(const Modes& g) noexcept
+{
+    return {g.z, g.x + g.zx, g.y + g.yz, g.xy + g.xyz};
+}
+
+inline Plane operator+(const Plane& a, const Plane& b) noexcept
+{
+    return {a.ss + b.ss, a.ds + b.ds, a.sd + b.sd, a.dd + b.dd};
+}
+
+// Modes that bend and twist a cell. Bending: with s = lambda / (lambda + 2 mu), the strain across it as free of stress.
+inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+{
+    constexpr float tiny = 1e-30F;  // so that an empty cell divides by something
+    const Lanes bend = (4.0F / 3.0F) * mu;
+    const Lanes both = bend * lambda / (lambda + 2.0F * mu + tiny);
+    const Lanes twist = (2.0F / 3.0F) * mu;
+    const Lanes ninth = (8.0F / 9.0F) * mu;
+    const Lanes alongX = both * (m[1].xy + m[2].zx);
+    const Lanes alongY = both * (m[0].xy + m[2].yz);
+    const Lanes alongZ = both * (m[0].zx + m[1].yz);
+    const Lanes c = twist * (m[0].yz + m[1].zx + m[2].xy);
+    g[0].xy = bend * m[0].xy + alongY;
+    g[0].zx = bend * m[0].zx + alongZ;
+    g[0].yz = twist * m[0].yz + c;
+    g[1].xy = bend * m[1].xy + alongX;
+    g[1].yz = bend * m[1].yz + alongZ;
+    g[1].zx = twist * m[1].zx + c;
+    g[2].yz = bend * m[2].yz + alongY;
+    g[2].zx = bend * m[2].zx + alongX;
+    g[2].xy = twist * m[2].xy + c;
+#pragma GCC unroll 3
+    for (int q = 0; q < 3; ++q) {
+        g[q].xyz = ninth * m[q].xyz;
+    }
+}
+
+// The same in axes that turn and stretch with the cell: with F its mean deformation gradient, a mode m becomes F^T m.
+// Adds to g the gradient of that energy, and returns twice the energy.
+inline Lanes hourglassTurned(Lanes mu, Lanes lambda, float quarter, const Lanes (&f)[3][3], const Modes (&m)[3],
+                             Modes (&g)[3]) noexcept
+{
+    Modes b[3];
+    Modes w[3];
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) {
+        b[j].xy = m[j].xy + f[0][j] * m[0].xy + f[1][j] * m[1].xy + f[2][j] * m[2].xy;
+        b[j].yz = m[j].yz + f[0][j] * m[0].yz + f[1][j] * m[1].yz + f[2][j] * m[2].yz;
+        b[j].zx = m[j].zx + f[0][j] * m[0].zx + f[1][j] * m[1].zx + f[2][j] * m[2].zx;
+        b[j].xyz = m[j].xyz + f[0][j] * m[0].xyz + f[1][j] * m[1].xyz + f[2][j] * m[2].xyz;
+    }
+    hourglass(mu, lambda, b, w);
+    Lanes twice{};
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+        g[i].xy = w[i].xy + f[i][0] * w[0].xy + f[i][1] * w[1].xy + f[i][2] * w[2].xy;
+        g[i].yz = w[i].yz + f[i][0] * w[0].yz + f[i][1] * w[1].yz + f[i][2] * w[2].yz;
+        g[i].zx = w[i].zx + f[i][0] * w[0].zx + f[i][1] * w[1].zx + f[i][2] * w[2].zx;
+        g[i].xyz = w[i].xyz + f[i][0] * w[0].xyz + f[i][1] * w[1].xyz + f[i][2] * w[2].xyz;
+        const Lanes byF[3] = {m[i].xy * w[0].xy + m[i].yz * w[0].yz + m[i].zx * w[0].zx + m[i].xyz * w[0].xyz,
+                              m[i].xy * w[1].xy + m[i].yz * w[1].yz + m[i].zx * w[1].zx + m[i].xyz * w[1].xyz,
+                              m[i].xy * w[2].xy + m[i].yz * w[2].yz + m[i].zx * w[2].zx + m[i].xyz * w[2].xyz};
+        g[i].x += quarter * byF[0];
+        g[i].y += quarter * byF[1];
+        g[i].z += quarter * byF[2];
+        twice += w[i].xy * b[i].xy + w[i].yz * b[i].yz + w[i].zx * b[i].zx + w[i].xyz * b[i].xyz;
+    }
+    return twice;
+}
+
+// Small strain: the law of kernels.h.
+struct Linear {
+    void operator()(Lanes mu, Lanes lambda, std::size_t, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    {
+        const Lanes two = 2.0F * mu;
+        const Lanes four = 4.0F * mu;
+        const Lanes d = 2.0F * lambda * (m[0].x + m[1].y + m[2].z);
+        g[0].x = four * m[0].x + d;
+        g[1].y = four * m[1].y + d;
+        g[2].z = four * m[2].z + d;
+        g[0].y = g[1].x = two * (m[0].y + m[1].x);
+        g[0].z = g[2].x = two * (m[0].z + m[2].x);
+        g[1].z = g[2].y = two * (m[1].z + m[2].y);
+        hourglass(mu, lambda, m, g);
+    }
+};
+
+// Finite strain: stable neo-Hookean on the mean deformation gradient. With modes eight times their size F = I + m / (4 h),
+// and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h times the scaled stiffness.
+struct NeoHookean {
+    float inverse;                         // 1 / h
+    const float* stiffening;               // of each cell, or none
+    Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
+    std::size_t turn = 0;
+
+    // With G = F - I:  J - 1 = tr G + (tr^2 - G : G^T) / 2 + det G, so that no small difference of large numbers is taken.
+    void operator()(Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    {
+        const float q = 0.25F * inverse;
+        const float h8 = 8.0F / inverse;
+        const Lanes f[3][3] = {{q * m[0].x, q * m[0].y, q * m[0].z},
+                               {q * m[1].x, q * m[1].y, q * m[1].z},
+                               {q * m[2].x, q * m[2].y, q * m[2].z}};
+        Lanes c[3][3];
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 3
+            for (int j = 0; j < 3; ++j) {
+                const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+                c[i][j] = f[i1][j1] * f[i2][j2] - f[i1][j2] * f[i2][j1];
+            }
+        }
+        const Lanes trace = f[0][0] + f[1][1] + f[2][2];
+        const Lanes minors = c[0][0] + c[1][1] + c[2][2];
+        const Lanes determinant = f[0][0] * c[0][0] + f[0][1] * c[0][1] + f[0][2] * c[0][2];
+        const Lanes volume = trace + minors + determinant;
+        const Lanes pressure = (lambda + mu) * volume;
+        Lanes square{};
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+            square += f[i][0] * f[i][0] + f[i][1] * f[i][1] + f[i][2] * f[i][2];
+        }
+        // I_C - 3, where it is more than 0, and what the tissue stiffens by it.
+        const Lanes stretch = 2.0F * trace + square;
+        const Lanes more = stretch > 0.0F ? stretch : Lanes{};
+        const Lanes b = stiffening != nullptr ? load(stiffening + cell) * mu : Lanes{};
+        const Lanes extra = b * more;
+        Lanes p[3][3];
+#pragma GCC unroll 3
+        for (int i = 0; i < 3; ++i) {
+#pragma GCC unroll 3
+            for (int j = 0; j < 3; ++j) {
+                // Cofactor of F, less I: tr G I - G^T + cof G.
+                const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
+                p[i][j] = h8 * (mu * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor) +
+                                extra * (i == j ? f[i][j] + 1.0F : f[i][j]));
+            }
+        }
+        g[0].x = p[0][0];
+        g[0].y = p[0][1];
+        g[0].z = p[0][2];
+        g[1].x = p[1][0];
+        g[1].y = p[1][1];
+        g[1].z = p[1][2];
+        g[2].x = p[2][0];
+        g[2].y = p[2][1];
+        g[2].z = p[2][2];
+        const Lanes bend = hourglassTurned(mu, lambda, q, f, m, g);
+        // h^3 W is 32 h^2 times W of the scaled stiffness.
+        const float h2 = 32.0F / (inverse * inverse);
+        energy[turn] +=
+            h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume + 0.25F * extra * more) +
+            0.5F * bend;
+        turn = (turn + 1) % (Layout::lanes / W);
+    }
+};
+
+// What becomes of A u at a node: it is stored,
+struct Keep {
+    float* out;
+    std::size_t count;
+
+    void operator()(std::size_t c, std::size_t at, Lanes v) const noexcept { store(out + c * count + at, v); }
+};
+
+// or it makes the residual, out = open (r - A u),
+struct KeepResidual {
+    const float* open;
+    const float* r;
+    float* out;
+    std::size_t count;
+
+    void operator()(std::size_t c, std::size_t at, Lanes v) const noexcept
+    {
+        store(out + c * count + at, load(open + at) * (load(r + c * count + at) - v));
+    }
+};
+
+// or it is stored and smooths u, u += weight * diagonal (r - A u). The sweep has read a plane of u before it gets here.
+struct KeepSmooth {
+    float weight;
+    const float* diagonal;
+    const float* r;
+    float* u;
+    float* out;
+    std::size_t count;
+
+    void operator()(std::size_t c, std::size_t at, Lanes v) const noexcept
+    {
+        const std::size_t i = c * count + at;
+        store(out + i, v);
+        store(u + i, load(u + i) + weight * load(diagonal + at) * (load(r + i) - v));
+    }
+};
+
+// One row of cells gives to two rows of nodes: `first` is its lower row, complete with what the row before left in `carry`.
+// Along x a node takes from the cell on its right and from the one on its left.
+template <typename Keeper>
+class RowSum {
+public:
+    RowSum(float* carry, const Keeper& keep, std::size_t component, std::size_t at)
+        : carry_(carry), keep_(keep), component_(component), at_(at)
+    {
+    }
+
+    void add(std::size_t i, const Plane& v) noexcept
+    {
+        const Lanes s = v.ss - v.sd + load(carry_ + 2 * i);
+        const Lanes d = v.ds - v.dd + load(carry_ + 2 * i + W);
+        store(carry_ + 2 * i, v.ss + v.sd);
+        store(carry_ + 2 * i + W, v.ds + v.dd);
+        emit(i, s, d);
+    }
+
+    // The last row of nodes has no cells of its own.
+    void finish(std::size_t i) noexcept { emit(i, load(carry_ + 2 * i), load(carry_ + 2 * i + W)); }
+
+private:
+    void emit(std::size_t i, Lanes s, Lanes d) noexcept
+    {
+        const Lanes right = s + d;
+        keep_(component_, at_ + i, s - d + shifted(before_, right));
+        before_ = right;
+    }
+
+    float* carry_;
+    const Keeper& keep_;
+    std::size_t component_;
+    std::size_t at_;
+    Lanes before_{};
+};
+
+// Gives what was gathered for one plane of nodes to its rows.
+template <typename Keeper>
+struct Sweep {
+    const Layout& layout;
+    const float* u;
+    const Keeper& keep;
+    float* planes;   // sums and differences of the plane below (12 x plane)
+    float* pending;  // what the layer below gave to the plane (12 x plane)
+    float* carry;    // what the row before gave to this row (6 x row)
+
+    Plane planeAt(int c, std::size_t at) const noexcept
+    {
+        return planeOf(u + static_cast<std::size_t>(c) * layout.count + at, layout.row);
+    }
+    float* component(float* p, int c) const noexcept { return p + static_cast<std::size_t>(c) * 4 * layout.plane; }
+    float* carryOf(int c) const noexcept { return carry + static_cast<std::size_t>(c) * 2 * layout.row; }
+
+    void begin() noexcept
+    {
+        std::memset(pending, 0, 12 * layout.plane * sizeof(float));
+#pragma GCC unroll 3
+        for (int c = 0; c < 3; ++c) {
+            for (std::size_t at = 0; at + layout.row < layout.plane; at += W) {
+                storePlane(component(planes, c) + at, layout.plane, planeAt(c, at));
+            }
+        }
+    }
+
+    void lastRow(std::size_t at) noexcept
+    {
+#pragma GCC unroll 3
+        for (int c = 0; c < 3; ++c) {
+            RowSum<Keeper> sum(carryOf(c), keep, static_cast<std::size_t>(c), at);
+            for (std::size_t i = 0; i < layout.row; i += W) {
+                sum.finish(i);
+            }
+        }
+    }
+
+    template <typename Law>
+    void layer(int k, CellStiffness stiffness, Law& law) noexcept
+    {
+        const std::size_t above = layout.at(0, 0, k + 1);
+        std::memset(carry, 0, 6 * layout.row * sizeof(float));
+        for (int j = 0; j + 1 < layout.ny; ++j) {
+            const std::size_t at = layout.at(0, j, k);
+            const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
+            RowSum<Keeper> sum[3] = {{carryOf(0), keep, 0, at}, {carryOf(1), keep, 1, at}, {carryOf(2), keep, 2, at}};
+            for (std::size_t i = 0; i < layout.row; i += W) {
+                Modes m[3];
+                Modes g[3];
+#pragma GCC unroll 3
+                for (int c = 0; c < 3; ++c) {
+                    const Plane high = planeAt(c, above + inPlane + i);
+                    m[c] = modesOf(loadPlane(component(planes, c) + inPlane + i, layout.plane), high);
+                    storePlane(component(planes, c) + inPlane + i, layout.plane, high);
+                }
+                law(load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
+#pragma GCC unroll 3
+                for (int c = 0; c < 3; ++c) {
+                    float* wait = component(pending, c) + inPlane + i;
+                    sum[c].add(i, lower(g[c]) + loadPlane(wait, layout.plane));
+                    storePlane(wait, layout.plane, upper(g[c]));
+                }
+            }
+        }
+        lastRow(layout.at(0, layout.ny - 1, k));
+    }
+
+    void end() noexcept
+    {
+        std::memset(carry, 0, 6 * layout.row * sizeof(float));
+        for (int j = 0; j + 1 < layout.ny; ++j) {
+            const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
+#pragma GCC unroll 3
+            for (int c = 0; c < 3; ++c) {
+                RowSum<Keeper> sum(carryOf(c), keep, static_cast<std::size_t>(c), layout.at(0, j, layout.nz - 1));
+                for (std::size_t i = 0; i < layout.row; i += W) {
+                    sum.add(i, loadPlane(component(pending, c) + inPlane + i, layout.plane));
+                }
+            }
+        }
+        lastRow(layout.at(0, layout.ny - 1, layout.nz - 1));
+    }
+};
+
+template <typename Law, typename Keeper>
+void sweepCells(const Layout& layout, CellStiffness stiffness, const float* u, const Keeper& keep, float* scratch,
+                Law& law) noexcept
+{
+    Sweep<Keeper> sweep{layout, u, keep, scratch, scratch + 12 * layout.plane, scratch + 24 * layout.plane};
+    sweep.begin();
+    for (int k = 0; k + 1 < layout.nz; ++k) {
+        sweep.layer(k, stiffness, law);
+    }
+    sweep.end();
+}
+
+void apply(const Layout& layout, CellStiffness stiffness, const float* u, float* out, float* scratch) noexcept
+{
+    Linear law;
+    sweepCells(layout, stiffness, u, Keep{out, layout.count}, scratch, law);
+}
+
+void residualOf(const Layout& layout, CellStiffness stiffness, const float* open, const float* r, const float* u,
+                float* out, float* scratch) noexcept
+{
+    Linear law;
+    sweepCells(layout, stiffness, u, KeepResidual{open, r, out, layout.count}, scratch, law);
+}
+
+void smoothOf(const Layout& layout, CellStiffness stiffness, const Smoother& by, float* u, float* out,
+              float* scratch) noexcept
+{
+    Linear law;
+    sweepCells(layout, stiffness, u, KeepSmooth{by.weight, by.diagonal, by.r, u, out, layout.count}, scratch, law);
+}
+
+double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
+                   float* scratch) noexcept
+{
+    NeoHookean law{inverse, stiffness.stiffening};
+    sweepCells(layout, stiffness, u, Keep{out, layout.count}, scratch, law);
+    double sum = 0.0;
+    for (const Lanes& part : law.energy) {
+        addLanes(sum, part);
+    }
+    return sum;
+}
+
+}  // namespace
+
+}  // namespace palpate::chainmail
