@@ -1,10 +1,9 @@
 // A device of one's own: a hand that taps the block three times a second. It runs in the servo loop of every session.
 #include <palpate/haptics/device.h>
-#include <palpate/haptics/servo.h>
 #include <palpate/session/open.h>
+#include <palpate/session/session.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -42,11 +41,9 @@ int main()
 {
     try {
         const haptics::SessionModel model = session::openSession("block", {});
-        haptics::Simulation simulation(model);
+        session::Session session(model, session::describeSession(model, "block", "tapper"));
         Tapper tapper(model.scene.tool.radius);
-        const std::atomic<bool> stop{false};
-        haptics::runServo(
-            tapper, simulation, {.paced = false}, [](const auto&, const auto&) {}, stop);
+        session.run(tapper, {.servo = {.paced = false}});  // paced: one tick per millisecond, as a hand needs it
         std::printf("the largest force on the hand was %.3f N\n", tapper.largest());
         return tapper.largest() > 0.0 ? 0 : 1;
     } catch (const std::exception& e) {

@@ -2,7 +2,6 @@
 
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
-#include <haptics/simulation.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -25,9 +24,6 @@ namespace palpate::session {
 namespace {
 
 using namespace haptics;
-
-constexpr std::size_t mostCores = 64;
-constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder in an unpaced session
 
 std::atomic<bool> interrupted{false};
 std::atomic<int> signalled{0};
@@ -108,42 +104,6 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
     }
 }
 
-// Takes in what the session's figures need, tick by tick, in the servo thread.
-struct Tally {
-    explicit Tally(const SessionInfo& info) : scorer(info)
-    {
-        result.cores.reserve(mostCores);
-        result.nearest.fill(std::numeric_limits<double>::infinity());
-    }
-
-    void add(const TickRecord& r) noexcept
-    {
-        scorer.add(r);
-        hash.add(r);
-        result.peakBasic = std::max(result.peakBasic, glm::length(r.basic));
-        result.peakAdditional = std::max(result.peakAdditional, glm::length(r.additional));
-        result.peakTotal = std::max(result.peakTotal, glm::length(r.total));
-        result.energyMade = std::max(result.energyMade, r.energy);
-        result.energyDamped = r.damped;
-        for (std::size_t i = 0; i < maxStructures; ++i) {
-            result.nearest[i] = std::min(result.nearest[i], r.distance[i]);
-        }
-        for (std::uint32_t i = 0; i < r.eventCount; ++i) {
-            result.contacts += r.events[i].kind == EventKind::contact ? 1 : 0;
-            result.punctures += r.events[i].kind == EventKind::puncture ? 1 : 0;
-        }
-        if (r.fired && result.cores.size() < mostCores) {
-            result.cores.push_back(r.core);
-        }
-        faulted = faulted || r.faulted;
-    }
-
-    Scorer scorer;
-    ForceHash hash;
-    TrainResult result;
-    bool faulted = false;
-};
-
 }  // namespace
 
 struct Trainer::Impl {
@@ -151,8 +111,7 @@ struct Trainer::Impl {
         : options(o),
           broadcast(o.session, model, deviceKind(o.device.name).needsViewer),
           device(openWithFaults(o, model, broadcast)),
-          simulation(model),
-          tally(info)
+          session(model, info)
     {
         if (!o.record.empty()) {
             recorder.emplace(o.record, info);
@@ -168,37 +127,26 @@ struct Trainer::Impl {
         if (options.servo.paced) {
             warnings = claimRealTime();
         }
-        const auto sink = [this](const TickRecord& record, const ServoTiming& timing) {
-            tally.add(record);
-            if (recorder) {
-                recorder->push(record);
-                // Faster than real time the loop would outrun the writer: it waits, as nobody holds the device.
-                if (!options.servo.paced && record.tick % flushPeriod == 0) {
-                    recorder->flush();
-                }
-            }
-            broadcast.publish(record, timing, simulation);
+        const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &interrupted};
+        timing = session.run(*device, run, [this](const TickRecord& record, const ServoTiming& soFar) {
+            broadcast.publish(record, soFar, session.simulation());
             if (around) {
                 around->tell(record.tick);
             }
             sleepThroughGap(options.faults, record.tick);
-        };
-        tally.result.timing = runServo(*device, simulation, options.servo, sink, interrupted);
+        });
         broadcast.finish();
     }
 
     void conclude(TrainResult& result)
     {
-        result.score = tally.scorer.score();
-        result.forceHash = tally.hash.value();
         if (recorder) {
             const auto late = result.timing.lateness.percentiles();
             const auto work = result.timing.work.percentiles();
-            const auto& timing = result.timing;
-            recorder->finish({{"missed_ticks", fmt::format("{}", timing.missed)},
-                              {"overruns", fmt::format("{}", timing.overruns)},
-                              {"gaps", fmt::format("{}", timing.gaps)},
-                              {"longest_gap_ms", fmt::format("{}", timing.longestGap)},
+            recorder->finish({{"missed_ticks", fmt::format("{}", result.timing.missed)},
+                              {"overruns", fmt::format("{}", result.timing.overruns)},
+                              {"gaps", fmt::format("{}", result.timing.gaps)},
+                              {"longest_gap_ms", fmt::format("{}", result.timing.longestGap)},
                               {"tick_us_p50", fmt::format("{:.2f}", 1e6 * work.p50)},
                               {"tick_us_p99", fmt::format("{:.2f}", 1e6 * work.p99)},
                               {"lateness_us_p50", fmt::format("{:.2f}", 1e6 * late.p50)},
@@ -215,7 +163,7 @@ struct Trainer::Impl {
         if (result.problem.empty()) {
             result.problem = device->problem();
         }
-        if (tally.faulted && result.problem.empty()) {
+        if (result.faulted && result.problem.empty()) {
             result.problem = "a force or a pose was not finite: the force was switched off (event 'fault' in the record)";
         }
     }
@@ -223,10 +171,10 @@ struct Trainer::Impl {
     TrainOptions options;
     Broadcast broadcast;
     std::unique_ptr<Device> device;
-    Simulation simulation;
+    Session session;
+    ServoTiming timing;
     std::optional<Recorder> recorder;
     std::optional<FaultsAround> around;
-    Tally tally;
 };
 
 Trainer::Trainer(const SessionModel& model, const SessionInfo& info, const TrainOptions& options)
@@ -258,7 +206,9 @@ TrainResult Trainer::run()
     for (const auto& warning : warnings) {
         fmt::print(stderr, "palpate: {}\n", warning);
     }
-    TrainResult result = std::move(impl_->tally.result);
+    TrainResult result;
+    static_cast<SessionFigures&>(result) = impl_->session.figures();
+    result.timing = std::move(impl_->timing);
     result.warnings = warnings;
     result.signal = signalled;
     impl_->conclude(result);

@@ -1,14 +1,10 @@
 #pragma once
 
-#include <haptics/recorder.h>
-#include <haptics/replay.h>
-#include <haptics/score.h>
-#include <haptics/servo.h>
-#include <haptics/session_model.h>
 #include <session/devices.h>
 #include <session/faults.h>
+#include <session/session.h>
 
-#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -28,16 +24,9 @@ struct TrainOptions {
     std::function<bool()> lookAfter;
 };
 
-/// What a session came to.
-struct TrainResult {
+/// What a session came to, with everything around it.
+struct TrainResult : SessionFigures {
     haptics::ServoTiming timing;
-    haptics::Score score;
-    std::vector<haptics::CoreSample> cores;
-    std::array<double, haptics::maxStructures> nearest{};  // least distance to each structure [m]
-    std::uint64_t contacts = 0, punctures = 0;
-    double peakBasic = 0, peakAdditional = 0, peakTotal = 0;  // [N]
-    double energyMade = 0, energyDamped = 0;  // most that the hand was ever given net; taken by the controller [J]
-    std::uint64_t forceHash = 0;
     std::uint64_t lostRecords = 0;
     std::vector<std::string> warnings;
     int signal = 0;       // that ended it before its time; 0: none

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <haptics/recorder.h>
 #include <haptics/session_model.h>
 #include <sweep/plan.h>
 
@@ -42,7 +43,13 @@ private:
         double tickTime = 0;
     };
 
-    std::shared_ptr<const haptics::SessionModel> modelOf(const datasets::Scene& scene);
+    // A model and what a score and a record say of it.
+    struct Modelled {
+        haptics::SessionModel model;
+        haptics::SessionInfo info;
+    };
+
+    std::shared_ptr<const Modelled> modelOf(const datasets::Scene& scene);
     std::shared_ptr<const volume::Tissue> volumeOf(const datasets::Scene& scene);
     const Measured& referenceOf(const SweepCase& c);
     Measured measure(const datasets::Scene& scene, const Procedure& procedure, std::uint64_t seed,
@@ -51,7 +58,7 @@ private:
     const SweepPlan& plan_;
     std::string build_;
     // By the text that they follow from, the last used first.
-    std::list<std::pair<std::string, std::shared_ptr<const haptics::SessionModel>>> models_;
+    std::list<std::pair<std::string, std::shared_ptr<const Modelled>>> models_;
     std::list<std::pair<std::string, std::shared_ptr<const volume::Tissue>>> volumes_;
     std::list<std::pair<std::string, Measured>> references_;
 };

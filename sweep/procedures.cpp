@@ -2,10 +2,8 @@
 
 #include <base/processor_time.h>
 #include <haptics/measures.h>
-#include <haptics/replay.h>
-#include <haptics/score.h>
-#include <haptics/simulation.h>
 #include <session/devices.h>
+#include <session/session.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -21,39 +19,58 @@ namespace palpate::sweep {
 
 namespace {
 
+using haptics::Device;
 using haptics::DeviceSample;
 using haptics::TickRecord;
-using Seen = std::function<void(const TickRecord&)>;
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr double gap = 2e-3;      // between tool and surface before it sets out [m]
 constexpr double outside = 5e-3;  // where a needle's way begins and ends [m]
 constexpr double judged = 20e-3;  // the force of a hold is the mean over its end [s]
 
-// A simulation whose ticks in contact are timed.
-class Timed {
-public:
-    Timed(const haptics::SessionModel& model, const Seen& seen) : simulation_(model), seen_(seen) {}
+struct Run {
+    const haptics::SessionModel& model;
+    const haptics::SessionInfo& info;
+    haptics::Recorder* recorder;
+};
 
-    const TickRecord& tick(const DeviceSample& sample)
+// A device whose forces reach the hand some ticks late, and that takes the processor time of the ticks in contact.
+class Measured final : public Device {
+public:
+    Measured(Device& device, double delay)
+        : device_(device), line_(static_cast<std::size_t>(std::llround(delay / haptics::tickSeconds)), Vec3(0.0))
     {
-        const double before = base::processorTime();
-        const TickRecord& record = simulation_.tick(sample);
+    }
+    DeviceSample read() noexcept override
+    {
+        const DeviceSample sample = device_.read();
+        began_ = base::processorTime();
+        return sample;
+    }
+    void write(Vec3 force) noexcept override
+    {
+        took_ = base::processorTime() - began_;
+        if (!line_.empty()) {
+            std::swap(force, line_[next_++ % line_.size()]);
+        }
+        device_.write(force);
+    }
+    void observe(const TickRecord& record) noexcept override
+    {
         if (record.phase != haptics::Phase::free || record.contacts > 0) {
-            seconds_ += base::processorTime() - before;
+            seconds_ += took_;
             ++ticks_;
         }
-        if (seen_) {
-            seen_(record);
-        }
-        return record;
+        device_.observe(record);
     }
+    bool finished() const noexcept override { return device_.finished(); }
     double mean() const noexcept { return ticks_ > 0 ? seconds_ / static_cast<double>(ticks_) : 0.0; }
 
 private:
-    haptics::Simulation simulation_;
-    const Seen& seen_;
-    double seconds_ = 0;
+    Device& device_;
+    std::vector<Vec3> line_;
+    std::size_t next_ = 0;
+    double began_ = 0, took_ = 0, seconds_ = 0;
     std::uint64_t ticks_ = 0;
 };
 
@@ -87,50 +104,78 @@ struct Felt {
     double force() const noexcept { return heldTicks > 0 ? held / heldTicks : none; }
 };
 
-// The tool at rest before it sets out: forces are ramped up after the start.
-void settle(Timed& timed, const DeviceSample& at)
+int ticksIn(double seconds) noexcept
 {
-    for (double t = 0; t < haptics::settledAfter; t += haptics::tickSeconds) {
-        timed.tick(at);
-    }
+    return static_cast<int>(std::ceil(seconds / haptics::tickSeconds));
 }
 
-// Along `way` from `from` by `length` and back to where it began; the hold is in between.
-Felt drive(Timed& timed, Vec3 from, Vec3 way, double length, const Procedure& p, bool back)
-{
-    Felt felt;
-    DeviceSample sample;
-    sample.position = from;
-    sample.axis = way;
-    sample.buttons = haptics::buttonDeadMan;
-    settle(timed, sample);
-    const double step = p.speed * haptics::tickSeconds;
-    const auto steps = static_cast<int>(std::ceil(length / step));
-    const auto at = [&](double far) -> const TickRecord& {
-        sample.position = from + far * way;
-        const TickRecord& r = timed.tick(sample);
-        felt.add(r, way);
-        return r;
-    };
-    for (int i = 1; i <= steps; ++i) {
-        at(std::min(i * step, length));
+// The tool on a prescribed way: at rest until the forces are ramped up, along `way` by `length`, the hold, and with `back`
+// to where it began.
+class Drive final : public Device {
+public:
+    Drive(Vec3 from, Vec3 way, double length, const Procedure& p, bool back)
+        : from_(from),
+          way_(way),
+          length_(length),
+          step_(p.speed * haptics::tickSeconds),
+          setsOut_(ticksIn(haptics::settledAfter)),
+          arrives_(setsOut_ + static_cast<int>(std::ceil(length / step_))),
+          leaves_(arrives_ + ticksIn(p.hold)),
+          ends_(leaves_ + (back ? arrives_ - setsOut_ : 0))
+    {
     }
-    const auto wait = static_cast<int>(std::ceil(p.hold / haptics::tickSeconds));
-    const auto counted = static_cast<int>(std::ceil(judged / haptics::tickSeconds));
-    for (int i = 0; i < wait; ++i) {
-        const TickRecord& r = at(length);
-        if (i >= wait - counted) {
-            felt.hold(r, way);
+    DeviceSample read() noexcept override
+    {
+        ++tick_;
+        DeviceSample sample;
+        sample.position = from_ + reach() * way_;
+        sample.axis = way_;
+        sample.buttons = haptics::buttonDeadMan;
+        return sample;
+    }
+    void write(Vec3) noexcept override {}
+    void observe(const TickRecord& record) noexcept override
+    {
+        if (tick_ > setsOut_) {
+            felt_.add(record, way_);
+        }
+        if (tick_ > std::max(arrives_, leaves_ - ticksIn(judged)) && tick_ <= leaves_) {
+            felt_.hold(record, way_);
         }
     }
-    for (int i = 1; back && i <= steps; ++i) {
-        at(std::max(length - i * step, 0.0));
+    bool finished() const noexcept override { return tick_ >= ends_; }
+    const Felt& felt() const noexcept { return felt_; }
+
+private:
+    // Along the way [m].
+    double reach() const noexcept
+    {
+        if (tick_ <= setsOut_) {
+            return 0.0;
+        }
+        return tick_ <= leaves_ ? std::min((tick_ - setsOut_) * step_, length_)
+                                : std::max(length_ - (tick_ - leaves_) * step_, 0.0);
     }
-    return felt;
+
+    Vec3 from_, way_;
+    double length_, step_;                   // [m]
+    int setsOut_, arrives_, leaves_, ends_;  // last tick of each part
+    int tick_ = 0;                           // from 1 up
+    Felt felt_;
+};
+
+// The whole of a drive. Mean processor time of its ticks in contact [s].
+double carryOut(const Run& run, Drive& drive)
+{
+    session::Session session(run.model, run.info);
+    Measured measured(drive, 0.0);
+    session.run(measured, {.servo = {.paced = false}, .recorder = run.recorder});
+    return measured.mean();
 }
 
-ProcedureResult press(const haptics::SessionModel& model, const Procedure& p, const Seen& seen)
+ProcedureResult press(const Run& run, const Procedure& p)
 {
+    const auto& model = run.model;
     const auto& tool = model.scene.tool;
     if (tool.kind == datasets::ToolKind::needle) {
         throw std::runtime_error("procedure press: a needle pierces: set tool.kind to sphere or capsule");
@@ -142,73 +187,40 @@ ProcedureResult press(const haptics::SessionModel& model, const Procedure& p, co
         place -= model.surface.distance(place) * model.surface.normal(place);
     }
     const Vec3 way = -model.surface.normal(place);
-    Timed timed(model, seen);
-    const Felt felt = drive(timed, place - (tool.radius + gap) * way, way, gap + p.depth, p, false);
+    Drive drive(place - (tool.radius + gap) * way, way, gap + p.depth, p, false);
+    const double tickTime = carryOut(run, drive);
+    const Felt& felt = drive.felt();
     return {{felt.force(), felt.peak, felt.force() / p.depth, 1e3 * felt.work, static_cast<double>(felt.contacts)},
-            timed.mean()};
+            tickTime};
 }
 
-ProcedureResult needle(const haptics::SessionModel& model, const Procedure& p, const Seen& seen)
+ProcedureResult needle(const Run& run, const Procedure& p)
 {
+    const auto& model = run.model;
     if (model.scene.tool.kind != datasets::ToolKind::needle) {
         throw std::runtime_error("procedure needle: set tool.kind to needle");
     }
     const Vec3 way = glm::normalize(model.approach.aim - model.approach.entry);
-    Timed timed(model, seen);
-    const Felt felt = drive(timed, model.approach.entry - outside * way, way, outside + p.depth, p, true);
+    Drive drive(model.approach.entry - outside * way, way, outside + p.depth, p, true);
+    const double tickTime = carryOut(run, drive);
+    const Felt& felt = drive.felt();
     return {{felt.puncture, static_cast<double>(felt.punctures), felt.peak, felt.force(), felt.pull, 1e3 * felt.work},
-            timed.mean()};
+            tickTime};
 }
 
-// The forces reach the hand some ticks late.
-class LateDevice {
-public:
-    LateDevice(std::unique_ptr<haptics::Device> device, double delay)
-        : device_(std::move(device)), line_(static_cast<std::size_t>(std::llround(delay / haptics::tickSeconds)), Vec3(0.0))
-    {
-    }
-    DeviceSample read() { return device_->read(); }
-    bool finished() const { return device_->finished(); }
-    void answer(const TickRecord& record)
-    {
-        Vec3 force = record.total;
-        if (!line_.empty()) {
-            std::swap(force, line_[next_++ % line_.size()]);
-        }
-        device_->write(force);
-        device_->observe(record);
-    }
-
-private:
-    std::unique_ptr<haptics::Device> device_;
-    std::vector<Vec3> line_;
-    std::size_t next_ = 0;
-};
-
-ProcedureResult wholeSession(const haptics::SessionModel& model, const Procedure& p, std::uint64_t seed, const Seen& seen)
+ProcedureResult wholeSession(const Run& run, const Procedure& p, std::uint64_t seed)
 {
-    LateDevice device(session::openDevice(model, {"hand", p.trainee, p.seed.value_or(seed), nullptr}, nullptr), p.delay);
-    haptics::Scorer scorer(haptics::infoOf(model));
-    Timed timed(model, seen);
-    double basic = 0, additional = 0, made = 0, punctures = 0, seconds = 0;
-    while (!device.finished() && seconds < p.seconds) {
-        const TickRecord& r = timed.tick(device.read());
-        device.answer(r);
-        scorer.add(r);
-        basic = std::max(basic, glm::length(r.basic));
-        additional = std::max(additional, glm::length(r.additional));
-        made = std::max(made, r.energy);
-        for (std::uint32_t i = 0; i < r.eventCount; ++i) {
-            punctures += r.events[i].kind == haptics::EventKind::puncture ? 1 : 0;
-        }
-        seconds += haptics::tickSeconds;
-    }
-    const haptics::Score score = scorer.score();
-    ProcedureResult result{{}, timed.mean()};
+    const auto hand = session::openDevice(run.model, {"hand", p.trainee, p.seed.value_or(seed), nullptr}, nullptr);
+    Measured measured(*hand, p.delay);
+    session::Session session(run.model, run.info);
+    session.run(measured, {.servo = {.paced = false, .seconds = p.seconds}, .recorder = run.recorder});
+    const session::SessionFigures figures = session.figures();
+    ProcedureResult result{{}, measured.mean()};
     for (const haptics::Measure& m : haptics::measures()) {
-        result.values.push_back(m.value(score));
+        result.values.push_back(m.value(figures.score));
     }
-    result.values.insert(result.values.end(), {basic, additional, 1e3 * made, punctures, device.finished() ? 1.0 : 0.0});
+    result.values.insert(result.values.end(), {figures.peakBasic, figures.peakAdditional, 1e3 * figures.energyMade,
+                                               static_cast<double>(figures.punctures), hand->finished() ? 1.0 : 0.0});
     return result;
 }
 
@@ -243,18 +255,19 @@ std::vector<OutputInfo> outputsOf(ProcedureKind kind)
     return out;
 }
 
-ProcedureResult carryOut(const haptics::SessionModel& model, const Procedure& procedure, std::uint64_t seed,
-                         const Seen& seen)
+ProcedureResult carryOut(const haptics::SessionModel& model, const haptics::SessionInfo& info, const Procedure& procedure,
+                         std::uint64_t seed, haptics::Recorder* recorder)
 {
+    const Run run{model, info, recorder};
     switch (procedure.kind) {
         case ProcedureKind::press:
-            return press(model, procedure, seen);
+            return press(run, procedure);
         case ProcedureKind::needle:
-            return needle(model, procedure, seen);
+            return needle(run, procedure);
         case ProcedureKind::session:
             break;
     }
-    return wholeSession(model, procedure, seed, seen);
+    return wholeSession(run, procedure, seed);
 }
 
 }  // namespace palpate::sweep

@@ -3,7 +3,6 @@
 #include <datasets/scene_text.h>
 #include <haptics/recorder.h>
 #include <haptics/replay.h>
-#include <haptics/score.h>
 #include <sweep/formula.h>
 #include <sweep/procedures.h>
 
@@ -11,9 +10,9 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <map>
+#include <optional>
 #include <stdexcept>
 
 namespace palpate::sweep {
@@ -22,7 +21,6 @@ namespace {
 
 constexpr std::size_t modelsKept = 2;       // a case's and its reference's
 constexpr std::size_t referencesKept = 64;  // numbers only
-constexpr std::uint64_t ticksPerFlush = 256;
 
 // The value of `key`, made where it is not there; the least recently used goes.
 template <class Value, class Make>
@@ -40,17 +38,6 @@ const Value& kept(std::list<std::pair<std::string, Value>>& all, const std::stri
         all.pop_back();
     }
     return all.front().second;
-}
-
-haptics::SessionInfo describe(const haptics::SessionModel& model, const Procedure& procedure, std::uint64_t seed,
-                              const std::string& build)
-{
-    haptics::SessionInfo info = haptics::infoOf(model);
-    info.sceneOrigin = "sweep";
-    info.device = fmt::format("{} {}", procedureNames[static_cast<std::size_t>(procedure.kind)], procedure.trainee);
-    info.build = build;
-    info.seed = seed;
-    return info;
 }
 
 std::string procedureText(const Procedure& p)
@@ -75,30 +62,34 @@ std::shared_ptr<const volume::Tissue> CaseRunner::volumeOf(const datasets::Scene
                 [&] { return std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene)); });
 }
 
-std::shared_ptr<const haptics::SessionModel> CaseRunner::modelOf(const datasets::Scene& scene)
+std::shared_ptr<const CaseRunner::Modelled> CaseRunner::modelOf(const datasets::Scene& scene)
 {
-    return kept(models_, scene.text, modelsKept,
-                [&] { return std::make_shared<const haptics::SessionModel>(haptics::buildModel(scene, volumeOf(scene))); });
+    return kept(models_, scene.text, modelsKept, [&] {
+        auto model = haptics::buildModel(scene, volumeOf(scene));
+        haptics::SessionInfo info = haptics::infoOf(model);
+        info.sceneOrigin = "sweep";
+        info.build = build_;
+        return std::make_shared<const Modelled>(Modelled{std::move(model), std::move(info)});
+    });
 }
 
 CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Procedure& procedure, std::uint64_t seed,
                                          const std::filesystem::path& record)
 {
-    const auto model = modelOf(scene);
-    if (record.empty()) {
-        auto result = carryOut(*model, procedure, seed, {});
-        return {std::move(result.values), result.tickTime};
+    const auto modelled = modelOf(scene);
+    haptics::SessionInfo info = modelled->info;
+    info.device = fmt::format("{} {}", procedureNames[static_cast<std::size_t>(procedure.kind)], procedure.trainee);
+    info.seed = procedure.seed.value_or(seed);
+    std::optional<haptics::Recorder> recorder;
+    if (!record.empty()) {
+        recorder.emplace(record, info);
     }
-    haptics::Recorder recorder(record, describe(*model, procedure, procedure.seed.value_or(seed), build_));
-    auto result = carryOut(*model, procedure, seed, [&](const haptics::TickRecord& tick) {
-        recorder.push(tick);
-        if (tick.tick % ticksPerFlush == 0) {
-            recorder.flush();
+    auto result = carryOut(modelled->model, info, procedure, seed, recorder ? &*recorder : nullptr);
+    if (recorder) {
+        recorder->finish({});
+        if (!recorder->error().empty()) {
+            throw RecordFailed(fmt::format("{}: {}", record.string(), recorder->error()));
         }
-    });
-    recorder.finish({});
-    if (!recorder.error().empty()) {
-        throw RecordFailed(fmt::format("{}: {}", record.string(), recorder.error()));
     }
     return {std::move(result.values), result.tickTime};
 }

@@ -1,9 +1,9 @@
 #include <studies/tick/bench_tick.h>
 
 #include <haptics/hand.h>
+#include <session/session.h>
 
 #include <algorithm>
-#include <atomic>
 
 namespace palpate::studies {
 
@@ -13,7 +13,7 @@ TickCase benchTick(const SessionModel& model, const ServoOptions& options)
 {
     constexpr double startDistance = 10e-3;
     HandDevice hand = handBefore(model, startDistance);
-    Simulation simulation(model);
+    session::Session session(model, infoOf(model));
 
     TickCase result;
     double moved = 0.0;
@@ -30,8 +30,7 @@ TickCase benchTick(const SessionModel& model, const ServoOptions& options)
         }
         result.contact.add(tick);
     };
-    const std::atomic<bool> stop{false};
-    result.all = runServo(hand, simulation, options, sink, stop);
+    result.all = session.run(hand, {.servo = options}, sink);
     result.meanMoved = moved / static_cast<double>(std::max<std::uint64_t>(result.contact.count(), 1));
     return result;
 }

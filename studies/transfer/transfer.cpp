@@ -3,7 +3,7 @@
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
-#include <haptics/servo.h>
+#include <session/session.h>
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -220,15 +220,14 @@ private:
     int file_ = -1;
 };
 
-// One paced session in a thread of its own; `sink` as runServo()'s.
-std::uint64_t runSession(const SessionModel& model, Simulation& simulation, double seconds, const TickSink& sink)
+// Paced, in a thread of its own, with the scene's hand; `sink` as runServo()'s.
+std::uint64_t runPaced(session::Session& session, double seconds, const TickSink& sink)
 {
-    HandDevice hand = handBefore(model, startDistance);
-    const std::atomic<bool> stop{false};
+    HandDevice hand = handBefore(session.simulation().model(), startDistance);
     std::uint64_t ticks = 0;
     std::thread servo([&] {
         claimRealTime();
-        ticks = runServo(hand, simulation, {true, seconds, 0}, sink, stop).ticks;
+        ticks = session.run(hand, {.servo = {true, seconds, 0}}, sink).ticks;
     });
     servo.join();
     return ticks;
@@ -238,21 +237,21 @@ std::uint64_t runSession(const SessionModel& model, Simulation& simulation, doub
 
 Transfer measureTransfer(const SessionModel& model, const TransferOptions& options)
 {
-    const std::string session = "bench-ipc-" + std::to_string(::getpid());
-    Simulation simulation(model);
+    const std::string name = "bench-ipc-" + std::to_string(::getpid());
+    session::Session session(model, infoOf(model));
     Pipe pipe;
-    const Receiver receiver(options, session, pipe.name());
+    const Receiver receiver(options, name, pipe.name());
     Transfer transfer;
     if (options.transport == Transport::sharedMemory) {
-        Broadcast broadcast(session, model);
+        Broadcast broadcast(name, model);
         receiver.waitUntilReady();
-        transfer.sent = runSession(model, simulation, options.seconds, [&](const TickRecord& r, const ServoTiming& timing) {
-            broadcast.publish(r, timing, simulation);
+        transfer.sent = runPaced(session, options.seconds, [&](const TickRecord& r, const ServoTiming& timing) {
+            broadcast.publish(r, timing, session.simulation());
         });
     } else {
         receiver.waitUntilReady();
         pipe.open();
-        transfer.sent = runSession(model, simulation, options.seconds, [&](const TickRecord& r, const ServoTiming&) {
+        transfer.sent = runPaced(session, options.seconds, [&](const TickRecord& r, const ServoTiming&) {
             const Vec3 tip = r.device.position + r.deflection;
             pipe.write({r.tick, now(), {tip.x, tip.y, tip.z}});
         });

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <haptics/recorder.h>
+#include <haptics/replay.h>
+#include <haptics/score.h>
+#include <haptics/servo.h>
+#include <haptics/session_model.h>
+#include <haptics/simulation.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace palpate::session {
+
+/// What a session came to, from all its ticks.
+struct SessionFigures {
+    haptics::Score score;
+    std::vector<haptics::CoreSample> cores;                   // at most 64, in their order
+    std::array<double, haptics::maxStructures> nearest{};     // least distance to each structure [m]
+    std::uint64_t contacts = 0, punctures = 0;                // events
+    double peakBasic = 0, peakAdditional = 0, peakTotal = 0;  // [N]
+    double energyMade = 0, energyDamped = 0;  // most that the hand was ever given net; taken by the controller [J]
+    std::uint64_t forceHash = 0;              // of all forces, see haptics::ForceHash
+    bool faulted = false;                     // a force or a pose was not finite: the force was switched off
+};
+
+struct RunOptions {
+    haptics::ServoOptions servo;
+    haptics::Recorder* recorder = nullptr;    // gets every tick; null: none
+    const std::atomic<bool>* stop = nullptr;  // set: the session ends after the tick; null: it runs to its end
+};
+
+/// A session in the calling thread: poses in, ticks out, and what they came to. `palpate train`, sweeps and studies run
+/// theirs with it. Between construction and figures() it allocates nothing.
+class Session {
+public:
+    /// @param model  must outlive the session
+    /// @param info   of this model, see describeSession(): what the score goes by
+    /// Throws std::runtime_error for a scene with a device that is not known.
+    Session(const haptics::SessionModel& model, const haptics::SessionInfo& info);
+    Session(haptics::SessionModel&&, const haptics::SessionInfo&) = delete;  // a temporary would not outlive it
+
+    /// One millisecond: the pose of the tool in, forces and events out. The same poses give the same ticks, bit for bit.
+    /// @returns  valid until the next tick
+    const haptics::TickRecord& tick(const haptics::DeviceSample& pose) noexcept;
+
+    /// tick() after tick() with the poses of `device`, which gets the forces, until it has finished, the time of
+    /// `options.servo` is over or `options.stop` is set. See haptics::runServo().
+    /// @param also  gets every tick after the recorder; must not allocate, lock or block in a paced session; may be empty
+    haptics::ServoTiming run(haptics::Device& device, const RunOptions& options, const haptics::TickSink& also = {});
+
+    const haptics::Simulation& simulation() const noexcept { return simulation_; }
+    /// Of the ticks so far. Allocates.
+    SessionFigures figures() const;
+
+private:
+    void add(const haptics::TickRecord& record) noexcept;
+
+    haptics::Simulation simulation_;
+    haptics::Scorer scorer_;
+    haptics::ForceHash hash_;
+    SessionFigures figures_;
+};
+
+}  // namespace palpate::session

@@ -1,0 +1,110 @@
+#include <session/session.h>
+
+#include <session/devices.h>
+#include <session/open.h>
+
+#include <gtest/gtest.h>
+
+#include <tests/allocations.h>
+
+#include <atomic>
+#include <bit>
+#include <vector>
+
+namespace palpate::session {
+namespace {
+
+class SessionTest : public testing::Test {
+protected:
+    static void SetUpTestSuite()
+    {
+        SceneChanges changes;
+        changes.setting = "fast";
+        model_ = new haptics::SessionModel(openSession("near-vessel", changes));
+    }
+    static void TearDownTestSuite() { delete model_; }
+
+    static const haptics::SessionModel& model() { return *model_; }
+    static haptics::SessionInfo info() { return describeSession(model(), "near-vessel", "hand"); }
+    static std::unique_ptr<haptics::Device> hand() { return openDevice(model(), {}, nullptr); }
+
+private:
+    static inline haptics::SessionModel* model_ = nullptr;
+};
+
+constexpr double length = 4.0;  // the scripted hand has punctured and fired by then [s]
+
+// The poses of a device's session, handed in one by one, give the same session: each bit of each force, and all figures.
+TEST_F(SessionTest, PosesHandedInAreTheDevicesSession)
+{
+    Session looped(model(), info());
+    std::vector<haptics::DeviceSample> poses;
+    const auto device = hand();
+    const auto timing = looped.run(*device, {.servo = {.paced = false, .seconds = length}},
+                                   [&](const haptics::TickRecord& r, const auto&) { poses.push_back(r.device); });
+    ASSERT_EQ(timing.ticks, poses.size());
+    ASSERT_EQ(poses.size(), 4000U);
+
+    Session stepped(model(), info());
+    haptics::ForceHash hash;
+    for (const haptics::DeviceSample& pose : poses) {
+        hash.add(stepped.tick(pose));
+    }
+    const SessionFigures a = looped.figures(), b = stepped.figures();
+    EXPECT_EQ(a.forceHash, b.forceHash);
+    EXPECT_EQ(a.forceHash, hash.value());
+    EXPECT_GT(a.punctures, 0U);
+    EXPECT_EQ(a.punctures, b.punctures);
+    EXPECT_EQ(a.cores.size(), b.cores.size());
+    EXPECT_EQ(a.nearest, b.nearest);
+    EXPECT_EQ(a.peakTotal, b.peakTotal);
+    EXPECT_EQ(a.energyMade, b.energyMade);
+    EXPECT_EQ(a.score.total, b.score.total);
+    EXPECT_EQ(a.score.pathLength, b.score.pathLength);
+    EXPECT_FALSE(a.faulted);
+}
+
+TEST_F(SessionTest, EndsAfterTheTickInWhichItIsTold)
+{
+    Session session(model(), info());
+    const auto device = hand();
+    std::atomic<bool> stop{false};
+    std::uint64_t last = 0;
+    const auto timing =
+        session.run(*device, {.servo = {.paced = false}, .stop = &stop}, [&](const haptics::TickRecord& r, const auto&) {
+            last = r.tick;
+            stop = r.tick == 41;
+        });
+    EXPECT_EQ(last, 41U);
+    EXPECT_EQ(timing.ticks, 42U);
+}
+
+// A pose that is no number switches the force off; the figures say so.
+TEST_F(SessionTest, FiguresTellOfAFault)
+{
+    Session session(model(), info());
+    haptics::DeviceSample pose{.position = model().approach.entry, .buttons = haptics::buttonDeadMan};
+    session.tick(pose);
+    EXPECT_FALSE(session.figures().faulted);
+    pose.position.x = std::bit_cast<double>(0x7ff8000000000000);
+    EXPECT_EQ(session.tick(pose).total, Vec3(0.0));
+    EXPECT_TRUE(session.figures().faulted);
+}
+
+TEST_F(SessionTest, ATickAllocatesNothing)
+{
+    Session session(model(), info());
+    const Vec3 way = glm::normalize(model().approach.aim - model().approach.entry);
+    haptics::DeviceSample pose{.axis = way, .buttons = haptics::buttonDeadMan | haptics::buttonFire};
+    EXPECT_EQ(tests::heapCallsIn([&] {
+                  for (int i = 0; i < 400; ++i) {
+                      pose.position = model().approach.entry + (0.1e-3 * i - 10e-3) * way;
+                      session.tick(pose);
+                  }
+              }),
+              0U);
+    EXPECT_GT(session.figures().peakBasic, 0.0);
+}
+
+}  // namespace
+}  // namespace palpate::session
