@@ -1,6 +1,7 @@
 #include <apps/replay_player.h>
 #include <base/build.h>
 #include <command/json.h>
+#include <render/keys.h>
 #include <render/viewer.h>
 
 #include <CLI/CLI.hpp>
@@ -55,11 +56,15 @@ void writeTimeline(const std::string& file, const std::vector<palpate::render::S
 
 int main(int argc, char** argv)
 {
-    CLI::App app("Shows a Palpate session that runs in another process. The key ? lists keys and what the mouse does.",
-                 "palpate-view");
+    CLI::App app(
+        "Shows a Palpate session that runs in another process. --keys lists what keys and mouse do, as does the "
+        "key ?.",
+        "palpate-view");
     palpate::render::ViewerOptions options;
     std::string size = "1280x960", json, layout = "trainee", slices = "tinted", timeline, replay;
     app.set_version_flag("--version", std::string(palpate::base::build()));
+    app.add_flag_callback(
+        "--keys", [] { throw CLI::CallForVersion(palpate::render::keysInWords(), 0); }, "List what keys and mouse do");
     app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
     app.add_option("--offscreen", options.offscreen, "Write PNG files to this folder instead of opening a window");
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");

@@ -9,16 +9,13 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace palpate::render {
 namespace {
 
-constexpr double turnStep = 2.0 / 180.0 * 3.14159265358979323846;  // of an arrow key [rad]
-constexpr double depthStep = 1e-3;                                 // of a notch of the wheel [m]
-constexpr double fineShare = 0.2;                                  // with Shift
-constexpr double opacityStep = 1.25;
+constexpr double depthStep = 1e-3;  // of a notch of the wheel [m]
+constexpr double fineShare = 0.2;   // with Shift
 
 Controls& controlsOf(GLFWwindow* window)
 {
@@ -42,24 +39,6 @@ glm::dvec2 pixelAt(GLFWwindow* window, double x, double y)
 Point2 point(glm::dvec2 p)
 {
     return {p.x, p.y};
-}
-
-SliceLook following(SliceLook look)
-{
-    return look == SliceLook::tinted ? SliceLook::image : look == SliceLook::image ? SliceLook::tissue : SliceLook::tinted;
-}
-
-// The picture's directions at a point [m]: to the right and up on the screen, and into it. Unit vectors.
-struct Screen {
-    glm::dvec3 right, up, into;
-};
-
-Screen screenAt(const Picture& picture, glm::dvec3 at)
-{
-    const glm::dvec3 origin = picture.under({0, 0}, at);
-    const glm::dvec3 right = glm::normalize(picture.under({100, 0}, at) - origin),
-                     up = glm::normalize(picture.under({0, 100}, at) - origin);
-    return {right, up, glm::cross(up, right)};
 }
 
 }  // namespace
@@ -144,82 +123,17 @@ void Controls::wheel(double notches, bool fine)
 {
     used_ = true;
     if (hand_.is())
-        hand_.move((fine ? fineShare : 1.0) * notches * depthStep * screenAt(picture_, hand_.target()).into);
+        hand_.move((fine ? fineShare : 1.0) * notches * depthStep * screen().into);
     else
         camera(notches > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
 }
 
-void Controls::key(int key, const std::string& name, bool again, bool shift)
+Controls::Screen Controls::screen() const
 {
-    used_ = true;
-    if (key == GLFW_KEY_ESCAPE || name == "q")
-        glfwSetWindowShouldClose(window_, GLFW_TRUE);
-    else if (!pictureKey(key, name, shift) && playback_ != nullptr)
-        playKey(key, name, shift);
-    else if (hand_.is())
-        handKey(key, name, again);
-}
-
-bool Controls::pictureKey(int key, const std::string& name, bool shift)
-{
-    if (key == GLFW_KEY_F1 || name == "h")
-        showHelp();
-    else if (name == "l")
-        picture_.show(picture_.layout() == Layout::trainee ? Layout::instructor : Layout::trainee);
-    else if (name == "r")
-        picture_.resetView();
-    else if (name == "c")
-        picture_.setCut(!picture_.cut());
-    else if (name == "i" && picture_.hasImage())
-        picture_.show(following(picture_.sliceLook()));
-    else if (name == "w" && picture_.hasImage())
-        picture_.nextWindow();
-    else if (key == GLFW_KEY_TAB)
-        picture_.selectTissue(shift ? -1 : 1);
-    else if (key == GLFW_KEY_PAGE_UP || key == GLFW_KEY_PAGE_DOWN)
-        picture_.changeOpacity(key == GLFW_KEY_PAGE_UP ? opacityStep : 1 / opacityStep);
-    else if (name == "+" || name == "=" || key == GLFW_KEY_KP_ADD)
-        camera(vtkCommand::MouseWheelForwardEvent);
-    else if (name == "-" || key == GLFW_KEY_KP_SUBTRACT)
-        camera(vtkCommand::MouseWheelBackwardEvent);
-    else
-        return false;
-    return true;
-}
-
-void Controls::handKey(int key, const std::string& name, bool again)
-{
-    const Screen screen = screenAt(picture_, hand_.target());
-    if (key == GLFW_KEY_LEFT || key == GLFW_KEY_RIGHT)
-        hand_.turn(screen.into, key == GLFW_KEY_RIGHT ? turnStep : -turnStep);
-    else if (key == GLFW_KEY_UP || key == GLFW_KEY_DOWN)
-        hand_.turn(screen.right, key == GLFW_KEY_UP ? turnStep : -turnStep);
-    else if (key == GLFW_KEY_SPACE && !again)
-        hand_.fire();
-    else if (name == "m" && !again)
-        hand_.mark();
-    else if (name == "e" && !again)
-        hand_.end();
-}
-
-void Controls::playKey(int key, const std::string& name, bool shift)
-{
-    Playback& p = *playback_;
-    // A second step may come before the player has taken the first.
-    const double asked = p.jump, now = std::isnan(asked) ? p.time.load() : asked;
-    const auto jump = [&p](double to) { p.jump = std::clamp<double>(to, 0, p.length); };
-    constexpr double tick = 1e-3, frame = 1.0 / 30, leap = 1.0;  // [s]
-    if (key == GLFW_KEY_SPACE)
-        p.paused = !p.paused;
-    else if (name == "." || name == ",") {
-        p.paused = true;
-        jump(now + (name == "." ? 1 : -1) * (shift ? frame : tick));
-    } else if (key == GLFW_KEY_RIGHT || key == GLFW_KEY_LEFT)
-        jump(now + (key == GLFW_KEY_RIGHT ? leap : -leap));
-    else if (key == GLFW_KEY_UP || key == GLFW_KEY_DOWN)
-        p.speed = std::clamp(p.speed * (key == GLFW_KEY_UP ? 2.0 : 0.5), 1.0 / 64, 8.0);
-    else if (key == GLFW_KEY_HOME || key == GLFW_KEY_END)
-        jump(key == GLFW_KEY_HOME ? 0.0 : p.length.load());
+    const glm::dvec3 at = hand_.target(), origin = picture_.under({0, 0}, at);
+    const glm::dvec3 right = glm::normalize(picture_.under({100, 0}, at) - origin),
+                     up = glm::normalize(picture_.under({0, 100}, at) - origin);
+    return {right, up, glm::cross(up, right)};
 }
 
 void Controls::scrub()
@@ -236,40 +150,6 @@ void Controls::showHelp()
     used_ = true;
     helping_ = !helping_;
     picture_.setHelp(helping_ ? help() : std::vector<KeyHelp>());
-}
-
-std::vector<KeyHelp> Controls::help() const
-{
-    std::vector<KeyHelp> keys;
-    if (hand_.is())
-        keys = {{"hold left", "take the tool and move it in the plane of the picture"},
-                {"  wheel", "push it into the picture, or pull it out"},
-                {"  Shift", "five times finer"},
-                {"  arrows", "turn the tool"},
-                {"  Space", "fire the biopsy gun"},
-                {"M", "mark the place of the tool"},
-                {"E", "end the session"}};
-    else if (playback_ != nullptr)
-        keys = {{"Space", "pause, play"},
-                {". ,", "one tick on, back; with Shift a frame"},
-                {"right left", "a second on, back"},
-                {"up down", "twice as fast, half as fast"},
-                {"Home End", "to the beginning, the end"},
-                {"hold left", "drag through the time"}};
-    std::vector<KeyHelp> all{{hand_.is() || playback_ != nullptr ? "hold right" : "hold left", "turn the camera"},
-                             {"hold middle", "shift the camera"},
-                             {hand_.is() ? "+ -" : "wheel, + -", "nearer, further"},
-                             {"R", "camera and opacities as at first"},
-                             {"L", "layout: trainee, instructor"},
-                             {"C", "cut towards the tool, whole body"},
-                             {"Tab", "choose a tissue"},
-                             {"Page up, down", "the tissue's opacity"},
-                             {"? H F1", "these keys"},
-                             {"Q Esc", "close the window"}};
-    if (picture_.hasImage())
-        all.insert(all.begin() + 6, {{"I", "slices: image and tissues, image, tissues"}, {"W", "the image's grey window"}});
-    keys.insert(keys.end(), all.begin(), all.end());
-    return keys;
 }
 
 std::string Controls::caption() const

@@ -21,7 +21,7 @@ namespace palpate::render {
 ///     any other session                 left or right: camera, wheel: zoom
 ///     record                            left: drag through the time, right: camera, wheel: zoom
 ///
-/// Middle shifts the camera. help() lists the keys.
+/// Middle shifts the camera. What keys do is in keys.cpp.
 class Controls {
 public:
     /// Listens to `window` until it is destroyed. All must outlive that. @param playback  of a record; null = a live
@@ -37,18 +37,43 @@ public:
     bool used() noexcept;
     bool holding() const noexcept { return hand_.held(); }
 
+    struct Press {
+        int sign;  // of the stroke
+        bool shift;
+    };
+    static constexpr int once = 0;  // instead of a sign: a key that is held down does not repeat
+    struct Stroke {
+        int key = 0;  // GLFW_KEY_..; 0: by its name on this keyboard
+        char name = 0;
+        int sign = 1;  // of two keys that do opposite things
+    };
+    struct Key {
+        unsigned windows;  // kinds, added up
+        const char* shown;
+        const char* what;
+        std::vector<Stroke> strokes;
+        void (*act)(Controls&, const Press&);
+        bool ofImage = false;  // only where the body has a CT or MR
+    };
+    /// The one list of them.
+    static const std::vector<Key> keys;
+
 private:
+    // The picture's directions at the hand [m]: to the right and up on the screen, and into it. Unit vectors.
+    struct Screen {
+        glm::dvec3 right, up, into;
+    };
     void button(int button, bool down);
     void moved(glm::dvec2 to, bool fine);
     void wheel(double notches, bool fine);
     void key(int key, const std::string& name, bool again, bool shift);
-    bool pictureKey(int key, const std::string& name, bool shift);
-    void handKey(int key, const std::string& name, bool again);
-    void playKey(int key, const std::string& name, bool shift);
+    bool applies(const Key& key) const;
+    std::vector<KeyHelp> help() const;
+    Screen screen() const;
+    void jumpBy(double seconds);
     void scrub();
     void camera(unsigned long event);
     void showHelp();
-    std::vector<KeyHelp> help() const;
     std::string caption() const;
 
     GLFWwindow* window_;

@@ -1,0 +1,56 @@
+#define GLFW_INCLUDE_NONE
+#include <GLFW/glfw3.h>
+
+#include <render/controls.h>
+#include <render/keys.h>
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+#include <sstream>
+#include <string>
+#include <tuple>
+
+namespace palpate::render {
+namespace {
+
+// In each kind of window a key does one thing. Keys that are known by their letter have none of GLFW's codes that mean the
+// same (those are ASCII).
+TEST(Keys, NoKeyHasTwoMeanings)
+{
+    std::set<std::tuple<unsigned, int, char>> seen;
+    for (const Controls::Key& key : Controls::keys) {
+        EXPECT_EQ(key.strokes.empty(), key.act == nullptr) << key.shown;
+        EXPECT_NE(std::string(key.what), "") << key.shown;
+        for (const Controls::Stroke& s : key.strokes) {
+            EXPECT_NE(s.key == 0, s.name == 0) << key.shown;
+            EXPECT_TRUE(s.key == 0 || s.key >= GLFW_KEY_ESCAPE || s.key == GLFW_KEY_SPACE) << key.shown;
+            for (const unsigned window : {1U, 2U, 4U}) {
+                if ((key.windows & window) != 0) {
+                    EXPECT_TRUE(seen.emplace(window, s.key, s.name).second) << key.shown << ": " << key.what;
+                }
+            }
+        }
+    }
+    EXPECT_GT(seen.size(), 40U);
+}
+
+// The page has what `palpate-view --keys` prints, and so each key of the list.
+TEST(Keys, ThePageHasAllOfThem)
+{
+    std::ifstream in(PALPATE_SOURCE_DIR "/docs/viewer.md");
+    std::ostringstream page;
+    page << in.rdbuf();
+    std::string block, line;
+    for (std::istringstream words(keysInWords()); std::getline(words, line);) {
+        block += (line.empty() ? "" : "    ") + line + "\n";
+    }
+    EXPECT_NE(page.str().find(block), std::string::npos) << "put this into docs/viewer.md:\n" << block;
+    for (const Controls::Key& key : Controls::keys) {
+        EXPECT_NE(block.find(key.what), std::string::npos) << key.shown;
+    }
+}
+
+}  // namespace
+}  // namespace palpate::render
