@@ -197,7 +197,7 @@ PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std
         return {there, std::chrono::duration<double>(Clock::now() - begin).count(), 0.0};
     }
     const auto told = [&](std::size_t done, std::size_t running) {
-        folder.lock().beat();
+        folder.lock().check();
         progress.show(interrupts > 0 ? fmt::format("finishing {}; Ctrl-C again leaves them", plural(running, "case"))
                                      : bar(before, done, all, begin));
         return interrupts == 0;

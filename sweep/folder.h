@@ -50,8 +50,15 @@ public:
     void forget(std::size_t index) const;
     /// Takes away what runs that were killed have left half written. Of a folder that is held.
     void clean() const;
-    /// Of a folder that is held: says now and then that it still is, see FolderLock::beat().
-    FolderLock& lock() { return *lock_; }
+    /// Of a folder that is held.
+    const FolderLock& lock() const { return *lock_; }
+    /// In a process of the run, see FolderLock::leave().
+    void leaveLock() noexcept
+    {
+        if (lock_) {
+            lock_->leave();
+        }
+    }
     /// Where a case's record goes: nothing is there yet.
     std::filesystem::path record(std::size_t index) const;
 

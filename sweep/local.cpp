@@ -9,11 +9,12 @@
 
 namespace palpate::sweep {
 
-PoolResult runLocally(const SweepFolder& folder, const std::vector<std::size_t>& cases, int jobs, const std::string& build,
+PoolResult runLocally(SweepFolder& folder, const std::vector<std::size_t>& cases, int jobs, const std::string& build,
                       const std::function<bool(std::size_t, std::size_t)>& told, const std::function<bool()>& abandoned)
 {
     PoolWork work;
     work.start = [&] {
+        folder.leaveLock();
         const auto runner = std::make_shared<CaseRunner>(folder.plan(), build);
         return [&folder, &cases, &build, runner](std::size_t item) {
             folder.write(runCase(*runner, folder, cases[item], build));

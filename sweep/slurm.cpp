@@ -231,7 +231,7 @@ bool runOnSlurm(SweepFolder& folder, const std::vector<std::size_t>& cases, cons
     cluster.submit(cases);
     while (!cluster.idle()) {
         std::this_thread::sleep_for(lookEvery);
-        folder.lock().beat();
+        folder.lock().check();
         std::vector<std::size_t> again;
         for (const std::size_t i : cluster.look()) {
             if (++losses[i] < mostLosses) {
@@ -266,7 +266,7 @@ void workOnChunk(const fs::path& file, int jobs, const std::string& build)
     if (!submission.is_object() || !submission.contains("chunks") || number >= submission["chunks"].size()) {
         throw std::runtime_error(file.string() + ": holds no chunk for this task");
     }
-    const SweepFolder folder(submission.at("folder").get<std::string>(), "", false);
+    SweepFolder folder(submission.at("folder").get<std::string>(), "", false);
     const auto lock = submission.at("lock").get<std::string>();
     std::vector<std::size_t> cases;
     for (const std::size_t i : submission["chunks"][number]) {
