@@ -4,7 +4,9 @@
 #include <command/interrupted.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
+#ifdef PALPATE_SWEEP
 #include <sweep/command.h>
+#endif
 
 #include <CLI/CLI.hpp>
 
@@ -69,7 +71,9 @@ int main(int argc, char** argv)
     addDevices(app);
     studies::addAccuracy(app);
     studies::addStability(app);
+#ifdef PALPATE_SWEEP
     sweep::addSweep(app);
+#endif
 
     try {
         app.parse(wordsOf(argc, argv));

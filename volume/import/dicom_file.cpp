@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <mutex>
 
 namespace palpate::volume {
@@ -263,19 +262,6 @@ std::string trimmedText(const char* text)
     std::replace_if(
         out.begin(), out.end(), [](unsigned char c) { return c < 32; }, ' ');
     return out;
-}
-
-bool isDicom(const std::filesystem::path& file)
-{
-    std::ifstream in(file, std::ios::binary);
-    std::string start(132, '\0');
-    in.read(start.data(), static_cast<std::streamsize>(start.size()));
-    if (in.gcount() == 132 && start.compare(128, 4, "DICM") == 0) {
-        return true;
-    }
-    // Without a preamble a data set begins with group 8, in little endian.
-    const bool group = start[0] == 8 && start[1] == 0 && static_cast<unsigned char>(start[2]) < 0x20 && start[3] == 0;
-    return in.gcount() >= 16 && group;
 }
 
 DicomObject readDicom(const std::filesystem::path& file)

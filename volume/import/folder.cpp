@@ -6,6 +6,7 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
+#include <fstream>
 
 namespace palpate::volume {
 
@@ -107,6 +108,19 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
 }
 
 }  // namespace
+
+bool isDicom(const std::filesystem::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    std::string start(132, '\0');
+    in.read(start.data(), static_cast<std::streamsize>(start.size()));
+    if (in.gcount() == 132 && start.compare(128, 4, "DICM") == 0) {
+        return true;
+    }
+    // Without a preamble a data set begins with group 8, in little endian.
+    const bool group = start[0] == 8 && start[1] == 0 && static_cast<unsigned char>(start[2]) < 0x20 && start[3] == 0;
+    return in.gcount() >= 16 && group;
+}
 
 Files dicomFilesIn(const std::filesystem::path& folder)
 {
