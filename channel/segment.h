@@ -147,7 +147,7 @@ std::string segmentName(const std::string& session);
 
 /// Opens the segment `name` where it is a regular file of this user's own, and never waits: others may put a pipe, or a
 /// file that they hold locked, under any name. Returns -1 otherwise, with errno (EPERM: it is not ours).
-/// @param access  O_RDONLY or O_RDWR
+/// `access` is O_RDONLY or O_RDWR.
 int openSegment(const std::string& name, int access) noexcept;
 
 /// Where the system keeps the segments (Linux).

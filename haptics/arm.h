@@ -51,8 +51,9 @@ std::vector<double> seededLateness(std::size_t count, double mean, double period
 /// It lives in ticks and not in wall time. read() and write() allocate nothing.
 class Arm {
 public:
-    /// @param start   where the tip rests and the hand holds it [m]    @param period  between samples [s]
-    /// Throws std::runtime_error for a delay that is longer than the line holds (256 samples).
+    /// @param device  its mechanics    @param grip  of the hand    @param start  where the tip rests and is held [m]
+    /// @param period  between samples [s]. Throws std::runtime_error for a delay that is longer than the line holds (256
+    /// samples).
     explicit Arm(const DeviceParameters& device, const Grip& grip = {}, Vec3 start = Vec3(0.0),
                  double period = tickSeconds);
 

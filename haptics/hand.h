@@ -22,7 +22,7 @@ struct HandParameters {
 /// after it, the force of the device acts back. It lives in ticks, not in wall time: a late tick changes nothing.
 class HandDevice final : public Device {
 public:
-    /// @param axis  of the tool, towards its tip (unit vector)    @param start  of the tip [m]
+    /// Of a tool along `axis` (unit vector, towards its tip) whose tip starts at `start` [m]; a tick is `period` long [s].
     HandDevice(const HandParameters& parameters, std::vector<datasets::TraineeStep> script, Vec3 start, Vec3 axis,
                double period = tickSeconds);
 

@@ -35,7 +35,7 @@ class Tremor {
 public:
     static constexpr double lowest = 8.0, highest = 12.0;  // [Hz]
 
-    /// @param rms  of the vector [m]
+    /// @param rms  of the vector [m]    @param random  phases and frequencies are drawn from it
     Tremor(double rms, datasets::Random& random) noexcept : amplitude_(rms * std::sqrt(2.0 / (3.0 * waves)))
     {
         for (Wave& w : waves_) {

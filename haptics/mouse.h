@@ -24,7 +24,8 @@ public:
     /// What the viewer has written last; nothing while there is none. Must neither allocate nor block.
     using Source = std::function<std::optional<channel::Input>()>;
 
-    /// @param start  where the tip waits until the viewer's hand moves it [m]    @param axis  of the tool (unit vector)
+    /// The tip waits at `start` [m] until the viewer's hand moves it; `axis` is the tool's (unit vector), `period` a tick
+    /// [s].
     MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis, double period = tickSeconds);
 
     DeviceSample read() noexcept override;

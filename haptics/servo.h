@@ -11,10 +11,11 @@
 
 namespace palpate::haptics {
 
+/// How a loop keeps time and when it ends.
 struct ServoOptions {
     bool paced = true;   // one tick per millisecond; false: as fast as it goes, for batches
     double seconds = 0;  // end after this much session time; 0 = when the device has finished
-    // Paced: asks for a cheaper model when more than this many of the last thousand ticks were missed; 0 = never.
+    /// Paced: asks for a cheaper model when more than this many of the last thousand ticks were missed; 0 = never.
     std::uint64_t missedAllowed = 100;
 };
 

@@ -14,21 +14,21 @@ namespace palpate::haptics {
 
 /// The target or a vital structure, with its distance at rest.
 struct GuardedStructure {
-    std::string name;
-    volume::DistanceField distance;  // at rest [m]
-    double warnDistance = 0;         // [m]; 0 for the target
-    double gain = 1;                 // of its proximity force
-    std::vector<std::uint16_t> labels;
+    std::string name;                   // as in the scene
+    volume::DistanceField distance;     // at rest [m]
+    double warnDistance = 0;            // [m]; 0 for the target
+    double gain = 1;                    // of its proximity force
+    std::vector<std::uint16_t> labels;  // its label values in the volume
 };
 
 /// Everything about a session that does not change while it runs.
 struct SessionModel {
-    datasets::Scene scene;
-    std::shared_ptr<const volume::Tissue> tissue;
-    datasets::Approach approach;
-    volume::DistanceField surface;      // of the body at rest [m]
-    volume::ScalarField youngsModulus;  // [Pa]
-    chainmail::Lattice lattice;
+    datasets::Scene scene;                                  // its text is what a record keeps
+    std::shared_ptr<const volume::Tissue> tissue;           // never null
+    datasets::Approach approach;                            // the planned line, patient frame [m]
+    volume::DistanceField surface;                          // of the body at rest [m]
+    volume::ScalarField youngsModulus;                      // [Pa]
+    chainmail::Lattice lattice;                             // its nodes are those of all fields
     std::shared_ptr<const chainmail::ElasticBody> elastic;  // level `elastic`: its cells are the lattice's nodes
     std::vector<GuardedStructure> structures;               // target first, then the lookup table of vital structures
 };

@@ -18,12 +18,14 @@
 
 namespace palpate::haptics {
 
+/// What a simulation takes from elsewhere than the scene.
 struct SimulationOptions {
     double period = tickSeconds;             // between samples [s]
     std::optional<DeviceParameters> device;  // that the stabiliser keeps stable; none: the scene's
 };
 
 /// Windows, cycles, strain and viscosity of a tick of level `elastic`, by the scene's settings.
+/// @param settings  of the scene
 /// @param period  of a tick [s]; longer than the usual one it has time for more cycles
 chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settings, double period = tickSeconds) noexcept;
 
@@ -44,6 +46,7 @@ public:
     datasets::ModelLevel level() const noexcept { return level_; }
     /// How often it stepped down: elastic, elastic on small windows, chainmail, spring.
     int stepsDown() const noexcept { return stepsDown_; }
+    /// That it was made of.
     const SessionModel& model() const noexcept { return model_; }
 
 private:

@@ -27,10 +27,10 @@ inline constexpr std::uint32_t poseInvalid = 1U
 
 /// What a device says in one tick.
 struct DeviceSample {
-    Vec3 position{0.0};  // of the tool's tip (sphere: its centre), patient frame [m]
-    Vec3 axis{0, 1, 0};  // unit vector along the tool, towards the tip
-    std::uint32_t buttons = 0;
-    bool fresh = true;  // false when the device had no new pose for this tick
+    Vec3 position{0.0};         // of the tool's tip (sphere: its centre), patient frame [m]
+    Vec3 axis{0, 1, 0};         // unit vector along the tool, towards the tip
+    std::uint32_t buttons = 0;  // button.. and the two marks above, added up
+    bool fresh = true;          // false when the device had no new pose for this tick
 };
 
 /// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
@@ -86,11 +86,12 @@ struct LookAhead {
     }
 };
 
+/// Something that happened in a tick.
 struct Event {
-    EventKind kind = EventKind::contact;
-    std::uint8_t structure = 0xFF;  // index in the session's structures, 0xFF = none
-    std::uint8_t tissue = 0;        // row of the tissue table
-    double value = 0;
+    EventKind kind = EventKind::contact;  // says which of the others count, see there
+    std::uint8_t structure = 0xFF;        // index in the session's structures, 0xFF = none
+    std::uint8_t tissue = 0;              // row of the tissue table
+    double value = 0;                     // see EventKind, in SI units
 };
 
 /// The tissue in the notch when the gun fired, in rest space.
@@ -100,39 +101,40 @@ struct CoreSample {
     double targetFraction = 0;                  // share of the target structure
     double targetLength = 0;                    // length of the notch's axis inside the target [m]
     std::uint32_t fragments = 0;                // pieces that the core comes out in
-    Vec3 notchStart{0.0}, notchEnd{0.0};        // patient frame [m]
+    Vec3 notchStart{0.0};                       // patient frame [m]
+    Vec3 notchEnd{0.0};                         // patient frame [m]
 };
 
 /// Everything that one tick computed. A pure function of the model and of the samples up to here, but for `seconds`.
 struct TickRecord {
-    std::uint64_t tick = 0;
-    DeviceSample device;
-    Vec3 proxy{0.0};        // where the tip would be without penetration [m]
-    Vec3 tissueForce{0.0};  // what the tissue does to the tool, before the controller: not coupled, damped or capped [N]
-    Vec3 basic{0.0};        // F_BFFB, equation 2, as sent [N]
-    Vec3 additional{0.0};   // F_AFFB, equations 3-8 [N]
-    Vec3 total{0.0};        // F_DFFB as sent: with the controller's damping [N]
-    double energy = 0;      // net, that all forces so far gave to the hand [J]
-    double damped = 0;      // that the controller's damping took from it so far [J]
-    Phase phase = Phase::free;
-    std::uint8_t tissue = 0;           // row of the tissue table at the tip
-    std::uint8_t nearestVital = 0xFF;  // index of a structure
-    WarningLevel warning = WarningLevel::none;
-    std::uint8_t warned = 0xFF;  // index of the structure that the warning is about
-    bool fired = false;
-    bool faulted = false;
+    std::uint64_t tick = 0;  // from 0 up, without gaps
+    DeviceSample device;     // what the device said
+    Vec3 proxy{0.0};         // where the tip would be without penetration [m]
+    Vec3 tissueForce{0.0};   // what the tissue does to the tool, before the controller: not coupled, damped or capped [N]
+    Vec3 basic{0.0};         // F_BFFB, equation 2, as sent [N]
+    Vec3 additional{0.0};    // F_AFFB, equations 3-8 [N]
+    Vec3 total{0.0};         // F_DFFB as sent: with the controller's damping [N]
+    double energy = 0;       // net, that all forces so far gave to the hand [J]
+    double damped = 0;       // that the controller's damping took from it so far [J]
+    Phase phase = Phase::free;                     // of the tool
+    std::uint8_t tissue = 0;                       // row of the tissue table at the tip
+    std::uint8_t nearestVital = 0xFF;              // index of a structure
+    WarningLevel warning = WarningLevel::none;     // the most urgent one
+    std::uint8_t warned = 0xFF;                    // index of the structure that the warning is about
+    bool fired = false;                            // the gun, in this tick
+    bool faulted = false;                          // a force or a pose was not finite: zero from then on
     double inserted = 0;                           // length of the shaft inside [m]
     Vec3 deflection{0.0};                          // of a bent needle's tip from the device's position [m]
     std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
-    LookAhead ahead;
-    std::uint32_t contacts = 0;  // elements of tissue that the tool touches
-    double penetration = 0;      // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
-    std::uint32_t moved = 0;     // nodes that the deformation moved
-    double residual = 0;         // largest violated link that the work cap left over [m]
-    CoreSample core;             // when fired
-    std::array<Event, maxEventsPerTick> events{};
-    std::uint32_t eventCount = 0;
-    std::array<float, taskCount> seconds{};  // by task, wall time [s]
+    LookAhead ahead;                               // in front of the tip
+    std::uint32_t contacts = 0;                    // elements of tissue that the tool touches
+    double penetration = 0;   // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
+    std::uint32_t moved = 0;  // nodes that the deformation moved
+    double residual = 0;      // largest violated link that the work cap left over [m]
+    CoreSample core;          // when fired
+    std::array<Event, maxEventsPerTick> events{};  // in their order; the first eventCount count
+    std::uint32_t eventCount = 0;                  // of this tick
+    std::array<float, taskCount> seconds{};        // by task, wall time [s]
 };
 
 }  // namespace palpate::haptics

@@ -16,6 +16,7 @@ namespace palpate::session {
 /// The body of a recorded session at one moment, computed again from the record's poses.
 class DeformedState {
 public:
+    /// @param file      the record
     /// @param at        session time [s]; the last tick that is not later
     /// @param progress  is called with the share that is done; may be empty
     /// Throws std::runtime_error for a time that the record does not have and for forces that are not the record's.
@@ -24,8 +25,9 @@ public:
     DeformedState(const DeformedState&) = delete;
     DeformedState& operator=(const DeformedState&) = delete;
 
-    std::uint64_t tick() const noexcept { return tick_; }
-    const haptics::SessionModel& model() const noexcept { return model_; }
+    std::uint64_t tick() const noexcept { return tick_; }                   // of the record
+    const haptics::SessionModel& model() const noexcept { return model_; }  // of the record
+    /// The displaced nodes at that moment.
     const chainmail::DisplacedLattice& shape() const noexcept { return simulation_->shape(); }
 
     /// The labels as the tissue lies now, on the voxels of the volume: each has the label of the material that is at its

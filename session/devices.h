@@ -23,11 +23,12 @@ struct DeviceRequest {
 
 /// A kind of device that a session can have. The one list of them: commands, their help and sessions go by it.
 struct DeviceKind {
-    std::string_view name;
+    std::string_view name;  // on the command line; empty: every other name
     std::string_view what;  // in the help of --device
     std::string_view arm;   // simulated arm that the stabiliser reckons with, see haptics/arm.h; empty: the scene's
     bool somebodyHolds;     // real time only, and no trainee
     bool needsViewer;       // its poses come from a viewer
+    /// Opens it; throws std::runtime_error.
     std::unique_ptr<haptics::Device> (*open)(const haptics::SessionModel& model, const DeviceRequest& request,
                                              const haptics::Broadcast* broadcast);
 };
@@ -38,6 +39,8 @@ std::span<const DeviceKind> deviceKinds() noexcept;
 const DeviceKind& deviceKind(std::string_view name) noexcept;
 
 /// Opens the device that is asked for, some centimetres outside of the body.
+/// @param model      that it works on
+/// @param request    which, and whose hand it is
 /// @param broadcast  the session's channel to viewers; null where there is none
 /// Throws std::runtime_error where tool, task and trainee do not go together, and for a record that cannot be read.
 std::unique_ptr<haptics::Device> openDevice(const haptics::SessionModel& model, const DeviceRequest& request,

@@ -9,9 +9,9 @@ namespace palpate::session {
 
 /// What the command line says about a Novint Falcon.
 struct FalconOptions {
-    std::string firmware;  // file; empty: it runs already
-    std::string onUnplug = "exit";
-    double grip = 100;  // mass that the motors carry [g]
+    std::string firmware;           // file; empty: it runs already
+    std::string onUnplug = "exit";  // what the guardian does: see falcon/guardian.h
+    double grip = 100;              // mass that the motors carry [g]
 };
 
 /// Tells the user what the Falcon needs: a line on standard error.

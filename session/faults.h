@@ -25,14 +25,14 @@ enum class FaultKind {
 
 /// What goes wrong in a session on purpose, to see how it is borne.
 struct Fault {
-    FaultKind kind = FaultKind::gap;
-    double amount = 0;  // late: [s]; jump: [m]
-    double length = 0;  // how long it lasts [s]
-    double start = 0;   // session time [s]
+    FaultKind kind = FaultKind::gap;  // which
+    double amount = 0;                // late: [s]; jump: [m]
+    double length = 0;                // how long it lasts [s]
+    double start = 0;                 // session time [s]
 };
 
-/// Faults from the form WHAT[=AMOUNT][/LENGTH]@TIME, several separated by commas: "gap=50ms@2s,late=5ms/500ms@3s". Throws
-/// std::runtime_error.
+/// Faults from the form WHAT[=AMOUNT][/LENGTH]\@TIME, several separated by commas: "gap=50ms\@2s,late=5ms/500ms\@3s".
+/// Throws std::runtime_error.
 std::vector<Fault> parseFaults(const std::string& text);
 
 using Faults = std::vector<Fault>;
@@ -47,7 +47,7 @@ double gapAfter(const Faults& faults, std::uint64_t tick) noexcept;
 /// behind it lives in ticks, as those that are simulated or replayed do: through a gap and a delay it goes on.
 class FaultyDevice final : public haptics::Device {
 public:
-    FaultyDevice(std::unique_ptr<haptics::Device> device, Faults faults);
+    FaultyDevice(std::unique_ptr<haptics::Device> device, Faults faults);  // takes the device over
 
     haptics::DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override;
@@ -69,13 +69,14 @@ private:
 /// only tells it the tick. All is set right again when it ends.
 class FaultsAround {
 public:
+    /// @param faults  those of other kinds count for nothing
     /// @param record  the file that cannot grow    @param stall  stops (true) or lets go on (false) the viewers
     FaultsAround(Faults faults, std::filesystem::path record, std::function<void(bool)> stall);
     ~FaultsAround();
     FaultsAround(const FaultsAround&) = delete;
     FaultsAround& operator=(const FaultsAround&) = delete;
 
-    void tell(std::uint64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }
+    void tell(std::uint64_t tick) noexcept { tick_.store(tick, std::memory_order_relaxed); }  // from the servo thread
 
 private:
     void work(const Faults& faults, const std::filesystem::path& record);

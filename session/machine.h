@@ -17,7 +17,8 @@ inline constexpr double fittingTick = 0.7e-3;
 
 /// Time of ticks in contact, at a setting [s].
 struct TickTime {
-    double p50 = 0, p99 = 0;
+    double p50 = 0;  // half are at most so long
+    double p99 = 0;  // 99 of 100
 };
 
 /// The finest setting whose ticks fit; the fastest where none does. `default` comes first: `fine` is only asked for where a

@@ -29,18 +29,18 @@ struct LesionFrom {
 struct SceneChanges {
     std::optional<std::string> model;    // one of datasets::modelLevels
     std::optional<std::string> setting;  // of level `elastic`: one of datasets::elasticSettings()
-    // Names the setting where level is `elastic` and neither scene nor `setting` says one; empty: the scene's standard.
+    /// Names the setting where level is `elastic` and neither scene nor `setting` says one; empty: the scene's standard.
     std::function<std::string()> fit;
-    std::optional<std::string> dffb;    // one of dffbChoices
-    std::optional<std::string> trial;   // with "fade": "K/N"
-    std::optional<std::string> arm;     // haptic device: one of haptics::deviceNames()
-    std::optional<std::string> target;  // structure
-    std::optional<std::uint64_t> seed;  // of a phantom
-    bool seedElsewhere = false;         // it decides more than a phantom: no error where there is none
-    std::optional<double> voxelsPerSide;
-    std::optional<LesionFrom> lesion;  // only of a volume (.vdb)
-    bool palpate = false;              // find the target with a fingertip instead of taking a core of it
-    std::vector<datasets::Insert> inserts;
+    std::optional<std::string> dffb;        // one of dffbChoices
+    std::optional<std::string> trial;       // with "fade": "K/N"
+    std::optional<std::string> arm;         // haptic device: one of haptics::deviceNames()
+    std::optional<std::string> target;      // structure
+    std::optional<std::uint64_t> seed;      // of a phantom
+    bool seedElsewhere = false;             // it decides more than a phantom: no error where there is none
+    std::optional<double> voxelsPerSide;    // of a phantom
+    std::optional<LesionFrom> lesion;       // only of a volume (.vdb)
+    bool palpate = false;                   // find the target with a fingertip instead of taking a core of it
+    std::vector<datasets::Insert> inserts;  // further ones
 };
 
 /// Loads a volume (.vdb). Throws std::runtime_error, also for a folder.

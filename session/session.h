@@ -17,18 +17,23 @@ namespace palpate::session {
 
 /// What a session came to, from all its ticks.
 struct SessionFigures {
-    haptics::Score score;
-    std::vector<haptics::CoreSample> cores;                   // at most 64, in their order
-    std::array<double, haptics::maxStructures> nearest{};     // least distance to each structure [m]
-    std::uint64_t contacts = 0, punctures = 0;                // events
-    double peakBasic = 0, peakAdditional = 0, peakTotal = 0;  // [N]
-    double energyMade = 0, energyDamped = 0;  // most that the hand was ever given net; taken by the controller [J]
-    std::uint64_t forceHash = 0;              // of all forces, see haptics::ForceHash
-    bool faulted = false;                     // a force or a pose was not finite: the force was switched off
+    haptics::Score score;                                  // of all ticks so far
+    std::vector<haptics::CoreSample> cores;                // at most 64, in their order
+    std::array<double, haptics::maxStructures> nearest{};  // least distance to each structure [m]
+    std::uint64_t contacts = 0;                            // events: the tool touched the body
+    std::uint64_t punctures = 0;                           // events: a tissue gave way
+    double peakBasic = 0;                                  // largest force of the tissue, as sent [N]
+    double peakAdditional = 0;                             // largest guiding force [N]
+    double peakTotal = 0;                                  // largest of their sums, as sent [N]
+    double energyMade = 0;                                 // most that the hand was ever given net [J]
+    double energyDamped = 0;                               // taken by the controller [J]
+    std::uint64_t forceHash = 0;                           // of all forces, see haptics::ForceHash
+    bool faulted = false;                                  // a force or a pose was not finite: the force was switched off
 };
 
+/// How a session is run, and what hears of it beside.
 struct RunOptions {
-    haptics::ServoOptions servo;
+    haptics::ServoOptions servo;              // pace and length
     haptics::Recorder* recorder = nullptr;    // gets every tick; null: none
     const std::atomic<bool>* stop = nullptr;  // set: the session ends after the tick; null: it runs to its end
 };
@@ -47,11 +52,15 @@ public:
     /// @returns  valid until the next tick
     const haptics::TickRecord& tick(const haptics::DeviceSample& pose) noexcept;
 
-    /// tick() after tick() with the poses of `device`, which gets the forces, until it has finished, the time of
-    /// `options.servo` is over or `options.stop` is set. See haptics::runServo().
-    /// @param also  gets every tick after the recorder; must not allocate, lock or block in a paced session; may be empty
+    /// tick() after tick() until the device has finished, the time is over or the session is told to stop. See
+    /// haptics::runServo().
+    /// @param device   gives the poses and gets the forces
+    /// @param options  pace and length, recorder, how to stop it
+    /// @param also     gets every tick after the recorder; must not allocate, lock or block in a paced session; may be
+    /// empty
     haptics::ServoTiming run(haptics::Device& device, const RunOptions& options, const haptics::TickSink& also = {});
 
+    /// What viewers are shown: shape of the tissue, level, model.
     const haptics::Simulation& simulation() const noexcept { return simulation_; }
     /// Of the ticks so far. Allocates.
     SessionFigures figures() const;

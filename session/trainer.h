@@ -13,24 +13,25 @@
 
 namespace palpate::session {
 
+/// What is asked of a session.
 struct TrainOptions {
-    DeviceRequest device;
-    std::string session;           // name for viewers
-    std::filesystem::path record;  // empty: none
-    haptics::ServoOptions servo;
+    DeviceRequest device;                    // hand, mouse, falcon or a record
+    std::string session;                     // name for viewers
+    std::filesystem::path record;            // empty: none
+    haptics::ServoOptions servo;             // pace and length
     Faults faults;                           // on purpose
     std::function<void(bool)> stallViewers;  // stops them (true) or lets them go on; called from a thread of its own
-    // Called ten times a second while the session runs, from the thread of run(); false ends the session.
+    /// Called ten times a second while the session runs, from the thread of run(); false ends the session.
     std::function<bool()> lookAfter;
 };
 
 /// What a session came to, with everything around it.
 struct TrainResult : SessionFigures {
-    haptics::ServoTiming timing;
-    std::uint64_t lostRecords = 0;
-    std::vector<std::string> warnings;
-    int signal = 0;       // that ended it before its time; 0: none
-    std::string problem;  // not empty: the session ran, but not everything that was asked for was done
+    haptics::ServoTiming timing;        // of the loop
+    std::uint64_t lostRecords = 0;      // ticks that the recorder had no room for
+    std::vector<std::string> warnings;  // a sentence each, for the user
+    int signal = 0;                     // that ended it before its time; 0: none
+    std::string problem;                // not empty: the session ran, but not everything that was asked for was done
 };
 
 /// A session with everything around it: device, servo thread, viewers' channel, recorder, score.

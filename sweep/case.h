@@ -33,7 +33,7 @@ public:
     CaseRunner(const SweepPlan& plan, std::string build);
     ~CaseRunner();
 
-    /// @param record  file for a record of the session; empty: none
+    /// @param index   of the case    @param record  file for a record of the session; empty: none
     /// Throws std::runtime_error when the case's scene cannot be built.
     CaseRow run(std::size_t index, const std::filesystem::path& record = {});
 

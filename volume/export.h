@@ -10,6 +10,7 @@
 
 namespace palpate::volume {
 
+/// How a label map is written.
 struct ExportOptions {
     /// NIfTI-2, which keeps positions as doubles. NIfTI-1 keeps them as floats: 8e-6 mm at 150 mm from the origin.
     bool nifti2 = false;
@@ -28,7 +29,10 @@ void checkExportName(const std::filesystem::path& file);
 ///     .seg.nrrd       3D Slicer's segmentation, one layer: name, colour, extent and terminology of every segment
 ///     .mha, .mhd      not compressed; no names
 ///
-/// @param names  of labels; those of value 0 and of labels that no voxel has are left out
+/// @param file     that is written
+/// @param image    the labels
+/// @param names    of labels; those of value 0 and of labels that no voxel has are left out
+/// @param options  version of NIfTI, and who hears how far it is
 /// Throws std::runtime_error ("FILE: what is wrong and what to do").
 void exportLabels(const std::filesystem::path& file, const LabelImage& image, std::span<const LabelName> names,
                   const ExportOptions& options = {});
@@ -45,6 +49,8 @@ void exportVectors(const std::filesystem::path& file, const VoxelGrid& grid, std
 /// Writes nodes and what they have moved by as a VTK unstructured grid (.vtu): a hexahedron between every eight nodes of
 /// tissue, at rest [mm], with `displacement_mm` and `tissue`, the row of the tissue table. ParaView's "Warp By Vector"
 /// gives the deformed shape.
+/// @param file    that is written
+/// @param grid    of the nodes
 /// @param tissue  0: no node there (count x 1)
 /// @param u       displacement [m] (count x 3)
 void exportVtu(const std::filesystem::path& file, const NodeGrid& grid, std::span<const std::uint8_t> tissue,

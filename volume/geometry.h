@@ -18,8 +18,8 @@ namespace volume {
 
 /// Axis-aligned box in the patient frame [m].
 struct Box {
-    Vec3 low{0.0};
-    Vec3 high{0.0};
+    Vec3 low{0.0};   // the corner with the smallest coordinates
+    Vec3 high{0.0};  // that with the largest
 };
 
 /// Voxel index to patient frame: patient = linear * index + origin. Oblique and left-handed directions are kept.
@@ -28,8 +28,8 @@ struct Affine {
     Mat3 linear{1.0};  // column k is the step along voxel axis k [m]
     Vec3 origin{0.0};  // centre of voxel (0, 0, 0) [m]
 
-    Vec3 toPatient(Vec3 index) const noexcept { return linear * index + origin; }
-    Vec3 toIndex(Vec3 patient) const noexcept;
+    Vec3 toPatient(Vec3 index) const noexcept { return linear * index + origin; }  // place of a voxel index [m]
+    Vec3 toIndex(Vec3 patient) const noexcept;                                     // the reverse, of a place [m]
     /// Edge lengths of a voxel [m].
     Vec3 spacing() const noexcept;
     /// Volume of a voxel [m^3], positive also for left-handed directions.
@@ -44,22 +44,26 @@ struct NodeGrid {
     Vec3 origin{0.0};    // position of node (0, 0, 0) [m]
     double spacing = 0;  // [m]
 
+    /// How many nodes.
     std::size_t count() const noexcept
     {
         return static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z);
     }
+    /// Of a node in arrays over the grid.
     std::size_t offset(Index3 n) const noexcept
     {
         return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
                    static_cast<std::size_t>(size.x) +
                static_cast<std::size_t>(n.x);
     }
-    Index3 node(std::size_t offset) const noexcept;
-    Vec3 position(Index3 n) const noexcept { return origin + spacing * Vec3(n); }
+    Index3 node(std::size_t offset) const noexcept;                                // the reverse of offset()
+    Vec3 position(Index3 n) const noexcept { return origin + spacing * Vec3(n); }  // of a node [m]
+    /// Whether there is such a node.
     bool contains(Index3 n) const noexcept
     {
         return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size.x && n.y < size.y && n.z < size.z;
     }
+    /// From the first node to the last [m].
     Box box() const noexcept { return {origin, position(size - Index3(1))}; }
 };
 

@@ -26,14 +26,14 @@ struct ImportOptions {
 
 /// Voxels that two segments claimed.
 struct Overlap {
-    std::uint16_t kept = 0;  // label value of the segment that won
-    std::uint16_t lost = 0;  // of one that did not
-    std::uint64_t voxels = 0;
+    std::uint16_t kept = 0;    // label value of the segment that won
+    std::uint16_t lost = 0;    // of one that did not
+    std::uint64_t voxels = 0;  // how many
 };
 
 /// A label map as a file holds it, with what the reader had to say.
 struct ImportedLabels {
-    LabelImage image;
+    LabelImage image;                   // labels and their place
     std::vector<LabelName> names;       // segment names where the file holds some; tissue is left empty
     std::vector<Overlap> overlaps;      // a voxel of `lost` is counted once, against the segment that has it now
     std::vector<std::string> warnings;  // geometry that was chosen among several, and the like
@@ -41,11 +41,11 @@ struct ImportedLabels {
 
 /// An intensity image: CT, MR.
 struct ImportedImage {
-    Index3 size{0};
-    Affine affine;
-    std::vector<float> values;  // size.x * size.y * size.z, x fastest; finite
-    std::string what;           // "HU" where the file says that it is CT, else empty
-    std::vector<std::string> warnings;
+    Index3 size{0};                     // voxels along each axis
+    Affine affine;                      // where they are [m]
+    std::vector<float> values;          // size.x * size.y * size.z, x fastest; finite
+    std::string what;                   // "HU" where the file says that it is CT, else empty
+    std::vector<std::string> warnings;  // as of labels
 };
 
 /// Reads a label map. A file: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd),

@@ -12,10 +12,11 @@ namespace palpate::volume {
 
 /// A dense label map: the form in which labels arrive from a file or a phantom. x runs fastest.
 struct LabelImage {
-    Index3 size{0};
-    Affine affine;
+    Index3 size{0};                     // voxels along each axis
+    Affine affine;                      // where they are [m]
     std::vector<std::uint16_t> values;  // size.x * size.y * size.z
 
+    /// Of a voxel in `values`.
     std::size_t offset(Index3 n) const noexcept
     {
         return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
@@ -26,7 +27,7 @@ struct LabelImage {
 
 /// A name for one label value, and the tissue it is made of.
 struct LabelName {
-    std::uint16_t value = 0;
+    std::uint16_t value = 0;                                           // that voxels have in the label map
     std::string name;                                                  // the structure: "tumour", "left lung"
     std::string tissue;                                                // a row of the tissue table
     std::optional<std::array<std::uint8_t, 3>> colour = std::nullopt;  // red, green, blue, where the file gives one

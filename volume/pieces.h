@@ -20,7 +20,8 @@ struct RowRun {
 /// Source: A. Rosenfeld, J. L. Pfaltz, "Sequential Operations in Digital Picture Processing", J. ACM 13, 1966, on runs.
 class Pieces {
 public:
-    /// @param groupOf  the class of each label value; voxels of class 0 belong to no piece (65536 x 1)
+    /// @param image  labels    @param groupOf  the class of each of their values; those of class 0 are in no piece (65536 x
+    /// 1)
     Pieces(const LabelImage& image, const std::vector<std::uint16_t>& groupOf);
 
     std::span<const RowRun> runs() const noexcept { return runs_; }

@@ -8,7 +8,7 @@ namespace palpate::volume {
 
 /// Scalar samples on a cubic grid, trilinear between nodes. Plain memory, so that the servo path can read it.
 struct ScalarField {
-    NodeGrid grid;
+    NodeGrid grid;              // where the values are
     std::vector<float> values;  // one per node
 
     /// Trilinear value at `p` [m]; points outside take the value at the nearest point of the border.

@@ -20,13 +20,13 @@ namespace palpate::volume {
 
 /// One structure of a volume: a label value with its name, tissue and size.
 struct Structure {
-    std::uint16_t value = 0;
-    std::string name;
-    std::uint8_t tissue = 0;  // row of the tissue table
-    std::uint64_t voxels = 0;
+    std::uint16_t value = 0;                                           // that its voxels have
+    std::string name;                                                  // "tumour", "left lung"
+    std::uint8_t tissue = 0;                                           // row of the tissue table
+    std::uint64_t voxels = 0;                                          // how many
     double volume = 0;                                                 // [m^3]
     std::optional<std::array<std::uint8_t, 3>> colour = std::nullopt;  // as in LabelName
-    std::string terminology = {};
+    std::string terminology = {};                                      // as in LabelName
 };
 
 /// Where a volume comes from, kept in the file.
@@ -34,10 +34,10 @@ using Provenance = std::vector<std::pair<std::string, std::string>>;  // key, va
 
 /// Bytes held by each grid.
 struct MemoryUse {
-    std::uint64_t label = 0;
-    std::uint64_t stiffness = 0;
-    std::uint64_t occupancy = 0;
-    std::uint64_t image = 0;
+    std::uint64_t label = 0;      // grid of label values
+    std::uint64_t stiffness = 0;  // of Young's modulus
+    std::uint64_t occupancy = 0;  // of where there is tissue
+    std::uint64_t image = 0;      // of the image; 0: none
 };
 
 /// How an image scales Young's modulus: a factor, piecewise linear in the image's value and constant beyond the points.
@@ -45,20 +45,20 @@ struct StiffnessMap {
     std::vector<std::pair<double, double>> points;  // value, factor; by value. None: the image changes nothing
     std::vector<std::string> tissues;               // of the table, that it applies to; none: all of them
 
-    double factor(double value) const noexcept;
+    double factor(double value) const noexcept;  // of the modulus, at a value of the image
 };
 
 /// An intensity image on the voxels of a label map.
 struct CompanionImage {
     std::vector<float> values;  // one per voxel, x fastest
     std::string unit;           // "HU", or empty
-    StiffnessMap stiffness;
+    StiffnessMap stiffness;     // what it does to Young's modulus
 };
 
 /// The tissue in a cell as one elastic material.
 struct CellMaterial {
-    // Root of arithmetic times harmonic mean, times the share of the cell that is tissue; where some of it is held in
-    // space, that of the rest, stiffer by as much as it is thinner [Pa].
+    /// Root of arithmetic times harmonic mean, times the share of the cell that is tissue; where some of it is held in
+    /// space, that of the rest, stiffer by as much as it is thinner [Pa].
     float youngsModulus = 0;
     float poissonRatio = 0;  // mean over the tissue [-]
     float fixed = 0;         // share of the tissue that is held in space [-]
@@ -76,9 +76,9 @@ struct CellMaterial {
 /// Reader. OpenVDB stays behind this header.
 class Tissue {
 public:
-    /// Builds the grids. Throws std::runtime_error for a label value without a name or a name without a tissue.
-    /// Voxels of role air, and value 0 when it has no name, are outside.
-    /// @param companion  an intensity image that is kept with the labels, and may scale their stiffness; may be null
+    /// Builds the grids of `image`, whose values have these `names` with tissues of this `table`; an image beside it (may
+    /// be null) is kept and may scale the stiffness. Voxels of role air, and value 0 when it has no name, are outside.
+    /// Throws std::runtime_error for a label value without a name or a name without a tissue.
     static Tissue fromLabels(const LabelImage& image, TissueTable table, std::span<const LabelName> names,
                              Provenance provenance, const CompanionImage* companion = nullptr);
     /// Reads a .vdb that save() wrote. Throws std::runtime_error ("FILE: what is wrong and what to do").
@@ -86,24 +86,24 @@ public:
     /// Writes beside `file` and renames, so that a full disk leaves what was there.
     void save(const std::filesystem::path& file) const;
 
-    Tissue(Tissue&&) noexcept;
-    Tissue& operator=(Tissue&&) noexcept;
+    Tissue(Tissue&&) noexcept;             // leaves the other only to be destroyed
+    Tissue& operator=(Tissue&&) noexcept;  // as above
     ~Tissue();
 
-    Index3 size() const noexcept;
-    const Affine& affine() const noexcept;
-    const TissueTable& table() const noexcept;
+    Index3 size() const noexcept;                            // voxels along each axis
+    const Affine& affine() const noexcept;                   // of the voxels [m]
+    const TissueTable& table() const noexcept;               // kept in the file too
     std::span<const Structure> structures() const noexcept;  // every label value in the volume, 0 included, by value
-    const Provenance& provenance() const noexcept;
-    MemoryUse memory() const;
+    const Provenance& provenance() const noexcept;           // where it comes from
+    MemoryUse memory() const;                                // of the grids [bytes]
     /// The label map that it was made from.
     LabelImage labels() const;
     /// The image that it came with; where there is no tissue, the value of air (-1000 HU, else 0).
     std::optional<CompanionImage> companion() const;
-    bool hasImage() const noexcept;
+    bool hasImage() const noexcept;  // came with a CT or MR
     /// Of the image: its unit and what it does to the stiffness.
     const std::string& imageUnit() const noexcept;
-    const StiffnessMap& stiffnessMap() const noexcept;
+    const StiffnessMap& stiffnessMap() const noexcept;  // none: changes nothing
     /// Box of the voxels that hold tissue [m].
     Box box() const noexcept;
     /// The structure called `name`, else those whose tissue is called so. Empty when there is none.
@@ -112,8 +112,8 @@ public:
     /// Reads voxels at 1 kHz: allocates nothing, locks nothing. One per thread; the Tissue must outlive it.
     class Reader {
     public:
-        explicit Reader(const Tissue& tissue);
-        Reader(Reader&&) noexcept;
+        explicit Reader(const Tissue& tissue);  // allocates
+        Reader(Reader&&) noexcept;              // leaves the other only to be destroyed
         ~Reader();
         /// Label value of the voxel around `p` [m]; 0 outside.
         std::uint16_t label(Vec3 p) const noexcept;

@@ -18,8 +18,8 @@ std::optional<Role> roleNamed(std::string_view name) noexcept;
 
 /// One tissue. SI units. Every row says where its numbers come from.
 struct TissueRow {
-    std::string name;
-    Role role = Role::plain;
+    std::string name;             // as scenes and label maps call it
+    Role role = Role::plain;      // what a core or a touch of it means
     double youngsModulus = 0;     // small strain [Pa]
     double poissonRatio = 0;      // [-]
     double stiffening = 0;        // b: the shear modulus grows as 1 + b (I_C - 3) with finite strain [-]
@@ -41,8 +41,8 @@ struct TissueRow {
 
 /// Rows in order; row 0 is always "air", the outside.
 struct TissueTable {
-    std::string name;
-    std::vector<TissueRow> rows;
+    std::string name;             // where it comes from
+    std::vector<TissueRow> rows;  // at most 64
 
     /// Index of the row called `name`, or nothing.
     std::optional<std::uint8_t> find(std::string_view name) const noexcept;

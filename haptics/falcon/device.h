@@ -22,7 +22,8 @@ public:
     static constexpr double fresh = 5e-3;   // a pose is for so long: a Falcon on a hub answers every 2 ms or so [s]
     static constexpr double endHeld = 1.0;  // of the left button [s]
 
-    /// @param start  of the tip, patient frame [m]    @param axis  of the tool, towards its tip (unit vector)
+    /// The tip starts at `start`, patient frame [m]; `axis` is the tool's, towards its tip (unit vector), `period` a tick
+    /// [s].
     FalconDevice(std::shared_ptr<Driver> driver, Vec3 start, Vec3 axis, double period = haptics::tickSeconds);
 
     haptics::DeviceSample read() noexcept override;

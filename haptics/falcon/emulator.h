@@ -42,7 +42,7 @@ struct Hand {
 /// commanded last stays, the worst that a real one could do. Time is what advance() makes of it.
 class Emulator {
 public:
-    /// @param firmware  the image that its processor runs; none other
+    /// @param firmware  the image that its processor runs; none other    @param seed  of its mishaps
     explicit Emulator(std::vector<std::uint8_t> firmware, std::uint64_t seed = 1);
 
     Mishaps mishaps;
