@@ -26,6 +26,7 @@ function(palpate_library name)
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
     VERIFY_INTERFACE_HEADER_SETS ${PALPATE_VERIFY_HEADERS})
+  palpate_precompile(${target})
   if(NOT arg_UNINSTALLED)
     install(TARGETS ${target} EXPORT palpateTargets
       FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/palpate)

@@ -19,9 +19,20 @@ if(PALPATE_WERROR)
   target_compile_options(palpate_flags INTERFACE -Werror)
 endif()
 if(PALPATE_SANITIZE)
-  add_compile_options(-fsanitize=${PALPATE_SANITIZE} -fno-omit-frame-pointer -g)
+  # What the undefined-behaviour sanitizer finds ends the program: a line on a terminal would fail no test.
+  add_compile_options(-fsanitize=${PALPATE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${PALPATE_SANITIZE})
 else()
   # GCC's -Wconversion fires under -fsanitize on code that is clean without it.
   target_compile_options(palpate_flags INTERFACE -Wconversion)
 endif()
+
+# palpate_precompile(TARGET HEADER...): one set of precompiled headers for each target, as targets differ in their flags.
+function(palpate_precompile target)
+  get_target_property(sources ${target} SOURCES)
+  list(LENGTH sources count)
+  if(PALPATE_PRECOMPILE AND count GREATER 3)
+    target_precompile_headers(${target} PRIVATE <algorithm> <array> <chrono> <cmath> <filesystem> <fstream> <functional>
+      <memory> <optional> <random> <span> <sstream> <stdexcept> <string> <vector> <glm/glm.hpp> ${ARGN})
+  endif()
+endfunction()

@@ -35,12 +35,16 @@ template <class Byte>
 struct OptionalIndex {
     Byte& value;
 };
+template <class Byte>
+OptionalIndex(Byte&) -> OptionalIndex<Byte>;  // clang below 17 wants it said
 
 /// A time [s] that the file holds in microseconds.
 template <class Seconds>
 struct Microseconds {
     Seconds& value;
 };
+template <class Seconds>
+Microseconds(Seconds&) -> Microseconds<Seconds>;
 
 /// Calls `visit(column, field)` for every column of table `ticks`, in the order of the file. One list serves the table's
 /// making, the writing (Tick = const TickRecord) and the reading (Tick = TickRecord).

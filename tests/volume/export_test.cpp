@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <tests/volume/itk_compiler.h>
+
 #include <itkImageFileReader.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>

@@ -4,6 +4,8 @@
 #include <volume/import.h>
 
 #include <gtest/gtest.h>
+#include <tests/volume/itk_compiler.h>
+
 #include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkNrrdImageIO.h>
