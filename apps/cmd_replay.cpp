@@ -1,6 +1,8 @@
 #include <apps/command.h>
+#include <base/build.h>
 #include <command/json.h>
 
+#include <haptics/record_check.h>
 #include <haptics/replay.h>
 #include <session/figures.h>
 #include <session/open.h>
@@ -11,6 +13,8 @@
 
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace palpate::apps {
 
@@ -21,38 +25,82 @@ struct Options {
     std::string json;
 };
 
+nlohmann::json differenceFigures(const haptics::ReplayResult& result)
+{
+    auto all = nlohmann::json::array();
+    for (const haptics::Difference& d : result.differences) {
+        all.push_back({{"what", d.what},
+                       {"first_tick", d.firstTick},
+                       {"ticks", d.ticks},
+                       {"recorded", d.recorded},
+                       {"recomputed", d.recomputed}});
+    }
+    return all;
+}
+
+// What is wrong with the record, beside what its format and its build have to do with it; empty: nothing.
+std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult& result, const haptics::RecordCheck& check)
+{
+    std::vector<std::string> faults;
+    if (check.seal.state == haptics::Seal::State::broken) {
+        faults.push_back("was changed after it was closed: " + haptics::someOf(check.seal.changed));
+    }
+    if (!result.identical) {
+        const bool forces = result.largestDifference > 0;
+        faults.push_back(
+            fmt::format("{} from tick {} on: the record was made by another build ({}) or machine, or was changed: {}",
+                        forces ? fmt::format("forces differ, by up to {:.3g} N,", result.largestDifference)
+                               : "what was recorded differs",
+                        *result.firstDifference, record.info().build, result.inWords));
+    }
+    for (const auto& [key, value] : record.results()) {
+        if (key == "force_hash" && value != session::hexadecimal(result.forceHash)) {
+            faults.push_back(fmt::format("its session's end says that its forces have the hash {}, and they have {}", value,
+                                         session::hexadecimal(result.forceHash)));
+        }
+    }
+    return haptics::someOf(faults, faults.size());
+}
+
 void replayRecord(const Options& o)
 {
     const haptics::Record record(o.file);
     const auto model = session::reopenSession(o.file, record.info());
     const auto result = haptics::replay(record, model);
+    const auto check = haptics::checkRecord(record, base::build());
+    const std::string faults = faultsOf(record, result, check);
 
     nlohmann::json figures{{"ticks", result.ticks},
                            {"identical", result.identical},
                            {"first_difference_tick", nullptr},
                            {"largest_difference_n", result.largestDifference},
+                           {"differences", differenceFigures(result)},
                            {"force_hash", session::hexadecimal(result.forceHash)},
-                           {"complete", record.complete()}};
+                           {"complete", record.complete()},
+                           {"record_sha256", check.seal.sha256},
+                           {"changed", check.seal.changed},
+                           {"doubts", check.warnings}};
     if (result.firstDifference) {
         figures["first_difference_tick"] = *result.firstDifference;
     }
     if (!o.json.empty()) {
         command::writeJson(o.json, figures);
     }
-    const bool tell = o.json != "-";
-    if (tell && !record.complete()) {
+    if (!faults.empty()) {
+        throw std::runtime_error(fmt::format("{}: {}", o.file, faults));
+    }
+    if (o.json == "-") {
+        return;
+    }
+    for (const std::string& warning : check.warnings) {
+        fmt::print("{}: {}\n", o.file, warning);
+    }
+    if (!record.complete()) {
         fmt::print("{}: the session was cut off; what there is of it is replayed\n", o.file);
     }
-    if (!result.identical) {
-        throw std::runtime_error(
-            fmt::format("{}: forces differ from tick {} on, by up to {:.3g} N: the record was made "
-                        "by another build ({}) or machine",
-                        o.file, *result.firstDifference, result.largestDifference, record.info().build));
-    }
-    if (tell) {
-        fmt::print("{} ticks replayed: every force is the same, bit for bit ({})\n", result.ticks,
-                   session::hexadecimal(result.forceHash));
-    }
+    fmt::print("{} ticks replayed: all that was recorded is the same, bit for bit (forces {}, seal {})\n", result.ticks,
+               session::hexadecimal(result.forceHash),
+               check.seal.sha256.empty() ? "none" : check.seal.sha256.substr(0, 16));
 }
 
 }  // namespace
@@ -60,7 +108,7 @@ void replayRecord(const Options& o)
 void addReplay(CLI::App& app)
 {
     auto o = std::make_shared<Options>();
-    auto* command = app.add_subcommand("replay", "Recompute every force of a record and compare all bits");
+    auto* command = app.add_subcommand("replay", "Recompute all of a record, compare all bits, and check its seal");
     command->add_option("FILE", o->file, "Record of a session (train --record)")->required();
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     command->final_callback([o] { replayRecord(*o); });

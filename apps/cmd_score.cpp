@@ -1,9 +1,11 @@
 #include <apps/command.h>
+#include <base/build.h>
 #include <command/json.h>
 #include <report/groups.h>
 #include <report/report.h>
 #include <session/figures.h>
 
+#include <haptics/record_check.h>
 #include <haptics/score.h>
 
 #include <fmt/format.h>
@@ -37,8 +39,10 @@ struct Options {
 struct Session {
     std::filesystem::path file;
     std::string scene, model, device;
+    std::string operatorName, host, started, sha256;
     bool complete = true;
     Score score;
+    std::vector<std::string> warnings;
 };
 
 struct Group {
@@ -54,7 +58,9 @@ std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessio
     }
     const haptics::Record record(file);
     const haptics::SessionInfo& info = record.info();
-    sessions.push_back({file, info.scene, info.model, info.device, record.complete(), haptics::scoreOf(record)});
+    haptics::RecordCheck check = haptics::checkRecord(record, base::build());
+    sessions.push_back({file, info.scene, info.model, info.device, info.operatorName, info.host, info.started,
+                        check.seal.sha256, record.complete(), haptics::scoreOf(record), std::move(check.warnings)});
     return sessions.size() - 1;
 }
 
@@ -106,7 +112,12 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
                     {"scene", s.scene},
                     {"model", s.model},
                     {"device", s.device},
-                    {"complete", s.complete}});
+                    {"operator", s.operatorName},
+                    {"host", s.host},
+                    {"started", s.started},
+                    {"complete", s.complete},
+                    {"record_sha256", s.sha256},
+                    {"doubts", s.warnings}});
         out["sessions"].push_back(std::move(one));
     }
     out["groups"] = json::array();
@@ -186,9 +197,14 @@ void printSessions(const std::vector<Session>& sessions)
         }
         printTable(heads, columns);
     }
+}
+
+// Beside the figures and never among them: what makes them doubtful.
+void warn(const std::vector<Session>& sessions)
+{
     for (const Session& s : sessions) {
-        if (!s.complete) {
-            std::printf("note: %s ends early: the program that wrote it was stopped; scored up to there\n", s.file.c_str());
+        for (const std::string& warning : s.warnings) {
+            fmt::print(stderr, "palpate: warning: {}: {}\n", s.file.string(), warning);
         }
     }
 }
@@ -237,6 +253,7 @@ void run(const Options& options)
     if (sessions.empty()) {
         throw std::runtime_error("score: give at least one record, or --group NAME=FILE,FILE");
     }
+    warn(sessions);
     if (!options.report.empty()) {
         if (!groups.empty()) {
             std::vector<report::ScoredGroup> all;

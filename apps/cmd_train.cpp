@@ -21,6 +21,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -57,7 +58,7 @@ struct Options {
     bool noView = false;
     bool unpaced = false;
     double seconds = 0;
-    std::string session;
+    std::string session, operatorName;
     std::string record, report, json, pictures;
     std::vector<std::string> inject;
     session::Faults faults;  // what `inject` says
@@ -267,9 +268,11 @@ void checkOutputs(const Options& o)
     }
 }
 
-// Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`.
-void writeOutputs(const Options& o, const haptics::SessionInfo& info, const datasets::ModelSettings& model,
-                  Viewers& viewers, session::TrainResult& result)
+// Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
+// is now, as it is told.
+std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
+                                                              const datasets::ModelSettings& model, Viewers& viewers,
+                                                              session::TrainResult& result)
 {
     const auto blame = [&result](const std::string& what) {
         result.problem += result.problem.empty() ? what : "; " + what;
@@ -277,10 +280,13 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, const data
     const auto attempt = [&blame](const auto& write) {
         try {
             write();
+            return true;
         } catch (const std::runtime_error& e) {
             blame(e.what());
+            return false;
         }
     };
+    std::vector<std::pair<const char*, std::string>> there;
     const bool wanted = o.view || session::deviceKind(o.device).needsViewer;
     if (wanted && viewers.window && viewers.window->wait(0) > 0) {
         blame("the window has failed, its message is above: check the display (DISPLAY), or do without by --headless");
@@ -293,8 +299,17 @@ void writeOutputs(const Options& o, const haptics::SessionInfo& info, const data
     }
     if (!o.report.empty()) {
         const fs::path pictures = fs::is_directory(o.pictures) ? o.pictures : "";  // not there when the viewer failed
-        attempt([&] { report::writeReport(o.report, haptics::Record(recordFile(o)), pictures); });
+        if (attempt([&] { report::writeReport(o.report, haptics::Record(recordFile(o)), pictures); })) {
+            there.emplace_back("report", o.report);
+        }
     }
+    for (const auto& [name, file] :
+         {std::pair<const char*, std::string>{"record", recordFile(o).string()}, {"pictures", o.pictures}}) {
+        if (std::error_code none; !file.empty() && fs::exists(file, none)) {
+            there.emplace_back(name, file);
+        }
+    }
+    return there;
 }
 
 void train(Options o)
@@ -326,6 +341,8 @@ void train(Options o)
     }
     const auto model = session::openSession(o.scene, o.changes);
     auto info = session::describeSession(model, o.scene, deviceInWords(o));
+    info.name = sessionName(o);
+    info.operatorName = o.operatorName;
     if (!fitted.empty()) {
         info.extra.emplace_back("setting", fitted);
     }
@@ -344,19 +361,15 @@ void train(Options o)
     }
     session::Trainer trainer(model, info, options);
     session::TrainResult result = trainer.run();
-    writeOutputs(o, info, model.scene.model, viewers, result);
+    const auto written = writeOutputs(o, info, model.scene.model, viewers, result);
 
     if (o.json != "-") {
         summarise(result, info, model.scene.model);
         if (!fitted.empty()) {
             fmt::print("{} (--setting says otherwise)\n", fitted);
         }
-        for (const auto& [name, file] : {std::pair<const char*, std::string>{"report", o.report},
-                                         {"record", record.string()},
-                                         {"pictures", o.pictures}}) {
-            if (!file.empty()) {
-                fmt::print("{}: {}\n", name, file);
-            }
+        for (const auto& [name, file] : written) {
+            fmt::print("{}: {}\n", name, file);
         }
     }
     if (result.signal != 0) {
@@ -378,6 +391,14 @@ std::string secondsFault(const std::string& text)
     return !number || !(seconds >= 0.0 && seconds <= longestSession)
                ? fmt::format("{}: must be 0 to {:g} s (0: to the end of the script)", text, longestSession)
                : "";
+}
+
+// Empty, or what is wrong with a value of --operator: a record would refuse it.
+std::string operatorFault(const std::string& text)
+{
+    const bool control =
+        std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
+    return text.empty() || text.size() > 200 || control ? "must be 1 to 200 bytes of text in one line" : "";
 }
 
 // Empty, or what is wrong with a value of --seed.
@@ -432,6 +453,8 @@ void addTrain(CLI::App& app)
         ->capture_default_str();
     c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
     c->add_option("--session", o->session, "Name under which viewers find the session");
+    c->add_option("--operator", o->operatorName, "Who holds the device, or a pseudonym: for the record")
+        ->check(operatorFault, "up to 200 bytes of text");
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
     c->add_option("--report", o->report, "Write a report (HTML) to this file");
     c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder")->excludes(unpaced);

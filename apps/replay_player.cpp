@@ -2,6 +2,7 @@
 
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
+#include <haptics/replay.h>
 #include <haptics/simulation.h>
 #include <session/open.h>
 
@@ -108,6 +109,7 @@ struct ReplayPlayer::Impl {
             const auto buffer = std::make_unique<channel::Displaced>();
             const ServoTiming timing;
             channel::State state;
+            TickComparison comparison(record);
             record.each([&](const TickRecord& then) {
                 if (stop) {
                     return;
@@ -116,11 +118,14 @@ struct ReplayPlayer::Impl {
                     throw std::runtime_error(fmt::format("{}: tick {} is missing in the record", file, film.ticks()));
                 }
                 const TickRecord& now = simulation.tick(then.device);
-                if (now.total != then.total) {
-                    blame("FORCES ARE NOT THOSE OF THE RECORD",
-                          fmt::format(
-                              "{}: forces differ from tick {} on: the record was made by another build or method ({})",
-                              file, then.tick, record.info().build));
+                const bool first = comparison.differences().empty();
+                if (!comparison.add(then, now) && first) {
+                    const bool force = now.total != then.total;
+                    blame(force ? "FORCES ARE NOT THOSE OF THE RECORD" : "THE RECORD SAYS SOMETHING ELSE",
+                          fmt::format("{}: {} from tick {} on: the record was made by another build or method ({}), or was "
+                                      "changed: {}",
+                                      file, force ? "forces differ" : "what was recorded differs", then.tick,
+                                      record.info().build, comparison.inWords()));
                 }
                 showTick(now, timing, state);
                 film.add(state, simulation, *buffer);

@@ -1,11 +1,16 @@
+#include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
+#include <haptics/record_rows.h>
 #include <haptics/recorder.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdlib>
+#include <charconv>
 #include <exception>
 #include <limits>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <system_error>
 
@@ -16,89 +21,7 @@ using format::Statement;
 
 namespace {
 
-// The row of an enumerator's name; throws on a word that this version does not know.
-template <class Enum, std::size_t n>
-Enum fromName(std::string_view word, const std::array<std::string_view, n>& names)
-{
-    const auto found = std::ranges::find(names, word);
-    if (found == names.end()) {
-        throw std::runtime_error("unknown word '" + std::string(word) + "'");
-    }
-    return static_cast<Enum>(found - names.begin());
-}
-
-std::uint8_t optionalIndex(const Statement& row, int column)
-{
-    return row.isNull(column) ? format::none : static_cast<std::uint8_t>(row.integer(column));
-}
-
-// Reads fields one after another, in the order of format::eachColumn.
-struct Reader {
-    const Statement& row;
-    int column = -1;
-
-    void operator()(const char*, double& v) { v = row.real(++column); }
-    void operator()(const char*, bool& v) { v = row.integer(++column) != 0; }
-    template <class Integer>
-    void operator()(const char*, Integer& v)
-    {
-        v = static_cast<Integer>(row.integer(++column));
-    }
-    void operator()(const char*, Phase& v) { v = fromName<Phase>(row.text(++column), phaseNames); }
-    void operator()(const char*, WarningLevel& v) { v = fromName<WarningLevel>(row.text(++column), warningNames); }
-    void operator()(const char*, format::Microseconds<float> v) { v.value = static_cast<float>(row.real(++column) / 1e6); }
-    void operator()(const char*, format::OptionalIndex<std::uint8_t> v) { v.value = optionalIndex(row, ++column); }
-};
-
-// Rows of a table beside `ticks`, handed out tick by tick.
-class Sidecar {
-public:
-    Sidecar(const Database& database, const std::string& sql) : rows_(database, sql) { more_ = rows_.step(); }
-
-    template <class Visit>
-    void take(std::uint64_t tick, Visit&& visit)
-    {
-        while (more_ && static_cast<std::uint64_t>(rows_.integer(0)) <= tick) {
-            if (static_cast<std::uint64_t>(rows_.integer(0)) == tick) {
-                visit(static_cast<const Statement&>(rows_));
-            }
-            more_ = rows_.step();
-        }
-    }
-
-private:
-    Statement rows_;
-    bool more_ = false;
-};
-
-void readEvent(const Statement& row, TickRecord& record)
-{
-    if (record.eventCount < maxEventsPerTick) {
-        Event& event = record.events[record.eventCount++];
-        event.kind = fromName<EventKind>(row.text(1), eventNames);
-        event.structure = optionalIndex(row, 2);
-        event.tissue = static_cast<std::uint8_t>(row.integer(3));
-        event.value = row.real(4);
-    }
-}
-
-void readCore(const Statement& row, CoreSample& core)
-{
-    core.volume = row.real(1);
-    core.targetFraction = row.real(2);
-    core.targetLength = row.real(3);
-    core.notchStart = {row.real(4), row.real(5), row.real(6)};
-    core.notchEnd = {row.real(7), row.real(8), row.real(9)};
-    core.fragments = static_cast<std::uint32_t>(row.integer(10));
-}
-
-void readFraction(const Statement& row, CoreSample& core)
-{
-    const auto tissue = row.integer(1);
-    if (tissue >= 0 && tissue < static_cast<std::int64_t>(maxTissues)) {
-        core.fraction[static_cast<std::size_t>(tissue)] = row.real(2);
-    }
-}
+constexpr int longestValue = 1 << 26;  // in any table [bytes]
 
 // All tables of one moment, while a live session may still write.
 class Snapshot {
@@ -142,6 +65,10 @@ struct Record::Impl {
     {
         guarded([&] {
             database.emplace(file, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX);
+            // A file from anywhere: its own SQL may call no function but harmless ones, and no value takes all memory.
+            sqlite3_db_config(database->get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+            sqlite3_db_config(database->get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+            sqlite3_limit(database->get(), SQLITE_LIMIT_LENGTH, longestValue);
             Statement(*database, "SELECT count(*) FROM sqlite_master").step();
         });
         checkFormat();
@@ -149,9 +76,8 @@ struct Record::Impl {
             checkWholePages();
             readInfo();
         });
-        if (!(info.rate > 0)) {
-            throw std::runtime_error(file + ": is damaged (no rate in table session); take another record");
-        }
+        guarded([&] { format::checkInfo(info); });
+        guarded([&] { checkTables(); });
     }
 
     // Gives SQLite's errors the file's name and a way out.
@@ -202,12 +128,33 @@ struct Record::Impl {
                                      std::to_string(format::oldestVersion) + " to " + std::to_string(format::version) +
                                      "; use the program that wrote it");
         }
-        for (const char* table :
-             {"session", "results", "structures", "tissues", "ticks", "events", "cores", "core_fractions"}) {
-            const std::string sql = "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = '";
-            if (single(*database, sql + table + "'") == 0) {
+        if (version < format::sealedVersion && !statementOf("seal").empty()) {
+            throw std::runtime_error(file + ": is damaged (a record of format " + std::to_string(version) +
+                                     " has no seal, and here one is); copy it again or take another");
+        }
+        for (const auto& [table, sql] : format::schema({})) {
+            if ((table != "seal" || version >= format::sealedVersion) && statementOf(table).empty()) {
                 throw std::runtime_error(file + ": is damaged (table " + table +
                                          " is missing); copy it again or take another");
+            }
+        }
+    }
+
+    // That made the table; empty where there is none.
+    std::string statementOf(const std::string& table) const
+    {
+        Statement query(*database, "SELECT sql FROM sqlite_master WHERE type = 'table' AND name = ?");
+        query.bind(1, std::string_view(table));
+        return query.step() ? std::string(query.text(0)) : std::string();
+    }
+
+    // A column could be computed, a table virtual: then reading runs what the file says.
+    void checkTables() const
+    {
+        for (const auto& [table, sql] : format::schema(info)) {
+            const bool compared = version >= format::sealedVersion;
+            if (compared ? statementOf(table) != sql : statementOf(table).starts_with("CREATE VIRTUAL")) {
+                throw std::runtime_error("table " + table + " is not as a recorder makes it");
             }
         }
     }
@@ -215,39 +162,73 @@ struct Record::Impl {
     void readInfo()
     {
         info.rate = 0;
+        std::set<std::string> keys;
         Statement session(*database, "SELECT key, value FROM session ORDER BY rowid");
         while (session.step()) {
             const std::string key(session.text(0));
+            if (!keys.insert(key).second) {
+                throw std::runtime_error("table session has key " + key + " twice");
+            }
             if (key == "rate_hz") {
-                info.rate = session.real(1);
+                info.rate = format::realOf(session, 1, "rate_hz");
             } else if (key == "seed") {
-                info.seed = std::strtoull(std::string(session.text(1)).c_str(), nullptr, 10);
+                info.seed = seedOf(std::string(session.text(1)));
             } else if (key.starts_with("extra.")) {
                 info.extra.emplace_back(key.substr(6), session.text(1));
             } else if (std::string* field = textField(key)) {
                 *field = session.text(1);
             }
         }
-        Statement structures(*database, "SELECT name, warn_distance_m FROM structures ORDER BY structure");
+        for (const char* key : {"scene", "scene_text", "volume_hash", "build", "rate_hz"}) {
+            if (!keys.contains(key)) {
+                throw std::runtime_error(std::string("table session has no key ") + key);
+            }
+        }
+        Statement structures(*database, "SELECT structure, name, warn_distance_m FROM structures ORDER BY structure");
         while (structures.step()) {
-            info.structures.emplace_back(structures.text(0));
-            info.warnDistances.push_back(structures.real(1));
+            inOrder(structures, "structures", info.structures.size());
+            info.structures.emplace_back(structures.text(1));
+            info.warnDistances.push_back(format::realOf(structures, 2, "warn_distance_m"));
         }
-        Statement tissues(*database, "SELECT name FROM tissues ORDER BY tissue");
+        Statement tissues(*database, "SELECT tissue, name FROM tissues ORDER BY tissue");
         while (tissues.step()) {
-            info.tissues.emplace_back(tissues.text(0));
+            inOrder(tissues, "tissues", info.tissues.size());
+            info.tissues.emplace_back(tissues.text(1));
         }
-        if (info.structures.size() > maxStructures || info.tissues.size() > maxTissues) {
-            throw std::runtime_error("more structures or tissues than a session has");
+    }
+
+    // Rows of the tables that others refer to are numbered from 0 without holes; no more are read than there may be.
+    static void inOrder(const Statement& row, const char* table, std::size_t expected)
+    {
+        if (expected >= maxTissues || row.integer(0) != static_cast<std::int64_t>(expected)) {
+            throw std::runtime_error(
+                fmt::format("table {} has row {} where {} should be", table, row.integer(0), expected));
         }
+    }
+
+    static std::uint64_t seedOf(const std::string& text)
+    {
+        std::uint64_t seed = 0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+        if (error != std::errc() || end != text.data() + text.size()) {
+            throw std::runtime_error("seed '" + text + "' is no whole number");
+        }
+        return seed;
     }
 
     std::string* textField(const std::string& key)
     {
-        const std::pair<const char*, std::string*> fields[] = {
-            {"scene", &info.scene}, {"scene_text", &info.sceneText},   {"scene_origin", &info.sceneOrigin},
-            {"model", &info.model}, {"volume_hash", &info.volumeHash}, {"device", &info.device},
-            {"build", &info.build}};
+        const std::pair<const char*, std::string*> fields[] = {{"scene", &info.scene},
+                                                               {"scene_text", &info.sceneText},
+                                                               {"scene_origin", &info.sceneOrigin},
+                                                               {"model", &info.model},
+                                                               {"volume_hash", &info.volumeHash},
+                                                               {"device", &info.device},
+                                                               {"build", &info.build},
+                                                               {"name", &info.name},
+                                                               {"operator", &info.operatorName},
+                                                               {"host", &info.host},
+                                                               {"started", &info.started}};
         for (const auto& [name, field] : fields) {
             if (key == name) {
                 return field;
@@ -260,33 +241,83 @@ struct Record::Impl {
     {
         std::optional<Snapshot> snapshot;
         std::optional<Statement> ticks;
-        std::optional<Sidecar> events, cores, fractions;
+        std::optional<format::Sidecar> events, cores, fractions;
         guarded([&] {
             snapshot.emplace(*database);
             ticks.emplace(*database,
                           "SELECT " + format::columnList(info.structures.size(), version) + " FROM ticks ORDER BY tick");
-            events.emplace(*database, "SELECT tick, kind, structure, tissue, value FROM events ORDER BY tick, position");
-            cores.emplace(*database, "SELECT * FROM cores ORDER BY tick");
-            fractions.emplace(*database, "SELECT tick, tissue, fraction FROM core_fractions ORDER BY tick");
+            events.emplace(*database, "events",
+                           "SELECT tick, kind, structure, tissue, value, position FROM events ORDER BY tick, position");
+            cores.emplace(*database, "cores", "SELECT * FROM cores ORDER BY tick");
+            fractions.emplace(*database, "core_fractions",
+                              "SELECT tick, tissue, fraction FROM core_fractions ORDER BY tick");
         });
         for (;;) {
             TickRecord record;
-            bool more = false;
+            bool more = false, core = false;
             guarded([&] {
                 more = ticks->step();
-                if (more) {
-                    record.tissueForce = Vec3(std::numeric_limits<double>::quiet_NaN());  // where the file has none
-                    format::eachColumn(record, info.structures.size(), Reader{*ticks}, version);
-                    events->take(record.tick, [&](const Statement& row) { readEvent(row, record); });
-                    cores->take(record.tick, [&](const Statement& row) { readCore(row, record.core); });
-                    fractions->take(record.tick, [&](const Statement& row) { readFraction(row, record.core); });
+                if (!more) {
+                    events->end();
+                    cores->end();
+                    fractions->end();
+                    return;
                 }
+                record.tissueForce = Vec3(std::numeric_limits<double>::quiet_NaN());  // where the file has none
+                readTick(*ticks, record);
+                events->take(record.tick, [&](const Statement& row) { format::readEvent(row, record); });
+                cores->take(record.tick, [&](const Statement& row) { format::readCore(row, record, core); });
+                fractions->take(record.tick, [&](const Statement& row) { format::readFraction(row, record); });
+                if (record.fired && !core) {
+                    throw std::runtime_error(fmt::format("tick {}: its core is missing, and it fired", record.tick));
+                }
+                format::checkTick(record, info);
             });
             if (!more) {
                 return;
             }
             visit(record);
         }
+    }
+
+    void readTick(const Statement& row, TickRecord& record) const
+    {
+        try {
+            format::eachColumn(record, info.structures.size(), format::Reader{row}, version);
+        } catch (const std::runtime_error& e) {
+            throw std::runtime_error(fmt::format("tick {}: {}", row.integer(0), e.what()));
+        }
+    }
+
+    Seal seal()
+    {
+        Seal seal;
+        if (version < format::sealedVersion) {
+            seal.state = Seal::State::absent;
+            return seal;
+        }
+        guarded([&] {
+            const Snapshot snapshot(*database);
+            format::SealedPart whole;
+            const std::vector<format::SealedPart> sealed = format::readSeal(*database, whole);
+            const bool complete = single(*database, "SELECT count(*) FROM session WHERE key = 'complete'") != 0;
+            if (sealed.empty() && whole.part.empty() && !complete) {
+                return;
+            }
+            seal.sha256 = whole.sha256;
+            std::vector<format::SealedPart> found = format::sealOfSmallTables(*database);
+            for (format::SealedPart& part : format::sealOfTicks(*database, info.structures.size())) {
+                found.push_back(std::move(part));
+            }
+            seal.changed = format::compareSeals(sealed, found);
+            if (sealed.empty()) {
+                seal.changed = {"the seal is gone"};
+            } else if (whole != format::sealOf(sealed)) {
+                seal.changed.emplace_back("table seal is not what was written");
+            }
+            seal.state = seal.changed.empty() ? Seal::State::whole : Seal::State::broken;
+        });
+        return seal;
     }
 };
 
@@ -308,6 +339,16 @@ bool Record::complete() const noexcept
     } catch (const std::exception&) {
         return false;
     }
+}
+
+int Record::format() const noexcept
+{
+    return impl_->version;
+}
+
+Seal Record::seal() const
+{
+    return impl_->seal();
 }
 
 std::uint64_t Record::ticks() const

@@ -1,9 +1,35 @@
 #include <haptics/record_format.h>
 
+#include <cmath>
 #include <limits>
+#include <locale>
+#include <sstream>
 #include <stdexcept>
 
 namespace palpate::haptics::format {
+
+// Columns of real numbers have no declared type on purpose: a REAL column would turn -0.0 into the integer 0.
+std::vector<std::pair<std::string, std::string>> schema(const SessionInfo& info)
+{
+    std::ostringstream rate;
+    rate.imbue(std::locale::classic());
+    rate.precision(17);
+    rate << std::showpoint << info.rate;
+    return {{"session", "CREATE TABLE session (key TEXT, value)"},
+            {"results", "CREATE TABLE results (key TEXT, value TEXT)"},
+            {"structures", "CREATE TABLE structures (structure INTEGER PRIMARY KEY, name TEXT, warn_distance_m)"},
+            {"tissues", "CREATE TABLE tissues (tissue INTEGER PRIMARY KEY, name TEXT)"},
+            {"ticks", "CREATE TABLE ticks (tick INTEGER PRIMARY KEY" +
+                          columnList(info.structures.size()).substr(std::string_view("tick").size()) +
+                          ", seconds AS (tick / " + rate.str() + ") VIRTUAL)"},
+            {"events",
+             "CREATE TABLE events (tick INTEGER, position INTEGER, kind TEXT, structure INTEGER, tissue INTEGER, value)"},
+            {"cores",
+             "CREATE TABLE cores (tick INTEGER PRIMARY KEY, volume_m3, target_fraction, target_length_m,"
+             " notch_start_x_m, notch_start_y_m, notch_start_z_m, notch_end_x_m, notch_end_y_m, notch_end_z_m, fragments)"},
+            {"core_fractions", "CREATE TABLE core_fractions (tick INTEGER, tissue INTEGER, fraction)"},
+            {"seal", "CREATE TABLE seal (part TEXT PRIMARY KEY, rows INTEGER, sha256 TEXT)"}};
+}
 
 std::string columnList(std::size_t structures, int of)
 {
@@ -52,8 +78,36 @@ Statement::~Statement()
     sqlite3_finalize(handle_);
 }
 
+// SQLite cannot hold "not a number": it stores NULL.
+void Statement::bind(int position, double value)
+{
+    check(sqlite3_bind_double(handle_, position, value));
+    if (digest_ != nullptr) {
+        std::isnan(value) ? digest_->addNull() : digest_->add(value);
+    }
+}
+
+void Statement::bind(int position, std::int64_t value)
+{
+    check(sqlite3_bind_int64(handle_, position, value));
+    if (digest_ != nullptr) {
+        digest_->add(value);
+    }
+}
+
+void Statement::bindNull(int position)
+{
+    check(sqlite3_bind_null(handle_, position));
+    if (digest_ != nullptr) {
+        digest_->addNull();
+    }
+}
+
 void Statement::bind(int position, std::string_view value)
 {
+    if (digest_ != nullptr) {
+        digest_->add(value);
+    }
     check(sqlite3_bind_text64(handle_, position, value.data(), value.size(), SQLITE_TRANSIENT, SQLITE_UTF8));
 }
 
@@ -72,9 +126,31 @@ void Statement::run()
 {
     step();
     check(sqlite3_reset(handle_));
+    if (digest_ != nullptr) {
+        digest_->endRow();
+    }
 }
 
-// SQLite cannot hold "not a number": it stores NULL, which is read back as one.
+void Statement::digestRow(RowDigest& digest) const
+{
+    for (int column = 0; column < sqlite3_column_count(handle_); ++column) {
+        switch (type(column)) {
+            case SQLITE_NULL:
+                digest.addNull();
+                break;
+            case SQLITE_INTEGER:
+                digest.add(integer(column));
+                break;
+            case SQLITE_FLOAT:
+                digest.add(real(column));
+                break;
+            default:
+                digest.add(text(column));
+        }
+    }
+    digest.endRow();
+}
+
 double Statement::real(int column) const
 {
     return isNull(column) ? std::numeric_limits<double>::quiet_NaN() : sqlite3_column_double(handle_, column);

@@ -2,6 +2,7 @@
 
 // How a record lies in its SQLite file; shared by the writer (recorder.cpp) and the reader (record.cpp), no public header.
 
+#include <haptics/record_seal.h>
 #include <haptics/recorder.h>
 #include <haptics/tick.h>
 
@@ -11,12 +12,15 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace palpate::haptics::format {
 
 inline constexpr int applicationId = 0x50414C50;  // "PALP", in the file's header
-inline constexpr int version = 3;                 // user_version; raise it when a table changes
+inline constexpr int version = 4;                 // user_version; raise it when a table changes
 inline constexpr int oldestVersion = 2;           // that is still read: its ticks have no tissue force
+inline constexpr int sealedVersion = 4;           // the first whose records are sealed when they are closed
 
 inline constexpr std::uint8_t none = 0xFF;  // a structure that is not there; NULL in the file
 
@@ -99,6 +103,9 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit, int of = version
 /// The names of all columns, separated by commas.
 std::string columnList(std::size_t structures, int of = version);
 
+/// The statements that make the tables of a session, by table.
+std::vector<std::pair<std::string, std::string>> schema(const SessionInfo& info);
+
 /// An open SQLite file. Errors come as std::runtime_error with SQLite's words and without the file's name.
 class Database {
 public:
@@ -122,10 +129,14 @@ public:
     Statement(const Statement&) = delete;
     Statement& operator=(const Statement&) = delete;
 
-    void bind(int position, double value) { check(sqlite3_bind_double(handle_, position, value)); }
-    void bind(int position, std::int64_t value) { check(sqlite3_bind_int64(handle_, position, value)); }
+    void bind(int position, double value);
+    void bind(int position, std::int64_t value);
     void bind(int position, std::string_view value);
-    void bindNull(int position) { check(sqlite3_bind_null(handle_, position)); }
+    void bindNull(int position);
+
+    /// What is bound from now on goes into `digest` too, a row with each run(). It must outlive the statement or be
+    /// replaced.
+    void digestInto(RowDigest* digest) noexcept { digest_ = digest; }
 
     /// True when there is a row.
     bool step();
@@ -135,12 +146,16 @@ public:
     double real(int column) const;
     std::int64_t integer(int column) const { return sqlite3_column_int64(handle_, column); }
     std::string_view text(int column) const;
-    bool isNull(int column) const { return sqlite3_column_type(handle_, column) == SQLITE_NULL; }
+    int type(int column) const { return sqlite3_column_type(handle_, column); }
+    bool isNull(int column) const { return type(column) == SQLITE_NULL; }
+    /// The row as it is, into a digest.
+    void digestRow(RowDigest& digest) const;
 
 private:
     void check(int status);
     sqlite3_stmt* handle_ = nullptr;
     sqlite3* database_ = nullptr;
+    RowDigest* digest_ = nullptr;
 };
 
 }  // namespace palpate::haptics::format

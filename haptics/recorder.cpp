@@ -1,3 +1,4 @@
+#include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
 #include <haptics/recorder.h>
 
@@ -18,7 +19,6 @@
 #include <exception>
 #include <mutex>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
@@ -43,26 +43,6 @@ void removeFile(const std::string& file) noexcept
     }
 }
 
-// Columns of real numbers have no declared type on purpose: a REAL column would turn -0.0 into the integer 0.
-std::string schema(const SessionInfo& info)
-{
-    std::ostringstream sql;
-    sql.precision(17);
-    sql << "CREATE TABLE session (key TEXT, value);"
-           "CREATE TABLE results (key TEXT, value TEXT);"
-           "CREATE TABLE structures (structure INTEGER PRIMARY KEY, name TEXT, warn_distance_m);"
-           "CREATE TABLE tissues (tissue INTEGER PRIMARY KEY, name TEXT);"
-           "CREATE TABLE ticks (tick INTEGER PRIMARY KEY"
-        << format::columnList(info.structures.size()).substr(std::string_view("tick").size()) << ", seconds AS (tick / "
-        << std::showpoint << info.rate
-        << ") VIRTUAL);"
-           "CREATE TABLE events (tick INTEGER, position INTEGER, kind TEXT, structure INTEGER, tissue INTEGER, value);"
-           "CREATE TABLE cores (tick INTEGER PRIMARY KEY, volume_m3, target_fraction, target_length_m,"
-           " notch_start_x_m, notch_start_y_m, notch_start_z_m, notch_end_x_m, notch_end_y_m, notch_end_z_m, fragments);"
-           "CREATE TABLE core_fractions (tick INTEGER, tissue INTEGER, fraction);";
-    return sql.str();
-}
-
 void insertPair(Database& database, const char* table, std::string_view key, const auto& value)
 {
     Statement insert(database, std::string("INSERT INTO ") + table + " VALUES (?, ?)");
@@ -80,6 +60,10 @@ void writeInfo(Database& database, const SessionInfo& info)
     put("volume_hash", std::string_view(info.volumeHash));
     put("model", std::string_view(info.model));
     put("device", std::string_view(info.device));
+    put("name", std::string_view(info.name));
+    put("operator", std::string_view(info.operatorName));
+    put("host", std::string_view(info.host));
+    put("started", std::string_view(info.started));
     put("build", std::string_view(info.build));
     put("rate_hz", info.rate);
     put("seed", std::string_view(std::to_string(info.seed)));
@@ -134,7 +118,9 @@ void makeFile(const std::string& file, const SessionInfo& info)
         database.execute("PRAGMA journal_mode = MEMORY; PRAGMA synchronous = OFF; BEGIN");
         database.execute("PRAGMA application_id = " + std::to_string(format::applicationId));
         database.execute("PRAGMA user_version = " + std::to_string(format::version));
-        database.execute(schema(info));
+        for (const auto& [table, statement] : format::schema(info)) {
+            database.execute(statement);
+        }
         writeInfo(database, info);
         database.execute("COMMIT; PRAGMA journal_mode = WAL");
     } catch (const std::exception& e) {
@@ -186,20 +172,25 @@ std::string tickInsert(std::size_t structures)
     return "INSERT INTO ticks (" + columns + ") VALUES (" + places + ")";
 }
 
-// The prepared statements of a session.
+// The prepared statements of a session, and the digests of what they write.
 class Writer {
 public:
     Writer(Database& database, std::size_t structures)
-        : structures_(structures),
+        : database_(database),
+          structures_(structures),
           tick_(database, tickInsert(structures)),
           event_(database, "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)"),
           core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
           fraction_(database, "INSERT INTO core_fractions VALUES (?, ?, ?)")
     {
+        event_.digestInto(&seal_.events);
+        core_.digestInto(&seal_.cores);
+        fraction_.digestInto(&seal_.fractions);
     }
 
     void write(const TickRecord& record)
     {
+        tick_.digestInto(&seal_.ticks(record.tick));
         format::eachColumn(record, structures_, Binder{tick_});
         tick_.run();
         for (std::uint32_t i = 0; i < std::min<std::size_t>(record.eventCount, maxEventsPerTick); ++i) {
@@ -215,6 +206,24 @@ public:
         }
         if (record.fired) {
             writeCore(record.tick, record.core);
+        }
+    }
+
+    /// Closes the record: what it holds now is what it held when it was written.
+    void seal()
+    {
+        std::vector<format::SealedPart> parts = format::sealOfSmallTables(database_);
+        for (format::SealedPart& part : seal_.parts()) {
+            parts.push_back(std::move(part));
+        }
+        parts.push_back(format::sealOf(parts));
+        database_.execute("DELETE FROM seal");
+        Statement insert(database_, "INSERT INTO seal VALUES (?, ?, ?)");
+        for (const format::SealedPart& part : parts) {
+            insert.bind(1, std::string_view(part.part));
+            insert.bind(2, part.rows);
+            insert.bind(3, std::string_view(part.sha256));
+            insert.run();
         }
     }
 
@@ -240,7 +249,9 @@ private:
         }
     }
 
+    Database& database_;
     std::size_t structures_;
+    format::RunningSeal seal_;
     Statement tick_, event_, core_, fraction_;
 };
 
@@ -375,6 +386,7 @@ struct Recorder::Impl {
         for (const auto& [key, value] : values) {
             insertPair(*database, "results", key, std::string_view(value));
         }
+        writer->seal();
         database->execute("COMMIT");
     }
 
@@ -415,12 +427,10 @@ struct Recorder::Impl {
 
 Recorder::Recorder(const std::filesystem::path& file, const SessionInfo& info)
 {
-    if (info.structures.size() > maxStructures || info.tissues.size() > maxTissues) {
-        refuse(file.string(), "at most " + std::to_string(maxStructures) + " structures and " + std::to_string(maxTissues) +
-                                  " tissues fit into a record");
-    }
-    if (!(info.rate > 0)) {
-        refuse(file.string(), "a rate of " + std::to_string(info.rate) + " Hz is not above 0");
+    try {
+        format::checkInfo(info);
+    } catch (const std::runtime_error& e) {
+        refuse(file.string(), e.what());
     }
     impl_ = std::make_unique<Impl>(file.string(), info);
 }

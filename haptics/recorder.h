@@ -14,14 +14,18 @@ namespace palpate::haptics {
 
 /// What a record says about its session.
 struct SessionInfo {
-    std::string scene;        // name
-    std::string sceneText;    // TOML, enough to build the same session again
-    std::string sceneOrigin;  // file that the text came from; relative paths start at its folder
-    std::string volumeHash;   // of the labels, so that replay can refuse another volume
-    std::string model;        // "chainmail", ..
-    std::string device;       // "hand", ..
-    std::string build;        // version and commit
-    double rate = 1000;       // [Hz]
+    std::string scene;         // name
+    std::string sceneText;     // TOML, enough to build the same session again
+    std::string sceneOrigin;   // file that the text came from; relative paths start at its folder
+    std::string volumeHash;    // of the labels, so that replay can refuse another volume
+    std::string model;         // "chainmail", ..
+    std::string device;        // "hand", ..
+    std::string build;         // version and commit
+    std::string name;          // of the session, under which viewers found it
+    std::string operatorName;  // or pseudonym of who held the device; empty: not said
+    std::string host;          // machine
+    std::string started;       // date and time, UTC: "2026-11-21T14:03:07Z"
+    double rate = 1000;        // [Hz]
     std::uint64_t seed = 1;
     std::vector<std::string> structures;  // target first, then vital structures
     std::vector<std::string> tissues;     // rows of the tissue table
@@ -29,11 +33,25 @@ struct SessionInfo {
     std::vector<std::pair<std::string, std::string>> extra;
 };
 
+/// Whether a record is what its writer closed.
+struct Seal {
+    enum class State {
+        open,    // it was never closed: its session was cut off or still runs
+        absent,  // of a format that had no seals
+        whole,
+        broken,
+    };
+    State state = State::open;
+    std::string sha256;                // of the whole record, as it was sealed; empty where it was not
+    std::vector<std::string> changed;  // what is not what was written, in words: "session.operator is gone"
+};
+
 /// Writes a session to one SQLite file (WAL). The servo thread pushes, a thread of the recorder's own writes in batches, so
 /// that a kill at any moment loses at most 0.5 s.
 class Recorder {
 public:
-    /// Throws std::runtime_error when the file cannot be made or exists already.
+    /// Throws std::runtime_error when the file cannot be made or exists already, and for a session that no record holds:
+    /// a rate outside 100 Hz to 20 kHz, more structures or tissues than there may be, names of over 200 bytes.
     Recorder(const std::filesystem::path& file, const SessionInfo& info);
     /// Writes what is left, marks the session complete and leaves one plain file.
     ~Recorder();
@@ -57,7 +75,9 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// A record opened for reading; also one whose writer was killed.
+/// A record opened for reading; also one whose writer was killed. A file from anywhere: what it holds is checked before it
+/// is handed out. Poses are poses, forces that were sent are finite and at most 1 kN, indices are of structures and tissues
+/// that the record has, shares are between 0 and 1; rows of events and cores are of ticks that are there.
 class Record {
 public:
     /// Throws std::runtime_error ("FILE: what is wrong and what to do").
@@ -67,6 +87,9 @@ public:
 
     const SessionInfo& info() const noexcept;
     bool complete() const noexcept;  // false when the writer was killed
+    int format() const noexcept;     // version of the file's tables: 2 to 4
+    /// Computes the digests of all tables again: reads the whole file.
+    Seal seal() const;
     std::uint64_t ticks() const;
     /// Calls `visit` for every tick in order, with events and cores filled in.
     void each(const std::function<void(const TickRecord&)>& visit) const;

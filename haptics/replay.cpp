@@ -5,24 +5,17 @@
 #include <volume/fnv.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <stdexcept>
+#include <string_view>
+#include <utility>
 
 namespace palpate::haptics {
-
-namespace {
-
-bool sameBits(Vec3 a, Vec3 b) noexcept
-{
-    return std::memcmp(&a, &b, sizeof a) == 0;
-}
-
-}  // namespace
 
 void ForceHash::add(const TickRecord& record) noexcept
 {
@@ -49,6 +42,7 @@ ReplayResult replay(const Record& record, const SessionModel& model)
     Simulation simulation(model, {1.0 / record.info().rate, {}});
     ReplayResult result;
     ForceHash hash;
+    TickComparison comparison(record);
     record.each([&](const TickRecord& then) {
         if (then.tick != result.ticks) {
             throw std::runtime_error(
@@ -59,20 +53,18 @@ ReplayResult replay(const Record& record, const SessionModel& model)
         const TickRecord& now = simulation.tick(then.device);
         hash.add(now);
         ++result.ticks;
-        if (sameBits(now.basic, then.basic) && sameBits(now.additional, then.additional) &&
-            sameBits(now.total, then.total)) {
-            return;
-        }
-        result.largestDifference = std::max(result.largestDifference, glm::distance(now.total, then.total));
-        if (result.identical) {
-            result.identical = false;
-            result.firstDifference = then.tick;
+        if (!comparison.add(then, now)) {
+            result.largestDifference = std::max(result.largestDifference, glm::distance(now.total, then.total));
+            result.firstDifference = result.firstDifference.value_or(then.tick);
         }
     });
     if (result.ticks == 0) {
         throw std::runtime_error("the record holds no ticks: there is nothing to replay");
     }
     result.forceHash = hash.value();
+    result.differences = comparison.differences();
+    result.inWords = comparison.inWords();
+    result.identical = result.differences.empty();
     return result;
 }
 
@@ -115,6 +107,40 @@ SessionInfo infoOf(const SessionModel& model)
         info.tissues.push_back(row.name);
     }
     return info;
+}
+
+std::string contradictionIn(const SessionInfo& info, const SessionModel& model)
+{
+    const SessionInfo own = infoOf(model);
+    const auto differ = [](const char* what, std::string_view says, std::string_view is) {
+        return fmt::format("{} is '{}' in the record and '{}' by its scene", what, says, is);
+    };
+    if (info.scene != own.scene) {
+        return differ("scene", info.scene, own.scene);
+    }
+    if (info.model != own.model) {
+        return differ("model", info.model, own.model);
+    }
+    if (info.structures != own.structures) {
+        return differ("the list of structures", fmt::format("{}", fmt::join(info.structures, ", ")),
+                      fmt::format("{}", fmt::join(own.structures, ", ")));
+    }
+    if (info.tissues != own.tissues) {
+        return differ("the list of tissues", fmt::format("{}", fmt::join(info.tissues, ", ")),
+                      fmt::format("{}", fmt::join(own.tissues, ", ")));
+    }
+    if (info.warnDistances != own.warnDistances) {
+        return differ("the list of warning distances [m]", fmt::format("{}", fmt::join(info.warnDistances, ", ")),
+                      fmt::format("{}", fmt::join(own.warnDistances, ", ")));
+    }
+    const auto target = [](const SessionInfo& i) {
+        const auto found = std::ranges::find(i.extra, targetShapeKey, &std::pair<std::string, std::string>::first);
+        return found == i.extra.end() ? std::string() : found->second;
+    };
+    if (const std::string said = target(info); !said.empty() && said != target(own)) {
+        return differ("the target's shape", said, target(own));
+    }
+    return {};
 }
 
 }  // namespace palpate::haptics

@@ -1,6 +1,7 @@
 #include <report/html.h>
 
 #include <haptics/measures.h>
+#include <haptics/record_check.h>
 #include <report/assets.h>
 
 #include <fmt/format.h>
@@ -305,6 +306,21 @@ std::string eventsCard(const ReportData& d, const haptics::SessionInfo& info)
     return out + "</tbody></table></div></details></section>";
 }
 
+std::string sealInWords(const haptics::Seal& seal)
+{
+    switch (seal.state) {
+        case haptics::Seal::State::open:
+            return "none: the record is open, its session was cut off";
+        case haptics::Seal::State::absent:
+            return "none: the record's format has none";
+        case haptics::Seal::State::broken:
+            return "BROKEN: was changed after it was closed: " + haptics::someOf(seal.changed);
+        case haptics::Seal::State::whole:
+            break;
+    }
+    return seal.sha256;
+}
+
 std::string sessionCard(const haptics::Record& record)
 {
     const haptics::SessionInfo& info = record.info();
@@ -318,6 +334,11 @@ std::string sessionCard(const haptics::Record& record)
     row("Volume", info.volumeHash);
     row("Model", info.model);
     row("Device", info.device);
+    row("Operator", info.operatorName.empty() ? "not said" : info.operatorName);
+    row("Started", info.started);
+    row("Machine", info.host);
+    row("Session", info.name);
+    row("Seal (SHA-256)", sealInWords(record.seal()));
     row("Rate", fmt::format("{:.0f} Hz", info.rate));
     row("Seed", std::to_string(info.seed));
     row("Build", info.build);

@@ -1,5 +1,6 @@
 #include <session/deformed_state.h>
 
+#include <haptics/replay.h>
 #include <session/open.h>
 
 #include <fmt/format.h>
@@ -58,6 +59,7 @@ DeformedState::DeformedState(const std::string& file, double at, const std::func
     tick_ = static_cast<std::uint64_t>(std::floor(at * rate + 1e-6));
     simulation_ = std::make_unique<haptics::Simulation>(model_, haptics::SimulationOptions{1.0 / rate, {}});
     std::uint64_t next = 0;
+    haptics::TickComparison comparison(record_);
     record_.each([&](const haptics::TickRecord& then) {
         if (next > tick_) {
             return;
@@ -68,11 +70,11 @@ DeformedState::DeformedState(const std::string& file, double at, const std::func
                             "computed",
                             file, next));
         }
-        if (simulation_->tick(then.device).total != then.total) {
+        if (!comparison.add(then, simulation_->tick(then.device))) {
             throw std::runtime_error(
-                fmt::format("{}: the force differs from tick {} on: the record was made by another build "
-                            "({}) or machine",
-                            file, next, record_.info().build));
+                fmt::format("{}: differs from tick {} on: the record was made by another build ({}) or machine, or was "
+                            "changed: {}",
+                            file, next, record_.info().build, comparison.inWords()));
         }
         if (progress && next % 256 == 0) {
             progress(static_cast<double>(next) / static_cast<double>(tick_ + 1));

@@ -6,12 +6,17 @@
 #include <haptics/replay.h>
 #include <haptics/score.h>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <stdexcept>
 
@@ -198,8 +203,21 @@ haptics::SessionModel reopenSession(const std::string& file, const haptics::Sess
                                  ": the volume or the tissue table of this session has changed since it was "
                                  "recorded; replay it with those it was recorded with");
     }
+    if (const std::string contradiction = haptics::contradictionIn(info, model); !contradiction.empty()) {
+        throw std::runtime_error(fmt::format("{}: was changed: {}", file, contradiction));
+    }
     return model;
 }
+
+namespace {
+
+std::string hostName()
+{
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+}  // namespace
 
 haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
                                      const std::string& device)
@@ -208,6 +226,8 @@ haptics::SessionInfo describeSession(const haptics::SessionModel& model, const s
     info.sceneOrigin = origin;
     info.device = device;
     info.build = std::string(base::build());
+    info.host = hostName();
+    info.started = fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
     info.seed = model.scene.source.phantom.seed;
     return info;
 }

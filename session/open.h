@@ -50,10 +50,11 @@ volume::Tissue loadVolume(const std::filesystem::path& file);
 /// the volume and builds the model. Throws std::runtime_error, also for a change that has nothing to change.
 haptics::SessionModel openSession(const std::string& what, SceneChanges changes);
 
-/// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now.
+/// The session of a record again: same scene, same volume. Throws std::runtime_error when the volume is another now, and
+/// when the record says something else of its scene than the scene does.
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info);
 
-/// What a record says about this session.
+/// What a record says about this session, which starts now on this machine.
 haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
                                      const std::string& device);
 

@@ -2,6 +2,7 @@
 
 #include <tests/allocations.h>
 #include <tests/haptics/synthetic_session.h>
+#include <tests/sqlite_edit.h>
 
 #include <gtest/gtest.h>
 
@@ -96,13 +97,7 @@ void expectOneLineAbout(const std::filesystem::path& file, const std::string& wo
     EXPECT_EQ(error.find('\n'), std::string::npos) << error;
 }
 
-void execute(const std::filesystem::path& file, const std::string& sql)
-{
-    sqlite3* database = nullptr;
-    ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);
-    EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK) << sqlite3_errmsg(database);
-    sqlite3_close(database);
-}
+using tests::executeSql;
 
 std::string query(const std::filesystem::path& file, const std::string& sql)
 {
@@ -140,9 +135,9 @@ TEST(Record, NotANumberComesBackAsOne)
 {
     const synthetic::Folder folder;
     TickRecord tick;
-    tick.total.x = std::numeric_limits<double>::quiet_NaN();
+    tick.tissueForce.x = std::numeric_limits<double>::quiet_NaN();
     synthetic::record(folder / "a.palpate", synthetic::info(), {tick});
-    EXPECT_TRUE(std::isnan(synthetic::read(Record(folder / "a.palpate")).at(0).total.x));
+    EXPECT_TRUE(std::isnan(synthetic::read(Record(folder / "a.palpate")).at(0).tissueForce.x));
 }
 
 TEST(Record, ReturnsTheSessionAndItsResults)
@@ -158,6 +153,10 @@ TEST(Record, ReturnsTheSessionAndItsResults)
     EXPECT_EQ(out.volumeHash, in.volumeHash);
     EXPECT_EQ(out.model, in.model);
     EXPECT_EQ(out.device, in.device);
+    EXPECT_EQ(out.name, in.name);
+    EXPECT_EQ(out.operatorName, in.operatorName);
+    EXPECT_EQ(out.host, in.host);
+    EXPECT_EQ(out.started, in.started);
     EXPECT_EQ(out.build, in.build);
     EXPECT_EQ(out.rate, in.rate);
     EXPECT_EQ(out.seed, in.seed);
@@ -375,9 +374,10 @@ TEST(Record, OfTheFormatBeforeIsRead)
     const auto ticks = synthetic::procedure(2, 1, 1);
     synthetic::record(folder / "old", synthetic::info(), ticks);
     for (const char axis : {'x', 'y', 'z'}) {
-        execute(folder / "old", std::string("ALTER TABLE ticks DROP COLUMN tissue_force_") + axis + "_n");
+        executeSql(folder / "old", std::string("ALTER TABLE ticks DROP COLUMN tissue_force_") + axis + "_n");
     }
-    execute(folder / "old", "PRAGMA user_version = 2");
+    executeSql(folder / "old", "DROP TABLE seal");
+    executeSql(folder / "old", "PRAGMA user_version = 2");
     const auto read = synthetic::read(Record(folder / "old"));
     ASSERT_EQ(read.size(), ticks.size());
     for (std::size_t i = 0; i < read.size(); ++i) {
@@ -399,7 +399,7 @@ TEST(Record, RefusesWhatIsNoRecordOnOneLine)
     refuse(folder / "text", "is not a session record");
     std::ofstream(folder / "empty").close();
     refuse(folder / "empty", "holds no session");
-    execute(folder / "other", "CREATE TABLE t (a)");
+    executeSql(folder / "other", "CREATE TABLE t (a)");
     refuse(folder / "other", "is an SQLite file, but not a session record");
 
     const auto make = [&](const std::string& name) {
@@ -407,22 +407,22 @@ TEST(Record, RefusesWhatIsNoRecordOnOneLine)
         return folder / name;
     };
     const auto newer = make("newer");
-    execute(newer, "PRAGMA user_version = 99");
+    executeSql(newer, "PRAGMA user_version = 99");
     refuse(newer, "format 99");
     for (const std::string table : {"session", "ticks", "events", "cores", "core_fractions", "tissues", "structures"}) {
         const auto file = make("no-" + table);
-        execute(file, "DROP TABLE " + table);
+        executeSql(file, "DROP TABLE " + table);
         refuse(file, "table " + table + " is missing");
     }
     const auto column = make("column");
-    execute(column, "ALTER TABLE ticks DROP COLUMN proxy_x_m");
+    executeSql(column, "ALTER TABLE ticks DROP COLUMN proxy_x_m");
     refuse(column, "is damaged");
     const auto words = make("words");
-    execute(words, "UPDATE ticks SET phase = 'nowhere' WHERE tick = 100");
+    executeSql(words, "UPDATE ticks SET phase = 'nowhere' WHERE tick = 100");
     refuse(words, "unknown word 'nowhere'");
     const auto rate = make("rate");
-    execute(rate, "UPDATE session SET value = -5 WHERE key = 'rate_hz'");
-    refuse(rate, "no rate");
+    executeSql(rate, "UPDATE session SET value = -5 WHERE key = 'rate_hz'");
+    refuse(rate, "a rate of -5 Hz is outside 100 to 20000 Hz");
 }
 
 // Cut anywhere, a record either is refused on one line or, cut behind its last page, read whole.
@@ -469,7 +469,8 @@ TEST(Record, StructuresBeyondTheLimitAreRefused)
     const synthetic::Folder folder;
     SessionInfo info = synthetic::info();
     info.structures.assign(maxStructures + 1, "vessel");
-    expectOneLineAbout(folder / "a", "at most 16 structures", errorOf([&] { Recorder(folder / "a", info); }));
+    expectOneLineAbout(folder / "a", "17 structures and 5 tissues: at most 16 structures",
+                       errorOf([&] { Recorder(folder / "a", info); }));
     EXPECT_FALSE(std::filesystem::exists(folder / "a"));
 }
 

@@ -30,6 +30,10 @@ inline SessionInfo info()
     i.model = "elastic";
     i.device = "hand";
     i.build = "0.1.0 (synthetic)";
+    i.name = "train-7";
+    i.operatorName = "P-07";
+    i.host = "bench";
+    i.started = "2026-11-21T14:03:07Z";
     i.rate = 1000;
     i.seed = 18446744073709551615ULL;
     i.structures = {"tumour", "chest wall", "vessel"};
@@ -171,18 +175,33 @@ inline double anyDouble(std::mt19937_64& random)
     return std::isnan(value) ? 0.5 : value;
 }
 
-/// A tick with every field that a record holds at random.
+/// A vector of any bits of at most this length.
+inline Vec3 anyVector(double longest, std::mt19937_64& random)
+{
+    std::uniform_real_distribution<double> part(-0.5 * longest, 0.5 * longest);
+    Vec3 v(part(random), part(random), part(random));
+    v[static_cast<int>(random() % 3)] = random() % 2 == 0 ? -0.0 : std::numeric_limits<double>::denorm_min();
+    return v;
+}
+
+/// A tick with every field that a record holds at random, within what a record may hold.
 inline TickRecord anyTick(std::uint64_t tick, std::mt19937_64& random)
 {
     TickRecord r;
     r.tick = tick;
-    for (Vec3* v : {&r.device.position, &r.device.axis, &r.proxy, &r.tissueForce, &r.basic, &r.additional, &r.total}) {
+    r.device.position = anyVector(10, random);
+    const Vec3 axis = anyVector(1, random);
+    r.device.axis = axis / std::sqrt(axis.x * axis.x + axis.y * axis.y + axis.z * axis.z);
+    for (Vec3* v : {&r.basic, &r.additional, &r.total}) {
+        *v = anyVector(1000, random);
+    }
+    for (Vec3* v : {&r.proxy, &r.tissueForce}) {
         *v = {anyDouble(random), anyDouble(random), anyDouble(random)};
     }
     r.device.buttons = static_cast<std::uint32_t>(random());
     r.device.fresh = random() % 2 == 0;
     r.phase = static_cast<Phase>(random() % 3);
-    r.tissue = static_cast<std::uint8_t>(random() % 64);
+    r.tissue = static_cast<std::uint8_t>(random() % 5);
     r.nearestVital = random() % 4 == 0 ? std::uint8_t{0xFF} : static_cast<std::uint8_t>(random() % 3);
     r.faulted = random() % 2 == 0;
     r.inserted = anyDouble(random);
@@ -200,18 +219,19 @@ inline TickRecord anyTick(std::uint64_t tick, std::mt19937_64& random)
     for (std::uint32_t i = 0; i < r.eventCount; ++i) {
         r.events[i] = {static_cast<EventKind>(random() % 7),
                        random() % 2 == 0 ? std::uint8_t{0xFF} : static_cast<std::uint8_t>(random() % 3),
-                       static_cast<std::uint8_t>(random() % 64), anyDouble(random)};
+                       static_cast<std::uint8_t>(random() % 5), anyDouble(random)};
     }
     r.fired = random() % 50 == 0;
     if (r.fired) {
-        for (double& f : r.core.fraction) {
-            f = random() % 2 == 0 ? 0.0 : std::abs(anyDouble(random));
+        std::uniform_real_distribution<double> share(0, 1);
+        for (std::size_t i = 0; i < 5; ++i) {
+            r.core.fraction[i] = random() % 2 == 0 ? 0.0 : share(random);
         }
-        r.core.volume = anyDouble(random);
-        r.core.targetFraction = anyDouble(random);
-        r.core.targetLength = anyDouble(random);
-        r.core.notchStart = {anyDouble(random), anyDouble(random), anyDouble(random)};
-        r.core.notchEnd = {anyDouble(random), anyDouble(random), anyDouble(random)};
+        r.core.volume = 1e-8 * share(random);
+        r.core.targetFraction = share(random);
+        r.core.targetLength = 0.02 * share(random);
+        r.core.notchStart = anyVector(10, random);
+        r.core.notchEnd = anyVector(10, random);
     }
     return r;
 }

@@ -1,0 +1,135 @@
+#include <haptics/record_check.h>
+
+#include <datasets/scene.h>
+#include <haptics/replay.h>
+#include <haptics/score.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+
+namespace palpate::haptics {
+
+namespace {
+
+// Where ticks follow one another and where they do not.
+class Continuity {
+public:
+    void add(std::uint64_t tick)
+    {
+        if (tick != next_) {
+            missing_ += tick - next_;
+            first_ = first_.value_or(next_);
+        }
+        next_ = tick + 1;
+        ++ticks_;
+    }
+    bool whole() const noexcept { return missing_ == 0; }
+    std::string inWords() const
+    {
+        return missing_ == 0 ? ""
+                             : fmt::format(
+                                   "{} of {} ticks are missing, the first of them tick {}: measures over time are "
+                                   "too small, and nothing can be replayed",
+                                   missing_, missing_ + ticks_, *first_);
+    }
+
+private:
+    std::uint64_t next_ = 0, ticks_ = 0, missing_ = 0;
+    std::optional<std::uint64_t> first_;
+};
+
+std::string resultOf(const Record& record, std::string_view key)
+{
+    for (const auto& [name, value] : record.results()) {
+        if (name == key) {
+            return value;
+        }
+    }
+    return {};
+}
+
+std::string sealInWords(const Seal& seal, int format)
+{
+    switch (seal.state) {
+        case Seal::State::open:
+            return "the record is open, its session was cut off or still runs: what there is of it has no seal";
+        case Seal::State::absent:
+            return fmt::format("a record of format {} has no seal: what has been changed in it does not show", format);
+        case Seal::State::broken:
+            return "was changed after it was closed: " + someOf(seal.changed);
+        case Seal::State::whole:
+            break;
+    }
+    return {};
+}
+
+// The scene is text in the record, and so is what it was called.
+std::string sceneInWords(const SessionInfo& info)
+{
+    try {
+        const datasets::Scene scene = datasets::parseScene(info.sceneText, info.sceneOrigin);
+        const auto level = datasets::modelLevels[static_cast<std::size_t>(scene.model.level)];
+        if (scene.name != info.scene || level != info.model) {
+            return fmt::format("the scene is '{}' with model {}, and '{}' with model {} by its own text", info.scene,
+                               info.model, scene.name, level);
+        }
+    } catch (const std::exception& e) {
+        return fmt::format("the scene's text cannot be read ({})", e.what());
+    }
+    return {};
+}
+
+}  // namespace
+
+std::string someOf(const std::vector<std::string>& parts, std::size_t most)
+{
+    std::string text;
+    for (std::size_t i = 0; i < std::min(parts.size(), most); ++i) {
+        text += (text.empty() ? "" : "; ") + parts[i];
+    }
+    return parts.size() > most ? fmt::format("{}; and {} more", text, parts.size() - most) : text;
+}
+
+RecordCheck checkRecord(const Record& record, std::string_view build)
+{
+    RecordCheck check;
+    check.seal = record.seal();
+    const auto warn = [&check](std::string words) {
+        if (!words.empty()) {
+            check.warnings.push_back(std::move(words));
+        }
+    };
+    warn(sealInWords(check.seal, record.format()));
+
+    Continuity continuity;
+    ForceHash hash;
+    Scorer scorer(record.info());
+    record.each([&](const TickRecord& tick) {
+        continuity.add(tick.tick);
+        hash.add(tick);
+        scorer.add(tick);
+    });
+    warn(continuity.inWords());
+    const std::string forces = resultOf(record, "force_hash"), now = fmt::format("{:016x}", hash.value());
+    if (!forces.empty() && forces != now && continuity.whole()) {
+        warn(fmt::format("its forces have the hash {}, and {} at the session's end", now, forces));
+    }
+    const bool sameBuild = record.info().build == build;
+    const std::string total = resultOf(record, "score_total"), again = fmt::format("{:.1f}", scorer.score().total);
+    if (sameBuild && !total.empty() && total != again) {
+        warn(fmt::format("its total is {} by its ticks, and was {} at the session's end", again, total));
+    }
+    if (!sameBuild) {
+        warn(
+            fmt::format("was recorded by another build ({}; this is {}): palpate replay says whether its forces are this "
+                        "one's too",
+                        record.info().build, build));
+    }
+    warn(sceneInWords(record.info()));
+    return check;
+}
+
+}  // namespace palpate::haptics
