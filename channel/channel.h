@@ -1,6 +1,7 @@
 #pragma once
 
 #include <channel/layout.h>
+#include <channel/mapping_guard.h>
 
 #include <cstdint>
 #include <memory>
@@ -31,20 +32,22 @@ public:
     /// What the viewer that is the hand has written last; nothing when none has, or its last write was never finished.
     /// Wait-free, and for the writer thread too.
     std::optional<Input> input() const noexcept;
+    /// Whether somebody has cut off the segment's file: no viewer sees what is published from then on. Wait-free.
+    bool torn() const noexcept;
 
 private:
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
 
-/// How a session is over. `none`: it goes on.
-enum class Ending : std::uint8_t { none, finished, killed };
+/// How a session is over. `none`: it goes on. `torn`: its segment was cut off by another program.
+enum class Ending : std::uint8_t { none, finished, killed, torn };
 
 /// A viewer's end. Any number of viewers may read; none can disturb the simulation: the memory is mapped read-only.
 class Subscriber {
 public:
     /// Attaches, or returns nothing when there is no such session (yet). Throws std::runtime_error when there is one of
-    /// another version or layout.
+    /// another version or layout, or whose scenery is none.
     static std::optional<Subscriber> attach(const std::string& session);
     Subscriber(Subscriber&&) noexcept;
     Subscriber& operator=(Subscriber&&) noexcept;
@@ -54,10 +57,11 @@ public:
     std::span<const std::uint8_t> labels() const noexcept;
     /// Empty where there is no image.
     std::span<const std::uint16_t> image() const noexcept;
-    /// A consistent copy of the last tick; nothing when the writer died in the middle of a write.
+    /// A consistent copy of the last tick; nothing when the writer died in the middle of a write, and for a state that is
+    /// none: numbers that are not, places beyond 100 m, rows that there are not.
     std::optional<State> state() const noexcept;
     /// Copies the last displaced nodes if they are newer than `out.publication`. When it returns false `out.nodes` may hold
-    /// part of a copy that the writer has overtaken.
+    /// part of a copy that the writer has overtaken, or that was refused for a node that the lattice does not have.
     bool displaced(Displaced& out) const noexcept;
     /// False when the simulation has ended, was killed, or its segment was replaced.
     bool alive() const noexcept { return ending() == Ending::none; }
@@ -94,6 +98,7 @@ private:
     ViewersHand() = default;
     void release() noexcept;
     void* page_ = nullptr;
+    MappingGuard guard_;
 };
 
 /// Sessions that can be attached to now, in order.

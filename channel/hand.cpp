@@ -36,22 +36,29 @@ std::optional<ViewersHand> ViewersHand::take(const Subscriber& session)
     ::close(file);
     if (mapped == MAP_FAILED)
         return std::nullopt;
+    MappingGuard guard(mapped, sizeof(InputBlock));
     if (!hold(blockAt(mapped))) {
+        guard = {};
         ::munmap(mapped, sizeof(InputBlock));
         return std::nullopt;
     }
     ViewersHand hand;
     hand.page_ = mapped;
+    hand.guard_ = std::move(guard);
     return hand;
 }
 
-ViewersHand::ViewersHand(ViewersHand&& other) noexcept : page_(std::exchange(other.page_, nullptr)) {}
+ViewersHand::ViewersHand(ViewersHand&& other) noexcept
+    : page_(std::exchange(other.page_, nullptr)), guard_(std::move(other.guard_))
+{
+}
 
 ViewersHand& ViewersHand::operator=(ViewersHand&& other) noexcept
 {
     if (this != &other) {
         release();
         page_ = std::exchange(other.page_, nullptr);
+        guard_ = std::move(other.guard_);
     }
     return *this;
 }
@@ -66,6 +73,7 @@ void ViewersHand::release() noexcept
     if (page_ == nullptr)
         return;
     blockAt(page_).holder.store(0, std::memory_order_release);
+    guard_ = {};
     ::munmap(page_, sizeof(InputBlock));
     page_ = nullptr;
 }

@@ -1,4 +1,6 @@
+#include <channel/bounds.h>
 #include <channel/channel.h>
+#include <channel/mapping_guard.h>
 #include <channel/segment.h>
 
 #include <fcntl.h>
@@ -59,6 +61,7 @@ Owner ownerOf(int descriptor)
     void* mapped = ::mmap(nullptr, sizeof(Header), PROT_READ, MAP_SHARED, descriptor, 0);
     if (mapped == MAP_FAILED)
         return {};
+    const MappingGuard guard(mapped, sizeof(Header));
     const auto& header = *static_cast<const Header*>(mapped);
     Owner owner;
     if (header.magic.load(std::memory_order_acquire) == magic) {
@@ -128,15 +131,18 @@ constexpr std::size_t aligned(std::size_t bytes)
 
 void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels, std::size_t image)
 {
-    if (labels == 0 || labels != voxelsOf(scenery))
+    if (labels == 0 || labels != voxelsOf(scenery.labels))
         throw std::runtime_error("session " + session + ": " + std::to_string(labels) + " labels for a grid of " +
-                                 std::to_string(voxelsOf(scenery)));
+                                 std::to_string(voxelsOf(scenery.labels)));
     if (scenery.windows > maxWindows || image != (scenery.windows > 0 ? labels : 0))
         throw std::runtime_error("session " + session + ": an image of " + std::to_string(image) + " voxels with " +
                                  std::to_string(scenery.windows) + " windows, for " + std::to_string(labels) + " labels");
     if (scenery.tissues > maxTissues || scenery.structures > maxStructures)
         throw std::runtime_error("session " + session + ": at most " + std::to_string(maxTissues) + " tissues and " +
                                  std::to_string(maxStructures) + " structures can be shown");
+    if (!sound(scenery))
+        throw std::runtime_error("session " + session +
+                                 ": its scenery has a grid, a colour, a name or a length that no viewer shows");
 }
 
 std::uint64_t now() noexcept
@@ -168,6 +174,8 @@ struct Publisher::Impl {
     StateBlock* state = nullptr;
     InputBlock* input = nullptr;
     DisplacedBlock* displaced = nullptr;
+    MappingGuard guard;
+    std::uint64_t owner = static_cast<std::uint64_t>(::getpid());
     std::uint64_t publication = 0;
     std::unique_ptr<Displaced> back = std::make_unique<Displaced>();
 };
@@ -214,6 +222,7 @@ void Publisher::Impl::allocate(std::size_t size)
     if (mapped == MAP_FAILED)
         fail(session, "cannot map shared memory", errno);
     base = static_cast<std::byte*>(mapped);
+    guard = MappingGuard(mapped, bytes);
 }
 
 void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t> labels,
@@ -252,6 +261,7 @@ void Publisher::Impl::release() noexcept
 {
     if (!temporary.empty() && descriptor >= 0)
         ::shm_unlink(temporary.c_str());
+    guard = {};
     if (base != nullptr)
         ::munmap(base, bytes);
     if (descriptor >= 0)
@@ -261,7 +271,7 @@ void Publisher::Impl::release() noexcept
 Publisher::Impl::~Impl()
 {
     // A forked child holds a copy of this object, but not the session.
-    if (header->ownerPid == static_cast<std::uint64_t>(::getpid())) {
+    if (owner == static_cast<std::uint64_t>(::getpid())) {
         header->closed.store(1, std::memory_order_release);
         if (sameFile(descriptor, name))
             ::shm_unlink(name.c_str());
@@ -292,6 +302,11 @@ std::optional<Input> Publisher::input() const noexcept
     constexpr int tries = 4;
     const auto words = readLocked<inputWords>(*impl_->input, tries);
     return words ? std::optional(std::bit_cast<Input>(*words)) : std::nullopt;
+}
+
+bool Publisher::torn() const noexcept
+{
+    return impl_->guard.torn();
 }
 
 Displaced& Publisher::backBuffer() noexcept

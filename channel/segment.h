@@ -133,15 +133,6 @@ constexpr std::uint64_t layoutHash() noexcept
     return hash;
 }
 
-/// Display voxels of a scenery; 0 where its grid has a side without any.
-inline std::uint64_t voxelsOf(const Scenery& scenery) noexcept
-{
-    std::uint64_t count = 1;
-    for (const std::int32_t n : scenery.labels.size)
-        count *= n > 0 ? static_cast<std::uint64_t>(n) : 0;
-    return count;
-}
-
 /// "/palpate-SESSION". Throws std::runtime_error for a name that is not made of letters, digits, '-' and '_'.
 std::string segmentName(const std::string& session);
 

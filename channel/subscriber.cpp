@@ -1,4 +1,6 @@
+#include <channel/bounds.h>
 #include <channel/channel.h>
+#include <channel/mapping_guard.h>
 #include <channel/segment.h>
 
 #include <dirent.h>
@@ -26,32 +28,47 @@ bool within(std::uint64_t offset, std::uint64_t length, std::uint64_t bytes) noe
     return offset <= bytes && length <= bytes - offset && offset % alignof(Word) == 0;
 }
 
-// Whether labels and image are as large as the scenery says.
-bool coherent(const Header& header, const Scenery& scenery) noexcept
+// Where things are, as it was checked: who may write the segment may change it afterwards.
+struct Places {
+    std::uint64_t version = 0, layoutHash = 0, bytes = 0, ownerPid = 0, ownerStart = 0, scenery = 0, labels = 0,
+                  labelsBytes = 0, image = 0, imageBytes = 0, state = 0, input = 0, displaced = 0;
+};
+
+Places placesIn(const Header& h) noexcept
 {
-    const std::uint64_t voxels = voxelsOf(scenery);
-    return header.labelsBytes == voxels && scenery.windows <= maxWindows &&
+    return {h.version,     h.layoutHash,  h.bytes,      h.ownerPid,    h.ownerStart,  h.sceneryOffset,  h.labelsOffset,
+            h.labelsBytes, h.imageOffset, h.imageBytes, h.stateOffset, h.inputOffset, h.displacedOffset};
+}
+
+bool lives(const Places& p) noexcept
+{
+    return p.ownerStart != 0 && processStart(p.ownerPid) == p.ownerStart;
+}
+
+// Whether labels and image are as large as the scenery says.
+bool coherent(const Places& header, const Scenery& scenery) noexcept
+{
+    const std::uint64_t voxels = voxelsOf(scenery.labels);
+    return sound(scenery) && header.labelsBytes == voxels &&
            header.imageBytes == (scenery.windows > 0 ? voxels * sizeof(std::uint16_t) : 0);
 }
 
-// Throws when `header` is not one that this program can read.
-void check(const std::string& session, const Header& header, std::uint64_t bytes)
+// Throws when the segment is not one that this program can read.
+void check(const std::string& session, const Places& header, std::uint64_t bytes)
 {
     const auto refuse = [&](const std::string& what) { throw std::runtime_error("session " + session + ": " + what); };
-    if (header.magic.load(std::memory_order_acquire) != magic)
-        refuse("its shared memory was not made by palpate; remove " + (segmentFolder + segmentName(session)));
     if (header.version != version)
         refuse("the simulation speaks version " + std::to_string(header.version) + ", this viewer version " +
                std::to_string(version) + "; install both from the same build");
     if (header.layoutHash != layoutHash())
         refuse("the simulation and this viewer were built with different layouts; install both from the same build");
-    const bool sound =
-        header.bytes == bytes && within(header.sceneryOffset, sizeof(Scenery), bytes) &&
-        within(header.labelsOffset, header.labelsBytes, bytes) && within(header.imageOffset, header.imageBytes, bytes) &&
-        within(header.stateOffset, sizeof(StateBlock), bytes) && within(header.inputOffset, sizeof(InputBlock), bytes) &&
-        within(header.displacedOffset, sizeof(DisplacedBlock), bytes);
-    if (!sound || !coherent(header, *reinterpret_cast<const Scenery*>(reinterpret_cast<const std::byte*>(&header) +
-                                                                      header.sceneryOffset)))
+    const bool inside =
+        header.bytes == bytes && within(header.scenery, sizeof(Scenery), bytes) &&
+        within(header.labels, header.labelsBytes, bytes) && within(header.image, header.imageBytes, bytes) &&
+        within(header.state, sizeof(StateBlock), bytes) && within(header.input, sizeof(InputBlock), bytes) &&
+        within(header.displaced, sizeof(DisplacedBlock), bytes) && header.state % alignof(StateBlock) == 0 &&
+        header.displaced % alignof(DisplacedBlock) == 0 && header.input % 4096 == 0;
+    if (!inside)
         refuse("its shared memory is damaged; end the simulation and start it again");
 }
 
@@ -60,6 +77,7 @@ void check(const std::string& session, const Header& header, std::uint64_t bytes
 struct Subscriber::Impl {
     ~Impl()
     {
+        guard = {};
         if (base != nullptr)
             ::munmap(base, bytes);
     }
@@ -73,7 +91,11 @@ struct Subscriber::Impl {
     void* base = nullptr;
     std::size_t bytes = 0;
     ino_t inode = 0;
+    MappingGuard guard;
     const Header* header = nullptr;
+    Places places;
+    Scenery scenery;
+    std::uint64_t nodes = 0;  // of the lattice
     const StateBlock* state = nullptr;
     const InputBlock* input = nullptr;
     const DisplacedBlock* displaced = nullptr;
@@ -106,41 +128,53 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
         throw std::runtime_error("session " + session + ": its shared memory was not made by palpate; remove " +
                                  (segmentFolder + impl.name));
     impl.base = mapped;
+    impl.guard = MappingGuard(mapped, impl.bytes);
     impl.header = &impl.at<Header>(0);
-    check(session, *impl.header, impl.bytes);
-    if (!ownerLives(*impl.header))
+    if (impl.header->magic.load(std::memory_order_acquire) != magic)
+        throw std::runtime_error("session " + session + ": its shared memory was not made by palpate; remove " +
+                                 (segmentFolder + impl.name));
+    impl.places = placesIn(*impl.header);
+    check(session, impl.places, impl.bytes);
+    std::memcpy(&impl.scenery, &impl.at<std::byte>(impl.places.scenery), sizeof(Scenery));
+    if (!coherent(impl.places, impl.scenery))
+        throw std::runtime_error("session " + session +
+                                 ": its shared memory is damaged; end the simulation and start it again");
+    if (!lives(impl.places))
         return std::nullopt;
-    impl.state = &impl.at<StateBlock>(impl.header->stateOffset);
-    impl.input = &impl.at<InputBlock>(impl.header->inputOffset);
-    impl.displaced = &impl.at<DisplacedBlock>(impl.header->displacedOffset);
+    impl.nodes = voxelsOf(impl.scenery.lattice);
+    impl.state = &impl.at<StateBlock>(impl.places.state);
+    impl.input = &impl.at<InputBlock>(impl.places.input);
+    impl.displaced = &impl.at<DisplacedBlock>(impl.places.displaced);
     return subscriber;
 }
 
 const Scenery& Subscriber::scenery() const noexcept
 {
-    return impl_->at<Scenery>(impl_->header->sceneryOffset);
+    return impl_->scenery;
 }
 
 std::span<const std::uint8_t> Subscriber::labels() const noexcept
 {
-    return {&impl_->at<std::uint8_t>(impl_->header->labelsOffset), impl_->header->labelsBytes};
+    return {&impl_->at<std::uint8_t>(impl_->places.labels), impl_->places.labelsBytes};
 }
 
 std::span<const std::uint16_t> Subscriber::image() const noexcept
 {
-    return {&impl_->at<std::uint16_t>(impl_->header->imageOffset), impl_->header->imageBytes / sizeof(std::uint16_t)};
+    return {&impl_->at<std::uint16_t>(impl_->places.image), impl_->places.imageBytes / sizeof(std::uint16_t)};
 }
 
 std::optional<State> Subscriber::state() const noexcept
 {
     const auto words = readLocked<stateWords>(*impl_->state, stateTries);
-    return words ? std::optional(std::bit_cast<State>(*words)) : std::nullopt;
+    auto state = words ? std::optional(std::bit_cast<State>(*words)) : std::nullopt;
+    return state && sound(*state, impl_->scenery) ? state : std::nullopt;
 }
 
 std::optional<Input> Subscriber::input() const noexcept
 {
     const auto words = readLocked<inputWords>(*impl_->input, stateTries);
-    return words ? std::optional(std::bit_cast<Input>(*words)) : std::nullopt;
+    auto input = words ? std::optional(std::bit_cast<Input>(*words)) : std::nullopt;
+    return input && sound(*input) ? input : std::nullopt;
 }
 
 bool Subscriber::displaced(Displaced& out) const noexcept
@@ -164,6 +198,9 @@ bool Subscriber::displaced(Displaced& out) const noexcept
             out.nodes[i] = std::bit_cast<Displacement>(words);
         }
         if (slot.sequence.load(std::memory_order_relaxed) == before) {
+            const auto given = std::span(out.nodes).first(count);
+            if (!std::all_of(given.begin(), given.end(), [&](const Displacement& d) { return sound(d, impl_->nodes); }))
+                return false;
             out.tick = tick;
             out.publication = publication;
             out.count = static_cast<std::uint32_t>(count);
@@ -185,7 +222,7 @@ int Subscriber::openToWrite() const noexcept
 
 std::uint64_t Subscriber::inputOffset() const noexcept
 {
-    return impl_->header->inputOffset;
+    return impl_->places.input;
 }
 
 Ending Subscriber::ending() const noexcept
@@ -194,19 +231,23 @@ Ending Subscriber::ending() const noexcept
         return Ending::finished;
     if (const auto last = state(); last && last->status == Status::finished)
         return Ending::finished;
-    if (!ownerLives(*impl_->header))
+    if (impl_->guard.torn())
+        return Ending::torn;
+    if (!lives(impl_->places))
         return Ending::killed;
     struct stat named {};
     const int file = openSegment(impl_->name, O_RDONLY);
     const bool ours = file >= 0 && ::fstat(file, &named) == 0 && named.st_ino == impl_->inode;
     if (file >= 0)
         ::close(file);
+    if (ours && static_cast<std::uint64_t>(named.st_size) < impl_->bytes)
+        return Ending::torn;
     return ours ? Ending::none : Ending::killed;
 }
 
 std::uint64_t Subscriber::ownerPid() const noexcept
 {
-    return impl_->header->ownerPid;
+    return impl_->places.ownerPid;
 }
 
 std::vector<std::string> sessions()

@@ -33,6 +33,8 @@ public:
     void publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept;
     /// What the viewer that is the hand asks for; see channel::Publisher.
     std::optional<channel::Input> input() const noexcept { return publisher_.input(); }
+    /// Whether another program has cut off the segment: nobody sees the session any more. Wait-free.
+    bool torn() const noexcept { return publisher_.torn(); }
     /// The last state again, marked finished.
     void finish() noexcept;
 

@@ -154,7 +154,9 @@ void Follower::notice(Picture& picture)
 void Follower::leave(Picture& picture)
 {
     const bool finished = ending_ == channel::Ending::finished;
-    picture.setNotice(finished ? "simulation ended" : "simulation stopped without ending",
+    picture.setNotice(finished                           ? "simulation ended"
+                      : ending_ == channel::Ending::torn ? "shared memory was cut off"
+                                                         : "simulation stopped without ending",
                       fmt::format("closes in {:.0f} s unless session {} starts again", wait_, name_));
     readShape();
     subscriber_.reset();
@@ -163,6 +165,8 @@ void Follower::leave(Picture& picture)
 
 void Follower::giveUp() const
 {
+    if (ending_ == channel::Ending::torn)
+        throw std::runtime_error(fmt::format("session {}: its shared memory was cut off by another program", name_));
     if (ending_ == channel::Ending::killed)
         throw std::runtime_error(fmt::format("session {} stopped without ending (process {} is gone)", name_, pid_));
     if (ending_ == channel::Ending::none)

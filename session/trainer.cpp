@@ -130,6 +130,9 @@ struct Trainer::Impl {
         const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &interrupted};
         timing = session.run(*device, run, [this](const TickRecord& record, const ServoTiming& soFar) {
             broadcast.publish(record, soFar, session.simulation());
+            if (broadcast.torn()) {
+                interrupted = true;
+            }
             if (around) {
                 around->tell(record.tick);
             }
@@ -159,6 +162,11 @@ struct Trainer::Impl {
                 result.problem = fmt::format("{}: {} ticks were lost by the recorder: record to a faster disk",
                                              options.record.string(), result.lostRecords);
             }
+        }
+        if (result.problem.empty() && broadcast.torn()) {
+            result.problem =
+                fmt::format("session {}: its shared memory was cut off by another program: the session was ended in order",
+                            options.session);
         }
         if (result.problem.empty()) {
             result.problem = device->problem();

@@ -25,6 +25,7 @@ inline Scenery smallScenery()
     scenery.labels.size = {5, 4, 3};
     scenery.labels.spacing = 0.001;
     scenery.lattice = scenery.labels;
+    scenery.lattice.size = {10, 10, 10};
     scenery.tissues = 2;
     scenery.structures = 1;
     scenery.forceCap = 8.5;
@@ -46,9 +47,10 @@ inline State stateOf(std::uint64_t tick)
     State state;
     state.tick = tick;
     state.time = x;
-    state.tip = state.axis = state.proxy = state.basic = state.additional = state.total = {x, x + 1, x + 2};
+    state.tip = state.axis = state.proxy = {1e-6 * x, 1e-6 * x + 1, 1e-6 * x + 2};
+    state.basic = state.additional = state.total = state.tip;
     state.distance.fill(x);
-    state.coreLength = x;
+    state.coreLength = 1e-6 * x;
     state.missed = tick;
     state.published = tick + 1;
     return state;
@@ -69,7 +71,8 @@ inline void fillDisplaced(Displaced& displaced, std::uint64_t tick)
     displaced.tick = tick;
     displaced.count = static_cast<std::uint32_t>(500 + tick % 500);
     for (std::uint32_t i = 0; i < displaced.count; ++i)
-        displaced.nodes[i] = {i, {static_cast<float>(tick), static_cast<float>(i), static_cast<float>(tick)}};
+        displaced.nodes[i] = {
+            i, {1e-6F * static_cast<float>(tick), 1e-3F * static_cast<float>(i), 1e-6F * static_cast<float>(tick)}};
 }
 
 inline bool whole(const Displaced& displaced)
@@ -78,7 +81,7 @@ inline bool whole(const Displaced& displaced)
         return false;
     for (std::uint32_t i = 0; i < displaced.count; ++i) {
         const Displacement& d = displaced.nodes[i];
-        if (d.node != i || d.u[0] != static_cast<float>(displaced.tick) || d.u[2] != d.u[0])
+        if (d.node != i || d.u[0] != 1e-6F * static_cast<float>(displaced.tick) || d.u[2] != d.u[0])
             return false;
     }
     return true;
@@ -105,6 +108,8 @@ public:
     {
         return *reinterpret_cast<T*>(static_cast<std::byte*>(base_) + offset);
     }
+
+    std::size_t bytes() const noexcept { return bytes_; }
 
 private:
     void* base_ = nullptr;
