@@ -119,7 +119,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     const Vec3 additional = additionalForce(model_.scene.dffb, model_.structures.size(), near, position,
                                             tip_.phase != Phase::free, stabiliserOptions_.period, dffb_);
     const bool wasFaulted = stabiliser_.faulted;
-    const auto sent = stabilise(tissue, additional, hand_, stabiliserOptions_, stabiliser_);
+    const auto sent = stabilise(tissue, additional, hand_, record_.device.position, stabiliserOptions_, stabiliser_);
     if (sent.faulted && !wasFaulted) {
         addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
     }

@@ -126,14 +126,14 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
     return next;
 }
 
-// How much the force may change where it falls with the motion. In periods under a millisecond the way is one of encoder
-// steps: there the speed says what it was, nearly.
-double mostFall(Vec3 way, const Motion& motion, double slew, double stiffness, double period) noexcept
+// How much the force may change where it falls with the motion: that which was estimated, and no more than was read. In
+// periods under a millisecond the way is one of encoder steps: there the speed says what it was, nearly.
+double mostFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness, double period) noexcept
 {
-    if (period >= tickSeconds) {
-        return slew + stiffness * glm::length(way);
-    }
-    return std::max(slew, fallShare * slew + stiffness * period * glm::length(motion.velocity));
+    const double estimated = period >= tickSeconds
+                                 ? slew + stiffness * glm::length(way)
+                                 : std::max(slew, fallShare * slew + stiffness * period * glm::length(motion.velocity));
+    return std::min(estimated, slew + stiffness * read);
 }
 
 // What the held, late force gives too much, less what the device's friction takes.
@@ -245,9 +245,11 @@ Motion motionIn(const MotionWindow& w, double encoder, double period) noexcept
     return {way / (static_cast<double>(length) * period), stiffness(w.force), stiffness(w.basic)};
 }
 
-SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& o,
+SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec3 read, const StabiliserOptions& o,
                     StabiliserState& s) noexcept
 {
+    const double readWay = s.started ? glm::distance(read, s.read) : 0.0;
+    s.read = read;
     s.faulted = s.faulted || !finite(basic) || !finite(additional) || (device.buttons & poseInvalid) != 0;
     bool believed = true;
     const Vec3 way = wayOf(device, o, s, believed);
@@ -287,7 +289,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, con
         // A spring that is let go gives energy where its force does not fall with the motion.
         const bool falls =
             device.fresh && glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
-        sent = towards(s.sent, sent, falls ? mostFall(way, motion, slew, limits.stiffness, o.period) : slew, cap);
+        sent = towards(s.sent, sent, falls ? mostFall(way, readWay, motion, slew, limits.stiffness, o.period) : slew, cap);
     }
     s.sent = sent;
     s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = sent;

@@ -81,6 +81,7 @@ struct EnergyLedger {
 /// State of stabilise() between ticks.
 struct StabiliserState {
     Vec3 position{0.0};  // in the tick before [m]
+    Vec3 read{0.0};      // by the encoder, in the tick before [m]
     bool started = false;
     double unsettled = 0;  // time that a pose that jumped still has to hold still [s]
     Vec3 resting{0.0};     // where the hand stands still [m], and since when [s]
@@ -113,8 +114,19 @@ struct StabiliserState {
 /// - Cap: all parts are scaled together, so that their sum is at most the cap (equation 1).
 /// - Slew: neither the sum nor a channel changes by more than 5 % of the cap per millisecond. Only on the way out,
 ///   and while poses are fresh, a force may fall by the stable stiffness times the motion beside it: a spring that unloads
-///   late kicks. A fault and the dead-man switch end the force at once.
-SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& options,
+///   late kicks. That is the motion that was read in this tick: while the encoder stands still there is none, whatever is
+///   estimated between its steps. A fault and the dead-man switch end the force at once.
+///
+/// @param device  the pose, between encoder steps where that is estimated
+/// @param read    what the encoder said [m]
+SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec3 read, const StabiliserOptions& options,
                     StabiliserState& state) noexcept;
+
+/// The same where the pose is what was read.
+inline SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, const StabiliserOptions& options,
+                           StabiliserState& state) noexcept
+{
+    return stabilise(basic, additional, device, device.position, options, state);
+}
 
 }  // namespace palpate::haptics

@@ -11,6 +11,12 @@ namespace palpate::studies {
 
 std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label)
 {
+    return smallBody(low, high, label, datasets::defaultTissues());
+}
+
+std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::function<BodyLabel(Vec3)>& label,
+                                                const volume::TissueTable& table)
+{
     constexpr double metres = 1e-3;
     volume::LabelImage image;
     image.size = Index3(glm::round(high - low));
@@ -36,7 +42,7 @@ std::shared_ptr<const volume::Tissue> smallBody(Vec3 low, Vec3 high, const std::
         }
     }
     return std::make_shared<const volume::Tissue>(
-        volume::Tissue::fromLabels(image, datasets::defaultTissues(), names, {{"made by", "palpate stability"}}));
+        volume::Tissue::fromLabels(image, table, names, {{"made by", "palpate stability"}}));
 }
 
 }  // namespace palpate::studies

@@ -1,9 +1,12 @@
 #include <studies/stability/fuzz.h>
 
 #include <datasets/phantom_random.h>
+#include <datasets/tables.h>
 #include <haptics/stabiliser.h>
 #include <haptics/tick.h>
+#include <studies/stability/body.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -11,6 +14,10 @@
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <memory>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 namespace palpate::studies {
 
@@ -33,7 +40,53 @@ constexpr double flatWithin = 0.95;   // cosine between normals of a face that i
 struct Session {
     Cell cell;
     int ticks = 0;
+    bool quantised = false;  // poses are whole steps of the device's encoder
 };
+
+// Bodies and tools that a scene file may have and nobody would: a tool larger than its body, tissue like water or like
+// rock, stuck to it or sliding, a spring at the end of its range.
+constexpr std::array<const char*, 4> absurd{"absurd-rock", "absurd-water", "absurd-ball", "absurd-rod"};
+
+std::shared_ptr<const volume::Tissue> absurdBody(double side, double youngsModulus, double compress, double stretch)
+{
+    auto table = datasets::defaultTissues();
+    auto& fat = table.rows[*table.find("fat")];
+    fat.youngsModulus = youngsModulus;
+    fat.compress = compress;
+    fat.stretch = stretch;
+    fat.punctureForce = 1000.0;
+    return smallBody(
+        Vec3(-0.5 * side - 4.0), Vec3(0.5 * side + 4.0),
+        [side](Vec3 p) {
+            const bool inside = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 0.5 * side;
+            return !inside ? BodyLabel{} : p.y > 0.5 * side - 3.0 ? bodyBase : bodyFat;
+        },
+        table);
+}
+
+StabilityScene absurdScene(const char* name, std::shared_ptr<const volume::Tissue> tissue, double radius)
+{
+    StabilityScene s;
+    s.name = name;
+    s.tissue = std::move(tissue);
+    s.session.name = name;
+    s.session.tool.kind = std::string_view(name) == "absurd-rod" ? datasets::ToolKind::capsule : datasets::ToolKind::sphere;
+    s.session.tool.radius = radius;
+    s.session.tool.length = 0.1;
+    s.session.dffb.mode = datasets::DffbMode::off;
+    s.session.model.stiffness = 1e4;
+    s.session.target = "base";
+    s.session.aim = Vec3(0, 5e-3, 0);
+    return s;
+}
+
+std::vector<StabilityScene> absurdScenes()
+{
+    return {absurdScene(absurd[0], absurdBody(16, 2e10, 1.0, 1.0), 3e-3),
+            absurdScene(absurd[1], absurdBody(16, 10.0, 0.01, 10.0), 3e-3),
+            absurdScene(absurd[2], absurdBody(10, 3e3, 0.5, 2.0), 30e-3),
+            absurdScene(absurd[3], absurdBody(10, 1e9, 0.9, 1.1), 20e-3)};
+}
 
 Session sessionOf(Random& random)
 {
@@ -41,9 +94,11 @@ Session sessionOf(Random& random)
     const auto devices = haptics::deviceNames();
     const auto pick = [&](std::size_t n) { return static_cast<std::size_t>(random.bits() % n); };
     Session s;
-    s.cell = {scenes[pick(scenes.size())], levels[pick(levels.size())], devices[pick(devices.size())], true,
-              rates[pick(rates.size())]};
+    const bool beyondReason = random.between(0, 1) < 0.3;
+    s.cell = {beyondReason ? absurd[pick(absurd.size())] : scenes[pick(scenes.size())], levels[pick(levels.size())],
+              devices[pick(devices.size())], true, rates[pick(rates.size())]};
     s.ticks = static_cast<int>(random.between(0.2, 0.5) * s.cell.rate);
+    s.quantised = random.between(0, 1) < 0.5;
     return s;
 }
 
@@ -207,7 +262,10 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
         PullWatch watch(at.model, at.period);
         Vec3 before(0.0), position(0.0);
         for (int i = 0; i < session.ticks; ++i) {
-            const haptics::DeviceSample sample = hand.next();
+            haptics::DeviceSample sample = hand.next();
+            if (session.quantised && at.device.encoder > 0.0) {
+                sample.position = at.device.encoder * glm::round(sample.position / at.device.encoder);
+            }
             const Vec3 force = running.tick(sample);
             const bool finite = std::isfinite(force.x + force.y + force.z);
             const double size = glm::length(force);
@@ -235,8 +293,11 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
 FuzzResult fuzz(StabilityModels& models, std::uint64_t seed, std::uint64_t runs, int jobs,
                 const std::function<void(std::size_t)>& told)
 {
+    models.add(absurdScenes());
     std::vector<Cell> all;
-    for (const char* const scene : scenes) {
+    std::vector<const char*> names(scenes.begin(), scenes.end());
+    names.insert(names.end(), absurd.begin(), absurd.end());
+    for (const char* const scene : names) {
         for (const char* const level : {"elastic", "chainmail", "spring"}) {
             all.push_back({scene, level, "premium", true, 1000});
         }

@@ -20,7 +20,8 @@ struct FuzzResult {
 
 /// `runs` sessions of 0.2 to 0.5 s, of seeds `seed`, `seed` + 1, ..: a random scene, level, device and rate; poses wander,
 /// press to four radii and draw back, jump, shake, are no numbers, stop and leave gaps; the dead-man switch and the gun's
-/// button flicker; the machine is too slow. The result depends on the seed alone.
+/// button flicker; the machine is too slow. In half of the sessions poses are whole steps of the encoder; in a third the
+/// body is absurd but legal: rock, water, tools larger than it. The result depends on the seed alone.
 FuzzResult fuzz(StabilityModels& models, std::uint64_t seed, std::uint64_t runs, int jobs,
                 const std::function<void(std::size_t)>& told);
 

@@ -111,8 +111,20 @@ std::string Cell::id() const
 
 StabilityModels::StabilityModels() : scenes_(stabilityScenes()), methods_(stabilityMethods()) {}
 
+void StabilityModels::add(std::vector<StabilityScene> scenes)
+{
+    for (StabilityScene& s : scenes) {
+        if (std::ranges::find(others_, s.name, &StabilityScene::name) == others_.end()) {
+            others_.push_back(std::move(s));
+        }
+    }
+}
+
 const StabilityScene& StabilityModels::scene(const std::string& name) const
 {
+    if (const auto other = std::ranges::find(others_, name, &StabilityScene::name); other != others_.end()) {
+        return *other;
+    }
     return named(scenes_, name, "scene");
 }
 

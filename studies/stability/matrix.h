@@ -44,6 +44,8 @@ public:
     StabilityModels(const StabilityModels&) = delete;
     StabilityModels& operator=(const StabilityModels&) = delete;
 
+    /// Scenes beside those of the matrix: found by name, and in no list. Those that are there already are left out.
+    void add(std::vector<StabilityScene> scenes);
     /// Makes the models that these cells run on, in parallel.
     void prepare(const std::vector<Cell>& cells);
     /// Throws std::runtime_error for a name that there is none of, with those that there are.
@@ -59,7 +61,7 @@ private:
     using Key = std::pair<std::string, datasets::ModelLevel>;  // body and tool, level
     static std::string bodyOf(const StabilityScene& scene);
 
-    std::vector<StabilityScene> scenes_;
+    std::vector<StabilityScene> scenes_, others_;
     std::vector<StabilityMethod> methods_;
     std::map<Key, std::unique_ptr<const haptics::SessionModel>> models_;
 };
