@@ -148,7 +148,11 @@ void dryRun(const Options& o)
 // Which cases are still to be run.
 std::vector<std::size_t> remaining(const Options& o, const SweepFolder& folder)
 {
-    const auto rows = folder.rows();
+    std::vector<std::string> damaged;
+    const auto rows = folder.rows(&damaged);
+    for (const std::string& what : damaged) {
+        fmt::print(stderr, "palpate: {}: the case is computed again\n", what);
+    }
     std::vector<std::size_t> cases;
     std::set<std::string> others;
     for (std::size_t i = 0; i < rows.size(); ++i) {

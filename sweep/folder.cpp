@@ -74,22 +74,56 @@ double cpuSeconds()
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
-std::optional<SweepRow> parseRow(const std::string& text, std::size_t index, const SweepPlan& plan)
+// FNV-1a over the entry without its checksum.
+std::string checksumOf(json entry)
+{
+    entry.erase("checksum");
+    std::uint64_t hash = 0xcbf29ce484222325U;
+    for (const char c : entry.dump(-1, ' ', false, json::error_handler_t::replace)) {
+        hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+    }
+    return fmt::format("{:016x}", hash);
+}
+
+// A value of a case's file; throws with its key.
+template <class T>
+T valueOf(const json& entry, const char* key, bool (json::*is)() const noexcept, const char* what)
+{
+    const auto at = entry.find(key);
+    if (at == entry.end() || !((*at).*is)()) {
+        throw std::runtime_error(
+            fmt::format("key {} is {}{}", key, at == entry.end() ? "missing, and should be " : "no ", what));
+    }
+    return at->get<T>();
+}
+
+// Throws std::runtime_error ("what is wrong").
+SweepRow parseRow(const std::string& text, std::size_t index, const SweepPlan& plan)
 {
     const json entry = json::parse(text, nullptr, false);
-    if (!entry.is_object() || entry.value("case", json()) != index || !entry.contains("build")) {
-        return std::nullopt;
+    if (!entry.is_object()) {
+        throw std::runtime_error("is no JSON object");
     }
     SweepRow row;
-    row.index = index;
-    row.error = entry.value("error", "");
-    row.build = entry.value("build", "");
-    row.machine = entry.value("machine", "");
-    row.tickTime = 1e-6 * entry.value("tick_us", 0.0);
-    row.seconds = entry.value("case_s", 0.0);
+    row.index = valueOf<std::size_t>(entry, "case", &json::is_number_unsigned, "whole number");
+    if (row.index != index) {
+        throw std::runtime_error(fmt::format("key case is {}", row.index));
+    }
+    row.error = valueOf<std::string>(entry, "error", &json::is_string, "text");
+    row.build = valueOf<std::string>(entry, "build", &json::is_string, "text");
+    row.machine = valueOf<std::string>(entry, "machine", &json::is_string, "text");
+    row.tickTime = 1e-6 * valueOf<double>(entry, "tick_us", &json::is_number, "number");
+    row.seconds = valueOf<double>(entry, "case_s", &json::is_number, "number");
+    const json outputs = valueOf<json>(entry, "outputs", &json::is_object, "object");
     for (const auto& output : plan.outputs) {
-        const json value = entry.value("outputs", json::object()).value(output.name, json());
+        const json value = outputs.value(output.name, json());
+        if (!value.is_number() && !value.is_null()) {
+            throw std::runtime_error(fmt::format("key outputs.{} is no number", output.name));
+        }
         row.outputs.push_back(value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN());
+    }
+    if (valueOf<std::string>(entry, "checksum", &json::is_string, "text") != checksumOf(entry)) {
+        throw std::runtime_error("key checksum is that of another text");
     }
     return row;
 }
@@ -184,12 +218,19 @@ bool SweepFolder::has(std::size_t index) const
     return !none && size > 0;
 }
 
-std::vector<std::optional<SweepRow>> SweepFolder::rows() const
+std::vector<std::optional<SweepRow>> SweepFolder::rows(std::vector<std::string>* damaged) const
 {
     std::vector<std::optional<SweepRow>> rows(plan_.cases());
     for (std::size_t i = 0; i < rows.size(); ++i) {
-        if (has(i)) {
+        if (!has(i)) {
+            continue;
+        }
+        try {
             rows[i] = parseRow(textOf(caseFile(i)), i, plan_);
+        } catch (const std::runtime_error& e) {
+            if (damaged != nullptr) {
+                damaged->push_back(fmt::format("{}: {}", caseFile(i).string(), e.what()));
+            }
         }
     }
     return rows;
@@ -201,9 +242,12 @@ void SweepFolder::write(const SweepRow& row) const
     for (std::size_t i = 0; i < row.outputs.size(); ++i) {
         outputs[plan_.outputs[i].name] = std::isfinite(row.outputs[i]) ? json(row.outputs[i]) : json();
     }
-    const json entry{{"case", row.index},    {"error", row.error},     {"outputs", std::move(outputs)},
-                     {"build", row.build},   {"machine", row.machine}, {"tick_us", 1e6 * row.tickTime},
-                     {"case_s", row.seconds}};
+    json entry{{"case", row.index},    {"error", row.error},     {"outputs", std::move(outputs)},
+               {"build", row.build},   {"machine", row.machine}, {"tick_us", 1e6 * row.tickTime},
+               {"case_s", row.seconds}};
+    // Numbers as they will be read: the checksum is over those.
+    entry = json::parse(entry.dump(-1, ' ', false, json::error_handler_t::replace));
+    entry["checksum"] = checksumOf(entry);
     const fs::path file = caseFile(row.index);
     std::error_code failed;
     fs::create_directories(file.parent_path(), failed);

@@ -43,7 +43,9 @@ public:
     const SweepPlan& plan() const noexcept { return plan_; }
     const std::filesystem::path& path() const noexcept { return folder_; }
     /// The rows there are, by case. A file that is no whole row counts as none.
-    std::vector<std::optional<SweepRow>> rows() const;
+    /// @param damaged  gets a line with file and key for each case file that is not what was written; such a case has no
+    /// row
+    std::vector<std::optional<SweepRow>> rows(std::vector<std::string>* damaged = nullptr) const;
     bool has(std::size_t index) const;
     /// Writes a row whole or not at all. Throws std::runtime_error.
     void write(const SweepRow& row) const;

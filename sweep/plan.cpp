@@ -388,6 +388,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     plan.repeats = static_cast<std::size_t>(top.integer("repeats", "", 1, mostSamples).value_or(1));
     plan.commonSeeds = top.flag("common_seeds").value_or(false);
     plan.records = top.flag("records").value_or(false);
+    plan.caseLimit = top.number("case_limit_s", "s", 0.001, 1e7).value_or(3600.0);
     readDesign(top, plan);
     for (Section& section : top.sections("axis")) {
         plan.axes.push_back(readAxis(section, plan.design));

@@ -72,6 +72,7 @@ struct SweepPlan {
     std::size_t repeats = 1;
     bool commonSeeds = false;  // repeat n has the same seed at every point
     bool records = false;      // a record per case
+    double caseLimit = 3600;   // by the clock, after which a case is given up, and its row says so [s]
     DesignKind design = DesignKind::grid;
     std::size_t samples = 0;
     std::vector<Axis> axes;

@@ -32,6 +32,7 @@ struct Run {
     const haptics::SessionModel& model;
     const haptics::SessionInfo& info;
     haptics::Recorder* recorder;
+    const haptics::TickSink& also;
 };
 
 // A device whose forces reach the hand some ticks late, and that takes the processor time of the ticks in contact.
@@ -169,7 +170,7 @@ double carryOut(const Run& run, Drive& drive)
 {
     session::Session session(run.model, run.info);
     Measured measured(drive, 0.0);
-    session.run(measured, {.servo = {.paced = false}, .recorder = run.recorder});
+    session.run(measured, {.servo = {.paced = false}, .recorder = run.recorder}, run.also);
     return measured.mean();
 }
 
@@ -213,7 +214,7 @@ ProcedureResult wholeSession(const Run& run, const Procedure& p, std::uint64_t s
     const auto hand = session::openDevice(run.model, {"hand", p.trainee, p.seed.value_or(seed), nullptr}, nullptr);
     Measured measured(*hand, p.delay);
     session::Session session(run.model, run.info);
-    session.run(measured, {.servo = {.paced = false, .seconds = p.seconds}, .recorder = run.recorder});
+    session.run(measured, {.servo = {.paced = false, .seconds = p.seconds}, .recorder = run.recorder}, run.also);
     const session::SessionFigures figures = session.figures();
     ProcedureResult result{{}, measured.mean()};
     for (const haptics::Measure& m : haptics::measures()) {
@@ -256,9 +257,9 @@ std::vector<OutputInfo> outputsOf(ProcedureKind kind)
 }
 
 ProcedureResult carryOut(const haptics::SessionModel& model, const haptics::SessionInfo& info, const Procedure& procedure,
-                         std::uint64_t seed, haptics::Recorder* recorder)
+                         std::uint64_t seed, haptics::Recorder* recorder, const haptics::TickSink& also)
 {
-    const Run run{model, info, recorder};
+    const Run run{model, info, recorder, also};
     switch (procedure.kind) {
         case ProcedureKind::press:
             return press(run, procedure);

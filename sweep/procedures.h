@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/recorder.h>
+#include <haptics/servo.h>
 #include <haptics/session_model.h>
 #include <sweep/procedure.h>
 
@@ -19,8 +20,9 @@ struct ProcedureResult {
 /// machine.
 /// @param info      of the model, see haptics::infoOf()
 /// @param recorder  gets every tick; null: none
+/// @param also      gets every tick after it; may throw to end the procedure
 /// Throws std::runtime_error where the procedure does not go with the scene.
 ProcedureResult carryOut(const haptics::SessionModel& model, const haptics::SessionInfo& info, const Procedure& procedure,
-                         std::uint64_t seed, haptics::Recorder* recorder);
+                         std::uint64_t seed, haptics::Recorder* recorder, const haptics::TickSink& also = {});
 
 }  // namespace palpate::sweep

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -84,7 +85,14 @@ CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Pro
     if (!record.empty()) {
         recorder.emplace(record, info);
     }
-    auto result = carryOut(modelled->model, info, procedure, seed, recorder ? &*recorder : nullptr);
+    const auto begin = std::chrono::steady_clock::now();
+    const auto watch = [&](const haptics::TickRecord&, const haptics::ServoTiming&) {
+        if (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > plan_.caseLimit) {
+            throw std::runtime_error(
+                fmt::format("took over {:g} s by the clock and was given up (case_limit_s in the plan)", plan_.caseLimit));
+        }
+    };
+    auto result = carryOut(modelled->model, info, procedure, seed, recorder ? &*recorder : nullptr, watch);
     if (recorder) {
         recorder->finish({});
         if (!recorder->error().empty()) {

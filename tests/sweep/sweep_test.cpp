@@ -2,6 +2,10 @@
 #include <sweep/plan.h>
 
 #include <datasets/scene_text.h>
+#include <sweep/folder.h>
+
+#include <tests/error_of.h>
+#include <tests/folder.h>
 
 #include <gtest/gtest.h>
 
@@ -9,7 +13,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <fstream>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -276,6 +282,57 @@ TEST(CaseRunner, DelayChangesASession)
     const auto prompt = runner.run(0), late = runner.run(1);
     EXPECT_EQ(prompt.outputs[2], 1.0);
     EXPECT_NE(bitsOf(prompt), bitsOf(late));
+}
+
+// A case's file is what was written, or the case has no row and its file and key are named.
+TEST(SweepFolder, ADamagedCaseIsNamedWithItsKeyAndHasNoRow)
+{
+    const tests::Folder home;
+    const std::string plan = home / "plan.toml";
+    const auto table = small.find("[procedure]");
+    std::ofstream(plan) << small.substr(0, table) + depths + small.substr(table);
+    SweepFolder folder(home / "sweep", plan, true);
+    SweepRow row;
+    row.build = "one";
+    row.machine = "here";
+    row.seconds = 0.1 + 0.2;  // a number whose digits do not end
+    row.outputs.assign(folder.plan().outputs.size(), 1.0 / 3.0);
+    folder.write(row);
+    const auto file = home / "sweep/cases/000/0.json";
+    std::stringstream whole;
+    whole << std::ifstream(file).rdbuf();
+    std::vector<std::string> damaged;
+    EXPECT_TRUE(folder.rows(&damaged).at(0));
+    EXPECT_TRUE(damaged.empty());
+    const std::vector<std::pair<std::string, std::string>> edits{{"\"tick_us\":0.0", "\"tick_us\":\"0\""},
+                                                                 {"\"build\":\"one\"", "\"build\":1"},
+                                                                 {"\"error\":\"\"", "\"error\":null"},
+                                                                 {"\"case\":0", "\"case\":-3"},
+                                                                 {"\"machine\":\"here\"", "\"machine\":\"there\""},
+                                                                 {"0.3333", "0.4333"},
+                                                                 {"\"checksum\"", "\"sum\""}};
+    const std::vector<std::string> named{"tick_us", "build", "error", "case", "checksum", "checksum", "checksum"};
+    for (std::size_t i = 0; i < edits.size(); ++i) {
+        std::string text = whole.str();
+        const auto at = text.find(edits[i].first);
+        ASSERT_NE(at, std::string::npos) << edits[i].first << " in " << text;
+        text.replace(at, edits[i].first.size(), edits[i].second);
+        std::ofstream(file) << text;
+        damaged.clear();
+        EXPECT_FALSE(folder.rows(&damaged).at(0)) << edits[i].second;
+        ASSERT_EQ(damaged.size(), 1U) << edits[i].second;
+        EXPECT_NE(damaged[0].find("cases/000/0.json: key " + named[i]), std::string::npos) << damaged[0];
+    }
+}
+
+TEST(SweepCase, ThatTakesTooLongIsGivenUpAndItsRowSaysSo)
+{
+    SweepPlan plan = planOf("case_limit_s = 0.001\n" + depths);
+    EXPECT_EQ(plan.caseLimit, 0.001);
+    CaseRunner runner(plan, "one");
+    EXPECT_NE(tests::errorOf([&] { runner.run(0); }).find("took over 0.001 s by the clock"), std::string::npos);
+    plan.caseLimit = 3600;
+    EXPECT_FALSE(runner.run(0).outputs.empty());
 }
 
 }  // namespace
