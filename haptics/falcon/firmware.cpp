@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <iterator>
+#include <span>
+#include <string_view>
 #include <system_error>
+#include <utility>
 
 namespace palpate::falcon {
 
@@ -99,26 +101,59 @@ void compareEcho(std::span<const std::uint8_t> sent, std::span<const std::uint8_
                     at + 1, total, *there, what));
 }
 
+// What the bytes are where they cannot be a program for a processor; empty where they may be.
+std::string otherThanFirmware(std::span<const std::uint8_t> image)
+{
+    const auto begins = [&](std::string_view with) {
+        return std::equal(with.begin(), with.end(), image.begin(),
+                          [](char a, std::uint8_t b) { return static_cast<std::uint8_t>(a) == b; });
+    };
+    constexpr std::array<std::pair<std::string_view, const char*>, 6> kinds{{{"PK\x03\x04", "a ZIP archive"},
+                                                                             {"\x1f\x8b", "a gzip archive"},
+                                                                             {"MZ", "a Windows program"},
+                                                                             {"\x7f"
+                                                                              "ELF",
+                                                                              "a Linux program"},
+                                                                             {"%PDF", "a PDF document"},
+                                                                             {"Rar!", "a RAR archive"}}};
+    for (const auto& [start, what] : kinds) {
+        if (begins(start)) {
+            return what;
+        }
+    }
+    if (std::ranges::all_of(image, [&](std::uint8_t b) { return b == image[0]; })) {
+        return fmt::format("the byte 0x{:02x} and no other", image[0]);
+    }
+    const bool text = std::ranges::all_of(
+        image, [](std::uint8_t b) { return (b >= 0x20 && b < 0x7F) || b == '\n' || b == '\r' || b == '\t'; });
+    return text ? "text" : "";
+}
+
 }  // namespace
 
 Firmware readFirmware(const std::filesystem::path& file)
 {
     Firmware firmware{file.string(), {}};
-    std::error_code ignored;
-    std::ifstream stream;
-    if (!std::filesystem::is_directory(file, ignored)) {
-        stream.open(file, std::ios::binary);
-    }
-    if (stream.is_open()) {
-        firmware.image.assign(std::istreambuf_iterator<char>(stream), {});
-    }
-    if (!stream.is_open() || stream.bad()) {
-        throw Trouble(Cause::firmwareFile, firmware.file + ": cannot be read: give the file with the Falcon's firmware");
-    }
-    if (firmware.image.size() < smallest || firmware.image.size() > largest) {
+    const auto refuse = [&](const std::string& what) {
         throw Trouble(Cause::firmwareFile,
-                      fmt::format("{}: has {} bytes, a Falcon's firmware has {} to {}: give the file with the firmware",
-                                  firmware.file, firmware.image.size(), smallest, largest));
+                      fmt::format("{}: {}: give the file with the Falcon's firmware", file.string(), what));
+    };
+    // By its size before a byte is read: a device such as /dev/zero has no end.
+    std::error_code none;
+    if (!std::filesystem::is_regular_file(file, none)) {
+        refuse(std::filesystem::exists(file, none) ? "is no regular file" : "cannot be read");
+    }
+    const std::uintmax_t size = std::filesystem::file_size(file, none);
+    if (none || size < smallest || size > largest) {
+        refuse(fmt::format("has {} bytes, a Falcon's firmware has {} to {}", none ? 0 : size, smallest, largest));
+    }
+    std::ifstream stream(file, std::ios::binary);
+    firmware.image.resize(size);
+    if (!stream.read(reinterpret_cast<char*>(firmware.image.data()), static_cast<std::streamsize>(size))) {
+        refuse("cannot be read");
+    }
+    if (const std::string other = otherThanFirmware(firmware.image); !other.empty()) {
+        refuse("holds " + other);
     }
     return firmware;
 }

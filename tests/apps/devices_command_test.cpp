@@ -24,7 +24,15 @@ TEST(DevicesCommand, RefusesWhatIsNoFirmware)
     expectRefusal({"devices", "--falcon-firmware", file}, "has 1 bytes, a Falcon's firmware has 512 to 1048576");
     expectRefusal({"train", "block", "--no-view", "--device", "falcon", "--falcon-firmware", file},
                   "short.bin: has 1 bytes");
-    expectRefusal({"devices", "--falcon-firmware", folder.path().string()}, "cannot be read");
+    expectRefusal({"devices", "--falcon-firmware", folder.path().string()}, "is no regular file");
+    expectRefusal({"devices", "--falcon-firmware", "/dev/zero"}, "/dev/zero: is no regular file");
+    const std::string page = folder / "page";
+    writeText(page, "<html>" + std::string(3000, 'x') + "</html>");
+    expectRefusal({"devices", "--falcon-firmware", page}, "holds text");
+    writeText(page, std::string(3000, '\xff'));
+    expectRefusal({"devices", "--falcon-firmware", page}, "holds the byte 0xff and no other");
+    writeText(page, "PK\x03\x04" + std::string(3000, '\x01'));
+    expectRefusal({"devices", "--falcon-firmware", page}, "holds a ZIP archive");
     expectRefusal({"devices", "--install-udev", "--udev-folder", (folder / "none").string()}, "cannot be written");
 }
 
