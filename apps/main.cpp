@@ -11,8 +11,11 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
 #include <exception>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -30,6 +33,16 @@ std::vector<std::string> wordsOf(int argc, char** argv)
     }
     std::ranges::reverse(words);
     return words;
+}
+
+// What a command printed and nobody got is no success: a full disk behind `>`, a closed pipe.
+void checkStandardOutput()
+{
+    errno = 0;
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+        throw std::runtime_error(std::string("standard output: cannot be written") +
+                                 (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : ""));
+    }
 }
 
 }  // namespace
@@ -77,6 +90,7 @@ int main(int argc, char** argv)
 
     try {
         app.parse(wordsOf(argc, argv));
+        checkStandardOutput();
         return 0;
     } catch (const CLI::ParseError& e) {
         const int status = app.exit(e);

@@ -1,10 +1,13 @@
 #include <command/json.h>
 
+#include <base/outputs.h>
+
 #include <nlohmann/json.hpp>
 
 #include <fstream>
 #include <iostream>
 #include <stdexcept>
+#include <system_error>
 
 namespace palpate::command {
 
@@ -17,6 +20,12 @@ void writeJson(const std::filesystem::path& file, const nlohmann::json& figures)
         if (!(std::cout << text << std::flush)) {
             throw std::runtime_error("standard output: the figures cannot be written");
         }
+        return;
+    }
+    // Whole or not at all; what is there and no file of the disk's (a pipe, /dev/stdout) is written as it is.
+    std::error_code none;
+    if (!std::filesystem::exists(file, none) || std::filesystem::is_regular_file(file, none)) {
+        base::writeWhole(file, text);
         return;
     }
     std::ofstream out(file);
