@@ -21,7 +21,7 @@ ARROWS = {
     "haptics/falcon": {"base", "volume", "datasets", "haptics"},
     "session": {"base", "volume", "datasets", "haptics", "haptics/falcon", "channel"},
     "report": {"base", "volume", "haptics"},
-    "command": {"session"},
+    "command": {"base", "session"},
     "studies": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "report", "command", "channel"},
     "planner": {"base", "chainmail", "datasets", "haptics", "session", "command", "studies"},
     "sweep": {"base", "volume", "datasets", "haptics", "session", "report", "command"},
