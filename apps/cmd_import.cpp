@@ -8,6 +8,7 @@
 #include <report/volume.h>
 #include <volume/fnv.h>
 #include <volume/import.h>
+#include <volume/prepare/body.h>
 #include <volume/prepare/mapping.h>
 #include <volume/prepare/steps.h>
 #include <volume/resample.h>
@@ -36,7 +37,9 @@ struct Options {
     volume::ImportOptions reading;
     prepare::MappingOptions mapping;
     prepare::PreparationOptions steps;
-    std::string voxel, closeSkinHoles, addSkin, pad, cropMargin;
+    std::string voxel, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;
+    double hull = 0;  // thickness of a body that is invented [m]
+    bool bodyFromImage = false;
 };
 
 void readLengths(Options& o)
@@ -46,6 +49,7 @@ void readLengths(Options& o)
     };
     set(o.steps.voxel, "--voxel", o.voxel, 0.05e-3, 50e-3);
     set(o.steps.addSkin, "--add-skin", o.addSkin, 0.05e-3, 50e-3);
+    set(o.hull, "--body-from-hull", o.bodyFromHull, 2e-3, 0.2);
     set(o.steps.pad, "--pad", o.pad, 0.05e-3, 0.5);
     set(o.steps.cropMargin, "--crop-margin", o.cropMargin, 0, 1);
     if (o.steps.closeSkinHoles) {
@@ -53,37 +57,50 @@ void readLengths(Options& o)
     }
 }
 
-// The image on the voxels of the labels.
-volume::CompanionImage readImage(const Options& o, const volume::LabelImage& labels, const volume::TissueTable& table,
-                                 std::vector<std::string>& notes, command::Progress& progress)
+// The image as its file has it, its unit as --image-unit has it.
+volume::ImportedImage readImage(const Options& o, std::vector<std::string>& notes, command::Progress& progress)
 {
     volume::ImportOptions reading;
     reading.series = o.reading.series;
     progress.show("checking the image");
     reading.progress = [&](double share) { progress.show("reading the image", share); };
-    const volume::ImportedImage image = volume::importImage(o.image, reading);
+    volume::ImportedImage image = volume::importImage(o.image, reading);
     for (const std::string& warning : image.warnings) {
         notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
     }
-    const volume::VoxelGrid from{image.size, image.affine}, to{labels.size, labels.affine};
     if (!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit) {
         throw std::runtime_error(
             fmt::format("{}: says itself that it is in {}: leave --image-unit out", o.image.string(), image.what));
     }
+    image.what = o.imageUnit.empty() ? image.what : o.imageUnit;
+    if (o.bodyFromImage && image.what != "HU") {
+        throw std::runtime_error(
+            fmt::format("{}: --body-from-image needs CT in Hounsfield units: add --image-unit HU if it "
+                        "is that, or invent a body with --body-from-hull MM",
+                        o.image.string()));
+    }
+    return image;
+}
+
+// The image on the voxels of the labels.
+volume::CompanionImage companionOf(const Options& o, const volume::ImportedImage& image, const volume::LabelImage& labels,
+                                   const volume::TissueTable& table, std::vector<std::string>& notes)
+{
+    const volume::VoxelGrid from{image.size, image.affine}, to{labels.size, labels.affine};
     volume::CompanionImage companion;
-    companion.unit = o.imageUnit.empty() ? image.what : o.imageUnit;
+    companion.unit = image.what;
     if (!o.stiffness.empty()) {
         companion.stiffness = datasets::stiffnessMap(o.stiffness, companion.unit, table);
     }
-    progress.show("resampling the image");
     const float missing = companion.unit == "HU" ? -1000.0F : 0.0F;
     companion.values = volume::resampledImage(from, image.values, to, std::nanf(""));
-    std::uint64_t bare = 0;
+    std::uint64_t bare = 0, labelled = 0;
     for (std::size_t i = 0; i < companion.values.size(); ++i) {
+        labelled += labels.values[i] != 0 ? 1 : 0;
         bare += std::isnan(companion.values[i]) && labels.values[i] != 0 ? 1 : 0;
         companion.values[i] = std::isnan(companion.values[i]) ? missing : companion.values[i];
     }
-    if (bare == labels.values.size() || bare > labels.values.size() / 2) {
+    if (2 * bare > labelled) {
         throw std::runtime_error(
             fmt::format("{}: it covers less than half of the labelled voxels of {}: give the image that the "
                         "segmentation was made of, in the same patient frame",
@@ -94,6 +111,30 @@ volume::CompanionImage readImage(const Options& o, const volume::LabelImage& lab
                                     companion.stiffness.points.empty() ? "" : ", for their stiffness too"));
     }
     return companion;
+}
+
+// A body around the labels, as it is asked for; before anything else is done to them.
+std::vector<prepare::PreparationStep> addBody(const Options& o, volume::LabelImage& labels,
+                                              std::vector<volume::LabelName>& named, const volume::TissueTable& table,
+                                              const volume::ImportedImage* image, std::vector<std::string>& notes,
+                                              command::Progress& progress)
+{
+    const auto tell = [&](const std::string& what) { progress.show(what); };
+    if (o.bodyFromImage) {
+        const volume::VoxelGrid ct{image->size, image->affine};
+        prepare::extendToImage(labels, ct);
+        progress.show("resampling the image");
+        auto hu = volume::resampledImage(ct, image->values, {labels.size, labels.affine}, std::nanf(""));
+        return prepare::bodyFromImage(labels, named, std::move(hu), table, tell);
+    }
+    if (o.hull == 0) {
+        return {};
+    }
+    notes.push_back(
+        fmt::format("the body around the labels is invented: {:g} mm of soft tissue and skin that no image "
+                    "shows",
+                    1e3 * o.hull));
+    return prepare::bodyFromHull(labels, named, o.hull, table, tell);
 }
 
 volume::Provenance provenanceOf(const Options& o, const volume::LabelImage& image, const std::vector<std::string>& notes,
@@ -164,6 +205,9 @@ void checkOptions(const Options& o)
     if (!o.stiffness.empty() && o.image.empty()) {
         throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
     }
+    if (o.bodyFromImage && o.image.empty()) {
+        throw std::runtime_error("--body-from-image: needs the image: add --image FILE");
+    }
     if (!o.imageUnit.empty() && o.image.empty()) {
         throw std::runtime_error("--image-unit: needs the image: add --image FILE");
     }
@@ -193,18 +237,27 @@ void runImport(Options o)
     std::vector<std::string> notes = labels.warnings;
     noteOverlaps(labels, notes);
     std::vector<volume::LabelName> named = prepare::mapLabels(o.mapping, o.input, labels, counts, table, notes);
-    const auto steps =
-        prepare::prepare(labels.image, named, table, o.steps, [&](const std::string& what) { progress.show(what); });
-    std::optional<volume::CompanionImage> image;
+    std::optional<volume::ImportedImage> image;
     if (!o.image.empty()) {
-        image = readImage(o, labels.image, table, notes, progress);
+        image = readImage(o, notes, progress);
+    }
+    auto steps = addBody(o, labels.image, named, table, image ? &*image : nullptr, notes, progress);
+    for (auto& step :
+         prepare::prepare(labels.image, named, table, o.steps, [&](const auto& what) { progress.show(what); })) {
+        steps.push_back(std::move(step));
+    }
+    std::optional<volume::CompanionImage> companion;
+    if (image) {
+        progress.show("resampling the image");
+        companion = companionOf(o, *image, labels.image, table, notes);
+        image.reset();
     }
     progress.show("making tissue");
     volume::Provenance provenance = provenanceOf(o, labels.image, notes, steps);
     const volume::Tissue tissue =
-        volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance), image ? &*image : nullptr);
+        volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance), companion ? &*companion : nullptr);
     labels.image.values = {};
-    image.reset();
+    companion.reset();
     progress.show("writing");
     tissue.save(o.output);
     progress.clear();
@@ -261,6 +314,19 @@ void addMapping(CLI::App& command, Options& o)
         .add_option("--write-map", o.mapping.writeMap,
                     "Write a label map to edit, with what is known of the labels, and stop")
         ->type_name("FILE")
+        ->group("Tissue");
+    CLI::Option* const fromImage =
+        command
+            .add_option_function<std::vector<std::string>>(
+                "--body-from-image", [&o](const std::vector<std::string>&) { o.bodyFromImage = true; },
+                "Find skin, fat, muscle, bone, lung and vessels around the labels in the image, which is CT")
+            ->expected(0, 1)
+            ->check(CLI::IsMember({"ct"}))
+            ->type_name("[ct]")
+            ->group("Tissue");
+    command.add_option("--body-from-hull", o.bodyFromHull, "Invent so much soft tissue and skin around the labels")
+        ->type_name("MM")
+        ->excludes(fromImage)
         ->group("Tissue");
     command.add_option("--tissues", o.tissues, "Tissue table in place of the built-in one")
         ->type_name("FILE")

@@ -1,15 +1,14 @@
 #include <volume/clean.h>
 
 #include <volume/pieces.h>
+#include <volume/voxel_distance.h>
 
-#include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
@@ -85,65 +84,6 @@ std::vector<std::uint8_t> outsideOf(const LabelImage& image, const std::vector<s
         }
     });
     return outside;
-}
-
-// Values along one axis, and how to work on a line of them.
-struct LinePass {
-    std::vector<float> square;  // of 0, 1, 2 .. steps [m^2]
-    std::size_t stride = 1;
-    int count = 0;
-
-    // Lowers each value to the least of those within the window plus the square of the way to them.
-    void run(float* first, std::vector<float>& line) const
-    {
-        line.resize(static_cast<std::size_t>(count));
-        for (std::size_t k = 0; k < line.size(); ++k) {
-            line[k] = first[k * stride];
-        }
-        if (std::all_of(line.begin(), line.end(), [&](float v) { return v == line[0]; })) {
-            return;
-        }
-        const int window = static_cast<int>(square.size()) - 1;
-        for (int k = 0; k < count; ++k) {
-            float least = std::numeric_limits<float>::infinity();
-            for (int j = std::max(0, k - window); j <= std::min(count - 1, k + window); ++j) {
-                least =
-                    std::min(least, line[static_cast<std::size_t>(j)] + square[static_cast<std::size_t>(std::abs(j - k))]);
-            }
-            first[static_cast<std::size_t>(k) * stride] = least;
-        }
-    }
-};
-
-// Squared distance [m^2] of every voxel's centre to the nearest marked one's, infinite beyond `reach` [m], along one axis
-// after the other; the steps of the voxels must be orthogonal.
-// Source: P. F. Felzenszwalb, D. P. Huttenlocher, "Distance Transforms of Sampled Functions", Theory of Computing 8, 2012;
-// the lower envelope of parabolas is found by trying all of them, for `reach` is a few voxels.
-std::vector<float> squaredDistance(const LabelImage& image, const std::vector<std::uint8_t>& marked, double reach)
-{
-    constexpr float far = std::numeric_limits<float>::infinity();
-    std::vector<float> d(marked.size());
-    std::transform(marked.begin(), marked.end(), d.begin(), [](std::uint8_t m) { return m != 0 ? 0.0F : far; });
-    const Vec3 spacing = image.affine.spacing();
-    for (int axis = 0; axis < 3; ++axis) {
-        Index3 step(0);
-        step[axis] = 1;
-        LinePass pass{{}, image.offset(step), image.size[axis]};
-        for (int k = 0; k * spacing[axis] <= reach * (1 + 1e-6); ++k) {
-            pass.square.push_back(static_cast<float>(k * k * spacing[axis] * spacing[axis]));
-        }
-        const int outer = axis == 2 ? 1 : 2, inner = axis == 0 ? 1 : 0;
-        tbb::parallel_for(0, image.size[outer], [&](int o) {
-            std::vector<float> line;
-            for (int i = 0; i < image.size[inner]; ++i) {
-                Index3 start(0);
-                start[outer] = o;
-                start[inner] = i;
-                pass.run(d.data() + image.offset(start), line);
-            }
-        });
-    }
-    return d;
 }
 
 // Gives `label` to the voxels of tissue for which wanted(offset) holds; returns what they were.
@@ -275,7 +215,7 @@ std::vector<Relabelled> keepLargestPieces(LabelImage& image, const std::vector<s
 std::vector<Relabelled> addSkin(LabelImage& image, const SkinLabels& labels, double thickness)
 {
     const std::vector<std::uint8_t> outside = outsideOf(image, labels.air);
-    const std::vector<float> distance = squaredDistance(image, outside, thickness);
+    const std::vector<float> distance = squaredDistance({image.size, image.affine}, outside, thickness);
     const auto most = static_cast<float>(thickness * thickness * (1 + 1e-5));
     return relabel(image, labels, [&](std::size_t i) { return distance[i] <= most; });
 }
@@ -310,7 +250,7 @@ ClosedHoles closeSkinHoles(LabelImage& image, const SkinLabels& labels, double a
     if (out.closed > 0) {
         // From the hole's own voxels inwards, less the voxel that they are themselves.
         const double depth = std::max(0.0, out.thickness - voxel);
-        const std::vector<float> distance = squaredDistance(image, holes, depth);
+        const std::vector<float> distance = squaredDistance({image.size, image.affine}, holes, depth);
         const auto most = static_cast<float>(depth * depth * (1 + 1e-5));
         out.taken = relabel(image, labels, [&](std::size_t i) { return distance[i] <= most; });
     }

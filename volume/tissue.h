@@ -70,7 +70,7 @@ struct CellMaterial {
 ///     label      Int32, background 0   the label value of every voxel
 ///     stiffness  Float, background 0   Young's modulus [kPa], per voxel
 ///     occupancy  Bool,  background 0   true where there is tissue
-///     image      Float                 an intensity image where there is tissue; only of volumes that came with one
+///     image      Float                 an intensity image, outside the labels too; only of volumes that came with one
 ///
 /// Homogeneous regions are stored as tiles. Immutable, so that threads may share it; each thread reads through its own
 /// Reader. OpenVDB stays behind this header.
@@ -98,7 +98,7 @@ public:
     MemoryUse memory() const;                                // of the grids [bytes]
     /// The label map that it was made from.
     LabelImage labels() const;
-    /// The image that it came with; where there is no tissue, the value of air (-1000 HU, else 0).
+    /// The image that it came with; where it had none, the value of air (-1000 HU, else 0).
     std::optional<CompanionImage> companion() const;
     bool hasImage() const noexcept;  // came with a CT or MR
     /// Of the image: its unit and what it does to the stiffness.

@@ -232,12 +232,10 @@ void addImage(TissueData& tissue, const LabelImage& labels, const CompanionImage
                                              companion.values.size(), labels.values.size()));
     }
     const auto background = static_cast<float>(valueOfAir(companion.unit));
-    const auto& solid = tissue.lookup.solid;
     tissue.imageUnit = companion.unit;
     tissue.stiffnessMap = companion.stiffness;
     tissue.image = gridOf<openvdb::FloatGrid>(
-        labels, [&](std::size_t at) { return solid[labels.values[at]] != 0 ? companion.values[at] : background; },
-        background);
+        labels, [&](std::size_t at) { return companion.values[at]; }, background);
     tissue.image->setName("image");
     if (companion.stiffness.points.empty()) {
         return;
