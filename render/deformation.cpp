@@ -66,7 +66,10 @@ VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept
 }
 
 Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels)
-    : labelGrid_(scenery.labels), lattice_(scenery.lattice), labels_(labels.begin(), labels.end())
+    : labelGrid_(scenery.labels),
+      lattice_(scenery.lattice),
+      labels_(labels.begin(), labels.end()),
+      inverse_(size(lattice_), static_cast<float>(1 / lattice_.spacing))
 {
     markPure();
     std::size_t nodes = 1;
@@ -159,6 +162,7 @@ VoxelBox Deformation::apply(const channel::Displaced& displaced)
     }
     largest_ = std::sqrt(largest);
     carryAir();
+    inverse_.update(u_, moved_);
     const VoxelBox now = boxOfMoved();
     const VoxelBox changed = enclosing(last_, now);
     last_ = now;
@@ -241,52 +245,16 @@ VoxelBox Deformation::boxOfMoved() const
             glm::clamp(glm::ivec3(glm::ceil(to)) + 1, glm::ivec3(0), size(labelGrid_))};
 }
 
-glm::vec3 Deformation::displacement(glm::vec3 g) const noexcept
-{
-    const glm::vec3 last(lattice_.size[0] - 1, lattice_.size[1] - 1, lattice_.size[2] - 1);
-    if (!(g.x >= 0 && g.y >= 0 && g.z >= 0 && g.x < last.x && g.y < last.y && g.z < last.z))
-        return glm::vec3(0);
-    const glm::ivec3 cell(g);
-    const glm::vec3 part = g - glm::vec3(cell);
-    const auto row = static_cast<std::size_t>(lattice_.size[0]), layer = row * static_cast<std::size_t>(lattice_.size[1]);
-    const glm::vec4* u = &u_[offset(lattice_, cell)];
-    const auto alongX = [&](std::size_t at) {
-        const Lanes from = lanes(u[at]);
-        return from + part.x * (lanes(u[at + 1]) - from);
-    };
-    const auto alongXY = [&](std::size_t at) {
-        const Lanes near = alongX(at);
-        return near + part.y * (alongX(at + row) - near);
-    };
-    const Lanes below = alongXY(0), sum = below + part.z * (alongXY(layer) - below);
-    return {sum[0], sum[1], sum[2]};
-}
-
-// In lattice units and single precision: this runs for every node of a shift field and every pixel of a slice, in every
-// frame.
-void Deformation::follow(glm::vec3 g, glm::vec3& shift) const noexcept
-{
-    constexpr int iterations = 5;
-    constexpr float enough = 0.03F;  // [lattice spacings]
-    const auto perMetre = static_cast<float>(1 / lattice_.spacing);
-    for (int i = 0; i < iterations; ++i) {
-        const glm::vec3 next = -perMetre * displacement(g + shift);
-        const glm::vec3 step = glm::abs(next - shift);
-        shift = next;
-        if (std::max({step.x, step.y, step.z}) < enough)
-            break;
-    }
-}
-
 glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
 {
-    follow(glm::vec3((x - vec(lattice_.origin)) / lattice_.spacing), shift);
+    inverse_.follow(glm::vec3((x - vec(lattice_.origin)) / lattice_.spacing), shift);
     return shift == glm::vec3(0) ? x : x + lattice_.spacing * glm::dvec3(shift);
 }
 
 glm::dvec3 Deformation::seen(glm::dvec3 p) const noexcept
 {
-    return p + glm::dvec3(displacement(glm::vec3((p - vec(lattice_.origin)) / lattice_.spacing)));
+    return p +
+           lattice_.spacing * glm::dvec3(inverse_.displacement(glm::vec3((p - vec(lattice_.origin)) / lattice_.spacing)));
 }
 
 std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept

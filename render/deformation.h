@@ -1,6 +1,7 @@
 #pragma once
 
 #include <channel/layout.h>
+#include <render/inverse.h>
 
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -35,13 +36,16 @@ public:
     /// `labels`: tissue row per display voxel, 0 = air, with shellBit; copied.
     Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
 
+    Deformation(const Deformation&) = delete;
+    Deformation& operator=(const Deformation&) = delete;
+
     /// Takes over the nodes of one moment. Returns the display voxels that look different from before.
     VoxelBox apply(const channel::Displaced& displaced);
-    /// The rest point X that lies at `x` [m], by the fixed point X <- x - u(X).
+    /// The rest point X that lies at `x` [m], see Inverse.
     /// @param shift  where to start, X - x in lattice spacings, and where it ended: the next point along a row starts there
     glm::dvec3 rest(glm::dvec3 x, glm::vec3& shift) const noexcept;
     /// The same in the lattice's own terms, for what needs many of them: takes shift(g) to X - x, both in spacings.
-    void follow(glm::vec3 g, glm::vec3& shift) const noexcept;
+    void follow(glm::vec3 g, glm::vec3& shift) const noexcept { inverse_.follow(g, shift); }
     /// Where the rest point `p` [m] lies now.
     glm::dvec3 seen(glm::dvec3 p) const noexcept;
     /// Tissue at the rest point `p` [m], with shellBit where a warning distance ends. Around a point the tissue with the
@@ -60,8 +64,6 @@ private:
     static constexpr int neighbours = 27;          // of a node in its 3 x 3 x 3, itself in the middle
     static constexpr int airLayers = 16;           // that go along with the body
 
-    /// At `g` [lattice spacings from the lattice's origin], in metres.
-    glm::vec3 displacement(glm::vec3 g) const noexcept;
     std::uint8_t restTissue(glm::dvec3 p) const noexcept;
     void markPure();
     void layerAir();
@@ -78,6 +80,7 @@ private:
     std::array<std::int32_t, neighbours> around_{};  // from a node to its neighbours
     std::vector<glm::vec4> u_;                       // per lattice node [m], and 1 if it has moved
     std::vector<std::uint32_t> moved_;               // nodes with u != 0
+    Inverse inverse_;                                // of u_
     std::vector<std::uint32_t> visited_;             // per lattice node: last pass that gave it a value
     std::vector<std::uint32_t> frontier_;
     std::uint32_t pass_ = 0;
