@@ -37,6 +37,7 @@ struct Options {
     std::vector<std::string> vital;
     std::uint64_t seed = 1;
     int proposals = 5, choose = 1;
+    bool strict = false;
 };
 
 // Biopsy needles in the order in which they are tried: a large core first, a short throw where there is no room.
@@ -148,21 +149,55 @@ std::string clearanceText(const Proposal& way)
     return way.clearance >= seen ? fmt::format("> {:.1f}", 1e3 * seen) : fmt::format("{:.1f}", 1e3 * way.clearance);
 }
 
-void writeScene(Scene scene, const Options& o, const Found& found, const Proposal& way)
+void writeScene(Scene scene, const Options& o, const Found& found, const Proposal& way,
+                const std::vector<std::string>& warnings)
 {
     scene.entry = way.approach.entry;
     scene.aim = way.approach.aim;
     scene.tool.length = needleLengthFor(scene, way);
     scene.source.file = fileFor(o.volume, o.output);
     scene.name = o.output.stem().string();
-    const std::string comment = fmt::format(
+    std::string comment = fmt::format(
         "# Proposed by palpate scene: way {} of {}, {:.1f} mm to the aim, {} mm from what must not be touched; {}, {:.0f} "
         "mm "
         "long.\n# The viewer looks at the plane of this line.\n",
         o.choose, found.ways.size(), 1e3 * way.length, clearanceText(way), found.needle, 1e3 * scene.tool.length);
+    for (const std::string& warning : warnings) {
+        comment += fmt::format("# Warning: {}\n", warning);
+    }
     const std::string text = comment + datasets::sceneText(scene);
     datasets::parseScene(text, o.output);  // what cannot be read back is not written
     base::writeWhole(o.output, text);
+}
+
+std::string crossingText(const Proposal& way)
+{
+    std::vector<std::string> parts;
+    for (const datasets::Crossing& c : way.verdict.crossings) {
+        parts.push_back(fmt::format("{} {:.0f}", c.structure, std::max(1.0, 1e3 * c.length)));
+    }
+    return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+nlohmann::json crossingFigures(const Proposal& way)
+{
+    nlohmann::json out = nlohmann::json::array();
+    for (const datasets::Crossing& c : way.verdict.crossings) {
+        out.push_back({{"structure", c.structure}, {"mm", 1e3 * c.length}});
+    }
+    return out;
+}
+
+// What is not safe to rely on, of the way that is written and of the volume.
+std::vector<std::string> warningsOf(const volume::Tissue& tissue, const Proposal& way)
+{
+    std::vector<std::string> warnings = way.verdict.warnings;
+    for (const volume::Structure& s : tissue.structures()) {
+        if (s.name.rfind("invented_", 0) == 0) {
+            warnings.push_back(fmt::format("{} is invented: no image shows what the way crosses there", s.name));
+        }
+    }
+    return warnings;
 }
 
 nlohmann::json figuresOf(const Scene& scene, const Found& found, const Options& o)
@@ -175,7 +210,10 @@ nlohmann::json figuresOf(const Scene& scene, const Found& found, const Options& 
                         {"length_mm", 1e3 * p.length},
                         {"clearance_mm", 1e3 * p.clearance},
                         {"angle_deg", degrees(p.angle)},
-                        {"off_centre_mm", 1e3 * p.offCentre}});
+                        {"off_centre_mm", 1e3 * p.offCentre},
+                        {"crosses", crossingFigures(p)},
+                        {"corridor", p.verdict.corridor},
+                        {"warnings", p.verdict.warnings}});
     }
     std::vector<std::string> vital;
     for (const datasets::VitalStructure& v : scene.vital) {
@@ -200,6 +238,8 @@ void printWays(const Scene& scene, const Found& found, const Options& o)
                    static_cast<int>(i) + 1 == o.choose ? "*" : " ", pointText(p.approach.entry), pointText(p.approach.aim),
                    1e3 * p.length, clearanceText(p), degrees(p.angle),
                    p.offCentre > 0.5e-3 ? fmt::format("  notch {:.0f} mm beyond the aim", 1e3 * p.offCentre) : "");
+        fmt::print("     crosses [mm] {}{}\n", crossingText(p),
+                   p.verdict.corridor.empty() ? "" : fmt::format("; {}", p.verdict.corridor));
     }
 }
 
@@ -233,8 +273,16 @@ void runScene(const Options& o)
         throw std::runtime_error(
             fmt::format("--choose {}: there are {} ways: choose one of these", o.choose, found.ways.size()));
     }
-    writeScene(scene, o, found, found.ways[static_cast<std::size_t>(o.choose - 1)]);
+    const Proposal& chosen = found.ways[static_cast<std::size_t>(o.choose - 1)];
+    const std::vector<std::string> warnings = warningsOf(tissue, chosen);
     progress.clear();
+    for (const std::string& warning : warnings) {
+        if (o.strict) {
+            throw std::runtime_error(fmt::format("{}: {}: no scene is written with --strict", o.volume.string(), warning));
+        }
+        fmt::print(stderr, "warning: {}\n", warning);
+    }
+    writeScene(scene, o, found, chosen, warnings);
     if (o.json != "-") {
         printWays(scene, found, o);
         fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose, o.output.string());
@@ -262,6 +310,7 @@ void addScene(CLI::App& app)
         ->add_option("--margin", o->margin,
                      "Least distance from needle to those, and to bone; default: what there is room for")
         ->type_name("MM");
+    command->add_flag("--strict", o->strict, "Write no scene that there is a warning about");
     command->add_option("--proposals", o->proposals, "Ways that are shown, at most (5)")->check(CLI::Range(1, 50));
     command->add_option("--choose", o->choose, "Which of them is written (1, the best)")->check(CLI::Range(1, 50));
     auto* in = command->add_option("--lesion-in", o->lesionIn, "Put a lesion into this structure, as the target")

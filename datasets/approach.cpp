@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
@@ -157,6 +158,7 @@ struct Surroundings {
     const Tissue& tissue;
     std::vector<char> forbidden;  // by label: vital, bone and fixed tissue
     std::vector<Vec3> disc;       // around a line: two offsets and their length [m], shortest first
+    WayJudge judge;
     bool hasSkin = false;
     double step = 0;   // along a line [m]
     double reach = 0;  // no line inside the body is longer [m]
@@ -179,7 +181,7 @@ std::vector<Vec3> discSamples(double radius)
 Surroundings surroundings(const Scene& scene, const Tissue& tissue)
 {
     const volume::TissueTable& table = tissue.table();
-    Surroundings s{tissue, std::vector<char>(65536, 0), discSamples(comfort + scene.tool.radius)};
+    Surroundings s{tissue, std::vector<char>(65536, 0), discSamples(comfort + scene.tool.radius), WayJudge(scene, tissue)};
     for (const Structure& structure : tissue.structures()) {
         const volume::TissueRow& row = table.rows[structure.tissue];
         s.hasSkin = s.hasSkin || row.role == Role::skin;
@@ -305,12 +307,14 @@ std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const T
     const double fired = firingDepth(scene.tool, length) + throwOf(scene.tool);
     const double room = clearance(s, reader, *entry, *entry - (fired + beyondTip) * direction) - scene.tool.radius;
     const double offCentre = std::max(0.0, fired - (length + halfNotch(scene.tool)));
-    const Proposal way{{*entry, aim}, length, room, std::acos(std::min(1.0, upright)), offCentre};
-    return Line{way, length + 3.0 * (std::max(0.0, comfort - room) + offCentre)};
+    const WayVerdict verdict = s.judge.judge(reader, *entry, aim, *entry - fired * direction);
+    const Proposal way{{*entry, aim}, length, room, std::acos(std::min(1.0, upright)), verdict, offCentre};
+    return Line{way, length + verdict.detour + 3.0 * (std::max(0.0, comfort - room) + offCentre)};
 }
 
 // Ways into `aim` from all around, on Fibonacci's spiral.
-void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vector<Line>& lines)
+void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vector<Line>& lines,
+                  std::map<std::string, int>& refused)
 {
     std::vector<std::optional<Line>> found(directionCount);
     tbb::parallel_for(tbb::blocked_range<int>(0, directionCount, 20), [&](const tbb::blocked_range<int>& range) {
@@ -324,8 +328,11 @@ void collectLines(const Scene& scene, const Surroundings& s, Vec3 aim, std::vect
         }
     });
     for (const std::optional<Line>& line : found) {
-        if (line) {
+        if (line && line->way.verdict.refusals.empty()) {
             lines.push_back(*line);
+        }
+        for (const std::string& why : line ? line->way.verdict.refusals : std::vector<std::string>{}) {
+            ++refused[why];
         }
     }
 }
@@ -340,8 +347,9 @@ std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optio
 {
     const Surroundings s = surroundings(scene, tissue);
     std::vector<Line> lines;
+    std::map<std::string, int> refused;
     for (const Vec3 aim : aims(scene, tissue)) {
-        collectLines(scene, s, aim, lines);
+        collectLines(scene, s, aim, lines, refused);
     }
     std::stable_sort(lines.begin(), lines.end(), [](const Line& a, const Line& b) { return a.cost < b.cost; });
     const std::vector<double> wanted =
@@ -354,11 +362,14 @@ std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optio
             return good;
         }
     }
+    std::string reasons;
+    for (const auto& [why, ways] : refused) {
+        reasons += fmt::format("; {} go {}", ways, why);
+    }
     throw std::runtime_error(
         fmt::format("{}: no straight way to '{}' from the skin that keeps {:g} mm from vital structures and bone ({} ways "
-                    "reach it): set "
-                    "entry_mm and aim_mm in [target]",
-                    scene.name, scene.target, wanted.back() * 1e3, lines.size()));
+                    "reach it{}): set entry_mm and aim_mm in [target]",
+                    scene.name, scene.target, wanted.back() * 1e3, lines.size(), reasons));
 }
 
 // Two lines between which there is something to choose.
@@ -408,15 +419,20 @@ std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& appro
     const Vec3 inward = length > 0 ? (approach.aim - approach.entry) / length : Vec3(0, 1, 0);
     const double depth = firingDepth(scene.tool, length);
     const Vec3 away = approach.entry - startDistance * inward;
+    const bool needle = scene.tool.kind == ToolKind::needle;
     std::vector<TraineeStep> script{
         {.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 4, .tolerance = 1e-3},
         {.kind = Kind::move, .to = approach.entry - 3e-3 * inward, .speed = 0.04, .seconds = 4, .tolerance = 1e-3}};
-    if (scene.tool.kind == ToolKind::needle) {
+    if (needle) {
         script.push_back({.kind = Kind::pierce, .to = approach.aim, .speed = 0.012, .seconds = 15});
     }
-    script.push_back(
-        {.kind = Kind::press, .to = approach.entry + depth * inward, .speed = 0.012, .seconds = 15, .tolerance = 1e-3});
-    if (scene.tool.kind == ToolKind::needle) {
+    script.push_back({.kind = Kind::press,
+                      .to = approach.entry + depth * inward,
+                      .speed = 0.012,
+                      .seconds = 15,
+                      .tolerance = 1e-3,
+                      .depth = needle ? depth : 0.0});
+    if (needle) {
         script.push_back({.kind = Kind::fire});
     }
     script.push_back({.kind = Kind::wait, .seconds = 0.5});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <datasets/crossing.h>
 #include <datasets/scene.h>
 #include <volume/tissue.h>
 
@@ -16,13 +17,14 @@ struct Proposal {
     double clearance = 0;  // between needle and the nearest vital structure, bone or fixed tissue, as far as it is looked
                            // for: 7 mm [m]
     double angle = 0;      // between needle and the skin's normal [rad]
+    WayVerdict verdict;
     double offCentre = 0;  // of the fired notch's middle beyond the aim: the line is too short for the throw [m]
 };
 
 /// As planApproach(), but several ways that differ, at most `most`; the first is that of planApproach(). The line is
 /// searched from all around, entries in the scene are not looked at.
 /// @param margin  clearance that each must have [m]; nothing: as much as possible of 4, 2.5 and 1.5 mm
-/// Throws std::runtime_error when there is none.
+/// Ways that a WayJudge refuses are none. Throws std::runtime_error when there is none, and says why.
 std::vector<Proposal> proposeApproaches(const Scene& scene, const volume::Tissue& tissue, std::size_t most,
                                         std::optional<double> margin = std::nullopt);
 

@@ -27,7 +27,7 @@ using volume::VoxelGrid;
 
 constexpr const char* imageOption = "--body-from-image";
 
-// CT numbers [HU]; their sources are in docs/scenes.md, "A body around the organs".
+// CT numbers [HU]; their sources are in docs/researcher.md, "A body around the organs".
 constexpr float airBelow = -500;       // outside the body; inside it lung or gas
 constexpr float gasBelow = -930;       // gas, where half of a region is so; else lung
 constexpr float fatTo = -30;           // and above it muscle and other soft tissue

@@ -24,7 +24,7 @@ void extendToImage(volume::LabelImage& labels, const volume::VoxelGrid& ct);
 /// @param names    gets a row for each structure that was found, with a free label value
 /// @param tell     is called with what is going on
 /// Throws std::runtime_error where nothing in the CT is a body, the voxels are sheared, or the table lacks a tissue.
-/// docs/scenes.md has the thresholds with their sources.
+/// docs/researcher.md has the thresholds with their sources.
 std::vector<PreparationStep> bodyFromImage(volume::LabelImage& image, std::vector<volume::LabelName>& names,
                                            std::vector<float> hu, const volume::TissueTable& table,
                                            const std::function<void(const std::string&)>& tell);
