@@ -1,6 +1,7 @@
 #include <haptics/broadcast.h>
 
 #include <haptics/display_image.h>
+#include <volume/resample.h>
 
 #include <glm/common.hpp>
 
@@ -124,7 +125,11 @@ channel::Publisher publisherOf(const std::string& session, const SessionModel& m
     auto scenery = sceneryOf(model, display, viewersHand);
     std::vector<std::uint16_t> image;
     if (model.tissue->hasImage()) {
-        image = displayImage(display, model.tissue->imageOn(display), model.tissue->imageUnit(), scenery);
+        const volume::Tissue& tissue = *model.tissue;
+        const std::vector<float> beyond =
+            volume::resampledImage({tissue.size(), tissue.affine()}, tissue.companion()->values,
+                                   {display.size, {Mat3(display.spacing), display.origin}}, std::nanf(""));
+        image = displayImage(display, tissue.imageOn(display), tissue.imageUnit(), scenery, beyond);
     }
     return {session, scenery, labelsOn(model, display), image};
 }

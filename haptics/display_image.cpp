@@ -110,7 +110,8 @@ std::vector<float> grown(const volume::NodeGrid& grid, const std::vector<float>&
 }  // namespace
 
 std::vector<std::uint16_t> displayImage(const volume::NodeGrid& grid, const std::vector<float>& values,
-                                        const std::string& unit, channel::Scenery& scenery)
+                                        const std::string& unit, channel::Scenery& scenery,
+                                        const std::vector<float>& beyond)
 {
     std::vector<float> body;
     std::copy_if(values.begin(), values.end(), std::back_inserter(body), [](float v) { return std::isfinite(v); });
@@ -118,9 +119,14 @@ std::vector<std::uint16_t> displayImage(const volume::NodeGrid& grid, const std:
     if (body.empty()) {
         return {};
     }
-    const auto [least, most] = std::minmax_element(body.begin(), body.end());
+    const auto [first, last] = std::minmax_element(body.begin(), body.end());
+    float least = *first, most = *last;
+    for (const float v : beyond) {
+        least = std::isfinite(v) ? std::min(least, v) : least;
+        most = std::isfinite(v) ? std::max(most, v) : most;
+    }
     constexpr double codes = 65535;
-    const double low = static_cast<double>(*least), step = (static_cast<double>(*most) - low) / codes;
+    const double low = static_cast<double>(least), step = (static_cast<double>(most) - low) / codes;
     scenery.imageLow = low;
     scenery.imageStep = step;
     scenery.imageUnit = nameOf(unit);
@@ -129,7 +135,10 @@ std::vector<std::uint16_t> displayImage(const volume::NodeGrid& grid, const std:
     std::copy(windows.begin(), windows.end(), scenery.window.begin());
 
     std::vector<std::uint16_t> image(values.size(), 0);
-    const std::vector<float> wide = grown(grid, values);
+    std::vector<float> wide = grown(grid, values);
+    for (std::size_t i = 0; i < beyond.size(); ++i) {
+        wide[i] = std::isfinite(wide[i]) ? wide[i] : beyond[i];
+    }
     for (std::size_t i = 0; i < image.size(); ++i) {
         if (std::isfinite(wide[i]) && step > 0) {
             image[i] = static_cast<std::uint16_t>(std::llround((static_cast<double>(wide[i]) - low) / step));

@@ -18,9 +18,11 @@ namespace palpate::haptics {
 /// between codes does not darken its surface.
 /// @param grid     scenery.labels
 /// @param values   image per node, not a number where there is none (count x 1)
+/// @param beyond   image per node where `values` has none, beside and outside the body; may be empty (count x 1)
 /// @param scenery  gets the windows; with none of them there is nothing to show, no value was a number
 /// @returns        as channel::Subscriber::image()
 std::vector<std::uint16_t> displayImage(const volume::NodeGrid& grid, const std::vector<float>& values,
-                                        const std::string& unit, channel::Scenery& scenery);
+                                        const std::string& unit, channel::Scenery& scenery,
+                                        const std::vector<float>& beyond = {});
 
 }  // namespace palpate::haptics

@@ -63,6 +63,13 @@ std::array<Paint, channel::maxTissues> paintsOf(const Anatomy& anatomy)
     return paints;
 }
 
+// Outside the labels there is the image alone.
+Pixel outside(float image)
+{
+    const auto grey = static_cast<std::uint8_t>(image + 0.5F);
+    return {std::max(airPixel[0], grey), std::max(airPixel[1], grey), std::max(airPixel[2], grey)};
+}
+
 double pixelsPerMetre(const ViewFrame& frame, const Area& area)
 {
     return std::min(area.width, area.height) / frame.extent;
@@ -166,7 +173,8 @@ void SlicePicture::paint(const Anatomy& anatomy)
             const std::uint8_t label = deformation.restLabel(rest);
             const std::size_t tissue = label & channel::rowBits;
             const bool onShell = shells && tissue != 0 && (label & channel::shellBit) != 0;
-            const Pixel pixel = onShell ? shell : paints[tissue].over(grey && tissue != 0 ? anatomy.grey.at(rest) : 0.0F);
+            const float image = grey ? anatomy.grey.at(rest) : 0.0F;
+            const Pixel pixel = onShell ? shell : tissue == 0 ? outside(image) : paints[tissue].over(image);
             for (int y = row; y < std::min(row + step, area_.height); ++y)
                 std::fill_n(pixels + static_cast<std::ptrdiff_t>(y) * area_.width + column,
                             std::min(step, area_.width - column), pixel);

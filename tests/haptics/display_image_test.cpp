@@ -143,6 +143,29 @@ TEST(DisplayImage, GoesOnBesideTheBodyByAVoxel)
     EXPECT_EQ(codes[plan.grid.offset({4, 4, 4})], 0);
 }
 
+// Outside the body the image goes on as it is, and the windows are those of the body.
+TEST(DisplayImage, GoesOnOutsideTheBody)
+{
+    Plan plan(8);
+    std::vector<float> beyond(plan.values.size());
+    for (std::size_t i = 0; i < plan.values.size(); ++i) {
+        const Index3 n = plan.grid.node(i);
+        plan.values[i] = n.x < 3 ? static_cast<float>(100 * n.x) : none;
+        beyond[i] = static_cast<float>(-1000 + 10 * n.y);
+    }
+    plan.shown("");
+    const channel::GreyWindow window = plan.scenery.window[0];
+    const auto codes = displayImage(plan.grid, plan.values, "", plan.scenery, beyond);
+    const auto valueAt = [&](Index3 n) {
+        return plan.scenery.imageLow + plan.scenery.imageStep * codes[plan.grid.offset(n)];
+    };
+    EXPECT_NEAR(valueAt({2, 4, 4}), 200, 0.02);
+    EXPECT_NEAR(valueAt({3, 4, 4}), 200, 0.02) << "a voxel beside the body";
+    EXPECT_NEAR(valueAt({5, 4, 4}), -960, 0.02);
+    EXPECT_EQ(plan.scenery.window[0].low, window.low);
+    EXPECT_EQ(plan.scenery.window[0].high, window.high);
+}
+
 TEST(DisplayImage, WithoutAValueThereIsNone)
 {
     Plan plan;
