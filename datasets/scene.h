@@ -103,6 +103,7 @@ struct TraineeStep {
     double speed = 0.02;      // of the hand [m/s]
     double seconds = 0;       // wait: how long; move, press: give up after
     double tolerance = 1e-3;  // the step is done when the tip is this near [m]
+    double depth = 0;         // press: and when so much of the needle is inside [m]; 0 = not asked
 };
 
 /// Something put into a volume, over what was there: a lesion, a vessel, a rib.

@@ -46,13 +46,23 @@ bool HandDevice::feltDrop() const noexcept
     return peak_ > parameters_.leastFelt && glm::length(force_) < (1.0 - parameters_.dropFelt) * peak_;
 }
 
-// Arrived, or past it: tissue that gives way may let the tip shoot beyond the mark.
+// Seen, where there is something to see: a force that drops may be a device that fades, as after missed ticks.
+bool HandDevice::gaveWay() const noexcept
+{
+    return sees_ ? inside_ : feltDrop();
+}
+
+// Arrived, or past it: tissue that gives way may let the tip shoot beyond the mark. Inside the body also as soon as the
+// hand, braking, would arrive, and when the needle is in as far as it is to be, wherever the tissue has gone with it.
 bool HandDevice::reached(const TraineeStep& step) const noexcept
 {
     const Vec3 way = step.to - from_;
     const double length = glm::length(way);
+    const bool onward = inside_ && glm::dot(way, axis_) > 0.0;
+    const Vec3 soon = arm_.position() + (onward ? parameters_.braking : 0.0) * arm_.velocity();
     return glm::distance(arm_.position(), step.to) < step.tolerance ||
-           (length > 0.0 && glm::dot(arm_.position() - from_, way) / length >= length);
+           (length > 0.0 && glm::dot(soon - from_, way) / length >= length) ||
+           (onward && step.depth > 0.0 && inserted_ >= step.depth);
 }
 
 void HandDevice::advance() noexcept
@@ -72,7 +82,7 @@ void HandDevice::advance() noexcept
     travelled_ = std::min(travelled_ + step.speed * period_, length + parameters_.furthestLead);
     goal_ = from_ + travelled_ * direction;
     const bool pierces = step.kind == TraineeStep::Kind::pierce;
-    if ((pierces ? feltDrop() : reached(step)) || (step.seconds > 0.0 && inStep_ >= step.seconds)) {
+    if ((pierces ? gaveWay() : reached(step)) || (step.seconds > 0.0 && inStep_ >= step.seconds)) {
         // The hand stops pushing where the tip is.
         goal_ = arm_.position();
         nextStep();
@@ -102,6 +112,13 @@ HandDevice handBefore(const SessionModel& model, double distance)
     HandParameters parameters;
     parameters.device = deviceParameters(model.scene.device);
     return {parameters, datasets::traineeScript(model.scene, way), way.entry - distance * axis, axis};
+}
+
+void HandDevice::observe(const TickRecord& record) noexcept
+{
+    sees_ = true;
+    inside_ = record.phase == Phase::inserted;
+    inserted_ = record.inserted;
 }
 
 void HandDevice::write(Vec3 force) noexcept

@@ -16,6 +16,7 @@ struct HandParameters {
     double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
     double dropFelt = 0.4;        // share of the force that must go for the hand to feel that tissue gave way
     double leastFelt = 0.3;       // forces below are not noticed [N]
+    double braking = 30e-3;       // inside the body the hand stops so long before the mark at its speed [s]; assumed
 };
 
 /// Simulated device and hand that follow a script: the hand's goal moves along straight lines, the grip pulls the stylus
@@ -28,11 +29,14 @@ public:
 
     DeviceSample read() noexcept override;
     void write(Vec3 force) noexcept override;
+    /// Takes what it sees of the needle: whether it is in, and how far. Without it the hand goes by what it feels.
+    void observe(const TickRecord& record) noexcept override;
     bool finished() const noexcept override { return step_ >= script_.size(); }
 
 private:
     void advance() noexcept;
     bool feltDrop() const noexcept;
+    bool gaveWay() const noexcept;
     bool reached(const datasets::TraineeStep& step) const noexcept;
     void nextStep() noexcept;
 
@@ -48,6 +52,8 @@ private:
     Vec3 force_{0.0};
     double peak_ = 0;  // largest force felt in this step [N]
     Vec3 axis_{0.0};
+    bool sees_ = false, inside_ = false;
+    double inserted_ = 0;  // [m]
 };
 
 /// The scripted trainee of a session with the scene's device in the hand, its tip `distance` [m] outside the body on the

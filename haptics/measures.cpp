@@ -11,7 +11,7 @@ namespace {
 
 using Listed = Measure::Listed;
 
-constexpr std::array<Measure, 23> all{{
+constexpr std::array<Measure, 24> all{{
     {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
     {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
@@ -40,6 +40,8 @@ constexpr std::array<Measure, 23> all{{
      [](const Score& s) { return s.insertedPath * 1e3; }},
     {"deepest_mm", "deepest mm", "Deepest insertion", "mm", 1, Listed::always,
      [](const Score& s) { return s.deepest * 1e3; }},
+    {"beyond_target_mm", "beyond mm", "Deeper than the target", "mm", 1, Listed::always,
+     [](const Score& s) { return s.beyondTarget * 1e3; }},
     {"jerk_m_s3", "jerk m/s3", "Jerk (root mean square)", "m/s3", 1, Listed::always, [](const Score& s) { return s.jerk; }},
     {"tissue_work_mj", "work mJ", "Work on the tissue", "mJ", 0, Listed::always,
      [](const Score& s) { return s.tissueWork * 1e3; }},

@@ -91,8 +91,9 @@ ScoreParts parts(const Score& s) noexcept
     const double economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1;
     // However well it was done: who missed has no technique to be praised for.
     const double hit = std::min(1.0, s.bestTargetFraction / 0.1);
+    const double stays = ramp(s.beyondTarget, 3e-3, 15e-3);
     p.technique =
-        hit * 5 *
+        hit * stays * 5 *
         (ramp(s.passes, 1, 5) + ramp(s.skinContacts, 1, 5) + ramp(s.redirects, 0, 4) + economy + ramp(s.peakForce, 4, 8.5));
     return p;
 }
@@ -211,8 +212,11 @@ void Scorer::addDepth(const TickRecord& record) noexcept
         }
         depthPeak_ = 0;
         withdrawing_ = false;
+        nearest_ = std::numeric_limits<double>::infinity();
+        furthest_ = 0;
         return;
     }
+    addBeyond(record);
     insidePath_.add(record.device.position);
     score_.deepest = std::max(score_.deepest, depth);
     if (!withdrawing_) {
@@ -227,6 +231,23 @@ void Scorer::addDepth(const TickRecord& record) noexcept
             depthPeak_ = depth;
         }
     }
+}
+
+// In lengths inside and not in places: the tissue goes along with the needle. A withdrawal begins another way in. The gun's
+// throw does not count, the device stays where it is.
+void Scorer::addBeyond(const TickRecord& record) noexcept
+{
+    if (record.inserted < furthest_ - redirectLength) {
+        nearest_ = std::numeric_limits<double>::infinity();
+        furthest_ = record.inserted;
+    }
+    furthest_ = std::max(furthest_, record.inserted);
+    const double distance = std::max(0.0, record.distance[0]);
+    if (distance <= nearest_) {
+        nearest_ = distance;
+        atTarget_ = record.inserted;
+    }
+    score_.beyondTarget = std::max(score_.beyondTarget, record.inserted - atTarget_);
 }
 
 void Scorer::addVital(const TickRecord& record) noexcept

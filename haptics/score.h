@@ -16,12 +16,13 @@ namespace palpate::haptics {
 
 /// What simulators of needle procedures score (Johnson 2012 and the list in docs/score.md), computed tick by tick.
 struct Score {
-    double seconds = 0;              // first contact to the end
-    double pathLength = 0;           // of the tip, in steps of 0.2 mm [m]
-    double insertedPath = 0;         // of the tip while inside [m]
-    double deepest = 0;              // largest length of the shaft inside [m]
-    double peakForce = 0;            // total [N]
-    double meanForce = 0;            // total, while in contact [N]
+    double seconds = 0;       // first contact to the end
+    double pathLength = 0;    // of the tip, in steps of 0.2 mm [m]
+    double insertedPath = 0;  // of the tip while inside [m]
+    double deepest = 0;       // largest length of the shaft inside [m]
+    double beyondTarget = 0;  // how much deeper the shaft went in than where the tip was in, or nearest to, the target [m]
+    double peakForce = 0;     // total [N]
+    double meanForce = 0;     // total, while in contact [N]
     std::uint32_t skinContacts = 0;  // after at least 0.1 s off the body
     std::uint32_t redirects = 0;     // withdrawn by over 5 mm inside and pushed on again by over 5 mm
     std::uint32_t passes = 0;        // fired
@@ -105,6 +106,7 @@ public:
 private:
     void addContact(const TickRecord& record) noexcept;
     void addDepth(const TickRecord& record) noexcept;
+    void addBeyond(const TickRecord& record) noexcept;
     void addFiring(const TickRecord& record) noexcept;
     void addVital(const TickRecord& record) noexcept;
     void addMark(const TickRecord& record) noexcept;
@@ -120,6 +122,8 @@ private:
     double forceSum_ = 0;                     // [N]
     double depthPeak_ = 0, depthValley_ = 0;  // of the shaft inside [m]
     bool withdrawing_ = false, touched_ = false;
+    // Of this way in: least distance to the target, length inside where that was, and the largest.
+    double nearest_ = std::numeric_limits<double>::infinity(), atTarget_ = 0, furthest_ = 0;  // [m]
     JerkMeter jerk_;
     std::array<Vec3, 32> marks_{};  // [m]
     bool markDown_ = false;

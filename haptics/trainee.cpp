@@ -19,6 +19,7 @@ constexpr std::array<Skill, 3> skills{{
 }};
 
 constexpr double standOff = 3e-3;       // the tip waits so far before the skin [m]
+constexpr double braking = 30e-3;       // the hand stops so long before the mark at its speed; assumed [s]
 constexpr double travelSpeed = 40e-3;   // in air [m/s]
 constexpr double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
 constexpr double tolerance = 1e-3;      // of a movement [m]
@@ -183,6 +184,13 @@ bool Trainee::dangerAhead() const noexcept
     return false;
 }
 
+// On its way in the hand knows the mark on the needle at which it is to stop, and brakes for it.
+bool Trainee::isDeepEnough() const noexcept
+{
+    const bool onward = insideSince_ >= 0.0 && glm::dot(to_ - from_, inward()) > 0.0;
+    return onward && inserted_ + braking * glm::dot(arm_.velocity(), inward()) >= depthToFire();
+}
+
 void Trainee::takeAnotherLine() noexcept
 {
     ++redirects_;
@@ -223,7 +231,7 @@ void Trainee::advanceAct() noexcept
         case Act::approach:
             return there ? begin(Act::pierce) : void();
         case Act::pierce:
-            if (insideSince_ >= skill_.reaction) {
+            if (insideSince_ >= skill_.reaction || isDeepEnough()) {
                 begin(Act::look);
             } else if (there) {
                 begin(Act::retreat);
@@ -232,7 +240,7 @@ void Trainee::advanceAct() noexcept
         case Act::advance:
             if (warnedSince_ >= skill_.reaction && redirects_ < mostRedirects) {
                 takeAnotherLine();
-            } else if (there) {
+            } else if (there || isDeepEnough()) {
                 begin(Act::look);
             }
             return;

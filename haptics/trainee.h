@@ -66,6 +66,7 @@ private:
     void afterCheck() noexcept;
     void afterCore() noexcept;
     bool arrived() const noexcept;
+    bool isDeepEnough() const noexcept;
     bool dangerAhead() const noexcept;
     Vec3 inward() const noexcept;
     double depthToFire() const noexcept;

@@ -84,5 +84,50 @@ TEST(Hand, PiercesUntilTheForceDrops)
     EXPECT_LT(s.position.y, 20e-3);
 }
 
+// Missed ticks fade the force, and the hand that only felt took that for tissue that gives way. Seeing that the needle is
+// not in, it goes on.
+TEST(Hand, SeesThatAForceThatFadesIsNoPuncture)
+{
+    TraineeStep pierce;
+    pierce.kind = TraineeStep::Kind::pierce;
+    pierce.to = {0, 0.05, 0};
+    pierce.speed = 0.02;
+    pierce.seconds = 20;
+    HandDevice hand({}, {pierce}, Vec3(0.0), {0, 1, 0});
+    TickRecord seen;
+    double last = 0;
+    for (int tick = 0; !hand.finished(); ++tick) {
+        last = hand.read().position.y;
+        hand.write(Vec3(0, tick > 300 && tick < 350 ? 0.0 : -100.0 * last, 0));  // a gap of 50 ms
+        seen.phase = last > 12e-3 ? Phase::inserted : Phase::contact;
+        hand.observe(seen);
+    }
+    EXPECT_GT(last, 12e-3);
+}
+
+// A needle that is in as deep as it is to be stops there, though the tip has not come to the place that was meant: the
+// tissue has gone along with it.
+TEST(Hand, StopsWhereTheNeedleIsDeepEnough)
+{
+    TraineeStep press = moveTo({0, 0.04, 0});
+    press.kind = TraineeStep::Kind::press;
+    press.depth = 10e-3;
+    HandDevice hand({}, {press}, Vec3(0.0), {0, 1, 0});
+    TickRecord seen;
+    seen.phase = Phase::inserted;
+    while (!hand.finished()) {
+        const double at = hand.read().position.y;
+        hand.write(Vec3(0.0));
+        seen.inserted = at;
+        hand.observe(seen);
+    }
+    double furthest = 0;
+    for (int i = 0; i < 500; ++i) {
+        furthest = std::max(furthest, hand.read().position.y);
+        hand.write(Vec3(0.0));
+    }
+    EXPECT_LT(furthest, 13e-3);
+}
+
 }  // namespace
 }  // namespace palpate::haptics

@@ -290,6 +290,40 @@ TEST(Score, AMissKeepsNoPointsForTechnique)
     EXPECT_DOUBLE_EQ(parts(s).technique, 25.0);
 }
 
+// A tip that goes on from the target's middle by 31 mm: what counts is from where it left the target, and the way back and
+// in again begins anew. Such a needle has no technique to be praised for.
+TEST(Score, DepthBeyondTheTargetIsFromWhereTheTipLeftIt)
+{
+    Scorer scorer(synthetic::info());
+    TickRecord tick;
+    tick.phase = Phase::inserted;
+    const auto push = [&](double from, double to) {
+        const double way = to > from ? 0.5 * millimetre : -0.5 * millimetre;
+        for (double depth = from; std::abs(depth - to) > 1e-9; depth += way) {
+            tick.inserted = depth;
+            tick.distance.fill(1);
+            tick.distance[0] = std::abs(depth - 15 * millimetre) - 5 * millimetre;
+            scorer.add(tick);
+            ++tick.tick;
+        }
+    };
+    push(0, 14 * millimetre);
+    EXPECT_NEAR(scorer.score().beyondTarget, 0, 1e-9);
+    push(14 * millimetre, 46.5 * millimetre);
+    EXPECT_NEAR(scorer.score().beyondTarget, 26 * millimetre, 1e-9);
+    push(46 * millimetre, 2 * millimetre);
+    push(2 * millimetre, 18 * millimetre);
+    EXPECT_NEAR(scorer.score().beyondTarget, 26 * millimetre, 1e-9);
+
+    Score good;
+    good.skinContacts = good.passes = 1;
+    good.bestTargetFraction = 0.6;
+    good.beyondTarget = 3 * millimetre;
+    EXPECT_DOUBLE_EQ(parts(good).technique, 25.0);
+    good.beyondTarget = 26 * millimetre;
+    EXPECT_DOUBLE_EQ(parts(good).technique, 0.0);
+}
+
 // Every point of the total falls, or stays, when a measure gets worse.
 TEST(Score, WorseMeasuresNeverGiveMorePoints)
 {
@@ -314,6 +348,7 @@ TEST(Score, WorseMeasuresNeverGiveMorePoints)
         s.deepest = 40 * millimetre;
         s.insertedPath = s.deepest * (1 + 4 * unit(random));
         s.peakForce = 10 * unit(random);
+        s.beyondTarget = 20 * millimetre * unit(random);
         const double before = total(s);
         EXPECT_GE(before, 0);
         EXPECT_LE(before, 100);
@@ -322,7 +357,8 @@ TEST(Score, WorseMeasuresNeverGiveMorePoints)
                  [](Score& w) { ++w.vitalContacts; }, [](Score& w) { w.vitalSeconds += 0.3; },
                  [](Score& w) { w.vitalDepth += millimetre; }, [](Score& w) { w.bestTargetFraction *= 0.8; },
                  [](Score& w) { w.bestTargetLength *= 0.8; }, [](Score& w) { w.targetingError += millimetre; },
-                 [](Score& w) { w.insertedPath *= 1.3; }, [](Score& w) { w.peakForce += 1; }}) {
+                 [](Score& w) { w.insertedPath *= 1.3; }, [](Score& w) { w.peakForce += 1; },
+                 [](Score& w) { w.beyondTarget += millimetre; }}) {
             Score w = s;
             worsen(w);
             EXPECT_LE(total(w), before + 1e-12);
