@@ -40,6 +40,7 @@ constexpr double lungReach = 0.12;       // to either side, where lungs make a m
 constexpr double lungStep = 3e-3;        // [m]
 constexpr double ribReach = 25e-3;       // [m]
 constexpr double usualCorridor = 30e-3;  // a way off the usual corridor is taken if it is so much shorter [m]
+constexpr double withoutWarning = 0.1;   // a way that the image warns of is taken if it is so much shorter [m]
 constexpr double fromTheBack = -0.2;     // least component to the back of the way out
 
 template <typename List>
@@ -144,7 +145,7 @@ void WayJudge::cross(Walk& walk, Vec3 p, double length, WayVerdict& out) const
         walk.dense[nameOf_[label]] += length;
     }
     if (out.crossings.empty() || out.crossings.back().structure != nameOf_[label]) {
-        out.crossings.push_back({nameOf_[label], 0});
+        out.crossings.push_back({nameOf_[label], tissueOf_[label], 0});
     }
     out.crossings.back().length += length;
     const bool soft = tissueOf_[label] != "lung" && role != Role::bone && role != Role::skin;
@@ -205,6 +206,7 @@ void WayJudge::lookOutside(Vec3 entry, Vec3 outward, WayVerdict& out) const
                                           "before it",
                                           1e3 * tissue));
     }
+    out.detour += out.warnings.empty() ? 0.0 : withoutWarning;
     if (!hasSkin_) {
         addOnce(out.warnings, "nothing in the volume is skin: the needle enters whatever lies outermost");
     }
@@ -214,14 +216,14 @@ void WayJudge::nameCorridor(const Tissue::Reader& reader, Vec3 entry, Vec3 aim, 
 {
     const Vec3 outward = glm::normalize(entry - aim);
     const auto through = [&](const auto& organs) {
-        return isIn(organs, organ_) || std::any_of(out.crossings.begin(), out.crossings.end(), [&](const Crossing& c) {
-                   return std::any_of(organs.begin(), organs.end(), [&](std::string_view o) { return c.structure == o; });
-               });
+        return isIn(organs, organ_) || std::any_of(out.crossings.begin(), out.crossings.end(),
+                                                   [&](const Crossing& c) { return isIn(organs, c.tissue); });
     };
-    if (through(retroperitoneal)) {
+    const std::string home = out.crossings.empty() ? organ_ : out.crossings.back().tissue;
+    if (isIn(retroperitoneal, organ_) || isIn(retroperitoneal, home)) {
         const bool back = outward.y >= fromTheBack;
         out.corridor = back ? "from the back or flank" : "from the front";
-        out.detour = back ? 0.0 : usualCorridor;
+        out.detour += back ? 0.0 : usualCorridor;
     } else if (through(underRibs) && hasBone_) {
         // Ribs lie head and feet of a way between them.
         bool above = false, below = false;

@@ -11,7 +11,7 @@ namespace palpate::datasets {
 
 /// What a needle goes through on its way.
 struct Crossing {
-    std::string structure;
+    std::string structure, tissue;
     double length = 0;  // of the needle's axis in it [m]
 };
 
@@ -21,7 +21,7 @@ struct WayVerdict {
     std::vector<std::string> refusals;  // why no needle goes there; none: it may
     std::vector<std::string> warnings;  // what is not safe to rely on
     std::string corridor;               // "between ribs", "from the back", or nothing
-    double detour = 0;                  // so much longer a way is as good, if it is by the organ's usual corridor [m]
+    double detour = 0;                  // a way without its faults is as good if it is no longer than that [m]
 };
 
 /// Judges ways by all that lies on them: labels, and the image where the volume came with a CT.
@@ -54,7 +54,7 @@ private:
     std::vector<char> target_, vital_;
     bool hasSkin_ = false, hasLung_ = false, hasBone_ = false;
     std::vector<float> hu_;  // empty: no CT
-    std::string organ_;      // tissue that the target lies in, or is
+    std::string organ_;      // tissue of the target
 };
 
 }  // namespace palpate::datasets

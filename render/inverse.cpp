@@ -144,34 +144,41 @@ Inverse::Box Inverse::seen(glm::ivec3 cell) const noexcept
     return box;
 }
 
-// A cell whose corners are seen around `g` may have it inside: Newton's method from its middle, and from near its corners.
-void Inverse::tryCell(glm::ivec3 cell, glm::vec3 g, Answer& best) const noexcept
+// Newton's method inside one cell, from `part` of the way along its edges; whether something of the cell is seen at `g`.
+bool Inverse::solveInCell(glm::ivec3 cell, glm::vec3 g, glm::vec3& part, float& volume) const noexcept
 {
     constexpr float edge = 1e-3F, beyond = 0.5F;
     constexpr int steps = 10;
+    for (int i = 0; i < steps; ++i) {
+        const Local here = inCell(cell, part);
+        const glm::vec3 miss = glm::vec3(cell) + part + here.u - g;
+        volume = glm::determinant(here.deformation);
+        if (glm::length(miss) < 0.5F * enough &&
+            glm::all(glm::lessThanEqual(glm::abs(part - 0.5F), glm::vec3(0.5F + edge))))
+            return true;
+        if (std::abs(volume) < 1e-6F)
+            return false;
+        part = glm::clamp(part - glm::inverse(here.deformation) * miss, -beyond, 1 + beyond);
+    }
+    return false;
+}
+
+// A cell whose corners are seen around `g` may have it inside: tried from its middle, and from near its corners.
+void Inverse::tryCell(glm::ivec3 cell, glm::vec3 g, Answer& best) const noexcept
+{
     if (!seen(cell).holds(g))
         return;
     for (int start = -1; start < 8; ++start) {
         glm::vec3 part = start < 0 ? glm::vec3(0.5F) : 0.15F + 0.7F * glm::vec3(corner(start));
-        for (int i = 0; i < steps; ++i) {
-            const Local here = inCell(cell, part);
-            const glm::vec3 miss = glm::vec3(cell) + part + here.u - g;
-            const float volume = glm::determinant(here.deformation);
-            const bool there = glm::length(miss) < 0.5F * enough &&
-                               glm::all(glm::lessThanEqual(glm::abs(part - 0.5F), glm::vec3(0.5F + edge)));
-            if (there) {
-                const glm::vec3 shift = glm::vec3(cell) + part - g;
-                const float cost = glm::dot(shift, shift) + (volume > 0 ? 0.0F : 1e6F);
-                if (best.cost < 0 || cost < best.cost)
-                    best = {shift, cost};
-                if (volume > 0)
-                    return;
-                break;
-            }
-            if (std::abs(volume) < 1e-6F)
-                break;
-            part = glm::clamp(part - glm::inverse(here.deformation) * miss, -beyond, 1 + beyond);
-        }
+        float volume = 0;
+        if (!solveInCell(cell, g, part, volume))
+            continue;
+        const glm::vec3 shift = glm::vec3(cell) + part - g;
+        const float cost = glm::dot(shift, shift) + (volume > 0 ? 0.0F : 1e6F);
+        if (best.cost < 0 || cost < best.cost)
+            best = {shift, cost};
+        if (volume > 0)
+            return;
     }
 }
 

@@ -57,6 +57,7 @@ private:
     Box seen(glm::ivec3 cell) const noexcept;
     bool newton(glm::vec3 g, float share, int steps, glm::vec3& shift) const noexcept;
     bool alongTheWay(glm::vec3 g, glm::vec3& shift) const noexcept;
+    bool solveInCell(glm::ivec3 cell, glm::vec3 g, glm::vec3& part, float& volume) const noexcept;
     void tryCell(glm::ivec3 cell, glm::vec3 g, Answer& best) const noexcept;
     Answer searched(glm::vec3 g) const noexcept;
     void findFolds(std::span<const std::uint32_t> moved);

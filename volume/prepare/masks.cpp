@@ -113,25 +113,28 @@ MaskPieces piecesOf(const VoxelGrid& grid, const Mask& mask, const std::vector<f
     const volume::Pieces found(labels, group);
     MaskPieces out{std::vector<std::uint32_t>(mask.size(), 0), {}};
     std::vector<std::uint32_t> number(found.runs().size(), 0);
+    const auto take = [&](std::uint32_t run, int y, int z) {
+        std::uint32_t& n = number[found.root(run)];
+        if (n == 0) {
+            out.pieces.emplace_back();
+            n = static_cast<std::uint32_t>(out.pieces.size());
+        }
+        MaskPiece& piece = out.pieces[n - 1];
+        const volume::RowRun& row = found.runs()[run];
+        const std::size_t from = labels.offset({row.first, y, z});
+        const auto length = static_cast<std::size_t>(row.last - row.first + 1);
+        std::fill_n(out.of.begin() + static_cast<std::ptrdiff_t>(from), length, n);
+        piece.voxels += length;
+        for (std::size_t i = from; i < from + length && !image.empty(); ++i) {
+            piece.mean += static_cast<double>(image[i]);
+            piece.low += image[i] < below ? 1 : 0;
+        }
+    };
     for (int z = 0; z < grid.size.z; ++z) {
         for (int y = 0; y < grid.size.y; ++y) {
             const auto [begin, end] = found.row(y, z);
             for (std::uint32_t run = begin; run != end; ++run) {
-                std::uint32_t& n = number[found.root(run)];
-                if (n == 0) {
-                    out.pieces.emplace_back();
-                    n = static_cast<std::uint32_t>(out.pieces.size());
-                }
-                MaskPiece& piece = out.pieces[n - 1];
-                const volume::RowRun& row = found.runs()[run];
-                const std::size_t from = labels.offset({row.first, y, z});
-                const auto length = static_cast<std::size_t>(row.last - row.first + 1);
-                std::fill_n(out.of.begin() + static_cast<std::ptrdiff_t>(from), length, n);
-                piece.voxels += length;
-                for (std::size_t i = from; i < from + length && !image.empty(); ++i) {
-                    piece.mean += static_cast<double>(image[i]);
-                    piece.low += image[i] < below ? 1 : 0;
-                }
+                take(run, y, z);
             }
         }
     }
