@@ -134,7 +134,8 @@ TEST(Bounds, NodesThatTheLatticeDoesNotHaveAreRefused)
     EXPECT_FALSE(publish({0, {0, 1e30F, 0}}));
 }
 
-// One to six words of the segment at random, values that are likely to hurt; half of them in the header and the scenery.
+// One to six words of the segment at random, values that are likely to hurt; a third of them in the header, a third there
+// and in the scenery.
 void mutate(RawSegment& raw, std::size_t bytes, std::mt19937_64& random)
 {
     static const std::uint64_t nasty[]{0,
@@ -150,7 +151,8 @@ void mutate(RawSegment& raw, std::size_t bytes, std::mt19937_64& random)
                                        0x0000FFFF0000FFFF,
                                        4096};
     for (auto n = 1 + random() % 6; n > 0; --n) {
-        const std::size_t reach = random() % 2 == 0 ? 3 * 4096 : bytes;
+        const std::size_t reaches[]{sizeof(Header), 4096 + sizeof(Scenery), bytes};
+        const std::size_t reach = reaches[random() % 3];
         auto& word = raw.at<std::uint64_t>(random() % (std::min(reach, bytes) / 8) * 8);
         switch (random() % 3) {
             case 0:
