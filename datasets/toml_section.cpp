@@ -1,5 +1,7 @@
 #include <datasets/toml_section.h>
 
+#include <base/inputs.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -106,10 +108,10 @@ toml::table parseToml(std::string_view text, const std::string& file)
 
 std::string readText(const std::filesystem::path& file)
 {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error)) {
-        throw std::runtime_error(file.string() + ": no such file: check the name");
+    if (const std::string why = base::whyNoFile(file); !why.empty()) {
+        throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
     }
+    std::error_code error;
     if (const auto size = std::filesystem::file_size(file, error); error || size > largestFile) {
         throw std::runtime_error(file.string() + ": over 16 MB, too large for a settings file: is it a volume?");
     }

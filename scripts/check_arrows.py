@@ -10,11 +10,11 @@ import sys
 # A folder may include itself and these.
 ARROWS = {
     "base": set(),
-    "volume": set(),
+    "volume": {"base"},
     "volume/prepare": {"base", "volume", "datasets"},
     "occupancy": {"volume"},
     "chainmail": {"volume", "occupancy"},
-    "datasets": {"volume"},
+    "datasets": {"base", "volume"},
     "channel": {"base"},
     "render": {"base", "channel"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "channel"},

@@ -21,6 +21,11 @@ struct ImportOptions {
     /// Grids whose voxel axes are not at right angles (tilted gantry, affine registration) are refused unless the caller
     /// resamples them. Images are read in any case.
     bool sheared = false;
+    int volume = 0;    // which of the volumes of a file with four dimensions, from 1; 0: refuse such a file
+    std::string axes;  // where the voxel axes of a file go that does not say it: "LPS", "RAS", ...; "": LPS, with a warning
+    bool renumber = false;                      // values that are no label (negative, over 65535) get free ones
+    bool round = false;                         // values within 0.001 of a whole number are taken as that
+    bool dicomLabels = false;                   // the values of a DICOM series of CT, MR and the like are labels
     std::function<void(double)> progress = {};  // is called with the share that is done, 0 to 1; may be empty
 };
 
@@ -31,12 +36,19 @@ struct Overlap {
     std::uint64_t voxels = 0;  // how many
 };
 
+/// A value of the file that is no label, and the label that its voxels have instead.
+struct Renumbered {
+    std::int64_t original = 0;  // in the file
+    std::uint16_t value = 0;    // in the volume
+};
+
 /// A label map as a file holds it, with what the reader had to say.
 struct ImportedLabels {
-    LabelImage image;                   // labels and their place
-    std::vector<LabelName> names;       // segment names where the file holds some; tissue is left empty
-    std::vector<Overlap> overlaps;      // a voxel of `lost` is counted once, against the segment that has it now
-    std::vector<std::string> warnings;  // geometry that was chosen among several, and the like
+    LabelImage image;                    // labels and their place
+    std::vector<LabelName> names;        // segment names where the file holds some; tissue is left empty
+    std::vector<Overlap> overlaps;       // a voxel of `lost` is counted once, against the segment that has it now
+    std::vector<std::string> warnings;   // geometry that was chosen among several, and the like
+    std::vector<Renumbered> renumbered;  // by the value in the file; empty without options.renumber
 };
 
 /// An intensity image: CT, MR.

@@ -13,9 +13,10 @@ namespace palpate::volume {
 
 openvdb::math::Transform::Ptr transformOf(const Affine& affine)
 {
-    // OpenVDB multiplies row vectors from the left, so a row holds a step.
-    const Mat3& m = affine.linear;
-    const Vec3& o = affine.origin;
+    // OpenVDB multiplies row vectors from the left, so a row holds a step. It takes steps of 10 um, in metres, for a
+    // singular matrix.
+    const Mat3 m = 1e3 * affine.linear;
+    const Vec3 o = 1e3 * affine.origin;
     return openvdb::math::Transform::createLinearTransform(openvdb::math::Mat4d(
         m[0].x, m[0].y, m[0].z, 0.0, m[1].x, m[1].y, m[1].z, 0.0, m[2].x, m[2].y, m[2].z, 0.0, o.x, o.y, o.z, 1.0));
 }

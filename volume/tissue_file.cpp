@@ -1,6 +1,8 @@
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
+#include <base/inputs.h>
+
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Stream.h>
@@ -289,8 +291,8 @@ void Tissue::save(const std::filesystem::path& file) const
 Tissue Tissue::load(const std::filesystem::path& file)
 {
     initialise();
-    if (!std::filesystem::is_regular_file(file)) {
-        throw std::runtime_error(fmt::format("{}: there is no such file", file.string()));
+    if (const std::string why = base::whyNoFile(file); !why.empty()) {
+        throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
     }
     auto impl = std::make_unique<Impl>();
     try {

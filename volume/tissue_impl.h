@@ -49,7 +49,7 @@ struct TissueData {
 
 struct Tissue::Impl : TissueData {};
 
-/// The affine as OpenVDB's index-to-world transform [m].
+/// The affine as OpenVDB's index-to-world transform [mm], for other programs; ours read the affine itself.
 openvdb::math::Transform::Ptr transformOf(const Affine& affine);
 
 /// What an image in `unit` has where there is no tissue.

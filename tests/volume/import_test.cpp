@@ -82,6 +82,8 @@ std::vector<T> ramp()
     return values;
 }
 
+constexpr const char* straight = "TransformMatrix = 1 0 0 0 1 0 0 0 1\n";
+
 std::string meta(const std::string& extra, const std::string& type = "MET_UCHAR", const std::string& size = "4 5 6",
                  const std::string& data = "LOCAL")
 {
@@ -177,7 +179,8 @@ TEST_F(ImportFile, MetaImageThatLiesAboutItsPackingIsReadAsItIs)
     const std::string plain = bytesOf(ramp<std::uint16_t>());
     for (const bool declared : {false, true}) {
         for (const bool packed : {false, true}) {
-            const std::string said = declared ? "CompressedData = True\n" : "CompressedData = False\n";
+            const std::string said =
+                std::string(straight) + (declared ? "CompressedData = True\n" : "CompressedData = False\n");
             write("v.raw", packed ? gzip(plain) : plain);
             const auto labels = importLabels(write("v.mhd", meta(said, "MET_USHORT", "4 5 6", "v.raw")));
             expectRamp(labels);
@@ -234,8 +237,15 @@ TEST_F(ImportFile, PairsOfFilesAndImagesComeIn)
             ASSERT_FLOAT_EQ(image.values[i], 0.5F * static_cast<float>(i % 7) - 3.0F);
         }
     }
+    // Without NIfTI's magic it is Analyze, which has no factor; SPM's is refused.
     std::memset(header.bytes.data() + 344, 0, 4);
-    expectRefused(write("pair.hdr", header.bytes), "Analyze 7.5");
+    expectRefused(write("pair.hdr", header.bytes), "a factor of 0.5 at the place where SPM puts one");
+    write("pair.hdr", header.put(112, 0.0F).bytes);
+    const ImportedLabels labels = importLabels(folder / "pair.hdr");
+    expectRamp(labels);
+    ASSERT_EQ(labels.warnings.size(), 1U);
+    EXPECT_NE(labels.warnings[0].find("does not say which side is left"), std::string::npos);
+    expectRefused(write("pair.nii", header.bytes + std::string(4, '\0')), "its magic is missing");
 }
 
 TEST_F(ImportFile, VoxelsThatAreNotNumbersTakeTheSmallestOfAnImage)
@@ -399,7 +409,7 @@ TEST_F(ImportFile, NumbersThatAreNotFiniteInOtherHeadersAreRefused)
 TEST_F(ImportFile, ManyVolumesAndManyValuesPerVoxelAreRefused)
 {
     const std::string twice = bytesOf(ramp<std::uint8_t>()) + bytesOf(ramp<std::uint8_t>());
-    expectRefused(write("a.nii", Nifti().put<std::int16_t>(40, 4).put<std::int16_t>(48, 2).bytes + twice), "4 dimensions");
+    expectRefused(write("a.nii", Nifti().put<std::int16_t>(40, 4).put<std::int16_t>(48, 2).bytes + twice), "2 volumes");
     expectRefused(write("a.mha", meta("ElementNumberOfChannels = 2\n") + twice), "2 values per voxel");
     for (const char* kinds :
          {"vector domain domain domain", "RGB-color domain domain domain", "time domain domain domain"}) {
@@ -407,7 +417,7 @@ TEST_F(ImportFile, ManyVolumesAndManyValuesPerVoxelAreRefused)
                                                   "encoding: raw\n\n",
                                                   kinds) +
                                           twice),
-                      "several values per voxel");
+                      "choose one with --volume N");
     }
 }
 

@@ -156,6 +156,7 @@ void send(const Sender& to, const ImportedLabels& labels)
     }
     to.put(labels.overlaps);
     to.put(labels.warnings);
+    to.put(labels.renumbered);
 }
 
 bool receive(const Receiver& from, ImportedLabels& labels)
@@ -173,7 +174,7 @@ bool receive(const Receiver& from, ImportedLabels& labels)
             n.colour = colour;
         }
     }
-    return whole && from.take(labels.overlaps) && from.take(labels.warnings);
+    return whole && from.take(labels.overlaps) && from.take(labels.warnings) && from.take(labels.renumbered);
 }
 
 void send(const Sender& to, const ImportedImage& image)

@@ -1,9 +1,11 @@
 #include <volume/import/dicom.h>
 #include <volume/import/dicom_file.h>
+#include <volume/import/label_sink.h>
 
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 
 namespace palpate::volume {
 
@@ -59,6 +61,19 @@ Objects chosen(const std::filesystem::path& path, const Files& files, const std:
     return std::move(series.begin()->second);
 }
 
+// A series of a modality is an image, however few values it has: few values are no labels.
+void checkNoImage(const std::filesystem::path& path, const DicomObject& object, const ImportOptions& options)
+{
+    constexpr std::array<const char*, 10> imaging = {"CT", "MR", "PT", "NM", "US", "XA", "MG", "CR", "DX", "RF"};
+    const bool image = std::any_of(imaging.begin(), imaging.end(), [&](const char* m) { return object.modality == m; });
+    if (image && !options.dicomLabels) {
+        refuse(path,
+               fmt::format("is a DICOM series of modality {}, so an image: give the segmentation that was made of it, "
+                           "or add --dicom-labels if its values are labels",
+                           object.modality));
+    }
+}
+
 }  // namespace
 
 ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files, const ImportOptions& options)
@@ -72,11 +87,12 @@ ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files
         }
         return readSegmentation(objects[0], options);
     }
+    checkNoImage(path, objects[0], options);
     DicomVolume volume = readSeries(path, objects, options.sheared, options.progress);
     ImportedLabels out;
     out.image.size = volume.size;
     out.image.affine = volume.affine;
-    LabelSink sink(path, volume.size, true);
+    LabelSink sink(path, volume.size, LabelRules(true, options));
     std::vector<double> row;
     for (std::size_t at = 0; at < volume.values.size(); at += row.size()) {
         const std::size_t count = std::min<std::size_t>(65536, volume.values.size() - at);
@@ -85,8 +101,8 @@ ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files
         sink.add(row);
     }
     volume.values = {};
-    out.image.values = sink.finish(false);
     out.warnings = std::move(volume.warnings);
+    sink.finish(false, out);
     return out;
 }
 

@@ -20,6 +20,6 @@ ImportedImage dicomImage(const std::filesystem::path& path, const Files& files, 
 ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOptions& options);
 
 /// Labels from an integer grid, or the inside of a level set, of a .vdb that another program wrote.
-ImportedLabels vdbLabels(const std::filesystem::path& file);
+ImportedLabels vdbLabels(const std::filesystem::path& file, const ImportOptions& options);
 
 }  // namespace palpate::volume

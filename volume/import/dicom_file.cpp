@@ -1,4 +1,5 @@
 #include <volume/import/dicom_file.h>
+#include <volume/import/dicom_load.h>
 
 #include <dcmtk/config/osconfig.h>
 
@@ -268,10 +269,7 @@ DicomObject readDicom(const std::filesystem::path& file)
 {
     quieten();
     DcmFileFormat format;
-    const OFCondition status = format.loadFile(file.c_str());
-    if (status.bad()) {
-        refuse(file, fmt::format("its DICOM cannot be read ({}): get the file again", trimmedText(status.text())));
-    }
+    loadDicom(file, format);
     DcmDataset& data = *format.getDataset();
     data.convertToUTF8();
     DicomObject object;
@@ -281,7 +279,8 @@ DicomObject readDicom(const std::filesystem::path& file)
     object.series = text(data, DCM_SeriesInstanceUID);
     object.description = text(data, DCM_SeriesDescription);
     object.modality = text(data, DCM_Modality);
-    object.syntax = DcmXfer(data.getOriginalXfer()).getXferID();
+    const std::string syntax = transferSyntaxOf(file);
+    object.syntax = syntax.empty() ? DcmXfer(data.getOriginalXfer()).getXferID() : syntax;
     object.pixels = data.tagExists(DCM_PixelData);
     if (!object.pixels) {
         return object;

@@ -1,4 +1,5 @@
 #include <volume/import/dicom_file.h>
+#include <volume/import/dicom_load.h>
 
 #include <dcmtk/config/osconfig.h>
 
@@ -10,6 +11,7 @@
 #include <dcmtk/dcmjpeg/djdecode.h>
 #include <dcmtk/dcmjpls/djdecode.h>
 
+#include <algorithm>
 #include <cstring>
 #include <mutex>
 
@@ -55,15 +57,17 @@ struct DicomPixels::Data {
     void checkRle(std::size_t index) const;
     void readPlain(std::size_t index);
     void readBits(std::size_t index);
+    void unpackBits(const std::byte* bytes, std::uint64_t first);
+    void readCompressedBits(std::size_t index);
+    void readDeflated(std::size_t index);
+    std::vector<std::int32_t> jpeg2000(std::span<const std::byte> stream) const;
     void normalise();
 };
 
 void DicomPixels::Data::open()
 {
     registerCodecs();
-    if (format.loadFile(object.file.c_str()).bad()) {
-        fail("its DICOM cannot be read");
-    }
+    loadDicom(object.file, format);
     DcmElement* element = nullptr;
     if (format.getDataset()->findAndGetElement(DCM_PixelData, element).bad() ||
         (pixels = dynamic_cast<DcmPixelData*>(element)) == nullptr) {
@@ -133,7 +137,7 @@ void DicomPixels::Data::checkRle(std::size_t index) const
         }
         return value;
     };
-    const auto segments = static_cast<std::size_t>(object.bitsAllocated) / 8;
+    const auto segments = std::max<std::size_t>(1, static_cast<std::size_t>(object.bitsAllocated) / 8);
     bool sound = stream.size() > headerBytes && number(0) == segments && number(1) == headerBytes;
     for (std::size_t i = 2; sound && i <= segments; ++i) {
         sound = number(i) > number(i - 1) && number(i) < stream.size();
@@ -170,21 +174,76 @@ void DicomPixels::Data::readPlain(std::size_t index)
     }
 }
 
+std::vector<std::int32_t> DicomPixels::Data::jpeg2000(std::span<const std::byte> stream) const
+{
+    try {
+        return decodeJpeg2000(stream, object.columns, object.rows);
+    } catch (const std::runtime_error& e) {
+        refuse(object.file, e.what());
+    }
+}
+
+// Pixels of whole bytes in a deflated frame, little endian.
+void DicomPixels::Data::readDeflated(std::size_t index)
+{
+    const std::size_t width = static_cast<std::size_t>(object.bitsAllocated) / 8;
+    const std::vector<std::byte> bytes = inflated(codeStream(index), values.size() * width);
+    if (bytes.size() < values.size() * width) {
+        fail(fmt::format("the deflated data of frame {} are damaged", index + 1));
+    }
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const auto byte = [&](std::size_t k) { return std::to_integer<std::int32_t>(bytes[i * width + k]); };
+        values[i] = (byte(0) | (width == 2 ? byte(1) << 8 : 0)) >> (object.highBit + 1 - object.bitsStored);
+    }
+}
+
+// Eight pixels to a byte, the first in the lowest bit.
+void DicomPixels::Data::unpackBits(const std::byte* bytes, std::uint64_t first)
+{
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const std::uint64_t bit = first + i;
+        values[i] = (std::to_integer<int>(bytes[bit / 8]) >> (bit % 8)) & 1;
+    }
+}
+
+// A compressed frame of single bits begins with a byte of its own. RLE and deflate hold the bytes of the packed bits, JPEG
+// 2000 pixels of one bit (PS3.5, 8.2 and G.2, as CP 2301 and Supplement 244 have it).
+void DicomPixels::Data::readCompressedBits(std::size_t index)
+{
+    const std::vector<std::byte> stream = codeStream(index);
+    const std::size_t wanted = (values.size() + 7) / 8;
+    std::vector<std::byte> packed;
+    if (object.syntax == deflatedFrames) {
+        packed = inflated(stream, wanted);
+    } else if (syntax == EXS_RLELossless) {
+        checkRle(index);
+        packed = unpackedRle(stream, wanted);
+    } else if (isJpeg2000(syntax)) {
+        values = jpeg2000(stream);
+        std::transform(values.begin(), values.end(), values.begin(), [](std::int32_t v) { return v != 0 ? 1 : 0; });
+        return;
+    } else {
+        refuse(object.file, fmt::format("its pixels of one bit are compressed as {} ({}), which is not read: decompress it",
+                                        DcmXfer(syntax).getXferName(), object.syntax));
+    }
+    if (packed.size() < wanted) {
+        fail(fmt::format("frame {} has {} bytes of pixels of one bit, but needs {}", index + 1, packed.size(), wanted));
+    }
+    unpackBits(packed.data(), 0);
+}
+
 // Frames of single bits follow each other without a gap.
 void DicomPixels::Data::readBits(std::size_t index)
 {
-    Uint8* bytes = nullptr;
     if (fragments != nullptr) {
-        fail("its pixels of one bit are compressed, which is not read");
+        readCompressedBits(index);
+        return;
     }
+    Uint8* bytes = nullptr;
     if (pixels->getUint8Array(bytes).bad() || bytes == nullptr) {
         fail("its pixels cannot be read");
     }
-    const std::uint64_t first = index * values.size();
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        const std::uint64_t bit = first + i;
-        values[i] = (bytes[bit / 8] >> (bit % 8)) & 1;
-    }
+    unpackBits(reinterpret_cast<const std::byte*>(bytes), index * values.size());
 }
 
 void DicomPixels::Data::normalise()
@@ -211,11 +270,9 @@ std::span<const std::int32_t> DicomPixels::frame(std::size_t index)
         return data_->values;
     }
     if (data_->fragments != nullptr && isJpeg2000(data_->syntax)) {
-        try {
-            data_->values = decodeJpeg2000(data_->codeStream(index), object.columns, object.rows);
-        } catch (const std::runtime_error& e) {
-            refuse(object.file, e.what());
-        }
+        data_->values = data_->jpeg2000(data_->codeStream(index));
+    } else if (object.syntax == deflatedFrames) {
+        data_->readDeflated(index);
     } else {
         data_->readPlain(index);
     }

@@ -84,6 +84,8 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
     Source first;
     for (std::size_t i = 0; i < files.size(); ++i) {
         Source source = readSource(files[i]);
+        chooseVolume(source, options);
+        placeAxes(files[i], source.oriented, options, source.affine, source.warnings);
         checkAffine(files[i], source.affine, options.sheared, source.warnings);
         if (source.layers > 1) {
             refuse(files[i], "has layers of segments, so it is no mask: name this file alone");

@@ -1,4 +1,5 @@
 #include <volume/import/dicom.h>
+#include <volume/import/label_sink.h>
 
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
@@ -39,7 +40,8 @@ openvdb::GridBase::Ptr onlyGrid(const std::filesystem::path& file)
 
 // Every voxel that `inside` accepts gets the label that it gives.
 template <typename Grid, typename Label>
-void fill(const std::filesystem::path& file, const Grid& grid, ImportedLabels& out, Label&& label)
+void fill(const std::filesystem::path& file, const Grid& grid, const ImportOptions& options, ImportedLabels& out,
+          Label&& label)
 {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
     if (box.empty()) {
@@ -59,7 +61,7 @@ void fill(const std::filesystem::path& file, const Grid& grid, ImportedLabels& o
     image.affine.linear = Mat3(unit * vec(to.indexToWorld(first + openvdb::Vec3d(1, 0, 0)) - to.indexToWorld(first)),
                                unit * vec(to.indexToWorld(first + openvdb::Vec3d(0, 1, 0)) - to.indexToWorld(first)),
                                unit * vec(to.indexToWorld(first + openvdb::Vec3d(0, 0, 1)) - to.indexToWorld(first)));
-    LabelSink sink(file, image.size, false);
+    LabelSink sink(file, image.size, LabelRules(false, options));
     const auto accessor = grid.getConstAccessor();
     std::vector<double> row(static_cast<std::size_t>(dim.x()));
     for (int k = 0; k < dim.z(); ++k) {
@@ -70,18 +72,19 @@ void fill(const std::filesystem::path& file, const Grid& grid, ImportedLabels& o
             sink.add(row);
         }
     }
-    image.values = sink.finish(false);
+    sink.finish(false, out);
 }
 
 template <typename Grid>
-bool fillIf(const std::filesystem::path& file, const openvdb::GridBase& grid, ImportedLabels& out)
+bool fillIf(const std::filesystem::path& file, const openvdb::GridBase& grid, const ImportOptions& options,
+            ImportedLabels& out)
 {
     const auto* typed = dynamic_cast<const Grid*>(&grid);
     if (typed == nullptr) {
         return false;
     }
     const bool surface = grid.getGridClass() == openvdb::GRID_LEVEL_SET;
-    fill(file, *typed, out, [surface](auto v) { return surface ? (v < 0 ? 1.0 : 0.0) : static_cast<double>(v); });
+    fill(file, *typed, options, out, [surface](auto v) { return surface ? (v < 0 ? 1.0 : 0.0) : static_cast<double>(v); });
     if (surface) {
         out.names.push_back({1, grid.getName(), ""});
         out.warnings.emplace_back("is a level set: its inside is taken as one structure");
@@ -91,7 +94,7 @@ bool fillIf(const std::filesystem::path& file, const openvdb::GridBase& grid, Im
 
 }  // namespace
 
-ImportedLabels vdbLabels(const std::filesystem::path& file)
+ImportedLabels vdbLabels(const std::filesystem::path& file, const ImportOptions& options)
 {
     try {
         const openvdb::GridBase::Ptr grid = onlyGrid(file);
@@ -99,14 +102,16 @@ ImportedLabels vdbLabels(const std::filesystem::path& file)
             refuse(file, "its grid is bent (a frustum): resample it to a straight grid first");
         }
         ImportedLabels out;
-        if (!fillIf<openvdb::Int32Grid>(file, *grid, out) && !fillIf<openvdb::Int64Grid>(file, *grid, out) &&
-            !fillIf<openvdb::FloatGrid>(file, *grid, out) && !fillIf<openvdb::DoubleGrid>(file, *grid, out)) {
+        if (!fillIf<openvdb::Int32Grid>(file, *grid, options, out) &&
+            !fillIf<openvdb::Int64Grid>(file, *grid, options, out) &&
+            !fillIf<openvdb::FloatGrid>(file, *grid, options, out) &&
+            !fillIf<openvdb::DoubleGrid>(file, *grid, options, out)) {
             refuse(file,
                    fmt::format("its grid holds {}, not labels: save it as a grid of int32 or float", grid->valueType()));
         }
         checkAffine(file, out.image.affine, false, out.warnings);
-        out.warnings.emplace_back(
-            "OpenVDB files do not say their unit and frame: millimetres and left, posterior, superior are assumed");
+        placeAxes(file, false, options, out.image.affine, out.warnings);
+        out.warnings.emplace_back("OpenVDB files do not say their unit: millimetres are assumed");
         return out;
     } catch (const openvdb::Exception& e) {
         refuse(file, fmt::format("OpenVDB cannot read it ({}): get the file again", e.what()));

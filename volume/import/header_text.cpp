@@ -1,6 +1,8 @@
 #include <volume/import/header_text.h>
 #include <volume/import/source.h>
 
+#include <base/inputs.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -104,14 +106,29 @@ std::int64_t integer(const std::filesystem::path& file, const std::string& what,
     return values[0];
 }
 
-std::filesystem::path besides(const std::filesystem::path& header, const std::string& name)
+std::filesystem::path besides(const std::filesystem::path& header, const std::string& name,
+                              std::vector<std::string>& warnings)
 {
-    const std::filesystem::path data = header.parent_path() / name;
-    std::error_code error;
-    if (name.size() > 4000 || !std::filesystem::is_regular_file(data, error)) {
-        refuse(header, fmt::format("its data file {} is not there: put it beside the header", name.substr(0, 200)));
+    const std::string shown = name.substr(0, 200);
+    if (name.size() > 4000) {
+        refuse(header, fmt::format("its data file {} is not there: put it beside the header", shown));
     }
-    return data;
+    const std::filesystem::path data = header.parent_path() / name;
+    const std::string why = base::whyNoFile(data);
+    if (why.empty()) {
+        return data;
+    }
+    // As FDA ships its VICTRE phantoms.
+    const std::filesystem::path packed = data.string() + ".gz";
+    std::error_code error;
+    if (!std::filesystem::exists(std::filesystem::symlink_status(data, error)) && base::whyNoFile(packed).empty()) {
+        warnings.push_back(fmt::format("its data file {} is not there: {}.gz beside it is read", shown, shown));
+        return packed;
+    }
+    if (!std::filesystem::exists(std::filesystem::symlink_status(data, error))) {
+        refuse(header, fmt::format("its data file {} is not there: put it beside the header", shown));
+    }
+    refuse(header, fmt::format("its data file {} {}", shown, why));
 }
 
 }  // namespace palpate::volume

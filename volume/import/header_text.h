@@ -22,7 +22,9 @@ std::vector<double> numbers(const std::filesystem::path& file, const std::string
 std::vector<std::int64_t> integers(const std::filesystem::path& file, const std::string& what, const std::string& text);
 std::int64_t integer(const std::filesystem::path& file, const std::string& what, const std::string& text);
 
-/// A data file that a header names, beside the header; refuses what is not there.
-std::filesystem::path besides(const std::filesystem::path& header, const std::string& name);
+/// A data file that a header names, beside the header; refuses what is not there. Where only NAME.gz is, that is taken,
+/// with a warning.
+std::filesystem::path besides(const std::filesystem::path& header, const std::string& name,
+                              std::vector<std::string>& warnings);
 
 }  // namespace palpate::volume

@@ -2,8 +2,11 @@
 #include <volume/import/barrier.h>
 #include <volume/import/dicom.h>
 #include <volume/import/header_text.h>
+#include <volume/import/label_sink.h>
 #include <volume/import/segments.h>
 #include <volume/import/source.h>
+
+#include <base/inputs.h>
 
 #include <algorithm>
 #include <fstream>
@@ -45,9 +48,8 @@ SourceReader readerFor(const std::filesystem::path& file)
 
 void checkFile(const std::filesystem::path& file)
 {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error)) {
-        refuse(file, "there is no such file: check the name");
+    if (const std::string why = base::whyNoFile(file); !why.empty()) {
+        refuse(file, why);
     }
     std::ifstream in(file, std::ios::binary);
     std::string start(23, '\0');
@@ -66,11 +68,11 @@ ImportedLabels labelsOf(Source source, const ImportOptions& options)
     out.image.size = source.size;
     out.image.affine = source.affine;
     if (source.layers > 1) {
-        flatten(source.header, layeredSegments(source, options.progress), options, out);
+        flatten(source.header, layeredSegments(source, options), options, out);
     } else {
-        LabelSink sink(source.header, source.size, source.scaled);
+        LabelSink sink(source.header, source.size, LabelRules(source.scaled, options));
         decode(source, options.progress, [&](std::span<const double> values) { sink.add(values); });
-        out.image.values = sink.finish(source.label);
+        sink.finish(source.label, out);
         for (SegmentName& s : source.segments) {
             out.names.push_back(std::move(s.label));
         }
@@ -80,9 +82,11 @@ ImportedLabels labelsOf(Source source, const ImportOptions& options)
     return out;
 }
 
-Source checkedSource(const std::filesystem::path& file, bool sheared)
+Source checkedSource(const std::filesystem::path& file, const ImportOptions& options, bool sheared)
 {
     Source source = readSource(file);
+    chooseVolume(source, options);
+    placeAxes(file, source.oriented, options, source.affine, source.warnings);
     checkAffine(file, source.affine, sheared, source.warnings);
     checkBytes(source);
     for (SegmentName& s : source.segments) {
@@ -99,18 +103,18 @@ void clean(std::vector<std::string>& texts)
 
 ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions& options)
 {
-    if (std::filesystem::is_directory(path)) {
+    if (std::error_code error; std::filesystem::is_directory(path, error)) {
         return folderLabels(path, options);
     }
     checkFile(path);
     if (isVdb(path)) {
-        return labelsApart(path, "OpenVDB", options, [&](const ImportOptions&) { return vdbLabels(path); });
+        return labelsApart(path, "OpenVDB", options, [&](const ImportOptions& o) { return vdbLabels(path, o); });
     }
     if (isDicom(path)) {
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
-    return labelsOf(checkedSource(path, options.sheared), options);
+    return labelsOf(checkedSource(path, options, options.sheared), options);
 }
 
 }  // namespace
@@ -145,7 +149,8 @@ ImportedLabels importLabels(const std::filesystem::path& path, const ImportOptio
 
 ImportedImage importImage(const std::filesystem::path& path, const ImportOptions& options)
 {
-    const bool folder = std::filesystem::is_directory(path);
+    std::error_code error;
+    const bool folder = std::filesystem::is_directory(path, error);
     if (!folder) {
         checkFile(path);
     }
@@ -156,9 +161,9 @@ ImportedImage importImage(const std::filesystem::path& path, const ImportOptions
         const Files files = folder ? dicomFilesIn(path) : Files{path};
         return imageApart(path, dicomLibrary, options, [&](const ImportOptions& o) { return dicomImage(path, files, o); });
     }
-    Source source = checkedSource(path, true);
+    Source source = checkedSource(path, options, true);
     if (source.layers > 1) {
-        refuse(path, fmt::format("has {} layers: an image has one, give the image itself", source.layers));
+        refuse(path, fmt::format("has {} layers: an image has one, choose it with --image-volume N", source.layers));
     }
     ImportedImage out;
     out.size = source.size;

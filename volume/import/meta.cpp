@@ -64,15 +64,20 @@ Component componentNamed(const std::filesystem::path& file, const std::string& t
     return found->second;
 }
 
-Index3 sizeOf(const std::filesystem::path& file, const Fields& fields)
+// The sizes without the last ones that are 1, and how many there are with them.
+std::vector<std::int64_t> sizesOf(const std::filesystem::path& file, const Fields& fields, std::size_t& dimensions)
 {
-    const std::vector<std::int64_t> sizes = integers(file, "DimSize", fields.at("DimSize"));
-    const std::string dimensions = firstOf(fields, {"NDims"});
-    if (!dimensions.empty() && integer(file, "NDims", dimensions) != static_cast<std::int64_t>(sizes.size())) {
-        refuse(file, fmt::format("NDims = {} but DimSize = {}: its header contradicts itself, save it again", dimensions,
+    std::vector<std::int64_t> sizes = integers(file, "DimSize", fields.at("DimSize"));
+    const std::string said = firstOf(fields, {"NDims"});
+    if (!said.empty() && integer(file, "NDims", said) != static_cast<std::int64_t>(sizes.size())) {
+        refuse(file, fmt::format("NDims = {} but DimSize = {}: its header contradicts itself, save it again", said,
                                  fields.at("DimSize")));
     }
-    return checkedSize(file, sizes);
+    dimensions = std::max<std::size_t>(3, sizes.size());
+    while (sizes.size() > 3 && sizes.back() == 1) {
+        sizes.pop_back();
+    }
+    return sizes;
 }
 
 std::vector<double> someNumbers(const std::filesystem::path& file, const Fields& fields, const char* what,
@@ -89,26 +94,35 @@ std::vector<double> someNumbers(const std::filesystem::path& file, const Fields&
     return found;
 }
 
-// MetaImage writes the direction of one axis after the other, in LPS.
-void place(const Fields& fields, Source& source)
+// MetaImage writes the direction of one axis after the other, in LPS. Axes beyond the third are no space.
+void place(const Fields& fields, std::size_t dimensions, Source& source)
 {
     const std::filesystem::path& file = source.header;
     const std::string units = lowerCase(firstOf(fields, {"DistanceUnits"}));
     if (!units.empty() && units != "mm" && units != "?") {
         refuse(file, fmt::format("DistanceUnits = {}: only mm is understood, save it with mm", units.substr(0, 60)));
     }
-    const auto direction = someNumbers(file, fields, "TransformMatrix", {"TransformMatrix", "Rotation", "Orientation"},
-                                       {1, 0, 0, 0, 1, 0, 0, 0, 1});
-    const auto origin = someNumbers(file, fields, "Offset", {"Offset", "Position", "Origin"}, {0, 0, 0});
+    std::vector<double> straight(dimensions * dimensions, 0.0);
+    for (std::size_t k = 0; k < dimensions; ++k) {
+        straight[k * dimensions + k] = 1.0;
+    }
+    const auto direction =
+        someNumbers(file, fields, "TransformMatrix", {"TransformMatrix", "Rotation", "Orientation"}, std::move(straight));
+    const auto origin =
+        someNumbers(file, fields, "Offset", {"Offset", "Position", "Origin"}, std::vector<double>(dimensions, 0.0));
     if (firstOf(fields, {"ElementSpacing", "ElementSize"}).empty()) {
         source.warnings.emplace_back("its header gives no ElementSpacing: voxels of 1 mm are assumed");
     }
-    const auto spacing = someNumbers(file, fields, "ElementSpacing", {"ElementSpacing", "ElementSize"}, {1, 1, 1});
+    const auto spacing = someNumbers(file, fields, "ElementSpacing", {"ElementSpacing", "ElementSize"},
+                                     std::vector<double>(dimensions, 1.0));
+    // RAI: from right, anterior, inferior, which is what no TransformMatrix means to ITK.
+    source.oriented = !firstOf(fields, {"TransformMatrix", "Rotation", "Orientation"}).empty() ||
+                      firstOf(fields, {"AnatomicalOrientation"}) == "RAI";
     for (int k = 0; k < 3; ++k) {
         const auto at = static_cast<std::size_t>(k);
+        const double* axis = direction.data() + at * dimensions;
         source.affine.origin[k] = 1e-3 * origin[at];
-        source.affine.linear[k] =
-            1e-3 * std::abs(spacing[at]) * Vec3(direction[3 * at], direction[3 * at + 1], direction[3 * at + 2]);
+        source.affine.linear[k] = 1e-3 * std::abs(spacing[at]) * Vec3(axis[0], axis[1], axis[2]);
     }
 }
 
@@ -119,7 +133,7 @@ void locateData(const Fields& fields, std::uint64_t headerEnd, Source& source)
         refuse(source.header, "its slices lie in one file each: save it as one file");
     }
     const bool local = lowerCase(name) == "local";
-    source.data = local ? source.header : besides(source.header, name);
+    source.data = local ? source.header : besides(source.header, name, source.warnings);
     source.offset = local ? headerEnd : 0;
     const std::string given = firstOf(fields, {"HeaderSize"});
     const std::int64_t headerSize = given.empty() ? 0 : integer(source.header, "HeaderSize", given);
@@ -136,7 +150,7 @@ void judgePacking(const Fields& fields, Source& source)
 {
     const bool declared = isTrue(fields, "CompressedData");
     const std::uint64_t stored = unpackedSize(source.data, source.offset, Encoding::raw, 0);
-    const bool exact = stored == source.voxels() * bytesOf(source.component);
+    const bool exact = stored == source.elements() * bytesOf(source.component);
     const Encoding there = looksLike(source.data, source.offset);
     source.encoding = there == Encoding::deflate && (declared || !exact) ? there : Encoding::raw;
     const bool packed = source.encoding == Encoding::deflate;
@@ -160,14 +174,15 @@ Source readMeta(const std::filesystem::path& file)
     const Fields fields = readFields(file, headerEnd);
     Source source;
     source.header = file;
-    source.size = sizeOf(file, fields);
+    std::size_t dimensions = 3;
+    source.size = checkedVolumes(file, sizesOf(file, fields, dimensions), source);
     source.component = componentNamed(file, fields.at("ElementType"));
     source.bigEndian = isTrue(fields, "BinaryDataByteOrderMSB") || isTrue(fields, "ElementByteOrderMSB");
     const std::string channels = firstOf(fields, {"ElementNumberOfChannels"});
     if (!channels.empty() && channels != "1") {
         refuse(file, fmt::format("has {} values per voxel: save it with one", channels.substr(0, 30)));
     }
-    place(fields, source);
+    place(fields, dimensions, source);
     if (fields.count("BinaryData") != 0 && !isTrue(fields, "BinaryData")) {
         locateData(fields, headerEnd, source);
         source.encoding = Encoding::text;

@@ -39,7 +39,7 @@ Source readMgh(const std::filesystem::path& file)
     if (integer(16) != 1) {
         sizes.push_back(integer(16));
     }
-    source.size = checkedSize(file, sizes);
+    source.size = checkedVolumes(file, sizes, source);
     static const std::map<int, Component> types = {
         {0, Component::u8}, {1, Component::i32}, {3, Component::f32}, {4, Component::i16}, {10, Component::u16}};
     const auto type = types.find(integer(20));

@@ -30,11 +30,12 @@ NiftiHeader readHeader(const std::filesystem::path& file)
     }
     for (const bool swapped : {false, true}) {
         if (isLength(bytes, NiftiHeader::firstBytes, swapped)) {
-            NiftiHeader header(std::move(bytes), false, swapped);
-            if (header.magic() != "n+1" && header.magic() != "ni1") {
-                refuse(file, "is Analyze 7.5, which does not say which side is left: save it as NIfTI");
+            const std::string magic(reinterpret_cast<const char*>(bytes.data()) + 344, 3);
+            const bool analyze = magic != "n+1" && magic != "ni1";
+            if (analyze && lowerCase(file.string()).find(".hdr") == std::string::npos) {
+                refuse(file, "is not a NIfTI file, its magic is missing: save it again");
             }
-            return header;
+            return NiftiHeader(std::move(bytes), false, swapped, analyze);
         }
         if (bytes.size() == NiftiHeader::secondBytes && isLength(bytes, NiftiHeader::secondBytes, swapped)) {
             NiftiHeader header(std::move(bytes), true, swapped);
@@ -69,7 +70,7 @@ Component componentOf(const std::filesystem::path& file, const NiftiHeader& head
     return found->second;
 }
 
-Index3 sizeOf(const std::filesystem::path& file, const NiftiHeader& header)
+Index3 sizeOf(const std::filesystem::path& file, const NiftiHeader& header, Source& source)
 {
     const std::int64_t dimensions = header.dim(0);
     if (dimensions < 1 || dimensions > 7) {
@@ -82,12 +83,12 @@ Index3 sizeOf(const std::filesystem::path& file, const NiftiHeader& header)
     while (sizes.size() > 3 && sizes.back() == 1) {
         sizes.pop_back();
     }
-    return checkedSize(file, sizes);
+    return checkedVolumes(file, sizes, source);
 }
 
 void locateData(const NiftiHeader& header, Source& source)
 {
-    const bool single = header.magic()[1] == '+';
+    const bool single = !header.analyze() && header.magic()[1] == '+';
     source.data = source.header;
     const double start = header.voxOffset();
     if (!(start >= 0 && start < 1e9) || (single && start < static_cast<double>(header.length())) ||
@@ -99,10 +100,11 @@ void locateData(const NiftiHeader& header, Source& source)
         std::string stem = source.header.string();
         stem = std::regex_replace(stem, std::regex("\\.(hdr|img|nii)(\\.gz)?$", std::regex::icase), "");
         source.data = stem + ".img";
-        if (!std::filesystem::is_regular_file(source.data)) {
+        std::error_code error;
+        if (!std::filesystem::is_regular_file(source.data, error)) {
             source.data = stem + ".img.gz";
         }
-        if (!std::filesystem::is_regular_file(source.data)) {
+        if (!std::filesystem::is_regular_file(source.data, error)) {
             refuse(source.header, fmt::format("its voxels, {}.img, are not there: put that file beside it", stem));
         }
     }
@@ -143,6 +145,16 @@ std::vector<SegmentName> extensionNames(const Source& source, std::size_t header
 
 void readScale(const NiftiHeader& header, Source& source)
 {
+    if (header.analyze()) {
+        // SPM puts a factor where Analyze has nothing.
+        if (header.slope() != 0 && header.slope() != 1) {
+            refuse(source.header,
+                   fmt::format("is Analyze 7.5 with a factor of {:g} at the place where SPM puts one, which the "
+                               "format does not know: save it as NIfTI",
+                               header.slope()));
+        }
+        return;
+    }
     const double slope = header.slope();
     const double intercept = header.intercept();
     if (!std::isfinite(slope) || !std::isfinite(intercept)) {
@@ -161,14 +173,14 @@ Source readNifti(const std::filesystem::path& file)
     // An .img is opened through its header.
     Source source;
     source.header = std::regex_replace(file.string(), std::regex("\\.img(\\.gz)?$", std::regex::icase), ".hdr$1");
-    if (!std::filesystem::is_regular_file(source.header)) {
+    if (std::error_code error; !std::filesystem::is_regular_file(source.header, error)) {
         refuse(file, fmt::format("its header {} is not there: put that file beside it", source.header.string()));
     }
     const NiftiHeader header = readHeader(source.header);
-    source.size = sizeOf(file, header);
+    source.size = sizeOf(file, header, source);
     source.component = componentOf(file, header);
     source.bigEndian = header.swapped();
-    source.label = header.intent() == intentLabel;
+    source.label = !header.analyze() && header.intent() == intentLabel;
     readScale(header, source);
     placeNifti(header, source);
     locateData(header, source);

@@ -11,8 +11,8 @@ namespace palpate::volume {
 /// Offsets: https://nifti.nimh.nih.gov/nifti-1, https://nifti.nimh.nih.gov/nifti-2
 class NiftiHeader {
 public:
-    NiftiHeader(std::vector<std::byte> bytes, bool second, bool swapped)
-        : bytes_(std::move(bytes)), second_(second), swapped_(swapped)
+    NiftiHeader(std::vector<std::byte> bytes, bool second, bool swapped, bool analyze = false)
+        : bytes_(std::move(bytes)), second_(second), swapped_(swapped), analyze_(analyze)
     {
     }
 
@@ -20,6 +20,8 @@ public:
     static constexpr std::size_t secondBytes = 540;
 
     bool swapped() const { return swapped_; }
+    /// Analyze 7.5: sizes, type and spacings lie where NIfTI-1 has them, the rest means something else.
+    bool analyze() const { return analyze_; }
     std::size_t length() const { return second_ ? secondBytes : firstBytes; }
     std::string magic() const { return text(second_ ? 4 : 344, 3); }
     std::int64_t dim(std::size_t i) const
@@ -63,6 +65,7 @@ private:
     std::vector<std::byte> bytes_;
     bool second_;
     bool swapped_;
+    bool analyze_;
 };
 
 /// The rule: the sform where it has a code, else the qform, else the plain axes; a warning where the first two disagree.

@@ -73,15 +73,35 @@ double disagreement(const Affine& a, const Affine& b, Index3 size)
     return most;
 }
 
+// Spacings alone: the header does not say where the axes run.
+void placePlain(const NiftiHeader& header, Source& source)
+{
+    const double unit = header.analyze() ? 1e-3 : unitOf(source.header, header);
+    source.oriented = false;
+    source.affine = Affine{
+        unit * Mat3(std::abs(header.pixdim(1)), 0, 0, 0, std::abs(header.pixdim(2)), 0, 0, 0, std::abs(header.pixdim(3))),
+        Vec3(0.0)};
+}
+
 }  // namespace
 
 void placeNifti(const NiftiHeader& header, Source& source)
 {
+    if (header.analyze()) {
+        placePlain(header, source);
+        return;
+    }
     const double unit = unitOf(source.header, header);
     const bool hasQ = header.qformCode() > 0;
-    const bool hasS = header.sformCode() > 0;
     const Affine q = qform(header, unit);
     const Affine s = sform(header, unit);
+    bool hasS = header.sformCode() > 0;
+    // A writer that sets the code and forgets the matrix.
+    const bool empty = s.linear == Mat3(0.0);
+    if (hasS && empty && hasQ && q.voxelVolume() > 0) {
+        hasS = false;
+        source.warnings.emplace_back("its sform is all zero, though it has a code: the qform is used");
+    }
     if (hasS) {
         source.affine = s;
         const double apart = s.voxelVolume() > 0 && hasQ ? disagreement(s, q, source.size) : 0.0;
@@ -95,12 +115,7 @@ void placeNifti(const NiftiHeader& header, Source& source)
         source.affine = q;
         return;
     }
-    source.affine = Affine{
-        unit * Mat3(std::abs(header.pixdim(1)), 0, 0, 0, std::abs(header.pixdim(2)), 0, 0, 0, std::abs(header.pixdim(3))),
-        Vec3(0.0)};
-    source.warnings.emplace_back(
-        "it has neither qform nor sform, so which side is left is not known: the axes are taken as left, posterior, "
-        "superior");
+    placePlain(header, source);
 }
 
 }  // namespace palpate::volume

@@ -124,7 +124,7 @@ void locateData(const NrrdHeader& header, Source& source)
     if (name.rfind("LIST", 0) == 0 || name.find('%') != std::string::npos) {
         refuse(source.header, "its slices lie in one file each: save it as one file");
     }
-    source.data = name.empty() ? source.header : besides(source.header, name);
+    source.data = name.empty() ? source.header : besides(source.header, name, source.warnings);
     source.offset = name.empty() ? header.end : 0;
     source.encoding = encodingNamed(source.header, header.field("encoding"));
     const std::int64_t lines =
@@ -156,6 +156,11 @@ void judgePacking(Source& source)
                            source.encoding == Encoding::deflate ? "gzip" : "bzip2"));
     }
     const std::uint64_t wanted = source.elements() * bytesOf(source.component);
+    if (source.encoding == Encoding::raw && there == Encoding::deflate && source.data.extension() == ".gz") {
+        source.encoding = there;
+        source.warnings.emplace_back("its header says encoding: raw, but the data are compressed: read as they are");
+        return;
+    }
     if (source.encoding == Encoding::raw && unpackedSize(source.data, source.offset, Encoding::raw, 0) < wanted) {
         source.encoding = there;
         source.warnings.emplace_back("its header says encoding: raw, but the data are compressed: read as they are");

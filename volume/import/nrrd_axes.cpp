@@ -132,8 +132,8 @@ double unitOf(const NrrdHeader& header)
     return all > 0 ? all : 1e-3;
 }
 
-// The sign of each axis of the header's space in LPS.
-Vec3 flipOf(const NrrdHeader& header, std::vector<std::string>& warnings)
+// The sign of each axis of the header's space in LPS; `oriented` is false where it names no patient frame.
+Vec3 flipOf(const NrrdHeader& header, bool& oriented)
 {
     const std::string space = lowerCase(header.field("space"));
     if (space == "right-anterior-superior" || space == "ras") {
@@ -142,12 +142,7 @@ Vec3 flipOf(const NrrdHeader& header, std::vector<std::string>& warnings)
     if (space == "left-anterior-superior" || space == "las") {
         return {1, -1, 1};
     }
-    if (space.empty()) {
-        warnings.emplace_back("its header names no space: the axes are taken as left, posterior, superior");
-    } else if (space != "left-posterior-superior" && space != "lps") {
-        warnings.push_back(fmt::format("space: {} is not a patient frame: the axes are taken as left, posterior, superior",
-                                       space.substr(0, 60)));
-    }
+    oriented = space == "left-posterior-superior" || space == "lps";
     return Vec3(1.0);
 }
 
@@ -155,25 +150,26 @@ void findLayers(const NrrdHeader& header, const std::vector<Axis>& axes, const s
                 Source& source)
 {
     std::uint64_t inner = 1;
-    std::size_t spaceBefore = 0;
     for (std::size_t i = 0; i < axes.size(); ++i) {
         const bool isSpace = std::find(space.begin(), space.end(), i) != space.end();
         if (isSpace) {
             inner *= static_cast<std::uint64_t>(axes[i].size);
-            ++spaceBefore;
             continue;
         }
         if (axes[i].size == 1) {
             continue;
         }
-        if (axes[i].size < 1 || axes[i].size > 4096 || source.layers > 1 || !isLayerKind(axes[i].kind)) {
+        if (axes[i].size < 1 || axes[i].size > 32767 || source.layers > 1 || source.volumes > 1) {
             refuse(header.file,
-                   fmt::format("sizes: {} (kinds: {}): several values per voxel are read only as a list of at most "
-                               "4096 layers of segments: save one volume of it",
+                   fmt::format("sizes: {} (kinds: {}): one axis beside those of space is read, of at most 32767 volumes: "
+                               "save one volume of it",
                                header.field("sizes"), header.field("kinds", "not given").substr(0, 80)));
         }
-        source.layers = static_cast<std::uint64_t>(axes[i].size);
-        source.inner = inner;
+        source.dimensions =
+            fmt::format("sizes: {}; kinds: {}", header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
+        const bool list = isLayerKind(axes[i].kind) && axes[i].size <= 4096;
+        (list ? source.layers : source.volumes) = static_cast<std::uint64_t>(axes[i].size);
+        (list ? source.inner : source.volumeInner) = inner;
     }
 }
 
@@ -191,7 +187,7 @@ void placeNrrd(const NrrdHeader& header, Source& source)
     findLayers(header, axes, space, source);
 
     const double unit = unitOf(header);
-    const Vec3 flip = unit * flipOf(header, source.warnings);
+    const Vec3 flip = unit * flipOf(header, source.oriented);
     bool given = false;
     for (int k = 0; k < 3; ++k) {
         const Axis& axis = axes[space[static_cast<std::size_t>(k)]];

@@ -1,3 +1,4 @@
+#include <volume/import/label_sink.h>
 #include <volume/import/segments.h>
 
 #include <fmt/ranges.h>
@@ -9,6 +10,9 @@
 namespace palpate::volume {
 
 namespace {
+
+constexpr std::size_t mostSaid = 5;    // segments in a warning about each
+constexpr std::size_t mostNamed = 12;  // in a list of names
 
 std::vector<std::string> namesOf(const std::vector<Segment>& segments)
 {
@@ -56,6 +60,7 @@ void makeUnique(const std::filesystem::path& file, std::vector<Segment>& segment
 {
     std::set<std::uint16_t> taken = {0};
     int highest = 0;
+    std::vector<std::string> changed;
     for (const Segment& s : segments) {
         highest = std::max(highest, static_cast<int>(s.label.value));
     }
@@ -66,10 +71,17 @@ void makeUnique(const std::filesystem::path& file, std::vector<Segment>& segment
         if (++highest > 65535) {
             refuse(file, "its segments need label values over 65535: save it with fewer");
         }
-        warnings.push_back(fmt::format("segment '{}' has label value {}, which is taken: it gets {}", s.label.name,
-                                       s.label.value, highest));
+        changed.push_back(fmt::format("segment '{}' has label value {}, which is taken: it gets {}", s.label.name,
+                                      s.label.value, highest));
         s.label.value = static_cast<std::uint16_t>(highest);
         taken.insert(s.label.value);
+    }
+    if (changed.size() > mostSaid) {
+        changed[mostSaid] = fmt::format("so do {} more", changed.size() - mostSaid);
+        changed.resize(mostSaid + 1);
+    }
+    if (!changed.empty()) {
+        warnings.push_back(fmt::format("{}", fmt::join(changed, "; ")));
     }
 }
 
@@ -105,7 +117,10 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
         refuse(file, "no voxel is set in any of its segments: give a segmentation that holds something");
     }
     if (!empty.empty()) {
-        out.warnings.push_back(fmt::format("segments without a voxel are left out: {}", fmt::join(empty, ", ")));
+        const std::size_t all = empty.size();
+        empty.resize(std::min(all, mostNamed));
+        out.warnings.push_back(fmt::format("segments without a voxel are left out: {}{}", fmt::join(empty, ", "),
+                                           all > mostNamed ? fmt::format(" and {} more", all - mostNamed) : ""));
     }
     makeUnique(file, segments, out.warnings);
     LabelImage& image = out.image;
@@ -124,7 +139,7 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
     }
 }
 
-std::vector<Segment> layeredSegments(const Source& source, const std::function<void(double)>& progress)
+std::vector<Segment> layeredSegments(const Source& source, const ImportOptions& options)
 {
     std::vector<Segment> segments;
     std::map<std::pair<std::uint64_t, std::uint16_t>, std::size_t> index;  // layer and value
@@ -142,7 +157,7 @@ std::vector<Segment> layeredSegments(const Source& source, const std::function<v
     }
     constexpr std::size_t most = 4096;  // segments
     std::uint64_t element = 0;
-    decode(source, progress, [&](std::span<const double> values) {
+    decode(source, options.progress, [&](std::span<const double> values) {
         for (const double number : values) {
             const std::uint64_t at = element++;
             if (number == 0) {
@@ -151,7 +166,7 @@ std::vector<Segment> layeredSegments(const Source& source, const std::function<v
             const std::uint64_t layer = at / source.inner % source.layers;
             const std::uint64_t voxel = at / source.inner / source.layers * source.inner + at % source.inner;
             const std::uint16_t value =
-                LabelSink::label(source.header, number, source.scaled, fmt::format("voxel {}", voxel));
+                LabelSink::label(source.header, number, {source.scaled, options}, fmt::format("voxel {}", voxel));
             if (index.count({layer, value}) == 0) {
                 append({value, fmt::format("layer {} value {}", layer, value), ""}, layer, value);
             }

@@ -34,6 +34,6 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
              ImportedLabels& out);
 
 /// The segments of a source with layers, in the order of its header.
-std::vector<Segment> layeredSegments(const Source& source, const std::function<void(double)>& progress);
+std::vector<Segment> layeredSegments(const Source& source, const ImportOptions& options);
 
 }  // namespace palpate::volume

@@ -52,9 +52,14 @@ struct Source {
     bool scaled = false;        // the values meant are slope * stored + intercept
     double slope = 1;
     double intercept = 0;
-    std::uint64_t layers = 1;  // segmentations of the same space in one stream
-    std::uint64_t inner = 1;   // how many elements of one layer follow each other before the next layer's
-    bool label = false;        // the file says itself that it is a label map
+    std::uint64_t layers = 1;       // segmentations of the same space in one stream
+    std::uint64_t inner = 1;        // how many elements of one layer follow each other before the next layer's
+    std::uint64_t volumes = 1;      // of four dimensions; chooseVolume() picks one
+    std::uint64_t volumeInner = 1;  // how many elements of one volume follow each other before the next one's
+    std::uint64_t volume = 0;       // the one that is read
+    std::string dimensions;         // all sizes, where there are volumes
+    bool oriented = true;           // the header says where the voxel axes go
+    bool label = false;             // the file says itself that it is a label map
     std::vector<SegmentName> segments;
     std::vector<std::string> warnings;
 
@@ -62,7 +67,7 @@ struct Source {
     {
         return static_cast<std::uint64_t>(size.x) * static_cast<std::uint64_t>(size.y) * static_cast<std::uint64_t>(size.z);
     }
-    std::uint64_t elements() const { return voxels() * layers; }
+    std::uint64_t elements() const { return voxels() * layers * volumes; }
 };
 
 Source readNifti(const std::filesystem::path& file);
@@ -90,28 +95,19 @@ void decode(const Source& source, const std::function<void(double)>& progress,
 /// The three sizes of a header, each in 1..32767 and not too many voxels, so that nothing absurd is allocated.
 Index3 checkedSize(const std::filesystem::path& file, const std::vector<std::int64_t>& sizes);
 
+/// The size of one volume from all sizes of a header: those beyond three dimensions are counted in `source.volumes`.
+Index3 checkedVolumes(const std::filesystem::path& file, std::vector<std::int64_t> sizes, Source& source);
+
+/// Picks options.volume of a source with four dimensions, or refuses it; the layers of a .seg.nrrd count as volumes then.
+void chooseVolume(Source& source, const ImportOptions& options);
+
+/// Where the voxel axes go that a header does not say: options.axes, else left, posterior, superior, with a warning.
+/// The one rule for all formats.
+void placeAxes(const std::filesystem::path& file, bool oriented, const ImportOptions& options, Affine& affine,
+               std::vector<std::string>& warnings);
+
 /// Refuses spacings that are not positive and finite, and sheared axes unless `sheared`, which leave a warning.
 void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings);
-
-/// Turns values into labels, one after another, and refuses what no label map holds.
-class LabelSink {
-public:
-    /// `rounded`: the values went through a slope, which leaves a rounding of single precision.
-    LabelSink(std::filesystem::path file, Index3 size, bool rounded);
-
-    void add(std::span<const double> values);
-    /// Refuses images (too many different values) and empty maps; the labels.
-    std::vector<std::uint16_t> finish(bool surelyLabels);
-
-    static std::uint16_t label(const std::filesystem::path& file, double value, bool rounded, const std::string& voxel);
-
-private:
-    std::filesystem::path file_;
-    Index3 size_;
-    bool rounded_;
-    std::vector<std::uint16_t> labels_;
-    std::vector<bool> seen_;
-};
 
 /// Values of an image: what is not a number takes the smallest value that is one, with a warning.
 void makeFinite(const std::filesystem::path& file, std::vector<float>& values, std::vector<std::string>& warnings);

@@ -12,10 +12,10 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr std::size_t mostLabels = 1024;                 // more different values than this is an image
 constexpr std::uint64_t mostVoxels = 0xffffffff;         // of one volume
 constexpr std::uint64_t mostPadding = 16;                // [bytes]
 constexpr std::uint64_t mostBefore = 1 << 30;            // unpacked, in front of voxels that are the last bytes [bytes]
+constexpr double leastSpacing = 0.999e-6;                // below a cell, and units were mistaken [m]
 constexpr double mostShear = 2e-3;                       // cosine between voxel axes
 constexpr double degree = 3.14159265358979323846 / 180;  // [rad]
 
@@ -61,13 +61,6 @@ void append(Component component, std::span<const std::byte> bytes, bool turned, 
     }
 }
 
-std::string voxelName(Index3 size, std::size_t at)
-{
-    const auto nx = static_cast<std::size_t>(size.x);
-    const auto ny = static_cast<std::size_t>(size.y);
-    return fmt::format("voxel ({}, {}, {})", at % nx, at / nx % ny, at / nx / ny);
-}
-
 }  // namespace
 
 Index3 checkedSize(const std::filesystem::path& file, const std::vector<std::int64_t>& sizes)
@@ -102,8 +95,11 @@ void checkBytes(Source& source)
         return;
     }
     const std::uint64_t expected = source.skip + wanted;
-    const std::string size = fmt::format("{} x {} x {}{}", source.size.x, source.size.y, source.size.z,
-                                         source.layers > 1 ? fmt::format(" x {} layers", source.layers) : "");
+    const std::string size =
+        fmt::format("{} x {} x {}{}", source.size.x, source.size.y, source.size.z,
+                    source.layers * source.volumes > 1
+                        ? fmt::format(" x {} {}", source.layers * source.volumes, source.layers > 1 ? "layers" : "volumes")
+                        : "");
     const std::string sizes =
         source.encoding == Encoding::text
             ? fmt::format("its header promises {} voxels, but there are {} numbers", size, there / width)
@@ -138,6 +134,7 @@ void decode(const Source& source, const std::function<void(double)>& progress,
     const double all = static_cast<double>(left);
     std::vector<std::byte> kept;  // the beginning of an element whose end is in the next piece
     std::vector<double> values;
+    std::uint64_t element = 0;
     unpack(source.data, source.offset, source.encoding, [&](std::span<const std::byte> bytes) {
         const std::uint64_t over = std::min<std::uint64_t>(skip, bytes.size());
         skip -= over;
@@ -161,6 +158,9 @@ void decode(const Source& source, const std::function<void(double)>& progress,
             for (double& v : values) {
                 v = source.slope * v + source.intercept;
             }
+        }
+        if (source.volumes > 1) {
+            std::erase_if(values, [&](double) { return element++ / source.volumeInner % source.volumes != source.volume; });
         }
         sink(values);
         if (progress) {
@@ -191,7 +191,7 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
         refuse(file, fmt::format("its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again",
                                  1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
     }
-    if (std::max({spacing.x, spacing.y, spacing.z}) > 10 || std::min({spacing.x, spacing.y, spacing.z}) < 1e-9) {
+    if (std::max({spacing.x, spacing.y, spacing.z}) > 10 || std::min({spacing.x, spacing.y, spacing.z}) < leastSpacing) {
         refuse(file, fmt::format("its voxels are {} x {} x {} mm: that is no patient, check the units in its header",
                                  1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
     }
@@ -211,60 +211,6 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
         refuse(file, said + ": give --voxel MM, which resamples it to a straight grid");
     }
     warnings.push_back(said);
-}
-
-LabelSink::LabelSink(std::filesystem::path file, Index3 size, bool rounded)
-    : file_(std::move(file)), size_(size), rounded_(rounded), seen_(65536, false)
-{
-    labels_.reserve(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z));
-}
-
-std::uint16_t LabelSink::label(const std::filesystem::path& file, double value, bool rounded, const std::string& voxel)
-{
-    if (!std::isfinite(value)) {
-        refuse(file, fmt::format("{} is not a number ({}): a label map holds whole numbers from 0 to 65535, give the "
-                                 "segmentation",
-                                 voxel, value));
-    }
-    const double whole = std::round(value);
-    if (whole < 0 || whole > 65535) {
-        refuse(file,
-               fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
-                           "an image: give the segmentation that was made of it",
-                           voxel, value));
-    }
-    // A slope that is no power of two leaves a rounding of single precision.
-    if (std::abs(value - whole) > (rounded ? 1e-6 * std::max(1.0, std::abs(value)) : 0.0)) {
-        refuse(file, fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, this is an image or a "
-                                 "probability{}: give the segmentation",
-                                 voxel, value, rounded ? " (its slope is applied)" : ""));
-    }
-    return static_cast<std::uint16_t>(whole);
-}
-
-void LabelSink::add(std::span<const double> values)
-{
-    for (const double value : values) {
-        // In a label map nothing else happens.
-        const auto plain = value >= 0 && value <= 65535 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
-        const bool exact = static_cast<double>(plain) == value;
-        labels_.push_back(exact ? plain : label(file_, value, rounded_, voxelName(size_, labels_.size())));
-        seen_[labels_.back()] = true;
-    }
-}
-
-std::vector<std::uint16_t> LabelSink::finish(bool surelyLabels)
-{
-    const auto different = static_cast<std::size_t>(std::count(seen_.begin(), seen_.end(), true));
-    if (different > mostLabels && !surelyLabels) {
-        refuse(file_, fmt::format("has {} different values, so it is not a label map (at most {}) but an image: give the "
-                                  "segmentation that was made of it",
-                                  different, mostLabels));
-    }
-    if (different == 1 && seen_[0]) {
-        refuse(file_, "no voxel is set: every label is 0, give a segmentation that holds something");
-    }
-    return std::move(labels_);
 }
 
 void makeFinite(const std::filesystem::path& file, std::vector<float>& values, std::vector<std::string>& warnings)
