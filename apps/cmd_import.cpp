@@ -10,6 +10,7 @@
 #include <volume/import.h>
 #include <volume/prepare/body.h>
 #include <volume/prepare/mapping.h>
+#include <volume/prepare/name_table.h>
 #include <volume/prepare/steps.h>
 #include <volume/resample.h>
 
@@ -40,6 +41,7 @@ struct Options {
     std::string voxel, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;
     double hull = 0;  // thickness of a body that is invented [m]
     bool bodyFromImage = false;
+    int imageVolume = 0;
 };
 
 void readLengths(Options& o)
@@ -62,6 +64,7 @@ volume::ImportedImage readImage(const Options& o, std::vector<std::string>& note
 {
     volume::ImportOptions reading;
     reading.series = o.reading.series;
+    reading.volume = o.imageVolume;
     progress.show("checking the image");
     reading.progress = [&](double share) { progress.show("reading the image", share); };
     volume::ImportedImage image = volume::importImage(o.image, reading);
@@ -165,8 +168,8 @@ volume::Provenance provenanceOf(const Options& o, const volume::LabelImage& imag
     return provenance;
 }
 
-// What became of voxels that several segments hold.
-void noteOverlaps(const volume::ImportedLabels& labels, std::vector<std::string>& notes)
+// What became of voxels that several segments hold: in one note, or with --verbose in one for each pair.
+void noteOverlaps(const volume::ImportedLabels& labels, bool verbose, std::vector<std::string>& notes)
 {
     const auto nameOf = [&](std::uint16_t value) {
         for (const volume::LabelName& n : labels.names) {
@@ -176,9 +179,21 @@ void noteOverlaps(const volume::ImportedLabels& labels, std::vector<std::string>
         }
         return fmt::format("label {}", value);
     };
+    std::uint64_t all = 0;
+    const volume::Overlap* most = nullptr;
     for (const volume::Overlap& o : labels.overlaps) {
-        notes.push_back(fmt::format("{} voxels of '{}' lie in '{}' too, which has them: --overlap says otherwise", o.voxels,
-                                    nameOf(o.lost), nameOf(o.kept)));
+        all += o.voxels;
+        most = most == nullptr || o.voxels > most->voxels ? &o : most;
+        if (verbose || labels.overlaps.size() == 1) {
+            notes.push_back(fmt::format("{} voxels of '{}' lie in '{}' too, which has them: --overlap says otherwise",
+                                        o.voxels, nameOf(o.lost), nameOf(o.kept)));
+        }
+    }
+    if (!verbose && labels.overlaps.size() > 1) {
+        notes.push_back(
+            fmt::format("{} voxels lie in several segments, in {} pairs of them, the most of '{}' in '{}' ({}): "
+                        "--overlap says who has them, --verbose lists each pair",
+                        all, labels.overlaps.size(), nameOf(most->lost), nameOf(most->kept), most->voxels));
     }
 }
 
@@ -228,6 +243,7 @@ void runImport(Options o)
     volume::ImportedLabels labels = volume::importLabels(o.input, o.reading);
     progress.show("counting labels");
     const prepare::LabelCounts counts = prepare::countLabels(labels.image);
+    prepare::addNames(o.mapping, o.input, counts, labels);
     if (!o.mapping.writeMap.empty()) {
         const std::size_t open = prepare::writeLabelMap(o.mapping, o.input, labels, counts, table);
         progress.clear();
@@ -235,7 +251,7 @@ void runImport(Options o)
         return;
     }
     std::vector<std::string> notes = labels.warnings;
-    noteOverlaps(labels, notes);
+    noteOverlaps(labels, o.mapping.verbose, notes);
     std::vector<volume::LabelName> named = prepare::mapLabels(o.mapping, o.input, labels, counts, table, notes);
     std::optional<volume::ImportedImage> image;
     if (!o.image.empty()) {
@@ -286,6 +302,24 @@ void addReading(CLI::App& command, Options& o)
                     "From which a probability of a fractional DICOM SEG is tissue (default 0.5)")
         ->check(CLI::Range(0.0, 1.0))
         ->group("Reading");
+    command.add_option("--volume", o.reading.volume, "Which volume of a file with several (4D), from 1")
+        ->check(CLI::Range(1, 1 << 30))
+        ->type_name("N")
+        ->group("Reading");
+    command.add_flag("--renumber", o.reading.renumber, "Give values that are negative or over 65535 free label values")
+        ->group("Reading");
+    command.add_flag("--round", o.reading.round, "Take values within 0.001 of a whole number as that")->group("Reading");
+    command
+        .add_option("--axes", o.reading.axes,
+                    "Sides to which the voxel axes run, where the file does not say it: LPS, RAS, LAS, ...")
+        ->type_name("XYZ")
+        ->group("Reading");
+    command.add_flag("--dicom-labels", o.reading.dicomLabels, "Take the values of a DICOM series of CT, MR, ... as labels")
+        ->group("Reading");
+    command.add_option("--image-volume", o.imageVolume, "Which volume of an image with several (4D), from 1")
+        ->check(CLI::Range(1, 1 << 30))
+        ->type_name("N")
+        ->group("Reading");
     command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
         ->type_name("FILE")
         ->group("Reading");
@@ -303,6 +337,25 @@ void addMapping(CLI::App& command, Options& o)
 {
     command.add_option("--map,--labels", o.mapping.map, "What the labels are: a built-in label map's name, or a TOML file")
         ->type_name("NAME|FILE")
+        ->group("Tissue");
+    command
+        .add_option("--names", o.mapping.names,
+                    "Names of the labels: a colour table (3D Slicer, FreeSurfer, ITK-SNAP) or a dataset.json")
+        ->type_name("FILE")
+        ->group("Tissue");
+    command
+        .add_flag_callback(
+            "--list-maps",
+            [] {
+                for (const datasets::LabelMap& map : datasets::labelMaps()) {
+                    fmt::print("{:<44} {:>4} labels  {}\n", map.name, map.labels.size(), map.source);
+                }
+                throw CLI::Success();
+            },
+            "List the built-in label maps with their sources, and stop")
+        ->trigger_on_parse()
+        ->group("Tissue");
+    command.add_flag("--verbose", o.mapping.verbose, "A warning for each label and each overlap, not one for all")
         ->group("Tissue");
     command.add_option("--set", o.mapping.set, "Tissue of one label, by its name or value; may be repeated")
         ->type_name("LABEL=TISSUE")

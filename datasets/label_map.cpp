@@ -3,6 +3,9 @@
 #include <datasets/embedded.h>
 #include <datasets/toml_fields.h>
 
+#include <base/inputs.h>
+#include <base/nearest.h>
+
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -18,12 +21,13 @@ namespace {
 constexpr double farthestValue = 1e6;  // of an image
 constexpr double mostFactor = 1e3;     // on a modulus
 
-LabelMap readLabelMap(std::string_view text, const std::string& file)
+// One map: the top of a file, or one [[map]] of several.
+LabelMap readMap(Section& top, const std::string& fallbackName)
 {
-    const toml::table root = parseToml(text, file);
-    Section top(root, file, "");
     LabelMap map;
-    map.name = top.word("name").value_or(std::filesystem::path(file).stem().string());
+    map.name = top.word("name").value_or(fallbackName);
+    map.source = top.word("source").value_or("");
+    map.general = top.flag("general").value_or(true);
     std::set<std::uint16_t> seen;
     for (Section& section : top.sections("labels")) {
         const auto value = section.integer("value", "", 0, 65535);
@@ -42,11 +46,37 @@ LabelMap readLabelMap(std::string_view text, const std::string& file)
         }
     }
     top.finish();
+    return map;
+}
+
+LabelMap readLabelMap(std::string_view text, const std::string& file)
+{
+    const toml::table root = parseToml(text, file);
+    Section top(root, file, "");
+    LabelMap map = readMap(top, std::filesystem::path(file).stem().string());
     if (map.labels.empty() && map.segments.empty()) {
         throw std::runtime_error(file +
                                  ": no labels in it: labels = [ { value = 1, name = \"liver\", tissue = \"liver\" } ]");
     }
     return map;
+}
+
+std::vector<LabelMap> readBuiltIn()
+{
+    std::vector<LabelMap> maps;
+    for (const std::string name : {"victre", "totalsegmentator", "freesurfer", "spl-abdomen", "spl-brain"}) {
+        maps.push_back(readLabelMap(embeddedFile("tables/" + name + ".toml"), "built-in " + name + ".toml"));
+    }
+    for (const std::string name : {"challenges", "totalsegmentator-tasks"}) {
+        const std::string file = "built-in " + name + ".toml";
+        const toml::table root = parseToml(embeddedFile("tables/" + name + ".toml"), file);
+        Section top(root, file, "");
+        for (Section& section : top.sections("map")) {
+            maps.push_back(readMap(section, name));
+        }
+        top.finish();
+    }
+    return maps;
 }
 
 // Text of a built-in table, or of the file that is called so.
@@ -100,16 +130,38 @@ std::vector<std::pair<double, double>> pointsOf(Section& top)
 
 }  // namespace
 
+const std::vector<LabelMap>& labelMaps()
+{
+    static const std::vector<LabelMap> maps = readBuiltIn();
+    return maps;
+}
+
 std::vector<std::string> labelMapNames()
 {
-    return {"victre", "totalsegmentator", "freesurfer", "spl-abdomen", "spl-brain"};
+    std::vector<std::string> names;
+    for (const LabelMap& map : labelMaps()) {
+        names.push_back(map.name);
+    }
+    return names;
 }
 
 LabelMap labelMap(const std::string& nameOrFile)
 {
-    std::string origin;
-    const std::string text = textOf(nameOrFile, labelMapNames(), "label map", origin);
-    return readLabelMap(text, origin);
+    const std::string name = nameOrFile == "destrieux" ? "freesurfer" : nameOrFile;
+    for (const LabelMap& map : labelMaps()) {
+        if (map.name == name) {
+            return map;
+        }
+    }
+    if (const std::string why = base::whyNoFile(nameOrFile); !why.empty()) {
+        const std::vector<std::string> names = labelMapNames();
+        const std::string near = base::nearest(nameOrFile, names);
+        throw std::runtime_error(fmt::format(
+            "{}: neither a file ({}) nor one of the {} built-in label maps{}; 'palpate import --list-maps' lists "
+            "them",
+            nameOrFile, why, names.size(), near.empty() ? "" : fmt::format(", is it {}?", near)));
+    }
+    return readLabelMap(readText(nameOrFile), nameOrFile);
 }
 
 std::string labelMapText(const LabelMap& map)
@@ -140,9 +192,14 @@ StructureNames::StructureNames()
             phrases_.emplace_back(wordsOf(*phrase.value<std::string>()), tissue);
         }
     }
-    for (const std::string& map : labelMapNames()) {
-        for (const volume::LabelName& label : labelMap(map).labels) {
-            labels_.emplace_back(wordsOf(label.name), label.tissue);
+    for (const toml::node& phrase : *root["ambiguous"].as_array()) {
+        ambiguous_.push_back(wordsOf(*phrase.value<std::string>()));
+    }
+    for (const LabelMap& map : labelMaps()) {
+        for (const volume::LabelName& label : map.labels) {
+            if (map.general) {
+                labels_.emplace_back(wordsOf(label.name), label.tissue);
+            }
         }
     }
 }
@@ -176,6 +233,9 @@ StructureNames::Words StructureNames::wordsOf(std::string_view name) const
 std::optional<std::string> StructureNames::tissueOf(std::string_view name) const
 {
     const Words words = wordsOf(name);
+    if (std::find(ambiguous_.begin(), ambiguous_.end(), words) != ambiguous_.end()) {
+        return std::nullopt;
+    }
     for (const auto* known : {&phrases_, &labels_}) {
         for (const auto& [phrase, tissue] : *known) {
             if (!words.empty() && words == phrase) {

@@ -17,11 +17,16 @@ struct LabelMap {
     std::string name;
     std::vector<volume::LabelName> labels;                      // by value; an empty name: the file's own
     std::vector<std::pair<std::string, std::string>> segments;  // by segment's name, tissue: entries without a value
+    std::string source = {};                                    // where the values come from
+    bool general = true;  // its names mean in other files what they mean here; "cancer", "PZ" do not
 };
 
-/// Names of the built-in maps: "victre", "totalsegmentator", "freesurfer", "spl-abdomen", "spl-brain".
+/// The built-in maps: "victre", "totalsegmentator", "freesurfer", those of challenges and of TotalSegmentator's tasks.
+const std::vector<LabelMap>& labelMaps();
+/// Their names.
 std::vector<std::string> labelMapNames();
-/// A built-in map by name, or one from a TOML file. Throws std::runtime_error that lists the names there are.
+/// A built-in map by name ("destrieux" is "freesurfer"), or one from a TOML file. Throws std::runtime_error that names some
+/// of those there are and says how to list all.
 LabelMap labelMap(const std::string& nameOrFile);
 /// The map as a TOML file that labelMap() reads.
 std::string labelMapText(const LabelMap& map);
@@ -40,8 +45,9 @@ private:
     Words wordsOf(std::string_view name) const;
 
     Words ignored_;
+    std::vector<Words> ambiguous_;                        // mean different things in different files
     std::vector<std::pair<Words, std::string>> phrases_;  // words, tissue
-    std::vector<std::pair<Words, std::string>> labels_;   // the same of the built-in label maps
+    std::vector<std::pair<Words, std::string>> labels_;   // the same of the built-in label maps that are general
 };
 
 /// A stiffness map from TOML, or the built-in one called "hu". `unit`: that of the image; a map for another unit is

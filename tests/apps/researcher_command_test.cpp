@@ -71,7 +71,7 @@ TEST_F(Researcher, SegmentsAreMappedByTheirNamesAndUnknownLabelsAreListed)
 {
     const auto j = figures({"import", seg, "-o", vdb});
     EXPECT_EQ(tissueOf(j, "Body"), "soft_tissue");
-    EXPECT_EQ(tissueOf(j, "Left lesion"), "idc_high_grade");
+    EXPECT_EQ(tissueOf(j, "Left lesion"), "tumour");
     EXPECT_EQ(tissueOf(j, "Aorta"), "artery");
     expectRefusal({"import", bare, "-o", vdb}, "3 of its labels: 1 (");
     expectRefusal({"import", bare, "-o", vdb, "--set", "9=fat"}, "--set 9=fat: no voxel has a label");
@@ -100,7 +100,8 @@ TEST_F(Researcher, ValuesAloneNeverDecide)
         const std::string file = folder / "unnamed.nii.gz";
         volume::exportLabels(file, image, {});
         expectRefusal({"import", file, "-o", vdb}, "no tissue is known for " + std::to_string(values.size()));
-        expectRefusal({"import", file, "-o", vdb}, "its values would fit --map totalsegmentator (");
+        expectRefusal({"import", file, "-o", vdb}, "; its values would fit --map ");
+        expectRefusal({"import", file, "-o", vdb}, "--map totalsegmentator (");
         EXPECT_FALSE(std::filesystem::exists(vdb));
         EXPECT_EQ(palpate({"import", file, "-o", vdb, "--map", "totalsegmentator"}).status, 0) << "who says so is believed";
         std::filesystem::remove(vdb);
@@ -121,6 +122,39 @@ TEST_F(Researcher, AMapThatContradictsTheNamesIsRefused)
               "name = \"own\"\nlabels = [\n  { value = 1, tissue = \"liver\" },\n  { value = 2, tissue = \"fat\" },\n"
               "  { value = 3, tissue = \"vein\" },\n]\n");
     EXPECT_EQ(tissueOf(figures({"import", seg, "-o", vdb, "--map", own}), "vertebrae_L5"), "liver");
+}
+
+// A colour table gives the names, and one line tells of all of them; --verbose has one for each.
+TEST_F(Researcher, AColourTableGivesNamesAndOneWarningSumsThemUp)
+{
+    const std::string table = folder / "colours.ctbl", wrong = folder / "wrong.ctbl";
+    writeText(
+        table,
+        "# Color table\n0 background 0 0 0 0\n1 body 200 160 140 255\n2 liver_lesion 32 128 32 255\n3 aorta 255 0 0 255\n");
+    writeText(wrong, "1 body 1 2 3 255\n2 aorta 1 2 3 255\n");
+    const auto j = figures({"import", bare, "-o", vdb, "--names", table});
+    EXPECT_EQ(tissueOf(j, "liver_lesion"), "tumour");
+    EXPECT_EQ(tissueOf(j, "aorta"), "artery");
+    ASSERT_EQ(j.at("warnings").size(), 1U) << j.at("warnings");
+    EXPECT_EQ(j.at("warnings").at(0),
+              "3 labels are taken for a tissue by their names: 'body' as soft_tissue, 'liver_lesion' as tumour, 'aorta' as "
+              "artery; "
+              "--verbose lists each");
+    EXPECT_EQ(figures({"import", bare, "-o", vdb, "--names", table, "--verbose"}).at("warnings").size(), 3U);
+    expectRefusal({"import", seg, "-o", vdb, "--names", wrong}, "2 is 'Left lesion' in the file and 'aorta' in the table");
+    expectRefusal({"import", bare, "-o", vdb, "--names", folder / "none"}, "none: there is no such file");
+    expectRefusal({"import", bare, "-o", vdb, "--axes", "RAS"}, "it says itself where its axes run");
+    expectRefusal({"import", bare, "-o", vdb, "--volume", "2"}, "--volume 2: it holds one volume");
+}
+
+TEST_F(Researcher, LabelMapsAreListedWithTheirSources)
+{
+    const auto listed = palpate({"import", "--list-maps"});
+    EXPECT_EQ(listed.status, 0);
+    for (const char* words :
+         {"totalsegmentator-total_mr ", "brats-2023 ", "msd-liver ", "VerSe 2019 and 2020", "FSL FIRST"}) {
+        EXPECT_NE(listed.out.find(words), std::string::npos) << words;
+    }
 }
 
 // A label map that was begun by the program and filled in by hand is one that it takes.

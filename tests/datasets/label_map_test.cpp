@@ -96,13 +96,18 @@ TEST(StructureNames, KnowWhatSegmentersWrite)
                                                          {"Kidneys", "kidney"},
                                                          {"Left-Cerebral-Cortex", "grey_matter"},
                                                          {"subcutaneous_fat", "fat"},
-                                                         {"tumor", "idc_high_grade"},
+                                                         {"tumor", "tumour"},
+                                                         {"Lymph nodes", "lymph_node"},
+                                                         {"Renal cyst", "cyst"},
+                                                         {"tibia_left", "bone"},
+                                                         {"Sigmoid colon", "bowel"},
                                                          {"esophagus", "esophagus"}};
     for (const auto& [name, tissue] : known) {
         EXPECT_EQ(names.tissueOf(name).value_or("unknown"), tissue) << name;
     }
     // What only speaks of a tissue is not taken for it.
-    for (const char* name : {"liver metastasis margin", "rib fracture", "left ventricle", "123", "", "Segment_4"}) {
+    for (const char* name : {"liver metastasis margin", "rib fracture", "left ventricle", "ventricle", "vessel", "breast",
+                             "edema", "PZ", "cancer margin", "123", "", "Segment_4"}) {
         EXPECT_FALSE(names.tissueOf(name)) << name;
     }
     EXPECT_EQ(names.suggestion("liver metastasis margin").value_or(""), "liver");
@@ -123,6 +128,51 @@ TEST(StructureNames, LeadToTissuesThatThereAre)
         }
     }
     EXPECT_GT(found, 30U);
+}
+
+// Every built-in map says where it comes from, and has tissues that there are.
+TEST(LabelMap, EveryBuiltInMapHasItsSourceAndItsTissues)
+{
+    const volume::TissueTable table = defaultTissues();
+    std::set<std::string> names;
+    for (const LabelMap& map : labelMaps()) {
+        EXPECT_FALSE(map.source.empty()) << map.name;
+        EXPECT_TRUE(names.insert(map.name).second) << map.name << " is there twice";
+        EXPECT_FALSE(map.labels.empty()) << map.name;
+        for (const volume::LabelName& label : map.labels) {
+            EXPECT_TRUE(table.find(label.tissue)) << map.name << ": " << label.tissue;
+            EXPECT_FALSE(label.name.empty()) << map.name << ": " << label.value;
+        }
+    }
+    EXPECT_GE(names.size(), 60U);
+}
+
+// The same name means the same tissue whichever general map it is in, unless names.toml calls it ambiguous: else the order
+// of the maps would decide.
+TEST(StructureNames, MeanTheSameInAllGeneralMaps)
+{
+    const StructureNames names;
+    for (const LabelMap& map : labelMaps()) {
+        for (const volume::LabelName& label : map.labels) {
+            const auto tissue = names.tissueOf(label.name);
+            if (map.general && tissue) {
+                EXPECT_EQ(*tissue, label.tissue) << map.name << ": " << label.name;
+            }
+        }
+    }
+}
+
+// FreeSurferColorLUT.txt: Destrieux's parcels have the same numbers on both sides, and in the white matter 2000 more.
+TEST(LabelMap, DestrieuxHasBothSidesAlike)
+{
+    const auto names = namesOf("destrieux");
+    EXPECT_EQ(names.at(11101), "ctx_lh_G_and_S_frontomargin");
+    EXPECT_EQ(names.at(12175), "ctx_rh_S_temporal_transverse");
+    for (int parcel = 11100; parcel <= 11175; ++parcel) {
+        EXPECT_EQ(names.at(parcel).substr(7), names.at(parcel + 1000).substr(7));
+        EXPECT_EQ(names.at(parcel).substr(7), names.at(parcel + 2000).substr(6));
+        EXPECT_EQ(names.at(parcel).substr(7), names.at(parcel + 3000).substr(6));
+    }
 }
 
 std::string errorOfMap(const std::string& text)

@@ -1,6 +1,7 @@
 #include <datasets/label_map.h>
 #include <datasets/tables.h>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -200,15 +201,17 @@ TEST(LabelMap, LabelsOfRealSegmentationsAreKnown)
     }
 }
 
-TEST(LabelMap, AnUnknownNameListsWhatThereIs)
+TEST(LabelMap, AnUnknownNameNamesTheNearest)
 {
     try {
-        labelMap("nosuchmap");
+        labelMap("totalsegmentater");
         FAIL();
     } catch (const std::runtime_error& e) {
-        EXPECT_STREQ(e.what(),
-                     "nosuchmap: neither a file nor a built-in label map (victre, totalsegmentator, freesurfer, "
-                     "spl-abdomen, spl-brain)");
+        EXPECT_EQ(e.what(),
+                  fmt::format("totalsegmentater: neither a file (there is no such file: check the name) nor one of "
+                              "the {} built-in label maps, is it totalsegmentator?; 'palpate import --list-maps' "
+                              "lists them",
+                              labelMaps().size()));
     }
 }
 

@@ -1,4 +1,5 @@
 #include <volume/prepare/mapping.h>
+#include <volume/prepare/offers.h>
 
 #include <base/outputs.h>
 #include <datasets/label_map.h>
@@ -7,8 +8,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <charconv>
-#include <functional>
+#include <cctype>
 #include <optional>
 #include <set>
 #include <stdexcept>
@@ -23,87 +23,14 @@ using volume::LabelName;
 constexpr std::size_t mostListed = 40;  // labels in a message
 constexpr std::size_t mostContradictions = 8;
 
-const LabelName* find(const std::vector<LabelName>& names, std::uint16_t value)
-{
-    const auto found = std::find_if(names.begin(), names.end(), [&](const LabelName& n) { return n.value == value; });
-    return found == names.end() ? nullptr : &*found;
-}
-
-// Whether a name is more than the value: some programs, and our own export, write "label 3" where they know none.
-bool tells(const LabelName& label)
-{
-    const std::string number = std::to_string(label.value);
-    return !label.name.empty() && label.name != number && label.name != "label " + number;
-}
-
-bool covers(const LabelMap& map, const LabelCounts& counts)
-{
-    return std::all_of(counts.begin(), counts.end(),
-                       [&](const auto& label) { return label.first == 0 || find(map.labels, label.first) != nullptr; });
-}
-
-// The file's own names agree with the map's for every label that is there.
-bool namesAgree(const LabelMap& map, const std::vector<LabelName>& names, const LabelCounts& counts)
-{
-    return std::all_of(counts.begin(), counts.end(), [&](const auto& label) {
-        const LabelName* ours = find(map.labels, label.first);
-        const LabelName* theirs = find(names, label.first);
-        return label.first == 0 || (ours != nullptr && theirs != nullptr && ours->name == theirs->name);
-    });
-}
-
-// The built-in map that the file was certainly made by, or an empty one. Names alone tell: 3, 11 and 20 are a kidney, a
-// lung and a bowel to one segmenter, and bundles of white matter to another.
-LabelMap recognise(const volume::ImportedLabels& labels, const LabelCounts& counts, std::vector<std::string>& notes)
-{
-    for (const std::string& name : datasets::labelMapNames()) {
-        LabelMap map = datasets::labelMap(name);
-        if (!labels.names.empty() && namesAgree(map, labels.names, counts)) {
-            notes.push_back(fmt::format("label map '{}' recognised by the names in the file", name));
-            return map;
-        }
-    }
-    return {};
-}
-
-// The built-in maps that have all values of a file without names, and what each makes of its largest labels: for the user
-// to choose from. Empty where there is none.
-std::string offers(const volume::ImportedLabels& labels, const LabelCounts& counts)
-{
-    constexpr std::size_t mostShown = 4;  // labels
-    std::vector<std::pair<std::uint64_t, std::uint16_t>> largest;
-    for (const auto& [value, voxels] : counts) {
-        if (const LabelName* own = find(labels.names, value); value != 0 && own != nullptr && tells(*own)) {
-            return "";
-        }
-        if (value != 0) {
-            largest.emplace_back(voxels, value);
-        }
-    }
-    std::ranges::sort(largest, std::greater<>());
-    largest.resize(std::min(largest.size(), mostShown));
-    std::vector<std::string> list;
-    for (const std::string& name : datasets::labelMapNames()) {
-        const LabelMap map = datasets::labelMap(name);
-        if (!covers(map, counts)) {
-            continue;
-        }
-        std::vector<std::string> parts;
-        for (const auto& [voxels, value] : largest) {
-            parts.push_back(fmt::format("{} is {}", value, find(map.labels, value)->name));
-        }
-        list.push_back(fmt::format("--map {} ({})", name, fmt::join(parts, ", ")));
-    }
-    return list.empty() ? "" : fmt::format("; its values would fit {}: is it one of these?", fmt::join(list, ", or "));
-}
-
 // One --set: which label, by value or name, is made of what.
 struct Setting {
     std::string text, label, tissue;
 
-    bool names(std::uint16_t value, const std::string& name) const
+    // `original`: the value in the file, which --renumber may have changed.
+    bool names(std::int64_t original, const std::string& name) const
     {
-        return label == name || label == std::to_string(value);
+        return label == name || label == std::to_string(original);
     }
 };
 
@@ -159,15 +86,18 @@ class Mapper {
 public:
     Mapper(const MappingOptions& options, const std::filesystem::path& file, const volume::ImportedLabels& labels,
            const LabelCounts& counts, const volume::TissueTable& table, std::vector<std::string>& notes)
-        : labels_(labels),
-          table_(table),
-          settings_(readSettings(options, table)),
-          map_(options.map.empty() ? recognise(labels, counts, notes) : datasets::labelMap(options.map))
+        : labels_(labels), table_(table), settings_(readSettings(options, table)), known_(recognised(labels, counts))
     {
+        if (!options.map.empty()) {
+            map_ = datasets::labelMap(options.map);
+        } else if (known_ != nullptr) {
+            map_ = *known_;
+            notes.push_back(fmt::format("label map '{}' recognised by the names in the file", map_.name));
+        }
         const auto there = [&](const Setting& s) {
             return std::any_of(counts.begin(), counts.end(), [&](const auto& label) {
                 const LabelName* own = find(labels.names, label.first);
-                return s.names(label.first, own != nullptr ? own->name : "");
+                return s.names(originalOf(label.first), own != nullptr ? own->name : "");
             });
         };
         for (const Setting& s : settings_) {
@@ -184,7 +114,8 @@ public:
     Found tissueOf(std::uint16_t value) const
     {
         const LabelName* own = find(labels_.names, value);
-        const LabelName* mapped = find(map_.labels, value);
+        // A value that --renumber gave says nothing about what the label is.
+        const LabelName* mapped = originalOf(value) == value ? find(map_.labels, value) : nullptr;
         Found found;
         found.label = own != nullptr ? *own : LabelName{value, "", ""};
         std::string& name = found.label.name;
@@ -192,10 +123,10 @@ public:
             name = mapped->name;
         }
         if (name.empty()) {
-            name = value == 0 ? "outside" : fmt::format("label {}", value);
+            name = value == 0 ? "outside" : fmt::format("label {}", originalOf(value));
         }
         for (const Setting& s : settings_) {
-            if (s.names(value, own != nullptr ? own->name : "")) {
+            if (s.names(originalOf(value), own != nullptr ? own->name : "")) {
                 found.label.tissue = s.tissue;
                 return found;
             }
@@ -215,6 +146,13 @@ public:
     }
 
 private:
+    std::int64_t originalOf(std::uint16_t value) const
+    {
+        const auto found = std::find_if(labels_.renumbered.begin(), labels_.renumbered.end(),
+                                        [&](const volume::Renumbered& r) { return r.value == value; });
+        return found == labels_.renumbered.end() ? value : found->original;
+    }
+
     // A map that calls a label something else than the file does, and makes something else of it, is the map of another
     // program.
     void checkNames(const std::string& map, const std::filesystem::path& file, const LabelCounts& counts) const
@@ -223,11 +161,16 @@ private:
         for (const auto& [value, voxels] : counts) {
             const LabelName* own = find(labels_.names, value);
             const LabelName* mapped = find(map_.labels, value);
-            if (value == 0 || own == nullptr || mapped == nullptr || mapped->name.empty() || mapped->name == own->name) {
+            if (value == 0 || own == nullptr || mapped == nullptr || mapped->name.empty() ||
+                sameName(mapped->name, own->name)) {
                 continue;
             }
             Found byName;
             searchByName(own->name, byName);
+            if (known_ != nullptr) {
+                byName.label.tissue = find(known_->labels, value)->tissue;
+                byName.certain = true;
+            }
             const bool said =
                 std::ranges::any_of(settings_, [&, v = value](const Setting& s) { return s.names(v, own->name); });
             if (!said && byName.certain && byName.label.tissue != mapped->tissue) {
@@ -268,6 +211,7 @@ private:
     const volume::ImportedLabels& labels_;
     const volume::TissueTable& table_;
     std::vector<Setting> settings_;
+    const LabelMap* known_;  // the map that the names in the file are of, or null
     LabelMap map_;
     datasets::StructureNames names_;
 };
@@ -279,21 +223,49 @@ private:
     for (const Found& u : unknown) {
         const std::string perhaps = u.label.tissue.empty() ? "" : fmt::format(", perhaps {}", u.label.tissue);
         list.push_back(fmt::format("{}{} ({} voxels{})", u.label.value,
-                                   u.label.name.rfind("label ", 0) == 0 ? "" : fmt::format(" '{}'", u.label.name),
-                                   counts.at(u.label.value), perhaps));
+                                   tellsMore(u.label) ? fmt::format(" '{}'", u.label.name) : "", counts.at(u.label.value),
+                                   perhaps));
         if (list.size() == mostListed && unknown.size() > mostListed) {
             list.push_back(fmt::format("and {} more", unknown.size() - mostListed));
             break;
         }
     }
-    throw std::runtime_error(
-        fmt::format("{}: no tissue is known for {} of its labels: {}: give --map ({} or a TOML file), --set "
-                    "NAME=TISSUE, or --default-tissue NAME; --write-map FILE begins a label map{}",
-                    file.string(), unknown.size(), fmt::join(list, ", "), fmt::join(datasets::labelMapNames(), ", "),
-                    offers(labels, counts)));
+    throw std::runtime_error(fmt::format(
+        "{}: no tissue is known for {} of its labels: {}: give --map NAME (one that --list-maps lists, or a TOML "
+        "file), --names FILE (a colour table or dataset.json), --set NAME=TISSUE, or --default-tissue NAME; "
+        "--write-map FILE begins a label map{}",
+        file.string(), unknown.size(), fmt::join(list, ", "), offers(labels, counts)));
+}
+
+// One note for all that happened to several labels, or with --verbose each its own.
+void sumUp(const std::vector<std::string>& each, const std::string& sum, const std::vector<std::string>& first,
+           bool verbose, std::vector<std::string>& notes)
+{
+    if (verbose || each.size() == 1) {
+        notes.insert(notes.end(), each.begin(), each.end());
+    } else if (!each.empty()) {
+        const std::size_t shown = std::min<std::size_t>(first.size(), 3);
+        notes.push_back(fmt::format("{} labels are {}: {}{}; --verbose lists each", each.size(), sum,
+                                    fmt::join(first.begin(), first.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+                                    first.size() > shown ? ", ..." : ""));
+    }
 }
 
 }  // namespace
+
+bool tellsMore(const LabelName& label)
+{
+    const std::string number = std::to_string(label.value);
+    return !label.name.empty() && label.name != number && !sameName(label.name, "label " + number);
+}
+
+bool sameName(std::string_view a, std::string_view b)
+{
+    const auto plain = [](char c) {
+        return c == '_' || c == '-' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    };
+    return std::ranges::equal(a, b, {}, plain, plain);
+}
 
 LabelCounts countLabels(const volume::LabelImage& image)
 {
@@ -321,17 +293,20 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
     const Mapper mapper(options, file, labels, counts, table, notes);
     std::vector<LabelName> named;
     std::vector<Found> unknown;
+    std::vector<std::string> byName, byDefault, names, values;
     for (const auto& [value, voxels] : counts) {
         Found found = mapper.tissueOf(value);
         if (found.certain) {
             if (found.byItsName) {
-                notes.push_back(
+                byName.push_back(
                     fmt::format("label {} '{}' is taken as {} by its name", value, found.label.name, found.label.tissue));
+                names.push_back(fmt::format("'{}' as {}", found.label.name, found.label.tissue));
             }
             named.push_back(std::move(found.label));
         } else if (value != 0 && !options.defaultTissue.empty()) {
             found.label.tissue = options.defaultTissue;
-            notes.push_back(fmt::format("label {} ({} voxels) is taken as {}", value, voxels, options.defaultTissue));
+            byDefault.push_back(fmt::format("label {} ({} voxels) is taken as {}", value, voxels, options.defaultTissue));
+            values.push_back(fmt::format("{} ({} voxels)", value, voxels));
             named.push_back(std::move(found.label));
         } else if (value != 0) {
             unknown.push_back(std::move(found));
@@ -340,6 +315,8 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
     if (!unknown.empty()) {
         refuseUnknown(file, labels, unknown, counts);
     }
+    sumUp(byName, "taken for a tissue by their names", names, options.verbose, notes);
+    sumUp(byDefault, fmt::format("taken as {}, the default", options.defaultTissue), values, options.verbose, notes);
     return named;
 }
 

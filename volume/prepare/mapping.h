@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::prepare {
@@ -17,11 +18,18 @@ struct MappingOptions {
     std::vector<std::string> set;    // "NAME=TISSUE" or "VALUE=TISSUE"
     std::string defaultTissue;       // of labels that nothing else names; "" = they are an error
     std::filesystem::path writeMap;  // a label map to write for editing; no volume is made then
+    std::filesystem::path names;     // a colour table or dataset.json that names the labels; "" = found out
+    bool verbose = false;            // a note for each label, not one for all
 };
 
 using LabelCounts = std::map<std::uint16_t, std::uint64_t>;  // label value, voxels
 
 LabelCounts countLabels(const volume::LabelImage& image);
+
+/// Whether a name is more than the label's value: some programs, and our own export, write "label 3" where they know none.
+bool tellsMore(const volume::LabelName& label);
+/// The same name but for case and for what stands between its words: "gall bladder", "Gall_Bladder".
+bool sameName(std::string_view a, std::string_view b);
 
 /// A name and a tissue for every label that is there, 0 only where it is mapped: by --set, else by the label map (by value,
 /// then by the segment's name), else by what the segment is called, else the default tissue. Appends to `notes` what was
