@@ -22,6 +22,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <exception>
@@ -42,6 +43,7 @@ namespace fs = std::filesystem;
 
 constexpr double longestSession = 86400.0;  // [s]
 constexpr double picturesTimeout = 60.0;    // after the end of a session [s]
+constexpr double laterTimeout = 600.0;  // for pictures that are drawn of the record, and ten times what the session took
 
 struct Options {
     std::string scene = "breast";
@@ -60,6 +62,7 @@ struct Options {
     double seconds = 0;
     std::string session, operatorName;
     std::string record, report, json, pictures;
+    bool ownRecord = true;  // false: a record only for the pictures, which is removed
     std::vector<std::string> inject;
     session::Faults faults;  // what `inject` says
 };
@@ -196,7 +199,7 @@ void checkFaults(const Options& o)
     };
     need({session::FaultKind::gap, session::FaultKind::late}, !o.unpaced,
          "gap and late strike the clock: leave out --unpaced");
-    need({session::FaultKind::stallViewer}, wantsWindow(o) || !o.pictures.empty(),
+    need({session::FaultKind::stallViewer}, wantsWindow(o) || (!o.pictures.empty() && !o.unpaced),
          "stall-viewer stops the viewers that the session starts: add --view or --pictures");
     need({session::FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
 }
@@ -268,11 +271,47 @@ void checkOutputs(const Options& o)
     }
 }
 
+// Without a clock no viewer keeps step with a session: its pictures are drawn of its record afterwards.
+void drawRecord(const Options& o, double sessionTook)
+{
+    base::ChildProcess viewer(base::programFolder() / "palpate-view",
+                              {"--replay", recordFile(o).string(), "--offscreen", o.pictures},
+                              "build it with -DPALPATE_VIEWER=ON, or leave out --pictures");
+    if (viewer.wait(laterTimeout + 10 * sessionTook) != 0) {
+        throw std::runtime_error(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
+    }
+}
+
+// A folder that goes away at the end.
+class TemporaryFolder {
+public:
+    TemporaryFolder()
+    {
+        std::string name = (fs::temp_directory_path() / "palpate-pictures-XXXXXX").string();
+        if (::mkdtemp(name.data()) == nullptr) {
+            throw std::runtime_error(name + ": no folder can be made there for the record that the pictures are drawn of");
+        }
+        path_ = name;
+    }
+    ~TemporaryFolder()
+    {
+        std::error_code ignored;
+        fs::remove_all(path_, ignored);
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+    const fs::path& path() const { return path_; }
+
+private:
+    fs::path path_;
+};
+
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
 // is now, as it is told.
 std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
                                                               const datasets::ModelSettings& model, Viewers& viewers,
-                                                              session::TrainResult& result)
+                                                              double sessionTook, session::TrainResult& result)
 {
     const auto blame = [&result](const std::string& what) {
         result.problem += result.problem.empty() ? what : "; " + what;
@@ -294,6 +333,9 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
     if (viewers.camera && viewers.camera->wait(picturesTimeout) != 0) {
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
     }
+    if (o.unpaced && !o.pictures.empty()) {
+        attempt([&] { drawRecord(o, sessionTook); });
+    }
     if (!o.json.empty()) {
         attempt([&] { command::writeJson(o.json, figuresOf(result, info, model)); });
     }
@@ -304,7 +346,8 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
         }
     }
     for (const auto& [name, file] :
-         {std::pair<const char*, std::string>{"record", recordFile(o).string()}, {"pictures", o.pictures}}) {
+         {std::pair<const char*, std::string>{"record", o.ownRecord ? recordFile(o).string() : ""},
+          {"pictures", o.pictures}}) {
         if (std::error_code none; !file.empty() && fs::exists(file, none)) {
             there.emplace_back(name, file);
         }
@@ -321,6 +364,11 @@ void train(Options o)
     checkDevice(o);
     checkFaults(o);
     checkOutputs(o);
+    std::optional<TemporaryFolder> temporary;
+    if (o.unpaced && !o.pictures.empty() && recordFile(o).empty()) {
+        o.record = temporary.emplace().path() / "session.db";
+        o.ownRecord = false;
+    }
     const auto record = recordFile(o);
     applyTask(o);
     std::shared_ptr<falcon::Driver> falcon;
@@ -354,14 +402,17 @@ void train(Options o)
     options.faults = o.faults;
 
     // Before the record is made, so that a viewer that cannot be started leaves none.
-    Viewers viewers({options.session, o.layout, o.pictures, wantsWindow(o), session::deviceKind(o.device).needsViewer});
+    Viewers viewers({options.session, o.layout, o.unpaced ? "" : o.pictures, wantsWindow(o),
+                     session::deviceKind(o.device).needsViewer});
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };
     }
     session::Trainer trainer(model, info, options);
+    const auto begun = std::chrono::steady_clock::now();
     session::TrainResult result = trainer.run();
-    const auto written = writeOutputs(o, info, model.scene.model, viewers, result);
+    const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    const auto written = writeOutputs(o, info, model.scene.model, viewers, took, result);
 
     if (o.json != "-") {
         summarise(result, info, model.scene.model);
@@ -457,7 +508,7 @@ void addTrain(CLI::App& app)
         ->check(operatorFault, "up to 200 bytes of text");
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
     c->add_option("--report", o->report, "Write a report (HTML) to this file");
-    c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder")->excludes(unpaced);
+    c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder; of an --unpaced session after its end");
     c->add_option("--inject", o->inject,
                   "Let something go wrong at a session time: gap=50ms@2s, late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, "
                   "unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s; several separated by commas")

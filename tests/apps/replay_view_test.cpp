@@ -52,6 +52,29 @@ TEST(ReplayView, WritesAPictureOfEveryAskedTimeAndEveryEvent)
     EXPECT_EQ(inserted, 1U);
 }
 
+// Without a clock the pictures are drawn of the record afterwards: of one for them alone, which is gone then, or of the one
+// that was asked for.
+TEST(ReplayView, AnUnpacedSessionHasPicturesOfItsEvents)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    for (const bool recorded : {false, true}) {
+        const fs::path to = folder / (recorded ? "second" : "first");
+        std::vector<std::string> command = {"train", "layered", "--unpaced", "--no-view", "--pictures", to};
+        if (recorded)
+            command.insert(command.end(), {"--record", folder / "s.db"});
+        const Outcome outcome = palpate(command);
+        ASSERT_EQ(outcome.status, 0) << outcome.err;
+        std::size_t fired = 0;
+        for (const auto& name : pictures(to))
+            fired += name.string().ends_with("_fired.png") ? 1 : 0;
+        EXPECT_EQ(fired, 1U);
+        EXPECT_EQ(outcome.out.find("record: ") != std::string::npos, recorded) << outcome.out;
+        EXPECT_EQ(fs::exists(folder / "s.db"), recorded);
+    }
+}
+
 // There is nothing between two ticks: every tick is one picture, and then it ends.
 TEST(ReplayView, WritesEveryTickOnceWhereNoTimeBetweenPicturesIsAskedFor)
 {
