@@ -271,17 +271,6 @@ void checkOutputs(const Options& o)
     }
 }
 
-// Without a clock no viewer keeps step with a session: its pictures are drawn of its record afterwards.
-void drawRecord(const Options& o, double sessionTook)
-{
-    base::ChildProcess viewer(base::programFolder() / "palpate-view",
-                              {"--replay", recordFile(o).string(), "--offscreen", o.pictures},
-                              "build it with -DPALPATE_VIEWER=ON, or leave out --pictures");
-    if (viewer.wait(laterTimeout + 10 * sessionTook) != 0) {
-        throw std::runtime_error(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
-    }
-}
-
 // A folder that goes away at the end.
 class TemporaryFolder {
 public:
@@ -334,7 +323,7 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
     }
     if (o.unpaced && !o.pictures.empty()) {
-        attempt([&] { drawRecord(o, sessionTook); });
+        attempt([&] { drawRecord(recordFile(o), o.pictures, laterTimeout + 10 * sessionTook); });
     }
     if (!o.json.empty()) {
         attempt([&] { command::writeJson(o.json, figuresOf(result, info, model)); });

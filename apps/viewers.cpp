@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
 namespace palpate::apps {
@@ -58,6 +59,16 @@ void Viewers::start(std::optional<base::ChildProcess>& viewer, std::vector<std::
     arguments.insert(arguments.end(), {"--session", wanted_.session, "--wait", "30"});
     viewer.emplace(base::programFolder() / "palpate-view", arguments,
                    "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
+}
+
+void drawRecord(const std::filesystem::path& record, const std::string& pictures, double timeout)
+{
+    base::ChildProcess viewer(base::programFolder() / "palpate-view",
+                              {"--replay", record.string(), "--offscreen", pictures},
+                              "build it with -DPALPATE_VIEWER=ON, or leave out --pictures");
+    if (viewer.wait(timeout) != 0) {
+        throw std::runtime_error(pictures + ": the pictures are not complete: the viewer failed or took too long");
+    }
 }
 
 }  // namespace palpate::apps

@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 
 #include <chrono>
+#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -41,5 +42,9 @@ private:
     std::mutex guard_;
     std::chrono::steady_clock::time_point opened_;
 };
+
+/// Draws the pictures of a session of its record: without a clock no viewer keeps step with one. Throws std::runtime_error
+/// where they are not complete within `timeout` [s].
+void drawRecord(const std::filesystem::path& record, const std::string& pictures, double timeout);
 
 }  // namespace palpate::apps
