@@ -18,7 +18,7 @@ bool sound(const State& state, const Scenery& scenery) noexcept;
 
 bool sound(const Input& input) noexcept;
 
-/// @param nodes  of the lattice
+/// `nodes`: of the lattice
 bool sound(const Displacement& displacement, std::uint64_t nodes) noexcept;
 
 }  // namespace palpate::channel

@@ -35,7 +35,8 @@ public:
     /// The volume must outlive it. Keeps its image in memory.
     WayJudge(const Scene& scene, const volume::Tissue& tissue);
 
-    /// @param end  where the fired tip comes to rest [m]
+    /// The way from `entry` to `aim`, and on to `end`, where the fired tip comes to rest [m]; `reader` is of the same
+    /// volume.
     WayVerdict judge(const volume::Tissue::Reader& reader, Vec3 entry, Vec3 aim, Vec3 end) const;
 
 private:
