@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/export_ultrasound.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <command/json.h>
@@ -26,10 +27,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "displacement", "inverse"};
+const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "displacement", "inverse", "ultrasound"};
 
 struct Options {
-    fs::path volume, output, map, json;
+    fs::path volume, output, map, json, like;
+    int width = 800, height = 600;
     std::string record, at, what;
     bool nifti2 = false;
 };
@@ -39,20 +41,32 @@ bool isVtu(const fs::path& file)
     return file.extension() == ".vtu" || file.extension() == ".VTU";
 }
 
+bool isPng(const fs::path& file)
+{
+    return file.extension() == ".png" || file.extension() == ".PNG";
+}
+
 bool ofRecordOnly(const std::string& what)
 {
-    return what == "displacement" || what == "inverse";
+    return what == "displacement" || what == "inverse" || what == "ultrasound";
 }
 
 void checkOptions(Options& o)
 {
     if (o.what.empty()) {
-        o.what = isVtu(o.output) ? "displacement" : "labels";
+        o.what = isVtu(o.output) ? "displacement" : isPng(o.output) ? "ultrasound" : "labels";
     }
     if (o.volume.empty() == o.record.empty()) {
         throw std::runtime_error("palpate export: give a volume (V.vdb), or a record (--record FILE --at TIME)");
     }
-    if (o.record.empty() != o.at.empty()) {
+    if ((o.what == "ultrasound") != isPng(o.output)) {
+        throw std::runtime_error(
+            fmt::format("{}: an ultrasound picture is a .png, and nothing else is", o.output.string()));
+    }
+    if (!o.like.empty() && (o.what != "ultrasound" || !o.at.empty())) {
+        throw std::runtime_error("--like: goes with --record FILE -o FILE.png, and says the time itself: leave out --at");
+    }
+    if (o.like.empty() && o.record.empty() != o.at.empty()) {
         throw std::runtime_error(o.at.empty() ? "--record: needs a time of the session: add --at 3.2s"
                                               : "--at: is a time of a record: add --record FILE");
     }
@@ -72,7 +86,7 @@ void checkOptions(Options& o)
     if (!o.map.empty() && o.what != "labels") {
         throw std::runtime_error("--write-map: goes with labels");
     }
-    if (!isVtu(o.output)) {
+    if (!isVtu(o.output) && !isPng(o.output)) {
         volume::checkExportName(o.output);
     }
     base::checkOutput(o.output);
@@ -184,6 +198,9 @@ void runExport(Options o)
     std::string more;
     if (o.record.empty()) {
         exportVolume(o, how);
+    } else if (o.what == "ultrasound") {
+        more = exportUltrasound({o.output, o.record, o.like.empty() ? timeFrom(o.at) : 0.0, o.like, o.width, o.height},
+                                [&](double share) { progress.show("computing the session again", share); });
     } else {
         more = exportState(o, how, progress, figures);
     }
@@ -204,19 +221,30 @@ void addExport(CLI::App& app)
     CLI::App* command = app.add_subcommand(
         "export", "Write a volume, or the deformed state of a record, as NIfTI, NRRD, MetaImage or .vtu");
     command->add_option("volume", o->volume, "Volume (.vdb)")->type_name("V.vdb");
-    command->add_option("-o,--output", o->output, "File to write: .nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd or .vtu")
+    command
+        ->add_option("-o,--output", o->output, "File to write: .nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd, .vtu or .png")
         ->type_name("FILE")
         ->required();
     command->add_option("--record", o->record, "Record of a session (train --record), in place of a volume")
         ->type_name("FILE");
     command->add_option("--at", o->at, "Time of the session, 3.2s")->type_name("TIME");
     command
-        ->add_option("--what", o->what,
-                     "labels (default), image, stiffness [kPa]; of a record labels, displacement or its inverse [mm, LPS]")
+        ->add_option(
+            "--what", o->what,
+            "labels (default), image, stiffness [kPa]; of a record labels, displacement or its inverse [mm, LPS], or "
+            "the ultrasound picture (.png)")
         ->check(CLI::IsMember(whatChoices));
     command->add_flag("--nifti2", o->nifti2, "NIfTI-2: positions as doubles");
     command->add_option("--write-map", o->map, "Write names and tissues too, as a label map for import --map")
         ->type_name("FILE");
+    command->add_option("--like", o->like, "A stored ultrasound picture: the same moment, probe, settings and size again")
+        ->type_name("FILE.png");
+    command->add_option("--width", o->width, "Of an ultrasound picture [pixels]")
+        ->check(CLI::Range(100, 8192))
+        ->capture_default_str();
+    command->add_option("--height", o->height, "Of an ultrasound picture [pixels]")
+        ->check(CLI::Range(100, 8192))
+        ->capture_default_str();
     command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
     command->final_callback([o] { runExport(*o); });
 }

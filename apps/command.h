@@ -19,5 +19,6 @@ void addPlan(CLI::App& app);
 void addPress(CLI::App& app);
 void addBench(CLI::App& app);
 void addDevices(CLI::App& app);
+void addValidate(CLI::App& app);
 
 }  // namespace palpate::apps

@@ -82,6 +82,7 @@ int main(int argc, char** argv)
     addPress(app);
     addBench(app);
     addDevices(app);
+    addValidate(app);
     studies::addAccuracy(app);
     studies::addStability(app);
 #ifdef PALPATE_SWEEP

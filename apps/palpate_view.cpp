@@ -30,13 +30,23 @@ void readSize(const std::string& text, palpate::render::ViewerOptions& options)
 void writeFigures(const std::string& file, const palpate::render::ViewerFigures& figures)
 {
     constexpr double ms = 1e3;
-    const nlohmann::json json{{"display", figures.display},
-                              {"frames", figures.frames},
-                              {"frames_per_second", figures.rate},
-                              {"frame_ms_p50", figures.frameP50 * ms},
-                              {"frame_ms_p90", figures.frameP90 * ms},
-                              {"delay_ms_p50", figures.delayP50 * ms},
-                              {"delay_ms_p99", figures.delayP99 * ms}};
+    nlohmann::json json{{"display", figures.display},
+                        {"frames", figures.frames},
+                        {"frames_per_second", figures.rate},
+                        {"frame_ms_p50", figures.frameP50 * ms},
+                        {"frame_ms_p90", figures.frameP90 * ms},
+                        {"delay_ms_p50", figures.delayP50 * ms},
+                        {"delay_ms_p99", figures.delayP99 * ms}};
+    if (figures.scans > 0) {
+        nlohmann::json stages;
+        for (const auto& [name, seconds] : figures.scanStages)
+            stages[name] = seconds * ms;
+        json["ultrasound"] = {{"pictures", figures.scans},
+                              {"ms_p50", figures.scanP50 * ms},
+                              {"ms_p90", figures.scanP90 * ms},
+                              {"first_ms", figures.firstScan * ms},
+                              {"stages_ms", stages}};
+    }
     palpate::command::writeJson(file, json);
 }
 
@@ -76,6 +86,9 @@ int main(int argc, char** argv)
     app.add_option("--slices", slices,
                    "Of a body with an image: tissue, tinted (the image in the tissues' colours) or image")
         ->check(CLI::IsMember({"tissue", "tinted", "image"}))
+        ->capture_default_str();
+    app.add_flag("--ultrasound", options.ultrasound, "Begin with the ultrasound picture (key U)");
+    app.add_option("--images", options.images, "Folder for ultrasound pictures that are stored (key P)")
         ->capture_default_str();
     app.add_flag("--hidden", options.hidden, "Draw as in a window, on a display that nobody sees (Xvfb): to measure");
     app.add_option("--timeline", timeline, "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");

@@ -55,6 +55,7 @@ public:
     const channel::State& state(std::uint64_t tick) const { return states_[tick / stateStride_]; }
     std::uint64_t shapeAt(std::uint64_t tick) const noexcept { return tick / shapeStride_; }
     const std::vector<channel::Displacement>& shape(std::uint64_t index) const { return shapes_[index]; }
+    std::uint64_t shapeTick(std::uint64_t index) const noexcept { return index * shapeStride_; }
 
 private:
     std::uint64_t stateStride_, shapeStride_;
@@ -146,7 +147,7 @@ struct ReplayPlayer::Impl {
             const auto& nodes = film.shape(shape);
             std::copy(nodes.begin(), nodes.end(), out.nodes.begin());
             out.count = static_cast<std::uint32_t>(nodes.size());
-            out.tick = tick;
+            out.tick = film.shapeTick(shape);
             publisher.publishDisplaced();
         }
         // Of a long record not every tick is kept: the one before stands for it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace palpate::channel {
 namespace {
@@ -10,7 +11,8 @@ constexpr std::int32_t longestSide = 4096;
 constexpr double furthest = 100;   // of a place [m]
 constexpr double strongest = 1e4;  // force [N]
 constexpr double largestValue = 1e12;
-constexpr std::array<std::int32_t, 3> noNodes{};  // of a body that does not deform
+constexpr std::array<std::int32_t, 3> noNodes{};  // of a body that does not deform, or without fine labels
+constexpr std::uint32_t mostPattern = 3;          // of TissueSound
 
 bool upTo(double value, double most) noexcept
 {
@@ -36,6 +38,46 @@ bool sound(const TissueLook& look) noexcept
 {
     const auto share = [](float v) { return v >= 0.0F && v <= 1.0F; };
     return ended(look.name) && share(look.opacity) && std::all_of(look.colour.begin(), look.colour.end(), share);
+}
+
+bool within(double value, double least, double most) noexcept
+{
+    return value >= least && value <= most;  // false for what is not a number
+}
+
+// Nothing of a tissue without figures is shown, and what reads a table takes these bounds too.
+bool sound(const TissueSound& s) noexcept
+{
+    return within(static_cast<double>(s.soundSpeed), 0, 1e4) && within(static_cast<double>(s.density), 0, 1e5) &&
+           within(static_cast<double>(s.attenuation), 0, 1e3) && within(static_cast<double>(s.attenuationPower), 0, 3) &&
+           within(static_cast<double>(s.echo), -100, 60) && within(static_cast<double>(s.echoVariation), 0, 30) &&
+           s.pattern <= mostPattern;
+}
+
+// The fine labels are of no size where there are none.
+bool soundOfUltrasound(const Scenery& s) noexcept
+{
+    return (s.fine.size == noNodes || sound(s.fine)) && s.probe <= ProbeKind::curved && within(s.probeDepth, 0, 1) &&
+           within(s.probeFrequency, 0, 1e8) && within(s.probeFocus, 0, 1) && within(s.holeRadius, 0, 1) &&
+           std::all_of(s.sound.begin(), s.sound.end(), [](const TissueSound& t) { return sound(t); });
+}
+
+// Its axes are unit vectors at right angles.
+bool sound(const ProbePose& p) noexcept
+{
+    const auto product = [](const Triple& a, const Triple& b) {
+        return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+    };
+    constexpr double loose = 1e-3;
+    return upTo(p.face, furthest) && upTo(product(p.axial, p.axial) - 1, loose) &&
+           upTo(product(p.lateral, p.lateral) - 1, loose) && upTo(product(p.axial, p.lateral), loose) &&
+           upTo(p.force, strongest);
+}
+
+bool sound(const Hole& h) noexcept
+{
+    const auto place = [](float v) { return upTo(static_cast<double>(v), furthest); };
+    return std::all_of(h.from.begin(), h.from.end(), place) && std::all_of(h.to.begin(), h.to.end(), place);
 }
 
 }  // namespace
@@ -64,7 +106,7 @@ bool sound(const Scenery& s) noexcept
             return false;
     return s.toolRadius >= 0 && s.toolRadius <= 1 && s.toolLength >= 0 && s.toolLength <= 10 && upTo(s.entry, furthest) &&
            upTo(s.aim, furthest) && upTo(s.forceCap, strongest) && upTo(s.imageLow, largestValue) &&
-           upTo(s.imageStep, largestValue);
+           upTo(s.imageStep, largestValue) && soundOfUltrasound(s);
 }
 
 bool sound(const State& s, const Scenery& scenery) noexcept
@@ -76,7 +118,9 @@ bool sound(const State& s, const Scenery& scenery) noexcept
     const bool rows = s.phase <= Phase::inserted && s.status <= Status::faulted && s.warning <= Warning::touching &&
                       s.tissue < maxTissues && s.aheadTissue < maxTissues &&
                       s.warned < std::max<std::uint32_t>(scenery.structures, 1);
-    return places && forces && rows && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
+    const bool probe = sound(s.probe) && s.holes <= maxHoles &&
+                       std::all_of(s.hole.begin(), s.hole.end(), [](const Hole& h) { return sound(h); });
+    return places && forces && rows && probe && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
            upTo(s.coreTarget, furthest) && upTo(s.coreLength, furthest) && number(s.aheadTissueDistance) &&
            std::all_of(s.distance.begin(), s.distance.end(), number) && std::all_of(s.ahead.begin(), s.ahead.end(), number);
 }

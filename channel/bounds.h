@@ -10,7 +10,8 @@ namespace palpate::channel {
 /// Voxels of a grid; 0 where a side has none or more than 4096.
 std::uint64_t voxelsOf(const Grid& grid) noexcept;
 
-/// Grids, names, colours, numbers of tissues, structures and windows, tool and line as a session has them.
+/// Grids, names, colours, numbers of tissues, structures and windows, tool, line, acoustics and probe as a session has
+/// them.
 bool sound(const Scenery& scenery) noexcept;
 
 /// Whether a viewer can show it: numbers that are, places within 100 m, rows that the scenery has.

@@ -18,9 +18,9 @@ class Publisher {
 public:
     /// `session`: letters, digits, '-' and '_'. Throws std::runtime_error when the segment cannot be made; takes over a
     /// segment whose owner is dead. `labels`: one tissue row per node of scenery.labels,
-    /// `image`: one code for each as well, or none where scenery has no windows.
+    /// `image`: one code for each as well, or none where scenery has no windows. `fine`: one row per node of scenery.fine.
     Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels,
-              std::span<const std::uint16_t> image = {});
+              std::span<const std::uint16_t> image = {}, std::span<const std::uint8_t> fine = {});
     Publisher(Publisher&&) noexcept;
     ~Publisher();
 
@@ -57,6 +57,8 @@ public:
     std::span<const std::uint8_t> labels() const noexcept;
     /// Empty where there is no image.
     std::span<const std::uint16_t> image() const noexcept;
+    /// Empty where there are none.
+    std::span<const std::uint8_t> fine() const noexcept;
     /// A consistent copy of the last tick; nothing when the writer died in the middle of a write, and for a state that is
     /// none: numbers that are not, places beyond 100 m, rows that there are not.
     std::optional<State> state() const noexcept;

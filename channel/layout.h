@@ -10,6 +10,7 @@
 ///     Scenery     names, colours, grids, tool, line        written once
 ///     labels      tissue row and shellBit per voxel        written once
 ///     image       code of its intensity per voxel          written once; only of bodies that came with an image
+///     fine        tissue row per voxel of scenery.fine     written once; only where the body is finer than the labels
 ///     State       sequence lock                            every tick
 ///     Input       sequence lock, in a page of its own      by the viewer whose mouse is the hand
 ///     Displaced   four slots, a sequence lock each         at frame rate
@@ -18,12 +19,13 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 3;
+inline constexpr std::uint32_t version = 4;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
 inline constexpr std::size_t maxWindows = 4;
 inline constexpr std::size_t maxDisplaced = 1U << 16;
+inline constexpr std::size_t maxHoles = 8;
 inline constexpr std::size_t nameLength = 32;
 /// Of a display voxel: the row of its tissue, and whether it lies on the border of a vital structure's warning distance.
 inline constexpr std::uint8_t rowBits = maxTissues - 1, shellBit = 0x80;
@@ -45,6 +47,15 @@ struct TissueLook {
     float opacity = 0;
 };
 
+/// What a tissue does to ultrasound, see volume::Acoustics.
+struct TissueSound {
+    float soundSpeed = 0;  // [m/s]
+    float density = 0;     // [kg/m^3]
+    float attenuation = 0, attenuationPower = 0;
+    float echo = 0, echoVariation = 0;  // [dB]
+    std::uint32_t pattern = 0;          // 0 even, 1 lobules, 2 fibres, 3 septa
+};
+
 /// A range of an image's values that is shown from black to white.
 struct GreyWindow {
     Name name{};
@@ -52,6 +63,7 @@ struct GreyWindow {
 };
 
 enum class ToolKind : std::uint32_t { sphere, needle, capsule };
+enum class ProbeKind : std::uint32_t { none, linear, curved };
 
 /// What does not change during a session.
 struct Scenery {
@@ -77,11 +89,32 @@ struct Scenery {
     Name imageUnit{};  // "HU"; empty: not known
     double imageLow = 0;
     double imageStep = 0;
+    // Of the ultrasound picture.
+    std::array<TissueSound, maxTissues> sound{};
+    Grid fine;                          // of the fine labels; size 0: there are none
+    ProbeKind probe = ProbeKind::none;  // that the scene holds; none: a viewer puts one on the skin where it likes
+    std::uint32_t soundPadding = 0;
+    double probeDepth = 0, probeFrequency = 0,
+           probeFocus = 0;  // that the scene asks for [m], [Hz], [m]; 0: the probe's own
+    double holeRadius = 0;  // of State::hole [m]
 };
 
 enum class Phase : std::uint32_t { free, contact, inserted };
 enum class Warning : std::uint32_t { none, near, veryNear, touching };
 enum class Status : std::uint32_t { running, finished, faulted };
+
+/// Where a core was taken, at rest: the middles of its ends [m].
+struct Hole {
+    std::array<float, 3> from{}, to{};
+};
+
+/// Where the ultrasound probe is; of a scene that holds one.
+struct ProbePose {
+    Triple face{};            // middle of its face [m]
+    Triple axial{0, 1, 0};    // unit vector into the body
+    Triple lateral{1, 0, 0};  // unit vector along the face, towards the marked side
+    double force = 0;         // that the body presses back with [N]
+};
 
 /// The state of one tick.
 struct State {
@@ -105,8 +138,12 @@ struct State {
     double aheadSpeed = 0;                         // of the tip along it [m/s]
     std::uint32_t aheadTissue = 0;                 // row of the tissue table
     std::uint32_t padding = 0;
-    double coreTarget = 0;        // share of target tissue in the last core
-    double coreLength = 0;        // length in the target of the last core [m]
+    double coreTarget = 0;  // share of target tissue in the last core
+    double coreLength = 0;  // length in the target of the last core [m]
+    ProbePose probe;
+    std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
+    std::uint32_t holePadding = 0;
+    std::array<Hole, maxHoles> hole{};
     std::uint64_t missed = 0;     // ticks
     double tickP99 = 0;           // [s]
     std::uint64_t published = 0;  // CLOCK_MONOTONIC when written [ns]

@@ -129,8 +129,12 @@ constexpr std::size_t aligned(std::size_t bytes)
     return (bytes + page - 1) / page * page;
 }
 
-void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels, std::size_t image)
+void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels, std::size_t image,
+                  std::size_t fine)
 {
+    if (fine != voxelsOf(scenery.fine))
+        throw std::runtime_error("session " + session + ": " + std::to_string(fine) + " fine labels for a grid of " +
+                                 std::to_string(voxelsOf(scenery.fine)));
     if (labels == 0 || labels != voxelsOf(scenery.labels))
         throw std::runtime_error("session " + session + ": " + std::to_string(labels) + " labels for a grid of " +
                                  std::to_string(voxelsOf(scenery.labels)));
@@ -156,13 +160,14 @@ std::uint64_t now() noexcept
 
 struct Publisher::Impl {
     Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels,
-         std::span<const std::uint16_t> image);
+         std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine);
     ~Impl();
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
     void allocate(std::size_t size);
-    void fill(const Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image);
+    void fill(const Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image,
+              std::span<const std::uint8_t> fine);
     void show();
     void release() noexcept;
 
@@ -181,15 +186,16 @@ struct Publisher::Impl {
 };
 
 Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels,
-                      std::span<const std::uint16_t> image)
+                      std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
     : session(sessionName), name(segmentName(sessionName)), temporary(name + "." + std::to_string(::getpid()))
 {
-    checkScenery(session, scenery, labels.size(), image.size());
+    checkScenery(session, scenery, labels.size(), image.size(), fine.size());
     removeLeftBehind(session, name);
     removeOthersLeftBehind();
     const std::size_t scene = aligned(sizeof(Header)), label = scene + aligned(sizeof(Scenery)),
-                      grey = label + aligned(labels.size()), states = grey + aligned(image.size_bytes()),
-                      inputs = states + aligned(sizeof(StateBlock)), displacements = inputs + aligned(sizeof(InputBlock));
+                      grey = label + aligned(labels.size()), detail = grey + aligned(image.size_bytes()),
+                      states = detail + aligned(fine.size()), inputs = states + aligned(sizeof(StateBlock)),
+                      displacements = inputs + aligned(sizeof(InputBlock));
     try {
         allocate(displacements + aligned(sizeof(DisplacedBlock)));
         header = new (base) Header;
@@ -198,10 +204,12 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
         header->labelsBytes = labels.size();
         header->imageOffset = grey;
         header->imageBytes = image.size_bytes();
+        header->fineOffset = detail;
+        header->fineBytes = fine.size();
         header->stateOffset = states;
         header->inputOffset = inputs;
         header->displacedOffset = displacements;
-        fill(scenery, labels, image);
+        fill(scenery, labels, image, fine);
         show();
     } catch (...) {
         release();
@@ -226,7 +234,7 @@ void Publisher::Impl::allocate(std::size_t size)
 }
 
 void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t> labels,
-                           std::span<const std::uint16_t> image)
+                           std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
 {
     header->version = version;
     header->layoutHash = layoutHash();
@@ -238,6 +246,8 @@ void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t>
     std::memcpy(base + header->labelsOffset, labels.data(), labels.size());
     if (!image.empty())
         std::memcpy(base + header->imageOffset, image.data(), image.size_bytes());
+    if (!fine.empty())
+        std::memcpy(base + header->fineOffset, fine.data(), fine.size());
     state = new (base + header->stateOffset) StateBlock;
     input = new (base + header->inputOffset) InputBlock;
     displaced = new (base + header->displacedOffset) DisplacedBlock;
@@ -280,8 +290,8 @@ Publisher::Impl::~Impl()
 }
 
 Publisher::Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels,
-                     std::span<const std::uint16_t> image)
-    : impl_(std::make_unique<Impl>(session, scenery, labels, image))
+                     std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
+    : impl_(std::make_unique<Impl>(session, scenery, labels, image, fine))
 {
 }
 

@@ -34,8 +34,8 @@ struct Header {
     std::uint64_t bytes = 0;  // of the segment
     std::uint64_t ownerPid = 0;
     std::uint64_t ownerStart = 0;  // start time of the owner [clock ticks since boot]: a recycled pid has another
-    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, imageOffset = 0, imageBytes = 0, stateOffset = 0,
-                  inputOffset = 0, displacedOffset = 0;
+    std::uint64_t sceneryOffset = 0, labelsOffset = 0, labelsBytes = 0, imageOffset = 0, imageBytes = 0, fineOffset = 0,
+                  fineBytes = 0, stateOffset = 0, inputOffset = 0, displacedOffset = 0;
     Word closed;  // 1: the owner has ended the session itself
 };
 
@@ -73,6 +73,9 @@ constexpr std::uint64_t layoutHash() noexcept
                                     sizeof(Grid),
                                     sizeof(TissueLook),
                                     sizeof(GreyWindow),
+                                    sizeof(TissueSound),
+                                    sizeof(ProbePose),
+                                    sizeof(Hole),
                                     sizeof(Scenery),
                                     sizeof(State),
                                     sizeof(Input),
@@ -107,6 +110,10 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(Scenery, window),
                                     offsetof(Scenery, imageUnit),
                                     offsetof(Scenery, imageLow),
+                                    offsetof(Scenery, sound),
+                                    offsetof(Scenery, fine),
+                                    offsetof(Scenery, probe),
+                                    offsetof(Scenery, holeRadius),
                                     offsetof(State, time),
                                     offsetof(State, tip),
                                     offsetof(State, bend),
@@ -121,6 +128,8 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(State, ahead),
                                     offsetof(State, aheadTissue),
                                     offsetof(State, coreTarget),
+                                    offsetof(State, probe),
+                                    offsetof(State, hole),
                                     offsetof(State, missed),
                                     offsetof(State, published),
                                     offsetof(Input, axis),

@@ -31,13 +31,14 @@ bool within(std::uint64_t offset, std::uint64_t length, std::uint64_t bytes) noe
 // Where things are, as it was checked: who may write the segment may change it afterwards.
 struct Places {
     std::uint64_t version = 0, layoutHash = 0, bytes = 0, ownerPid = 0, ownerStart = 0, scenery = 0, labels = 0,
-                  labelsBytes = 0, image = 0, imageBytes = 0, state = 0, input = 0, displaced = 0;
+                  labelsBytes = 0, image = 0, imageBytes = 0, fine = 0, fineBytes = 0, state = 0, input = 0, displaced = 0;
 };
 
 Places placesIn(const Header& h) noexcept
 {
-    return {h.version,     h.layoutHash,  h.bytes,      h.ownerPid,    h.ownerStart,  h.sceneryOffset,  h.labelsOffset,
-            h.labelsBytes, h.imageOffset, h.imageBytes, h.stateOffset, h.inputOffset, h.displacedOffset};
+    return {h.version,       h.layoutHash,   h.bytes,       h.ownerPid,    h.ownerStart,
+            h.sceneryOffset, h.labelsOffset, h.labelsBytes, h.imageOffset, h.imageBytes,
+            h.fineOffset,    h.fineBytes,    h.stateOffset, h.inputOffset, h.displacedOffset};
 }
 
 bool lives(const Places& p) noexcept
@@ -45,12 +46,13 @@ bool lives(const Places& p) noexcept
     return p.ownerStart != 0 && processStart(p.ownerPid) == p.ownerStart;
 }
 
-// Whether labels and image are as large as the scenery says.
+// Whether labels, fine labels and image are as large as the scenery says.
 bool coherent(const Places& header, const Scenery& scenery) noexcept
 {
     const std::uint64_t voxels = voxelsOf(scenery.labels);
     return sound(scenery) && header.labelsBytes == voxels &&
-           header.imageBytes == (scenery.windows > 0 ? voxels * sizeof(std::uint16_t) : 0);
+           header.imageBytes == (scenery.windows > 0 ? voxels * sizeof(std::uint16_t) : 0) &&
+           header.fineBytes == voxelsOf(scenery.fine);
 }
 
 // Throws when the segment is not one that this program can read.
@@ -65,9 +67,10 @@ void check(const std::string& session, const Places& header, std::uint64_t bytes
     const bool inside =
         header.bytes == bytes && within(header.scenery, sizeof(Scenery), bytes) &&
         within(header.labels, header.labelsBytes, bytes) && within(header.image, header.imageBytes, bytes) &&
-        within(header.state, sizeof(StateBlock), bytes) && within(header.input, sizeof(InputBlock), bytes) &&
-        within(header.displaced, sizeof(DisplacedBlock), bytes) && header.state % alignof(StateBlock) == 0 &&
-        header.displaced % alignof(DisplacedBlock) == 0 && header.input % 4096 == 0;
+        within(header.fine, header.fineBytes, bytes) && within(header.state, sizeof(StateBlock), bytes) &&
+        within(header.input, sizeof(InputBlock), bytes) && within(header.displaced, sizeof(DisplacedBlock), bytes) &&
+        header.state % alignof(StateBlock) == 0 && header.displaced % alignof(DisplacedBlock) == 0 &&
+        header.input % 4096 == 0;
     if (!inside)
         refuse("its shared memory is damaged; end the simulation and start it again");
 }
@@ -161,6 +164,11 @@ std::span<const std::uint8_t> Subscriber::labels() const noexcept
 std::span<const std::uint16_t> Subscriber::image() const noexcept
 {
     return {&impl_->at<std::uint16_t>(impl_->places.image), impl_->places.imageBytes / sizeof(std::uint16_t)};
+}
+
+std::span<const std::uint8_t> Subscriber::fine() const noexcept
+{
+    return {&impl_->at<std::uint8_t>(impl_->places.fine), impl_->places.fineBytes};
 }
 
 std::optional<State> Subscriber::state() const noexcept

@@ -385,6 +385,7 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
         safety->finish();
     }
     readScript(top, scene.script);
+    readProbe(top, scene.probe);
     top.finish();
     if (scene.target.empty() && !scene.aim) {
         top.missing("[target]", "structure = \"..\", what to sample, or aim_mm = [x, y, z]");
@@ -448,7 +449,7 @@ std::string sceneText(const Scene& scene)
     for (const TraineeStep& step : scene.script) {
         out += stepText(step);
     }
-    return out;
+    return out + probeText(scene.probe);
 }
 
 }  // namespace palpate::datasets

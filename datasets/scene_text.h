@@ -18,6 +18,10 @@ inline constexpr std::size_t mostVital = 15;
 std::vector<TissueChange> readTissueChanges(Section& top);
 std::string tissueChangesText(std::span<const TissueChange> changes);
 
+/// The table [probe] and the tables [[probe_step]] of a scene, and back.
+void readProbe(Section& top, ProbeSpec& probe);
+std::string probeText(const ProbeSpec& probe);
+
 /// A scene as TOML text with every field, for scenes that no one wrote. parseScene() reads it back.
 std::string sceneText(const Scene& scene);
 

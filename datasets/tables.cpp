@@ -13,6 +13,7 @@ namespace palpate::datasets {
 
 namespace {
 
+using volume::Acoustics;
 using volume::Role;
 using volume::TissueRow;
 using volume::TissueTable;
@@ -41,6 +42,29 @@ constexpr std::array<Field<TissueRow>, 12> tissueFields{{
     {"opacity", "", 0, 1, 1, &TissueRow::opacity},
     {"source", "", 0, 0, 1, &TissueRow::source},
 }};
+
+// For the ultrasound picture: all of them, or none.
+constexpr std::array<Field<Acoustics>, 6> acousticFields{{
+    {"sound_speed_m_s", "m/s", 100, 10000, 1, &Acoustics::soundSpeed},
+    {"attenuation_db_cm", "dB/cm", 0, 1000, 1, &Acoustics::attenuation},
+    {"attenuation_power", "", 0, 3, 1, &Acoustics::attenuationPower},
+    {"echo_db", "dB", -100, 60, 1, &Acoustics::echo},
+    {"echo_variation_db", "dB", 0, 30, 1, &Acoustics::echoVariation},
+    {"acoustic_source", "", 0, 0, 1, &Acoustics::source},
+}};
+constexpr std::string_view echoPatternKey = "echo_pattern";
+
+void readAcoustics(Section& section, Acoustics& acoustics)
+{
+    const bool any = std::ranges::any_of(acousticFields, [&](const auto& f) { return section.has(f.key); });
+    if (!any && !section.has(echoPatternKey)) {
+        return;
+    }
+    readFields<Acoustics>(section, acousticFields, acoustics, Need::all);
+    if (const auto pattern = section.choice(echoPatternKey, volume::echoPatterns)) {
+        acoustics.pattern = static_cast<volume::EchoPattern>(*pattern);
+    }
+}
 
 Role readRole(Section& section)
 {
@@ -96,6 +120,7 @@ TissueRow readTissue(Section& section)
     row.colour = readColour(section);
     readFields<TissueRow>(section, tissueFields, row, Need::all);
     readFields<TissueRow>(section, measuredFields, row, Need::some);
+    readAcoustics(section, row.acoustics);
     section.finish();
     if (const auto [key, why] = misfit(row); !key.empty()) {
         section.refuse(key, why, key == "cutting_n" ? "N" : "kPa");
@@ -145,6 +170,17 @@ void forNumbers(Use use)
     }
 }
 
+// The same for what the table says of ultrasound.
+template <class Use>
+void forAcoustics(Use use)
+{
+    for (const Field<Acoustics>& f : acousticFields) {
+        if (const auto* const member = std::get_if<double Acoustics::*>(&f.member)) {
+            use(f, *member);
+        }
+    }
+}
+
 std::vector<TissueChange> readTissueChanges(Section& top)
 {
     std::vector<TissueChange> changes;
@@ -156,6 +192,11 @@ std::vector<TissueChange> readTissueChanges(Section& top)
         Section section = *all->section(name);
         TissueChange change{name, {}};
         forNumbers([&](const Field<TissueRow>& f, double TissueRow::*) {
+            if (const auto value = section.number(f.key, f.unit, f.low, f.high)) {
+                change.values.emplace_back(f.key, *value);
+            }
+        });
+        forAcoustics([&](const Field<Acoustics>& f, double Acoustics::*) {
             if (const auto value = section.number(f.key, f.unit, f.low, f.high)) {
                 change.values.emplace_back(f.key, *value);
             }
@@ -178,6 +219,19 @@ std::string tissueChangesText(std::span<const TissueChange> changes)
     return out;
 }
 
+// What a table without figures for ultrasound lacks comes from the built-in one first, so that one of them can be changed.
+void changeAcoustics(TissueRow& row, const TissueChange& change)
+{
+    forAcoustics([&](const Field<Acoustics>& f, double Acoustics::*member) {
+        for (const auto& [key, value] : change.values) {
+            if (key == f.key) {
+                row.acoustics = acousticsOf(row);
+                row.acoustics.*member = value * f.si;
+            }
+        }
+    });
+}
+
 TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes)
 {
     for (const TissueChange& change : changes) {
@@ -198,11 +252,34 @@ TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes
                 }
             }
         });
+        changeAcoustics(row, change);
         if (const auto [key, why] = misfit(row); !key.empty()) {
             throw std::runtime_error(fmt::format("[tissue.{}] {}: {}", change.tissue, key, why));
         }
     }
     return table;
+}
+
+volume::Acoustics acousticsOf(const volume::TissueRow& row)
+{
+    if (row.acoustics.given()) {
+        return row.acoustics;
+    }
+    static const volume::TissueTable known = defaultTissues();
+    const auto standIn = [&]() -> std::string_view {
+        switch (row.role) {
+            case Role::air:
+                return "air";
+            case Role::skin:
+                return "skin";
+            case Role::bone:
+                return "bone";
+            default:
+                return "soft_tissue";
+        }
+    };
+    const auto same = known.find(row.name);
+    return known.rows[same ? *same : known.find(standIn()).value()].acoustics;
 }
 
 volume::TissueTable defaultTissues()

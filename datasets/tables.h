@@ -18,6 +18,10 @@ volume::TissueTable defaultTissues();
 /// kPa").
 volume::TissueTable loadTissues(const std::filesystem::path& file);
 
+/// What a tissue does to ultrasound. Where its table says nothing: the built-in table's row of the same name, else of its
+/// role (air, skin, bone), else that of "soft_tissue".
+volume::Acoustics acousticsOf(const volume::TissueRow& row);
+
 /// The table with the changes of a scene in it. Throws std::runtime_error for a tissue that it does not have, and for
 /// values that do not go together.
 volume::TissueTable withChanges(volume::TissueTable table, std::span<const TissueChange> changes);

@@ -90,6 +90,8 @@ CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& rea
         }
     }
     pieces.end();
+    core.restStart = occupancy::restPoint(body, core.notchStart);
+    core.restEnd = occupancy::restPoint(body, core.notchEnd);
     for (double& f : core.fraction) {
         f /= std::max(filled, 1);
     }

@@ -123,6 +123,10 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     if (sent.faulted && !wasFaulted) {
         addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
     }
+    const auto probe = datasets::probeAt(model_.scene.probe, static_cast<double>(ticks_) * stabiliserOptions_.period);
+    record_.probeFace = probe.face;
+    record_.probeAxis = probe.direction;
+    record_.probeLateral = probe.lateral;
     record_.proxy = tip_.proxy;
     record_.phase = tip_.phase;
     record_.tissue = tip_.tissue;

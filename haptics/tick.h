@@ -103,6 +103,8 @@ struct CoreSample {
     std::uint32_t fragments = 0;                // pieces that the core comes out in
     Vec3 notchStart{0.0};                       // patient frame [m]
     Vec3 notchEnd{0.0};                         // patient frame [m]
+    Vec3 restStart{0.0};                        // where notchStart was at rest [m]
+    Vec3 restEnd{0.0};                          // and notchEnd [m]
 };
 
 /// Everything that one tick computed. A pure function of the model and of the samples up to here, but for `seconds`.
@@ -128,10 +130,14 @@ struct TickRecord {
     std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
     LookAhead ahead;                               // in front of the tip
     std::uint32_t contacts = 0;                    // elements of tissue that the tool touches
-    double penetration = 0;   // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
-    std::uint32_t moved = 0;  // nodes that the deformation moved
-    double residual = 0;      // largest violated link that the work cap left over [m]
-    CoreSample core;          // when fired
+    double penetration = 0;      // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
+    std::uint32_t moved = 0;     // nodes that the deformation moved
+    double residual = 0;         // largest violated link that the work cap left over [m]
+    CoreSample core;             // when fired
+    Vec3 probeFace{0.0};         // of the ultrasound probe, where the scene holds one: middle of its face [m]
+    Vec3 probeAxis{0, 1, 0};     // unit vector into the body
+    Vec3 probeLateral{1, 0, 0};  // unit vector along the face
+    Vec3 probeForce{0.0};        // that the body presses it back with [N]
     std::array<Event, maxEventsPerTick> events{};  // in their order; the first eventCount count
     std::uint32_t eventCount = 0;                  // of this tick
     std::array<float, taskCount> seconds{};        // by task, wall time [s]

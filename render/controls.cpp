@@ -41,11 +41,25 @@ Point2 point(glm::dvec2 p)
     return {p.x, p.y};
 }
 
+// The probe slides and sweeps with the cursor; `turned`: rocks and turns.
+ultrasound::ProbeMove probeMove(glm::dvec2 pixels, bool turned)
+{
+    constexpr double metres = 0.1e-3, radians = 0.3 / 180.0 * 3.14159265358979323846;  // a pixel
+    if (turned)
+        return {0, 0, radians * pixels.x, radians * pixels.y};
+    return {-metres * pixels.x, metres * pixels.y, 0, 0};
+}
+
 }  // namespace
 
 Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture,
-                   const Follower& follower, Playback* playback)
-    : window_(window), interactor_(interactor), picture_(picture), follower_(follower), playback_(playback)
+                   const Follower& follower, Playback* playback, std::filesystem::path images)
+    : window_(window),
+      interactor_(interactor),
+      picture_(picture),
+      follower_(follower),
+      playback_(playback),
+      images_(std::move(images))
 {
     glfwSetWindowUserPointer(window, this);
     glfwSetMouseButtonCallback(
@@ -93,6 +107,15 @@ void Controls::button(int button, bool down)
     used_ = true;
     if (button == GLFW_MOUSE_BUTTON_MIDDLE)
         return camera(down ? vtkCommand::MiddleButtonPressEvent : vtkCommand::MiddleButtonReleaseEvent);
+    if (!down)
+        measuring_ = probing_ = false;
+    if (down && onUltrasound() && (button == GLFW_MOUSE_BUTTON_LEFT || button == GLFW_MOUSE_BUTTON_RIGHT)) {
+        measuring_ = button == GLFW_MOUSE_BUTTON_LEFT;
+        probing_ = !measuring_;
+        if (measuring_)
+            picture_.ultrasound().beginCaliper(point(cursor_));
+        return;
+    }
     if (button == GLFW_MOUSE_BUTTON_LEFT && hand_.is())
         return down ? hand_.press(follower_.state()) : hand_.release();
     if (button == GLFW_MOUSE_BUTTON_LEFT && playback_ != nullptr) {
@@ -113,6 +136,10 @@ void Controls::moved(glm::dvec2 to, bool fine)
         const glm::dvec3 way = picture_.under(point(to), at) - picture_.under(point(from), at);
         hand_.move((fine ? fineShare : 1.0) * way);
     }
+    if (measuring_)
+        picture_.ultrasound().dragCaliper(point(to));
+    if (probing_)
+        picture_.ultrasound().moveProbe(probeMove(to - from, fine));
     if (scrubbing_)
         scrub();
     interactor_.SetEventInformation(static_cast<int>(to.x), static_cast<int>(to.y));
@@ -122,7 +149,9 @@ void Controls::moved(glm::dvec2 to, bool fine)
 void Controls::wheel(double notches, bool fine)
 {
     used_ = true;
-    if (hand_.is())
+    if (onUltrasound())
+        picture_.ultrasound().turn(Knob::depth, notches > 0 ? -1 : 1);
+    else if (hand_.is())
         hand_.move((fine ? fineShare : 1.0) * notches * depthStep * screen().into);
     else
         camera(notches > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
@@ -134,6 +163,11 @@ Controls::Screen Controls::screen() const
     const glm::dvec3 right = glm::normalize(picture_.under({100, 0}, at) - origin),
                      up = glm::normalize(picture_.under({0, 100}, at) - origin);
     return {right, up, glm::cross(up, right)};
+}
+
+bool Controls::onUltrasound() const
+{
+    return picture_.ultrasoundShown() && picture_.ultrasound().holds(point(cursor_));
 }
 
 void Controls::scrub()

@@ -8,6 +8,7 @@
 
 #include <vtkGenericRenderWindowInteractor.h>
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -21,13 +22,15 @@ namespace palpate::render {
 ///     any other session                 left or right: camera, wheel: zoom
 ///     record                            left: drag through the time, right: camera, wheel: zoom
 ///
+/// On the ultrasound picture: left measures, right moves the probe, wheel: depth.
+///
 /// Middle shifts the camera. What keys do is in keys.cpp.
 class Controls {
 public:
     /// Listens to `window` until it is destroyed. All must outlive that. @param playback  of a record; null = a live
     /// session
     Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture, const Follower& follower,
-             Playback* playback);
+             Playback* playback, std::filesystem::path images);
     Controls(const Controls&) = delete;
     Controls& operator=(const Controls&) = delete;
 
@@ -40,12 +43,14 @@ public:
     struct Press {
         int sign;  // of the stroke
         bool shift;
+        int value;  // of the stroke
     };
     static constexpr int once = 0;  // instead of a sign: a key that is held down does not repeat
     struct Stroke {
         int key = 0;  // GLFW_KEY_..; 0: by its name on this keyboard
         char name = 0;
-        int sign = 1;  // of two keys that do opposite things
+        int sign = 1;   // of two keys that do opposite things
+        int value = 0;  // of several that do the same to different things
     };
     struct Key {
         unsigned windows;  // kinds, added up
@@ -53,7 +58,8 @@ public:
         const char* what;
         std::vector<Stroke> strokes;
         void (*act)(Controls&, const Press&);
-        bool ofImage = false;  // only where the body has a CT or MR
+        bool ofImage = false;       // only where the body has a CT or MR
+        bool ofUltrasound = false;  // only while the ultrasound picture is shown
     };
     /// The one list of them.
     static const std::vector<Key> keys;
@@ -72,6 +78,7 @@ private:
     Screen screen() const;
     void jumpBy(double seconds);
     void scrub();
+    bool onUltrasound() const;
     void camera(unsigned long event);
     void showHelp();
     std::string caption() const;
@@ -81,9 +88,11 @@ private:
     Picture& picture_;
     const Follower& follower_;
     Playback* playback_;
+    std::filesystem::path images_;  // folder for stored ultrasound pictures
     MouseHand hand_;
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
     bool used_ = false, helping_ = false, scrubbing_ = false;
+    bool measuring_ = false, probing_ = false;  // on the ultrasound picture
 };
 
 }  // namespace palpate::render

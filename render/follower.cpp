@@ -102,7 +102,7 @@ void Follower::tryAttach(Picture& picture)
     state_ = {};
     health_ = {};
     structures_ = subscriber_->scenery().structure;
-    picture.open(subscriber_->scenery(), subscriber_->labels(), name, subscriber_->image());
+    picture.open(subscriber_->scenery(), subscriber_->labels(), name, subscriber_->image(), subscriber_->fine());
     picture.setNotice("", "");
 }
 
@@ -250,6 +250,19 @@ ViewerFigures Follower::figures() const
     const double span = first_ ? seconds(last_ - *first_) : 0;
     figures.rate = span > 0 ? static_cast<double>(frames_ - 1) / span : 0;
     return figures;
+}
+
+void addScans(const UltrasoundPicture& ultrasound, ViewerFigures& figures)
+{
+    const auto scans = ultrasound.figures();
+    if (!scans || scans->seconds.empty())
+        return;
+    figures.scans = scans->seconds.size();
+    figures.scanP50 = quantile(scans->seconds, 0.5);
+    figures.scanP90 = quantile(scans->seconds, 0.9);
+    figures.firstScan = scans->first;
+    for (std::size_t i = 0; i < ultrasound::stageCount; ++i)
+        figures.scanStages.emplace_back(ultrasound::stageNames[i], scans->stages[i] / static_cast<double>(figures.scans));
 }
 
 }  // namespace palpate::render

@@ -85,4 +85,7 @@ private:
     double read_ = 0;  // when the state was [s], as monotonic()
 };
 
+/// What the scanner has measured of itself, into `figures`.
+void addScans(const UltrasoundPicture& ultrasound, ViewerFigures& figures);
+
 }  // namespace palpate::render

@@ -124,6 +124,11 @@ const std::vector<Controls::Key> Controls::keys{
      "the tissue's opacity",
      {{GLFW_KEY_PAGE_UP}, {GLFW_KEY_PAGE_DOWN, 0, -1}},
      [](Controls& c, const Press& p) { c.picture_.changeOpacity(p.sign > 0 ? opacityStep : 1 / opacityStep); }},
+    {every,
+     "U",
+     "ultrasound picture, body",
+     {{0, 'u'}},
+     [](Controls& c, const Press&) { c.picture_.showUltrasound(!c.picture_.ultrasoundShown()); }},
     // ? comes as a character: where it is on a keyboard differs too much for a key's name.
     {every, "? H F1", "these keys", {{0, 'h'}, {GLFW_KEY_F1}}, [](Controls& c, const Press&) { c.showHelp(); }},
     {every,
@@ -131,12 +136,127 @@ const std::vector<Controls::Key> Controls::keys{
      "close the window",
      {{0, 'q'}, {GLFW_KEY_ESCAPE}},
      [](Controls& c, const Press&) { glfwSetWindowShouldClose(c.window_, GLFW_TRUE); }},
+    {every, "hold left", "on the picture: measure from here to there", {}, nullptr, false, true},
+    {every,
+     "hold right",
+     "on the picture: slide and sweep the probe; with Shift rock and turn it",
+     {},
+     nullptr,
+     false,
+     true},
+    {every, "wheel", "on the picture: depth", {}, nullptr, false, true},
+    {every,
+     "D",
+     "more depth; with Shift less",
+     {{0, 'd'}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::depth, p.shift ? -1 : 1); },
+     false,
+     true},
+    {every,
+     "G",
+     "more gain; with Shift less",
+     {{0, 'g'}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::gain, p.shift ? -1 : 1); },
+     false,
+     true},
+    {every,
+     "Z",
+     "focus deeper; with Shift less",
+     {{0, 'z'}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::focus, p.shift ? -1 : 1); },
+     false,
+     true},
+    {every,
+     "Y",
+     "higher frequency; with Shift less",
+     {{0, 'y'}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::frequency, p.shift ? -1 : 1); },
+     false,
+     true},
+    {every,
+     "V",
+     "more dynamic range; with Shift less",
+     {{0, 'v'}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::dynamicRange, p.shift ? -1 : 1); },
+     false,
+     true},
+    {every,
+     "1 .. 8",
+     "gain of a layer (TGC), from the top; with Shift less",
+     {{0, '1', 1, 0},
+      {0, '2', 1, 1},
+      {0, '3', 1, 2},
+      {0, '4', 1, 3},
+      {0, '5', 1, 4},
+      {0, '6', 1, 5},
+      {0, '7', 1, 6},
+      {0, '8', 1, 7}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::tgc, p.shift ? -1 : 1, p.value); },
+     false,
+     true},
+    {every,
+     "0",
+     "all layers alike",
+     {{0, '0'}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().levelTgc(); },
+     false,
+     true},
+    {every,
+     "F",
+     "freeze, go on",
+     {{0, 'f', once}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().toggleFreeze(); },
+     false,
+     true},
+    {every,
+     "J K",
+     "while frozen: a picture back, on",
+     {{0, 'k'}, {0, 'j', -1}},
+     [](Controls& c, const Press& p) { c.picture_.ultrasound().stepCine(p.sign); },
+     false,
+     true},
+    {every,
+     "X",
+     "no measures any more",
+     {{0, 'x'}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().clearCalipers(); },
+     false,
+     true},
+    {every,
+     "B",
+     "guide line: where the needle goes",
+     {{0, 'b'}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().toggleGuide(); },
+     false,
+     true},
+    {every,
+     "O",
+     "marked side left, right",
+     {{0, 'o'}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().mirror(); },
+     false,
+     true},
+    {every,
+     "T",
+     "linear probe, curved probe",
+     {{0, 't', once}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().changeProbe(); },
+     false,
+     true},
+    {every,
+     "P",
+     "store the picture",
+     {{0, 'p', once}},
+     [](Controls& c, const Press&) { c.picture_.ultrasound().store(c.images_); },
+     false,
+     true},
 };
 
 bool Controls::applies(const Key& key) const
 {
     const unsigned here = playback_ != nullptr ? record : hand_.is() ? hand : session;
-    return (key.windows & here) != 0 && (!key.ofImage || picture_.hasImage());
+    return (key.windows & here) != 0 && (!key.ofImage || picture_.hasImage()) &&
+           (!key.ofUltrasound || picture_.ultrasoundShown());
 }
 
 void Controls::key(int key, const std::string& name, bool again, bool shift)
@@ -146,7 +266,7 @@ void Controls::key(int key, const std::string& name, bool again, bool shift)
         for (const Stroke& s : k.strokes)
             if (applies(k) && (s.key != 0 ? s.key == key : name == std::string_view(&s.name, 1))) {
                 if (!again || s.sign != once)
-                    k.act(*this, {s.sign < 0 ? -1 : 1, shift});
+                    k.act(*this, {s.sign < 0 ? -1 : 1, shift, s.value});
                 return;
             }
     }
@@ -178,9 +298,13 @@ std::string keysInWords()
                                          {every, "In every window"}}) {
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)
-            if (k.windows == windows)
+            if (k.windows == windows && !k.ofUltrasound)
                 text += fmt::format("  {:<15}{}{}\n", k.shown, k.what, k.ofImage ? " (of a body with a CT or MR)" : "");
     }
+    text += "\nWhile the ultrasound picture is shown:\n";
+    for (const Controls::Key& k : Controls::keys)
+        if (k.ofUltrasound)
+            text += fmt::format("  {:<15}{}\n", k.shown, k.what);
     return text;
 }
 

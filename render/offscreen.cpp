@@ -226,11 +226,13 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool
     Picture picture(*window);
     picture.show(options.instructor ? Layout::instructor : Layout::trainee);
     picture.show(options.slices);
+    picture.showUltrasound(options.ultrasound);
     Follower follower(options.session, options.wait);
     writeAll(options, stop, picture, follower, outputs);
     outputs.finish();
     ViewerFigures figures = follower.figures();
     figures.display = figures.frames > 0 ? picture.display() : "";
+    addScans(picture.ultrasound(), figures);
     picture.close();
     return figures;
 }

@@ -244,7 +244,7 @@ void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     constexpr int distanceLines = 7;
     drawDistances(pen, scenery, state, distanceLines);
 
-    const double x = plan.view.x + edge, top = plan.view.y + plan.view.height;
+    const double x = plan.title.x + edge, top = plan.title.y + plan.title.height;
     // Over the body as well: dark below bright.
     const auto words = [&](double y, const std::string& what, double size, const Colour& colour, bool bold) {
         canvas.text({x + 1, y - 1}, what, size, {0, 0, 0}, Align::left, bold);

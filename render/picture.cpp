@@ -56,12 +56,14 @@ std::vector<std::uint8_t> tissuesIn(const channel::Scenery& scenery, std::span<c
 
 struct Picture::Session {
     Session(const channel::Scenery& shown, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image,
-            std::string sessionName, vtkRenderer& renderer)
+            std::span<const std::uint8_t> fineLabels, std::string sessionName, vtkRenderer& renderer)
         : scenery(shown),
           name(std::move(sessionName)),
           frame(viewFrame(shown)),
           deformation(shown, labels),
           grey(shown, image),
+          coarse(labels.begin(), labels.end()),
+          fine(fineLabels.begin(), fineLabels.end()),
           volume(shown, deformation, renderer),
           tool(shown, renderer),
           legend(tissuesIn(shown, labels))
@@ -77,6 +79,7 @@ struct Picture::Session {
     ViewFrame frame;
     Deformation deformation;
     GreyImage grey;
+    std::vector<std::uint8_t> coarse, fine;  // labels, for a scanner that begins later
     VolumePicture volume;
     ToolPicture tool;
     std::vector<std::uint8_t> legend;                 // rows of the tissues that there are, smallest volume first
@@ -86,11 +89,15 @@ struct Picture::Session {
     History history;
     Health health;
     bool known = false;  // a state has come
-    VoxelBox changed;    // since the last slices
+    channel::Displaced shape;
+    VoxelBox changed;  // since the last slices
 };
 
 Picture::Picture(vtkRenderWindow& window)
-    : window_(window), slices_{SlicePicture(*flat_), SlicePicture(*flat_), SlicePicture(*flat_)}, canvas_(*flat_)
+    : window_(window),
+      slices_{SlicePicture(*flat_), SlicePicture(*flat_), SlicePicture(*flat_)},
+      ultrasound_(*flat_),
+      canvas_(*flat_)
 {
     window_.SetNumberOfLayers(2);
     view_->SetBackground(0.06, 0.07, 0.10);
@@ -108,16 +115,18 @@ Picture::Picture(vtkRenderWindow& window)
 Picture::~Picture() = default;
 
 void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
-                   std::span<const std::uint16_t> image)
+                   std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
 {
     close();
-    session_ = std::make_unique<Session>(scenery, labels, image, session, *view_);
+    session_ = std::make_unique<Session>(scenery, labels, image, fine, session, *view_);
     aimCamera();
+    showUltrasound(ultrasoundShown_);
 }
 
 void Picture::close()
 {
     awaitSlices();
+    ultrasound_.close();
     session_.reset();
     view_->RemoveAllViewProps();
     for (SlicePicture& slice : slices_)
@@ -166,6 +175,9 @@ void Picture::update(const channel::State& state, const channel::Displaced* disp
         session_->volume.update(session_->deformation);
         session_->changed = enclosing(session_->changed, changed);
     }
+    if (displaced != nullptr)
+        session_->shape = *displaced;
+    ultrasound_.see(state, displaced);
     session_->state = state;
     session_->health = health;
     session_->known = true;
@@ -187,7 +199,23 @@ void Picture::setNotice(const std::string& words, const std::string& smaller)
 
 ScreenPlan Picture::screenPlan() const
 {
-    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_};
+    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_, ultrasoundShown_};
+}
+
+void Picture::showUltrasound(bool shown)
+{
+    const bool turned = std::exchange(ultrasoundShown_, shown) != shown;
+    if (!shown)
+        ultrasound_.hide();
+    if (!session_)
+        return;
+    if (shown && !ultrasound_.opened()) {
+        ultrasound_.open(session_->scenery, session_->coarse, session_->fine, session_->name);
+        if (session_->known)
+            ultrasound_.see(session_->state, &session_->shape);
+    }
+    if (turned)
+        aimCamera();
 }
 
 void Picture::render(Quality quality)
@@ -202,6 +230,9 @@ void Picture::render(Quality quality)
         session_->tool.showHand(hand_, vec(session_->state.tip));
         session_->volume.prepare(quality, software_.value_or(true), static_cast<double>(view.width) * view.height);
         drawSlices(plan, quality == Quality::moving && software_.value_or(true) ? 2 : 1);
+        if (!plan.ultrasound.empty())
+            ultrasound_.draw(canvas_, plan.ultrasound, layout_ == Layout::trainee ? plan.title : plan.ultrasound, plan.font,
+                             quality == Quality::still);
         drawFlat(plan);
     }
     if (!words_.empty())
@@ -294,7 +325,7 @@ void Picture::drawFlat(const ScreenPlan& plan)
     if (!plan.distances.empty())
         drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
     // Where the legend has a place of its own help does not cover it.
-    if (help_.empty() || !plan.events.empty()) {
+    if (!plan.legend.empty() && (help_.empty() || !plan.events.empty())) {
         const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
         drawLegend(canvas_, plan, s.scenery, {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1});
     }

@@ -8,6 +8,7 @@
 #include <render/slice_picture.h>
 #include <render/tool_picture.h>
 #include <render/traces.h>
+#include <render/ultrasound_picture.h>
 #include <render/view_frame.h>
 #include <render/volume_picture.h>
 
@@ -36,7 +37,7 @@ public:
 
     /// Takes a session's scenery on; the camera starts anew.
     void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
-              std::span<const std::uint16_t> image = {});
+              std::span<const std::uint16_t> image = {}, std::span<const std::uint8_t> fine = {});
     void close();
     /// Shows what has come. `displaced` is null when there is nothing newer.
     void update(const channel::State& state, const channel::Displaced* displaced, const Health& health);
@@ -65,6 +66,12 @@ public:
     bool hasImage() const noexcept;
     /// Shows the image through the session's next window.
     void nextWindow() noexcept;
+    /// Shows the ultrasound picture in the place of the body, and the body in that of the slice; in layout instructor in
+    /// the place of the third slice. The scanner begins with the first time.
+    void showUltrasound(bool shown);
+    bool ultrasoundShown() const noexcept { return ultrasoundShown_; }
+    UltrasoundPicture& ultrasound() noexcept { return ultrasound_; }
+    const UltrasoundPicture& ultrasound() const noexcept { return ultrasound_; }
     /// Camera and opacities as they were when the session was opened.
     void resetView();
     /// Lists the keys across the picture; empty = hidden.
@@ -97,6 +104,7 @@ private:
     vtkNew<vtkRenderer> view_, flat_;
     // Before the canvas: flat things are drawn in the order in which they were added.
     std::array<SlicePicture, 3> slices_;
+    UltrasoundPicture ultrasound_;
     Canvas canvas_;
     std::unique_ptr<Session> session_;
     std::future<void> painting_;  // of the slices, while the body is drawn
@@ -104,7 +112,7 @@ private:
     std::vector<KeyHelp> help_;
     Layout layout_ = Layout::trainee;
     SliceLook look_ = SliceLook::tinted;
-    bool cut_ = true;
+    bool cut_ = true, ultrasoundShown_ = false;
     double timeline_ = -1, scale_ = 1;
     std::optional<glm::dvec3> hand_;
     std::optional<bool> software_;

@@ -48,7 +48,7 @@ void planInstructor(ScreenPlan& plan)
 
 }  // namespace
 
-ScreenPlan::ScreenPlan(int windowWidth, int windowHeight, Layout layout, double scale)
+ScreenPlan::ScreenPlan(int windowWidth, int windowHeight, Layout layout, double scale, bool scanned)
     : width(windowWidth),
       height(windowHeight),
       font(std::max(10.0 * std::max(scale, 1.0), std::round(13.0 * std::min(windowWidth / 800.0, windowHeight / 600.0))))
@@ -57,6 +57,20 @@ ScreenPlan::ScreenPlan(int windowWidth, int windowHeight, Layout layout, double 
         planInstructor(*this);
     else
         planTrainee(*this);
+    title = view;
+    if (scanned && layout == Layout::instructor) {
+        ultrasound = slices[2];
+        slices[2] = {};
+    } else if (scanned) {
+        // Large, and the body in the place of the slice; without a place for that the picture has the whole.
+        ultrasound = view;
+        const int upper = static_cast<int>(6.6 * font), lower = static_cast<int>(3 * font);
+        ultrasound.y += lower;
+        ultrasound.height = std::max(ultrasound.height - upper - lower, 1);
+        view = slices[0].empty() ? Area{panel.x, panel.y + panel.height - 1, panel.width, 1} : slices[0];
+        slices[0] = {};
+        legend = {};
+    }
 }
 
 }  // namespace palpate::render

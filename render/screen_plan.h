@@ -23,14 +23,17 @@ struct Area {
 /// Where things are in a window of `width` x `height` pixels. What the window is too small for has an empty area.
 struct ScreenPlan {
     /// `scale`: pixels per point of the screen, from 1.
-    ScreenPlan(int windowWidth, int windowHeight, Layout layout = Layout::trainee, double scale = 1);
+    /// `scanned`: with the ultrasound picture.
+    ScreenPlan(int windowWidth, int windowHeight, Layout layout = Layout::trainee, double scale = 1, bool scanned = false);
 
     int width, height;
     double font;                 // [pixels]
     Area view;                   // 3-D
     std::array<Area, 3> slices;  // trainee: the first only
+    Area ultrasound;             // only where it is shown
     Area panel;                  // figures
     Area events, forces, distances;
+    Area title;                   // scene and session stand in its upper left corner
     Area legend, health, banner;  // banner: the left and right ends and the baseline of warnings
 };
 

@@ -1,6 +1,6 @@
 #include <render/slice_picture.h>
 
-#include <render/needle_shape.h>
+#include <channel/needle_shape.h>
 #include <render/tool_picture.h>
 #include <render/volume_picture.h>
 
@@ -207,7 +207,7 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
         return;
     }
     constexpr double inPlane = 2e-3;  // [m]
-    const NeedleShape shape = needleShape(scenery, state);
+    const channel::NeedleShape shape = needleShape(scenery, state);
     const auto off = [&](glm::dvec3 p) { return std::abs(glm::dot(p - frame_.centre, frame_.towards)) > inPlane; };
     for (const bool border : {true, false})
         for (std::size_t i = 0; i + 1 < shape.size(); ++i) {

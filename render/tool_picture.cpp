@@ -1,7 +1,7 @@
 #include <render/tool_picture.h>
 
+#include <channel/needle_shape.h>
 #include <render/deformation.h>
-#include <render/needle_shape.h>
 
 #include <vtkAppendPolyData.h>
 #include <vtkCellArray.h>
@@ -103,7 +103,7 @@ void show(vtkRenderer& renderer, vtkActor& actor, vtkPolyData* shape, const std:
 }
 
 // Of the line that ends at point `last`, across points that coincide.
-glm::dvec3 endDirection(const NeedleShape& shape, std::size_t last)
+glm::dvec3 endDirection(const channel::NeedleShape& shape, std::size_t last)
 {
     constexpr double apart = 1e-4;  // [m]
     std::size_t before = last;
@@ -203,7 +203,7 @@ void ToolPicture::addPlan(const channel::Scenery& scenery, vtkRenderer& renderer
 
 void ToolPicture::moveNeedle(const channel::Scenery& scenery, const channel::State& state)
 {
-    NeedleShape shape = needleShape(scenery, state);
+    channel::NeedleShape shape = needleShape(scenery, state);
     // The point follows the shaft's end.
     const double point = pointLength(std::max(scenery.toolRadius, 0.2e-3));
     std::size_t last = shape.size() - 1;
@@ -247,7 +247,7 @@ void ToolPicture::update(const channel::Scenery& scenery, const channel::State& 
     glm::dvec3 axis = vec(state.axis);
     if (scenery.tool == channel::ToolKind::needle) {
         moveNeedle(scenery, state);
-        const NeedleShape shape = needleShape(scenery, state);
+        const channel::NeedleShape shape = needleShape(scenery, state);
         axis = endDirection(shape, shape.size() - 1);
     }
     const double length = glm::length(axis);

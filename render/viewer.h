@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::render {
@@ -30,6 +31,8 @@ struct ViewerOptions {
     bool hidden = false;                   // the window is on a display of its own that nobody sees, for measurements
     bool instructor = false;               // layout to begin with
     SliceLook slices = SliceLook::tinted;  // to begin with, where there is an image
+    bool ultrasound = false;               // the ultrasound picture, to begin with
+    std::filesystem::path images = ".";    // folder for ultrasound pictures that are stored
     int width = 1280, height = 960;        // [pixels]
     double every = 0.5;                    // offscreen: session time from one picture to the next [s]
     double wait = 10;                      // how long without a session before giving up [s]
@@ -51,7 +54,11 @@ struct ViewerFigures {
     double delayP50 = 0, delayP99 = 0;  // from the tick to its picture [s]
     double rate = 0;                    // frames per second while it was showing
     std::string display;                // what draws: the renderer's name
-    std::vector<Shown> shown;           // each picture of a tick that was not shown before
+    // Of the ultrasound picture, where it was shown: processor time of a picture and of its stages [s].
+    std::uint64_t scans = 0;
+    double scanP50 = 0, scanP90 = 0, firstScan = 0;
+    std::vector<std::pair<std::string, double>> scanStages;
+    std::vector<Shown> shown;  // each picture of a tick that was not shown before
 };
 
 /// Shows a session until it has ended, its window is closed, or SIGINT or SIGTERM comes. Attaches late, attaches again when

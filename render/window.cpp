@@ -182,6 +182,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     Picture picture(*target);
     picture.show(options.instructor ? Layout::instructor : Layout::trainee);
     picture.show(options.slices);
+    picture.showUltrasound(options.ultrasound);
     vtkNew<vtkGenericRenderWindowInteractor> interactor;
     interactor->SetRenderWindow(target);
     vtkNew<vtkInteractorStyleTrackballCamera> style;
@@ -191,7 +192,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     const Target shown{*target, *interactor};
 
     Follower follower(options.session, options.wait);
-    Controls controls(window.get(), *interactor, picture, follower, options.playback);
+    Controls controls(window.get(), *interactor, picture, follower, options.playback, options.images);
     FrameClock clock;
     auto used = Clock::now();
     const auto nothingToShow = [&] { return options.playback != nullptr && options.playback->length < 0; };
@@ -222,6 +223,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     }
     ViewerFigures figures = follower.figures();
     figures.display = picture.display();
+    addScans(picture.ultrasound(), figures);
     picture.close();
     return figures;
 }

@@ -16,19 +16,20 @@ ARROWS = {
     "chainmail": {"volume", "occupancy"},
     "datasets": {"base", "volume"},
     "channel": {"base"},
-    "render": {"base", "channel"},
+    "ultrasound": {"base", "channel"},
+    "render": {"base", "channel", "ultrasound"},
     "haptics": {"volume", "occupancy", "chainmail", "datasets", "channel"},
     "haptics/falcon": {"base", "volume", "datasets", "haptics"},
     "session": {"base", "volume", "datasets", "haptics", "haptics/falcon", "channel"},
     "report": {"base", "volume", "haptics"},
     "command": {"base", "session"},
-    "studies": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "report", "command", "channel"},
+    "studies": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "report", "command", "channel", "ultrasound"},
     "planner": {"base", "chainmail", "datasets", "haptics", "session", "command", "studies"},
     "sweep": {"base", "volume", "datasets", "haptics", "session", "report", "command"},
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
-        "studies", "planner", "sweep", "render", "reference",
+        "studies", "planner", "sweep", "ultrasound", "render", "reference",
     },
 }
 # Third-party headers that stay in one folder.

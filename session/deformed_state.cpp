@@ -1,5 +1,6 @@
 #include <session/deformed_state.h>
 
+#include <haptics/broadcast.h>
 #include <haptics/replay.h>
 #include <session/open.h>
 
@@ -8,6 +9,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -44,11 +46,10 @@ bool inside(const volume::Box& box, Vec3 p)
 
 }  // namespace
 
-DeformedState::DeformedState(const std::string& file, double at, const std::function<void(double)>& progress)
-    : record_(file), model_(reopenSession(file, record_.info()))
+std::uint64_t tickAt(const haptics::Record& record, const std::string& file, double at)
 {
-    const double rate = record_.info().rate;
-    const std::uint64_t ticks = record_.ticks();
+    const double rate = record.info().rate;
+    const std::uint64_t ticks = record.ticks();
     if (ticks == 0) {
         throw std::runtime_error(file + ": no tick was recorded: there is no state to export");
     }
@@ -56,12 +57,16 @@ DeformedState::DeformedState(const std::string& file, double at, const std::func
     if (!(at >= 0 && at <= last + 1e-9)) {
         throw std::runtime_error(fmt::format("{}: --at {:g}s: the record runs from 0 s to {:g} s", file, at, last));
     }
-    tick_ = static_cast<std::uint64_t>(std::floor(at * rate + 1e-6));
-    simulation_ = std::make_unique<haptics::Simulation>(model_, haptics::SimulationOptions{1.0 / rate, {}});
+    return static_cast<std::uint64_t>(std::floor(at * rate + 1e-6));
+}
+
+void recompute(const haptics::Record& record, haptics::Simulation& simulation, const std::string& file, std::uint64_t tick,
+               const std::function<void(const haptics::TickRecord&)>& each, const std::function<void(double)>& progress)
+{
     std::uint64_t next = 0;
-    haptics::TickComparison comparison(record_);
-    record_.each([&](const haptics::TickRecord& then) {
-        if (next > tick_) {
+    haptics::TickComparison comparison(record);
+    record.each([&](const haptics::TickRecord& then) {
+        if (next > tick) {
             return;
         }
         if (then.tick != next) {
@@ -70,17 +75,54 @@ DeformedState::DeformedState(const std::string& file, double at, const std::func
                             "computed",
                             file, next));
         }
-        if (!comparison.add(then, simulation_->tick(then.device))) {
+        const haptics::TickRecord& now = simulation.tick(then.device);
+        if (!comparison.add(then, now)) {
             throw std::runtime_error(
                 fmt::format("{}: differs from tick {} on: the record was made by another build ({}) or machine, or was "
                             "changed: {}",
-                            file, next, record_.info().build, comparison.inWords()));
+                            file, next, record.info().build, comparison.inWords()));
+        }
+        if (each) {
+            each(now);
         }
         if (progress && next % 256 == 0) {
-            progress(static_cast<double>(next) / static_cast<double>(tick_ + 1));
+            progress(static_cast<double>(next) / static_cast<double>(tick + 1));
         }
         ++next;
     });
+}
+
+ShownState shownState(const std::string& file, double at, std::optional<std::uint64_t> shapeTick,
+                      const std::function<void(double)>& progress)
+{
+    const haptics::Record record(file);
+    const haptics::SessionModel model = reopenSession(file, record.info());
+    const std::uint64_t tick = tickAt(record, file, at);
+    const std::uint64_t shape = std::min(shapeTick.value_or(tick / channel::frameTicks * channel::frameTicks), tick);
+    ShownState shown;
+    shown.showing = haptics::showingOf(model, false, haptics::displayGrid(*model.tissue));
+    haptics::Simulation simulation(model, {1.0 / record.info().rate, {}});
+    const haptics::ServoTiming timing;
+    recompute(
+        record, simulation, file, tick,
+        [&](const haptics::TickRecord& now) {
+            haptics::showTick(now, timing, shown.state);
+            if (now.tick == shape) {
+                haptics::showShape(simulation, *shown.shape);
+                shown.shape->tick = shape;
+            }
+        },
+        progress);
+    return shown;
+}
+
+DeformedState::DeformedState(const std::string& file, double at, const std::function<void(double)>& progress)
+    : record_(file), model_(reopenSession(file, record_.info()))
+{
+    const double rate = record_.info().rate;
+    tick_ = tickAt(record_, file, at);
+    simulation_ = std::make_unique<haptics::Simulation>(model_, haptics::SimulationOptions{1.0 / rate, {}});
+    recompute(record_, *simulation_, file, tick_, {}, progress);
 }
 
 volume::LabelImage DeformedState::labels() const

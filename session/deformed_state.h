@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/recorder.h>
+#include <haptics/scenery.h>
 #include <haptics/session_model.h>
 #include <haptics/simulation.h>
 #include <volume/resample.h>
@@ -8,10 +9,31 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace palpate::session {
+
+/// The last tick of a record that is not later than `at` [s]. Throws std::runtime_error for a time that it does not have.
+std::uint64_t tickAt(const haptics::Record& record, const std::string& file, double at);
+
+/// Computes a record again up to `tick`, and tells `each` of every tick; both may be empty. Throws std::runtime_error for
+/// forces that are not the record's.
+void recompute(const haptics::Record& record, haptics::Simulation& simulation, const std::string& file, std::uint64_t tick,
+               const std::function<void(const haptics::TickRecord&)>& each, const std::function<void(double)>& progress);
+
+/// What a viewer was shown at one moment of a record.
+struct ShownState {
+    haptics::Showing showing;                                                            // what it was told once
+    channel::State state;                                                                // of the tick
+    std::unique_ptr<channel::Displaced> shape = std::make_unique<channel::Displaced>();  // the last that was published
+};
+
+/// Computes the record `file` again up to `at` [s]. `shapeTick`: when the displaced nodes were published; nothing: the last
+/// publication before `at`. Throws as DeformedState.
+ShownState shownState(const std::string& file, double at, std::optional<std::uint64_t> shapeTick,
+                      const std::function<void(double)>& progress);
 
 /// The body of a recorded session at one moment, computed again from the record's poses.
 class DeformedState {

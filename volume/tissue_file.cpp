@@ -10,6 +10,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -50,26 +51,59 @@ Index3 index3(const json& j)
     return {j.at(0).get<int>(), j.at(1).get<int>(), j.at(2).get<int>()};
 }
 
+json toJson(const Acoustics& a)
+{
+    return {{"sound_speed_m_s", a.soundSpeed},
+            {"attenuation_db_cm", a.attenuation},
+            {"attenuation_power", a.attenuationPower},
+            {"echo_db", a.echo},
+            {"echo_variation_db", a.echoVariation},
+            {"echo_pattern", std::string(echoPatterns[static_cast<std::size_t>(a.pattern)])},
+            {"source", a.source}};
+}
+
+Acoustics acousticsFrom(const json& j)
+{
+    Acoustics a;
+    a.soundSpeed = j.at("sound_speed_m_s").get<double>();
+    a.attenuation = j.at("attenuation_db_cm").get<double>();
+    a.attenuationPower = j.at("attenuation_power").get<double>();
+    a.echo = j.at("echo_db").get<double>();
+    a.echoVariation = j.at("echo_variation_db").get<double>();
+    const auto pattern = j.at("echo_pattern").get<std::string>();
+    const auto* const found = std::find(echoPatterns.begin(), echoPatterns.end(), pattern);
+    if (found == echoPatterns.end()) {
+        throw std::runtime_error(fmt::format("unknown echo pattern '{}'", pattern));
+    }
+    a.pattern = static_cast<EchoPattern>(found - echoPatterns.begin());
+    a.source = j.at("source").get<std::string>();
+    return a;
+}
+
 json toJson(const TissueRow& row)
 {
-    return {{"name", row.name},
-            {"role", std::string(name(row.role))},
-            {"youngs_pa", row.youngsModulus},
-            {"poisson", row.poissonRatio},
-            {"stiffening", row.stiffening},
-            {"density_kg_m3", row.density},
-            {"compress", row.compress},
-            {"stretch", row.stretch},
-            {"shear", row.shear},
-            {"puncture_n", row.punctureForce},
-            {"cutting_n", row.cuttingForce},
-            {"friction_n_m", row.frictionPerMetre},
-            {"stiction_n_m", row.stictionPerMetre},
-            {"friction_ns_m2", row.frictionDamping},
-            {"fixed", row.fixed},
-            {"colour", json::array({row.colour.r, row.colour.g, row.colour.b})},
-            {"opacity", row.opacity},
-            {"source", row.source}};
+    json out{{"name", row.name},
+             {"role", std::string(name(row.role))},
+             {"youngs_pa", row.youngsModulus},
+             {"poisson", row.poissonRatio},
+             {"stiffening", row.stiffening},
+             {"density_kg_m3", row.density},
+             {"compress", row.compress},
+             {"stretch", row.stretch},
+             {"shear", row.shear},
+             {"puncture_n", row.punctureForce},
+             {"cutting_n", row.cuttingForce},
+             {"friction_n_m", row.frictionPerMetre},
+             {"stiction_n_m", row.stictionPerMetre},
+             {"friction_ns_m2", row.frictionDamping},
+             {"fixed", row.fixed},
+             {"colour", json::array({row.colour.r, row.colour.g, row.colour.b})},
+             {"opacity", row.opacity},
+             {"source", row.source}};
+    if (row.acoustics.given()) {
+        out["acoustics"] = toJson(row.acoustics);
+    }
+    return out;
 }
 
 TissueRow rowFrom(const json& j)
@@ -98,6 +132,9 @@ TissueRow rowFrom(const json& j)
     row.colour = {colour.at(0).get<float>(), colour.at(1).get<float>(), colour.at(2).get<float>()};
     row.opacity = j.at("opacity").get<float>();
     row.source = j.at("source").get<std::string>();
+    if (const auto acoustics = j.find("acoustics"); acoustics != j.end()) {
+        row.acoustics = acousticsFrom(*acoustics);
+    }
     return row;
 }
 

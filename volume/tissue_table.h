@@ -2,6 +2,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -15,6 +16,24 @@ enum class Role : std::uint8_t { plain, skin, tumour, vital, bone, air };
 
 std::string_view name(Role role) noexcept;
 std::optional<Role> roleNamed(std::string_view name) noexcept;
+
+/// How the echo of a tissue varies from place to place: evenly, as lobules in stroma, as fibres along z, or as septa
+/// between lobules.
+enum class EchoPattern : std::uint8_t { even, lobules, fibres, septa };
+inline constexpr std::array<std::string_view, 4> echoPatterns{"even", "lobules", "fibres", "septa"};
+
+/// What a tissue does to ultrasound. Attenuation one way is `attenuation` f^`attenuationPower` with f in MHz.
+struct Acoustics {
+    double soundSpeed = 0;                    // [m/s]; 0: the table says nothing of ultrasound
+    double attenuation = 0;                   // [dB/cm at 1 MHz]
+    double attenuationPower = 1;              // of the frequency [-]
+    double echo = 0;                          // level of the speckle over that of breast fat [dB]
+    double echoVariation = 0;                 // from place to place, about its largest [dB]
+    EchoPattern pattern = EchoPattern::even;  // of that variation
+    std::string source;                       // where the numbers come from
+    /// Whether the table says anything of ultrasound.
+    bool given() const noexcept { return soundSpeed > 0; }
+};
 
 /// One tissue. SI units. Every row says where its numbers come from.
 struct TissueRow {
@@ -37,6 +56,7 @@ struct TissueRow {
     glm::vec3 colour{1.0F};      // display, RGB in [0, 1]
     float opacity = 0;           // display, in [0, 1]
     std::string source;          // where the numbers come from
+    Acoustics acoustics;         // for the ultrasound picture; forces do not depend on it
 };
 
 /// Rows in order; row 0 is always "air", the outside.

@@ -44,6 +44,7 @@ struct Options {
     int frames = 150;
     session::SceneChanges changes;
     bool alone = false;
+    bool ultrasound = false;
     std::string json;
 };
 
@@ -184,11 +185,21 @@ nlohmann::json measure(const Options& o, const haptics::SessionModel& model, int
         servo = std::make_unique<ServoBeside>(model);
     }
     const fs::path file = fs::temp_directory_path() / (session + ".json");
-    base::ChildProcess viewer(
-        (base::programFolder() / "palpate-view").string(),
-        {"--session", session, "--hidden", "--layout", layout, "--size", fmt::format("{}x{}", o.width, o.height),
-         "--frames", fmt::format("{}", o.frames), "--json", file.string()},
-        "build it with PALPATE_VIEWER=ON");
+    std::vector<std::string> words{"--session",
+                                   session,
+                                   "--hidden",
+                                   "--layout",
+                                   layout,
+                                   "--size",
+                                   fmt::format("{}x{}", o.width, o.height),
+                                   "--frames",
+                                   fmt::format("{}", o.frames),
+                                   "--json",
+                                   file.string()};
+    if (o.ultrasound) {
+        words.emplace_back("--ultrasound");
+    }
+    base::ChildProcess viewer((base::programFolder() / "palpate-view").string(), words, "build it with PALPATE_VIEWER=ON");
     if (publishWave(publisher, model, wave, viewer) != 0) {
         throw std::runtime_error("palpate-view did not finish its pictures: see its message above");
     }
@@ -204,6 +215,9 @@ nlohmann::json measure(const Options& o, const haptics::SessionModel& model, int
                           {"frames_per_second", figures["frames_per_second"]},
                           {"frame_ms_p50", figures["frame_ms_p50"]},
                           {"frame_ms_p90", figures["frame_ms_p90"]}};
+    if (o.ultrasound) {
+        result["ultrasound"] = figures.value("ultrasound", nlohmann::json::object());
+    }
     if (servo) {
         servo->end();
         result["lateness_us_p99"] = servo->latenessP99();
@@ -212,6 +226,22 @@ nlohmann::json measure(const Options& o, const haptics::SessionModel& model, int
         result["warnings"] = servo->warnings;
     }
     return result;
+}
+
+// Of the scanner: pictures a second if it had a core for itself, and where its time goes.
+void printScans(const nlohmann::json& c)
+{
+    const auto scans = c.find("ultrasound");
+    if (scans == c.end() || !scans->contains("ms_p90")) {
+        return;
+    }
+    fmt::print("{:>8} {:<10} {:>9.1f} {:>9.1f} {:>9.1f}   first {:.0f} ms;", "", "ultrasound",
+               (*scans)["ms_p50"].get<double>(), (*scans)["ms_p90"].get<double>(), 1e3 / (*scans)["ms_p50"].get<double>(),
+               (*scans)["first_ms"].get<double>());
+    for (const auto& [name, ms] : (*scans)["stages_ms"].items()) {
+        fmt::print(" {} {:.1f}", name, ms.get<double>());
+    }
+    fmt::print(" ms\n");
 }
 
 void benchView(const Options& o)
@@ -245,6 +275,7 @@ void benchView(const Options& o)
                            c["frame_ms_p50"].get<double>(), c["frame_ms_p90"].get<double>(),
                            c["frames_per_second"].get<double>(), c.value("lateness_us_p99", 0.0),
                            100 * c.value("missed_share", 0.0));
+                printScans(c);
                 std::fflush(stdout);
             }
             cases.push_back(c);
@@ -278,6 +309,8 @@ void addBenchView(CLI::App& bench)
     view->add_option("--frames", o->frames, "Pictures of each case")->check(CLI::Range(10, 100000))->capture_default_str();
     command::addSetting(*view, o->changes);
     view->add_flag("--alone", o->alone, "Without a servo loop beside it, to compare");
+    view->add_flag("--ultrasound", o->ultrasound,
+                   "With the ultrasound picture: processor time of each and of its stages too");
     view->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     view->final_callback([o] { benchView(*o); });
 }

@@ -250,7 +250,8 @@ TEST_F(Researcher, AnExportIsImportedAgainAsItWas)
         }
         EXPECT_EQ(after.at("provenance").at("label hash"), before.at("provenance").at("label hash"));
     }
-    expectRefusal({"export", vdb, "-o", folder / "e.png"}, "is no format that is written");
+    expectRefusal({"export", vdb, "-o", folder / "e.jpg"}, "is no format that is written");
+    expectRefusal({"export", vdb, "-o", folder / "e.png"}, "is of a session");
     expectRefusal({"export", vdb, "-o", folder / "e.vtu"}, "is of a session");
     expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--what", "image"}, "holds no image");
 }

@@ -40,6 +40,24 @@ inline std::vector<std::uint8_t> smallLabels()
     return labels;
 }
 
+inline Scenery fineScenery()
+{
+    Scenery scenery = smallScenery();
+    scenery.fine.size = {9, 7, 5};
+    scenery.fine.spacing = 0.0005;
+    scenery.sound[1] = {1540, 1060, 0.7F, 1, 3, 4, 3};
+    scenery.probe = ProbeKind::linear;
+    return scenery;
+}
+
+inline std::vector<std::uint8_t> finelyLabelled()
+{
+    std::vector<std::uint8_t> labels(9 * 7 * 5);
+    for (std::size_t i = 0; i < labels.size(); ++i)
+        labels[i] = static_cast<std::uint8_t>(i % 3 % 2);
+    return labels;
+}
+
 // A state in which every number follows from `tick`, so that a copy mixed from two ticks shows.
 inline State stateOf(std::uint64_t tick)
 {

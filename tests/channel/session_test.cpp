@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <fstream>
 #include <functional>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -445,6 +446,28 @@ TEST(Session, WhoseImageIsNotWhatTheSceneryClaimsIsRefused)
     EXPECT_TRUE(refused(scenery.labels.size[2], 30));
     EXPECT_TRUE(refused(scenery.labels.size[2], -3));
     EXPECT_TRUE(Subscriber::attach(session).has_value());
+}
+
+TEST(Session, BringsFineLabelsToViewers)
+{
+    const std::string session = sessionNamed("fine");
+    Scenery scenery = smallScenery();
+    scenery.fine = {{4, 3, 2}, 0, {0, 0, 0}, 1e-4};
+    std::vector<std::uint8_t> fine(24);
+    std::iota(fine.begin(), fine.end(), std::uint8_t{1});
+    {
+        const Publisher publisher(session, scenery, smallLabels(), {}, fine);
+        const auto viewer = Subscriber::attach(session);
+        ASSERT_TRUE(viewer);
+        EXPECT_EQ(std::vector<std::uint8_t>(viewer->fine().begin(), viewer->fine().end()), fine);
+        RawSegment raw(segmentName(session));
+        raw.at<Header>(0).fineBytes = 23;
+        EXPECT_NE(messageOf([&] { Subscriber::attach(session); }).find("damaged"), std::string::npos);
+    }
+    fine.pop_back();
+    EXPECT_NE(messageOf([&] { Publisher(session, scenery, smallLabels(), {}, fine); }).find("23 fine labels"),
+              std::string::npos);
+    EXPECT_FALSE(listed(session));
 }
 
 TEST(Session, LabelsThatDoNotFillTheGridAreRefused)

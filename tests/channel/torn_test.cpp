@@ -105,7 +105,15 @@ TEST(Bounds, AStateThatIsNoneIsNotShown)
                                                [](State& s) { s.warned = 1; },
                                                [](State& s) { s.tissue = 64; },
                                                [](State& s) { s.aheadTissue = 0xFFFFFFFF; },
-                                               [](State& s) { s.distance[3] = nan; }};
+                                               [](State& s) { s.distance[3] = nan; },
+                                               [](State& s) { s.probe.face[0] = nan; },
+                                               [](State& s) {
+                                                   s.probe.axial = {0, 0, 0};
+                                               },
+                                               [](State& s) { s.probe.lateral = s.probe.axial; },
+                                               [](State& s) { s.probe.force = 1e9; },
+                                               [](State& s) { s.holes = maxHoles + 1; },
+                                               [](State& s) { s.hole[2].to[1] = std::numeric_limits<float>::infinity(); }};
     for (const auto& fault : faults) {
         State state = stateOf(4);
         publisher.setState(state);
@@ -113,6 +121,52 @@ TEST(Bounds, AStateThatIsNoneIsNotShown)
         fault(state);
         publisher.setState(state);
         EXPECT_FALSE(subscriber->state());
+    }
+}
+
+TEST(Bounds, AnUltrasoundThatIsNoneIsNoScenery)
+{
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    const std::vector<void (*)(Scenery&)> faults{
+        [](Scenery& s) { s.fine.spacing = 0; },          [](Scenery& s) { s.fine.size[1] = -4; },
+        [](Scenery& s) { s.fine.size[2] = 1 << 20; },    [](Scenery& s) { s.sound[63].soundSpeed = nan; },
+        [](Scenery& s) { s.sound[1].attenuation = -1; }, [](Scenery& s) { s.sound[1].echo = 1e30F; },
+        [](Scenery& s) { s.sound[0].pattern = 4; },      [](Scenery& s) { s.probe = static_cast<ProbeKind>(3); },
+        [](Scenery& s) { s.probeFrequency = -5e6; },     [](Scenery& s) { s.holeRadius = std::nan(""); }};
+    const std::vector<std::uint8_t> fine(finelyLabelled().size());
+    for (const auto& fault : faults) {
+        Scenery scenery = fineScenery();
+        EXPECT_TRUE(sound(scenery));
+        fault(scenery);
+        EXPECT_FALSE(sound(scenery));
+        EXPECT_THROW(Publisher(sessionNamed("unsound"), scenery, smallLabels(), {}, fine), std::runtime_error);
+    }
+}
+
+// Its place and its length in the header are whatever somebody has written there.
+TEST(Bounds, FineLabelsLieInsideTheSegment)
+{
+    const std::string session = sessionNamed("fine");
+    Publisher publisher(session, fineScenery(), smallLabels(), {}, finelyLabelled());
+    const auto viewer = Subscriber::attach(session);
+    ASSERT_TRUE(viewer);
+    const auto given = viewer->fine();
+    EXPECT_EQ(std::vector<std::uint8_t>(given.begin(), given.end()), finelyLabelled());
+    RawSegment raw(segmentName(session));
+    auto& header = raw.at<Header>(0);
+    const std::uint64_t offset = header.fineOffset, bytes = header.fineBytes;
+    for (const auto& [at, length] : {std::pair{raw.bytes(), bytes},
+                                     {raw.bytes() - bytes + 8, bytes},
+                                     {~7ULL, bytes},
+                                     {offset, bytes + 1},
+                                     {offset, bytes - 1},
+                                     {offset, ~0ULL},
+                                     {offset, 0ULL}}) {
+        header.fineOffset = at;
+        header.fineBytes = length;
+        EXPECT_THROW(Subscriber::attach(session), std::runtime_error) << at << ' ' << length;
+        EXPECT_EQ(viewer->fine().data(), given.data()) << "what was checked is a copy";
+        EXPECT_EQ(viewer->fine().size(), bytes);
     }
 }
 
@@ -174,7 +228,7 @@ TEST(Bounds, ViewersTakeOnlyWhatTheyCanShow)
     const int count = tests::fuzzCount(400);
     const auto displaced = std::make_unique<Displaced>();
     int shown = 0, refused = 0;
-    Publisher publisher(session, smallScenery(), smallLabels());
+    Publisher publisher(session, fineScenery(), smallLabels(), {}, finelyLabelled());
     publisher.setState(stateOf(3));
     fillDisplaced(publisher.backBuffer(), 3);
     publisher.publishDisplaced();
@@ -199,6 +253,9 @@ TEST(Bounds, ViewersTakeOnlyWhatTheyCanShow)
             ASSERT_EQ(viewer->labels().size(), voxelsOf(s.labels));
             std::size_t sum = viewer->image().size();
             for (const std::uint8_t label : viewer->labels())
+                sum += label;
+            ASSERT_EQ(viewer->fine().size(), voxelsOf(s.fine));
+            for (const std::uint8_t label : viewer->fine())
                 sum += label;
             if (const auto state = viewer->state()) {
                 ASSERT_TRUE(sound(*state, s)) << i;

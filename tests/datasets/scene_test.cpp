@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include <cmath>
 #include <random>
@@ -62,6 +63,10 @@ Scene fullScene(std::mt19937_64& random)
                     {Kind::press, *scene.aim, draw(0.01, 0.1), 3, 2e-3},
                     {Kind::fire, Vec3(0), 0.02, 0, 1e-3},
                     {Kind::wait, Vec3(0), 0.02, draw(0.1, 1), 1e-3}};
+    scene.probe = {ProbeKind::curved, *scene.entry,
+                   {0.6, 0.8, 0},     {-0.8, 0.6, 0},
+                   draw(0.03, 0.2),   draw(2e6, 9e6),
+                   draw(0.01, 0.1),   {{draw(0, 1), 1e-3, draw(-0.1, 0.1), 0, 0.1}, {2, draw(0, 0.04)}}};
     return scene;
 }
 
@@ -89,7 +94,39 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
         EXPECT_NEAR(a.poissonCap, e.poissonCap, 1e-12);
         EXPECT_NEAR(a.viscosity, e.viscosity, 1e-12);
         EXPECT_NEAR(a.friction, e.friction, 1e-12);
+        EXPECT_EQ(again.probe.kind, ProbeKind::curved);
+        EXPECT_NEAR(again.probe.lateral.x, -0.8, 1e-12);
+        EXPECT_NEAR(again.probe.depth, scene.probe.depth, 1e-12);
+        EXPECT_NEAR(again.probe.frequency, scene.probe.frequency, 1e-3);
+        ASSERT_EQ(again.probe.script.size(), 2U);
+        EXPECT_NEAR(again.probe.script[0].slide, scene.probe.script[0].slide, 1e-12);
     }
+}
+
+// Linear between the steps, from where it begins; after the last it stays. Rocking turns both axes within the plane.
+TEST(Probe, GoesStraightFromStepToStep)
+{
+    ProbeSpec probe;
+    probe.kind = ProbeKind::linear;
+    probe.face = Vec3(0.1, 0.2, 0.3);
+    probe.direction = Vec3(0, 1, 0);
+    probe.lateral = Vec3(1, 0, 0);
+    EXPECT_EQ(probeAt(probe, 5).face, probe.face);
+    probe.script = {{1, 4e-3, 2e-3, 0, 0}, {3, 0, 2e-3, -6e-3, 0.5}};
+    const auto expectFace = [&](double t, Vec3 shift) {
+        const Vec3 off = probeAt(probe, t).face - probe.face - shift;
+        EXPECT_NEAR(glm::length(off), 0, 1e-15) << t;
+    };
+    const Vec3 elevation = glm::cross(probe.direction, probe.lateral);
+    expectFace(0, Vec3(0));
+    expectFace(0.5, 2e-3 * probe.direction + 1e-3 * probe.lateral);
+    expectFace(1, 4e-3 * probe.direction + 2e-3 * probe.lateral);
+    expectFace(2, 2e-3 * probe.direction + 2e-3 * probe.lateral - 3e-3 * elevation);
+    expectFace(9, 2e-3 * probe.lateral - 6e-3 * elevation);
+    const ProbePlace rocked = probeAt(probe, 9);
+    EXPECT_NEAR(glm::dot(rocked.direction, rocked.lateral), 0, 1e-15);
+    EXPECT_NEAR(glm::dot(rocked.direction, probe.direction), std::cos(0.5), 1e-15);
+    EXPECT_NEAR(glm::dot(rocked.direction, elevation), 0, 1e-15);
 }
 
 const std::string head = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n";
@@ -230,6 +267,20 @@ TEST(Scene, EveryBrokenKeyIsNamedWithFileAndLine)
         }
     }
     EXPECT_GT(broken, 300);
+}
+
+TEST(Scene, AProbeThatCannotBeIsRefused)
+{
+    const std::string probe = "[probe]\nkind = \"linear\"\nface_mm = [0, 0, 0]\ndirection = [0, 1, 0]\n";
+    const auto expect = [&](const std::string& text, const std::string& what) {
+        EXPECT_NE(errorOf(head + text).find(what), std::string::npos) << errorOf(head + text);
+    };
+    expect(probe + "lateral = [0, 2, 0]\n", "must not be along direction");
+    expect(probe + "lateral = [0, 0, 0]\n", "must not be [0, 0, 0]");
+    expect(probe, "lateral");
+    expect("[[probe_step]]\nat_s = 1\n", "needs a [probe]");
+    expect(probe + "lateral = [1, 0, 0]\n[[probe_step]]\nat_s = 1\n[[probe_step]]\nat_s = 1\n", "must be later");
+    EXPECT_EQ(errorOf(head + probe + "lateral = [1, 0, 0]\n"), "no error");
 }
 
 TEST(Scene, AnUnknownKeyProposesTheNearest)

@@ -38,6 +38,48 @@ TEST(TissueTable, EveryRowHasASourceAndPhysicalValues)
     }
 }
 
+// Each figure has a source, or the word assumed; echo levels are on no scale that papers share.
+TEST(TissueTable, EveryRowSaysWhatItDoesToUltrasoundAndFromWhere)
+{
+    for (const TissueRow& r : defaultTissues().rows) {
+        SCOPED_TRACE(r.name);
+        const volume::Acoustics& a = r.acoustics;
+        EXPECT_TRUE(a.given());
+        EXPECT_TRUE(a.soundSpeed > 300 && a.soundSpeed < 4000);
+        EXPECT_TRUE(a.attenuation >= 0 && a.attenuationPower > 0);
+        for (const char* column : {"c: ", "c, ", "attenuation: ", "echo: "}) {
+            const bool both = a.source.find("c, attenuation: ") != std::string::npos;
+            const bool needed = std::string(column) != (both ? "c: " : "c, ");
+            EXPECT_EQ(a.source.find(column) != std::string::npos, needed) << column;
+        }
+    }
+    EXPECT_EQ(row(defaultTissues(), "fat").acoustics.echo, 0) << "the reference";
+}
+
+// A row without such figures has those of the built-in table: by its name, else by its role.
+TEST(TissueTable, TissuesThatSayNothingOfUltrasoundHaveStandIns)
+{
+    TissueRow mine = row(defaultTissues(), "liver");
+    EXPECT_EQ(acousticsOf(mine).soundSpeed, 1586);
+    mine.acoustics.soundSpeed = 1600;
+    EXPECT_EQ(acousticsOf(mine).soundSpeed, 1600);
+    mine.acoustics = {};
+    EXPECT_EQ(acousticsOf(mine).soundSpeed, 1586);
+    mine.name = "my own";
+    EXPECT_EQ(acousticsOf(mine).soundSpeed, 1540);
+    mine.role = Role::bone;
+    EXPECT_EQ(acousticsOf(mine).soundSpeed, 3500);
+}
+
+TEST(TissueTable, AScenesEchoTakesThePlaceOfTheTables)
+{
+    const std::vector<TissueChange> changes{{"fat", {{"echo_db", -3.5}}}};
+    const TissueTable changed = withChanges(defaultTissues(), changes);
+    EXPECT_EQ(row(changed, "fat").acoustics.echo, -3.5);
+    EXPECT_EQ(row(changed, "fat").acoustics.soundSpeed, 1440);
+    EXPECT_EQ(row(changed, "gland").acoustics.echo, row(defaultTissues(), "gland").acoustics.echo);
+}
+
 // Samani, Zubovits, Plewes 2007, Phys Med Biol 52:1565, small strain [Pa].
 TEST(TissueTable, BreastFollowsSamani2007)
 {

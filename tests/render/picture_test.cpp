@@ -1,7 +1,7 @@
 #include <render/picture.h>
 
+#include <channel/needle_shape.h>
 #include <render/display.h>
-#include <render/needle_shape.h>
 #include <tests/render/body.h>
 
 #include <gtest/gtest.h>
@@ -181,7 +181,7 @@ TEST_F(PictureTest, ShowsTheBentNeedleWhereThePoseProjects)
     for (const auto& [layout, layoutName] : layouts)
         for (const Moment& moment : moments) {
             const Image image = studio->take(moment.time, layout, false, std::string(layoutName) + "-" + moment.name);
-            const NeedleShape shape = needleShape(studio->scenery, storyState(studio->scenery, moment.time));
+            const channel::NeedleShape shape = needleShape(studio->scenery, storyState(studio->scenery, moment.time));
             const Area view = ScreenPlan(width, height, layout).view;
             int inside = 0, seen = 0;
             for (std::size_t i = 0; i + 1 < shape.size(); ++i)

@@ -1,5 +1,5 @@
+#include <channel/needle_shape.h>
 #include <render/events.h>
-#include <render/needle_shape.h>
 #include <render/screen_plan.h>
 #include <render/shift_field.h>
 #include <render/traces.h>
@@ -21,7 +21,7 @@ TEST(NeedleShape, IsStraightWithoutABend)
 {
     const channel::Scenery scenery = bodyScenery();
     const channel::State state = storyState(scenery, 1.5);
-    const NeedleShape shape = needleShape(scenery, state);
+    const channel::NeedleShape shape = needleShape(scenery, state);
     EXPECT_NEAR(glm::distance(shape.front(), shape.back()), scenery.toolLength, 1e-12);
     for (const glm::dvec3& p : shape)
         EXPECT_NEAR(glm::length(glm::cross(p - shape.back(), vec(state.axis))), 0, 1e-12);
@@ -34,7 +34,7 @@ TEST(NeedleShape, BendsWithConstantCurvatureFromTheEntryOn)
     channel::State state = storyState(scenery, 3.4);
     state.inserted = 0.04;
     const glm::dvec3 aside = glm::normalize(vec(state.bend));
-    const NeedleShape shape = needleShape(scenery, state);
+    const channel::NeedleShape shape = needleShape(scenery, state);
     EXPECT_NEAR(glm::distance(shape.back(), vec(state.tip)), 0, 1e-12);
     const auto off = [&](std::size_t i) { return glm::dot(shape[i] - shape[0], aside); };
     EXPECT_NEAR(off(1), 0, 1e-12);

@@ -34,9 +34,11 @@ inline TissueRow row(const char* name, Role role, double youngsModulus)
 
 inline TissueTable table()
 {
-    return {"test",
-            {row("air", Role::air, 0), row("fat", Role::plain, 3.25e3), row("tumour", Role::tumour, 43.7e3),
-             row("bone", Role::bone, 1e6)}};
+    TissueTable table{"test",
+                      {row("air", Role::air, 0), row("fat", Role::plain, 3.25e3), row("tumour", Role::tumour, 43.7e3),
+                       row("bone", Role::bone, 1e6)}};
+    table.rows[1].acoustics = {1440, 0.38, 1.16, -0.3, 2.5, EchoPattern::septa, "c: \"recalled\""};
+    return table;
 }
 
 inline std::vector<LabelName> names()

@@ -77,7 +77,8 @@ TEST_F(TissueFile, SaveAndLoadGiveBackEverythingExactly)
     const auto all = [](const TissueRow& r) {
         return std::tie(r.name, r.role, r.youngsModulus, r.poissonRatio, r.density, r.compress, r.stretch, r.shear,
                         r.punctureForce, r.cuttingForce, r.frictionPerMetre, r.fixed, r.colour.x, r.colour.y, r.colour.z,
-                        r.opacity, r.source);
+                        r.opacity, r.source, r.acoustics.soundSpeed, r.acoustics.attenuation, r.acoustics.attenuationPower,
+                        r.acoustics.echo, r.acoustics.echoVariation, r.acoustics.pattern, r.acoustics.source);
     };
     ASSERT_EQ(loaded.table().rows.size(), table().rows.size());
     EXPECT_EQ(loaded.table().name, "test");

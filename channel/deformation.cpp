@@ -1,4 +1,4 @@
-#include <render/deformation.h>
+#include <channel/deformation.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -8,33 +8,33 @@
 #include <bit>
 #include <cmath>
 
-namespace palpate::render {
+namespace palpate::channel {
 namespace {
 
-std::size_t offset(const channel::Grid& grid, glm::ivec3 n) noexcept
+std::size_t offset(const Grid& grid, glm::ivec3 n) noexcept
 {
     return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(grid.size[1]) + static_cast<std::size_t>(n.y)) *
                static_cast<std::size_t>(grid.size[0]) +
            static_cast<std::size_t>(n.x);
 }
 
-glm::ivec3 size(const channel::Grid& grid) noexcept
+glm::ivec3 size(const Grid& grid) noexcept
 {
     return {grid.size[0], grid.size[1], grid.size[2]};
 }
 
-glm::ivec3 node(const channel::Grid& grid, std::uint32_t at) noexcept
+glm::ivec3 node(const Grid& grid, std::uint32_t at) noexcept
 {
     const auto nx = static_cast<std::uint32_t>(grid.size[0]), ny = static_cast<std::uint32_t>(grid.size[1]);
     return {static_cast<int>(at % nx), static_cast<int>(at / nx % ny), static_cast<int>(at / nx / ny)};
 }
 
-bool inside(const channel::Grid& grid, glm::ivec3 n) noexcept
+bool inside(const Grid& grid, glm::ivec3 n) noexcept
 {
     return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < grid.size[0] && n.y < grid.size[1] && n.z < grid.size[2];
 }
 
-glm::dvec3 position(const channel::Grid& grid, glm::ivec3 n) noexcept
+glm::dvec3 position(const Grid& grid, glm::ivec3 n) noexcept
 {
     return vec(grid.origin) + grid.spacing * glm::dvec3(n);
 }
@@ -65,7 +65,7 @@ VoxelBox enclosing(const VoxelBox& a, const VoxelBox& b) noexcept
     return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
 }
 
-Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::uint8_t> labels)
+Deformation::Deformation(const Scenery& scenery, std::span<const std::uint8_t> labels)
     : labelGrid_(scenery.labels),
       lattice_(scenery.lattice),
       labels_(labels.begin(), labels.end()),
@@ -83,9 +83,9 @@ Deformation::Deformation(const channel::Scenery& scenery, std::span<const std::u
 // Axis after axis: of three cells that are the same within themselves and to each other.
 void Deformation::markPure()
 {
-    constexpr std::uint8_t compared = channel::rowBits | pureBit;
+    constexpr std::uint8_t compared = rowBits | pureBit;
     for (std::uint8_t& label : labels_)
-        label = static_cast<std::uint8_t>((label & ~compared) | (label & channel::rowBits) | pureBit);
+        label = static_cast<std::uint8_t>((label & ~compared) | (label & rowBits) | pureBit);
     std::vector<std::uint8_t> before;
     std::size_t stride = 1;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -141,16 +141,16 @@ std::uint32_t Deformation::neighbour(std::uint32_t node, std::size_t k) const no
     return node + static_cast<std::uint32_t>(around_[k]);
 }
 
-VoxelBox Deformation::apply(const channel::Displaced& displaced)
+VoxelBox Deformation::apply(const Displaced& displaced)
 {
     for (const std::uint32_t n : moved_)
         u_[n] = glm::vec4(0);
     moved_.clear();
     ++pass_;
     float largest = 0;
-    const std::size_t count = std::min<std::size_t>(displaced.count, channel::maxDisplaced);
+    const std::size_t count = std::min<std::size_t>(displaced.count, maxDisplaced);
     for (std::size_t i = 0; i < count; ++i) {
-        const channel::Displacement& d = displaced.nodes[i];
+        const Displacement& d = displaced.nodes[i];
         const glm::vec3 u(d.u[0], d.u[1], d.u[2]);
         const float square = glm::dot(u, u);
         if (d.node >= u_.size() || !(square > 0) || !std::isfinite(square) || visited_[d.node] == pass_)
@@ -251,6 +251,11 @@ glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
     return shift == glm::vec3(0) ? x : x + lattice_.spacing * glm::dvec3(shift);
 }
 
+glm::vec3 Deformation::displacement(glm::vec3 g) const noexcept
+{
+    return static_cast<float>(lattice_.spacing) * inverse_.displacement(g);
+}
+
 glm::dvec3 Deformation::seen(glm::dvec3 p) const noexcept
 {
     return p +
@@ -267,7 +272,7 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
     const glm::ivec3 middle(nearest);
     const std::uint8_t label = labels_[offset(labelGrid_, middle)];
     if ((label & pureBit) != 0)
-        return label & channel::rowBits;
+        return label & rowBits;
     std::array<std::array<float, 3>, 3> along{};
     for (int axis = 0; axis < 3; ++axis)
         for (int step = 0; step < 3; ++step)
@@ -282,7 +287,7 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
     for (std::size_t z = 0; z < 3; ++z)
         for (std::size_t y = 0; y < 3; ++y)
             for (std::size_t x = 0; x < 3; ++x) {
-                const std::uint8_t tissue = corner[z * layer + y * row + x] & channel::rowBits;
+                const std::uint8_t tissue = corner[z * layer + y * row + x] & rowBits;
                 std::size_t n = 0;
                 while (n < known && tissues[n] != tissue)
                     ++n;
@@ -300,7 +305,7 @@ std::uint8_t Deformation::restLabel(glm::dvec3 p) const noexcept
     const std::uint8_t tissue = restTissue(p);
     if (tissue == 0 || !inside(labelGrid_, nearest))
         return tissue;
-    return tissue | (labels_[offset(labelGrid_, nearest)] & channel::shellBit);
+    return tissue | (labels_[offset(labelGrid_, nearest)] & shellBit);
 }
 
-}  // namespace palpate::render
+}  // namespace palpate::channel

@@ -1,15 +1,15 @@
-#include <render/needle_shape.h>
+#include <channel/needle_shape.h>
 
-#include <render/deformation.h>
+#include <channel/deformation.h>
 
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
 
-namespace palpate::render {
+namespace palpate::channel {
 
-NeedleShape needleShape(const channel::Scenery& scenery, const channel::State& state) noexcept
+NeedleShape needleShape(const Scenery& scenery, const State& state) noexcept
 {
     const glm::dvec3 bend = vec(state.bend), straight = vec(state.tip) - bend;
     const double norm = glm::length(vec(state.axis));
@@ -25,4 +25,4 @@ NeedleShape needleShape(const channel::Scenery& scenery, const channel::State& s
     return shape;
 }
 
-}  // namespace palpate::render
+}  // namespace palpate::channel

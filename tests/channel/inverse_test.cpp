@@ -1,4 +1,4 @@
-#include <render/inverse.h>
+#include <channel/inverse.h>
 
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-namespace palpate::render {
+namespace palpate::channel {
 namespace {
 
 constexpr float halfVoxel = 0.25F;  // display voxels are half a spacing wide [spacings]
@@ -177,4 +177,4 @@ TEST(Inverse, IsNothingAtRest)
 }
 
 }  // namespace
-}  // namespace palpate::render
+}  // namespace palpate::channel

@@ -1,4 +1,4 @@
-#include <render/inverse.h>
+#include <channel/inverse.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -9,10 +9,9 @@
 #include <array>
 #include <cmath>
 
-namespace palpate::render {
+namespace palpate::channel {
 namespace {
 
-constexpr float enough = 0.01F;       // residual [spacings]
 constexpr float flat = 0.05F;         // a cell whose volume anywhere falls under this share counts as folded
 constexpr float edgeWithout = 0.57F;  // no cell is folded whose edges change by less (a root of a third) [spacings]
 
@@ -91,7 +90,7 @@ glm::vec3 Inverse::displacement(glm::vec3 g) const noexcept
 }
 
 // Solves shift + share u(g + shift) = 0; whether it got there, and to tissue that is not inside out.
-bool Inverse::newton(glm::vec3 g, float share, int steps, glm::vec3& shift) const noexcept
+bool Inverse::newton(glm::vec3 g, float share, int steps, float enough, glm::vec3& shift) const noexcept
 {
     constexpr float furthest = 2;  // step [spacings]: beyond, the cell's gradient says nothing
     for (int i = 0; i <= steps; ++i) {
@@ -111,23 +110,23 @@ bool Inverse::newton(glm::vec3 g, float share, int steps, glm::vec3& shift) cons
 }
 
 // The place where the material is on its way from rest: for small t the solution is near, and it moves on with t.
-bool Inverse::alongTheWay(glm::vec3 g, glm::vec3& shift) const noexcept
+bool Inverse::alongTheWay(glm::vec3 g, float enough, glm::vec3& shift) const noexcept
 {
     constexpr int parts = 12;
     shift = glm::vec3(0);
     for (int k = 1; k < parts; ++k)
-        if (!newton(g, static_cast<float>(k) / parts, 4, shift))
+        if (!newton(g, static_cast<float>(k) / parts, 4, enough, shift))
             return false;
-    return newton(g, 1, 8, shift);
+    return newton(g, 1, 8, enough, shift);
 }
 
-void Inverse::follow(glm::vec3 g, glm::vec3& shift) const noexcept
+void Inverse::follow(glm::vec3 g, glm::vec3& shift, float enough) const noexcept
 {
     if (!folded_.holds(g)) {
-        if (newton(g, 1, 5, shift))
+        if (newton(g, 1, 5, enough, shift))
             return;
         shift = glm::vec3(0);
-        if (newton(g, 1, 5, shift) || alongTheWay(g, shift))
+        if (newton(g, 1, 5, enough, shift) || alongTheWay(g, enough, shift))
             return;
     }
     const Answer answer = searched(g);
@@ -153,8 +152,7 @@ bool Inverse::solveInCell(glm::ivec3 cell, glm::vec3 g, glm::vec3& part, float& 
         const Local here = inCell(cell, part);
         const glm::vec3 miss = glm::vec3(cell) + part + here.u - g;
         volume = glm::determinant(here.deformation);
-        if (glm::length(miss) < 0.5F * enough &&
-            glm::all(glm::lessThanEqual(glm::abs(part - 0.5F), glm::vec3(0.5F + edge))))
+        if (glm::length(miss) < 0.5F * close && glm::all(glm::lessThanEqual(glm::abs(part - 0.5F), glm::vec3(0.5F + edge))))
             return true;
         if (std::abs(volume) < 1e-6F)
             return false;
@@ -253,8 +251,8 @@ void Inverse::findFolds(std::span<const std::uint32_t> moved)
 // Cells by the unit cubes around folds that they are seen in.
 void Inverse::indexCells()
 {
-    folded_.low -= enough;
-    folded_.high += enough;
+    folded_.low -= close;
+    folded_.high += close;
     binLow_ = glm::ivec3(glm::floor(folded_.low));
     bins_ = glm::ivec3(glm::floor(folded_.high)) - binLow_ + 1;
     first_.assign(bin({0, 0, bins_.z}) + 2, 0);
@@ -292,4 +290,4 @@ void Inverse::update(std::span<const glm::vec4> u, std::span<const std::uint32_t
         indexCells();
 }
 
-}  // namespace palpate::render
+}  // namespace palpate::channel

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-namespace palpate::render {
+namespace palpate::channel {
 
 /// Where at rest lies what is seen at a place: the inverse of x = X + u(X), u trilinear between the nodes of a lattice and
 /// zero beyond it. All in lattice units: places in spacings from the lattice's origin, and displacements in spacings too.
@@ -27,8 +27,11 @@ public:
     /// @param moved  the nodes that are not at rest
     void update(std::span<const glm::vec4> u, std::span<const std::uint32_t> moved);
 
-    /// Takes shift(g) = X - x to what solves shift + u(g + shift) = 0. Error: 0.01 spacings.
-    void follow(glm::vec3 g, glm::vec3& shift) const noexcept;
+    static constexpr float close = 0.01F;  // spacings: what pictures of a body need
+
+    /// Takes shift(g) = X - x to what solves shift + u(g + shift) = 0.
+    /// `enough`: error along each axis [spacings]; around folds it is half of `close`.
+    void follow(glm::vec3 g, glm::vec3& shift, float enough = close) const noexcept;
 
     /// u at the rest place `g`.
     glm::vec3 displacement(glm::vec3 g) const noexcept;
@@ -55,8 +58,8 @@ private:
     Local local(glm::vec3 g) const noexcept;
     Local inCell(glm::ivec3 cell, glm::vec3 part) const noexcept;
     Box seen(glm::ivec3 cell) const noexcept;
-    bool newton(glm::vec3 g, float share, int steps, glm::vec3& shift) const noexcept;
-    bool alongTheWay(glm::vec3 g, glm::vec3& shift) const noexcept;
+    bool newton(glm::vec3 g, float share, int steps, float enough, glm::vec3& shift) const noexcept;
+    bool alongTheWay(glm::vec3 g, float enough, glm::vec3& shift) const noexcept;
     bool solveInCell(glm::ivec3 cell, glm::vec3 g, glm::vec3& part, float& volume) const noexcept;
     void tryCell(glm::ivec3 cell, glm::vec3 g, Answer& best) const noexcept;
     Answer searched(glm::vec3 g) const noexcept;
@@ -80,4 +83,4 @@ private:
     std::vector<std::uint32_t> cells_;  // seen in the bin
 };
 
-}  // namespace palpate::render
+}  // namespace palpate::channel

@@ -1,0 +1,138 @@
+#include <datasets/scene_text.h>
+
+#include <datasets/toml_fields.h>
+
+#include <glm/geometric.hpp>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace palpate::datasets {
+
+namespace {
+
+constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
+constexpr std::size_t mostSteps = 1000;
+
+constexpr std::array<Field<ProbeSpec>, 3> probeFields{{
+    {"depth_mm", "mm", 20, 250, 1e-3, &ProbeSpec::depth},
+    {"frequency_mhz", "MHz", 1, 20, 1e6, &ProbeSpec::frequency},
+    {"focus_mm", "mm", 5, 200, 1e-3, &ProbeSpec::focus},
+}};
+
+constexpr std::array<Field<ProbeStep>, 5> stepFields{{
+    {"at_s", "s", 0, 86400, 1, &ProbeStep::time},
+    {"press_mm", "mm", -50, 50, 1e-3, &ProbeStep::press},
+    {"slide_mm", "mm", -200, 200, 1e-3, &ProbeStep::slide},
+    {"sweep_mm", "mm", -200, 200, 1e-3, &ProbeStep::sweep},
+    {"rock_deg", "deg", -80, 80, std::numbers::pi / 180.0, &ProbeStep::rock},
+}};
+
+// Any length but 0, given as three numbers; the unit vector.
+Vec3 readDirection(Section& section, std::string_view key)
+{
+    const auto v = section.point(key, farthest);
+    if (!v) {
+        section.missing(key, "a direction [x, y, z] in the patient frame LPS");
+    }
+    if (!(glm::length(*v) > 0)) {
+        section.refuse(key, "a direction must not be [0, 0, 0]");
+    }
+    return glm::normalize(*v);
+}
+
+std::string triple(Vec3 v)
+{
+    return fmt::format("[{:.12g}, {:.12g}, {:.12g}]", v.x, v.y, v.z);
+}
+
+}  // namespace
+
+void readProbe(Section& top, ProbeSpec& probe)
+{
+    if (std::optional<Section> section = top.section("probe")) {
+        const auto kind = section->choice("kind", std::span(probeKinds).subspan(1));
+        if (!kind) {
+            section->missing("kind", "linear or curved");
+        }
+        probe.kind = static_cast<ProbeKind>(*kind + 1);
+        const auto face = section->point("face_mm", farthest);
+        if (!face) {
+            section->missing("face_mm", "the middle of the probe's face: [x, y, z] in mm");
+        }
+        probe.face = *face;
+        probe.direction = readDirection(*section, "direction");
+        probe.lateral = readDirection(*section, "lateral");
+        const Vec3 across = probe.lateral - glm::dot(probe.lateral, probe.direction) * probe.direction;
+        constexpr double least = 0.2;
+        if (glm::length(across) < least) {
+            section->refuse("lateral", "must not be along direction");
+        }
+        probe.lateral = glm::normalize(across);
+        readFields<ProbeSpec>(*section, probeFields, probe, Need::some);
+        section->finish();
+    }
+    for (Section& section : top.sections("probe_step")) {
+        if (probe.kind == ProbeKind::none) {
+            section.refuse("at_s", "a step of a probe needs a [probe]");
+        }
+        ProbeStep step;
+        if (!section.has("at_s")) {
+            section.missing("at_s", "when the probe is there [s]");
+        }
+        readFields<ProbeStep>(section, stepFields, step, Need::some);
+        if (!probe.script.empty() && step.time <= probe.script.back().time) {
+            section.refuse("at_s", "must be later than the step before", "s");
+        }
+        section.finish();
+        probe.script.push_back(step);
+        if (probe.script.size() > mostSteps) {
+            section.refuse("at_s", fmt::format("over {} steps", mostSteps));
+        }
+    }
+}
+
+std::string probeText(const ProbeSpec& probe)
+{
+    if (probe.kind == ProbeKind::none) {
+        return {};
+    }
+    std::string out = fmt::format("\n[probe]\nkind = \"{}\"\nface_mm = {}\ndirection = {}\nlateral = {}\n",
+                                  probeKinds[static_cast<std::size_t>(probe.kind)], triple(1e3 * probe.face),
+                                  triple(probe.direction), triple(probe.lateral));
+    out += probe.depth > 0 ? fmt::format("depth_mm = {:.12g}\n", 1e3 * probe.depth) : "";
+    out += probe.frequency > 0 ? fmt::format("frequency_mhz = {:.12g}\n", 1e-6 * probe.frequency) : "";
+    out += probe.focus > 0 ? fmt::format("focus_mm = {:.12g}\n", 1e3 * probe.focus) : "";
+    for (const ProbeStep& step : probe.script) {
+        out += "\n[[probe_step]]\n" + writeFields<ProbeStep>(stepFields, step);
+    }
+    return out;
+}
+
+ProbePlace probeAt(const ProbeSpec& probe, double time) noexcept
+{
+    ProbeStep now;
+    if (!probe.script.empty()) {
+        std::size_t next = 0;
+        while (next < probe.script.size() && probe.script[next].time <= time) {
+            ++next;
+        }
+        const ProbeStep start;  // where it begins, at time 0
+        const ProbeStep& from = next > 0 ? probe.script[next - 1] : start;
+        const ProbeStep& to = next < probe.script.size() ? probe.script[next] : probe.script.back();
+        const double span = to.time - from.time, t = span > 0 ? (time - from.time) / span : 0.0;
+        const auto between = [&](double ProbeStep::*m) { return from.*m + t * (to.*m - from.*m); };
+        now = {time, between(&ProbeStep::press), between(&ProbeStep::slide), between(&ProbeStep::sweep),
+               between(&ProbeStep::rock)};
+    }
+    const Vec3 elevation = glm::cross(probe.direction, probe.lateral);
+    ProbePlace place;
+    place.face = probe.face + now.press * probe.direction + now.slide * probe.lateral + now.sweep * elevation;
+    const double c = std::cos(now.rock), s = std::sin(now.rock);
+    place.direction = c * probe.direction + s * probe.lateral;
+    place.lateral = c * probe.lateral - s * probe.direction;
+    return place;
+}
+
+}  // namespace palpate::datasets

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <channel/layout.h>
+#include <haptics/session_model.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace palpate::haptics {
+
+/// What viewers are told of a session once: what there is to see, and grids of it.
+struct Showing {
+    channel::Scenery scenery;
+    std::vector<std::uint8_t> labels;  // per node of scenery.labels: tissue row and channel::shellBit
+    std::vector<std::uint16_t> image;  // per node of scenery.labels, or empty
+    std::vector<std::uint8_t> fine;    // per node of scenery.fine: tissue row; or empty
+};
+
+/// The grid that a viewer's labels are on where nobody asks for another.
+volume::NodeGrid displayGrid(const volume::Tissue& tissue);
+
+/// What a tissue does to ultrasound, as viewers are told; see datasets::acousticsOf().
+channel::TissueSound soundOf(const volume::TissueRow& row);
+
+/// @param viewersHand  the mouse of a viewer is the hand
+Showing showingOf(const SessionModel& model, bool viewersHand, const volume::NodeGrid& display);
+
+}  // namespace palpate::haptics

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <channel/layout.h>
+
+#include <glm/vec3.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace palpate::ultrasound {
+
+/// Of a voxel's label, beside the row of its tissue (channel::rowBits): all within two voxels are the same; a core was
+/// taken there.
+inline constexpr std::uint8_t pureBit = 0x40, holeBit = 0x80;
+/// What is not known: beyond the labels.
+inline constexpr std::uint8_t unknown = pureBit | holeBit;
+inline constexpr std::uint8_t compared = channel::rowBits | holeBit;
+
+/// A body at rest as sound meets it: tissues and the logarithm of their impedance on a fine grid.
+class Medium {
+public:
+    /// From the fine labels where there are some, else from those of the display, whose borders are smoothed by quadratic
+    /// splines on a grid up to three times as fine.
+    Medium(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint8_t> fine);
+
+    glm::dvec3 origin() const noexcept { return origin_; }
+    double spacing() const noexcept { return spacing_; }
+    glm::ivec3 size() const noexcept { return size_; }
+
+    /// Label of the voxel around `v` [voxels from the origin]: tissue row, pureBit, holeBit; `unknown` beyond.
+    std::uint8_t label(glm::vec3 v) const noexcept;
+    /// Gradient of ln Z, smoothed over a voxel [1/voxel].
+    glm::vec3 slope(glm::vec3 v) const noexcept;
+    /// What a label's tissue does to sound; a hole is filled with blood.
+    const channel::TissueSound& sound(std::uint8_t label) const noexcept { return sound_[label & compared]; }
+    /// The tissue's impedance [MRayl]; that of gel in air, which the labels tell.
+    float impedance(std::uint8_t label) const noexcept;
+
+    /// Makes `holes` of `radius` [m], and those of before that are not among them whole again. Returns whether anything has
+    /// changed.
+    bool punch(std::span<const channel::Hole> holes, double radius);
+
+private:
+    struct Saved {
+        std::size_t at = 0;
+        std::uint8_t label = 0;
+    };
+
+    void refine(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
+    void finish(glm::ivec3 low, glm::ivec3 high);
+    std::size_t offset(glm::ivec3 n) const noexcept;
+    void dig(const channel::Hole& hole, double radius, glm::ivec3& low, glm::ivec3& high);
+
+    glm::dvec3 origin_{0.0};
+    double spacing_ = 1e-3;
+    glm::ivec3 size_{0};
+    std::vector<std::uint8_t> labels_;
+    std::vector<std::int16_t> lnZ_;  // 4096 ln Z [MRayl]
+    std::array<channel::TissueSound, 256> sound_{};
+    std::array<std::int16_t, 256> code_{};  // of a label's ln Z
+    std::vector<channel::Hole> holes_;
+    std::vector<Saved> saved_;  // labels that holes have taken the place of, in the order of the holes
+};
+
+}  // namespace palpate::ultrasound

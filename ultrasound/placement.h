@@ -1,0 +1,41 @@
+#pragma once
+
+#include <ultrasound/medium.h>
+#include <ultrasound/transducer.h>
+
+namespace palpate::ultrasound {
+
+/// A probe on the skin for a needle along the line from `entry` to `aim` [m], in the body at rest: the picture's plane
+/// holds the line, the aim is in the picture, the face lies on the skin beside the needle's way in, and the needle is as
+/// broadside to the beams as the skin allows; the needle comes from the marked side.
+/// Where entry and aim are the same, the line is taken from the middle of the body to its front.
+Pose placeProbe(const Medium& medium, const Beam& beam, glm::dvec3 entry, glm::dvec3 aim);
+
+/// Curved for what lies deeper than a linear probe sees, else linear.
+Transducer probeFor(const Medium& medium, glm::dvec3 entry, glm::dvec3 aim);
+
+/// How an examination of a session begins.
+struct Examination {
+    Transducer transducer;
+    Settings settings;
+    Pose pose;          // where no hand of the session holds the probe
+    bool held = false;  // the scene holds the probe: its pose is that of each tick
+};
+
+Examination examinationOf(const channel::Scenery& scenery, const Medium& medium);
+
+/// How a probe is moved on the skin.
+struct ProbeMove {
+    double slide = 0, sweep = 0;  // along its face, across the picture [m]
+    double rock = 0, turn = 0;    // within the picture's plane, about the probe's axis [rad]
+
+    bool operator==(const ProbeMove&) const = default;
+};
+
+/// The probe moved so and laid on the skin at rest again; where there is no skin it stays.
+Pose movedOnSkin(const Medium& medium, const Examination& examination, const ProbeMove& move);
+
+/// Where the probe is at a tick.
+Pose poseAt(const Examination& examination, const channel::State& state);
+
+}  // namespace palpate::ultrasound

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <ultrasound/view.h>
+
+#include <array>
+#include <vector>
+
+namespace palpate::ultrasound {
+
+struct RayOptions {
+    bool interfaces = true;  // Fresnel reflections
+};
+
+/// Sends a ray along every line in every plane: attenuation by the tissues it crosses, mirror echoes where the impedance
+/// changes, the needle, and what is dark behind them.
+///
+///     attenuation   A *= 10^(-2 a f^p ds / 20)
+///     interface     R = tanh(half the change of ln Z), one echo at its centre, of amplitude
+///                   R (0.9 exp(-t^2 / 2 (0.25 rad)^2) + 0.1 cos t) at t off the perpendicular; 1 - R^2 goes on
+///     needle        0.93 less 0.6 dB a degree off broadside; echoes to and fro between its walls behind it; 0.02 goes on;
+///                   its tip echoes in all directions, also behind its own shaft, for the aperture looks around that
+///     gas           all comes back, and again at multiples of its depth
+///
+/// Sources: Buerger et al., IEEE TMI 32:609, 2013 (convolution-enhanced ray tracing); Schafhalter-Zoppoth et al., Reg
+/// Anesth Pain Med 2004, and Nichols et al., JVIR 14:1553, 2003 (visibility of needles by angle); shares of mirror and
+/// rough reflection, and the fall of reverberations: assumed.
+class RayCaster {
+public:
+    /// @param needle  null: there is none in the picture
+    void cast(const View& view, const Needle* needle, const RayOptions& options, Shade& shade, EchoLines& echoes);
+
+private:
+    // An interface that a ray is crossing: sums over its steps.
+    struct Crossing {
+        float change = 0;             // of half ln Z
+        float weight = 0, depth = 0;  // of its absolute value, and that times the depth
+        float amplitude = 0;          // that reached it
+        glm::vec3 normal{0};
+        std::uint8_t before = 0;  // label of what is before it
+    };
+    struct Ray {
+        int line = 0, plane = 0;
+        float weight = 1;     // of its plane
+        float amplitude = 1;  // left by the tissue
+        float behind = 1;     // and of that by the needle
+        glm::vec3 step{0};    // at rest [voxels]
+        Crossing crossing;
+        float needleAt = 0, needleEcho = -1;  // of the shaft
+        float tipAt = -1;                     // depth of the tip's echo; below 0: not on this ray
+        bool inside = false, stopped = false;
+    };
+
+    void prepare(const View& view);
+    void castLine(const View& view, const RayOptions& options, Ray& ray, Shade& shade, EchoLines& echoes);
+    void meetNeedle(const View& view, const Needle& needle, Ray& ray) const;
+    float dimmed(const Beam& beam, float depth, float slope) const;
+    void echoNeedle(Ray& ray, EchoLines& echoes) const;
+    void release(Ray& ray, EchoLines& echoes) const;
+    void stopAtAir(Ray& ray, float depth, EchoLines& echoes) const;
+    void deposit(EchoLines& echoes, int line, float depth, float re, float im) const;
+    void fillShadows(const View& view, Shade& shade);
+
+    std::array<float, 256> left_{};  // share of the amplitude after one step in a tissue
+    std::vector<float> planeWeight_;
+    std::vector<float> before_, now_, raw_;  // of fillShadows()
+    float step_ = 0, sample_ = 0;
+    float needleRadius_ = 0;
+};
+
+/// Echo of a shaft whose line makes `degrees` with the perpendicular of the ray.
+float needleEcho(float degrees) noexcept;
+
+}  // namespace palpate::ultrasound
