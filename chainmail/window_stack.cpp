@@ -150,7 +150,7 @@ void WindowStack::joinBorders(Field x) noexcept
     }
 }
 
-WindowStack::Evaluated WindowStack::applyWith(Field x, Field y, Field along, bool finite) noexcept
+WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, bool finite) noexcept
 {
     const Kernels& k = *kernels_;
     Evaluated sum;

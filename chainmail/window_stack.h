@@ -44,14 +44,14 @@ public:
     bool follow(const Focus& focus, bool carry) noexcept;
 
     /// y = -A x on the degrees of freedom, over all windows. x must be continuous at the windows' borders.
-    void apply(Field x, Field y) noexcept { applyWith(x, y, x, false); }
+    void apply(Field x, Field y) noexcept { evaluate(x, y, x, false); }
 
     /// The tissue's force y at displacement x, which must be continuous at the windows' borders.
     struct Evaluated {
         double energy = 0;   // at finite strain; else 0 [J]
         double product = 0;  // along . y
     };
-    Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept { return applyWith(x, y, along, finite); }
+    Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept;
 
     /// Gives border nodes what the next coarser window has there. Sums of continuous fields are continuous but for
     /// rounding, and what a multigrid cycle or follow() leaves is continuous.
@@ -79,7 +79,6 @@ private:
     Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
     void place() noexcept;
     void transfer(Field field) noexcept;
-    Evaluated applyWith(Field x, Field y, Field along, bool finite) noexcept;
     static StepFields stepFields(Window& window, Field direction) noexcept;
 
     const ElasticBody* body_;

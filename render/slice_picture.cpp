@@ -1,10 +1,10 @@
 #include <render/slice_picture.h>
 
+#include <render/screen_image.h>
+
 #include <channel/needle_shape.h>
 #include <render/tool_picture.h>
 #include <render/volume_picture.h>
-
-#include <vtkImageMapper.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -106,14 +106,7 @@ bool inside(Point2 p, const Area& area)
 
 SlicePicture::SlicePicture(vtkRenderer& renderer)
 {
-    vtkNew<vtkImageMapper> mapper;
-    mapper->SetInputData(image_);
-    mapper->SetColorWindow(255);
-    mapper->SetColorLevel(127.5);
-    actor_->SetMapper(mapper);
-    actor_->SetLayerNumber(0);
-    actor_->SetVisibility(0);
-    renderer.AddActor2D(actor_);
+    addScreenImage(renderer, image_, actor_);
 }
 
 bool SlicePicture::update(const Anatomy& anatomy, const ViewFrame& frame, const Area& area, const VoxelBox& changed,

@@ -1,11 +1,11 @@
 #include <render/ultrasound_picture.h>
 
+#include <render/screen_image.h>
+
 #include <base/outputs.h>
 #include <render/deformation.h>
 #include <render/overlay.h>
 #include <ultrasound/stored_image.h>
-
-#include <vtkImageMapper.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -32,14 +32,7 @@ const char* nameOf(const ultrasound::Transducer& t)
 
 UltrasoundPicture::UltrasoundPicture(vtkRenderer& renderer)
 {
-    vtkNew<vtkImageMapper> mapper;
-    mapper->SetInputData(image_);
-    mapper->SetColorWindow(255);
-    mapper->SetColorLevel(127.5);
-    actor_->SetMapper(mapper);
-    actor_->SetLayerNumber(0);
-    actor_->SetVisibility(0);
-    renderer.AddActor2D(actor_);
+    addScreenImage(renderer, image_, actor_);
 }
 
 void UltrasoundPicture::open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels,

@@ -12,13 +12,14 @@ constexpr auto betweenLooks = std::chrono::milliseconds(100);
 
 }  // namespace
 
-// The server chooses a number that is free, and tells it when it is ready.
+// The server chooses a number that is free, and tells it when it is ready. It must not begin anew when a client goes: a
+// window that connects in that moment would be cut off.
 Desktop::Desktop()
 {
     const std::string file = folder_ / "display";
     server_ = std::make_unique<Program>(
-        "/usr/bin/env",
-        std::vector<std::string>{"sh", "-c", "exec Xvfb -displayfd 3 -screen 0 1024x768x24 -nolisten tcp 3> " + file});
+        "/usr/bin/env", std::vector<std::string>{
+                            "sh", "-c", "exec Xvfb -displayfd 3 -screen 0 1024x768x24 -nolisten tcp -noreset 3> " + file});
     for (int i = 0; i < patience && display_.empty(); ++i) {
         std::this_thread::sleep_for(betweenLooks);
         if (const std::string told = readText(file); told.ends_with('\n'))

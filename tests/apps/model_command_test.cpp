@@ -131,7 +131,8 @@ TEST(BenchCosts, FeedsThePlanner)
     const std::string scene = smallScene(folder), costs = folder / "costs.json";
     const auto measured = figures({"bench", "costs", scene, "--quick"});
     for (const char* law : {"small", "finite"}) {
-        EXPECT_GT(measured[law]["slot_cycle_ns"].get<double>(), 0.0);
+        // Few models differ little in their cycles, so that the fit may give all of a node's time to either.
+        EXPECT_GT(measured[law]["slot_ns"].get<double>() + measured[law]["slot_cycle_ns"].get<double>(), 0.0);
         EXPECT_LT(measured[law]["fit_rms_pct"].get<double>(), 50.0);
     }
     writeText(costs, measured.dump());

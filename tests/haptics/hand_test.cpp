@@ -62,14 +62,19 @@ TEST(Hand, PositionsAreWholeEncoderSteps)
     }
 }
 
-TEST(Hand, PiercesUntilTheForceDrops)
+TraineeStep pierceAlongY()
 {
     TraineeStep pierce;
     pierce.kind = TraineeStep::Kind::pierce;
     pierce.to = {0, 0.05, 0};
     pierce.speed = 0.02;
     pierce.seconds = 20;
-    HandDevice hand({}, {pierce}, Vec3(0.0), {0, 1, 0});
+    return pierce;
+}
+
+TEST(Hand, PiercesUntilTheForceDrops)
+{
+    HandDevice hand({}, {pierceAlongY()}, Vec3(0.0), {0, 1, 0});
     double held = 0.0;
     while (!hand.finished()) {
         const auto s = hand.read();
@@ -88,12 +93,7 @@ TEST(Hand, PiercesUntilTheForceDrops)
 // not in, it goes on.
 TEST(Hand, SeesThatAForceThatFadesIsNoPuncture)
 {
-    TraineeStep pierce;
-    pierce.kind = TraineeStep::Kind::pierce;
-    pierce.to = {0, 0.05, 0};
-    pierce.speed = 0.02;
-    pierce.seconds = 20;
-    HandDevice hand({}, {pierce}, Vec3(0.0), {0, 1, 0});
+    HandDevice hand({}, {pierceAlongY()}, Vec3(0.0), {0, 1, 0});
     TickRecord seen;
     double last = 0;
     for (int tick = 0; !hand.finished(); ++tick) {

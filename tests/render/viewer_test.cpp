@@ -309,8 +309,8 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
     // xvfb-run trips over a display that is just going.
     std::this_thread::sleep_for(std::chrono::seconds(2));
     Process publisher(publish("hold", "1.9"), log("publisher"));
-    Process viewer({"xvfb-run", "-a", "-s", "-screen 0 800x600x24 -fbdir " + folder_.string(), program(), "--session",
-                    session_, "--size", "800x600", "--wait", "1"},
+    Process viewer({"xvfb-run", "-a", "-s", "-noreset -screen 0 800x600x24 -fbdir " + folder_.string(), program(),
+                    "--session", session_, "--size", "800x600", "--wait", "1"},
                    log("viewer"));
     constexpr Pixel bar{89, 166, 255}, onSlice{64, 217, 255};
     int bars = 0, needle = 0;
@@ -334,8 +334,8 @@ TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
 {
     std::this_thread::sleep_for(std::chrono::seconds(2));
     Process publisher(publish("hold", "1.5"), log("publisher"));
-    Process viewer({"xvfb-run", "-a", "-s", "-screen 0 1280x1024x24", program(), "--session", session_, "--size", "640x480",
-                    "--frames", "5", "--json", "-"},
+    Process viewer({"xvfb-run", "-a", "-s", "-noreset -screen 0 1280x1024x24", program(), "--session", session_, "--size",
+                    "640x480", "--frames", "5", "--json", "-"},
                    log("viewer"));
     viewer.wait();
     EXPECT_NE(said("viewer").find("\"frames\": 5"), std::string::npos) << said("viewer");

@@ -1,10 +1,11 @@
+#include "gzip.h"
+
 // Files made here, byte by byte, that tell the truth and that lie.
 #include <tests/folder.h>
 #include <volume/import.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -52,21 +53,6 @@ template <typename T>
 std::string bytesOf(const std::vector<T>& values)
 {
     return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
-}
-
-std::string gzip(const std::string& plain)
-{
-    z_stream z{};
-    deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY);
-    std::string packed(plain.size() + 1000, '\0');
-    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
-    z.avail_in = static_cast<uInt>(plain.size());
-    z.next_out = reinterpret_cast<Bytef*>(packed.data());
-    z.avail_out = static_cast<uInt>(packed.size());
-    deflate(&z, Z_FINISH);
-    packed.resize(packed.size() - z.avail_out);
-    deflateEnd(&z);
-    return packed;
 }
 
 // 4 x 5 x 6 voxels, values 0 to 6.

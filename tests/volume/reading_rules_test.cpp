@@ -5,11 +5,11 @@
 #include <volume/tissue.h>
 
 #include "bodies.h"
+#include "gzip.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
-#include <zlib.h>
 #include <glm/geometric.hpp>
 
 #include <cstring>
@@ -74,21 +74,6 @@ std::string meta(const std::string& extra, const std::string& data = "LOCAL", co
                        extra, type, data);
 }
 constexpr const char* straight = "TransformMatrix = 1 0 0 0 1 0 0 0 1\n";
-
-std::string gzip(const std::string& plain)
-{
-    std::string packed(plain.size() + 1000, '\0');
-    z_stream z{};
-    deflateInit2(&z, 6, Z_DEFLATED, 31, 8, Z_DEFAULT_STRATEGY);
-    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
-    z.avail_in = static_cast<uInt>(plain.size());
-    z.next_out = reinterpret_cast<Bytef*>(packed.data());
-    z.avail_out = static_cast<uInt>(packed.size());
-    deflate(&z, Z_FINISH);
-    packed.resize(packed.size() - z.avail_out);
-    deflateEnd(&z);
-    return packed;
-}
 
 class ReadingRules : public ::testing::Test {
 protected:
