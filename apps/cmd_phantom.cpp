@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <base/memory.h>
 #include <command/json.h>
 #include <datasets/phantom.h>
 #include <datasets/tables.h>
@@ -22,6 +23,7 @@ struct PhantomOptions {
     std::vector<std::string> settings;
     std::filesystem::path output, tissues, json;
     bool list = false;
+    bool anyway = false;
 };
 
 void listParameters(const std::string& phantom)
@@ -108,6 +110,9 @@ void runPhantom(PhantomOptions& options)
                                              fmt::join(datasets::phantomNames(), ", ")));
     }
     options.spec.voxel = options.voxel * 1e-3;
+    if (!options.anyway) {
+        options.spec.memory = base::availableMemory();
+    }
     for (const std::string& setting : options.settings) {
         applySetting(options.spec, setting);
     }
@@ -138,6 +143,7 @@ void addPhantom(CLI::App& app)
     command->add_option("--voxel", options->voxel, "Edge of a voxel [mm]")->type_name("MM")->capture_default_str();
     command->add_option("--set", options->settings, "Parameters, see --list")->type_name("KEY=VALUE");
     command->add_flag("--list", options->list, "Show the parameters with units, ranges and standard values");
+    command->add_flag("--anyway", options->anyway, "Also one that takes more memory than is free");
     command->add_option("--tissues", options->tissues, "Tissue table in place of the built-in one")->type_name("FILE");
     command->add_option("--json", options->json, "Write the figures here, - for standard output")->type_name("FILE");
     command->final_callback([options] { runPhantom(*options); });

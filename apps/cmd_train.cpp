@@ -1,6 +1,8 @@
 #include <apps/command.h>
 
+#include <apps/temporary_folder.h>
 #include <apps/viewers.h>
+#include <base/memory.h>
 #include <base/outputs.h>
 #include <command/interrupted.h>
 #include <command/json.h>
@@ -12,6 +14,7 @@
 #include <session/figures.h>
 #include <session/machine.h>
 #include <session/open.h>
+#include <session/rehearsal.h>
 #include <session/trainer.h>
 
 #include <fmt/format.h>
@@ -59,6 +62,7 @@ struct Options {
     bool view = false;
     bool noView = false;
     bool unpaced = false;
+    bool anyway = false;
     double seconds = 0;
     std::string session, operatorName;
     std::string record, report, json, pictures;
@@ -271,31 +275,6 @@ void checkOutputs(const Options& o)
     }
 }
 
-// A folder that goes away at the end.
-class TemporaryFolder {
-public:
-    TemporaryFolder()
-    {
-        std::string name = (fs::temp_directory_path() / "palpate-pictures-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error(name + ": no folder can be made there for the record that the pictures are drawn of");
-        }
-        path_ = name;
-    }
-    ~TemporaryFolder()
-    {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-    const fs::path& path() const { return path_; }
-
-private:
-    fs::path path_;
-};
-
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
 // is now, as it is told.
 std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
@@ -344,6 +323,20 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
     return there;
 }
 
+// The session's model, unless it asks for more than this machine has: before a record, a window or a device's thread is
+// there.
+haptics::SessionModel openModel(Options& o)
+{
+    if (!o.anyway) {
+        o.changes.memory = base::availableMemory();
+    }
+    haptics::SessionModel model = session::openSession(o.scene, o.changes);
+    if (const std::string why = o.anyway ? "" : session::whyTooSlow(session::rehearse(model), !o.unpaced); !why.empty()) {
+        throw std::runtime_error(o.scene + ": " + why);
+    }
+    return model;
+}
+
 void train(Options o)
 {
     for (const auto& text : o.inject) {
@@ -355,7 +348,7 @@ void train(Options o)
     checkOutputs(o);
     std::optional<TemporaryFolder> temporary;
     if (o.unpaced && !o.pictures.empty() && recordFile(o).empty()) {
-        o.record = temporary.emplace().path() / "session.db";
+        o.record = temporary.emplace("the record that the pictures are drawn of").path() / "session.db";
         o.ownRecord = false;
     }
     const auto record = recordFile(o);
@@ -376,7 +369,7 @@ void train(Options o)
             return fitting.setting;
         };
     }
-    const auto model = session::openSession(o.scene, o.changes);
+    const auto model = openModel(o);
     auto info = session::describeSession(model, o.scene, deviceInWords(o));
     info.name = sessionName(o);
     info.operatorName = o.operatorName;
@@ -498,6 +491,8 @@ void addTrain(CLI::App& app)
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
     c->add_option("--report", o->report, "Write a report (HTML) to this file");
     c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder; of an --unpaced session after its end");
+    c->add_flag("--anyway", o->anyway,
+                "Start also where a tick takes far too long here, or a phantom more memory than is free");
     c->add_option("--inject", o->inject,
                   "Let something go wrong at a session time: gap=50ms@2s, late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, "
                   "unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s; several separated by commas")

@@ -89,6 +89,7 @@ int main(int argc, char** argv)
     sweep::addSweep(app);
 #endif
 
+    command::endOnSignals();
     try {
         app.parse(wordsOf(argc, argv));
         checkStandardOutput();

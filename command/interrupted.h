@@ -5,6 +5,11 @@
 
 namespace palpate::command {
 
+/// From now on Ctrl-C, a polite kill and a terminal that is closed (SIGINT, SIGTERM, SIGHUP, SIGQUIT) end this program with
+/// one line that says so and the exit status 128 + signal. For commands that have nothing to end in order; others install
+/// handlers of their own meanwhile. A signal that is ignored stays ignored (nohup).
+void endOnSignals();
+
 /// What was asked for has been ended in order by a signal, before its time: the program's exit status is 128 + signal.
 class Interrupted : public std::runtime_error {
 public:

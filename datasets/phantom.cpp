@@ -56,6 +56,7 @@ PhantomValues checkedValues(const PhantomSpec& spec, const std::vector<PhantomPa
 {
     PhantomValues values;
     values.seed = spec.seed;
+    values.memory = spec.memory;
     values.voxel = checked(spec.name, {"voxel", "mm", "", smallestVoxel, largestVoxel, 1, ""}, spec.voxel * 1e3);
     for (const PhantomParameter& p : parameters) {
         if (p.word.empty()) {

@@ -3,6 +3,7 @@
 #include <volume/tissue.h>
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
@@ -15,7 +16,8 @@ struct PhantomSpec {
     std::uint64_t seed = 1;                   // every random choice
     double voxel = 1e-3;                      // edge of a voxel [m]
     std::map<std::string, double> numbers{};  // e.g. tumour_diameter_mm, tumour_depth_mm, tumours; see phantomParameters()
-    std::map<std::string, std::string> words{};  // e.g. tumour_kind = "idc_high_grade"
+    std::map<std::string, std::string> words{};               // e.g. tumour_kind = "idc_high_grade"
+    double memory = std::numeric_limits<double>::infinity();  // that it may take [bytes]: no part of what it is
 };
 
 /// One parameter of a phantom, for help and for checking scenes.

@@ -15,6 +15,8 @@ namespace palpate::datasets {
 namespace {
 
 constexpr double mostVoxels = 1024.0 * 1024.0 * 1024.0;
+constexpr double perVoxel = 4.2;  // of a session's memory at its peak, measured from 60 to 450 million voxels [bytes]
+constexpr double giga = 1e9;
 
 }  // namespace
 
@@ -41,6 +43,12 @@ volume::LabelImage phantomImage(const PhantomValues& values, Vec3 low, Vec3 high
     if (count > mostVoxels) {
         throw std::runtime_error(fmt::format("a phantom of {} x {} x {} voxels is too large: choose a larger voxel",
                                              image.size.x, image.size.y, image.size.z));
+    }
+    if (count * perVoxel > values.memory) {
+        throw std::runtime_error(
+            fmt::format("a phantom of {} x {} x {} voxels takes some {:.1f} GB of memory, and {:.1f} GB are free: choose a "
+                        "larger voxel, or go on with --anyway",
+                        image.size.x, image.size.y, image.size.z, count * perVoxel / giga, values.memory / giga));
     }
     image.affine.linear = Mat3(edge * 1e-3);
     image.affine.origin = (low + Vec3(edge / 2)) * 1e-3;

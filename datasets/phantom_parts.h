@@ -19,6 +19,7 @@ struct PhantomValues {
     std::map<std::string, std::string> words;
     std::uint64_t seed = 1;
     double voxel = 1;  // [mm]
+    double memory = std::numeric_limits<double>::infinity();  // that the phantom may take [bytes]
 
     double number(const std::string& name) const { return numbers.at(name); }
     const std::string& word(const std::string& name) const { return words.at(name); }
@@ -38,7 +39,8 @@ std::vector<PhantomParameter> layeredParameters();
 std::vector<PhantomParameter> blockParameters();
 
 /// An empty image over the box from `low` to `high` [mm]. With the parameter voxels_per_side it is a cube of that many
-/// voxels along each side instead; what the cube has more than the box is air, in front of it and at both sides.
+/// voxels along each side instead; what the cube has more than the box is air, in front of it and at both sides. Throws
+/// std::runtime_error for more voxels than there are at most, or than there is memory for.
 volume::LabelImage phantomImage(const PhantomValues& values, Vec3 low, Vec3 high);
 /// Centre of a voxel [mm].
 Vec3 voxelCentre(const volume::LabelImage& image, Index3 n);

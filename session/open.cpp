@@ -189,6 +189,7 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
                                              fmt::join(datasets::builtInScenes(), ", ")));
     }
     auto scene = changed(builtIn ? *builtIn : datasets::loadScene(path), changes, what);
+    scene.source.phantom.memory = changes.memory;
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
     return haptics::buildModel(std::move(scene), std::move(tissue));
 }

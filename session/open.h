@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +42,7 @@ struct SceneChanges {
     std::optional<LesionFrom> lesion;       // only of a volume (.vdb)
     bool palpate = false;                   // find the target with a fingertip instead of taking a core of it
     std::vector<datasets::Insert> inserts;  // further ones
+    double memory = std::numeric_limits<double>::infinity();  // that a phantom may take [bytes]
 };
 
 /// Loads a volume (.vdb). Throws std::runtime_error, also for a folder.

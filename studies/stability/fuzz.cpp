@@ -208,7 +208,8 @@ bool isFlat(const haptics::SessionModel& model, Vec3 proxy, Vec3 out)
 // Watches whether tissue pulls a ball or a finger into the body, along the normal of the surface at rest under it. Without
 // friction a surface pushes. What counts is the force of level `elastic` before the controller, whose damping may well
 // hold back a tool on its way out, where what is sent pulls too. A tool that was somewhere else in the tick before has not
-// pressed the tissue that it is in: it counts again when it has been free.
+// pressed the tissue that it is in, nor has one that came in through another face, which the tissue that it has pushed
+// aside there rightly holds: it counts again when it has been free.
 class PullWatch {
 public:
     explicit PullWatch(const haptics::SessionModel& model, double period) : model_(model), furthest_(fastestHand * period)
@@ -226,11 +227,15 @@ public:
             (model_.scene.tool.kind == datasets::ToolKind::capsule && glm::distance(back, back_) > furthest_);
         tip_ = tip;
         back_ = back;
-        pressed_ = !jumped && (pressed_ || record.phase == haptics::Phase::free);
+        const bool free = record.phase == haptics::Phase::free;
+        const Vec3 out = model_.surface.normal(record.proxy);
+        const bool sameFace = free || wasFree_ || glm::dot(out, out_) >= flatWithin;
+        out_ = out;
+        wasFree_ = free;
+        pressed_ = !jumped && (free || (pressed_ && sameFace));
         if (!watches_ || !pressed_ || record.phase != haptics::Phase::contact) {
             return false;
         }
-        const Vec3 out = model_.surface.normal(record.proxy);
         const double least = leastPull * cap;
         return -glm::dot(tissue, out) > least && -glm::dot(record.total, out) > least && isFlat(model_, record.proxy, out);
     }
@@ -240,7 +245,8 @@ private:
     double furthest_;
     bool watches_ = false;
     bool pressed_ = false;  // what it is in contact with, it has come to from outside
-    Vec3 tip_{0.0}, back_{0.0};
+    bool wasFree_ = false;
+    Vec3 tip_{0.0}, back_{0.0}, out_{0.0};  // in the tick before: both ends of the tool, the normal under it
 };
 
 FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)

@@ -344,6 +344,41 @@ TEST(Session, PicturesThatAreNotCompleteAreAFailureAndEverythingElseIsWritten)
     EXPECT_NE(readText(copy.report()).find("</html>"), std::string::npos);
 }
 
+// A model that no machine holds is refused before there is a record, and goes where somebody insists.
+TEST(Session, AModelThatNoMachineHoldsIsRefusedBeforeItStarts)
+{
+    const Folder folder;
+    const std::string scene = folder / "absurd.toml", record = folder / "s.db";
+    writeText(scene,
+              "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n[tool]\nkind = \"sphere\"\n"
+              "radius_mm = 10\n[model]\nlevel = \"elastic\"\n[model.elastic]\nwindow = 41\ncycles = 100\n");
+    const std::vector<std::string> words{"train", scene, "--headless", "--seconds", "0.02", "--record", record};
+    expectRefusal(words, "and there is 1 ms: choose a coarser [model]");
+    EXPECT_FALSE(std::filesystem::exists(record));
+    auto insisting = words;
+    insisting.emplace_back("--anyway");
+    EXPECT_EQ(figures(insisting)["model"], "elastic");
+    EXPECT_TRUE(haptics::Record(record).complete());
+}
+
+// Also while a scene is loaded, and in a benchmark.
+TEST(Interrupt, EndsWhatHasNothingToEndInOrderWithOneLine)
+{
+    const std::vector<std::vector<std::string>> commands{
+        {"phantom", "breast", "--voxel", "0.3", "-o", "/dev/null"}, {"bench", "tick"}, {"bench", "needle"}, {"stability"}};
+    for (const auto& words : commands) {
+        for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
+            Program program("palpate", words);
+            std::this_thread::sleep_for(400ms);
+            ASSERT_TRUE(program.running()) << words[0];
+            program.send(signal);
+            const Outcome outcome = program.wait();
+            EXPECT_EQ(outcome.status, 128 + signal) << words[0];
+            EXPECT_EQ(outcome.err, "palpate: interrupted\n") << words[0];
+        }
+    }
+}
+
 TEST(Session, AnInterruptAfterItsEndStopsTheWaitForPictures)
 {
     const WithViewer copy("exec sleep 20");
@@ -353,7 +388,7 @@ TEST(Session, AnInterruptAfterItsEndStopsTheWaitForPictures)
     ASSERT_TRUE(train.running());
     std::this_thread::sleep_for(100ms);  // from the last byte of the record to the wait
     train.send(SIGINT);
-    EXPECT_EQ(train.wait().status, -SIGINT);
+    EXPECT_EQ(train.wait().status, 128 + SIGINT);
 }
 
 }  // namespace

@@ -326,6 +326,17 @@ std::string errorOf(const PhantomSpec& spec)
     return "no error";
 }
 
+// Said before anything is made. Where there is enough, it changes nothing.
+TEST(Phantom, OneThatTakesMoreMemoryThanThereIsIsRefused)
+{
+    PhantomSpec spec{.name = "block", .voxel = 1e-3, .memory = 1e5};
+    const std::string error = errorOf(spec);
+    EXPECT_NE(error.find("GB of memory"), std::string::npos) << error;
+    EXPECT_NE(error.find("--anyway"), std::string::npos) << error;
+    spec.memory = 1e10;
+    EXPECT_EQ(errorOf(spec), "no error");
+}
+
 TEST(Phantom, EveryParameterIsCheckedAgainstItsRange)
 {
     for (const std::string& name : phantomNames()) {

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+namespace palpate::apps {
+
+/// A folder that goes away at the end.
+class TemporaryFolder {
+public:
+    /// @param what  that is put there, in the message of the std::runtime_error where none can be made
+    explicit TemporaryFolder(const std::string& what)
+    {
+        std::string name = (std::filesystem::temp_directory_path() / "palpate-XXXXXX").string();
+        if (::mkdtemp(name.data()) == nullptr) {
+            throw std::runtime_error(name + ": no folder can be made there for " + what);
+        }
+        path_ = name;
+    }
+    ~TemporaryFolder()
+    {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+    const std::filesystem::path& path() const { return path_; }
+
+private:
+    std::filesystem::path path_;
+};
+
+}  // namespace palpate::apps

@@ -1,0 +1,63 @@
+#include <session/rehearsal.h>
+
+#include <base/processor_time.h>
+#include <haptics/simulation.h>
+#include <haptics/timing.h>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+
+namespace palpate::session {
+
+namespace {
+
+constexpr int ticks = 40;
+constexpr double stride = 1e-4;    // of the tool per tick [m]
+constexpr double patience = 0.3;   // [s]
+constexpr double tickTime = 1e-3;  // that there is for a tick [s]
+constexpr double pacedLimit = 5 * tickTime;
+constexpr double unpacedLimit = 60 * tickTime;
+
+}  // namespace
+
+Rehearsal rehearse(const haptics::SessionModel& model)
+{
+    haptics::Simulation simulation(model);
+    const bool needle = model.scene.tool.kind == datasets::ToolKind::needle;
+    const Vec3 way = glm::normalize(model.approach.aim - model.approach.entry);
+    const Vec3 touch = model.approach.entry - (needle ? 0.0 : model.scene.tool.radius) * way;
+    haptics::DeviceSample sample{.position = touch, .axis = way, .buttons = haptics::buttonDeadMan};
+    haptics::Histogram times;
+    Rehearsal rehearsal;
+    double spent = 0;
+    for (int i = 0; i < ticks && spent < patience; ++i) {
+        sample.position = touch + stride * i * way;
+        const double start = base::processorTime();
+        simulation.tick(sample);
+        const double took = base::processorTime() - start;
+        spent += took;
+        times.add(took);
+        rehearsal.worst = std::max(rehearsal.worst, took);
+    }
+    rehearsal.p50 = times.percentiles().p50;
+    return rehearsal;
+}
+
+std::string whyTooSlow(const Rehearsal& rehearsal, bool paced)
+{
+    if (rehearsal.p50 <= (paced ? pacedLimit : unpacedLimit)) {
+        return "";
+    }
+    const std::string takes = fmt::format("a tick of this model takes {:.0f} ms here ({:.0f} ms at worst)",
+                                          1e3 * rehearsal.p50, 1e3 * rehearsal.worst);
+    return paced ? fmt::format("{}, and there is {:.0f} ms: choose a coarser [model] or --setting, or go on with --anyway",
+                               takes, 1e3 * tickTime)
+                 : fmt::format(
+                       "{}, so that a second of the session takes {:.0f} s: choose a coarser [model] or --setting, "
+                       "or go on with --anyway",
+                       takes, rehearsal.p50 / tickTime);
+}
+
+}  // namespace palpate::session
