@@ -18,7 +18,7 @@ struct PhantomValues {
     std::map<std::string, double> numbers;
     std::map<std::string, std::string> words;
     std::uint64_t seed = 1;
-    double voxel = 1;  // [mm]
+    double voxel = 1;                                         // [mm]
     double memory = std::numeric_limits<double>::infinity();  // that the phantom may take [bytes]
 
     double number(const std::string& name) const { return numbers.at(name); }
