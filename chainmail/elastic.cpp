@@ -25,7 +25,7 @@ constexpr int freePeriod = 8;          // ... and where tissue springs back: its
 
 Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const Focus& focus)
     : options_(options),
-      stack_(body, options.window, focus),
+      stack_(body, options.window, focus, options.kernels != nullptr ? *options.kernels : kernels()),
       multigrid_(stack_, 8 * options.maxSites),
       sites_(options.maxSites)
 {

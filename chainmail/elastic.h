@@ -17,9 +17,10 @@ struct ElasticOptions {
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
     double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
     std::size_t maxSites = 4096;
-    double tolerance = 0.01;  // no more once the forces out of balance are this share of the contacts' [-]
-    int heldPeriod = 3;       // of an ElasticLevel: see there
-    bool goOn = true;         // begin with the last call's increment; without, a call begins where the tissue lies
+    double tolerance = 0.01;           // no more once the forces out of balance are this share of the contacts' [-]
+    int heldPeriod = 3;                // of an ElasticLevel: see there
+    bool goOn = true;                  // begin with the last call's increment; without, a call begins where the tissue lies
+    const Kernels* kernels = nullptr;  // the arithmetic; null: the widest set of this machine. All have the same results
 };
 
 struct ElasticResult {

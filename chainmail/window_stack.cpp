@@ -34,8 +34,8 @@ Focus focusAt(const volume::DistanceField& surface, Vec3 point) noexcept
     return {point, -surface.normal(point), std::max(0.0, -surface.distance(point))};
 }
 
-WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus)
-    : body_(&body), kernels_(&chainmail::kernels())
+WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus, const Kernels& kernels)
+    : body_(&body), kernels_(&kernels)
 {
     std::size_t scratch = 0;
     const Index3 wanted = windowSize(window, focus);

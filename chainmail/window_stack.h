@@ -28,8 +28,9 @@ public:
     /// @param window  nodes of a window along the way in, odd; sideways it has half as many again. A level with fewer is
     ///                held whole
     /// @param focus   where the windows start; its inward direction decides which way is in
-    /// The body must outlive it.
-    WindowStack(const ElasticBody& body, int window, const Focus& focus);
+    /// @param kernels the arithmetic
+    /// The body must outlive it, and the kernels.
+    WindowStack(const ElasticBody& body, int window, const Focus& focus, const Kernels& kernels = chainmail::kernels());
 
     std::span<Window> windows() noexcept { return windows_; }
     std::span<const Window> windows() const noexcept { return windows_; }

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace palpate::studies {
 
 using namespace chainmail;
@@ -9,6 +11,16 @@ using namespace chainmail;
 namespace {
 
 constexpr std::size_t mostNodes = 4U << 20;
+
+// Of the same ticks again, with arithmetic that counts.
+std::vector<KernelWork> workOf(const ElasticBody& body, const TrialPath& path, double speed, ElasticOptions options)
+{
+    const CountedKernels counting;
+    options.kernels = &counting.kernels();
+    Elastic elastic(body, options, TrialLoad(path).load().focus);
+    const TrialResult result = timeTrial(elasticModel(elastic), path, speed);
+    return counting.work(static_cast<double>(std::max<std::size_t>(result.ticks, 1)));
+}
 
 class SceneBench {
 public:
@@ -56,6 +68,7 @@ private:
             c.strain = reference.strain;
             c.residual = reference.residual;
             c.result = elasticTrial(body.body, path, speed, reference, options);
+            c.work = workOf(body.body, path, speed, options);
             if (setting == request_.rivalsOf && speed == request_.speeds.front()) {
                 c.rivals = rivals(body, path, speed, reference, elastic, options);
             }

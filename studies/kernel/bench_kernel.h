@@ -2,6 +2,7 @@
 
 #include <haptics/session_model.h>
 #include <studies/kernel/kernel_rivals.h>
+#include <studies/kernel/kernel_work.h>
 
 #include <functional>
 #include <optional>
@@ -30,6 +31,7 @@ struct KernelCase {
     double strain = 0;          // largest that the reference sees, see ReferenceState
     double residual = 0;        // of the reference, share of the contacts' forces
     TrialResult result;
+    std::vector<KernelWork> work;  // of the solver, per tick in contact
     std::optional<KernelRivals> rivals;
 };
 

@@ -80,6 +80,29 @@ void printOperator(const OperatorBench& bench)
     }
 }
 
+// What a tick in contact asks of the machine, for people: of the first case of the headline's setting; and of each case how
+// near it is to that.
+void printWork(const std::vector<KernelCase>& cases, const std::string& setting, const MachineRates& rates)
+{
+    const auto shown = std::ranges::find(cases, setting, &KernelCase::setting);
+    if (shown == cases.end()) {
+        return;
+    }
+    fmt::print("\na tick in contact of {}, {}, {}, {:g} mm/s\n{:<12} {:>7} {:>9} {:>9} {:>9}\n", shown->setting,
+               shown->scene, shown->tool, 1e3 * shown->speed, "operation", "calls", "nodes", "kB", "bound us");
+    for (const KernelWork& w : shown->work) {
+        fmt::print("{:<12} {:>7.1f} {:>9.0f} {:>9.0f} {:>9.1f}  {}\n", w.operation, w.calls, w.nodes, 1e-3 * w.bytes,
+                   1e6 * leastTime(std::span(&w, 1), rates), w.purpose);
+    }
+    fmt::print("\n{:<10} {:<12} {:>5} {:<8} {:>14} {:>9} {:>7}\n", "scene", "tool", "mm/s", "setting", "us, processor",
+               "bound us", "share");
+    for (const KernelCase& c : cases) {
+        const double bound = leastTime(c.work, rates);
+        fmt::print("{:<10} {:<12} {:>5g} {:<8} {:>14.0f} {:>9.0f} {:>6.0f}%\n", c.scene, c.tool, 1e3 * c.speed, c.setting,
+                   1e6 * c.result.cpu, 1e6 * bound, 100.0 * bound / c.result.cpu);
+    }
+}
+
 // Each case with rivals, for people.
 void printRivals(const std::vector<KernelCase>& cases)
 {
@@ -198,6 +221,7 @@ void benchKernelCommand(Options o)
     if (tell) {
         printRivals(cases);
         printOperator(operators);
+        printWork(cases, request.rivalsOf, operators.sets.back().rates);
     }
     const auto figures = kernelFigures(cases, operators, request.rivalsOf);
     if (tell) {

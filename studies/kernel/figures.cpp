@@ -80,7 +80,20 @@ nlohmann::json rivalFigures(const KernelCase& c)
     return out;
 }
 
-nlohmann::json caseFigures(const KernelCase& c)
+nlohmann::json workFigures(std::span<const KernelWork> work)
+{
+    auto out = nlohmann::json::array();
+    for (const KernelWork& w : work) {
+        out.push_back({{"operation", w.operation},
+                       {"purpose", w.purpose},
+                       {"calls", w.calls},
+                       {"nodes", w.nodes},
+                       {"kilobytes", 1e-3 * w.bytes}});
+    }
+    return out;
+}
+
+nlohmann::json caseFigures(const KernelCase& c, const MachineRates& rates)
 {
     nlohmann::json out{{"scene", c.scene},
                        {"tool", c.tool},
@@ -97,7 +110,11 @@ nlohmann::json caseFigures(const KernelCase& c)
                        {"window_moves", c.result.windowMoves},
                        {"strain", c.strain},
                        {"reference_residual", c.residual},
-                       {"looks", looksOf(c.result)}};
+                       {"looks", looksOf(c.result)},
+                       {"tick_us_cpu", 1e6 * c.result.cpu},
+                       {"tick_bound_us", 1e6 * leastTime(c.work, rates)},
+                       {"tick_bound_fraction", leastTime(c.work, rates) / c.result.cpu},
+                       {"work", workFigures(c.work)}};
     addErrors(out, c.result);
     if (c.rivals) {
         out["rivals"] = rivalFigures(c);
@@ -244,7 +261,7 @@ nlohmann::json kernelFigures(const std::vector<KernelCase>& cases, const Operato
 {
     auto list = nlohmann::json::array();
     for (const KernelCase& c : cases) {
-        list.push_back(caseFigures(c));
+        list.push_back(caseFigures(c, operators.sets.back().rates));
     }
     const int window = datasets::elasticSetting("default").window;
     const std::string& widest = operators.sets.back().name;
