@@ -243,11 +243,13 @@ void Scorer::addBeyond(const TickRecord& record) noexcept
     }
     furthest_ = std::max(furthest_, record.inserted);
     const double distance = std::max(0.0, record.distance[0]);
-    if (distance <= nearest_) {
-        nearest_ = distance;
+    // What the needle's line still meets is not behind its tip, however the tissue goes back and forth.
+    if (distance <= nearest_ || std::isfinite(record.ahead.structure[0])) {
+        nearest_ = std::min(nearest_, distance);
         atTarget_ = record.inserted;
     }
-    score_.beyondTarget = std::max(score_.beyondTarget, record.inserted - atTarget_);
+    // Nor is a tip farther beyond it than from it: the gun takes what it met, and the tissue lets go of the shaft.
+    score_.beyondTarget = std::max(score_.beyondTarget, std::min(record.inserted - atTarget_, distance));
 }
 
 void Scorer::addVital(const TickRecord& record) noexcept

@@ -290,6 +290,30 @@ TEST(Score, AMissKeepsNoPointsForTechnique)
     EXPECT_DOUBLE_EQ(parts(s).technique, 25.0);
 }
 
+// The tissue goes back and forth with the needle: a capsule that gives way in front of the target, or a shaft that is let go
+// when the gun has fired, is not beyond it.
+TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
+{
+    const auto beyond = [](double distance, double ahead) {
+        Scorer scorer(synthetic::info());
+        TickRecord tick;
+        tick.phase = Phase::inserted;
+        tick.distance.fill(1);
+        for (const auto& [inserted, from, on] : {std::tuple(53.4, 2.0, 2.0), {57.4, distance, ahead}}) {
+            tick.inserted = inserted * millimetre;
+            tick.distance[0] = from * millimetre;
+            tick.ahead.structure[0] = on * millimetre;
+            scorer.add(tick);
+            ++tick.tick;
+        }
+        return scorer.score().beyondTarget / millimetre;
+    };
+    constexpr double nowhere = std::numeric_limits<double>::infinity();
+    EXPECT_NEAR(beyond(3.8, 3.0), 0.0, 1e-9);
+    EXPECT_NEAR(beyond(2.5, nowhere), 2.5, 1e-9);
+    EXPECT_NEAR(beyond(9.0, nowhere), 4.0, 1e-9);
+}
+
 // A tip that goes on from the target's middle by 31 mm: what counts is from where it left the target, and the way back and
 // in again begins anew. Such a needle has no technique to be praised for.
 TEST(Score, DepthBeyondTheTargetIsFromWhereTheTipLeftIt)
