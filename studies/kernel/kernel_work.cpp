@@ -96,109 +96,107 @@ void masked(Operation operation, std::size_t count, double perNode) noexcept
 
 constexpr double operatorFloats = 8;  // displacement, two moduli, result
 
+void countOperators(Kernels& k) noexcept
+{
+    k.apply = [](const Layout& l, CellStiffness s, const float* u, float* out, float* scratch) noexcept {
+        whole(Operation::apply, l, operatorFloats);
+        counted->apply(l, s, u, out, scratch);
+    };
+    k.residualOf = [](const Layout& l, CellStiffness s, const float* open, const float* r, const float* u, float* out,
+                      float* scratch) noexcept {
+        whole(Operation::residualOf, l, operatorFloats + 4);
+        counted->residualOf(l, s, open, r, u, out, scratch);
+    };
+    k.smoothOf = [](const Layout& l, CellStiffness s, const Smoother& by, float* u, float* out, float* scratch) noexcept {
+        whole(Operation::smoothOf, l, operatorFloats + 7);
+        counted->smoothOf(l, s, by, u, out, scratch);
+    };
+    k.applyFinite = [](const Layout& l, CellStiffness s, float inverse, const float* u, float* out,
+                       float* scratch) noexcept {
+        whole(Operation::applyFinite, l, operatorFloats);
+        return counted->applyFinite(l, s, inverse, u, out, scratch);
+    };
+}
+
+void countPasses(Kernels& k) noexcept
+{
+    k.dots = [](const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept {
+        pass(Operation::dots, n, a == b ? 2 : 3);
+        counted->dots(x, a, b, n, sums);
+    };
+    k.combine = [](const float* x, float a, const float* y, float* out, std::size_t n) noexcept {
+        pass(Operation::combine, n, 3);
+        counted->combine(x, a, y, out, n);
+    };
+    k.goOn = [](float step, const StepFields& to, std::size_t n) noexcept {
+        pass(Operation::goOn, n, 4 + 5);
+        counted->goOn(step, to, n);
+    };
+    k.direct = [](const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept {
+        pass(Operation::direct, n, 3 + 2);
+        counted->direct(z, beta, last, step, to, n);
+    };
+    k.keepStep = [](const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept {
+        pass(Operation::keepStep, n, 6 + 7);
+        counted->keepStep(step, f, to, n, sums);
+    };
+    k.negate = [](const float* mask, const float* x, float* y, std::size_t count) noexcept {
+        masked(Operation::negate, count, 1 + 3 + 6);
+        return counted->negate(mask, x, y, count);
+    };
+    k.smoothFirst = [](float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept {
+        masked(Operation::smoothFirst, count, 1 + 3 + 3);
+        counted->smoothFirst(weight, diagonal, r, z, count);
+    };
+    k.smooth = [](float weight, const float* diagonal, const float* r, const float* q, float* z,
+                  std::size_t count) noexcept {
+        masked(Operation::smooth, count, 1 + 6 + 6);
+        counted->smooth(weight, diagonal, r, q, z, count);
+    };
+    k.chebyshev = [](float shrink, float weight, const Defect& by, float* f, float* z) noexcept {
+        masked(Operation::chebyshev, by.count, 1 + 6 + 12);
+        counted->chebyshev(shrink, weight, by, f, z);
+    };
+    k.blend = [](const float* border, const float* x, float* y, std::size_t count) noexcept {
+        masked(Operation::blend, count, 1 + 3 + 6);
+        counted->blend(border, x, y, count);
+    };
+    k.addMasked = [](const float* mask, const float* x, float* y, std::size_t count) noexcept {
+        masked(Operation::addMasked, count, 1 + 3 + 6);
+        counted->addMasked(mask, x, y, count);
+    };
+}
+
+void countTransfers(Kernels& k) noexcept
+{
+    k.average = [](const float* a, const float* b, float* out, std::size_t n) noexcept {
+        pass(Operation::average, n, 3);
+        counted->average(a, b, out, n);
+    };
+    k.hat = [](const float* a, const float* b, const float* c, float* out, std::size_t n) noexcept {
+        pass(Operation::hat, n, 4);
+        counted->hat(a, b, c, out, n);
+    };
+    k.spread = [](const float* from, int nodes, float* to) noexcept {
+        add(Operation::spread, nodes / 3.0, 1.5 * nodes);
+        counted->spread(from, nodes, to);
+    };
+    k.gatherAdd = [](const float* from, int nodes, float* to) noexcept {
+        add(Operation::gatherAdd, nodes / 3.0, 2.0 * nodes);
+        counted->gatherAdd(from, nodes, to);
+    };
+}
+
 const Kernels& countingKernels() noexcept
 {
-    static const Kernels k{
-        .name = kernels().name,
-        .width = kernels().width,
-        .apply =
-            [](const Layout& l, CellStiffness s, const float* u, float* out, float* scratch) noexcept {
-                whole(Operation::apply, l, operatorFloats);
-                counted->apply(l, s, u, out, scratch);
-            },
-        .residualOf =
-            [](const Layout& l, CellStiffness s, const float* open, const float* r, const float* u, float* out,
-               float* scratch) noexcept {
-                whole(Operation::residualOf, l, operatorFloats + 4);
-                counted->residualOf(l, s, open, r, u, out, scratch);
-            },
-        .smoothOf =
-            [](const Layout& l, CellStiffness s, const Smoother& by, float* u, float* out, float* scratch) noexcept {
-                whole(Operation::smoothOf, l, operatorFloats + 7);
-                counted->smoothOf(l, s, by, u, out, scratch);
-            },
-        .applyFinite =
-            [](const Layout& l, CellStiffness s, float inverse, const float* u, float* out, float* scratch) noexcept {
-                whole(Operation::applyFinite, l, operatorFloats);
-                return counted->applyFinite(l, s, inverse, u, out, scratch);
-            },
-        .dots =
-            [](const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept {
-                pass(Operation::dots, n, a == b ? 2 : 3);
-                counted->dots(x, a, b, n, sums);
-            },
-        .combine =
-            [](const float* x, float a, const float* y, float* out, std::size_t n) noexcept {
-                pass(Operation::combine, n, 3);
-                counted->combine(x, a, y, out, n);
-            },
-        .goOn =
-            [](float step, const StepFields& to, std::size_t n) noexcept {
-                pass(Operation::goOn, n, 4 + 5);
-                counted->goOn(step, to, n);
-            },
-        .direct =
-            [](const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept {
-                pass(Operation::direct, n, 3 + 2);
-                counted->direct(z, beta, last, step, to, n);
-            },
-        .keepStep =
-            [](const KeptStep& step, const float* f, const StepFields& to, std::size_t n, double* sums) noexcept {
-                pass(Operation::keepStep, n, 6 + 7);
-                counted->keepStep(step, f, to, n, sums);
-            },
-        .negate =
-            [](const float* mask, const float* x, float* y, std::size_t count) noexcept {
-                masked(Operation::negate, count, 1 + 3 + 6);
-                return counted->negate(mask, x, y, count);
-            },
-        .smoothFirst =
-            [](float weight, const float* diagonal, const float* r, float* z, std::size_t count) noexcept {
-                masked(Operation::smoothFirst, count, 1 + 3 + 3);
-                counted->smoothFirst(weight, diagonal, r, z, count);
-            },
-        .smooth =
-            [](float weight, const float* diagonal, const float* r, const float* q, float* z, std::size_t count) noexcept {
-                masked(Operation::smooth, count, 1 + 6 + 6);
-                counted->smooth(weight, diagonal, r, q, z, count);
-            },
-        .chebyshev =
-            [](float shrink, float weight, const Defect& by, float* f, float* z) noexcept {
-                masked(Operation::chebyshev, by.count, 1 + 6 + 12);
-                counted->chebyshev(shrink, weight, by, f, z);
-            },
-        .blend =
-            [](const float* border, const float* x, float* y, std::size_t count) noexcept {
-                masked(Operation::blend, count, 1 + 3 + 6);
-                counted->blend(border, x, y, count);
-            },
-        .addMasked =
-            [](const float* mask, const float* x, float* y, std::size_t count) noexcept {
-                masked(Operation::addMasked, count, 1 + 3 + 6);
-                counted->addMasked(mask, x, y, count);
-            },
-        .average =
-            [](const float* a, const float* b, float* out, std::size_t n) noexcept {
-                pass(Operation::average, n, 3);
-                counted->average(a, b, out, n);
-            },
-        .hat =
-            [](const float* a, const float* b, const float* c, float* out, std::size_t n) noexcept {
-                pass(Operation::hat, n, 4);
-                counted->hat(a, b, c, out, n);
-            },
-        .spread =
-            [](const float* from, int nodes, float* to) noexcept {
-                add(Operation::spread, nodes / 3.0, 1.5 * nodes);
-                counted->spread(from, nodes, to);
-            },
-        .gatherAdd =
-            [](const float* from, int nodes, float* to) noexcept {
-                add(Operation::gatherAdd, nodes / 3.0, 2.0 * nodes);
-                counted->gatherAdd(from, nodes, to);
-            },
-    };
-    return k;
+    static const Kernels counting = [] {
+        Kernels k = kernels();
+        countOperators(k);
+        countPasses(k);
+        countTransfers(k);
+        return k;
+    }();
+    return counting;
 }
 
 }  // namespace

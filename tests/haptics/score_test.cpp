@@ -290,8 +290,8 @@ TEST(Score, AMissKeepsNoPointsForTechnique)
     EXPECT_DOUBLE_EQ(parts(s).technique, 25.0);
 }
 
-// The tissue goes back and forth with the needle: a capsule that gives way in front of the target, or a shaft that is let go
-// when the gun has fired, is not beyond it.
+// The tissue goes back and forth with the needle: a capsule that gives way in front of the target, or a shaft that is let
+// go when the gun has fired, is not beyond it.
 TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
 {
     const auto beyond = [](double distance, double ahead) {
