@@ -248,7 +248,12 @@ void Scorer::addBeyond(const TickRecord& record) noexcept
         nearest_ = std::min(nearest_, distance);
         atTarget_ = record.inserted;
     }
-    // Nor is a tip farther beyond it than from it: the gun takes what it met, and the tissue lets go of the shaft.
+    // What the gun took of it lay ahead of the tip, and does no more: the tissue lets go of the shaft, which slides on.
+    if (record.fired && record.core.targetLength > 0.0) {
+        nearest_ = 0.0;
+        atTarget_ = record.inserted + record.core.targetLength;
+    }
+    // No tip is farther beyond the target than from it.
     score_.beyondTarget = std::max(score_.beyondTarget, std::min(record.inserted - atTarget_, distance));
 }
 

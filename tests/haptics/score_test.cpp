@@ -308,6 +308,25 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
         }
         return scorer.score().beyondTarget / millimetre;
     };
+    // A core with 11 mm of target, after which the shaft slides on by 4 mm, and is pushed by another 20.
+    Scorer scorer(synthetic::info());
+    TickRecord fires;
+    fires.phase = Phase::inserted;
+    fires.distance.fill(1);
+    const auto at = [&](double inserted, double from) {
+        fires.inserted = inserted * millimetre;
+        fires.distance[0] = from * millimetre;
+        scorer.add(fires);
+        ++fires.tick;
+        fires.fired = false;
+        return scorer.score().beyondTarget / millimetre;
+    };
+    fires.fired = true;
+    fires.core.targetLength = 11 * millimetre;
+    EXPECT_NEAR(at(43, 3.6), 0.0, 1e-9);
+    EXPECT_NEAR(at(47, 3.6), 0.0, 1e-9);
+    EXPECT_NEAR(at(67, 12.0), 12.0, 1e-9);
+
     constexpr double nowhere = std::numeric_limits<double>::infinity();
     EXPECT_NEAR(beyond(3.8, 3.0), 0.0, 1e-9);
     EXPECT_NEAR(beyond(2.5, nowhere), 2.5, 1e-9);
