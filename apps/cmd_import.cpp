@@ -6,24 +6,15 @@
 #include <datasets/label_map.h>
 #include <datasets/tables.h>
 #include <report/volume.h>
-#include <volume/fnv.h>
-#include <volume/import.h>
-#include <volume/prepare/body.h>
-#include <volume/prepare/mapping.h>
-#include <volume/prepare/name_table.h>
-#include <volume/prepare/steps.h>
-#include <volume/resample.h>
+#include <volume/prepare/volume_import.h>
 
-#include <base/build.h>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <cmath>
-#include <ctime>
 #include <memory>
 #include <new>
+#include <optional>
 #include <stdexcept>
 
 namespace palpate::apps {
@@ -32,16 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
-    fs::path input, output, tissues, image, json;
-    std::string stiffness, imageUnit;
-    volume::ImportOptions reading;
-    prepare::MappingOptions mapping;
-    prepare::PreparationOptions steps;
-    std::string voxel, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;
-    double hull = 0;  // thickness of a body that is invented [m]
-    bool bodyFromImage = false;
-    int imageVolume = 0;
+struct Options : prepare::ImportRequest {
+    fs::path output, tissues, json;
+    std::string voxel, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;  // as they were typed
 };
 
 void readLengths(Options& o)
@@ -59,151 +43,12 @@ void readLengths(Options& o)
     }
 }
 
-// The image as its file has it, its unit as --image-unit has it.
-volume::ImportedImage readImage(const Options& o, std::vector<std::string>& notes, command::Progress& progress)
+nlohmann::json figuresOf(const prepare::ImportedVolume& made)
 {
-    volume::ImportOptions reading;
-    reading.series = o.reading.series;
-    reading.volume = o.imageVolume;
-    progress.show("checking the image");
-    reading.progress = [&](double share) { progress.show("reading the image", share); };
-    volume::ImportedImage image = volume::importImage(o.image, reading);
-    for (const std::string& warning : image.warnings) {
-        notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
-    }
-    if (!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit) {
-        throw std::runtime_error(
-            fmt::format("{}: says itself that it is in {}: leave --image-unit out", o.image.string(), image.what));
-    }
-    image.what = o.imageUnit.empty() ? image.what : o.imageUnit;
-    if (o.bodyFromImage && image.what != "HU") {
-        throw std::runtime_error(
-            fmt::format("{}: --body-from-image needs CT in Hounsfield units: add --image-unit HU if it "
-                        "is that, or invent a body with --body-from-hull MM",
-                        o.image.string()));
-    }
-    return image;
-}
-
-// The image on the voxels of the labels.
-volume::CompanionImage companionOf(const Options& o, const volume::ImportedImage& image, const volume::LabelImage& labels,
-                                   const volume::TissueTable& table, std::vector<std::string>& notes)
-{
-    const volume::VoxelGrid from{image.size, image.affine}, to{labels.size, labels.affine};
-    volume::CompanionImage companion;
-    companion.unit = image.what;
-    if (!o.stiffness.empty()) {
-        companion.stiffness = datasets::stiffnessMap(o.stiffness, companion.unit, table);
-    }
-    const float missing = companion.unit == "HU" ? -1000.0F : 0.0F;
-    companion.values = volume::resampledImage(from, image.values, to, std::nanf(""));
-    std::uint64_t bare = 0, labelled = 0;
-    for (std::size_t i = 0; i < companion.values.size(); ++i) {
-        labelled += labels.values[i] != 0 ? 1 : 0;
-        bare += std::isnan(companion.values[i]) && labels.values[i] != 0 ? 1 : 0;
-        companion.values[i] = std::isnan(companion.values[i]) ? missing : companion.values[i];
-    }
-    if (2 * bare > labelled) {
-        throw std::runtime_error(
-            fmt::format("{}: it covers less than half of the labelled voxels of {}: give the image that the "
-                        "segmentation was made of, in the same patient frame",
-                        o.image.string(), o.input.filename().string()));
-    }
-    if (bare > 0) {
-        notes.push_back(fmt::format("{} labelled voxels lie outside the image and have {} there{}", bare, missing,
-                                    companion.stiffness.points.empty() ? "" : ", for their stiffness too"));
-    }
-    return companion;
-}
-
-// A body around the labels, as it is asked for; before anything else is done to them.
-std::vector<prepare::PreparationStep> addBody(const Options& o, volume::LabelImage& labels,
-                                              std::vector<volume::LabelName>& named, const volume::TissueTable& table,
-                                              const volume::ImportedImage* image, std::vector<std::string>& notes,
-                                              command::Progress& progress)
-{
-    const auto tell = [&](const std::string& what) { progress.show(what); };
-    if (o.bodyFromImage) {
-        const volume::VoxelGrid ct{image->size, image->affine};
-        prepare::extendToImage(labels, ct);
-        progress.show("resampling the image");
-        auto hu = volume::resampledImage(ct, image->values, {labels.size, labels.affine}, std::nanf(""));
-        return prepare::bodyFromImage(labels, named, std::move(hu), table, tell);
-    }
-    if (o.hull == 0) {
-        return {};
-    }
-    notes.push_back(
-        fmt::format("the body around the labels is invented: {:g} mm of soft tissue and skin that no image "
-                    "shows",
-                    1e3 * o.hull));
-    return prepare::bodyFromHull(labels, named, o.hull, table, tell);
-}
-
-volume::Provenance provenanceOf(const Options& o, const volume::LabelImage& image, const std::vector<std::string>& notes,
-                                const std::vector<prepare::PreparationStep>& steps)
-{
-    volume::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
-    hash.addAll(image.values);
-    volume::Provenance provenance = {{"source", o.input.filename().string()},
-                                     {"label hash", fmt::format("{:016x}", hash.value)},
-                                     {"imported", fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr)))},
-                                     {"program", std::string(base::build())}};
-    std::error_code none;
-    if (fs::is_regular_file(o.input, none)) {
-        provenance.insert(provenance.begin() + 1, {"bytes", std::to_string(fs::file_size(o.input))});
-    }
-    if (!o.image.empty()) {
-        provenance.emplace_back("image file", o.image.filename().string());
-    }
-    if (!o.stiffness.empty()) {
-        provenance.emplace_back("stiffness", fmt::format("scaled by the image, map {}", o.stiffness));
-    }
-    for (const prepare::PreparationStep& step : steps) {
-        provenance.emplace_back(report::stepKey, step.text);
-    }
-    for (const std::string& note : notes) {
-        provenance.emplace_back(report::warningKey, note);
-    }
-    return provenance;
-}
-
-// What became of voxels that several segments hold: in one note, or with --verbose in one for each pair.
-void noteOverlaps(const volume::ImportedLabels& labels, bool verbose, std::vector<std::string>& notes)
-{
-    const auto nameOf = [&](std::uint16_t value) {
-        for (const volume::LabelName& n : labels.names) {
-            if (n.value == value) {
-                return n.name;
-            }
-        }
-        return fmt::format("label {}", value);
-    };
-    std::uint64_t all = 0;
-    const volume::Overlap* most = nullptr;
-    for (const volume::Overlap& o : labels.overlaps) {
-        all += o.voxels;
-        most = most == nullptr || o.voxels > most->voxels ? &o : most;
-        if (verbose || labels.overlaps.size() == 1) {
-            notes.push_back(fmt::format("{} voxels of '{}' lie in '{}' too, which has them: --overlap says otherwise",
-                                        o.voxels, nameOf(o.lost), nameOf(o.kept)));
-        }
-    }
-    if (!verbose && labels.overlaps.size() > 1) {
-        notes.push_back(
-            fmt::format("{} voxels lie in several segments, in {} pairs of them, the most of '{}' in '{}' ({}): "
-                        "--overlap says who has them, --verbose lists each pair",
-                        all, labels.overlaps.size(), nameOf(most->lost), nameOf(most->kept), most->voxels));
-    }
-}
-
-nlohmann::json figuresOf(const volume::Tissue& tissue, const volume::ImportedLabels& labels,
-                         const std::vector<prepare::PreparationStep>& steps)
-{
-    nlohmann::json figures = report::volumeFigures(tissue);
-    figures["steps"] = prepare::stepFigures(steps);
+    nlohmann::json figures = report::volumeFigures(made.tissue);
+    figures["steps"] = prepare::stepFigures(made.steps);
     figures["overlaps"] = nlohmann::json::array();
-    for (const volume::Overlap& o : labels.overlaps) {
+    for (const volume::Overlap& o : made.overlaps) {
         figures["overlaps"].push_back({{"kept", o.kept}, {"lost", o.lost}, {"voxels", o.voxels}});
     }
     return figures;
@@ -217,15 +62,7 @@ void checkOptions(const Options& o)
     if (!o.output.empty() && o.output.extension() != ".vdb") {
         throw std::runtime_error(o.output.string() + ": a volume is a .vdb file: name it so");
     }
-    if (!o.stiffness.empty() && o.image.empty()) {
-        throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
-    }
-    if (o.bodyFromImage && o.image.empty()) {
-        throw std::runtime_error("--body-from-image: needs the image: add --image FILE");
-    }
-    if (!o.imageUnit.empty() && o.image.empty()) {
-        throw std::runtime_error("--image-unit: needs the image: add --image FILE");
-    }
+    prepare::checkRequest(o);
     base::checkOutput(o.output);
     base::checkOutput(o.mapping.writeMap);
     base::checkOutput(o.json);
@@ -237,52 +74,27 @@ void runImport(Options o)
     checkOptions(o);
     const volume::TissueTable table = o.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(o.tissues);
     command::Progress progress(command::Progress::Clock::ticking);
-    progress.show("checking the file");
+    const auto tell = [&](const std::string& what, std::optional<double> share) {
+        share ? progress.show(what, *share) : progress.show(what);
+    };
     o.reading.sheared = o.steps.voxel > 0;
-    o.reading.progress = [&](double share) { progress.show("reading", share); };
-    volume::ImportedLabels labels = volume::importLabels(o.input, o.reading);
-    progress.show("counting labels");
-    const prepare::LabelCounts counts = prepare::countLabels(labels.image);
-    prepare::addNames(o.mapping, o.input, counts, labels);
     if (!o.mapping.writeMap.empty()) {
+        const auto [labels, counts] = prepare::readLabels(o, tell);
         const std::size_t open = prepare::writeLabelMap(o.mapping, o.input, labels, counts, table);
         progress.clear();
         fmt::print("{}: {} labels, {} of them to be filled in\n", o.mapping.writeMap.string(), counts.size(), open);
         return;
     }
-    std::vector<std::string> notes = labels.warnings;
-    noteOverlaps(labels, o.mapping.verbose, notes);
-    std::vector<volume::LabelName> named = prepare::mapLabels(o.mapping, o.input, labels, counts, table, notes);
-    std::optional<volume::ImportedImage> image;
-    if (!o.image.empty()) {
-        image = readImage(o, notes, progress);
-    }
-    auto steps = addBody(o, labels.image, named, table, image ? &*image : nullptr, notes, progress);
-    for (auto& step :
-         prepare::prepare(labels.image, named, table, o.steps, [&](const auto& what) { progress.show(what); })) {
-        steps.push_back(std::move(step));
-    }
-    std::optional<volume::CompanionImage> companion;
-    if (image) {
-        progress.show("resampling the image");
-        companion = companionOf(o, *image, labels.image, table, notes);
-        image.reset();
-    }
-    progress.show("making tissue");
-    volume::Provenance provenance = provenanceOf(o, labels.image, notes, steps);
-    const volume::Tissue tissue =
-        volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance), companion ? &*companion : nullptr);
-    labels.image.values = {};
-    companion.reset();
+    const prepare::ImportedVolume made = prepare::importVolume(o, table, tell);
     progress.show("writing");
-    tissue.save(o.output);
+    made.tissue.save(o.output);
     progress.clear();
     if (o.json != "-") {
         fmt::print("{} -> {}\n\n", o.input.string(), o.output.string());
-        report::printVolume(tissue);
+        report::printVolume(made.tissue);
     }
     if (!o.json.empty()) {
-        command::writeJson(o.json, figuresOf(tissue, labels, steps));
+        command::writeJson(o.json, figuresOf(made));
     }
 }
 

@@ -5,6 +5,7 @@
 #include <base/quantities.h>
 #include <command/progress.h>
 #include <planner/costs.h>
+#include <planner/figures.h>
 #include <planner/planner.h>
 #include <session/open.h>
 
@@ -33,62 +34,6 @@ struct Options {
     std::string costs;
     std::string json;
 };
-
-double spacingOf(const PlanCandidate& c)
-{
-    return c.level == ModelLevel::elastic ? c.elastic.spacing : c.spacing;
-}
-
-nlohmann::json candidateFigures(const PlanCandidate& c)
-{
-    const bool elastic = c.level == ModelLevel::elastic;
-    nlohmann::json out{{"level", datasets::modelLevels[static_cast<std::size_t>(c.level)]},
-                       {"spacing_mm", 1e3 * spacingOf(c)},
-                       {"windows", nlohmann::json::array()},
-                       {"sweeps", elastic ? c.elastic.cycles : 0},
-                       {"strain", elastic && c.elastic.strain == Strain::finite ? "finite" : "small"},
-                       {"nodes", c.nodes},
-                       {"slots", c.slots},
-                       {"cycles", c.meanCycles},
-                       {"touched", c.touched},
-                       {"tried", c.tried},
-                       {"predicted_us", c.microseconds},
-                       {"holds_budget", c.holdsBudget}};
-    if (elastic) {
-        out["windows"].push_back(c.elastic.window);
-    }
-    if (c.tried) {
-        out["predicted_error_pct"] = c.error;
-        out["rms_pct"] = c.rms;
-        out["near_pct"] = c.near;
-        out["force_pct"] = nullptr;
-        out["holds_error"] = c.holdsError;
-    }
-    if (c.force) {
-        out["force_pct"] = *c.force;
-    }
-    return out;
-}
-
-nlohmann::json planFigures(const Options& o, const Plan& plan, const planner::PlanRequest& request)
-{
-    auto candidates = nlohmann::json::array();
-    for (const PlanCandidate& c : plan.candidates) {
-        candidates.push_back(candidateFigures(c));
-    }
-    nlohmann::json out = plan.choice ? candidateFigures(plan.candidates[*plan.choice]) : nlohmann::json::object();
-    out["scene"] = o.scene;
-    out["found"] = plan.choice.has_value();
-    out["error_pct"] = 100.0 * request.error;
-    out["budget_us"] = 1e6 * request.budget;
-    out["costs"] = o.costs.empty() ? "built in" : o.costs;
-    out["reference_spacing_mm"] = 1e3 * plan.referenceSpacing;
-    out["reference_nodes"] = plan.referenceNodes;
-    out["reference_strain"] = plan.finiteReference ? "finite" : "small";
-    out["local_strain"] = plan.strain;
-    out["candidates"] = candidates;
-    return out;
-}
 
 std::string verdict(const PlanCandidate& c, bool chosen)
 {
@@ -193,7 +138,7 @@ void planScene(const Options& o)
     const Plan plan = planner::planModel(model, request, [&](const std::string& what) { progress.show(what); });
     progress.clear();
     if (!o.json.empty()) {
-        command::writeJson(o.json, planFigures(o, plan, request));
+        command::writeJson(o.json, planner::planFigures(o.scene, plan, request, o.costs));
     }
     const bool tell = o.json != "-";
     if (tell) {

@@ -37,6 +37,23 @@ if(PALPATE_DICOM)
   endforeach()
 endif()
 
+# Debian's own Python, whatever other one is first in PATH: its packages numpy and pybind11 are for that. Python is built
+# without sanitizers.
+if(PALPATE_PYTHON AND NOT (PALPATE_PYTHON STREQUAL AUTO AND PALPATE_SANITIZE))
+  set(Python_EXECUTABLE /usr/bin/python3 CACHE FILEPATH "Python that `import palpate` is built for")
+  set(PYBIND11_FINDPYTHON ON)
+  if(PALPATE_PYTHON STREQUAL AUTO)
+    find_package(Python 3.11 COMPONENTS Interpreter Development.Module QUIET)
+    find_package(pybind11 2.10 CONFIG QUIET)
+    set(PALPATE_PYTHON ${pybind11_FOUND})
+  else()
+    find_package(Python 3.11 COMPONENTS Interpreter Development.Module REQUIRED)
+    find_package(pybind11 2.10 CONFIG REQUIRED)
+  endif()
+else()
+  set(PALPATE_PYTHON OFF)
+endif()
+
 if(PALPATE_REFERENCE)
   find_package(CGAL 5.5 CONFIG REQUIRED)
   find_package(GetFEM REQUIRED)

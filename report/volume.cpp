@@ -1,5 +1,7 @@
 #include <report/volume.h>
 
+#include <volume/provenance.h>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -108,9 +110,9 @@ nlohmann::json volumeFigures(const volume::Tissue& tissue)
     nlohmann::json provenance = nlohmann::json::object();
     nlohmann::json warnings = nlohmann::json::array(), done = nlohmann::json::array();
     for (const auto& [key, value] : tissue.provenance()) {
-        if (key == warningKey) {
+        if (key == volume::warningKey) {
             warnings.push_back(value);
-        } else if (key == stepKey) {
+        } else if (key == volume::stepKey) {
             done.push_back(value);
         } else {
             provenance[key] = value;

@@ -6,11 +6,6 @@
 
 namespace palpate::report {
 
-/// Provenance entries of this key are what the import warned of; they travel with the file.
-inline constexpr const char* warningKey = "warning";
-/// And of this key what it did to the labels.
-inline constexpr const char* stepKey = "step";
-
 /// The figures of `info` and `import`: size, spacing_mm, direction, origin_mm, labels, memory_mb, warnings and more.
 nlohmann::json volumeFigures(const volume::Tissue& tissue);
 

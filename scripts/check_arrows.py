@@ -26,6 +26,9 @@ ARROWS = {
     "studies": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "report", "command", "channel", "ultrasound"},
     "planner": {"base", "chainmail", "datasets", "haptics", "session", "command", "studies"},
     "sweep": {"base", "volume", "datasets", "haptics", "session", "report", "command"},
+    "python": {
+        "base", "volume", "volume/prepare", "datasets", "channel", "haptics", "session", "ultrasound", "planner", "report", "sweep",
+    },
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
@@ -35,6 +38,7 @@ ARROWS = {
 # Third-party headers that stay in one folder.
 OWNERS = {
     "openvdb/": {"volume"},
+    "pybind11/": {"python"},
     "dcmtk/": {"volume"},
     "openjpeg": {"volume"},
     "itk": {"tests"},  # an independent reader to compare with

@@ -232,7 +232,8 @@ SweepCase sweepPoint(const SweepPlan& plan, std::size_t index)
     for (std::size_t a = 0; a < plan.axes.size(); ++a) {
         const double x = plan.points[c.point][a];
         const Axis& axis = plan.axes[a];
-        c.parameters.push_back(plan.design == DesignKind::grid ? axis.level(static_cast<std::size_t>(x)) : axis.at(x));
+        const bool byNumber = plan.design == DesignKind::grid || plan.design == DesignKind::list;
+        c.parameters.push_back(byNumber ? axis.level(static_cast<std::size_t>(x)) : axis.at(x));
         if (const auto* const number = std::get_if<double>(&c.parameters.back())) {
             c.variables[axis.name] = *number;
         } else if (const auto* const whole = std::get_if<std::int64_t>(&c.parameters.back())) {
@@ -244,6 +245,19 @@ SweepCase sweepPoint(const SweepPlan& plan, std::size_t index)
         }
     }
     return c;
+}
+
+datasets::Scene sceneWith(const datasets::Scene& scene, const std::vector<Setting>& settings)
+{
+    toml::table root = datasets::parseToml(datasets::sceneText(scene), "");
+    apply(root, settings, {});
+    try {
+        std::ostringstream text;
+        text << root << '\n';
+        return datasets::parseScene(text.str(), "");
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(withoutPlace(e.what()));
+    }
 }
 
 SweepCase sweepCase(const SweepPlan& plan, std::size_t index)

@@ -6,6 +6,7 @@
 #include <command/progress.h>
 #include <sweep/local.h>
 #include <sweep/report.h>
+#include <sweep/run.h>
 #include <sweep/slurm.h>
 #include <sweep/table.h>
 
@@ -20,6 +21,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <iterator>
 #include <memory>
 #include <set>
 #include <stdexcept>
@@ -38,10 +40,11 @@ constexpr std::size_t barWidth = 30;
 constexpr double fileBlock = 4096;  // what a small file takes on a disk
 
 struct Options {
-    std::string plan, folder, report, json, work;
+    std::string plan, folder, report, json, work, shard, cases;
+    std::vector<std::string> merged;  // folders of shards
     SlurmSettings slurm;
     int jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-    bool dry = false, onSlurm = false, retry = false, anyBuild = false, list = false;
+    bool dry = false, onSlurm = false, retry = false, anyBuild = false, list = false, merge = false;
 };
 
 std::atomic<int> interrupts{0};
@@ -145,31 +148,27 @@ void dryRun(const Options& o)
     }
 }
 
-// Which cases are still to be run.
-std::vector<std::size_t> remaining(const Options& o, const SweepFolder& folder)
+bool isPart(const Options& o)
 {
-    std::vector<std::string> damaged;
-    const auto rows = folder.rows(&damaged);
-    for (const std::string& what : damaged) {
-        fmt::print(stderr, "palpate: {}: the case is computed again\n", what);
-    }
-    std::vector<std::size_t> cases;
-    std::set<std::string> others;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        if (!rows[i] || (o.retry && rows[i]->failed())) {
-            folder.forget(i);
-            cases.push_back(i);
-        } else if (rows[i]->build != std::string(base::build())) {
-            others.insert(rows[i]->build);
-        }
-    }
-    if (!others.empty() && !cases.empty() && !o.anyBuild) {
-        throw std::runtime_error(
-            fmt::format("{}: holds cases of {} and this is {}: go on with that, or add --any-build (the table says which "
-                        "case is whose)",
-                        folder.path().string(), fmt::join(others, ", "), std::string(base::build())));
-    }
-    return cases;
+    return !o.shard.empty() || !o.cases.empty();
+}
+
+// A part of a sweep works in a folder of its own.
+fs::path placeOf(const Options& o)
+{
+    constexpr std::size_t any = std::size_t{1} << 40U;  // the plan is not known yet
+    return !o.shard.empty()   ? shardFolder(o.folder, o.shard)
+           : !o.cases.empty() ? casesFolder(o.folder, casesOfList(o.cases, any))
+                              : fs::path(o.folder);
+}
+
+CasesWanted wantedOf(const Options& o, const SweepPlan& plan)
+{
+    CasesWanted wanted{{}, o.retry, o.anyBuild};
+    wanted.cases = !o.shard.empty()   ? casesOfShard(o.shard, plan.cases())
+                   : !o.cases.empty() ? casesOfList(o.cases, plan.cases())
+                                      : allCases(plan);
+    return wanted;
 }
 
 SlurmSettings merged(const Options& o, const SweepPlan& plan)
@@ -184,11 +183,11 @@ SlurmSettings merged(const Options& o, const SweepPlan& plan)
     return s;
 }
 
-PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std::size_t>& cases)
+PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std::size_t>& cases, std::size_t all)
 {
     command::Progress progress;
     const auto begin = Clock::now();
-    const std::size_t all = folder.plan().cases(), before = all - cases.size();
+    const std::size_t before = all - cases.size();
     if (o.onSlurm) {
         const auto told = [&](std::size_t done, std::size_t running, std::size_t waiting) {
             progress.show(
@@ -209,20 +208,19 @@ PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std
     return runLocally(folder, cases, o.jobs, std::string(base::build()), told, [] { return interrupts > 1; });
 }
 
-// Table and figures of what there is; how many cases are done.
-std::size_t conclude(const Options& o, const SweepFolder& folder, const PoolResult& run, std::size_t begun)
+// Table and figures of what there is; which of the wanted cases are not done.
+std::vector<std::size_t> conclude(const Options& o, const SweepFolder& folder, const PoolResult& run, std::size_t begun,
+                                  const std::vector<std::size_t>& wanted)
 {
     const auto rows = folder.rows();
-    const SweepTable table = tableOf(folder.plan(), rows);
-    base::writeWhole(folder.path() / "table.csv", csvText(table));
-    writeDatabase(folder.path() / "table.db", table, folder.plan());
+    const SweepTable table = writeTables(folder, rows);
     const auto failed =
         static_cast<std::size_t>(std::ranges::count_if(rows, [](const auto& r) { return r && r->failed(); }));
     const auto processes = static_cast<double>(std::min(begun, static_cast<std::size_t>(o.jobs)));
     const double share = run.seconds > 0 && processes > 0 ? run.cpuSeconds / (run.seconds * processes) : 0.0;
     const fs::path file = folder.path() / "table.csv";
     if (!o.json.empty()) {
-        command::writeJson(o.json, {{"cases", rows.size()},
+        command::writeJson(o.json, {{"cases", wanted.size()},
                                     {"done", table.rows.size()},
                                     {"failed", failed},
                                     {"seconds", run.seconds},
@@ -231,31 +229,54 @@ std::size_t conclude(const Options& o, const SweepFolder& folder, const PoolResu
     }
     if (o.json != "-") {
         fmt::print("{} of {}, {} failed; {} now in {:.3g} s{}\ntable: {}, {}\n", table.rows.size(),
-                   plural(rows.size(), "case"), failed, run.done, run.seconds,
+                   plural(wanted.size(), "case"), failed, run.done, run.seconds,
                    run.cpuSeconds > 0
                        ? fmt::format(", {:.0f} % of {}", 100 * share, plural(static_cast<std::size_t>(processes), "core"))
                        : "",
                    file.string(), (folder.path() / "table.db").string());
     }
-    if (failed == rows.size()) {
+    if (failed == wanted.size()) {
         const auto first = std::ranges::find_if(rows, [](const auto& r) { return r && r->failed(); });
         throw std::runtime_error("every case failed: " + (*first)->error);
     }
-    return table.rows.size();
+    std::vector<std::size_t> missing;
+    std::ranges::copy_if(wanted, std::back_inserter(missing), [&](std::size_t i) { return !rows[i]; });
+    return missing;
 }
 
 void run(const Options& o)
 {
     base::checkOutput(o.json);
     heedSignals();
-    SweepFolder folder(o.folder, o.plan, true);
+    SweepFolder folder(placeOf(o), o.plan, true);
     folder.clean();
-    const auto cases = remaining(o, folder);
-    const PoolResult result = cases.empty() ? PoolResult() : runCases(o, folder, cases);
-    const std::size_t done = conclude(o, folder, result, cases.size());
-    if (done < folder.plan().cases()) {
+    const CasesWanted wanted = wantedOf(o, folder.plan());
+    const auto cases =
+        remainingCases(folder, wanted, [](const std::string& what) { fmt::print(stderr, "palpate: {}\n", what); });
+    const PoolResult result = cases.empty() ? PoolResult() : runCases(o, folder, cases, wanted.cases.size());
+    const auto missing = conclude(o, folder, result, cases.size(), wanted.cases);
+    if (!missing.empty()) {
         throw std::runtime_error(fmt::format("stopped: {} of {} cases are done; the same command goes on with the others",
-                                             done, folder.plan().cases()));
+                                             wanted.cases.size() - missing.size(), wanted.cases.size()));
+    }
+    if (isPart(o) && o.json != "-") {
+        fmt::print("when all parts are done: palpate sweep -o {} --merge\n", o.folder);
+    }
+}
+
+// One table of what shards have done, in their folders and in those that are named.
+void merge(const Options& o)
+{
+    base::checkOutput(o.json);
+    const std::vector<fs::path> from(o.merged.begin(), o.merged.end());
+    const std::size_t came = mergeShards(o.folder, from);
+    const SweepFolder folder(o.folder, o.plan, true);
+    PoolResult result;
+    result.done = came;
+    const auto missing = conclude(o, folder, result, 0, allCases(folder.plan()));
+    if (!missing.empty()) {
+        throw std::runtime_error(fmt::format("{}: {} of {} cases are missing: run them with --cases {}, and merge again",
+                                             o.folder, missing.size(), folder.plan().cases(), listOfCases(missing)));
     }
 }
 
@@ -294,9 +315,32 @@ void sweepCommand(const Options& o)
             throw std::runtime_error("sweep --dry-run: of what? give a plan, or -o DIR");
         }
         dryRun(o);
+    } else if (o.merge) {
+        merge(o);
     } else {
         run(o);
     }
+}
+
+void addParts(CLI::App& c, Options& o)
+{
+    auto* shard = c.add_option("--shard", o.shard, "Run part K of N, in DIR/shards/K-of-N, whoever runs the others")
+                      ->type_name("K/N");
+    auto* cases = c.add_option("--cases", o.cases, "Run these cases alone, as in 0-9,12, in a folder below DIR/shards")
+                      ->type_name("LIST")
+                      ->excludes(shard);
+    auto* merge = c.add_option_function<std::vector<std::string>>(
+        "--merge",
+        [&o](const std::vector<std::string>& folders) {
+            o.merge = true;
+            for (const std::string& folder : folders) {
+                if (!folder.empty()) {
+                    o.merged.push_back(folder);
+                }
+            }
+        },
+        "Take what shards have done, in DIR/shards and in these folders, into one table");
+    merge->expected(0, CLI::detail::expected_max_vector_size)->type_name("[DIR..]")->excludes(shard)->excludes(cases);
 }
 
 }  // namespace
@@ -315,6 +359,7 @@ void addSweep(CLI::App& app)
     c->add_option("--jobs", o->jobs, "Processes, one core each; the table does not depend on it")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
+    addParts(*c, *o);
     auto* slurm = c->add_flag("--slurm", o->onSlurm, "As a Slurm job array: submit, watch, submit again what was lost");
     c->add_option("--partition", o->slurm.partition, "Of the cluster")->needs(slurm);
     c->add_option("--time", o->slurm.time, "Limit of a task, as sbatch takes it")->needs(slurm);
@@ -326,6 +371,9 @@ void addSweep(CLI::App& app)
     c->add_option("--sbatch", o->slurm.options, "Another option for sbatch, such as --sbatch=--qos=long")
         ->needs(slurm)
         ->allow_extra_args(false);
+    for (const char* const part : {"--shard", "--cases", "--merge"}) {
+        c->get_option(part)->excludes(slurm);
+    }
     c->add_flag("--retry", o->retry, "Run cases that failed again");
     c->add_flag("--any-build", o->anyBuild, "Go on with a sweep that another build began");
     c->add_option("--report", o->report, "Write report.html in this folder of a sweep");

@@ -10,8 +10,9 @@
 namespace palpate::sweep {
 
 /// How the points of a sweep lie in the unit cube of its axes.
-enum class DesignKind : std::uint8_t { grid, latinHypercube, sobol, saltelli, morris };
-inline constexpr std::array<std::string_view, 5> designNames{"grid", "latin_hypercube", "sobol", "saltelli", "morris"};
+enum class DesignKind : std::uint8_t { grid, latinHypercube, sobol, saltelli, morris, list };
+inline constexpr std::array<std::string_view, 6> designNames{"grid",     "latin_hypercube", "sobol",
+                                                             "saltelli", "morris",          "list"};
 
 /// Points of the unit cube [0, 1)^d, one row each.
 using UnitPoints = std::vector<std::vector<double>>;

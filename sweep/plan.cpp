@@ -158,8 +158,8 @@ void readDesign(Section& top, SweepPlan& plan)
         plan.design = static_cast<DesignKind>(*kind);
     }
     const auto samples = section->integer("samples", "", 1, mostSamples);
-    if ((plan.design == DesignKind::grid) == samples.has_value()) {
-        section->missing("samples", samples ? "a grid has none: leave it out" : "how many");
+    if ((plan.design == DesignKind::grid || plan.design == DesignKind::list) == samples.has_value()) {
+        section->missing("samples", samples ? "a grid or a list has none: leave it out" : "how many");
     }
     plan.samples = static_cast<std::size_t>(samples.value_or(0));
     section->finish();
@@ -284,6 +284,24 @@ UnitPoints gridPoints(const std::vector<Axis>& axes, Section& top)
     return points;
 }
 
+// Point i has value i of every axis.
+UnitPoints listPoints(const std::vector<Axis>& axes, Section& top)
+{
+    const std::size_t count = axes.front().values.size();
+    for (const Axis& a : axes) {
+        if (a.values.empty() || a.values.size() != count) {
+            top.refuse("axis",
+                       fmt::format("'{}' has {} values and '{}' has {}: in a list every axis has one for each point",
+                                   axes.front().name, count, a.name, a.values.size()));
+        }
+    }
+    UnitPoints points;
+    for (std::size_t i = 0; i < count; ++i) {
+        points.emplace_back(axes.size(), static_cast<double>(i));
+    }
+    return points;
+}
+
 UnitPoints pointsOf(const SweepPlan& plan, Section& top)
 {
     switch (plan.design) {
@@ -295,6 +313,8 @@ UnitPoints pointsOf(const SweepPlan& plan, Section& top)
             return saltelliPoints(plan.samples, plan.axes.size(), plan.seed);
         case DesignKind::morris:
             return morrisPoints(plan.samples, plan.axes.size(), plan.seed);
+        case DesignKind::list:
+            return listPoints(plan.axes, top);
         case DesignKind::grid:
             break;
     }

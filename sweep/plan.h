@@ -82,7 +82,8 @@ struct SweepPlan {
     std::vector<SweepOutput> outputs;
     std::vector<OutputMark> marks;
     SlurmSettings slurm;
-    UnitPoints points;  // that satisfy the constraints; of a grid the index of each value in place of a coordinate
+    UnitPoints
+        points;  // that satisfy the constraints; of a grid or a list the index of each value in place of a coordinate
 
     std::size_t cases() const noexcept { return points.size() * repeats; }
 };
@@ -108,6 +109,8 @@ struct SweepCase {
     Procedure procedure, referenceProcedure;
 };
 SweepCase sweepCase(const SweepPlan& plan, std::size_t index);
+/// The scene with these keys set. Throws std::runtime_error for a key or a value that no scene has.
+datasets::Scene sceneWith(const datasets::Scene& scene, const std::vector<Setting>& settings);
 /// The parameters alone: cannot fail.
 SweepCase sweepPoint(const SweepPlan& plan, std::size_t index);
 

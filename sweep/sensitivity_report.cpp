@@ -124,6 +124,7 @@ Ranking rankingOf(const SweepPlan& plan)
                 return {"Share of the variance over the grid that an axis makes by itself", {"share"}, byShare};
             }
             break;
+        case DesignKind::list:
         case DesignKind::latinHypercube:
         case DesignKind::sobol:
             break;

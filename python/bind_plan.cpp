@@ -1,0 +1,42 @@
+#include <python/scene_box.h>
+
+#include <planner/figures.h>
+#include <planner/planner.h>
+
+#include <pybind11/stl.h>
+#include <nlohmann/json.hpp>
+
+namespace palpate::python {
+
+namespace {
+
+py::object plan(const py::object& what, double error, const std::optional<double>& forceError, double budget, double speed)
+{
+    SceneBox box = sceneOf(what);
+    const std::string name = box.scene.name;
+    planner::PlanRequest request;
+    request.error = error;
+    request.forceError = forceError;
+    request.budget = budget;
+    request.speed = speed;
+    nlohmann::json figures;
+    {
+        const py::gil_scoped_release others;
+        box.scene.model.level = datasets::ModelLevel::spring;  // the bodies are made by the planner, one per spacing
+        auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
+        const auto model = haptics::buildModel(std::move(box.scene), std::move(tissue));
+        const auto found = planner::planModel(model, request, [](const std::string&) {});
+        figures = planner::planFigures(name, found, request, "");
+    }
+    return toPython(figures);
+}
+
+}  // namespace
+
+void bindPlan(py::module_& module)
+{
+    module.def("plan", &plan, py::arg("scene"), py::kw_only(), py::arg("error") = 0.03, py::arg("force_error") = py::none(),
+               py::arg("budget") = 4e-4, py::arg("speed") = 0.02);
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,234 @@
+#include <python/scene_box.h>
+
+#include <datasets/scene_text.h>
+#include <datasets/tables.h>
+#include <haptics/arm.h>
+#include <session/open.h>
+#ifdef PALPATE_SWEEP
+#include <sweep/plan.h>
+#endif
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <glm/geometric.hpp>
+
+#include <stdexcept>
+
+namespace palpate::python {
+
+namespace {
+
+std::string textOfPath(const py::object& what)
+{
+    return py::str(py::module_::import("os").attr("fspath")(what)).cast<std::string>();
+}
+
+SceneBox parsed(const std::string& text, const std::string& origin)
+{
+    try {
+        return {datasets::parseScene(text, origin), origin, nullptr, false};
+    } catch (const std::runtime_error& e) {
+        throwSceneError(e.what());
+    }
+}
+
+#ifdef PALPATE_SWEEP
+sweep::KeyValue keyValueOf(const std::string& key, const py::object& value)
+{
+    // A scalar of numpy is what its item() is.
+    const py::object plain = py::hasattr(value, "item") ? py::object(value.attr("item")()) : value;
+    if (py::isinstance<py::bool_>(plain)) {
+        return plain.cast<bool>();
+    }
+    if (py::isinstance<py::int_>(plain)) {
+        return plain.cast<std::int64_t>();
+    }
+    if (py::isinstance<py::float_>(plain)) {
+        return plain.cast<double>();
+    }
+    if (py::isinstance<py::str>(plain)) {
+        return plain.cast<std::string>();
+    }
+    throw py::type_error("key '" + key + "': give a number, a word, True or False");
+}
+#endif
+
+SceneBox changed(const SceneBox& box, const py::dict& tables)
+{
+#ifdef PALPATE_SWEEP
+    std::vector<sweep::Setting> settings;
+    for (const auto& [key, value] : flattened(tables)) {
+        if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+            const Vec3 point = vec3Of(value, key.c_str());
+            for (const auto& [axis, coordinate] : {std::pair{".x", point.x}, {".y", point.y}, {".z", point.z}}) {
+                settings.push_back({key + axis, coordinate});
+            }
+        } else {
+            settings.push_back({key, keyValueOf(key, value)});
+        }
+    }
+    try {
+        return {sweep::sceneWith(box.scene, settings), box.origin, box.volume, box.inMemory};
+    } catch (const std::runtime_error& e) {
+        throwSceneError(e.what());
+    }
+#else
+    static_cast<void>(box);
+    static_cast<void>(tables);
+    throw std::runtime_error("this build has no sweeps (PALPATE_SWEEP), whose keys change scenes");
+#endif
+}
+
+SceneBox fromKeywords(const py::object& source, const py::kwargs& tables)
+{
+    if (!source.is_none()) {
+        SceneBox box = sceneOf(source);
+        return tables.empty() ? box : changed(box, tables);
+    }
+    const auto text = py::module_::import("palpate._toml").attr("dumps")(tables).cast<std::string>();
+    return parsed(text, (std::filesystem::current_path() / "keywords").string());
+}
+
+SceneBox forVolume(const py::object& what, const std::string& target)
+{
+    if (!py::isinstance<VolumeBox>(what)) {
+        const std::string file = textOfPath(what);
+        auto tissue = std::make_shared<const volume::Tissue>(session::loadVolume(file));
+        return {datasets::sceneForVolume(std::filesystem::absolute(file), *tissue, target), file, tissue, false};
+    }
+    const auto& box = what.cast<VolumeBox&>();
+    const bool inMemory = box.file.empty();
+    const auto file = std::filesystem::absolute(inMemory ? "volume-in-memory.vdb" : box.file);
+    return {datasets::sceneForVolume(file, *box.tissue, target), file.string(), box.tissue, inMemory};
+}
+
+py::dict toDict(const SceneBox& box)
+{
+    return py::module_::import("tomllib").attr("loads")(datasets::sceneText(box.scene));
+}
+
+std::vector<std::string> structuresOf(const Modelled& modelled)
+{
+    return modelled.info.structures;
+}
+
+py::dict latticeOf(const Modelled& modelled)
+{
+    const volume::NodeGrid& grid = modelled.model.lattice.grid;
+    py::dict out;
+    out["shape"] = py::make_tuple(grid.size.x, grid.size.y, grid.size.z);
+    out["origin"] = vectorOf(grid.origin);
+    out["spacing"] = grid.spacing;
+    return out;
+}
+
+void bindModel(py::module_& module)
+{
+    py::class_<Modelled, std::shared_ptr<Modelled>>(module, "Model")
+        .def(py::init([](const py::object& scene) { return std::const_pointer_cast<Modelled>(modelOf(scene)); }),
+             py::arg("scene"))
+        .def_property_readonly("scene",
+                               [](const Modelled& m) {
+                                   return SceneBox{m.model.scene, m.info.sceneOrigin, m.model.tissue, m.inMemory};
+                               })
+        .def_property_readonly("volume",
+                               [](const Modelled& m) {
+                                   auto box = std::make_unique<VolumeBox>();
+                                   box->tissue = m.model.tissue;
+                                   return box;
+                               })
+        .def_property_readonly("structures", structuresOf)
+        .def_property_readonly("tissues", [](const Modelled& m) { return m.info.tissues; })
+        .def_property_readonly("entry", [](const Modelled& m) { return vectorOf(m.model.approach.entry); })
+        .def_property_readonly("aim", [](const Modelled& m) { return vectorOf(m.model.approach.aim); })
+        .def_property_readonly("firing_depth",
+                               [](const Modelled& m) {
+                                   const auto& line = m.model.approach;
+                                   return datasets::firingDepth(m.model.scene.tool, glm::distance(line.entry, line.aim));
+                               })
+        .def_property_readonly("lattice", latticeOf)
+        .def_property_readonly("hash", [](const Modelled& m) { return m.info.volumeHash; });
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, py::object>> flattened(const py::dict& tables, const std::string& before)
+{
+    std::vector<std::pair<std::string, py::object>> out;
+    for (const auto& [key, value] : tables) {
+        const std::string name = before + py::str(key).cast<std::string>();
+        if (py::isinstance<py::dict>(value)) {
+            for (auto& inner : flattened(py::reinterpret_borrow<py::dict>(value), name + ".")) {
+                out.push_back(std::move(inner));
+            }
+        } else {
+            out.emplace_back(name, py::reinterpret_borrow<py::object>(value));
+        }
+    }
+    return out;
+}
+
+SceneBox sceneNamed(const std::string& what)
+{
+    try {
+        if (auto builtIn = datasets::builtInScene(what)) {
+            return {std::move(*builtIn), what, nullptr, false};
+        }
+        if (std::filesystem::path(what).extension() == ".vdb") {
+            return forVolume(py::str(what), "");
+        }
+        if (!std::filesystem::exists(what)) {
+            std::string names;
+            for (const std::string& name : datasets::builtInScenes()) {
+                names += (names.empty() ? "" : ", ") + name;
+            }
+            throw std::runtime_error(what + ": no such scene or volume; built-in scenes are: " + names);
+        }
+        return {datasets::loadScene(what), what, nullptr, false};
+    } catch (const std::runtime_error& e) {
+        throwSceneError(e.what());
+    }
+}
+
+SceneBox sceneOf(const py::object& what)
+{
+    if (py::isinstance<SceneBox>(what)) {
+        return what.cast<SceneBox>();
+    }
+    if (py::isinstance<VolumeBox>(what)) {
+        return forVolume(what, "");
+    }
+    return sceneNamed(textOfPath(what));
+}
+
+std::shared_ptr<const Modelled> modelOf(const py::object& what)
+{
+    if (py::isinstance<Modelled>(what)) {
+        return what.cast<std::shared_ptr<Modelled>>();
+    }
+    SceneBox box = sceneOf(what);
+    const py::gil_scoped_release others;
+    auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
+    auto made = std::make_shared<Modelled>(haptics::buildModel(std::move(box.scene), std::move(tissue)), box.origin);
+    made->inMemory = box.inMemory;
+    return made;
+}
+
+void bindScene(py::module_& module)
+{
+    py::class_<SceneBox>(module, "Scene")
+        .def(py::init(&fromKeywords), py::arg("source") = py::none())
+        .def_static("parse", &parsed, py::arg("text"), py::arg("origin") = "text")
+        .def_static("for_volume", &forVolume, py::arg("volume"), py::arg("target") = "")
+        .def("changed", &changed, py::arg("keys"))
+        .def("to_dict", &toDict)
+        .def_property_readonly("name", [](const SceneBox& box) { return box.scene.name; })
+        .def_property_readonly("text", [](const SceneBox& box) { return datasets::sceneText(box.scene); })
+        .def_property_readonly("origin", [](const SceneBox& box) { return box.origin; })
+        .def_property_readonly("target", [](const SceneBox& box) { return box.scene.target; })
+        .def("__repr__", [](const SceneBox& box) { return "<palpate.Scene '" + box.scene.name + "'>"; });
+    bindModel(module);
+    module.def("scenes", &datasets::builtInScenes);
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,329 @@
+#include <python/live_ultrasound.h>
+#include <python/scene_box.h>
+#include <python/tick_rows.h>
+
+#include <session/figures.h>
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+
+#include <chrono>
+#include <cmath>
+
+namespace palpate::python {
+
+namespace {
+
+using haptics::DeviceSample;
+using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Buttons = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
+using Flags = py::array_t<bool, py::array::c_style | py::array::forcecast>;
+
+/// A session, what of it is made when first asked for, and what an interrupted run has done.
+struct SessionBox {
+    SessionBox(std::shared_ptr<const Modelled> modelled, const std::string& record, const std::string& operatorName)
+        : live(std::move(modelled), record, operatorName)
+    {
+    }
+
+    LiveSession live;
+    std::unique_ptr<LiveUltrasound> ultrasound;
+    py::object interrupted = py::none();  // rows of the ticks that were done
+};
+
+/// One tick as step() gives it.
+struct TickBox {
+    TickRow row;
+};
+
+// As given where it is a unit vector to the last bits, so that a record's poses stay what they are.
+Vec3 unit(Vec3 axis)
+{
+    const double length = glm::length(axis);
+    if (!(length > 0)) {
+        throw py::value_error("pose: the axis has no length");
+    }
+    return std::abs(length - 1) < 1e-12 ? axis : axis / length;
+}
+
+DeviceSample sampleOf(const double* pose, py::ssize_t numbers, Vec3 axis, std::uint32_t buttons, bool fresh)
+{
+    DeviceSample sample;
+    sample.position = {pose[0], pose[1], pose[2]};
+    sample.axis = numbers == 6 ? unit({pose[3], pose[4], pose[5]}) : axis;
+    sample.buttons = buttons;
+    sample.fresh = fresh;
+    return sample;
+}
+
+TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, bool fresh)
+{
+    const auto numbers = Doubles::ensure(pose);
+    if (!numbers || numbers.ndim() != 1 || (numbers.shape(0) != 3 && numbers.shape(0) != 6)) {
+        PyErr_Clear();
+        throw py::value_error("pose: give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres");
+    }
+    const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), buttons, fresh);
+    const py::gil_scoped_release others;
+    const LiveSession::Use use(box.live);
+    return {rowOf(box.live.step(sample))};
+}
+
+template <class Array>
+void checkColumn(const Array& column, py::ssize_t rows, const char* name)
+{
+    if (column.ndim() > 1 || (column.ndim() == 1 && column.shape(0) != rows)) {
+        throw py::value_error(std::string(name) + ": give one value, or one for each of the " + std::to_string(rows) +
+                              " poses");
+    }
+}
+
+std::vector<DeviceSample> samplesOf(const Doubles& poses, const Buttons& buttons, const Flags& fresh, Vec3 axis)
+{
+    if (poses.ndim() != 2 || (poses.shape(1) != 3 && poses.shape(1) != 6)) {
+        throw py::value_error("poses: give an array of n x 3 (positions) or n x 6 (and axes), in metres");
+    }
+    const py::ssize_t rows = poses.shape(0);
+    checkColumn(buttons, rows, "buttons");
+    checkColumn(fresh, rows, "fresh");
+    std::vector<DeviceSample> samples;
+    samples.reserve(static_cast<std::size_t>(rows));
+    for (py::ssize_t i = 0; i < rows; ++i) {
+        const std::uint32_t pressed = buttons.data()[buttons.ndim() == 0 ? 0 : i];
+        const bool isFresh = fresh.data()[fresh.ndim() == 0 ? 0 : i];
+        samples.push_back(sampleOf(poses.data() + i * poses.shape(1), poses.shape(1), axis, pressed, isFresh));
+    }
+    return samples;
+}
+
+// Runs a device to its end, or to a KeyboardInterrupt, which is then set.
+bool runDevice(SessionBox& box, haptics::Device& device, double seconds,
+               const std::function<void(const haptics::TickRecord&)>& each)
+{
+    const py::gil_scoped_release others;
+    const LiveSession::Use use(box.live);
+    return box.live.run(device, seconds, each, [] {
+        const py::gil_scoped_acquire mine;
+        return PyErr_CheckSignals() == 0;
+    });
+}
+
+py::array run(SessionBox& box, const Doubles& poses, const Buttons& buttons, const Flags& fresh)
+{
+    const auto samples = samplesOf(poses, buttons, fresh, box.live.axis());
+    py::array out = rowsOf(tickType(box.live.modelled().info.structures.size()), samples.size());
+    auto* const rows = static_cast<TickRow*>(out.mutable_data());
+    std::size_t done = 0;
+    PosesDevice device(samples);
+    if (!runDevice(box, device, 0, [&](const haptics::TickRecord& tick) { rows[done++] = rowOf(tick); })) {
+        box.interrupted = out[py::slice(0, static_cast<py::ssize_t>(done), 1)];
+        throw py::error_already_set();
+    }
+    return out;
+}
+
+std::size_t advance(SessionBox& box, const Doubles& poses, const Buttons& buttons, const Flags& fresh)
+{
+    const auto samples = samplesOf(poses, buttons, fresh, box.live.axis());
+    PosesDevice device(samples);
+    if (!runDevice(box, device, 0, {})) {
+        throw py::error_already_set();
+    }
+    return samples.size();
+}
+
+py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t seed, double seconds)
+{
+    session::DeviceRequest request;
+    request.trainee = trainee == "script" ? "" : trainee;
+    request.seed = seed;
+    const auto device = session::openDevice(box.live.modelled().model, request, nullptr);
+    std::vector<TickRow> rows;
+    const bool whole =
+        runDevice(box, *device, seconds, [&](const haptics::TickRecord& tick) { rows.push_back(rowOf(tick)); });
+    py::array out = rowsOf(tickType(box.live.modelled().info.structures.size()), rows.size());
+    std::copy(rows.begin(), rows.end(), static_cast<TickRow*>(out.mutable_data()));
+    if (!whole) {
+        box.interrupted = out;
+        throw py::error_already_set();
+    }
+    return out;
+}
+
+py::array eventsOf(const SessionBox& box)
+{
+    py::array out = rowsOf(eventType(), box.live.events().size());
+    auto* row = static_cast<EventRow*>(out.mutable_data());
+    for (const auto& [tick, event] : box.live.events()) {
+        *row++ = rowOf(tick, event);
+    }
+    return out;
+}
+
+// Nodes lie x fastest, so that index (i, j, k, axis) has strides of 1, nx and nx ny nodes.
+py::array displacementOf(const py::object& self)
+{
+    const auto& box = self.cast<SessionBox&>();
+    const chainmail::DisplacedLattice& shape = box.live.session().simulation().shape();
+    const Index3 size = shape.lattice().grid.size;
+    const py::ssize_t node = sizeof(Vec3f), row = node * size.x, slice = row * size.y;
+    return readOnlyView(py::dtype::of<float>(), {size.x, size.y, size.z, 3}, {node, row, slice, sizeof(float)},
+                        shape.u().data(), self);
+}
+
+py::list coresOf(const SessionBox& box)
+{
+    py::list out;
+    for (const haptics::CoreSample& core : box.live.session().figures().cores) {
+        py::dict fractions, one;
+        for (std::size_t i = 0; i < box.live.modelled().info.tissues.size(); ++i) {
+            if (core.fraction[i] > 0) {
+                fractions[py::str(box.live.modelled().info.tissues[i])] = core.fraction[i];
+            }
+        }
+        one["fraction"] = fractions;
+        one["volume"] = core.volume;
+        one["target_fraction"] = core.targetFraction;
+        one["target_length"] = core.targetLength;
+        one["fragments"] = core.fragments;
+        one["notch_start"] = vectorOf(core.notchStart);
+        one["notch_end"] = vectorOf(core.notchEnd);
+        out.append(one);
+    }
+    return out;
+}
+
+py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object& face, const py::object& direction,
+                        const py::object& lateral, double depth)
+{
+    UltrasoundRequest request;
+    request.width = width;
+    request.height = height;
+    request.depth = depth;
+    if (!face.is_none()) {
+        request.pose = ultrasound::poseOf(vec3Of(face, "face"), unit(vec3Of(direction, "direction")),
+                                          unit(vec3Of(lateral, "lateral")));
+    }
+    UltrasoundPicture picture;
+    {
+        const py::gil_scoped_release others;
+        const LiveSession::Use use(box.live);
+        if (!box.ultrasound) {
+            box.ultrasound = std::make_unique<LiveUltrasound>(box.live.modelled().model);
+        }
+        picture = box.ultrasound->picture(box.live.session().simulation(), box.live.shown(), request);
+    }
+    py::array_t<std::uint8_t> pixels({picture.pixels.height, picture.pixels.width});
+    std::copy(picture.pixels.grey.begin(), picture.pixels.grey.end(), pixels.mutable_data());
+    py::array_t<std::uint8_t> lines({picture.image.settings.samples, picture.image.settings.lines});
+    std::copy(picture.image.grey.begin(), picture.image.grey.end(), lines.mutable_data());
+    py::dict out;
+    out["pixels"] = pixels;
+    out["lines"] = lines;
+    out["metres_per_pixel"] = picture.metresPerPixel;
+    out["depth"] = picture.image.settings.depth;
+    out["frequency"] = picture.image.settings.frequency;
+    out["face"] = vectorOf(picture.image.pose.face);
+    out["direction"] = vectorOf(picture.image.pose.axial);
+    out["lateral"] = vectorOf(picture.image.pose.lateral);
+    out["tick"] = picture.image.tick;
+    return out;
+}
+
+template <class T>
+py::object vectorField(const std::array<T, 3>& v)
+{
+    return vectorOf({v[0], v[1], v[2]});
+}
+
+void bindTick(py::module_& module)
+{
+    py::class_<TickBox>(module, "Tick")
+        .def_property_readonly("tick", [](const TickBox& t) { return t.row.tick; })
+        .def_property_readonly("position", [](const TickBox& t) { return vectorField(t.row.position); })
+        .def_property_readonly("axis", [](const TickBox& t) { return vectorField(t.row.axis); })
+        .def_property_readonly("proxy", [](const TickBox& t) { return vectorField(t.row.proxy); })
+        .def_property_readonly("tissue_force", [](const TickBox& t) { return vectorField(t.row.tissueForce); })
+        .def_property_readonly("basic", [](const TickBox& t) { return vectorField(t.row.basic); })
+        .def_property_readonly("additional", [](const TickBox& t) { return vectorField(t.row.additional); })
+        .def_property_readonly("total", [](const TickBox& t) { return vectorField(t.row.total); })
+        .def_property_readonly("deflection", [](const TickBox& t) { return vectorField(t.row.deflection); })
+        .def_property_readonly("phase", [](const TickBox& t) { return haptics::phaseNames[t.row.phase]; })
+        .def_property_readonly("warning", [](const TickBox& t) { return haptics::warningNames[t.row.warning]; })
+        .def_property_readonly("tissue", [](const TickBox& t) { return t.row.tissue; })
+        .def_property_readonly("inserted", [](const TickBox& t) { return t.row.inserted; })
+        .def_property_readonly("contacts", [](const TickBox& t) { return t.row.contacts; })
+        .def_property_readonly("penetration", [](const TickBox& t) { return t.row.penetration; })
+        .def_property_readonly("ahead", [](const TickBox& t) { return t.row.ahead; })
+        .def_property_readonly("distance_to_target", [](const TickBox& t) { return t.row.distance[0]; })
+        .def_property_readonly("nearest_vital", [](const TickBox& t) { return t.row.nearestVital; })
+        .def_property_readonly(
+            "distance", [](const TickBox& t) { return py::array_t<double>(t.row.distance.size(), t.row.distance.data()); })
+        .def_property_readonly("events", [](const TickBox& t) { return t.row.events; })
+        .def_property_readonly("fired", [](const TickBox& t) { return t.row.fired != 0; })
+        .def_property_readonly("faulted", [](const TickBox& t) { return t.row.faulted != 0; });
+}
+
+void bindConstants(py::module_& module)
+{
+    module.attr("DEADMAN") = haptics::buttonDeadMan;
+    module.attr("FIRE") = haptics::buttonFire;
+    module.attr("MARK") = haptics::buttonMark;
+    module.attr("EVENTS") = py::tuple(py::cast(haptics::eventNames));
+    module.attr("PHASES") = py::tuple(py::cast(haptics::phaseNames));
+    module.attr("WARNINGS") = py::tuple(py::cast(haptics::warningNames));
+    module.attr("TICK_SECONDS") = haptics::tickSeconds;
+}
+
+}  // namespace
+
+void bindSession(py::module_& module)
+{
+    bindConstants(module);
+    bindTick(module);
+    const auto held = py::arg("buttons") = Buttons(std::vector<py::ssize_t>{}, &haptics::buttonDeadMan);
+    static constexpr bool yes = true;
+    const auto isFresh = py::arg("fresh") = Flags(std::vector<py::ssize_t>{}, &yes);
+    py::class_<SessionBox>(module, "Session")
+        .def(py::init([](const py::object& scene, const std::optional<std::filesystem::path>& record,
+                         const std::string& operatorName) {
+                 const auto modelled = modelOf(scene);
+                 return std::make_unique<SessionBox>(modelled, record ? record->string() : "", operatorName);
+             }),
+             py::arg("scene"), py::arg("record") = py::none(), py::arg("operator") = "")
+        .def("step", &step, py::arg("pose"), py::arg("buttons") = haptics::buttonDeadMan, py::arg("fresh") = true)
+        .def("run", &run, py::arg("poses"), held, isFresh)
+        .def("advance", &advance, py::arg("poses"), held, isFresh)
+        .def("perform", &perform, py::arg("trainee") = "script", py::arg("seed") = 1, py::arg("seconds") = 120.0)
+        .def("close",
+             [](SessionBox& box) {
+                 const py::gil_scoped_release others;
+                 box.live.close();
+             })
+        .def("__enter__", [](const py::object& self) { return self; })
+        .def("__exit__",
+             [](SessionBox& box, const py::args&) {
+                 const py::gil_scoped_release others;
+                 box.live.close();
+             })
+        .def("score",
+             [](const SessionBox& box) { return toPython(session::scoreFigures(box.live.session().figures().score)); })
+        .def("ultrasound", &ultrasoundOf, py::arg("width") = 640, py::arg("height") = 640, py::kw_only(),
+             py::arg("face") = py::none(), py::arg("direction") = py::make_tuple(0, 1, 0),
+             py::arg("lateral") = py::make_tuple(1, 0, 0), py::arg("depth") = 0.0)
+        .def_property_readonly("events", &eventsOf)
+        .def_property_readonly("cores", &coresOf)
+        .def_property_readonly("displacement", &displacementOf)
+        .def_property_readonly("interrupted", [](const SessionBox& box) { return box.interrupted; })
+        .def_property_readonly("model",
+                               [](const SessionBox& box) { return std::const_pointer_cast<Modelled>(box.live.shared()); })
+        .def_property_readonly("ticks", [](const SessionBox& box) { return box.live.ticks(); })
+        .def_property_readonly("closed", [](const SessionBox& box) { return box.live.closed(); })
+        .def_property_readonly("force_hash", [](const SessionBox& box) {
+            return session::hexadecimal(box.live.session().figures().forceHash);
+        });
+}
+
+}  // namespace palpate::python

@@ -1,0 +1,90 @@
+#include <python/convert.h>
+
+#include <base/build.h>
+#include <sweep/case.h>
+#include <sweep/folder.h>
+#include <sweep/local.h>
+#include <sweep/procedure.h>
+#include <sweep/run.h>
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <optional>
+
+namespace palpate::python {
+
+namespace {
+
+using sweep::SweepFolder;
+
+// Runs what is left of a sweep. It forks, so that only a process of one thread may call it (palpate/_sweep_worker.py).
+// `told(done, of)` is called ten times a second; false ends the run after the cases in flight.
+std::size_t runSweep(const std::filesystem::path& folder, const std::string& plan, int jobs, bool retry,
+                     const py::function& told)
+{
+    const auto alone = sweep::oneThread();
+    SweepFolder held(folder, plan, true);
+    held.clean();
+    const sweep::CasesWanted wanted{sweep::allCases(held.plan()), retry, false};
+    const auto cases = sweep::remainingCases(held, wanted, [](const std::string&) {});
+    const std::size_t all = held.plan().cases(), before = all - cases.size();
+    if (!cases.empty()) {
+        sweep::runLocally(
+            held, cases, jobs, std::string(base::build()),
+            [&](std::size_t done, std::size_t) {
+                held.lock().check();
+                return PyErr_CheckSignals() == 0 && told(before + done, all).cast<bool>();
+            },
+            [] { return false; });
+    }
+    if (PyErr_Occurred() != nullptr) {
+        throw py::error_already_set();
+    }
+    return sweep::writeTables(held, held.rows()).rows.size();
+}
+
+// (number of cases, [(column, kind, meaning)]) of a plan, checked.
+py::tuple checkPlan(const std::string& given)
+{
+    const auto [text, origin] = sweep::planText(given);
+    const sweep::SweepPlan plan = sweep::parsePlan(text, origin, sweep::namedScene);
+    py::list columns;
+    for (const auto& column : sweep::tableOf(plan, {}).columns) {
+        columns.append(py::make_tuple(column.name, column.kind, column.meaning));
+    }
+    return py::make_tuple(plan.cases(), columns);
+}
+
+py::dict outputs()
+{
+    py::dict out;
+    for (std::size_t kind = 0; kind < sweep::procedureNames.size(); ++kind) {
+        py::dict one;
+        for (const auto& info : sweep::outputsOf(static_cast<sweep::ProcedureKind>(kind))) {
+            one[py::str(info.name)] = info.meaning;
+        }
+        out[py::str(std::string(sweep::procedureNames[kind]))] = one;
+    }
+    return out;
+}
+
+}  // namespace
+
+void bindSweep(py::module_& module)
+{
+    module.def("run_sweep", &runSweep, py::arg("folder"), py::arg("plan"), py::arg("jobs"), py::arg("retry"),
+               py::arg("told"));
+    module.def("check_plan", &checkPlan, py::arg("plan"));
+    module.def("sweep_outputs", &outputs);
+    module.def(
+        "merge_shards",
+        [](const std::filesystem::path& folder, const std::vector<std::filesystem::path>& shards) {
+            sweep::mergeShards(folder, shards);
+            const SweepFolder merged(folder, "", true);
+            sweep::writeTables(merged, merged.rows());
+        },
+        py::arg("folder"), py::arg("shards"));
+}
+
+}  // namespace palpate::python

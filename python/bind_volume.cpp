@@ -1,0 +1,319 @@
+#include <python/scene_box.h>
+
+#include <datasets/phantom.h>
+#include <datasets/tables.h>
+#include <report/volume.h>
+#include <session/open.h>
+#include <volume/prepare/volume_import.h>
+
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+#include <tbb/parallel_for.h>
+#include <glm/matrix.hpp>
+#include <nlohmann/json.hpp>
+
+#include <limits>
+#include <stdexcept>
+
+namespace palpate::python {
+
+namespace {
+
+using Path = std::filesystem::path;
+using Labels = py::array_t<std::uint16_t, py::array::f_style | py::array::forcecast>;
+using Image = py::array_t<float, py::array::f_style | py::array::forcecast>;
+using Matrix = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+std::unique_ptr<VolumeBox> boxed(volume::Tissue tissue, Path file = {})
+{
+    auto box = std::make_unique<VolumeBox>();
+    box->tissue = std::make_shared<const volume::Tissue>(std::move(tissue));
+    box->file = std::move(file);
+    return box;
+}
+
+volume::TissueTable tableOf(const Path& file)
+{
+    return file.empty() ? datasets::defaultTissues() : datasets::loadTissues(file);
+}
+
+std::unique_ptr<VolumeBox> open(const Path& file)
+{
+    const py::gil_scoped_release others;
+    return boxed(session::loadVolume(file), file);
+}
+
+std::unique_ptr<VolumeBox> phantom(const std::string& name, std::uint64_t seed, double voxel, const Path& tissues,
+                                   const py::kwargs& parameters)
+{
+    datasets::PhantomSpec spec;
+    spec.name = name;
+    spec.seed = seed;
+    spec.voxel = voxel;
+    for (const auto& [key, value] : parameters) {
+        const auto parameter = py::str(key).cast<std::string>();
+        if (py::isinstance<py::str>(value)) {
+            spec.words[parameter] = value.cast<std::string>();
+        } else {
+            spec.numbers[parameter] = value.cast<double>();
+        }
+    }
+    const py::gil_scoped_release others;
+    return boxed(datasets::makePhantom(spec, tableOf(tissues)));
+}
+
+// RAS and LPS differ in the sign of x and y.
+volume::Affine affineOf(const Matrix& matrix, const std::string& frame)
+{
+    if (matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4) {
+        throw py::value_error("affine: give 4 x 4 numbers, voxel index to patient, in metres");
+    }
+    if (frame != "LPS" && frame != "RAS") {
+        throw py::value_error("frame: is LPS or RAS, not " + frame);
+    }
+    const auto at = matrix.unchecked<2>();
+    volume::Affine affine;
+    for (int row = 0; row < 3; ++row) {
+        const double sign = frame == "RAS" && row < 2 ? -1.0 : 1.0;
+        for (int column = 0; column < 3; ++column) {
+            affine.linear[column][row] = sign * at(row, column);
+        }
+        affine.origin[row] = sign * at(row, 3);
+    }
+    return affine;
+}
+
+py::array_t<double> matrixOf(const volume::Affine& affine)
+{
+    py::array_t<double> out({4, 4});
+    auto at = out.mutable_unchecked<2>();
+    for (int row = 0; row < 4; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            at(row, column) = row < 3 ? affine.linear[column][row] : 0.0;
+        }
+        at(row, 3) = row < 3 ? affine.origin[row] : 1.0;
+    }
+    return out;
+}
+
+// {value: "tissue"} or {value: ("name", "tissue")}.
+std::vector<volume::LabelName> namesOf(const py::dict& tissues)
+{
+    std::vector<volume::LabelName> names;
+    for (const auto& [value, said] : tissues) {
+        volume::LabelName name;
+        name.value = value.cast<std::uint16_t>();
+        if (py::isinstance<py::str>(said)) {
+            name.name = name.tissue = said.cast<std::string>();
+        } else {
+            std::tie(name.name, name.tissue) = said.cast<std::pair<std::string, std::string>>();
+        }
+        names.push_back(std::move(name));
+    }
+    return names;
+}
+
+Labels labelArray(const py::array& given)
+{
+    const char kind = given.dtype().kind();
+    if (kind != 'u' && kind != 'i' && kind != 'b') {
+        throw py::value_error("labels: give an array of whole numbers, not of " +
+                              py::str(given.dtype()).cast<std::string>());
+    }
+    if (given.ndim() != 3) {
+        throw py::value_error("labels: give an array of three dimensions, indexed (i, j, k)");
+    }
+    if (given.size() > 0) {
+        const auto low = given.attr("min")().cast<std::int64_t>();
+        const auto high = given.attr("max")().cast<std::int64_t>();
+        if (low < 0 || high > std::numeric_limits<std::uint16_t>::max()) {
+            throw py::value_error("labels: values are 0 to 65535, and here " + std::to_string(low) + " to " +
+                                  std::to_string(high));
+        }
+    }
+    return Labels(given);
+}
+
+std::unique_ptr<VolumeBox> fromNumpy(const py::array& given, const Matrix& affine, const py::dict& tissues,
+                                     const py::object& image, const std::string& unit, const std::string& frame,
+                                     const Path& table)
+{
+    const Labels labels = labelArray(given);
+    volume::LabelImage map;
+    map.size = {static_cast<int>(labels.shape(0)), static_cast<int>(labels.shape(1)), static_cast<int>(labels.shape(2))};
+    map.affine = affineOf(affine, frame);
+    map.values.assign(labels.data(), labels.data() + labels.size());
+    std::optional<volume::CompanionImage> companion;
+    if (!image.is_none()) {
+        const Image values = image.cast<Image>();
+        if (values.ndim() != 3 || !std::equal(values.shape(), values.shape() + 3, labels.shape())) {
+            throw py::value_error("image: has to have the shape of the labels");
+        }
+        companion.emplace();
+        companion->unit = unit;
+        companion->values.assign(values.data(), values.data() + values.size());
+    }
+    const auto names = namesOf(tissues);
+    const py::gil_scoped_release others;
+    return boxed(
+        volume::Tissue::fromLabels(map, tableOf(table), names, {{"source", "numpy"}}, companion ? &*companion : nullptr));
+}
+
+py::array gridView(const py::object& self, const py::dtype& type, const void* data)
+{
+    const Index3 size = self.cast<VolumeBox&>().tissue->size();
+    const py::ssize_t item = type.itemsize();
+    return readOnlyView(type, {size.x, size.y, size.z}, {item, item * size.x, item * size.x * size.y}, data, self);
+}
+
+py::object imageOf(const py::object& self)
+{
+    auto& box = self.cast<VolumeBox&>();
+    return box.tissue->hasImage() ? py::object(gridView(self, py::dtype::of<float>(), box.image().data())) : py::none();
+}
+
+py::dict provenanceOf(const VolumeBox& box)
+{
+    py::dict out;
+    for (const auto& [key, value] : box.tissue->provenance()) {
+        if (!out.contains(key)) {
+            out[py::str(key)] = py::list();
+        }
+        out[py::str(key)].cast<py::list>().append(value);
+    }
+    return out;
+}
+
+py::list tissuesOf(const VolumeBox& box)
+{
+    py::list out;
+    for (const volume::TissueRow& row : box.tissue->table().rows) {
+        py::dict one;
+        one["name"] = row.name;
+        one["role"] = std::string(volume::name(row.role));
+        one["youngs_modulus"] = row.youngsModulus;
+        one["poisson_ratio"] = row.poissonRatio;
+        one["density"] = row.density;
+        one["puncture_force"] = row.punctureForce;
+        one["fixed"] = row.fixed;
+        one["source"] = row.source;
+        out.append(one);
+    }
+    return out;
+}
+
+std::unique_ptr<VolumeBox> import(const Path& path, const std::map<std::string, std::string>& set, const std::string& map,
+                                  const std::string& defaultTissue, const Path& image, const std::string& imageUnit,
+                                  const std::string& stiffnessFrom, double voxel, bool bodyFromImage, double bodyFromHull,
+                                  const Path& tissues)
+{
+    prepare::ImportRequest request;
+    request.input = path;
+    request.mapping.map = map;
+    request.mapping.defaultTissue = defaultTissue;
+    for (const auto& [label, tissue] : set) {
+        request.mapping.set.push_back(label + "=" + tissue);
+    }
+    request.image = image;
+    request.imageUnit = imageUnit;
+    request.stiffness = stiffnessFrom;
+    request.steps.voxel = voxel;
+    request.reading.sheared = voxel > 0;
+    request.bodyFromImage = bodyFromImage;
+    request.hull = bodyFromHull;
+    const py::gil_scoped_release others;
+    return boxed(prepare::importVolume(request, tableOf(tissues), [](const std::string&, std::optional<double>) {}).tissue);
+}
+
+}  // namespace
+
+const std::vector<std::uint16_t>& VolumeBox::labels()
+{
+    const std::lock_guard lock(making_);
+    if (!labels_) {
+        labels_ = tissue->labels().values;
+    }
+    return *labels_;
+}
+
+const std::vector<float>& VolumeBox::stiffness()
+{
+    const std::lock_guard lock(making_);
+    if (!stiffness_) {
+        const Index3 size = tissue->size();
+        volume::LabelImage at;
+        at.size = size;
+        std::vector<float> values(at.offset({0, 0, size.z}));
+        tbb::parallel_for(0, size.z, [&](int z) {
+            const volume::Tissue::Reader reader(*tissue);
+            volume::forEachIndex({0, 0, z}, {size.x - 1, size.y - 1, z}, [&](Index3 n) {
+                values[at.offset(n)] = static_cast<float>(reader.youngsModulus(tissue->affine().toPatient(Vec3(n))));
+            });
+        });
+        stiffness_ = std::move(values);
+    }
+    return *stiffness_;
+}
+
+const std::vector<float>& VolumeBox::image()
+{
+    const std::lock_guard lock(making_);
+    if (!image_) {
+        auto companion = tissue->companion();
+        image_ = companion ? std::move(companion->values) : std::vector<float>();
+    }
+    return *image_;
+}
+
+void bindVolume(py::module_& module)
+{
+    const char* const none = "";  // an empty path of Python would be "."
+    py::class_<VolumeBox>(module, "Volume")
+        .def_static("open", &open, py::arg("file"))
+        .def_static("import_", &import, py::arg("path"), py::kw_only(),
+                    py::arg("set") = std::map<std::string, std::string>(), py::arg("map") = "",
+                    py::arg("default_tissue") = "", py::arg("image") = none, py::arg("image_unit") = "",
+                    py::arg("stiffness_from") = "", py::arg("voxel") = 0.0, py::arg("body_from_image") = false,
+                    py::arg("body_from_hull") = 0.0, py::arg("tissues") = none)
+        .def_static("phantom", &phantom, py::arg("name") = "breast", py::arg("seed") = 1, py::arg("voxel") = 1e-3,
+                    py::arg("tissues") = none)
+        .def_static("from_numpy", &fromNumpy, py::arg("labels"), py::arg("affine"), py::arg("tissues"), py::kw_only(),
+                    py::arg("image") = py::none(), py::arg("image_unit") = "", py::arg("frame") = "LPS",
+                    py::arg("table") = none)
+        .def(
+            "save",
+            [](VolumeBox& box, const Path& file) {
+                const py::gil_scoped_release others;
+                box.tissue->save(file);
+                box.file = file;
+            },
+            py::arg("file"))
+        .def_property_readonly("labels",
+                               [](const py::object& self) {
+                                   return gridView(self, py::dtype::of<std::uint16_t>(),
+                                                   self.cast<VolumeBox&>().labels().data());
+                               })
+        .def_property_readonly("stiffness",
+                               [](const py::object& self) {
+                                   return gridView(self, py::dtype::of<float>(),
+                                                   self.cast<VolumeBox&>().stiffness().data());
+                               })
+        .def_property_readonly("image", &imageOf)
+        .def_property_readonly("image_unit", [](const VolumeBox& box) { return box.tissue->imageUnit(); })
+        .def_property_readonly("shape",
+                               [](const VolumeBox& box) {
+                                   const Index3 size = box.tissue->size();
+                                   return py::make_tuple(size.x, size.y, size.z);
+                               })
+        .def_property_readonly("affine", [](const VolumeBox& box) { return matrixOf(box.tissue->affine()); })
+        .def_property_readonly("spacing", [](const VolumeBox& box) { return vectorOf(box.tissue->affine().spacing()); })
+        .def_property_readonly("info", [](const VolumeBox& box) { return toPython(report::volumeFigures(*box.tissue)); })
+        .def_property_readonly("provenance", &provenanceOf)
+        .def_property_readonly("tissues", &tissuesOf)
+        .def_property_readonly("file", [](const VolumeBox& box) -> py::object {
+            return box.file.empty() ? py::object(py::none()) : py::str(box.file.string());
+        });
+    module.def("phantoms", &datasets::phantomNames);
+}
+
+}  // namespace palpate::python

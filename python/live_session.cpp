@@ -1,0 +1,167 @@
+#include <python/live_session.h>
+
+#include <haptics/broadcast.h>
+#include <session/figures.h>
+#include <session/open.h>
+
+#include <fmt/format.h>
+#include <unistd.h>
+#include <glm/geometric.hpp>
+
+#include <chrono>
+#include <optional>
+#include <stdexcept>
+
+namespace palpate::python {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr auto askEvery = std::chrono::milliseconds(10);
+constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the recorder's writer
+
+haptics::SessionInfo infoFor(const Modelled& modelled, const std::string& operatorName)
+{
+    haptics::SessionInfo info = session::describeSession(modelled.model, modelled.info.sceneOrigin, "python");
+    info.operatorName = operatorName;
+    return info;
+}
+
+}  // namespace
+
+Modelled::Modelled(haptics::SessionModel built, std::string origin) : model(std::move(built))
+{
+    info = session::describeSession(model, std::move(origin), "python");
+}
+
+LiveSession::LiveSession(std::shared_ptr<const Modelled> modelled, const std::string& record,
+                         const std::string& operatorName)
+    : modelled_(std::move(modelled)), session_(modelled_->model, modelled_->info), recordFile_(record), process_(getpid())
+{
+    if (!record.empty() && modelled_->inMemory) {
+        throw std::runtime_error(record +
+                                 ": the volume of this session is in memory alone, and its record could not be "
+                                 "replayed: save the volume (Volume.save) and make the scene of that file");
+    }
+    if (!record.empty()) {
+        recorder_ = std::make_unique<haptics::Recorder>(record, infoFor(*modelled_, operatorName));
+    }
+    const Vec3 line = modelled_->model.approach.aim - modelled_->model.approach.entry;
+    if (glm::length(line) > 0) {
+        axis_ = glm::normalize(line);
+    }
+}
+
+LiveSession::~LiveSession()
+{
+    try {
+        close();
+    } catch (const std::exception&) {
+        // A destructor has nobody to tell; close() does.
+    }
+}
+
+LiveSession::Use::Use(LiveSession& session) : session_(session)
+{
+    if (session.busy_.test_and_set()) {
+        throw std::runtime_error("the session is at work in another thread: give each thread a session of its own");
+    }
+    std::string problem;
+    if (session.closed_) {
+        problem = "the session is closed: open another one";
+    } else if (session.recorder_ && getpid() != session.process_) {
+        problem = session.recordFile_ + ": the session was opened, with its record, in another process: open one here";
+    }
+    if (!problem.empty()) {
+        session.busy_.clear();
+        throw std::runtime_error(problem);
+    }
+}
+
+void LiveSession::heed(const haptics::TickRecord& tick)
+{
+    for (std::uint32_t i = 0; i < tick.eventCount; ++i) {
+        events_.emplace_back(tick.tick, tick.events[i]);
+    }
+    if (tick.fired) {
+        haptics::showTick(tick, {}, cores_);
+    }
+    last_ = tick;
+    axis_ = tick.device.axis;
+    ticks_ = tick.tick + 1;
+}
+
+channel::State LiveSession::shown() const noexcept
+{
+    channel::State state = cores_;
+    haptics::TickRecord tick = last_;
+    tick.fired = false;  // its core is in cores_
+    haptics::showTick(tick, {}, state);
+    return state;
+}
+
+const haptics::TickRecord& LiveSession::step(const haptics::DeviceSample& sample)
+{
+    const haptics::TickRecord& tick = session_.tick(sample);
+    if (recorder_) {
+        recorder_->push(tick);
+        if (tick.tick % flushPeriod == 0) {
+            recorder_->flush();
+        }
+    }
+    heed(tick);
+    return last_;
+}
+
+bool LiveSession::run(haptics::Device& device, double seconds, const std::function<void(const haptics::TickRecord&)>& each,
+                      const std::function<bool()>& goOn)
+{
+    std::atomic<bool> stop{false};
+    session::RunOptions options;
+    options.servo.paced = false;
+    options.servo.seconds = seconds;
+    options.recorder = recorder_.get();
+    options.stop = &stop;
+    auto asked = Clock::now();
+    session_.run(device, options, [&](const haptics::TickRecord& tick, const haptics::ServoTiming&) {
+        heed(tick);
+        if (each) {
+            each(tick);
+        }
+        if (const auto now = Clock::now(); now - asked > askEvery) {
+            asked = now;
+            stop = !goOn();
+        }
+    });
+    return !stop;
+}
+
+void LiveSession::close()
+{
+    if (closed_) {
+        return;
+    }
+    closed_ = true;
+    // In a process that was forked the recorder's thread is not there: the file is its owner's.
+    if (recorder_ && getpid() != process_) {
+        static_cast<void>(recorder_.release());
+    }
+    if (!recorder_) {
+        return;
+    }
+    const session::SessionFigures figures = session_.figures();
+    recorder_->finish({{"force_hash", session::hexadecimal(figures.forceHash)},
+                       {"score_total", fmt::format("{:.1f}", figures.score.total)}});
+    const std::string problem = recorder_->error();
+    const std::uint64_t lost = recorder_->lost();
+    recorder_.reset();
+    if (!problem.empty()) {
+        throw std::runtime_error(problem);
+    }
+    if (lost > 0) {
+        throw std::runtime_error(fmt::format("{}: {} ticks were lost: record to a faster disk", recordFile_, lost));
+    }
+}
+
+}  // namespace palpate::python

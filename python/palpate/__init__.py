@@ -1,0 +1,43 @@
+"""Palpate: feel inside a segmented volume, from Python.
+
+Lengths in metres, forces in newtons, moduli in pascals, times in seconds; the patient frame is LPS (x to the patient's left,
+y to the back, z to the head). docs/python.md is the tutorial.
+
+    >>> import palpate
+    >>> session = palpate.Session("block")
+    >>> ticks = session.run(poses)          # n x 3 positions -> n rows
+    >>> ticks["tissue_force"]               # n x 3 [N]
+"""
+
+from . import _palpate
+from ._errors import Error, SceneError
+from ._palpate import (
+    DEADMAN,
+    EVENTS,
+    FIRE,
+    MARK,
+    PHASES,
+    TICK_SECONDS,
+    WARNINGS,
+    Model,
+    Scene,
+    Session,
+    Tick,
+    Volume,
+    phantoms,
+    plan,
+    scenes,
+)
+from ._poses import press_path
+from ._record import Record, score
+from ._studies import accuracy
+from ._sweep import SweepResult, merge, sweep, sweep_outputs
+
+__version__ = _palpate.build.split()[1]
+build = _palpate.build  #: version and commit of the C++ side
+
+__all__ = [
+    "DEADMAN", "EVENTS", "Error", "FIRE", "MARK", "Model", "PHASES", "Record", "Scene", "SceneError", "Session", "SweepResult",
+    "TICK_SECONDS", "Tick", "Volume", "WARNINGS", "accuracy", "build", "merge", "phantoms", "plan", "press_path", "scenes",
+    "score", "sweep", "sweep_outputs",
+]

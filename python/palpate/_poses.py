@@ -1,0 +1,31 @@
+"""Paths of a tool."""
+
+import numpy as np
+
+from ._palpate import TICK_SECONDS
+
+
+def press_path(start, direction, depth, *, speed=0.02, hold=0.1, lead=1e-3):
+    """Positions of a tool that comes straight down, holds, and goes back: one row per tick.
+
+    Args:
+        start: where the tool touches the body (3) [m]. Of a sphere this is its centre at first touch.
+        direction: into the body (3); any length but 0.
+        depth: how far it goes beyond `start` [m].
+        speed: of the tool [m/s].
+        hold: at the depth [s].
+        lead: where it begins before `start` [m]; forces are ramped up in the first 0.6 s, so it waits there so long.
+
+    Returns:
+        n x 3 positions [m], float64.
+    """
+    start, direction = np.asarray(start, float), np.asarray(direction, float)
+    length = np.linalg.norm(direction)
+    if not length > 0:
+        raise ValueError("direction: has no length")
+    if not (speed > 0 and depth >= 0 and hold >= 0 and lead >= 0):
+        raise ValueError("press_path: speed has to be above 0, and depth, hold and lead not below 0")
+    step = speed * TICK_SECONDS
+    down = np.append(np.arange(-lead, depth, step), depth)
+    way = np.concatenate([np.full(600, -lead), down, np.full(round(hold / TICK_SECONDS), depth), down[::-1]])
+    return start + way[:, None] * (direction / length)

@@ -1,0 +1,134 @@
+"""Records of sessions."""
+
+import os
+
+import numpy as np
+
+from ._palpate import RecordFile
+
+# Columns of a table, by field of a tick: the names that a record's own table has.
+_VECTORS = {
+    "position": "tip_{}_m", "axis": "axis_{}", "proxy": "proxy_{}_m", "tissue_force": "tissue_force_{}_n",
+    "basic": "basic_{}_n", "additional": "additional_{}_n", "total": "total_{}_n", "deflection": "deflection_{}_m",
+}
+_NUMBERS = {
+    "tick": "tick", "buttons": "buttons", "fresh": "fresh", "energy": "energy_j", "damped": "damped_j", "phase": "phase",
+    "tissue": "tissue", "inserted": "inserted_m", "contacts": "contacts", "penetration": "penetration_m", "moved": "moved",
+    "residual": "residual_m", "nearest_vital": "nearest_vital", "warning": "warning", "warned": "warned",
+    "ahead": "ahead_m", "ahead_tissue": "ahead_tissue", "ahead_speed": "ahead_m_s", "fired": "fired", "faulted": "faulted",
+    "events": "events",
+}
+
+
+def columns_of(ticks, structures=None):
+    """Columns of a structured array of ticks, one number each: {"tip_x_m": array of n, ...}.
+
+    Args:
+        ticks: what Session.run() or Record.ticks gives.
+        structures: names for the columns of distances; default: their numbers.
+    """
+    out = {}
+    for field in ticks.dtype.names:
+        if field in _VECTORS:
+            for axis, letter in enumerate("xyz"):
+                out[_VECTORS[field].format(letter)] = ticks[field][:, axis]
+        elif field == "distance":
+            for i in range(ticks["distance"].shape[1]):
+                name = structures[i] if structures is not None else i
+                out[f"distance_{name}_m"] = ticks["distance"][:, i]
+        else:
+            out[_NUMBERS[field]] = ticks[field]
+    return out
+
+
+class Record:
+    """The record of a session, read whole.
+
+    Args:
+        file: that Session(record=...) or `palpate train --record` wrote.
+
+    Attributes:
+        ticks: structured array, a row per tick, as Session.run() gives it.
+        events: structured array (tick, kind, structure, tissue, value), in their order; palpate.EVENTS names the kinds.
+        info: what the record says of its session: scene, model, device, build, operator, host, started, rate, seed,
+            structures, tissues.
+        results: what the session said at its end, as text.
+        complete: False when the session was cut off.
+
+    Raises:
+        palpate.Error: the file is no record, or is damaged.
+    """
+
+    def __init__(self, file):
+        self._file = RecordFile(os.fspath(file))
+        self.ticks, self.events = self._file.read_ticks()
+        for array in (self.ticks, self.events):
+            array.flags.writeable = False
+        self.info = self._file.info
+        self.results = self._file.results
+        self.complete = self._file.complete
+
+    def __repr__(self):
+        return f"<palpate.Record '{self._file.file}': {len(self.ticks)} ticks of '{self.info['scene']}'>"
+
+    def __len__(self):
+        return len(self.ticks)
+
+    @property
+    def file(self):
+        """Path of the file."""
+        return self._file.file
+
+    @property
+    def scene_text(self):
+        """The scene as TOML text, enough to run the session again."""
+        return self._file.scene_text
+
+    @property
+    def poses(self):
+        """n x 6: positions [m] and axes, as Session.run() takes them."""
+        return np.concatenate([self.ticks["position"], self.ticks["axis"]], axis=1)
+
+    @property
+    def samples(self):
+        """What Session.run(**record.samples) takes to give the same ticks, bit for bit: poses, buttons, fresh."""
+        return {"poses": self.poses, "buttons": self.ticks["buttons"], "fresh": self.ticks["fresh"]}
+
+    def to_dict(self):
+        """Arrays of n by the names that the columns have in the file, events as a bit mask."""
+        return columns_of(self.ticks, self.info["structures"])
+
+    def to_dataframe(self):
+        """The same as a pandas.DataFrame, with a column seconds before them. Raises ImportError without pandas."""
+        import pandas
+
+        frame = pandas.DataFrame(self.to_dict())
+        frame.insert(0, "seconds", frame["tick"] / self.info["rate"])
+        return frame
+
+    def score(self):
+        """Every measure of docs/score.md by its key, `points`, and `doubts`: what makes them doubtful (list of str)."""
+        return self._file.score()
+
+    def model(self):
+        """The palpate.Model of the session. Raises palpate.Error when its volume is another now."""
+        return self._file.model()
+
+    def replay(self):
+        """Computes the session again and compares all bits.
+
+        Returns:
+            dict: ticks, identical (bool), first_difference_tick (int or None), largest_difference_n, force_hash,
+            differences (str, empty where there are none).
+
+        Raises:
+            palpate.Error: the volume is another now, ticks are missing.
+        """
+        return self._file.replay()
+
+
+def score(what):
+    """The score of a Record, of a record's file, or of a Session so far: a dict by the keys of docs/score.md."""
+    if isinstance(what, (str, os.PathLike)):
+        return RecordFile(os.fspath(what)).score()
+    return what.score()

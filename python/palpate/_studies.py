@@ -1,0 +1,41 @@
+"""Figures of studies that commands make."""
+
+import json
+import os
+import shutil
+import subprocess
+
+
+def accuracy(file=None, *, command=None):
+    """The accuracy figures: how far forces and shapes are from closed forms and finite elements.
+
+    Args:
+        file: what `palpate accuracy --json FILE` wrote. Without it the command is run, which takes minutes.
+        command: the program `palpate`; default: that in PATH.
+
+    Returns:
+        dict: "verification", a list of {problem, quantity, ours, reference, error_pct, source}, and "chart", a list of
+        {method, setting, scene, us_per_update, rms_pct, force_pct}. pandas.DataFrame(result["verification"]) is a table.
+
+    Raises:
+        palpate.Error: the program is not there or failed, or the file holds no such figures.
+    """
+    from . import Error
+
+    if file is not None:
+        with open(os.fspath(file), encoding="utf-8") as text:
+            try:
+                figures = json.load(text)
+            except ValueError as error:
+                raise Error(f"{file}: is no JSON ({error}): give what `palpate accuracy --json` wrote") from None
+    else:
+        program = command or shutil.which("palpate")
+        if program is None:
+            raise Error("accuracy: there is no program palpate in PATH: install it, or say where with command=")
+        done = subprocess.run([os.fspath(program), "accuracy", "--json", "-"], capture_output=True, text=True)
+        if done.returncode != 0:
+            raise Error(done.stderr.strip() or f"palpate accuracy: exit status {done.returncode}")
+        figures = json.loads(done.stdout)
+    if not isinstance(figures, dict) or not {"verification", "chart"} <= figures.keys():
+        raise Error(f"{file}: has no figures of accuracy: give what `palpate accuracy --json` wrote")
+    return figures

@@ -1,0 +1,332 @@
+"""Environments for learning, in the manner of Gymnasium, which need not be installed.
+
+    env = palpate.envs.Biopsy()
+    observation, info = env.reset(seed=7)
+    observation, reward, terminated, truncated, info = env.step(env.action_space.sample())
+
+Where gymnasium is installed, the classes are gymnasium.Env and the spaces are gymnasium.spaces.Box.
+"""
+
+import multiprocessing
+import os
+
+import numpy as np
+
+from . import _palpate
+from ._errors import Error
+
+try:
+    import gymnasium as _gymnasium
+
+    _Env, _Box = _gymnasium.Env, _gymnasium.spaces.Box
+except ImportError:
+    _Env = object
+
+    class _Box:
+        """A box of numbers from low to high, as gymnasium.spaces.Box."""
+
+        def __init__(self, low, high, shape=None, dtype=np.float32, seed=None):
+            self.dtype = np.dtype(dtype)
+            shape = np.shape(low) if shape is None else shape
+            self.low = np.broadcast_to(np.asarray(low, dtype), shape)
+            self.high = np.broadcast_to(np.asarray(high, dtype), shape)
+            self.shape = tuple(shape)
+            self.seed(seed)
+
+        def seed(self, seed=None):
+            self._random = np.random.default_rng(seed)
+
+        def sample(self):
+            """A point of the box, evenly; along directions without an end, of a normal distribution."""
+            ends = np.isfinite(self.low) & np.isfinite(self.high)
+            even = self._random.uniform(np.where(ends, self.low, 0), np.where(ends, self.high, 1))
+            return np.where(ends, even, self._random.normal(size=self.shape)).astype(self.dtype)
+
+        def contains(self, x):
+            x = np.asarray(x)
+            return x.shape == self.shape and bool(np.all(x >= self.low) and np.all(x <= self.high))
+
+        def __repr__(self):
+            return f"Box({self.shape}, {self.dtype})"
+
+
+_VITAL_TOUCH = 1 << _palpate.EVENTS.index("vital touch")
+_models = {}  # of scenes by their text: models are constant, and all environments of a process share them
+
+
+def _model_of(scene):
+    if isinstance(scene, _palpate.Model):
+        return scene
+    scene = _palpate.Scene(scene)
+    if scene.text not in _models:
+        _models[scene.text] = _palpate.Model(scene)
+    return _models[scene.text]
+
+
+class Biopsy(_Env):
+    """A core biopsy: bring the needle's tip to the target, past what must not be touched, and fire.
+
+    Every step is 20 ms: 20 ticks of the simulator, in which the tip goes on a straight line at the speed of the action. The
+    needle keeps the direction that it has at the start, towards the aim.
+
+    Action, 4 numbers from -1 to 1 (float32): the tip's velocity along the needle and to two sides of it, as a share of
+    `max_speed`, and the trigger: the gun is fired where it is above 0.5. The gun takes a core that lies before the tip, so it
+    is fired short of the aim: when observation 6, the length inside, has come to `firing_depth` [m] of the info of reset().
+
+    Observation, 16 numbers (float32), in the needle's frame (along, side, side) where they are vectors:
+
+        0-2    from the tip to the aim [cm]
+        3-5    force of the tissue on the needle [N]
+        6      length of the shaft inside the body [cm]
+        7      from the tip to the target's surface, below 0 inside [cm]
+        8      from the tip to the nearest vital structure [cm], 10 at most
+        9      along the needle to the next tissue [cm], 10 at most
+        10-12  phase: free, contact, inserted (one of them is 1)
+        13     size of the force that the hand feels [N]
+        14     how many warnings of a vital structure are on: 0 to 3
+        15     share of the time that is left
+
+    Reward: the sum of
+        (d0 - d1) / 50 mm    with d the distance from the tip to the target's surface, before and after the step;
+        -0.005               for every step;
+        -0.1 (F - 4 N)       for the largest force F that the hand felt in the step [N], where it was above 4 N;
+        -1                   for every time that a vital structure was touched;
+        total / 20           when the gun was fired: the score, 0 to 100 points (docs/score.md).
+
+    An episode ends when the gun was fired (terminated), or after `max_seconds` (truncated). info: "ticks"; at the end also
+    "score", a dict by the keys of docs/score.md.
+
+    Args:
+        scene: a built-in scene, a file, a palpate.Scene or a palpate.Model; of a biopsy, with a needle.
+        max_seconds: of an episode [s].
+        max_speed: of the tip [m/s].
+        entry_error: standard deviation of where the needle is set on the skin, each way across it [m].
+
+    Same seed and actions, same episode, bit for bit. Raises palpate.Error for a scene whose tool is no needle.
+    """
+
+    metadata = {"render_modes": ["ultrasound"], "render_fps": 50}
+    ticks_per_step = 20
+    lead = 5e-3  # the tip begins so far outside the body [m]
+
+    def __init__(self, scene="breast", *, max_seconds=20.0, max_speed=0.05, entry_error=2e-3, render_mode=None):
+        self.model = _model_of(scene)
+        tool = self.model.scene.to_dict().get("tool", {})
+        if tool.get("kind", "needle") != "needle":
+            raise Error(f"{self.model.scene.name}: the tool is no needle: choose a scene of a biopsy")
+        if render_mode not in (None, "ultrasound"):
+            raise ValueError(f"render_mode: is None or 'ultrasound', not {render_mode!r}")
+        self.render_mode = render_mode
+        self.max_steps = int(round(max_seconds / (self.ticks_per_step * _palpate.TICK_SECONDS)))
+        self.max_speed, self.entry_error = float(max_speed), float(entry_error)
+        self.action_space = _Box(-1.0, 1.0, (4,), np.float32)
+        self.observation_space = _Box(-np.inf, np.inf, (16,), np.float32)
+        self._seed = None
+        self.session = None
+
+    def reset(self, *, seed=None, options=None):
+        """Begins an episode. Without a seed the episodes follow from the one before.
+
+        Returns:
+            (observation, info)
+        """
+        if seed is not None or self._seed is None:
+            self._seed = np.random.default_rng(seed)
+        random = self._seed
+        entry, aim = self.model.entry, self.model.aim
+        line = (aim - entry) / np.linalg.norm(aim - entry)
+        side, other = _across(line)
+        start = entry + random.normal(0, self.entry_error, 2) @ np.stack([side, other]) - self.lead * line
+        axis = (aim - start) / np.linalg.norm(aim - start)
+        self._frame = np.stack([axis, *_across(axis)])
+        self._aim, self._tip, self._steps, self._done = aim, start, 0, False
+        self.session = _palpate.Session(self.model)
+        # Forces are ramped up in the first 0.6 s of a session: the needle waits outside.
+        settled = self.session.run(np.tile(np.concatenate([start, axis]), (600, 1)))
+        return self._observe(settled[-1], 0.0), {
+            "ticks": 600, "firing_depth": self.model.firing_depth}
+
+    def step(self, action):
+        """One step of 20 ms. Returns (observation, reward, terminated, truncated, info)."""
+        if self.session is None or self._done:
+            raise Error("step: the episode is over: call reset()")
+        action = np.clip(np.nan_to_num(np.asarray(action, float)), -1, 1)
+        if action.shape != (4,):
+            raise ValueError("action: give 4 numbers: velocity along, to two sides, trigger")
+        n = self.ticks_per_step
+        way = action[:3] @ self._frame * (self.max_speed * _palpate.TICK_SECONDS)
+        poses = np.empty((n, 6))
+        poses[:, :3] = self._tip + np.arange(1, n + 1)[:, None] * way
+        poses[:, 3:] = self._frame[0]
+        self._tip = poses[-1, :3]
+        buttons = np.full(n, _palpate.DEADMAN, np.uint32)
+        if action[3] > 0.5:
+            buttons[-1] |= _palpate.FIRE
+        before = self._distance
+        ticks = self.session.run(poses, buttons)
+        self._steps += 1
+        force = float(np.linalg.norm(ticks["total"], axis=1).max())
+        fired = bool(ticks["fired"].any())
+        observation = self._observe(ticks[-1], force)
+        touches = int(np.count_nonzero(ticks["events"] & _VITAL_TOUCH))
+        reward = (before - self._distance) / 0.05 - 0.005 - 0.1 * max(force - 4.0, 0.0) - 1.0 * touches
+        info = {"ticks": self.session.ticks}
+        truncated = not fired and self._steps >= self.max_steps
+        if fired or truncated:
+            self._done = True
+            info["score"] = self.session.score()
+            reward += info["score"]["total"] / 20.0 if fired else 0.0
+        return observation, float(reward), fired, truncated, info
+
+    def render(self):
+        """The ultrasound picture, 640 x 640 x 3 (uint8), or None without render_mode="ultrasound"."""
+        if self.render_mode is None or self.session is None:
+            return None
+        return np.repeat(self.session.ultrasound()["pixels"][:, :, None], 3, axis=2)
+
+    def close(self):
+        """Lets go of the session."""
+        self.session = None
+
+    def _observe(self, tick, force):
+        self._distance = float(tick["distance"][0])
+        vital = tick["distance"][1:].min() if len(tick["distance"]) > 1 else np.inf
+        phase = np.eye(3)[int(tick["phase"])]
+        return np.concatenate([
+            100 * self._frame @ (self._aim - tick["position"]), self._frame @ tick["tissue_force"],
+            [100 * tick["inserted"], 100 * self._distance, 100 * min(vital, 0.1), 100 * min(float(tick["ahead"]), 0.1)],
+            phase, [force, float(tick["warning"]), 1.0 - self._steps / self.max_steps],
+        ]).astype(np.float32)
+
+
+def _across(line):
+    """Two unit vectors across a unit vector and each other."""
+    side = np.cross(line, np.eye(3)[np.argmin(np.abs(line))])
+    side /= np.linalg.norm(side)
+    return side, np.cross(line, side)
+
+
+def _serve(pipe, make, numbers, seed):
+    """The life of a worker process: its environments, stepped when asked."""
+    try:
+        envs = [make() for _ in numbers]
+        children = np.random.SeedSequence(seed)
+        streams = [np.random.SeedSequence(children.entropy, spawn_key=(n,)) for n in numbers]
+        pipe.send(None)
+        while True:
+            what, argument = pipe.recv()
+            if what == "reset":
+                if argument is not None:
+                    streams = [np.random.SeedSequence(argument, spawn_key=(n,)) for n in numbers]
+                pipe.send([env.reset(seed=int(s.generate_state(1)[0])) for env, s in zip(envs, streams)])
+            elif what == "step":
+                pipe.send([_step(env, action) for env, action in zip(envs, argument)])
+            else:
+                return
+    except (EOFError, KeyboardInterrupt):
+        pass
+    except Exception as error:  # told to who waits for it
+        pipe.send(error)
+
+
+def _step(env, action):
+    observation, reward, terminated, truncated, info = env.step(action)
+    if terminated or truncated:
+        info = dict(info, final_observation=observation)
+        observation, _ = env.reset()
+    return observation, reward, terminated, truncated, info
+
+
+class Vector:
+    """Many environments at once, over processes. An episode that ends begins anew by itself; its last observation is in
+    infos[i]["final_observation"].
+
+        with palpate.envs.Vector(8, processes=2, seed=1) as envs:
+            observations = envs.reset()
+            observations, rewards, terminated, truncated, infos = envs.step(actions)     # actions: 8 x 4
+
+    The episodes of environment i follow from the seed and i alone, whatever the number of processes.
+
+    Args:
+        count: how many environments.
+        make: what makes one; called in the processes, so it has to be a function of a module. Default: Biopsy.
+        processes: default: all cores.
+        seed: of all of them; default: another one each time.
+        context: how processes start, see multiprocessing. With "spawn", the default, a script needs the usual
+            `if __name__ == "__main__":`.
+    """
+
+    def __init__(self, count, make=Biopsy, *, processes=None, seed=None, context="spawn"):
+        if count < 1:
+            raise ValueError("count: has to be 1 or more")
+        processes = max(1, min(count, processes or os.cpu_count() or 1))
+        seed = np.random.SeedSequence(seed).entropy
+        start = multiprocessing.get_context(context)
+        self.count = count
+        self._parts = np.array_split(np.arange(count), processes)
+        self._pipes, self._processes = [], []
+        try:
+            for part in self._parts:
+                here, there = start.Pipe()
+                process = start.Process(target=_serve, args=(there, make, [int(n) for n in part], seed), daemon=True)
+                process.start()
+                there.close()
+                self._pipes.append(here)
+                self._processes.append(process)
+            for pipe in self._pipes:
+                self._answer(pipe)
+        except BaseException:
+            self.close()
+            raise
+
+    def reset(self, *, seed=None):
+        """Begins all episodes. Returns count x 16 observations."""
+        for pipe in self._pipes:
+            pipe.send(("reset", seed))
+        return np.stack([observation for pipe in self._pipes for observation, _ in self._answer(pipe)])
+
+    def step(self, actions):
+        """One step of each.
+
+        Args:
+            actions: count x 4.
+
+        Returns:
+            observations (count x 16), rewards, terminated, truncated (count each), infos (list of dict)
+        """
+        actions = np.asarray(actions)
+        if len(actions) != self.count:
+            raise ValueError(f"actions: give {self.count}, one for each environment")
+        for pipe, part in zip(self._pipes, self._parts):
+            pipe.send(("step", actions[part]))
+        results = [result for pipe in self._pipes for result in self._answer(pipe)]
+        observations, rewards, terminated, truncated, infos = zip(*results)
+        return np.stack(observations), np.array(rewards), np.array(terminated), np.array(truncated), list(infos)
+
+    def close(self):
+        """Ends the processes."""
+        for pipe in self._pipes:
+            try:
+                pipe.send(("close", None))
+            except OSError:
+                pass
+            pipe.close()
+        for process in self._processes:
+            process.join()
+        self._pipes, self._processes = [], []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+    @staticmethod
+    def _answer(pipe):
+        try:
+            answer = pipe.recv()
+        except EOFError:
+            raise Error("a process of the environments has ended: see what it printed") from None
+        if isinstance(answer, Exception):
+            raise answer
+        return answer

@@ -1,0 +1,51 @@
+#pragma once
+
+// Scenes and volumes as Python holds them.
+
+#include <datasets/scene.h>
+#include <python/convert.h>
+#include <python/live_session.h>
+#include <volume/tissue.h>
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::python {
+
+/// A volume and dense copies of its grids, which are made when first asked for; all views look into those.
+struct VolumeBox {
+    std::shared_ptr<const volume::Tissue> tissue;
+    std::filesystem::path file;  // that it was read from or saved to; empty: it is in memory alone
+
+    const std::vector<std::uint16_t>& labels();
+    const std::vector<float>& stiffness();  // [Pa]
+    const std::vector<float>& image();      // empty: none
+
+private:
+    std::mutex making_;
+    std::optional<std::vector<std::uint16_t>> labels_;
+    std::optional<std::vector<float>> stiffness_, image_;
+};
+
+/// A scene, and what its text came from.
+struct SceneBox {
+    datasets::Scene scene;
+    std::string origin;
+    std::shared_ptr<const volume::Tissue> volume;  // loaded already; null: not
+    bool inMemory = false;                         // its volume is in no file
+};
+
+/// A scene by built-in name, TOML file or volume (.vdb). Throws palpate.SceneError.
+SceneBox sceneNamed(const std::string& what);
+/// The scene that an argument of Python means: a Scene, a name or a path.
+SceneBox sceneOf(const py::object& what);
+/// The model that it means: a Model, or one that is built now, with the GIL released.
+std::shared_ptr<const Modelled> modelOf(const py::object& what);
+/// [(key, value)] of nested dictionaries, keys joined by dots.
+std::vector<std::pair<std::string, py::object>> flattened(const py::dict& tables, const std::string& before = "");
+
+}  // namespace palpate::python

@@ -1,0 +1,211 @@
+#include <sweep/run.h>
+
+#include <base/build.h>
+#include <base/outputs.h>
+#include <base/split.h>
+#include <datasets/scene_text.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <stdexcept>
+
+namespace palpate::sweep {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t longestName = 100;  // of a folder for a list of cases
+
+std::optional<std::size_t> numberOf(std::string_view text)
+{
+    std::size_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return error == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
+}
+
+std::pair<std::size_t, std::size_t> partOf(const std::string& shard)
+{
+    const auto slash = shard.find('/');
+    const auto k = numberOf(std::string_view(shard).substr(0, slash));
+    const auto n = slash == std::string::npos ? std::nullopt : numberOf(std::string_view(shard).substr(slash + 1));
+    if (!k || !n || *k < 1 || *k > *n) {
+        throw std::runtime_error(fmt::format("--shard {}: must be K/N, part K of N, with K from 1 to N", shard));
+    }
+    return {*k, *n};
+}
+
+// The files that make a folder the folder of a plan.
+constexpr std::array<const char*, 3> planFiles{"scene.toml", "sweep.json", "plan.toml"};
+
+void checkSamePlan(const SweepFolder& to, const SweepFolder& from)
+{
+    if (from.plan().text != to.plan().text ||
+        datasets::sceneText(from.plan().base) != datasets::sceneText(to.plan().base)) {
+        throw std::runtime_error(fmt::format("{}: is of another plan or scene than {}: it cannot be merged",
+                                             from.path().string(), to.path().string()));
+    }
+}
+
+// Of plans that keep records.
+void copyRecord(const SweepFolder& from, const SweepFolder& to, std::size_t index)
+{
+    const fs::path file = from.path() / "records" / fmt::format("{}.db", index);
+    if (fs::exists(file)) {
+        fs::copy_file(file, to.record(index));
+    }
+}
+
+}  // namespace
+
+std::vector<std::size_t> remainingCases(const SweepFolder& folder, const CasesWanted& wanted,
+                                        const std::function<void(const std::string&)>& warn)
+{
+    std::vector<std::string> damaged;
+    const auto rows = folder.rows(&damaged);
+    for (const std::string& what : damaged) {
+        warn(what + ": the case is computed again");
+    }
+    std::vector<std::size_t> cases;
+    std::set<std::string> others;
+    for (const std::size_t i : wanted.cases) {
+        if (!rows[i] || (wanted.retry && rows[i]->failed())) {
+            folder.forget(i);
+            cases.push_back(i);
+        } else if (rows[i]->build != std::string(base::build())) {
+            others.insert(rows[i]->build);
+        }
+    }
+    if (!others.empty() && !cases.empty() && !wanted.anyBuild) {
+        throw std::runtime_error(
+            fmt::format("{}: holds cases of {} and this is {}: go on with that, or add --any-build (the table says which "
+                        "case is whose)",
+                        folder.path().string(), fmt::join(others, ", "), std::string(base::build())));
+    }
+    return cases;
+}
+
+SweepTable writeTables(const SweepFolder& folder, const std::vector<std::optional<SweepRow>>& rows)
+{
+    SweepTable table = tableOf(folder.plan(), rows);
+    base::writeWhole(folder.path() / "table.csv", csvText(table));
+    writeDatabase(folder.path() / "table.db", table, folder.plan());
+    return table;
+}
+
+std::vector<std::size_t> allCases(const SweepPlan& plan)
+{
+    std::vector<std::size_t> cases(plan.cases());
+    std::iota(cases.begin(), cases.end(), std::size_t{0});
+    return cases;
+}
+
+std::vector<std::size_t> casesOfShard(const std::string& shard, std::size_t cases)
+{
+    const auto [k, n] = partOf(shard);
+    // In two steps, so that no product is out of bounds: every part has cases / n, the first ones one more.
+    const std::size_t each = cases / n, more = cases % n;
+    const std::size_t first = (k - 1) * each + std::min(k - 1, more);
+    std::vector<std::size_t> out(each + (k <= more ? 1 : 0));
+    std::iota(out.begin(), out.end(), first);
+    return out;
+}
+
+std::vector<std::size_t> casesOfList(const std::string& list, std::size_t cases)
+{
+    std::set<std::size_t> out;
+    for (const auto part : base::splitAt(',', list)) {
+        const std::string_view text(part);
+        const auto dash = text.find('-');
+        const auto first = numberOf(text.substr(0, dash));
+        const auto last = dash == std::string_view::npos ? first : numberOf(text.substr(dash + 1));
+        if (!first || !last || *first > *last) {
+            throw std::runtime_error(fmt::format("--cases {}: must be numbers and ranges, as in 0-9,12", list));
+        }
+        if (*last >= cases) {
+            throw std::runtime_error(fmt::format("--cases {}: the plan has the cases 0 to {}", list, cases - 1));
+        }
+        for (std::size_t i = *first; i <= *last; ++i) {
+            out.insert(i);
+        }
+    }
+    return {out.begin(), out.end()};
+}
+
+std::string listOfCases(const std::vector<std::size_t>& sorted)
+{
+    std::vector<std::string> parts;
+    for (std::size_t i = 0; i < sorted.size();) {
+        std::size_t last = i;
+        while (last + 1 < sorted.size() && sorted[last + 1] == sorted[last] + 1) {
+            ++last;
+        }
+        parts.push_back(last == i ? fmt::format("{}", sorted[i]) : fmt::format("{}-{}", sorted[i], sorted[last]));
+        i = last + 1;
+    }
+    return fmt::format("{}", fmt::join(parts, ","));
+}
+
+fs::path shardFolder(const fs::path& folder, const std::string& shard)
+{
+    const auto [k, n] = partOf(shard);
+    return folder / "shards" / fmt::format("{}-of-{}", k, n);
+}
+
+fs::path casesFolder(const fs::path& folder, const std::vector<std::size_t>& cases)
+{
+    std::string name = listOfCases(cases);
+    if (name.size() > longestName) {
+        const std::size_t hash = std::hash<std::string>{}(name);
+        name = fmt::format("{}-and-more-{:016x}", name.substr(0, longestName / 2), hash);
+    }
+    return folder / "shards" / ("cases-" + name);
+}
+
+std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& from)
+{
+    std::vector<fs::path> parts = from;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder / "shards", none)) {
+        if (fs::exists(entry.path() / "plan.toml")) {
+            parts.push_back(entry.path());
+        }
+    }
+    std::sort(parts.begin(), parts.end());
+    if (parts.empty()) {
+        throw std::runtime_error(folder.string() + ": has no shards to merge: give their folders behind --merge");
+    }
+    if (!fs::exists(folder / "plan.toml")) {
+        const SweepFolder first(parts.front(), "", false);
+        fs::create_directories(folder / "cases");
+        for (const char* const file : planFiles) {
+            fs::copy_file(first.path() / file, folder / file, fs::copy_options::overwrite_existing);
+        }
+    }
+    const SweepFolder to(folder, "", true);
+    to.clean();
+    auto rows = to.rows();
+    std::size_t came = 0;
+    for (const fs::path& part : parts) {
+        const SweepFolder shard(part, "", false);
+        checkSamePlan(to, shard);
+        for (const auto& row : shard.rows()) {
+            if (row && (!rows[row->index] || (rows[row->index]->failed() && !row->failed()))) {
+                to.write(*row);
+                copyRecord(shard, to, row->index);
+                rows[row->index] = row;
+                ++came;
+            }
+        }
+    }
+    return came;
+}
+
+}  // namespace palpate::sweep

@@ -1,0 +1,171 @@
+"""Sessions opened and closed, threads, processes, and an interrupt in the middle of a run."""
+
+import gc
+import multiprocessing
+import os
+import pathlib
+import signal
+import threading
+import time
+import unittest
+
+import numpy as np
+
+import palpate
+from common import InFolder, small_block, wander
+
+
+def resident():
+    """Memory of this process [MB]."""
+    pages = int(pathlib.Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+class Leaks(InFolder):
+    def test_sessions_leave_no_memory_files_or_threads(self):
+        model, poses = small_block(), wander(30)
+
+        def open_and_close(count):
+            for _ in range(count):
+                session = palpate.Session(model)
+                kept = session.run(poses)["total"]
+                field = session.displacement
+                del session, field, kept
+            gc.collect()
+
+        open_and_close(40)  # what is made once is made
+        before, files, threads = resident(), len(os.listdir("/proc/self/fd")), len(os.listdir("/proc/self/task"))
+        rounds = [before]
+        for _ in range(3):
+            open_and_close(100)
+            rounds.append(resident())
+        # One session holds about 1.5 MB: 300 that leak would be 450.
+        self.assertLess(rounds[-1] - before, 20, rounds)
+        self.assertEqual(len(os.listdir("/proc/self/fd")), files)
+        self.assertEqual(len(os.listdir("/proc/self/task")), threads)
+
+    def test_a_closed_session_says_so_and_keeps_its_figures(self):
+        session = palpate.Session(small_block(), record=self.folder / "r.db")
+        session.run(wander(100))
+        session.close()
+        session.close()
+        with self.assertRaisesRegex(palpate.Error, "closed"):
+            session.step([0, 0, 0])
+        self.assertEqual(session.ticks, 100)
+        self.assertEqual(palpate.Record(self.folder / "r.db").results["force_hash"], session.force_hash)
+
+
+class Threads(unittest.TestCase):
+    def test_sessions_of_one_model_run_side_by_side(self):
+        model = small_block()
+        expected = [palpate.Session(model).run(wander(1500, seed))["total"] for seed in range(4)]
+        found = [None] * 4
+
+        def work(seed):
+            found[seed] = palpate.Session(model).run(wander(1500, seed))["total"]
+
+        threads = [threading.Thread(target=work, args=(seed,)) for seed in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        np.testing.assert_array_equal(found, expected)
+
+    def test_python_goes_on_while_a_session_runs(self):
+        session = palpate.Session(small_block())
+        thread = threading.Thread(target=session.run, args=(wander(4000),))
+        thread.start()
+        beats = 0
+        while thread.is_alive():
+            beats += 1
+            time.sleep(1e-3)
+        self.assertGreater(beats, 20)
+
+    def test_two_threads_cannot_work_with_one_session(self):
+        session = palpate.Session(small_block())
+        thread = threading.Thread(target=session.run, args=(wander(6000),))
+        thread.start()
+        refused = 0
+        while thread.is_alive():
+            try:
+                session.step([0, -0.02, 0])
+            except palpate.Error as error:
+                self.assertIn("another thread", str(error))
+                refused += 1
+        self.assertGreater(refused, 0)
+
+
+def _child(model, session, pipe):
+    fresh = palpate.Session(model).run(wander(800))["total"]
+    gone_on = session.run(wander(1600)[800:])["total"]
+    built = palpate.Session(palpate.Model(model.scene)).run(wander(800))["total"]
+    pipe.send((fresh, gone_on, built))
+
+
+class Forks(InFolder):
+    def test_a_forked_process_has_sessions_of_its_own(self):
+        model = small_block()
+        expected = palpate.Session(model).run(wander(1600))["total"]
+        session = palpate.Session(model)
+        session.run(wander(1600)[:800])
+        here, there = multiprocessing.Pipe()
+        process = multiprocessing.get_context("fork").Process(target=_child, args=(model, session, there))
+        process.start()
+        self.assertTrue(here.poll(120), "the child says nothing")
+        fresh, gone_on, built = here.recv()
+        process.join(20)
+        self.assertEqual(process.exitcode, 0)
+        np.testing.assert_array_equal(fresh, expected[:800])
+        np.testing.assert_array_equal(built, expected[:800])
+        np.testing.assert_array_equal(gone_on, expected[800:])
+        self.assertEqual(session.ticks, 800)
+
+    def test_a_record_is_its_own_process_s_alone(self):
+        file = self.folder / "r.db"
+        session = palpate.Session(small_block(), record=file)
+        session.run(wander(500))
+        child = os.fork()
+        if child == 0:
+            try:
+                session.run(wander(10))
+            except palpate.Error as error:
+                del session
+                os._exit(0 if "another process" in str(error) else 1)
+            os._exit(2)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+        session.run(wander(600)[500:])
+        session.close()
+        self.assertEqual(len(palpate.Record(file)), 600)
+        self.assertTrue(palpate.Record(file).replay()["identical"])
+
+
+class Interrupts(unittest.TestCase):
+    def test_an_interrupted_run_has_done_whole_ticks_and_goes_on(self):
+        poses = wander(60000)
+        session = palpate.Session(small_block())
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            session.run(poses)
+        done = session.ticks
+        self.assertTrue(0 < done < len(poses))
+        self.assertEqual(len(session.interrupted), done)
+        rest = session.run(poses[done:done + 500])
+        whole = palpate.Session(small_block()).run(poses[:done + 500])
+        np.testing.assert_array_equal(np.concatenate([session.interrupted, rest]), whole)
+
+    def test_an_exception_of_a_signal_handler_ends_a_run_too(self):
+        class Enough(Exception):
+            pass
+
+        def handler(*_):
+            raise Enough
+
+        before = signal.signal(signal.SIGALRM, handler)
+        self.addCleanup(signal.signal, signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with self.assertRaises(Enough):
+            palpate.Session(small_block()).run(wander(60000))
+
+
+if __name__ == "__main__":
+    unittest.main()

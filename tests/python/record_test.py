@@ -1,0 +1,65 @@
+import json
+import unittest
+
+import numpy as np
+
+import palpate
+from common import InFolder, figures, small_block, wander
+
+
+class Records(InFolder):
+    def setUp(self):
+        super().setUp()
+        self.file = self.folder / "r.db"
+        with palpate.Session(small_block(), record=self.file, operator="P-17") as session:
+            self.ticks = session.run(wander(2000))
+            self.hash, self.total = session.force_hash, session.score()
+
+    def test_a_table_of_it_has_the_program_s_columns(self):
+        frame = palpate.Record(self.file).to_dataframe()
+        self.assertEqual(len(frame), 2000)
+        np.testing.assert_array_equal(frame[["total_x_n", "total_y_n", "total_z_n"]].to_numpy(), self.ticks["total"])
+        np.testing.assert_array_equal(frame["seconds"], np.arange(2000) / 1000)
+        np.testing.assert_array_equal(frame["distance_tumour_m"], self.ticks["distance"][:, 0])
+
+    def test_its_samples_give_the_session_again(self):
+        record = palpate.Record(self.file)
+        again = palpate.Session(record.model())
+        np.testing.assert_array_equal(again.run(**record.samples), record.ticks)
+        self.assertEqual(again.force_hash, self.hash)
+
+    def test_replay_and_score_are_the_program_s(self):
+        record = palpate.Record(self.file)
+        theirs = figures("replay", self.file)
+        ours = record.replay()
+        self.assertTrue(ours["identical"])
+        self.assertEqual(ours["force_hash"], theirs["force_hash"])
+        score = figures("score", self.file)["sessions"][0]
+        for measure in ("total", "path_length_mm", "peak_force_n"):
+            if measure in score:
+                self.assertEqual(palpate.score(self.file)[measure], score[measure])
+        self.assertEqual(record.score()["total"], score["total"])
+        self.assertEqual(self.total["total"], score["total"])
+
+    def test_it_says_who_and_what(self):
+        record = palpate.Record(self.file)
+        self.assertEqual(record.info["operator"], "P-17")
+        self.assertEqual(record.info["device"], "python")
+        self.assertEqual(record.info["scene"], "block")
+        self.assertTrue(record.complete)
+        self.assertEqual(record.results["force_hash"], self.hash)
+        self.assertEqual(palpate.Scene.parse(record.scene_text).name, "block")
+
+    def test_a_record_is_never_written_over(self):
+        with self.assertRaisesRegex(palpate.Error, "r.db"):
+            palpate.Session(small_block(), record=self.file)
+        self.assertEqual(len(palpate.Record(self.file)), 2000)
+
+    def test_what_is_no_record_is_refused(self):
+        (self.folder / "no.db").write_text("no record")
+        with self.assertRaisesRegex(palpate.Error, "no.db"):
+            palpate.Record(self.folder / "no.db")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,90 @@
+import pickle
+import unittest
+
+import numpy as np
+
+import palpate
+from common import InFolder, small_block
+
+
+class Scenes(InFolder):
+    def test_text_gives_the_scene_again(self):
+        for name in palpate.scenes():
+            scene = palpate.Scene(name)
+            self.assertEqual(palpate.Scene.parse(scene.text).text, scene.text, name)
+
+    def test_keywords_are_the_tables_of_a_scene_file(self):
+        written = palpate.Scene(
+            name="mine", volume={"phantom": "block", "voxel_mm": 3.0, "parameters": {"width_mm": 60}},
+            tool={"kind": "sphere", "radius_mm": 8}, target={"structure": "tumour", "aim_mm": [0, 25, 0]},
+            script=[{"kind": "move", "to_mm": [0, -20, 0], "speed_mm_s": 60, "seconds": 2}])
+        told = written.to_dict()
+        self.assertEqual(told["tool"]["radius_mm"], 8)
+        self.assertEqual(told["volume"]["parameters"]["width_mm"], 60)
+        self.assertEqual(told["script"][0]["to_mm"], [0, -20, 0])
+
+    def test_changed_keys_change_nothing_else(self):
+        before = palpate.Scene("block").to_dict()
+        after = palpate.Scene("block", tool={"radius_mm": 7}).changed({"dffb.gain": 0.5}).to_dict()
+        self.assertEqual(after["tool"]["radius_mm"], 7)
+        self.assertEqual(after["dffb"]["gain"], 0.5)
+        after["tool"]["radius_mm"], after["dffb"]["gain"] = before["tool"]["radius_mm"], before["dffb"]["gain"]
+        self.assertEqual(after, before)
+
+    def test_an_error_says_file_line_and_key(self):
+        file = self.folder / "bad.toml"
+        file.write_text('name = "x"\n[volume]\nphantom = "block"\n\n[dffb]\nrange_mm = -4\n')
+        with self.assertRaises(palpate.SceneError) as caught:
+            palpate.Scene(file)
+        self.assertEqual(caught.exception.file, str(file))
+        self.assertEqual(caught.exception.line, 6)
+        self.assertEqual(caught.exception.key, "dffb.range_mm")
+        self.assertIsInstance(caught.exception, ValueError)
+        again = pickle.loads(pickle.dumps(caught.exception))
+        self.assertEqual((again.file, again.line, again.key), (str(file), 6, "dffb.range_mm"))
+
+    def test_errors_of_keywords_and_changes_name_the_key(self):
+        with self.assertRaises(palpate.SceneError) as caught:
+            palpate.Scene("block", tool={"radius_mm": -1})
+        self.assertEqual(caught.exception.key, "tool.radius_mm")
+        with self.assertRaisesRegex(palpate.SceneError, "unknown key"):
+            palpate.Scene("block", tool={"radus_mm": 1})
+        with self.assertRaisesRegex(palpate.SceneError, "built-in scenes are"):
+            palpate.Scene("blok")
+        with self.assertRaisesRegex(palpate.SceneError, "TOML"):
+            palpate.Scene.parse("name = ")
+
+
+class Models(InFolder):
+    def test_a_volume_in_memory_is_pressed_like_its_file(self):
+        labels = np.zeros((30, 20, 30), np.uint16)
+        labels[2:-2, 2:-2, 2:-2] = 1
+        labels[12:18, 8:13, 12:18] = 2
+        affine = np.diag([2e-3, 2e-3, 2e-3, 1.0])
+        volume = palpate.Volume.from_numpy(labels, affine, {1: "fat", 2: ("lump", "idc_high_grade")})
+        scene = palpate.Scene.for_volume(volume, "lump")
+        self.assertEqual(scene.target, "lump")
+        memory = palpate.Model(scene)
+        with self.assertRaisesRegex(palpate.Error, "save the volume"):
+            palpate.Session(memory, record=self.folder / "r.db")
+        volume.save(self.folder / "v.vdb")
+        file = palpate.Model(palpate.Scene.for_volume(self.folder / "v.vdb", "lump"))
+        self.assertEqual(memory.hash, file.hash)
+        poses = memory.entry + np.linspace(-5e-3, 5e-3, 900)[:, None] * np.array([0, 1, 0])
+        ours, theirs = (palpate.Session(m).run(poses) for m in (memory, file))
+        np.testing.assert_array_equal(ours["total"], theirs["total"])
+        self.assertGreater(np.abs(ours["tissue_force"]).max(), 0)
+
+    def test_a_model_says_what_it_is_of(self):
+        model = small_block()
+        self.assertEqual(model.structures[0], "tumour")
+        self.assertIn("fat", model.tissues)
+        self.assertEqual(len(model.lattice["shape"]), 3)
+        self.assertEqual(model.scene.name, "block")
+        made = palpate.Volume.phantom("block", voxel=3e-3, width_mm=60, thickness_mm=36, tumour_centre_mm=18,
+                                      tumour_diameter_mm=14)
+        np.testing.assert_array_equal(model.volume.labels, made.labels)
+
+
+if __name__ == "__main__":
+    unittest.main()

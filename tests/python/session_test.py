@@ -1,0 +1,137 @@
+import unittest
+
+import numpy as np
+
+import palpate
+from common import InFolder, figures, small_block, wander
+
+
+class Run(InFolder):
+    def test_ten_thousand_poses_have_the_bits_of_palpate_replay(self):
+        record = self.folder / "r.db"
+        with palpate.Session(small_block(), record=record) as session:
+            ticks = session.run(wander(10000))
+        replayed = figures("replay", record)
+        self.assertTrue(replayed["identical"])
+        self.assertEqual(replayed["ticks"], 10000)
+        self.assertEqual(replayed["force_hash"], session.force_hash)
+        recorded = palpate.Record(record)
+        for field in ticks.dtype.names:
+            np.testing.assert_array_equal(ticks[field], recorded.ticks[field], field)
+        np.testing.assert_array_equal(session.events, recorded.events)
+        self.assertGreater(np.linalg.norm(ticks["tissue_force"], axis=1).max(), 0.15)
+
+    def test_steps_and_any_pieces_of_a_run_are_one_run(self):
+        poses = wander(2500, seed=2)
+        whole = palpate.Session(small_block()).run(poses)
+        session = palpate.Session(small_block())
+        first = session.run(poses[:700])
+        self.assertEqual(session.advance(poses[700:1100]), 400)
+        stepped = [session.step(pose) for pose in poses[1100:1600]]
+        last = session.run(poses[1600:])
+        np.testing.assert_array_equal(first, whole[:700])
+        np.testing.assert_array_equal([s.total for s in stepped], whole["total"][1100:1600])
+        np.testing.assert_array_equal([s.tissue_force for s in stepped], whole["tissue_force"][1100:1600])
+        self.assertEqual([s.events for s in stepped], whole["events"][1100:1600].tolist())
+        np.testing.assert_array_equal(last, whole[1600:])
+
+    def test_the_force_pushes_the_ball_out_and_grows_with_depth(self):
+        model = small_block()
+        radius = 1e-3 * model.scene.to_dict()["tool"]["radius_mm"]
+        path = palpate.press_path([0, -radius, 0], [0, 1, 0], 4e-3)
+        ticks = palpate.Session(model).run(path)
+        depth = ticks["position"][:, 1] + radius
+        down = slice(np.argmax(depth > 0), np.argmax(depth))
+        force = -ticks["tissue_force"][down, 1]
+        self.assertTrue(np.all(np.diff(force) > -1e-3 * force.max()))
+        self.assertGreater(force[-1], 0.1)
+        np.testing.assert_allclose(ticks["tissue_force"][down][:, [0, 2]], 0, atol=0.05 * force.max())
+        self.assertTrue(np.all(ticks["tissue_force"][depth < -0.5e-3] == 0))
+
+    def test_without_the_dead_man_switch_nothing_is_sent(self):
+        ticks = palpate.Session(small_block()).run(wander(1500), buttons=0)
+        self.assertTrue(np.all(ticks["total"] == 0))
+        self.assertGreater(np.abs(ticks["tissue_force"]).max(), 0)
+
+    def test_events_are_those_of_the_mask(self):
+        session = palpate.Session(small_block())
+        ticks = session.run(wander(3000))
+        mask = np.zeros(3000, np.uint32)
+        for event in session.events:
+            mask[event["tick"]] |= 1 << int(event["kind"])
+        np.testing.assert_array_equal(mask, ticks["events"])
+        self.assertIn("contact", {palpate.EVENTS[k] for k in session.events["kind"]})
+
+    def test_a_pose_that_is_none_is_marked_and_not_followed(self):
+        poses = wander(1000)
+        poses[500] = np.nan
+        ticks = palpate.Session(small_block()).run(poses)
+        np.testing.assert_array_equal(ticks["position"][500], poses[499])
+        self.assertFalse(ticks["fresh"][500])
+        self.assertTrue(np.all(np.isfinite(ticks["total"])))
+
+    def test_bad_arguments_are_refused_and_change_nothing(self):
+        session = palpate.Session(small_block())
+        for wrong, call in [
+            ("n x 3", lambda: session.run(np.zeros((4, 5)))),
+            ("n x 3", lambda: session.run(np.zeros(3))),
+            ("no length", lambda: session.run(np.zeros((4, 6)))),
+            ("buttons", lambda: session.run(np.zeros((4, 3)), buttons=[1, 1])),
+            ("fresh", lambda: session.run(np.zeros((4, 3)), fresh=[True])),
+            ("pose", lambda: session.step([1, 2])),
+            ("pose", lambda: session.step("abc")),
+        ]:
+            with self.subTest(wrong), self.assertRaisesRegex(ValueError, wrong):
+                call()
+        self.assertEqual(session.ticks, 0)
+        self.assertEqual(len(session.run(np.zeros((0, 3)))), 0)
+
+
+class Shape(unittest.TestCase):
+    def test_displacement_is_a_view_of_what_the_tissue_does(self):
+        session = palpate.Session(small_block())
+        field = session.displacement
+        self.assertEqual(field.shape, (*session.model.lattice["shape"], 3))
+        self.assertTrue(np.all(field == 0))
+        radius = 1e-2
+        session.run(palpate.press_path([0, -radius, 0], [0, 1, 0], 3e-3)[:800])
+        lattice = session.model.lattice
+        largest = np.unravel_index(np.argmax(np.linalg.norm(field, axis=-1)), lattice["shape"])
+        place = lattice["origin"] + lattice["spacing"] * np.array(largest)
+        # Under the ball, and inwards.
+        self.assertLess(np.hypot(place[0], place[2]), radius)
+        self.assertGreater(field[largest][1], 1e-3)
+        with self.assertRaises(ValueError):
+            field[0, 0, 0] = 1
+        del session
+        self.assertGreater(np.abs(field).max(), 1e-3)
+
+    def test_ultrasound_shows_the_body_and_is_the_same_for_the_same_state(self):
+        pictures = []
+        for _ in range(2):
+            session = palpate.Session(small_block())
+            session.run(wander(1200))
+            pictures.append(session.ultrasound(320, 320))
+        np.testing.assert_array_equal(pictures[0]["pixels"], pictures[1]["pixels"])
+        self.assertEqual(pictures[0]["pixels"].shape, (320, 320))
+        self.assertGreater(pictures[0]["pixels"].std(), 10)
+        deeper = session.ultrasound(320, 320, depth=0.03)
+        self.assertAlmostEqual(deeper["depth"], 0.03, places=6)
+        elsewhere = session.ultrasound(320, 320, face=[0.01, 0, 0])
+        self.assertGreater(np.count_nonzero(elsewhere["pixels"] != pictures[0]["pixels"]), 1000)
+
+
+class Hands(InFolder):
+    def test_a_scripted_hand_does_what_palpate_train_does(self):
+        figure = figures("train", "layered", "--unpaced", "--setting", "fast", "--seed", 1)
+        session = palpate.Session(palpate.Scene("layered").changed({"model.setting": "fast"}))
+        ticks = session.perform("script")
+        self.assertEqual(session.force_hash, figure["force_hash"])
+        self.assertEqual(len(ticks), figure["ticks"])
+        self.assertEqual(session.score()["total"], figure["score"]["total"])
+        self.assertEqual(len(session.cores), len(figure["core"]))
+        self.assertGreater(len(session.cores), 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,119 @@
+import gc
+import unittest
+
+import numpy as np
+
+import palpate
+from common import InFolder, figures, program
+
+
+def cube(size=12):
+    labels = np.zeros((size, size + 1, size + 2), np.uint16)
+    labels[2:-2, 2:-2, 2:-2] = 1
+    labels[4:7, 5:8, 5:8] = 2
+    return labels
+
+
+TISSUES = {1: "fat", 2: ("lump", "idc_high_grade")}
+AFFINE = np.diag([1e-3, 2e-3, 3e-3, 1.0])
+
+
+class FromNumpy(InFolder):
+    def test_labels_come_back_as_they_were(self):
+        labels = cube()
+        volume = palpate.Volume.from_numpy(labels, AFFINE, TISSUES)
+        np.testing.assert_array_equal(volume.labels, labels)
+        np.testing.assert_array_equal(volume.affine, AFFINE)
+        self.assertEqual(volume.shape, labels.shape)
+
+    def test_any_order_and_type_of_numbers_gives_the_same_labels(self):
+        labels = cube()
+        for given in (labels.astype(np.int64), np.asfortranarray(labels), labels[::-1][::-1], labels.astype(">u2")):
+            np.testing.assert_array_equal(palpate.Volume.from_numpy(given, AFFINE, TISSUES).labels, labels)
+
+    def test_the_program_counts_the_same_voxels(self):
+        labels = cube()
+        palpate.Volume.from_numpy(labels, AFFINE, TISSUES).save(self.folder / "v.vdb")
+        told = figures("info", self.folder / "v.vdb")
+        counted = {one["value"]: one["voxels"] for one in told["labels"]}
+        self.assertEqual(counted, dict(zip(*(n.tolist() for n in np.unique(labels, return_counts=True)))))
+        self.assertEqual(told["spacing_mm"], [1, 2, 3])
+
+    def test_ras_differs_in_the_signs_of_x_and_y(self):
+        lps = palpate.Volume.from_numpy(cube(), AFFINE, TISSUES).affine
+        ras = palpate.Volume.from_numpy(cube(), AFFINE, TISSUES, frame="RAS").affine
+        np.testing.assert_array_equal(ras, np.diag([-1, -1, 1, 1]) @ lps)
+
+    def test_an_image_comes_back(self):
+        labels = cube()
+        image = np.random.default_rng(1).normal(size=labels.shape).astype(np.float32)
+        volume = palpate.Volume.from_numpy(labels, AFFINE, TISSUES, image=image, image_unit="HU")
+        np.testing.assert_array_equal(volume.image, image)
+        self.assertEqual(volume.image_unit, "HU")
+        self.assertIsNone(palpate.Volume.from_numpy(labels, AFFINE, TISSUES).image)
+
+    def test_bad_arguments_are_refused_by_what_is_wrong(self):
+        for wrong, labels, affine, tissues in [
+            ("whole numbers", cube().astype(float), AFFINE, TISSUES),
+            ("three dimensions", cube()[0], AFFINE, TISSUES),
+            ("0 to 65535", cube().astype(int) - 1, AFFINE, TISSUES),
+            ("4 x 4", cube(), np.eye(3), TISSUES),
+            ("no volume", cube(), np.zeros((4, 4)), TISSUES),
+            ("label 2", cube(), AFFINE, {1: "fat"}),
+            ("no tissue 'cheese'", cube(), AFFINE, {1: "fat", 2: "cheese"}),
+        ]:
+            with self.subTest(wrong), self.assertRaisesRegex((ValueError, palpate.Error), wrong):
+                palpate.Volume.from_numpy(labels, affine, tissues)
+
+
+class Views(unittest.TestCase):
+    def test_stiffness_is_that_of_the_tissue_table(self):
+        volume = palpate.Volume.from_numpy(cube(), AFFINE, TISSUES)
+        modulus = {row["name"]: row["youngs_modulus"] for row in volume.tissues}
+        expected = np.choose(cube(), [0, modulus["fat"], modulus["idc_high_grade"]])
+        np.testing.assert_allclose(volume.stiffness, expected, rtol=1e-6)
+
+    def test_views_are_of_one_memory_and_cannot_be_written(self):
+        volume = palpate.Volume.phantom("block", voxel=4e-3)
+        self.assertTrue(np.shares_memory(volume.labels, volume.labels))
+        self.assertFalse(volume.labels.flags.owndata)
+        for view in (volume.labels, volume.stiffness):
+            with self.assertRaises(ValueError):
+                view[0, 0, 0] = 1
+
+    def test_a_view_outlives_its_volume(self):
+        kept = palpate.Volume.phantom("block", voxel=4e-3).labels[3:]
+        before = kept.copy()
+        gc.collect()
+        others = [palpate.Volume.phantom("block", seed=s, voxel=4e-3).labels for s in range(4)]
+        np.testing.assert_array_equal(kept, before)
+        self.assertEqual(len(others), 4)
+
+
+class Files(InFolder):
+    def test_a_phantom_is_that_of_the_program(self):
+        program("phantom", "layered", "--voxel", "3", "-o", self.folder / "p.vdb")
+        theirs = palpate.Volume.open(self.folder / "p.vdb")
+        ours = palpate.Volume.phantom("layered", voxel=3e-3)
+        np.testing.assert_array_equal(ours.labels, theirs.labels)
+
+    def test_an_import_is_that_of_the_program(self):
+        palpate.Volume.from_numpy(cube(), AFFINE, TISSUES).save(self.folder / "v.vdb")
+        program("export", self.folder / "v.vdb", "-o", self.folder / "v.nii.gz")
+        program("import", self.folder / "v.nii.gz", "--set", "1=fat", "--set", "2=liver", "-o", self.folder / "w.vdb")
+        theirs = palpate.Volume.open(self.folder / "w.vdb")
+        ours = palpate.Volume.import_(self.folder / "v.nii.gz", set={"1": "fat", "2": "liver"})
+        np.testing.assert_array_equal(ours.labels, theirs.labels)
+        self.assertEqual(ours.info["labels"], theirs.info["labels"])
+        np.testing.assert_allclose(ours.affine, AFFINE, atol=1e-9)
+
+    def test_errors_name_the_file(self):
+        with self.assertRaisesRegex(palpate.Error, "nothing.vdb"):
+            palpate.Volume.open(self.folder / "nothing.vdb")
+        (self.folder / "text.nii").write_text("no volume")
+        with self.assertRaisesRegex(palpate.Error, "text.nii"):
+            palpate.Volume.import_(self.folder / "text.nii")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,220 @@
+#include <volume/prepare/volume_import.h>
+
+#include <base/build.h>
+#include <datasets/label_map.h>
+#include <volume/fnv.h>
+#include <volume/prepare/body.h>
+#include <volume/prepare/name_table.h>
+#include <volume/provenance.h>
+#include <volume/resample.h>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <cmath>
+#include <ctime>
+#include <stdexcept>
+
+namespace palpate::prepare {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// The image as its file has it, its unit as --image-unit has it.
+volume::ImportedImage readImage(const ImportRequest& o, std::vector<std::string>& notes, const ImportProgress& tell)
+{
+    volume::ImportOptions reading;
+    reading.series = o.reading.series;
+    reading.volume = o.imageVolume;
+    tell("checking the image", {});
+    reading.progress = [&](double share) { tell("reading the image", share); };
+    volume::ImportedImage image = volume::importImage(o.image, reading);
+    for (const std::string& warning : image.warnings) {
+        notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
+    }
+    if (!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit) {
+        throw std::runtime_error(
+            fmt::format("{}: says itself that it is in {}: leave --image-unit out", o.image.string(), image.what));
+    }
+    image.what = o.imageUnit.empty() ? image.what : o.imageUnit;
+    if (o.bodyFromImage && image.what != "HU") {
+        throw std::runtime_error(
+            fmt::format("{}: --body-from-image needs CT in Hounsfield units: add --image-unit HU if it "
+                        "is that, or invent a body with --body-from-hull MM",
+                        o.image.string()));
+    }
+    return image;
+}
+
+// The image on the voxels of the labels.
+volume::CompanionImage companionOf(const ImportRequest& o, const volume::ImportedImage& image,
+                                   const volume::LabelImage& labels, const volume::TissueTable& table,
+                                   std::vector<std::string>& notes)
+{
+    const volume::VoxelGrid from{image.size, image.affine}, to{labels.size, labels.affine};
+    volume::CompanionImage companion;
+    companion.unit = image.what;
+    if (!o.stiffness.empty()) {
+        companion.stiffness = datasets::stiffnessMap(o.stiffness, companion.unit, table);
+    }
+    const float missing = companion.unit == "HU" ? -1000.0F : 0.0F;
+    companion.values = volume::resampledImage(from, image.values, to, std::nanf(""));
+    std::uint64_t bare = 0, labelled = 0;
+    for (std::size_t i = 0; i < companion.values.size(); ++i) {
+        labelled += labels.values[i] != 0 ? 1 : 0;
+        bare += std::isnan(companion.values[i]) && labels.values[i] != 0 ? 1 : 0;
+        companion.values[i] = std::isnan(companion.values[i]) ? missing : companion.values[i];
+    }
+    if (2 * bare > labelled) {
+        throw std::runtime_error(
+            fmt::format("{}: it covers less than half of the labelled voxels of {}: give the image that the "
+                        "segmentation was made of, in the same patient frame",
+                        o.image.string(), o.input.filename().string()));
+    }
+    if (bare > 0) {
+        notes.push_back(fmt::format("{} labelled voxels lie outside the image and have {} there{}", bare, missing,
+                                    companion.stiffness.points.empty() ? "" : ", for their stiffness too"));
+    }
+    return companion;
+}
+
+// A body around the labels, as it is asked for; before anything else is done to them.
+std::vector<PreparationStep> addBody(const ImportRequest& o, volume::LabelImage& labels,
+                                     std::vector<volume::LabelName>& named, const volume::TissueTable& table,
+                                     const volume::ImportedImage* image, std::vector<std::string>& notes,
+                                     const ImportProgress& tell)
+{
+    const auto quiet = [&](const std::string& what) { tell(what, {}); };
+    if (o.bodyFromImage) {
+        const volume::VoxelGrid ct{image->size, image->affine};
+        extendToImage(labels, ct);
+        tell("resampling the image", {});
+        auto hu = volume::resampledImage(ct, image->values, {labels.size, labels.affine}, std::nanf(""));
+        return bodyFromImage(labels, named, std::move(hu), table, quiet);
+    }
+    if (o.hull == 0) {
+        return {};
+    }
+    notes.push_back(
+        fmt::format("the body around the labels is invented: {:g} mm of soft tissue and skin that no image "
+                    "shows",
+                    1e3 * o.hull));
+    return bodyFromHull(labels, named, o.hull, table, quiet);
+}
+
+volume::Provenance provenanceOf(const ImportRequest& o, const volume::LabelImage& image,
+                                const std::vector<std::string>& notes, const std::vector<PreparationStep>& steps)
+{
+    volume::Fnv hash;  // of the label values, x fastest: the same voxels give the same hash whatever file they came in
+    hash.addAll(image.values);
+    volume::Provenance provenance = {{"source", o.input.filename().string()},
+                                     {"label hash", fmt::format("{:016x}", hash.value)},
+                                     {"imported", fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr)))},
+                                     {"program", std::string(base::build())}};
+    std::error_code none;
+    if (fs::is_regular_file(o.input, none)) {
+        provenance.insert(provenance.begin() + 1, {"bytes", std::to_string(fs::file_size(o.input))});
+    }
+    if (!o.image.empty()) {
+        provenance.emplace_back("image file", o.image.filename().string());
+    }
+    if (!o.stiffness.empty()) {
+        provenance.emplace_back("stiffness", fmt::format("scaled by the image, map {}", o.stiffness));
+    }
+    for (const PreparationStep& step : steps) {
+        provenance.emplace_back(volume::stepKey, step.text);
+    }
+    for (const std::string& note : notes) {
+        provenance.emplace_back(volume::warningKey, note);
+    }
+    return provenance;
+}
+
+// What became of voxels that several segments hold: in one note, or with --verbose in one for each pair.
+void noteOverlaps(const volume::ImportedLabels& labels, bool verbose, std::vector<std::string>& notes)
+{
+    const auto nameOf = [&](std::uint16_t value) {
+        for (const volume::LabelName& n : labels.names) {
+            if (n.value == value) {
+                return n.name;
+            }
+        }
+        return fmt::format("label {}", value);
+    };
+    std::uint64_t all = 0;
+    const volume::Overlap* most = nullptr;
+    for (const volume::Overlap& o : labels.overlaps) {
+        all += o.voxels;
+        most = most == nullptr || o.voxels > most->voxels ? &o : most;
+        if (verbose || labels.overlaps.size() == 1) {
+            notes.push_back(fmt::format("{} voxels of '{}' lie in '{}' too, which has them: --overlap says otherwise",
+                                        o.voxels, nameOf(o.lost), nameOf(o.kept)));
+        }
+    }
+    if (!verbose && labels.overlaps.size() > 1) {
+        notes.push_back(
+            fmt::format("{} voxels lie in several segments, in {} pairs of them, the most of '{}' in '{}' ({}): "
+                        "--overlap says who has them, --verbose lists each pair",
+                        all, labels.overlaps.size(), nameOf(most->lost), nameOf(most->kept), most->voxels));
+    }
+}
+
+}  // namespace
+
+void checkRequest(const ImportRequest& o)
+{
+    if (!o.stiffness.empty() && o.image.empty()) {
+        throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
+    }
+    if (o.bodyFromImage && o.image.empty()) {
+        throw std::runtime_error("--body-from-image: needs the image: add --image FILE");
+    }
+    if (!o.imageUnit.empty() && o.image.empty()) {
+        throw std::runtime_error("--image-unit: needs the image: add --image FILE");
+    }
+}
+
+NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
+{
+    tell("checking the file", {});
+    volume::ImportOptions reading = request.reading;
+    reading.progress = [&](double share) { tell("reading", share); };
+    NamedLabels read;
+    read.labels = volume::importLabels(request.input, reading);
+    tell("counting labels", {});
+    read.counts = countLabels(read.labels.image);
+    addNames(request.mapping, request.input, read.counts, read.labels);
+    return read;
+}
+
+ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTable& table, const ImportProgress& tell)
+{
+    checkRequest(request);
+    auto [labels, counts] = readLabels(request, tell);
+    std::vector<std::string> notes = labels.warnings;
+    noteOverlaps(labels, request.mapping.verbose, notes);
+    std::vector<volume::LabelName> named = mapLabels(request.mapping, request.input, labels, counts, table, notes);
+    std::optional<volume::ImportedImage> image;
+    if (!request.image.empty()) {
+        image = readImage(request, notes, tell);
+    }
+    auto steps = addBody(request, labels.image, named, table, image ? &*image : nullptr, notes, tell);
+    for (auto& step :
+         prepare(labels.image, named, table, request.steps, [&](const std::string& what) { tell(what, {}); })) {
+        steps.push_back(std::move(step));
+    }
+    std::optional<volume::CompanionImage> companion;
+    if (image) {
+        tell("resampling the image", {});
+        companion = companionOf(request, *image, labels.image, table, notes);
+        image.reset();
+    }
+    tell("making tissue", {});
+    volume::Provenance provenance = provenanceOf(request, labels.image, notes, steps);
+    auto tissue =
+        volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance), companion ? &*companion : nullptr);
+    return {std::move(tissue), std::move(labels.overlaps), std::move(steps)};
+}
+
+}  // namespace palpate::prepare

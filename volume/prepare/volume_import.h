@@ -1,0 +1,56 @@
+#pragma once
+
+#include <volume/import.h>
+#include <volume/prepare/mapping.h>
+#include <volume/prepare/steps.h>
+#include <volume/tissue.h>
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::prepare {
+
+/// What is asked of an import: what `palpate import` takes on its command line.
+struct ImportRequest {
+    std::filesystem::path input;    // label map or segmentation: a file, or a folder of masks or of DICOM
+    std::filesystem::path image;    // CT or MR of the same patient, on any grid; empty: none
+    std::string stiffness;          // stiffness map, see datasets::stiffnessMap(); empty: the image changes nothing
+    std::string imageUnit;          // "HU", where the image's file does not say so
+    int imageVolume = 0;            // of an image with four dimensions, from 1
+    volume::ImportOptions reading;  // of the labels
+    MappingOptions mapping;         // of labels to tissues
+    PreparationOptions steps;       // done to the labels
+    double hull = 0;                // thickness of a body that is invented around the labels [m]; 0: none
+    bool bodyFromImage = false;     // find the body around the labels in the image, which is CT
+};
+
+/// Throws std::runtime_error for a request that contradicts itself, by the options of `palpate import`.
+void checkRequest(const ImportRequest& request);
+
+/// Told what is going on, and the share of it that is done where that is known.
+using ImportProgress = std::function<void(const std::string& what, std::optional<double> share)>;
+
+/// Labels as their file has them, named as far as file and name table go.
+struct NamedLabels {
+    volume::ImportedLabels labels;
+    LabelCounts counts;
+};
+
+/// Reads the labels of an import. Throws std::runtime_error.
+NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell);
+
+/// What came of an import.
+struct ImportedVolume {
+    volume::Tissue tissue;
+    std::vector<volume::Overlap> overlaps;
+    std::vector<PreparationStep> steps;
+};
+
+/// Turns a segmentation into a volume of tissue. What it warned of and did is in the volume's provenance
+/// (volume::warningKey, volume::stepKey). Throws std::runtime_error ("FILE: what is wrong and what to do").
+ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTable& table, const ImportProgress& tell);
+
+}  // namespace palpate::prepare
