@@ -29,31 +29,20 @@ std::size_t runSweep(const std::filesystem::path& folder, const std::string& pla
     const sweep::CasesWanted wanted{sweep::allCases(held.plan()), retry, false};
     const auto cases = sweep::remainingCases(held, wanted, [](const std::string&) {});
     const std::size_t all = held.plan().cases(), before = all - cases.size();
+    bool interrupted = false;
+    const auto goOn = [&](std::size_t done, std::size_t) {
+        held.lock().check();
+        interrupted = interrupted || PyErr_CheckSignals() != 0;
+        return !interrupted && told(before + done, all).cast<bool>();
+    };
     if (!cases.empty()) {
-        sweep::runLocally(
-            held, cases, jobs, std::string(base::build()),
-            [&](std::size_t done, std::size_t) {
-                held.lock().check();
-                return PyErr_CheckSignals() == 0 && told(before + done, all).cast<bool>();
-            },
-            [] { return false; });
+        sweep::runLocally(held, cases, jobs, std::string(base::build()), goOn, [] { return false; });
     }
-    if (PyErr_Occurred() != nullptr) {
+    const std::size_t rows = sweep::writeTables(held, held.rows()).rows.size();
+    if (interrupted) {
         throw py::error_already_set();
     }
-    return sweep::writeTables(held, held.rows()).rows.size();
-}
-
-// (number of cases, [(column, kind, meaning)]) of a plan, checked.
-py::tuple checkPlan(const std::string& given)
-{
-    const auto [text, origin] = sweep::planText(given);
-    const sweep::SweepPlan plan = sweep::parsePlan(text, origin, sweep::namedScene);
-    py::list columns;
-    for (const auto& column : sweep::tableOf(plan, {}).columns) {
-        columns.append(py::make_tuple(column.name, column.kind, column.meaning));
-    }
-    return py::make_tuple(plan.cases(), columns);
+    return rows;
 }
 
 py::dict outputs()
@@ -75,7 +64,6 @@ void bindSweep(py::module_& module)
 {
     module.def("run_sweep", &runSweep, py::arg("folder"), py::arg("plan"), py::arg("jobs"), py::arg("retry"),
                py::arg("told"));
-    module.def("check_plan", &checkPlan, py::arg("plan"));
     module.def("sweep_outputs", &outputs);
     module.def(
         "merge_shards",

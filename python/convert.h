@@ -39,5 +39,7 @@ void bindSession(py::module_& module);
 void bindRecord(py::module_& module);
 void bindPlan(py::module_& module);
 void bindSweep(py::module_& module);
+/// Gives everything the text that palpate/_palpate.pyi has of it. Throws where that names what is not there.
+void attachDocs(py::module_& module);
 
 }  // namespace palpate::python

@@ -26,4 +26,5 @@ PYBIND11_MODULE(_palpate, module)
 #ifdef PALPATE_SWEEP
     bindSweep(module);
 #endif
+    attachDocs(module);
 }

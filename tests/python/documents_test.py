@@ -1,0 +1,61 @@
+"""The tutorial's code runs as it stands, and stubs and module say the same."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import unittest
+
+import palpate
+from common import SOURCE, InFolder
+from palpate import _palpate
+
+
+class Tutorial(InFolder):
+    def test_every_block_of_docs_python_runs(self):
+        text = (SOURCE / "docs" / "python.md").read_text(encoding="utf-8")
+        blocks = re.findall(r"^```python\n(.*?)^```", text, re.S | re.M)
+        self.assertGreater(len(blocks), 8)
+        script = self.folder / "tutorial.py"
+        script.write_text("\n".join(blocks))
+        done = subprocess.run([sys.executable, script], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("None None tool.radius_mm", done.stdout)
+        self.assertRegex(done.stdout, r"0\.\d\d N at 4\.0 mm")
+
+    def test_the_table_of_fields_is_whole(self):
+        text = (SOURCE / "docs" / "python.md").read_text(encoding="utf-8")
+        table = text[text.index("| field |"):text.index("`session.events` has")]
+        named = set(re.findall(r"`(\w+)`", "".join(line.split("|")[1] for line in table.splitlines() if "|" in line)))
+        fields = set(palpate.Session("block").run([[0, -0.1, 0]]).dtype.names)
+        self.assertEqual(named & fields, fields)
+
+
+class Stubs(unittest.TestCase):
+    def test_stub_and_module_have_the_same_names(self):
+        stub = ast.parse((SOURCE / "python" / "palpate" / "_palpate.pyi").read_text(encoding="utf-8"))
+        for node in stub.body:
+            if isinstance(node, ast.ClassDef):
+                theirs = {n.name for n in node.body if isinstance(n, ast.FunctionDef)}
+                ours = {n for n in vars(getattr(_palpate, node.name)) if not n.startswith("_")}
+                self.assertEqual(ours, {n for n in theirs if not n.startswith("_")}, node.name)
+        functions = {n.name for n in stub.body if isinstance(n, ast.FunctionDef)}
+        self.assertEqual(functions, {n for n, f in vars(_palpate).items() if callable(f) and not isinstance(f, type)})
+
+    def test_help_is_the_stub_s(self):
+        self.assertIn("n x 3 or n x 6 [m]", palpate.Session.run.__doc__)
+        self.assertTrue(palpate.Session.run.__doc__.startswith("run(poses: ArrayLike"))
+        self.assertIn("Young's modulus [Pa]", palpate.Volume.stiffness.__doc__)
+        self.assertIn("The array is copied", palpate.Volume.from_numpy.__doc__)
+        self.assertIn("Immutable", palpate.Volume.__doc__)
+
+    def test_everything_public_is_explained(self):
+        for name in palpate.__all__:
+            thing = getattr(palpate, name)
+            if callable(thing) and name not in ("phantoms", "scenes"):
+                self.assertGreater(len((thing.__doc__ or "").split()), 4, name)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,151 @@
+import functools
+import unittest
+
+import numpy as np
+
+import palpate
+from palpate import envs
+
+
+@functools.lru_cache(maxsize=None)
+def layered():
+    """A biopsy that is quick: contact laws alone."""
+    return palpate.Model(palpate.Scene("layered").changed({"model.level": "spring", "volume.voxel_mm": 2}))
+
+
+def make():
+    return envs.Biopsy(layered(), max_seconds=0.4)
+
+
+def straight(env, info, speed=1.0):
+    """Straight in to where the gun is to be fired, and fires."""
+    observation, total, steps = None, 0.0, 0
+    inserted = 0.0
+    while True:
+        left = info["firing_depth"] - inserted
+        fire = left < 5e-4
+        go = np.clip(left / (0.02 * env.max_speed), 0, speed)
+        observation, reward, terminated, truncated, last = env.step([go, 0, 0, 1 if fire else 0])
+        inserted = observation[6] / 100
+        total += reward
+        steps += 1
+        if terminated or truncated:
+            return observation, total, steps, terminated, last
+
+
+class Biopsy(unittest.TestCase):
+    def test_the_needle_that_goes_to_the_aim_takes_a_core(self):
+        env = envs.Biopsy(layered(), entry_error=0.0)
+        _, info = env.reset(seed=1)
+        _, total, _, terminated, last = straight(env, info)
+        self.assertTrue(terminated)
+        self.assertGreater(env.session.cores[0]["target_fraction"], 0.3)
+        self.assertGreater(last["score"]["total"], 50)
+        self.assertGreater(total, 1)
+
+    def test_firing_outside_is_worth_less(self):
+        env = envs.Biopsy(layered())
+        _, info = env.reset(seed=1)
+        _, good, *_ = straight(env, info)
+        env.reset(seed=1)
+        total, over = 0.0, False
+        while not over:
+            _, reward, terminated, truncated, _ = env.step([0, 0, 0, 1])
+            total += reward
+            over = terminated or truncated
+        self.assertLess(total, good)
+
+    def test_same_seed_same_episode(self):
+        def episode(seed):
+            env = make()
+            random = np.random.default_rng(3)
+            rows = [env.reset(seed=seed)[0]]
+            for _ in range(20):
+                observation, reward, terminated, truncated, _ = env.step(random.uniform(-1, 0.4, 4))
+                rows.append(np.append(observation, reward))
+                if terminated or truncated:
+                    break
+            return np.concatenate(rows)
+
+        np.testing.assert_array_equal(episode(5), episode(5))
+        self.assertFalse(np.array_equal(episode(5), episode(6)))
+
+    def test_observation_and_actions_are_of_their_spaces(self):
+        env = make()
+        observation, _ = env.reset(seed=2)
+        self.assertEqual(observation.dtype, np.float32)
+        self.assertTrue(env.observation_space.contains(observation))
+        self.assertEqual(observation[10:13].tolist(), [1, 0, 0])
+        env.action_space.seed(1)
+        for _ in range(50):
+            self.assertTrue(env.action_space.contains(env.action_space.sample()))
+        self.assertFalse(env.action_space.contains(np.full(4, 1.5)))
+
+    def test_an_episode_ends_with_its_time_and_has_to_be_begun(self):
+        env = make()
+        with self.assertRaisesRegex(palpate.Error, "reset"):
+            env.step(np.zeros(4))
+        env.reset(seed=1)
+        ends = [env.step(np.zeros(4))[2:4] for _ in range(20)]
+        self.assertEqual(ends, [(False, False)] * 19 + [(False, True)])
+        with self.assertRaisesRegex(palpate.Error, "reset"):
+            env.step(np.zeros(4))
+
+    def test_the_reward_is_what_the_documentation_says(self):
+        env = make()
+        env.reset(seed=1)
+        before = env._distance
+        observation, reward, *_ = env.step([1, 0, 0, 0])
+        force = float(observation[13])
+        self.assertAlmostEqual(reward, (before - env._distance) / 0.05 - 0.005 - 0.1 * max(force - 4, 0), places=6)
+        self.assertAlmostEqual(before - env._distance, 0.02 * env.max_speed, places=4)
+
+    def test_a_scene_without_a_needle_is_refused(self):
+        with self.assertRaisesRegex(palpate.Error, "no needle"):
+            envs.Biopsy("block")
+
+    def test_it_can_be_looked_at(self):
+        env = envs.Biopsy(layered(), render_mode="ultrasound")
+        env.reset(seed=1)
+        picture = env.render()
+        self.assertEqual(picture.shape, (640, 640, 3))
+        self.assertGreater(picture.std(), 5)
+
+
+class Vectors(unittest.TestCase):
+    def test_episodes_do_not_depend_on_the_number_of_processes(self):
+        actions = np.random.default_rng(1).uniform(-1, 0.4, (30, 3, 4))
+        seen, ended = [], False
+        for processes in (1, 2):
+            with envs.Vector(3, make, processes=processes, seed=11) as vector:
+                rows = [vector.reset()]
+                for action in actions:
+                    observations, rewards, terminated, truncated, infos = vector.step(action)
+                    ended |= truncated.any()
+                rows += [observations, rewards, terminated, truncated]
+                seen.append(rows)
+        for a, b in zip(*seen):
+            np.testing.assert_array_equal(a, b)
+        self.assertTrue(ended)
+
+    def test_an_ended_episode_begins_anew(self):
+        with envs.Vector(2, make, processes=2, seed=1) as vector:
+            first = vector.reset()
+            for _ in range(20):
+                observations, _, _, truncated, infos = vector.step(np.zeros((2, 4)))
+            self.assertTrue(truncated.all())
+            self.assertEqual(observations[:, 15].tolist(), [1, 1])
+            self.assertEqual([i["final_observation"][15] for i in infos], [0, 0])
+            self.assertFalse(np.array_equal(first, observations))
+
+    def test_an_error_in_a_process_comes_here(self):
+        with self.assertRaisesRegex(palpate.Error, "no needle"):
+            envs.Vector(1, functools.partial(envs.Biopsy, "block"), processes=1)
+        with envs.Vector(1, make, processes=1, seed=1) as vector:
+            vector.reset()
+            with self.assertRaisesRegex(ValueError, "give 1"):
+                vector.step(np.zeros((2, 4)))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,116 @@
+import json
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+import pandas
+
+import palpate
+from common import InFolder, figures, program
+
+SMALL = {
+    "volume.voxel_mm": 3, "volume.parameters.width_mm": 60, "volume.parameters.thickness_mm": 36,
+    "volume.parameters.tumour_centre_mm": 18, "volume.parameters.tumour_diameter_mm": 14, "target.aim_mm.y": 18,
+    "model.setting": "fast",
+}
+
+
+def sweep(folder, cases, **options):
+    return palpate.sweep("block", cases, folder=folder, jobs=2, procedure={"kind": "press", "depth_mm": 3}, set=SMALL,
+                         outputs=["force_n"], **options)
+
+
+class Sweeps(InFolder):
+    cases = pandas.DataFrame({"tissue.fat.youngs_kpa": [2.0, 4.0, 8.0], "procedure.speed_mm_s": [20, 20, 10]})
+
+    def test_a_table_of_cases_gives_a_table_of_results(self):
+        told = []
+        result = sweep(self.folder / "s", self.cases, progress=lambda done, of: told.append((done, of)))
+        frame = result.to_dataframe()
+        self.assertEqual(frame["tissue_fat_youngs_kpa"].tolist(), [2, 4, 8])
+        self.assertEqual(frame["procedure_speed_mm_s"].tolist(), [20, 20, 10])
+        self.assertTrue(np.all(np.diff(frame["force_n"]) > 0))
+        self.assertEqual(result.failed, [])
+        self.assertTrue(all(of == 3 for _, of in told))
+
+    def test_rows_are_those_of_a_session_by_hand(self):
+        result = sweep(self.folder / "s", [{"tissue.fat.youngs_kpa": 4.0}])
+        model = palpate.Model(palpate.Scene("block").changed({**SMALL, "tissue.fat.youngs_kpa": 4.0}))
+        radius = 1e-3 * model.scene.to_dict()["tool"]["radius_mm"]
+        ticks = palpate.Session(model).run(palpate.press_path([0, -radius, 0], [0, 1, 0], 3e-3, speed=0.02, hold=0.1))
+        deepest = np.argmax(ticks["position"][:, 1])
+        # The procedure's own way begins elsewhere and holds the same depth.
+        self.assertAlmostEqual(-ticks["tissue_force"][deepest + 90, 1] / result["force_n"][0], 1, delta=0.05)
+
+    def test_the_program_gives_the_same_table_of_the_same_plan(self):
+        ours = sweep(self.folder / "s", self.cases).to_dataframe()
+        program("sweep", self.folder / "s" / "plan.toml", "-o", self.folder / "t", "--jobs", 1)
+        theirs = palpate.SweepResult(self.folder / "t").to_dataframe()
+        timing = ["machine", "tick_us", "case_s"]
+        pandas.testing.assert_frame_equal(ours.drop(columns=timing), theirs.drop(columns=timing))
+
+    def test_the_same_call_goes_on_and_other_cases_are_refused(self):
+        first = sweep(self.folder / "s", self.cases)
+        again = sweep(self.folder / "s", self.cases)
+        self.assertEqual(first.rows, again.rows)
+        with self.assertRaisesRegex(palpate.Error, "other cases"):
+            sweep(self.folder / "s", self.cases[:2])
+
+    def test_wrong_keys_are_known_before_a_case_runs(self):
+        with self.assertRaisesRegex(palpate.Error, "cheese"):
+            sweep(self.folder / "s", [{"tissue.cheese.youngs_kpa": 4.0}])
+        with self.assertRaisesRegex(palpate.Error, "other keys"):
+            sweep(self.folder / "t", [{"a": 1}, {"b": 1}])
+        with self.assertRaisesRegex(palpate.Error, "no cases"):
+            sweep(self.folder / "u", [])
+
+    def test_an_interrupt_keeps_what_is_done(self):
+        script = self.folder / "long.py"
+        script.write_text(
+            "import palpate\n"
+            f"palpate.sweep('block', [{{'tissue.fat.youngs_kpa': 2 + i / 100}} for i in range(400)], folder={str(self.folder / 's')!r},\n"
+            f"    jobs=1, procedure={{'kind': 'press', 'depth_mm': 3}}, set={SMALL!r}, outputs=['force_n'],\n"
+            "    progress=lambda done, of: print(done, flush=True))\n")
+        process = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for line in process.stdout:
+            if int(line) >= 2:
+                break
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=120)
+        self.assertIn("KeyboardInterrupt", errors)
+        done = len(palpate.SweepResult(self.folder / "s"))
+        self.assertTrue(2 <= done < 400, done)
+
+    def test_outputs_are_listed(self):
+        self.assertIn("force_n", palpate.sweep_outputs()["press"])
+
+
+class Plans(unittest.TestCase):
+    def test_a_plan_is_that_of_the_program(self):
+        scene = palpate.Scene("block").changed({k: v for k, v in SMALL.items() if k != "model.setting"})
+        ours = palpate.plan(scene, error=0.2, budget=1e-3)
+        self.assertTrue(ours["found"])
+        self.assertLessEqual(ours["predicted_error_pct"], 20)
+        self.assertLessEqual(ours["predicted_us"], 1000)
+        self.assertGreater(len(ours["candidates"]), 3)
+
+
+class Accuracy(InFolder):
+    def test_figures_of_the_command_are_read(self):
+        file = self.folder / "a.json"
+        file.write_text(json.dumps({"verification": [{"problem": "p", "error_pct": 1.0}], "chart": []}))
+        self.assertEqual(palpate.accuracy(file)["verification"][0]["error_pct"], 1.0)
+        file.write_text("{}")
+        with self.assertRaisesRegex(palpate.Error, "no figures"):
+            palpate.accuracy(file)
+        file.write_text("x")
+        with self.assertRaisesRegex(palpate.Error, "no JSON"):
+            palpate.accuracy(file)
+
+
+if __name__ == "__main__":
+    unittest.main()
