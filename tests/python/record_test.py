@@ -1,4 +1,3 @@
-import json
 import unittest
 
 import numpy as np
@@ -35,9 +34,13 @@ class Records(InFolder):
         self.assertTrue(ours["identical"])
         self.assertEqual(ours["force_hash"], theirs["force_hash"])
         score = figures("score", self.file)["sessions"][0]
-        for measure in ("total", "path_length_mm", "peak_force_n"):
-            if measure in score:
-                self.assertEqual(palpate.score(self.file)[measure], score[measure])
+        compared = 0
+        for measure, value in palpate.score(self.file).items():
+            if isinstance(value, (int, float)):
+                theirs = score[measure]
+                self.assertTrue(theirs == value or (theirs is None and not np.isfinite(value)), measure)
+                compared += 1
+        self.assertGreater(compared, 20)
         self.assertEqual(record.score()["total"], score["total"])
         self.assertEqual(self.total["total"], score["total"])
 
