@@ -1,6 +1,7 @@
 #include <apps/command.h>
 
 #include <apps/temporary_folder.h>
+#include <apps/train_profile.h>
 #include <apps/viewers.h>
 #include <base/memory.h>
 #include <base/outputs.h>
@@ -56,6 +57,7 @@ struct Options {
     session::FalconOptions falcon;
     std::string trainee;
     std::string task, lesionFrom;
+    TrainingOptions training;
     double lesionDiameter = 10;  // [mm]
     bool sphere = false;
     std::string layout = "trainee";
@@ -337,12 +339,28 @@ haptics::SessionModel openModel(Options& o)
     return model;
 }
 
+void applyTraining(Options& o, const Training& training)
+{
+    if (const std::string scene = training.scene(); !scene.empty()) {
+        if (o.sceneGiven || !o.task.empty()) {
+            throw std::runtime_error("--case: a case has a scene of its own: leave out SCENE and --task");
+        }
+        o.scene = scene;
+        o.sceneGiven = true;
+    }
+    if (o.record.empty() && o.report.empty()) {
+        o.record = training.record().string();
+    }
+}
+
 void train(Options o)
 {
     for (const auto& text : o.inject) {
         const auto faults = session::parseFaults(text);
         o.faults.insert(o.faults.end(), faults.begin(), faults.end());
     }
+    Training training(o.training);
+    applyTraining(o, training);
     checkDevice(o);
     checkFaults(o);
     checkOutputs(o);
@@ -353,6 +371,7 @@ void train(Options o)
     }
     const auto record = recordFile(o);
     applyTask(o);
+    training.change(o.changes);
     std::shared_ptr<falcon::Driver> falcon;
     if (o.device == "falcon") {
         falcon = session::openFalcon(o.falcon);
@@ -373,6 +392,7 @@ void train(Options o)
     auto info = session::describeSession(model, o.scene, deviceInWords(o));
     info.name = sessionName(o);
     info.operatorName = o.operatorName;
+    training.describe(info);
     if (!fitted.empty()) {
         info.extra.emplace_back("setting", fitted);
     }
@@ -395,6 +415,8 @@ void train(Options o)
     session::TrainResult result = trainer.run();
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     const auto written = writeOutputs(o, info, model.scene.model, viewers, took, result);
+    const bool counts = result.signal == 0 && !result.faulted;
+    const auto kept = counts ? training.keep(info, result.score, record) : std::vector<std::string>{};
 
     if (o.json != "-") {
         summarise(result, info, model.scene.model);
@@ -403,6 +425,9 @@ void train(Options o)
         }
         for (const auto& [name, file] : written) {
             fmt::print("{}: {}\n", name, file);
+        }
+        for (const std::string& line : kept) {
+            fmt::print("{}\n", line);
         }
     }
     if (result.signal != 0) {
@@ -451,6 +476,7 @@ void addTrain(CLI::App& app)
         c->add_option("SCENE", o->scene,
                       fmt::format("{}; a scene (.toml) or a volume (.vdb)", fmt::join(datasets::builtInScenes(), ", ")))
             ->capture_default_str();
+    addTrainingOptions(*c, o->training);
     c->add_option(
          "--task", o->task,
          "core-biopsy: of the scene's target; near-vessel, behind-rib: biopsies with scenes of their own; find-lump: "
@@ -501,6 +527,10 @@ void addTrain(CLI::App& app)
     c->final_callback([o, scene, c] {
         command::checkFalconOptions(*c, o->device == "falcon");
         o->sceneGiven = scene->count() > 0;
+        if (o->sceneGiven && o->training.caseId.empty() && training::isCaseFolder(o->scene)) {
+            o->training.caseId = o->scene;
+            o->sceneGiven = false;
+        }
         train(*o);
     });
 }

@@ -71,6 +71,10 @@ int main(int argc, char** argv)
     using namespace palpate;
     using namespace palpate::apps;
     addTrain(app);
+    addCase(app);
+    addCurriculum(app);
+    addProfile(app);
+    addProgress(app);
     addImport(app);
     addInfo(app);
     addExport(app);

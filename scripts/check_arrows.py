@@ -22,6 +22,7 @@ ARROWS = {
     "haptics/falcon": {"base", "volume", "datasets", "haptics"},
     "session": {"base", "volume", "datasets", "haptics", "haptics/falcon", "channel"},
     "report": {"base", "volume", "haptics"},
+    "training": {"base", "volume", "datasets", "haptics", "session", "report"},
     "command": {"base", "session"},
     "studies": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "session", "report", "command", "channel", "ultrasound"},
     "planner": {"base", "chainmail", "datasets", "haptics", "session", "command", "studies"},
@@ -32,7 +33,7 @@ ARROWS = {
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
-        "studies", "planner", "sweep", "ultrasound", "render", "reference",
+        "studies", "planner", "sweep", "training", "ultrasound", "render", "reference",
     },
 }
 # Third-party headers that stay in one folder.
@@ -44,7 +45,7 @@ OWNERS = {
     "itk": {"tests"},  # an independent reader to compare with
     "vtk": {"render", "reference"},
     "GLFW/": {"render"},
-    "sqlite3": {"haptics", "sweep"},
+    "sqlite3": {"haptics", "sweep", "training"},
     "libusb": {"haptics"},
     "CGAL/": {"reference"},
     "getfem/": {"reference"},

@@ -10,7 +10,7 @@ import pathlib
 import re
 import sys
 
-FOLDERS = ("base", "volume", "datasets", "occupancy", "chainmail", "channel", "render", "haptics", "session", "report", "command", "studies", "planner", "sweep", "python", "apps", "tests")
+FOLDERS = ("base", "volume", "datasets", "occupancy", "chainmail", "channel", "render", "haptics", "session", "report", "command", "studies", "planner", "sweep", "training", "python", "apps", "tests")
 MOST_FILE_LINES = 520
 MOST_FUNCTION_LINES = 80
 DEEPEST = 3

@@ -1,0 +1,204 @@
+#include <apps/command.h>
+#include <apps/temporary_folder.h>
+#include <apps/viewers.h>
+#include <base/outputs.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <session/devices.h>
+#include <session/open.h>
+#include <session/session.h>
+#include <training/case.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+using training::Case;
+
+constexpr double pictureTimeout = 600;  // [s]
+
+struct Options {
+    std::string id;
+    fs::path json, picture;
+    training::NewCase made;
+    double at = -1;  // of a picture: how far through the session, 0 to 1
+};
+
+nlohmann::json figuresOf(const Case& c)
+{
+    return {{"id", c.id},
+            {"title", c.title},
+            {"folder", c.folder.string()},
+            {"scene", c.scene},
+            {"picture", c.picture.string()},
+            {"difficulty", c.difficulty},
+            {"trains", c.trains},
+            {"measures", c.measures},
+            {"briefing", c.briefing},
+            {"licence", c.licence},
+            {"source", c.source}};
+}
+
+void list(const Options& o)
+{
+    std::vector<std::string> faults;
+    const auto all = training::allCases(&faults);
+    for (const std::string& fault : faults) {
+        fmt::print(stderr, "palpate: warning: {}\n", fault);
+    }
+    if (!o.json.empty()) {
+        auto cases = nlohmann::json::array();
+        for (const Case& c : all) {
+            cases.push_back(figuresOf(c));
+        }
+        command::writeJson(o.json, {{"cases", cases}});
+    }
+    if (o.json != "-") {
+        fmt::print("{:<22} {:<10}  {}\n", "case", "difficulty", "title: what it trains");
+        for (const Case& c : all) {
+            fmt::print("{:<22} {} of {}      {}: {}\n", c.id, c.difficulty, training::hardest, c.title,
+                       fmt::join(c.trains, ", "));
+        }
+    }
+}
+
+void show(const Options& o)
+{
+    const Case c = training::findCase(o.id);
+    if (!o.json.empty()) {
+        command::writeJson(o.json, figuresOf(c));
+    }
+    if (o.json == "-") {
+        return;
+    }
+    fmt::print("{} ({})\ndifficulty {} of {}; trains {}\n", c.title, c.id, c.difficulty, training::hardest,
+               fmt::join(c.trains, ", "));
+    int step = 0;
+    for (const std::string& sentence : c.briefing) {
+        fmt::print("  {}. {}\n", ++step, sentence);
+    }
+    fmt::print("measures that matter: {}\nscene: {}\npicture: {}\nlicence: {}\n", fmt::join(c.measures, ", "), c.scene,
+               c.picture.empty() ? "none" : c.picture.string(), c.licence);
+    if (!c.source.empty()) {
+        fmt::print("source: {}\n", c.source);
+    }
+    fmt::print("palpate train --case {}\n", o.id);
+}
+
+void check(const Options& o)
+{
+    const Case c = training::findCase(o.id);
+    command::Progress progress(command::Progress::Clock::ticking);
+    progress.show("opening " + c.id);
+    const auto faults = training::faultsOf(c);
+    progress.clear();
+    for (const std::string& fault : faults) {
+        fmt::print("{}\n", fault);
+    }
+    if (!faults.empty()) {
+        throw std::runtime_error(fmt::format("{}: {} {}", o.id, faults.size(), faults.size() == 1 ? "fault" : "faults"));
+    }
+    fmt::print("{}: good\n", c.id);
+}
+
+void make(const Options& o)
+{
+    command::Progress progress(command::Progress::Clock::ticking);
+    progress.show("reading " + o.made.volume.string());
+    const Case c = training::makeCase(o.made);
+    progress.clear();
+    fmt::print("{}: made; edit its case.toml, then palpate case picture and palpate case check\n", c.folder.string());
+}
+
+// A session of the scripted hand, recorded for the picture.
+void recordSession(const Case& c, const fs::path& file)
+{
+    const haptics::SessionModel model = session::openSession(c.scene, {});
+    const haptics::SessionInfo info = session::describeSession(model, c.scene, "hand");
+    session::DeviceRequest request;
+    const auto device = session::openDevice(model, request, nullptr);
+    haptics::Recorder recorder(file, info);
+    session::Session session(model, info);
+    session::RunOptions options;
+    options.servo.paced = false;
+    options.recorder = &recorder;
+    session.run(*device, options);
+    recorder.finish({});
+}
+
+void draw(const Options& o)
+{
+    const Case c = training::findCase(o.id);
+    const fs::path to = o.picture.empty() ? c.folder / "picture.png" : o.picture;
+    base::checkOutput(to);
+    const TemporaryFolder folder("the session that is drawn");
+    command::Progress progress(command::Progress::Clock::ticking);
+    progress.show("drawing " + c.id);
+    recordSession(c, folder.path() / "session.db");
+    drawRecord(folder.path() / "session.db", (folder.path() / "pictures").string(), pictureTimeout);
+    std::vector<fs::path> pictures;
+    for (const auto& entry : fs::directory_iterator(folder.path() / "pictures")) {
+        pictures.push_back(entry.path());
+    }
+    std::ranges::sort(pictures);
+    if (pictures.empty()) {
+        throw std::runtime_error(c.id + ": the viewer drew no picture");
+    }
+    const double at = o.at < 0 ? 0.6 : o.at;
+    fs::copy_file(pictures[static_cast<std::size_t>(at * static_cast<double>(pictures.size() - 1))], to,
+                  fs::copy_options::overwrite_existing);
+    progress.clear();
+    fmt::print("{}\n", to.string());
+    if (c.picture.empty()) {
+        fmt::print("name it in {}: picture = \"{}\"\n", (c.folder / training::caseFile).string(), to.filename().string());
+    }
+}
+
+}  // namespace
+
+void addCase(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    CLI::App* const c = app.add_subcommand("case", "What trainees are given: list, show, make and check cases");
+    c->require_subcommand(1);
+    CLI::App* const all = c->add_subcommand("list", "The cases that there are");
+    all->add_option("--json", o->json, "write them here (- for standard output)");
+    all->final_callback([o] { list(*o); });
+
+    const auto one = [&](const char* name, const char* what) {
+        CLI::App* const sub = c->add_subcommand(name, what);
+        sub->add_option("CASE", o->id, "a case's name, or its folder")->required();
+        return sub;
+    };
+    CLI::App* const shown = one("show", "Briefing, picture and scene of a case");
+    shown->add_option("--json", o->json, "write it here (- for standard output)");
+    shown->final_callback([o] { show(*o); });
+    one("check", "What is wrong with a case; exit status 1 where something is")->final_callback([o] { check(*o); });
+    CLI::App* const picture = one("picture", "Draw a case's picture, from a session of the scripted hand");
+    picture->add_option("-o,--output", o->picture, "file (.png; the case's picture.png where it is left out)");
+    picture->add_option("--at", o->at, "how far through the session")->check(CLI::Range(0.0, 1.0));
+    picture->final_callback([o] { draw(*o); });
+
+    CLI::App* const made = c->add_subcommand("new", "Make a case of a volume");
+    made->add_option("VOLUME", o->made.volume, "a volume (.vdb)")->required();
+    made->add_option("-o,--output", o->made.folder, "folder of the case; must not be there")->required();
+    made->add_option("--title", o->made.title, "a few words");
+    made->add_option("--target", o->made.target, "structure to sample");
+    made->add_option("--difficulty", o->made.difficulty, "1 to 5")
+        ->check(CLI::Range(1, training::hardest))
+        ->capture_default_str();
+    made->add_option("--licence", o->made.licence, "who may use the volume");
+    made->final_callback([o] { make(*o); });
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,220 @@
+#include <apps/command.h>
+#include <command/json.h>
+#include <training/progress.h>
+#include <training/simulate.h>
+#include <training/store.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+using training::Curriculum;
+using training::CusumChart;
+
+struct Options {
+    std::string id, profile;
+    fs::path json, profiles;
+    int people = 200, most = 500;
+    std::uint64_t seed = 1;
+};
+
+std::string levelInWords(const training::Level& level)
+{
+    std::string words = level.measure;
+    words += level.atLeast ? fmt::format(" at least {:g}", *level.atLeast) : "";
+    words += level.atLeast && level.atMost ? " and" : "";
+    return words + (level.atMost ? fmt::format(" at most {:g}", *level.atMost) : "");
+}
+
+void list(const Options& o)
+{
+    std::vector<std::string> faults;
+    const auto all = training::allCurricula(&faults);
+    for (const std::string& fault : faults) {
+        fmt::print(stderr, "palpate: warning: {}\n", fault);
+    }
+    auto figures = nlohmann::json::array();
+    for (const Curriculum& c : all) {
+        figures.push_back({{"id", c.id},
+                           {"title", c.title},
+                           {"about", c.about},
+                           {"exercises", c.exercises.size()},
+                           {"file", c.file.string()}});
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, {{"curricula", figures}});
+    }
+    if (o.json != "-") {
+        for (const Curriculum& c : all) {
+            fmt::print("{:<22} {} exercises: {}\n{:<22} {}\n", c.id, c.exercises.size(), c.title, "", c.about);
+        }
+    }
+}
+
+std::string sessionsInWords(double n)
+{
+    return std::isfinite(n) ? fmt::format("{:.0f} sessions", n) : "never";
+}
+
+void check(const Options& o)
+{
+    const Curriculum c = training::findCurriculum(o.id);
+    fmt::print("{}: {}\n", c.id, c.title);
+    int number = 0;
+    for (const training::Exercise& e : c.exercises) {
+        fmt::print("  {}. {} ({}), case {}; {} of the last {}{} sessions:\n", ++number, e.title, e.id, e.caseId,
+                   e.gate.pass, e.gate.of, e.gate.testOnly ? " test" : "");
+        for (const training::Level& level : e.gate.levels) {
+            fmt::print("       {}\n", levelInWords(level));
+        }
+    }
+    const training::CusumPlan& plan = c.cusum;
+    fmt::print("CUSUM: p0 {:g}, p1 {:g}, alpha {:g}, beta {:g}\n", plan.p0, plan.p1, plan.alpha, plan.beta);
+    for (const double p : {plan.p0, plan.p1}) {
+        fmt::print("  fails {:.0f} % of the time: {} to an alarm, {} to \"has learnt it\" (means)\n", 100 * p,
+                   sessionsInWords(averageRunLength(plan, CusumChart::alarm, p)),
+                   sessionsInWords(averageRunLength(plan, CusumChart::learning, p)));
+    }
+    fmt::print("good\n");
+}
+
+fs::path fileOf(const Options& o)
+{
+    return o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles;
+}
+
+void next(const Options& o)
+{
+    const training::ProfileStore store(fileOf(o));
+    const training::Person person = store.find(o.profile);
+    const auto sessions = store.sessions(person);
+    // The one that was named, else that of the last session, else all.
+    std::vector<Curriculum> curricula;
+    const auto last = std::find_if(sessions.rbegin(), sessions.rend(), [](const auto& s) { return !s.curriculum.empty(); });
+    if (!o.id.empty() || last != sessions.rend()) {
+        curricula.push_back(training::findCurriculum(o.id.empty() ? last->curriculum : o.id));
+    } else {
+        curricula = training::allCurricula();
+    }
+    auto figures = nlohmann::json::array();
+    for (const Curriculum& c : curricula) {
+        const auto progress = training::progressOf(c, sessions, training::utcNow());
+        const auto* const e = progress.next();
+        if (e == nullptr) {
+            figures.push_back({{"curriculum", c.id}, {"finished", true}});
+            if (o.json != "-") {
+                fmt::print("{}: all {} exercises are reached\n", c.id, c.exercises.size());
+            }
+            continue;
+        }
+        const std::string reason = training::reasonFor(*e);
+        const bool test = e->exercise->gate.testOnly && !e->gate.open;
+        const std::string how = fmt::format("palpate train --profile '{}' --exercise {}/{}{}", person.name, c.id,
+                                            e->exercise->id, test ? " --test" : "");
+        figures.push_back({{"curriculum", c.id},
+                           {"finished", false},
+                           {"exercise", e->exercise->id},
+                           {"title", e->exercise->title},
+                           {"case", e->exercise->caseId},
+                           {"refresh", e->refresh},
+                           {"test", test},
+                           {"reason", reason},
+                           {"command", how}});
+        if (o.json != "-") {
+            fmt::print("{}: {} {}\n  {}\n", c.id, e->exercise->title, reason, how);
+        }
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, {{"name", person.name}, {"next", figures}});
+    }
+}
+
+double quantile(std::vector<int> values, double share)
+{
+    std::ranges::sort(values);
+    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+void simulate(const Options& o)
+{
+    const Curriculum c = training::findCurriculum(o.id);
+    auto figures = nlohmann::json::array();
+    if (o.json != "-") {
+        fmt::print("{} simulated people of each skill through {}, at most {} sessions each\n{:<10} {:>8}  {}\n", o.people,
+                   c.id, o.most, "skill", "finished", "sessions that took: median (quartiles; most)");
+    }
+    for (const training::LearningLaw& law : training::learningLaws()) {
+        std::vector<int> taken;
+        for (int k = 0; k < o.people; ++k) {
+            const auto course = training::simulate(c, law, o.seed + static_cast<std::uint64_t>(k), o.most);
+            if (course.finished) {
+                taken.push_back(static_cast<int>(course.sessions.size()));
+            }
+        }
+        nlohmann::json one = {{"skill", law.name}, {"people", o.people}, {"finished", taken.size()}};
+        std::string words = "none";
+        if (!taken.empty()) {
+            one["sessions"] = {{"median", quantile(taken, 0.5)},
+                               {"lower_quartile", quantile(taken, 0.25)},
+                               {"upper_quartile", quantile(taken, 0.75)},
+                               {"max", quantile(taken, 1)}};
+            words = fmt::format("{:.0f} ({:.0f} to {:.0f}; {:.0f})", quantile(taken, 0.5), quantile(taken, 0.25),
+                                quantile(taken, 0.75), quantile(taken, 1));
+        }
+        figures.push_back(one);
+        if (o.json != "-") {
+            fmt::print("{:<10} {:>8}  {}\n", law.name, taken.size(), words);
+        }
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, {{"curriculum", c.id}, {"skills", figures}});
+    }
+}
+
+}  // namespace
+
+void addCurriculum(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    CLI::App* const c =
+        app.add_subcommand("curriculum", "Ways from the first touch to proficiency: list, check, what is next");
+    c->require_subcommand(1);
+    const auto json = [&](CLI::App* sub) { sub->add_option("--json", o->json, "write it here (- for standard output)"); };
+    CLI::App* const all = c->add_subcommand("list", "The curricula that there are");
+    json(all);
+    all->final_callback([o] { list(*o); });
+
+    CLI::App* const checked = c->add_subcommand("check", "What is wrong with a curriculum, or what it asks for");
+    checked->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
+    checked->final_callback([o] { check(*o); });
+
+    CLI::App* const after = c->add_subcommand("next", "What somebody should train next, and why");
+    after->add_option("CURRICULUM", o->id, "a curriculum's name or file (that of the last session)");
+    after->add_option("--profile", o->profile, "whose progress")->required();
+    after->add_option("--profiles", o->profiles, "file of the profiles");
+    json(after);
+    after->final_callback([o] { next(*o); });
+
+    CLI::App* const tried =
+        c->add_subcommand("simulate", "How many sessions simulated people of three skills need: for choosing gates");
+    tried->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
+    tried->add_option("--people", o->people, "of each skill")->check(CLI::Range(1, 100000))->capture_default_str();
+    tried->add_option("--sessions", o->most, "of each of them, at most")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    tried->add_option("--seed", o->seed, "of all chances")->capture_default_str();
+    json(tried);
+    tried->final_callback([o] { simulate(*o); });
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,197 @@
+#include <apps/command.h>
+#include <base/outputs.h>
+#include <command/json.h>
+#include <training/case.h>
+#include <training/curriculum.h>
+#include <training/store.h>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <memory>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+using training::Hand;
+using training::Person;
+using training::ProfileStore;
+
+struct Options {
+    fs::path profiles, output, json;
+    std::string name, hand = "right", exercise, caseId, note;
+    std::vector<fs::path> records;
+    std::int64_t session = 0;
+    int rating = 0;
+    bool test = false, yes = false;
+};
+
+ProfileStore open(const Options& o)
+{
+    return ProfileStore(o.profiles.empty() ? ProfileStore::standardFile() : o.profiles);
+}
+
+const char* handInWords(Hand hand)
+{
+    return hand == Hand::left ? "left" : "right";
+}
+
+void make(const Options& o)
+{
+    ProfileStore store = open(o);
+    const Person person = store.add(o.name, o.hand == "left" ? Hand::left : Hand::right);
+    fmt::print("{}: made, {} hand, in {}\n", person.name, handInWords(person.hand), store.file().string());
+}
+
+void list(const Options& o)
+{
+    const ProfileStore store = open(o);
+    const auto people = store.people();
+    if (!o.json.empty()) {
+        auto out = nlohmann::json::array();
+        for (const Person& p : people) {
+            out.push_back(
+                {{"name", p.name}, {"hand", handInWords(p.hand)}, {"created", p.created}, {"sessions", p.sessions}});
+        }
+        command::writeJson(o.json, {{"file", store.file().string()}, {"profiles", out}});
+    }
+    if (o.json == "-") {
+        return;
+    }
+    if (people.empty()) {
+        fmt::print("no profiles yet: palpate profile new NAME\n");
+    }
+    for (const Person& p : people) {
+        fmt::print("{:<24} {:<6} {:>5} sessions, since {}\n", p.name, handInWords(p.hand), p.sessions,
+                   p.created.substr(0, 10));
+    }
+}
+
+void exportOne(const Options& o)
+{
+    const ProfileStore store = open(o);
+    const fs::path to = o.output.empty() ? fs::path("-") : o.output;
+    base::checkOutput(to);
+    command::writeJson(to, store.exported(store.find(o.name)));
+}
+
+void erase(const Options& o)
+{
+    ProfileStore store = open(o);
+    const Person person = store.find(o.name);
+    if (!o.yes) {
+        throw std::runtime_error(fmt::format(
+            "{}: erasing cannot be undone: {} sessions and their records; add --yes (palpate profile export keeps a copy)",
+            person.name, person.sessions));
+    }
+    const auto stay = store.erase(person);
+    fmt::print("{}: erased\n", person.name);
+    for (const fs::path& file : stay) {
+        fmt::print("this record was kept elsewhere and stays: {}\n", file.string());
+    }
+}
+
+void backup(const Options& o)
+{
+    const ProfileStore store = open(o);
+    store.backup(o.output);
+    fmt::print("{}: {} profiles\n", o.output.string(), store.people().size());
+}
+
+void addRecords(const Options& o)
+{
+    ProfileStore store = open(o);
+    const Person person = store.find(o.name);
+    // All are read before one is stored.
+    std::vector<training::StoredSession> sessions;
+    for (const fs::path& file : o.records) {
+        training::StoredSession s = training::sessionOf(file);
+        if (!o.caseId.empty()) {
+            s.caseId = training::findCase(o.caseId).id;
+        }
+        if (!o.exercise.empty()) {
+            const std::size_t slash = o.exercise.find('/');
+            const auto curriculum = training::findCurriculum(o.exercise.substr(0, slash));
+            const auto* const exercise =
+                slash == std::string::npos ? nullptr : curriculum.exercise(o.exercise.substr(slash + 1));
+            if (exercise == nullptr) {
+                throw std::runtime_error("--exercise " + o.exercise +
+                                         ": give CURRICULUM/EXERCISE (palpate curriculum check)");
+            }
+            s.curriculum = curriculum.id;
+            s.exercise = exercise->id;
+            s.caseId = o.caseId.empty() ? exercise->caseId : s.caseId;
+        }
+        s.test = s.test || o.test;
+        sessions.push_back(std::move(s));
+    }
+    for (std::size_t i = 0; i < sessions.size(); ++i) {
+        const auto id = store.store(person, sessions[i]);
+        fmt::print("{}: session {} of {}, total {:.0f}\n", o.records[i].string(), id, person.name,
+                   sessions[i].values["total"]);
+    }
+}
+
+void note(const Options& o)
+{
+    ProfileStore store = open(o);
+    store.annotate(store.find(o.name), o.session, o.note, o.rating);
+    fmt::print("{}: session {} noted\n", o.name, o.session);
+}
+
+}  // namespace
+
+void addProfile(CLI::App& app)
+{
+    auto o = std::make_shared<Options>();
+    CLI::App* const c = app.add_subcommand("profile", "Who trains: make, list, export, erase and back up profiles");
+    c->require_subcommand(1);
+    const auto sub = [&](const char* name, const char* what, bool person) {
+        CLI::App* const s = c->add_subcommand(name, what);
+        s->add_option("--profiles", o->profiles, "file of the profiles (~/.local/share/palpate/profiles.db)");
+        if (person) {
+            s->add_option("NAME", o->name, "whose; may be a pseudonym")->required();
+        }
+        return s;
+    };
+    CLI::App* const made = sub("new", "Make a profile", true);
+    made->add_option("--hand", o->hand, "that holds the needle")
+        ->check(CLI::IsMember({"right", "left"}))
+        ->capture_default_str();
+    made->final_callback([o] { make(*o); });
+
+    CLI::App* const all = sub("list", "The profiles that there are", false);
+    all->add_option("--json", o->json, "write them here (- for standard output)");
+    all->final_callback([o] { list(*o); });
+
+    CLI::App* const exported = sub("export", "Everything that is known of a person, as JSON", true);
+    exported->add_option("-o,--output", o->output, "file (standard output where it is left out)");
+    exported->final_callback([o] { exportOne(*o); });
+
+    CLI::App* const erased = sub("erase", "Remove a person, all sessions and their records", true);
+    erased->add_flag("--yes", o->yes, "it cannot be undone");
+    erased->final_callback([o] { erase(*o); });
+
+    CLI::App* const copied = sub("backup", "Copy the file of all profiles", false);
+    copied->add_option("FILE", o->output, "where to; must not be there")->required();
+    copied->final_callback([o] { backup(*o); });
+
+    CLI::App* const taken = sub("add-record", "Take in sessions from their records, e.g. from another machine", true);
+    taken->add_option("RECORD", o->records, "records (.db)")->required();
+    taken->add_option("--case", o->caseId, "the case, where the record does not say it");
+    taken->add_option("--exercise", o->exercise, "CURRICULUM/EXERCISE, where the record does not say it");
+    taken->add_flag("--test", o->test, "they were tests");
+    taken->final_callback([o] { addRecords(*o); });
+
+    CLI::App* const noted = sub("note", "An instructor's words and global rating of a session", true);
+    noted->add_option("SESSION", o->session, "its number (palpate progress NAME --json -)")->required();
+    noted->add_option("--text", o->note, "words");
+    noted->add_option("--rating", o->rating, "global rating, 1 to 5")->check(CLI::Range(0, 5));
+    noted->final_callback([o] { note(*o); });
+}
+
+}  // namespace palpate::apps

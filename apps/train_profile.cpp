@@ -1,0 +1,154 @@
+#include <apps/train_profile.h>
+
+#include <training/progress.h>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <ctime>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace fs = std::filesystem;
+
+Training::Training(TrainingOptions options) : options_(std::move(options))
+{
+    if (!options_.profile.empty()) {
+        store_.emplace(options_.profiles.empty() ? training::ProfileStore::standardFile() : options_.profiles);
+        person_ = store_->find(options_.profile);
+    } else if (!options_.profiles.empty()) {
+        throw std::runtime_error("--profiles: says where profiles are: add --profile NAME");
+    }
+    if (!options_.exercise.empty()) {
+        const std::size_t slash = options_.exercise.find('/');
+        curriculum_ = training::findCurriculum(options_.exercise.substr(0, slash));
+        exercise_ = slash == std::string::npos ? nullptr : curriculum_->exercise(options_.exercise.substr(slash + 1));
+        if (exercise_ == nullptr) {
+            throw std::runtime_error(fmt::format("--exercise {}: {} has no such exercise (palpate curriculum check {})",
+                                                 options_.exercise, curriculum_->id, curriculum_->id));
+        }
+        if (!options_.caseId.empty()) {
+            throw std::runtime_error("--case: the exercise says its case: leave one of them out");
+        }
+        case_ = training::findCase(exercise_->caseId);
+    } else if (!options_.caseId.empty()) {
+        case_ = training::findCase(options_.caseId);
+    }
+    if (exercise_ != nullptr && person_) {
+        const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), training::utcNow());
+        const auto here = std::ranges::find(progress.exercises, exercise_, &training::ExerciseProgress::exercise);
+        if (!here->available) {
+            const auto* const next = progress.next();
+            throw std::runtime_error(fmt::format("--exercise {}: its gate is shut for {}{}", options_.exercise,
+                                                 person_->name,
+                                                 next ? "; next is " + curriculum_->id + "/" + next->exercise->id : ""));
+        }
+        trial_ = static_cast<int>(here->sessions.size()) + 1;
+    }
+}
+
+std::string Training::scene() const
+{
+    return case_ ? case_->scene : "";
+}
+
+void Training::change(session::SceneChanges& changes) const
+{
+    if (changes.dffb) {
+        return;  // the user says it
+    }
+    if (options_.test) {
+        changes.dffb = "off";
+    } else if (exercise_ != nullptr && exercise_->guidance == training::Guidance::off) {
+        changes.dffb = "off";
+    } else if (exercise_ != nullptr && exercise_->guidance == training::Guidance::fade) {
+        changes.dffb = "fade";
+        changes.trial = fmt::format("{}/{}", std::min(trial_, exercise_->fadeTrials), exercise_->fadeTrials);
+    }
+}
+
+fs::path Training::record() const
+{
+    if (!store_) {
+        return {};
+    }
+    const fs::path folder = store_->recordFolder();
+    if (!fs::exists(folder)) {
+        fs::create_directories(folder);
+        fs::permissions(folder, fs::perms::owner_all);
+    }
+    return folder / fmt::format("{:%Y%m%d-%H%M%S}-{}-{}.db", fmt::gmtime(std::time(nullptr)), case_ ? case_->id : "session",
+                                ::getpid());
+}
+
+void Training::describe(haptics::SessionInfo& info) const
+{
+    if (person_ && info.operatorName.empty()) {
+        info.operatorName = person_->name;
+    }
+    if (case_) {
+        info.extra.emplace_back(training::caseKey, case_->id);
+    }
+    if (exercise_ != nullptr) {
+        info.extra.emplace_back(training::exerciseKey, curriculum_->id + "/" + exercise_->id);
+        info.extra.emplace_back(training::guidanceKey,
+                                fmt::format("{:g}", training::guidanceOf(*exercise_, trial_, options_.test)));
+    }
+    if (case_ || options_.test) {
+        info.extra.emplace_back(training::modeKey, options_.test ? "test" : "practice");
+    }
+}
+
+std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const haptics::Score& score,
+                                        const fs::path& record)
+{
+    std::vector<std::string> lines;
+    const training::Values values = training::valuesOf(score);
+    if (exercise_ != nullptr) {
+        lines.push_back(fmt::format("{}: this session {} its level", exercise_->title,
+                                    training::meets(exercise_->gate, values) ? "reached" : "did not reach"));
+    }
+    if (!person_) {
+        return lines;
+    }
+    training::StoredSession s;
+    s.started = info.started;
+    s.caseId = case_ ? case_->id : "";
+    s.curriculum = curriculum_ ? curriculum_->id : "";
+    s.exercise = exercise_ != nullptr ? exercise_->id : "";
+    s.test = options_.test;
+    s.guidance = options_.test ? 0 : exercise_ != nullptr ? training::guidanceOf(*exercise_, trial_, false) : 1;
+    s.scene = info.scene;
+    s.device = info.device;
+    s.build = info.build;
+    s.values = values;
+    if (!record.empty()) {
+        s.record = fs::absolute(record).lexically_normal().string();
+        s.recordSha256 = haptics::Record(record).seal().sha256;
+    }
+    const auto id = store_->store(*person_, s);
+    lines.push_back(fmt::format("kept as session {} of {}", id, person_->name));
+    if (curriculum_) {
+        const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), training::utcNow());
+        const auto* const next = progress.next();
+        lines.push_back(next == nullptr ? "all exercises are reached"
+                                        : fmt::format("{} {}", next->exercise->title, training::reasonFor(*next)));
+    }
+    return lines;
+}
+
+void addTrainingOptions(CLI::App& command, TrainingOptions& o)
+{
+    command.add_option("--case", o.caseId, "A case by its name or folder (palpate case list)");
+    command.add_option("--exercise", o.exercise,
+                       "CURRICULUM/EXERCISE: its case, with as much guidance as this trial has (palpate curriculum list)");
+    command.add_option("--profile", o.profile, "Whose progress it counts for (palpate profile new)");
+    command.add_option("--profiles", o.profiles, "File of the profiles");
+    command.add_flag("--test", o.test, "A test: no guidance, and it counts for gates that ask for tests");
+}
+
+}  // namespace palpate::apps

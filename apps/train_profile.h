@@ -1,0 +1,58 @@
+#pragma once
+
+#include <session/open.h>
+#include <session/trainer.h>
+#include <training/case.h>
+#include <training/curriculum.h>
+#include <training/store.h>
+
+#include <CLI/App.hpp>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace palpate::apps {
+
+/// What `palpate train` is told of case, exercise and person.
+struct TrainingOptions {
+    std::string caseId;    // name or folder
+    std::string exercise;  // CURRICULUM/EXERCISE
+    std::string profile;
+    std::filesystem::path profiles;  // empty: the standard file
+    bool test = false;
+};
+
+/// A session that is trained for something: a case, an exercise, a person's progress.
+class Training {
+public:
+    /// Looks everything up. Throws std::runtime_error for what is not there, and for an exercise that is not available yet.
+    explicit Training(TrainingOptions options);
+
+    /// The scene to open; empty: none of the options says one.
+    std::string scene() const;
+    /// Guidance of this trial.
+    void change(session::SceneChanges& changes) const;
+    /// Where the record goes when nobody asked for one; empty: nowhere.
+    std::filesystem::path record() const;
+    /// What the record says of it.
+    void describe(haptics::SessionInfo& info) const;
+    /// Keeps the session in the profile. @returns  what there is to say, a line each
+    std::vector<std::string> keep(const haptics::SessionInfo& info, const haptics::Score& score,
+                                  const std::filesystem::path& record);
+    const std::string& profile() const noexcept { return options_.profile; }
+
+private:
+    TrainingOptions options_;
+    std::optional<training::Case> case_;
+    std::optional<training::Curriculum> curriculum_;
+    const training::Exercise* exercise_ = nullptr;
+    std::optional<training::ProfileStore> store_;
+    std::optional<training::Person> person_;
+    int trial_ = 1;  // of the exercise, from 1 up
+};
+
+/// The options of `palpate train`.
+void addTrainingOptions(CLI::App& command, TrainingOptions& options);
+
+}  // namespace palpate::apps

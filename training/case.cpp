@@ -1,0 +1,246 @@
+#include <training/case.h>
+
+#include <base/nearest.h>
+#include <datasets/scene.h>
+#include <datasets/toml_section.h>
+#include <haptics/measures.h>
+#include <session/open.h>
+#include <training/folders.h>
+#include <training/toml_lists.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <stdexcept>
+
+namespace palpate::training {
+
+namespace fs = std::filesystem;
+using datasets::Section;
+
+namespace {
+
+// A file that the case names: inside its folder, so that the folder can be given away.
+fs::path fileIn(const Section& top, const Case& made, std::string_view key, const std::string& name)
+{
+    const fs::path file(name);
+    if (file.is_absolute() || file.lexically_normal().native().starts_with("..")) {
+        top.refuse(key, "must lie in the case's folder");
+    }
+    if (!fs::is_regular_file(made.folder / file)) {
+        top.refuse(key, fmt::format("there is no such file in {}", made.folder.string()));
+    }
+    return made.folder / file;
+}
+
+void readScene(Section& top, Case& made)
+{
+    const auto scene = top.word("scene");
+    const auto volume = top.word("volume");
+    if (!scene && !volume) {
+        top.missing("scene", "a built-in scene, or a file (.toml) in the folder; or volume = \"FILE.vdb\"");
+    }
+    if (scene && volume) {
+        top.refuse("volume", "there is a scene too: the scene names its volume itself");
+    }
+    if (volume) {
+        made.scene = fileIn(top, made, "volume", *volume).string();
+        return;
+    }
+    if (fs::path(*scene).extension() == ".toml") {
+        made.scene = fileIn(top, made, "scene", *scene).string();
+        return;
+    }
+    const auto builtIn = datasets::builtInScenes();
+    if (std::ranges::find(builtIn, *scene) == builtIn.end()) {
+        const std::string meant = base::nearest(*scene, builtIn);
+        top.refuse("scene", "there is no such built-in scene" + (meant.empty() ? "" : "; did you mean " + meant + "?"));
+    }
+    made.scene = *scene;
+}
+
+}  // namespace
+
+void checkMeasure(const Section& section, std::string_view key, const std::string& measure)
+{
+    std::vector<std::string> keys;
+    for (const haptics::Measure& m : haptics::measures()) {
+        keys.emplace_back(m.key);
+    }
+    if (std::ranges::find(keys, measure) == keys.end()) {
+        const std::string meant = base::nearest(measure, keys);
+        section.refuse(key, fmt::format("there is no measure {}{}", measure,
+                                        meant.empty() ? " (docs/score.md lists them)" : "; did you mean " + meant + "?"));
+    }
+}
+
+std::vector<std::string> wordsOf(Section& section, std::string_view key)
+{
+    std::vector<std::string> words;
+    const toml::node* const node = section.node(key);
+    if (node == nullptr) {
+        return words;
+    }
+    if (!node->is_array()) {
+        section.refuse(key, "must be a list of texts");
+    }
+    for (const toml::node& one : *node->as_array()) {
+        if (!one.is_string() || one.as_string()->get().empty()) {
+            section.refuse(key, "must be a list of texts that are not empty");
+        }
+        words.push_back(one.as_string()->get());
+    }
+    return words;
+}
+
+Case loadCase(const fs::path& given)
+{
+    Case made;
+    const fs::path folder = given.filename() == caseFile ? given.parent_path() : given;
+    made.folder = fs::absolute(folder.empty() ? fs::path(".") : folder).lexically_normal();
+    if (!made.folder.has_filename()) {  // "case/"
+        made.folder = made.folder.parent_path();
+    }
+    made.id = made.folder.filename().string();
+    const fs::path file = made.folder / caseFile;
+    const toml::table table = datasets::parseToml(datasets::readText(file), file.string());
+    Section top(table, file.string(), "");
+    const auto title = top.word("title");
+    if (!title) {
+        top.missing("title", "a few words");
+    }
+    made.title = *title;
+    readScene(top, made);
+    if (const auto picture = top.word("picture")) {
+        made.picture = fileIn(top, made, "picture", *picture);
+    }
+    const auto difficulty = top.integer("difficulty", "", 1, hardest);
+    if (!difficulty) {
+        top.missing("difficulty", "1 to 5");
+    }
+    made.difficulty = static_cast<int>(*difficulty);
+    made.briefing = wordsOf(top, "briefing");
+    if (made.briefing.empty()) {
+        top.missing("briefing", "a list of the task's steps, a sentence each");
+    }
+    made.trains = wordsOf(top, "trains");
+    made.measures = wordsOf(top, "measures");
+    for (const std::string& measure : made.measures) {
+        checkMeasure(top, "measures", measure);
+    }
+    const auto licence = top.word("licence");
+    if (!licence) {
+        top.missing("licence", "who may use the case and its volume, e.g. \"CC0-1.0\"");
+    }
+    made.licence = *licence;
+    made.source = top.word("source").value_or("");
+    top.finish();
+    return made;
+}
+
+bool isCaseFolder(const fs::path& what)
+{
+    std::error_code none;
+    return fs::is_regular_file(what / caseFile, none);
+}
+
+std::vector<Case> allCases(std::vector<std::string>* faults)
+{
+    std::vector<Case> all;
+    std::set<std::string> seen;
+    for (const fs::path& folder : dataFolders("cases")) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder, none)) {
+            if (!isCaseFolder(entry.path()) || !seen.insert(entry.path().filename().string()).second) {
+                continue;
+            }
+            try {
+                all.push_back(loadCase(entry.path()));
+            } catch (const std::runtime_error& e) {
+                if (faults != nullptr) {
+                    faults->emplace_back(e.what());
+                }
+            }
+        }
+    }
+    std::ranges::sort(all, [](const Case& a, const Case& b) {
+        return a.difficulty != b.difficulty ? a.difficulty < b.difficulty : a.title < b.title;
+    });
+    return all;
+}
+
+Case findCase(const std::string& id)
+{
+    if (isCaseFolder(id) || fs::path(id).filename() == caseFile) {
+        return loadCase(id);
+    }
+    const bool name = !id.empty() && id.find('/') == std::string::npos;
+    for (const fs::path& folder : dataFolders("cases")) {
+        if (name && isCaseFolder(folder / id)) {
+            return loadCase(folder / id);
+        }
+    }
+    if (fs::is_directory(id)) {
+        throw std::runtime_error(id + ": no case: there is no " + std::string(caseFile) + " in it");
+    }
+    std::vector<std::string> ids;
+    for (const Case& one : allCases()) {
+        ids.push_back(one.id);
+    }
+    const std::string meant = base::nearest(id, ids);
+    throw std::runtime_error(fmt::format("{}: there is no such case{} (palpate case list)", id,
+                                         meant.empty() ? "" : "; did you mean " + meant + "?"));
+}
+
+namespace {
+
+bool isPng(const fs::path& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    std::string head(8, '\0');
+    in.read(head.data(), 8);
+    return in && head == "\x89PNG\r\n\x1a\n";
+}
+
+}  // namespace
+
+std::vector<std::string> faultsOf(const Case& made)
+{
+    std::vector<std::string> faults;
+    const std::string file = (made.folder / caseFile).string();
+    const auto add = [&](const std::string& what) { faults.push_back(file + ": " + what); };
+    if (made.picture.empty()) {
+        add("picture: there is none; palpate case picture makes one");
+    } else if (!isPng(made.picture)) {
+        add(fmt::format("picture: {} is no PNG", made.picture.filename().string()));
+    }
+    if (made.trains.empty()) {
+        add("trains: is missing: say what the case trains");
+    }
+    if (made.measures.empty()) {
+        add("measures: is missing: name the measures that matter");
+    }
+    if (made.licence.starts_with("not stated")) {
+        add("licence: is not stated");
+    }
+    try {
+        const haptics::SessionModel model = session::openSession(made.scene, {});
+        const bool find = model.scene.task == datasets::SessionTask::find;
+        for (const std::string& key : made.measures) {
+            const auto measures = haptics::measures();
+            const auto m = std::ranges::find(measures, key, &haptics::Measure::key);
+            const bool ofMarks = key.starts_with("mark");
+            const bool ofCores = m->listed == haptics::Measure::Listed::ifFired || key == "passes";
+            if (find ? ofCores : ofMarks) {
+                add(fmt::format("measures: {} has no value in a {}", key, find ? "palpation" : "biopsy"));
+            }
+        }
+    } catch (const std::runtime_error& e) {
+        faults.emplace_back(e.what());
+    }
+    return faults;
+}
+
+}  // namespace palpate::training

@@ -1,0 +1,216 @@
+#include <training/curriculum.h>
+
+#include <base/nearest.h>
+#include <datasets/toml_section.h>
+#include <training/case.h>
+#include <training/folders.h>
+#include <training/toml_lists.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <set>
+#include <stdexcept>
+
+namespace palpate::training {
+
+namespace fs = std::filesystem;
+using datasets::Section;
+
+namespace {
+
+constexpr int mostTrials = 100;
+constexpr std::array<std::string_view, 3> guidanceNames{"on", "off", "fade"};
+constexpr std::array<std::string_view, 2> modeNames{"any", "test"};
+
+Level readLevel(Section& section)
+{
+    Level level;
+    const auto measure = section.word("measure");
+    if (!measure) {
+        section.missing("measure", "a measure of docs/score.md");
+    }
+    level.measure = *measure;
+    checkMeasure(section, "measure", level.measure);
+    level.atLeast = section.number("at_least", "", -1e9, 1e9);
+    level.atMost = section.number("at_most", "", -1e9, 1e9);
+    if (!level.atLeast && !level.atMost) {
+        section.missing("at_most", "or at_least: what the measure has to be");
+    }
+    if (level.atLeast && level.atMost && *level.atLeast > *level.atMost) {
+        section.refuse("at_least", "nothing can be at least that and at most what at_most says");
+    }
+    section.finish();
+    return level;
+}
+
+Gate readGate(Section& section)
+{
+    Gate gate;
+    gate.of = static_cast<int>(section.integer("of", "sessions", 1, mostTrials).value_or(gate.of));
+    gate.pass = static_cast<int>(section.integer("pass", "sessions", 1, gate.of).value_or(std::min(gate.pass, gate.of)));
+    gate.testOnly = section.choice("mode", modeNames).value_or(0) == 1;
+    for (Section& one : section.sections("level")) {
+        gate.levels.push_back(readLevel(one));
+    }
+    if (gate.levels.empty()) {
+        section.missing("level", "at least one [[exercise.level]]: what opens the gate");
+    }
+    return gate;
+}
+
+std::string called(Section& section, std::string_view key, std::string_view what)
+{
+    const auto word = section.word(key);
+    if (!word) {
+        section.missing(key, what);
+    }
+    return *word;
+}
+
+Exercise readExercise(Section& section, const Curriculum& before)
+{
+    Exercise e;
+    e.id = called(section, "id", "a short name");
+    if (before.exercise(e.id) != nullptr) {
+        section.refuse("id", "there is an exercise of this name already");
+    }
+    if (e.id.find('/') != std::string::npos) {
+        section.refuse("id", "must be without /");
+    }
+    e.title = called(section, "title", "a few words");
+    e.caseId = called(section, "case", "a case: palpate case list");
+    try {
+        findCase(e.caseId);
+    } catch (const std::runtime_error& fault) {
+        section.refuse("case", fault.what());
+    }
+    if (section.has("after")) {
+        e.after = wordsOf(section, "after");
+    } else if (!before.exercises.empty()) {
+        e.after = {before.exercises.back().id};
+    }
+    e.guidance =
+        static_cast<Guidance>(section.choice("guidance", guidanceNames).value_or(static_cast<std::size_t>(Guidance::fade)));
+    if (section.has("fade_trials") && e.guidance != Guidance::fade) {
+        section.refuse("fade_trials", "guidance does not fade here: add guidance = \"fade\"");
+    }
+    e.fadeTrials = static_cast<int>(section.integer("fade_trials", "sessions", 2, mostTrials).value_or(e.fadeTrials));
+    e.gate = readGate(section);
+    for (const std::string& other : e.after) {
+        // Only those before it: so none wait for one another.
+        if (before.exercise(other) == nullptr) {
+            std::vector<std::string> ids;
+            for (const Exercise& one : before.exercises) {
+                ids.push_back(one.id);
+            }
+            const std::string meant = base::nearest(other, ids);
+            section.refuse("after", fmt::format("there is no exercise {} before this one{}", other,
+                                                meant.empty() ? "" : "; did you mean " + meant + "?"));
+        }
+    }
+    section.finish();
+    return e;
+}
+
+CusumPlan readCusum(Section& section)
+{
+    CusumPlan plan;
+    plan.p0 = section.number("acceptable_failure", "", 0.001, 0.9).value_or(plan.p0);
+    plan.p1 = section.number("unacceptable_failure", "", 0.002, 0.99).value_or(plan.p1);
+    if (plan.p1 <= plan.p0) {
+        section.refuse("unacceptable_failure", fmt::format("must be over acceptable_failure, {:g}", plan.p0));
+    }
+    plan.alpha = section.number("alpha", "", 0.001, 0.4).value_or(plan.alpha);
+    plan.beta = section.number("beta", "", 0.001, 0.4).value_or(plan.beta);
+    section.finish();
+    return plan;
+}
+
+}  // namespace
+
+const Exercise* Curriculum::exercise(std::string_view name) const noexcept
+{
+    const auto at = std::ranges::find(exercises, name, &Exercise::id);
+    return at == exercises.end() ? nullptr : &*at;
+}
+
+Curriculum loadCurriculum(const fs::path& file)
+{
+    Curriculum c;
+    c.file = fs::absolute(file);
+    c.id = file.stem().string();
+    const toml::table table = datasets::parseToml(datasets::readText(file), file.string());
+    Section top(table, file.string(), "");
+    c.title = called(top, "title", "a few words");
+    c.about = top.word("about").value_or("");
+    c.refreshDays = top.number("refresh_days", "days", 1, 10000).value_or(c.refreshDays);
+    if (auto section = top.section("cusum")) {
+        c.cusum = readCusum(*section);
+    }
+    for (Section& section : top.sections("exercise")) {
+        c.exercises.push_back(readExercise(section, c));
+    }
+    if (c.exercises.empty()) {
+        top.missing("exercise", "at least one [[exercise]]");
+    }
+    top.finish();
+    return c;
+}
+
+std::vector<Curriculum> allCurricula(std::vector<std::string>* faults)
+{
+    std::vector<Curriculum> all;
+    std::set<std::string> seen;
+    for (const fs::path& folder : dataFolders("curricula")) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder, none)) {
+            if (entry.path().extension() != ".toml" || !seen.insert(entry.path().stem().string()).second) {
+                continue;
+            }
+            try {
+                all.push_back(loadCurriculum(entry.path()));
+            } catch (const std::runtime_error& e) {
+                if (faults != nullptr) {
+                    faults->emplace_back(e.what());
+                }
+            }
+        }
+    }
+    std::ranges::sort(all, {}, &Curriculum::title);
+    return all;
+}
+
+Curriculum findCurriculum(const std::string& id)
+{
+    if (fs::path(id).extension() == ".toml") {
+        return loadCurriculum(id);
+    }
+    for (const fs::path& folder : dataFolders("curricula")) {
+        const fs::path file = folder / (id + ".toml");
+        if (id.find('/') == std::string::npos && fs::is_regular_file(file)) {
+            return loadCurriculum(file);
+        }
+    }
+    std::vector<std::string> ids;
+    for (const Curriculum& one : allCurricula()) {
+        ids.push_back(one.id);
+    }
+    const std::string meant = base::nearest(id, ids);
+    throw std::runtime_error(fmt::format("{}: there is no such curriculum{} (palpate curriculum list)", id,
+                                         meant.empty() ? "" : "; did you mean " + meant + "?"));
+}
+
+double guidanceOf(const Exercise& exercise, int number, bool test) noexcept
+{
+    if (test || exercise.guidance == Guidance::off) {
+        return 0;
+    }
+    if (exercise.guidance == Guidance::on) {
+        return 1;
+    }
+    return std::clamp(static_cast<double>(exercise.fadeTrials - number) / (exercise.fadeTrials - 1), 0.0, 1.0);
+}
+
+}  // namespace palpate::training

@@ -1,0 +1,46 @@
+#include <training/folders.h>
+
+#include <base/child_process.h>
+
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+namespace palpate::training {
+
+namespace fs = std::filesystem;
+
+fs::path installedData()
+{
+    if (const char* const named = std::getenv("PALPATE_DATA"); named != nullptr && *named != 0) {
+        return named;
+    }
+    return base::programFolder().parent_path() / "share" / "palpate";
+}
+
+fs::path userData()
+{
+    // The XDG base directory specification: a path that is not absolute is ignored.
+    if (const char* const named = std::getenv("XDG_DATA_HOME"); named != nullptr && *named == '/') {
+        return fs::path(named) / "palpate";
+    }
+    const char* const home = std::getenv("HOME");
+    if (home == nullptr || *home == 0) {
+        throw std::runtime_error("profiles: neither XDG_DATA_HOME nor HOME says where they are: give --profiles FILE");
+    }
+    return fs::path(home) / ".local" / "share" / "palpate";
+}
+
+std::vector<fs::path> dataFolders(const char* kind)
+{
+    std::vector<fs::path> folders;
+    try {
+        folders.push_back(userData() / kind);
+    } catch (const std::runtime_error&) {
+        // A user without a home has those that come along.
+    }
+    folders.push_back(installedData() / kind);
+    return folders;
+}
+
+}  // namespace palpate::training

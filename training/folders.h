@@ -1,0 +1,18 @@
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace palpate::training {
+
+/// Where data that come along lie: share/palpate beside the program's folder, or the folder that PALPATE_DATA names.
+std::filesystem::path installedData();
+
+/// Where this user's data lie: $XDG_DATA_HOME/palpate, else ~/.local/share/palpate. Not made here.
+/// Throws std::runtime_error where neither XDG_DATA_HOME nor HOME is set.
+std::filesystem::path userData();
+
+/// Folders in which things of a kind ("cases", "curricula") are looked for: the user's, then those that come along.
+std::vector<std::filesystem::path> dataFolders(const char* kind);
+
+}  // namespace palpate::training

@@ -1,0 +1,432 @@
+#include <training/store.h>
+
+#include <base/nearest.h>
+#include <haptics/measures.h>
+#include <haptics/record_format.h>
+#include <training/folders.h>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sqlite3.h>
+#include <nlohmann/json.hpp>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <stdexcept>
+
+namespace palpate::training {
+
+namespace fs = std::filesystem;
+using haptics::format::Database;
+using haptics::format::Statement;
+
+namespace {
+
+constexpr int applicationId = 0x50414C54;  // "PALT", in the file's header
+constexpr int busyTimeout = 10000;         // for others that store [ms]
+
+// What each version adds; user_version says how many were done. Never change one that was released: add another.
+constexpr std::array migrations{
+    R"(CREATE TABLE person (id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, hand TEXT NOT NULL CHECK (hand IN ('right', 'left')),
+                            created TEXT NOT NULL);
+       CREATE TABLE session (id INTEGER PRIMARY KEY, person INTEGER NOT NULL REFERENCES person ON DELETE CASCADE,
+                             started TEXT NOT NULL, case_id TEXT NOT NULL, curriculum TEXT NOT NULL, exercise TEXT NOT NULL,
+                             test INTEGER NOT NULL, guidance REAL NOT NULL, scene TEXT NOT NULL, device TEXT NOT NULL,
+                             build TEXT NOT NULL, record TEXT NOT NULL, record_sha256 TEXT NOT NULL, taken INTEGER NOT NULL);
+       CREATE INDEX session_of_person ON session (person, started);
+       CREATE TABLE measure (session INTEGER NOT NULL REFERENCES session ON DELETE CASCADE, key TEXT NOT NULL, value REAL NOT NULL,
+                             PRIMARY KEY (session, key)) WITHOUT ROWID;)",
+    R"(ALTER TABLE session ADD COLUMN note TEXT NOT NULL DEFAULT '';
+       ALTER TABLE session ADD COLUMN rating INTEGER NOT NULL DEFAULT 0 CHECK (rating BETWEEN 0 AND 5);)",
+};
+constexpr int newest = static_cast<int>(migrations.size());
+
+constexpr const char* sessionColumns =
+    "id, started, case_id, curriculum, exercise, test, guidance, scene, device, build, record, record_sha256, taken, note, "
+    "rating";
+
+std::string now()
+{
+    return fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+// SQLite makes its own files beside this one with this one's mode.
+void makePrivate(const fs::path& file)
+{
+    if (!file.parent_path().empty() && !fs::exists(file.parent_path())) {
+        fs::create_directories(file.parent_path());
+        ::chmod(file.parent_path().c_str(), 0700);
+    }
+    const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
+    if (descriptor < 0) {
+        throw std::runtime_error(
+            fmt::format("{}: cannot be opened: {}", file.string(), errno == ELOOP ? "is a link" : std::strerror(errno)));
+    }
+    ::fchmod(descriptor, 0600);
+    ::close(descriptor);
+}
+
+std::int64_t pragma(const Database& database, const char* name)
+{
+    Statement ask(database, std::string("PRAGMA ") + name);
+    return ask.step() ? ask.integer(0) : 0;
+}
+
+// A transaction that is undone unless it was finished.
+class Transaction {
+public:
+    explicit Transaction(Database& database) : database_(database) { database_.execute("BEGIN IMMEDIATE"); }
+    ~Transaction()
+    {
+        if (!done_) {
+            sqlite3_exec(database_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
+        }
+    }
+    Transaction(const Transaction&) = delete;
+    Transaction& operator=(const Transaction&) = delete;
+    void commit()
+    {
+        database_.execute("COMMIT");
+        done_ = true;
+    }
+
+private:
+    Database& database_;
+    bool done_ = false;
+};
+
+void migrate(Database& database)
+{
+    Transaction all(database);
+    const auto version = pragma(database, "user_version");
+    const auto application = pragma(database, "application_id");
+    Statement tables(database, "SELECT count(*) FROM sqlite_master");
+    tables.step();
+    if (tables.integer(0) > 0 && application != applicationId) {
+        throw std::runtime_error("is no file of profiles: choose another name");
+    }
+    if (version > newest) {
+        throw std::runtime_error(
+            fmt::format("was written by a newer Palpate (version {}; this one knows {}): update", version, newest));
+    }
+    for (auto v = version; v < newest; ++v) {
+        database.execute(migrations[static_cast<std::size_t>(v)]);
+    }
+    if (version < newest) {
+        database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", applicationId, newest));
+    }
+    all.commit();
+}
+
+StoredSession readSession(const Statement& row)
+{
+    StoredSession s;
+    int c = 0;
+    s.id = row.integer(c++);
+    for (std::string* text : {&s.started, &s.caseId, &s.curriculum, &s.exercise}) {
+        *text = row.text(c++);
+    }
+    s.test = row.integer(c++) != 0;
+    s.guidance = row.real(c++);
+    for (std::string* text : {&s.scene, &s.device, &s.build, &s.record, &s.recordSha256}) {
+        *text = row.text(c++);
+    }
+    s.taken = row.integer(c++) != 0;
+    s.note = row.text(c++);
+    s.rating = static_cast<int>(row.integer(c));
+    return s;
+}
+
+void checkLine(const std::string& what, const std::string& text, std::size_t most)
+{
+    const bool control =
+        std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
+    if (text.empty() || text.size() > most || control) {
+        throw std::runtime_error(fmt::format("{}: must be 1 to {} bytes of text in one line", what, most));
+    }
+}
+
+bool isIn(const fs::path& file, const fs::path& folder)
+{
+    const fs::path relative = file.lexically_normal().lexically_relative(folder.lexically_normal());
+    return !relative.empty() && *relative.begin() != ".." && *relative.begin() != ".";
+}
+
+}  // namespace
+
+namespace {
+
+// Does the work, and says which file its errors are about.
+template <class Work>
+auto guarded(const fs::path& file, const Work& work)
+{
+    try {
+        return work();
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+    }
+}
+
+}  // namespace
+
+struct ProfileStore::Impl {
+    explicit Impl(fs::path path) : file(std::move(path))
+    {
+        makePrivate(file);
+        guarded(file, [&] {
+            database = std::make_unique<Database>(file.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+            sqlite3_busy_timeout(database->get(), busyTimeout);
+            // The content is not trusted to bring functions along; what is removed is overwritten.
+            database->execute("PRAGMA trusted_schema = OFF; PRAGMA secure_delete = ON; PRAGMA foreign_keys = ON");
+            migrate(*database);
+            database->execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+        });
+    }
+
+    fs::path file;
+    std::unique_ptr<Database> database;
+};
+
+ProfileStore::ProfileStore(const fs::path& file) : impl_(std::make_unique<Impl>(fs::absolute(file))) {}
+ProfileStore::~ProfileStore() = default;
+ProfileStore::ProfileStore(ProfileStore&&) noexcept = default;
+
+fs::path ProfileStore::standardFile()
+{
+    return userData() / "profiles.db";
+}
+
+const fs::path& ProfileStore::file() const noexcept
+{
+    return impl_->file;
+}
+
+fs::path ProfileStore::recordFolder() const
+{
+    return impl_->file.parent_path() / "records";
+}
+
+Person ProfileStore::add(const std::string& name, Hand hand)
+{
+    checkLine("profile '" + name + "'", name, 100);
+    for (const Person& one : people()) {
+        if (one.name == name) {
+            throw std::runtime_error(name + ": there is a profile of this name already");
+        }
+    }
+    return guarded(impl_->file, [&] {
+        Statement insert(*impl_->database, "INSERT INTO person (name, hand, created) VALUES (?, ?, ?)");
+        insert.bind(1, std::string_view(name));
+        insert.bind(2, std::string_view(hand == Hand::left ? "left" : "right"));
+        insert.bind(3, std::string_view(now()));
+        insert.run();
+        return find(name);
+    });
+}
+
+std::vector<Person> ProfileStore::people() const
+{
+    return guarded(impl_->file, [&] {
+        std::vector<Person> all;
+        Statement select(*impl_->database,
+                         "SELECT id, name, hand, created, (SELECT count(*) FROM session WHERE person = person.id) "
+                         "FROM person ORDER BY name");
+        while (select.step()) {
+            all.push_back({select.integer(0), std::string(select.text(1)),
+                           select.text(2) == "left" ? Hand::left : Hand::right, std::string(select.text(3)),
+                           static_cast<int>(select.integer(4))});
+        }
+        return all;
+    });
+}
+
+Person ProfileStore::find(const std::string& name) const
+{
+    const auto all = people();
+    const auto at = std::ranges::find(all, name, &Person::name);
+    if (at != all.end()) {
+        return *at;
+    }
+    std::vector<std::string> names;
+    for (const Person& one : all) {
+        names.push_back(one.name);
+    }
+    const std::string meant = base::nearest(name, names);
+    throw std::runtime_error(
+        fmt::format("{}: there is no such profile{}", name,
+                    meant.empty() ? "; palpate profile new makes one" : "; did you mean " + meant + "?"));
+}
+
+std::int64_t ProfileStore::store(const Person& person, const StoredSession& s)
+{
+    return guarded(impl_->file, [&] {
+        Transaction all(*impl_->database);
+        if (!s.recordSha256.empty()) {
+            Statement known(*impl_->database, "SELECT id FROM session WHERE person = ? AND record_sha256 = ?");
+            known.bind(1, person.id);
+            known.bind(2, std::string_view(s.recordSha256));
+            if (known.step()) {
+                throw std::runtime_error(
+                    fmt::format("{} has this session already, number {}", person.name, known.integer(0)));
+            }
+        }
+        Statement insert(
+            *impl_->database,
+            "INSERT INTO session (person, started, case_id, curriculum, exercise, test, guidance, scene, device, build, "
+            "record, record_sha256, taken) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
+        int c = 0;
+        insert.bind(++c, person.id);
+        for (const std::string* text : {&s.started, &s.caseId, &s.curriculum, &s.exercise}) {
+            insert.bind(++c, std::string_view(*text));
+        }
+        insert.bind(++c, static_cast<std::int64_t>(s.test));
+        insert.bind(++c, s.guidance);
+        for (const std::string* text : {&s.scene, &s.device, &s.build, &s.record, &s.recordSha256}) {
+            insert.bind(++c, std::string_view(*text));
+        }
+        insert.bind(++c, static_cast<std::int64_t>(s.taken));
+        insert.run();
+        const std::int64_t id = sqlite3_last_insert_rowid(impl_->database->get());
+        for (const auto& [key, value] : s.values) {
+            Statement measure(*impl_->database, "INSERT INTO measure VALUES (?, ?, ?)");
+            measure.bind(1, id);
+            measure.bind(2, std::string_view(key));
+            measure.bind(3, value);
+            measure.run();
+        }
+        all.commit();
+        return id;
+    });
+}
+
+std::vector<StoredSession> ProfileStore::sessions(const Person& person) const
+{
+    return guarded(impl_->file, [&] {
+        std::vector<StoredSession> all;
+        Statement select(*impl_->database,
+                         fmt::format("SELECT {} FROM session WHERE person = ? ORDER BY started, id", sessionColumns));
+        select.bind(1, person.id);
+        while (select.step()) {
+            all.push_back(readSession(select));
+            Statement measures(*impl_->database, "SELECT key, value FROM measure WHERE session = ?");
+            measures.bind(1, all.back().id);
+            while (measures.step()) {
+                all.back().values[std::string(measures.text(0))] = measures.real(1);
+            }
+        }
+        return all;
+    });
+}
+
+void ProfileStore::annotate(const Person& person, std::int64_t session, const std::string& note, int rating)
+{
+    guarded(impl_->file, [&] {
+        if (rating < 0 || rating > 5) {
+            throw std::runtime_error(fmt::format("rating {}: must be 1 to 5, or 0 for none", rating));
+        }
+        Statement update(*impl_->database, "UPDATE session SET note = ?, rating = ? WHERE id = ? AND person = ?");
+        update.bind(1, std::string_view(note));
+        update.bind(2, static_cast<std::int64_t>(rating));
+        update.bind(3, session);
+        update.bind(4, person.id);
+        update.run();
+        if (sqlite3_changes(impl_->database->get()) == 0) {
+            throw std::runtime_error(
+                fmt::format("{} has no session {}: palpate progress lists them", person.name, session));
+        }
+    });
+}
+
+nlohmann::json ProfileStore::exported(const Person& person) const
+{
+    nlohmann::json out = {{"name", person.name},
+                          {"hand", person.hand == Hand::left ? "left" : "right"},
+                          {"created", person.created},
+                          {"sessions", nlohmann::json::array()}};
+    for (const StoredSession& s : sessions(person)) {
+        nlohmann::json values = nlohmann::json::object();
+        for (const auto& [key, value] : s.values) {
+            values[key] =
+                std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(value > 0 ? "infinite" : "-infinite");
+        }
+        out["sessions"].push_back({{"id", s.id},
+                                   {"started", s.started},
+                                   {"case", s.caseId},
+                                   {"curriculum", s.curriculum},
+                                   {"exercise", s.exercise},
+                                   {"mode", s.test ? "test" : "practice"},
+                                   {"guidance", s.guidance},
+                                   {"scene", s.scene},
+                                   {"device", s.device},
+                                   {"build", s.build},
+                                   {"record", s.record},
+                                   {"record_sha256", s.recordSha256},
+                                   {"taken_from_record", s.taken},
+                                   {"note", s.note},
+                                   {"rating", s.rating},
+                                   {"measures", values}});
+    }
+    return out;
+}
+
+std::vector<fs::path> ProfileStore::erase(const Person& person)
+{
+    std::vector<fs::path> stay;
+    const auto known = sessions(person);
+    guarded(impl_->file, [&] {
+        Transaction all(*impl_->database);
+        Statement remove(*impl_->database, "DELETE FROM person WHERE id = ?");
+        remove.bind(1, person.id);
+        remove.run();
+        all.commit();
+        // Overwritten in the file by secure_delete; now also out of the write-ahead log and the free pages.
+        impl_->database->execute("PRAGMA wal_checkpoint(TRUNCATE); VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
+    });
+    for (const StoredSession& s : known) {
+        std::error_code none;
+        if (!s.record.empty() && isIn(s.record, recordFolder())) {
+            fs::remove(s.record, none);
+        } else if (!s.record.empty() && fs::exists(s.record, none)) {
+            stay.emplace_back(s.record);
+        }
+    }
+    return stay;
+}
+
+void ProfileStore::backup(const fs::path& to) const
+{
+    if (fs::exists(to)) {
+        throw std::runtime_error(to.string() + ": exists already; choose another name or remove it");
+    }
+    const fs::path part = to.string() + fmt::format(".{}.part", ::getpid());
+    try {
+        makePrivate(part);
+        Database copy(part.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+        sqlite3_backup* const job = sqlite3_backup_init(copy.get(), "main", impl_->database->get(), "main");
+        if (job == nullptr) {
+            throw std::runtime_error(sqlite3_errmsg(copy.get()));
+        }
+        const int done = sqlite3_backup_step(job, -1);
+        if (sqlite3_backup_finish(job); done != SQLITE_DONE) {
+            throw std::runtime_error(sqlite3_errstr(done));
+        }
+        copy.execute("PRAGMA journal_mode = DELETE");
+        fs::rename(part, to);
+    } catch (const std::exception& e) {
+        std::error_code none;
+        for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
+            fs::remove(part.string() + suffix, none);
+        }
+        throw std::runtime_error(fmt::format("{}: no backup was made: {}", to.string(), e.what()));
+    }
+}
+
+}  // namespace palpate::training

@@ -1,0 +1,104 @@
+#pragma once
+
+#include <haptics/recorder.h>
+#include <haptics/score.h>
+#include <training/gate.h>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::training {
+
+enum class Hand : std::uint8_t { right, left };
+
+/// Somebody who trains. The name may be a pseudonym.
+struct Person {
+    std::int64_t id = 0;
+    std::string name;
+    Hand hand = Hand::right;
+    std::string created;  // UTC, "2026-11-22T09:14:05Z"
+    int sessions = 0;     // stored
+};
+
+/// A session as it is kept: what it was, and all its measures.
+struct StoredSession {
+    std::int64_t id = 0;
+    std::string started;               // UTC, "2026-11-22T09:14:05Z"
+    std::string caseId;                // empty: none
+    std::string curriculum, exercise;  // empty: outside one
+    bool test = false;                 // test mode; else practice
+    double guidance = 1;               // share of the guiding force, 0 to 1
+    std::string scene, device, build;
+    std::string record;        // file; empty: none was kept
+    std::string recordSha256;  // its seal; empty: none
+    bool taken = false;        // taken in from a record afterwards, not stored by the session itself
+    Values values;             // all measures, by key; those without a value are missing
+    std::string note;          // of an instructor
+    int rating = 0;            // global rating, 1 to 5; 0: none
+};
+
+/// All measures of a score, as a store keeps them. Infinite ones stay; what is not a number is left out.
+Values valuesOf(const haptics::Score& score);
+
+/// The keys in SessionInfo::extra under which a record says what its session was trained for.
+inline constexpr const char* caseKey = "case";
+inline constexpr const char* exerciseKey = "exercise";  // "CURRICULUM/EXERCISE"
+inline constexpr const char* modeKey = "mode";          // "practice" or "test"
+inline constexpr const char* guidanceKey = "guidance";  // 0 to 1
+
+/// People and their sessions in one SQLite file of mode 0600. Every change is one transaction, which is on the disk when
+/// the call returns; a process that is killed leaves all of it or nothing. Several processes may have it open. All calls
+/// throw std::runtime_error ("FILE: what is wrong and what to do").
+class ProfileStore {
+public:
+    /// Opens the file, or makes it and its folder (mode 0700). One of an older version is brought up to date in one
+    /// transaction; one of a newer version, or of another program, is refused.
+    explicit ProfileStore(const std::filesystem::path& file);
+    ~ProfileStore();
+    ProfileStore(ProfileStore&&) noexcept;
+
+    /// $XDG_DATA_HOME/palpate/profiles.db, see userData().
+    static std::filesystem::path standardFile();
+    const std::filesystem::path& file() const noexcept;
+    /// The folder "records" beside the file, where sessions of profiles keep their records.
+    std::filesystem::path recordFolder() const;
+
+    /// @param name  1 to 100 bytes of text in one line; none that is there
+    Person add(const std::string& name, Hand hand);
+    std::vector<Person> people() const;
+    /// Refuses a name that is not there, with the nearest that is.
+    Person find(const std::string& name) const;
+
+    /// @returns  the session's id
+    std::int64_t store(const Person& person, const StoredSession& session);
+    /// By start.
+    std::vector<StoredSession> sessions(const Person& person) const;
+    /// An instructor's words and global rating (1 to 5; 0: none) of a session of this person.
+    void annotate(const Person& person, std::int64_t session, const std::string& note, int rating);
+
+    /// Everything that is known of a person.
+    nlohmann::json exported(const Person& person) const;
+    /// Removes a person, all sessions and notes, so that nothing of it is left in the file, and the records in
+    /// recordFolder(). @returns  records elsewhere, which stay
+    std::vector<std::filesystem::path> erase(const Person& person);
+    /// A copy of the whole file as it is at one moment, also while sessions are stored. Appears whole, mode 0600; refuses a
+    /// file that is there.
+    void backup(const std::filesystem::path& to) const;
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Takes in a session from its record, e.g. from another machine: measures computed from the ticks, what it was trained for
+/// from the record. Throws std::runtime_error where the person has it already, and for a record that was changed or not
+/// closed.
+StoredSession sessionOf(const std::filesystem::path& record);
+
+}  // namespace palpate::training

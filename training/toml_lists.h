@@ -1,0 +1,19 @@
+#pragma once
+
+// What cases and curricula read alike; no public header.
+
+#include <datasets/toml_section.h>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate::training {
+
+/// The texts of a list; none where the key is missing. Throws std::runtime_error for anything but a list of texts.
+std::vector<std::string> wordsOf(datasets::Section& section, std::string_view key);
+
+/// Refuses the name of a measure that haptics::measures() does not have.
+void checkMeasure(const datasets::Section& section, std::string_view key, const std::string& measure);
+
+}  // namespace palpate::training
