@@ -26,6 +26,7 @@ namespace palpate::apps {
 namespace {
 
 constexpr std::size_t mostColumns = 12;  // sessions beside one another in a table
+constexpr std::size_t shownLosses = 3;
 
 using haptics::Score;
 using nlohmann::json;
@@ -42,6 +43,7 @@ struct Session {
     std::string operatorName, host, started, sha256;
     bool complete = true;
     Score score;
+    std::vector<haptics::Loss> losses;
     std::vector<std::string> warnings;
 };
 
@@ -58,9 +60,12 @@ std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessio
     }
     const haptics::Record record(file);
     const haptics::SessionInfo& info = record.info();
+    haptics::LossWatch watch(info);
+    record.each([&](const haptics::TickRecord& tick) { watch.add(tick); });
     haptics::RecordCheck check = haptics::checkRecord(record, base::build());
     sessions.push_back({file, info.scene, info.model, info.device, info.operatorName, info.host, info.started,
-                        check.seal.sha256, record.complete(), haptics::scoreOf(record), std::move(check.warnings)});
+                        check.seal.sha256, record.complete(), watch.score(), watch.losses(info),
+                        std::move(check.warnings)});
     return sessions.size() - 1;
 }
 
@@ -84,7 +89,7 @@ report::ScoredGroup scored(const Group& group, const std::vector<Session>& sessi
 {
     report::ScoredGroup out{group.name, {}};
     for (const std::size_t i : group.sessions) {
-        out.scores.push_back(sessions[i].score);
+        out.sessions.push_back(report::rowOf(sessions[i].score));
     }
     return out;
 }
@@ -107,7 +112,7 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
 {
     json out = {{"sessions", json::array()}};
     for (const Session& s : sessions) {
-        json one = session::scoreFigures(s.score);
+        json one = session::scoreFigures(s.score, s.losses);
         one.update({{"file", s.file.string()},
                     {"scene", s.scene},
                     {"model", s.model},
@@ -184,6 +189,9 @@ void printSessions(const std::vector<Session>& sessions)
     } else if (sessions.size() == 1) {
         for (const auto& [label, value] : haptics::describe(sessions[0].score)) {
             std::printf("%-26s %s\n", label.c_str(), value.c_str());
+        }
+        for (std::size_t i = 0; i < std::min<std::size_t>(sessions[0].losses.size(), shownLosses); ++i) {
+            std::printf("%s\n", haptics::inWords(sessions[0].losses[i]).c_str());
         }
     } else {
         std::vector<std::string> heads;
@@ -262,7 +270,7 @@ void run(const Options& options)
             }
             report::writeGroupReport(options.report, all);
         } else if (sessions.size() == 1) {
-            report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures);
+            report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures, sessions[0].file);
         } else {
             throw std::runtime_error(options.report.string() +
                                      ": a report is of one record or of groups: give one file, or --group NAME=FILE,FILE");

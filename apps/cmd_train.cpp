@@ -73,25 +73,6 @@ struct Options {
     session::Faults faults;  // what `inject` says
 };
 
-nlohmann::json coreFigures(const session::TrainResult& result, const haptics::SessionInfo& info)
-{
-    auto cores = nlohmann::json::array();
-    for (const auto& core : result.cores) {
-        nlohmann::json fraction = nlohmann::json::object();
-        for (std::size_t i = 0; i < info.tissues.size(); ++i) {
-            if (core.fraction[i] > 0.0) {
-                fraction[info.tissues[i]] = core.fraction[i];
-            }
-        }
-        cores.push_back({{"fraction", fraction},
-                         {"target_fraction", core.targetFraction},
-                         {"length_in_lesion_mm", 1e3 * core.targetLength},
-                         {"fragments", core.fragments},
-                         {"volume_mm3", 1e9 * core.volume}});
-    }
-    return cores;
-}
-
 nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
                          const datasets::ModelSettings& model)
 {
@@ -113,8 +94,8 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
         nearest[info.structures[i]] = 1e3 * result.nearest[i];
     }
     figures["nearest_mm"] = nearest;
-    figures["score"] = session::scoreFigures(result.score);
-    figures["core"] = coreFigures(result, info);
+    figures["score"] = session::scoreFigures(result.score, result.losses);
+    figures["core"] = session::coreFigures(result.cores, info.tissues);
     figures["force_hash"] = session::hexadecimal(result.forceHash);
     figures["peak_memory_mb"] = session::peakMemoryMb();
     figures["lost_records"] = result.lostRecords;
@@ -311,7 +292,7 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
     }
     if (!o.report.empty()) {
         const fs::path pictures = fs::is_directory(o.pictures) ? o.pictures : "";  // not there when the viewer failed
-        if (attempt([&] { report::writeReport(o.report, haptics::Record(recordFile(o)), pictures); })) {
+        if (attempt([&] { report::writeReport(o.report, haptics::Record(recordFile(o)), pictures, recordFile(o)); })) {
             there.emplace_back("report", o.report);
         }
     }
@@ -350,6 +331,21 @@ void applyTraining(Options& o, const Training& training)
     }
     if (o.record.empty() && o.report.empty()) {
         o.record = training.record().string();
+    }
+}
+
+// What else there is to say after a session, a line each.
+void tell(const std::string& fitted, const std::vector<std::pair<const char*, std::string>>& written,
+          const std::vector<std::string>& kept)
+{
+    if (!fitted.empty()) {
+        fmt::print("{} (--setting says otherwise)\n", fitted);
+    }
+    for (const auto& [name, file] : written) {
+        fmt::print("{}: {}\n", name, file);
+    }
+    for (const std::string& line : kept) {
+        fmt::print("{}\n", line);
     }
 }
 
@@ -416,19 +412,11 @@ void train(Options o)
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     const auto written = writeOutputs(o, info, model.scene.model, viewers, took, result);
     const bool counts = result.signal == 0 && !result.faulted;
-    const auto kept = counts ? training.keep(info, result.score, record) : std::vector<std::string>{};
+    const auto kept = counts ? training.keep(info, result, record) : std::vector<std::string>{};
 
     if (o.json != "-") {
         summarise(result, info, model.scene.model);
-        if (!fitted.empty()) {
-            fmt::print("{} (--setting says otherwise)\n", fitted);
-        }
-        for (const auto& [name, file] : written) {
-            fmt::print("{}: {}\n", name, file);
-        }
-        for (const std::string& line : kept) {
-            fmt::print("{}\n", line);
-        }
+        tell(fitted, written, kept);
     }
     if (result.signal != 0) {
         throw command::Interrupted(

@@ -103,11 +103,15 @@ void Training::describe(haptics::SessionInfo& info) const
     }
 }
 
-std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const haptics::Score& score,
+std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
                                         const fs::path& record)
 {
+    constexpr std::size_t shown = 3;
     std::vector<std::string> lines;
-    const training::Values values = training::valuesOf(score);
+    for (std::size_t i = 0; i < std::min(shown, figures.losses.size()); ++i) {
+        lines.push_back(haptics::inWords(figures.losses[i]));
+    }
+    const training::Values values = training::valuesOf(figures.score);
     if (exercise_ != nullptr) {
         lines.push_back(fmt::format("{}: this session {} its level", exercise_->title,
                                     training::meets(exercise_->gate, values) ? "reached" : "did not reach"));

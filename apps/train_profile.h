@@ -37,8 +37,8 @@ public:
     std::filesystem::path record() const;
     /// What the record says of it.
     void describe(haptics::SessionInfo& info) const;
-    /// Keeps the session in the profile. @returns  what there is to say, a line each
-    std::vector<std::string> keep(const haptics::SessionInfo& info, const haptics::Score& score,
+    /// Keeps the session in the profile. @returns  what there is to say, a line each: the largest losses of points first
+    std::vector<std::string> keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
                                   const std::filesystem::path& record);
     const std::string& profile() const noexcept { return options_.profile; }
 

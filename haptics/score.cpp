@@ -79,8 +79,10 @@ ScoreParts parts(const Score& s) noexcept
     }
     p.vital = 25 * std::max(0.0, 1 - 0.4 * s.vitalContacts - 0.1 * s.vitalSeconds - 0.1 * s.vitalDepth * 1e3);
     if (s.marks > 0) {
-        p.core = 30 * ramp(s.markError, 2e-3, 20e-3) + 20 * ramp(s.markSizeError, 2e-3, 15e-3);
-        p.technique = 25 * ramp(s.peakForce, 4, 8.5);
+        // Who marked another place has neither sized the target nor found it gently.
+        const double near = ramp(s.markError, 10e-3, 20e-3);
+        p.core = 30 * ramp(s.markError, 2e-3, 20e-3) + 20 * near * ramp(s.markSizeError, 2e-3, 15e-3);
+        p.technique = 25 * near * ramp(s.peakForce, 4, 8.5);
         return p;
     }
     if (s.passes == 0) {

@@ -15,6 +15,7 @@ constexpr double depthBin = 0.5;          // [mm]
 constexpr double directionLength = 0.25;  // a change of direction shorter than this is noise [mm]
 constexpr double pathStep = 0.5;          // [mm]
 constexpr std::size_t markedEvents = 200;
+constexpr std::size_t mostEntries = 20;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 TaskTime percentiles(std::vector<float>& seconds)
@@ -87,7 +88,7 @@ struct Collector {
     Collector(const haptics::SessionInfo& info, std::uint64_t ticks)
         : rate(info.rate),
           structures(std::min(info.structures.size(), haptics::maxStructures)),
-          scorer(info),
+          watch(info),
           forces(4, ticks, pointsPerChart),
           distances(2 + structures, ticks, pointsPerChart),
           energy(3, ticks, pointsPerChart),
@@ -100,7 +101,7 @@ struct Collector {
     {
         const double seconds = static_cast<double>(r.tick) / rate;
         const double total = glm::length(r.total);
-        scorer.add(r);
+        watch.add(r);
         forces.add({seconds, glm::length(r.basic), glm::length(r.additional), total});
         energy.add({seconds, r.energy * 1e3, r.damped * 1e3});
         row[0] = seconds;
@@ -152,6 +153,10 @@ struct Collector {
             glm::distance(data.path.back().tip, point.tip) > pathStep) {
             data.path.push_back(point);
         }
+        if (r.phase != haptics::Phase::free && outside && data.entries.size() < mostEntries) {
+            data.entries.push_back(point.tip);
+        }
+        outside = r.phase == haptics::Phase::free;
         const bool down = (r.device.buttons & haptics::buttonMark) != 0;
         if (down && !markDown) {
             data.marks.push_back(point.tip);
@@ -174,9 +179,9 @@ struct Collector {
 
     double rate;
     std::size_t structures;
-    bool markDown = false;
+    bool markDown = false, outside = true;
     std::vector<std::vector<double>> nearest;  // by bin, then structure [mm]
-    haptics::Scorer scorer;
+    haptics::LossWatch watch;
     Decimator forces, distances, energy;
     std::vector<double> row;
     ProfileBuilder profile;
@@ -256,7 +261,8 @@ ReportData collect(const haptics::Record& record)
 {
     Collector c(record.info(), record.ticks());
     record.each([&](const haptics::TickRecord& tick) { c.add(tick); });
-    c.data.score = c.scorer.score();
+    c.data.score = c.watch.score();
+    c.data.losses = c.watch.losses(record.info());
     c.data.forces = c.forces.finish();
     c.data.distances = c.distances.finish();
     c.data.energy = c.energy.finish();

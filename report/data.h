@@ -2,6 +2,7 @@
 
 // What a report draws, collected in one pass over a record.
 
+#include <haptics/losses.h>
 #include <haptics/recorder.h>
 #include <haptics/score.h>
 
@@ -65,7 +66,8 @@ struct TaskTime {
 
 struct ReportData {
     haptics::Score score;
-    double seconds = 0;  // of the record
+    std::vector<haptics::Loss> losses;  // the largest first
+    double seconds = 0;                 // of the record
     std::uint64_t ticks = 0;
     std::vector<std::vector<double>> forces;     // seconds; basic, additional, total [N]
     std::vector<std::vector<double>> distances;  // seconds; inserted depth, then each structure [mm]
@@ -74,6 +76,7 @@ struct ReportData {
     std::vector<std::vector<double>>
         nearest;                      // by bin of the profile: its depth, then the least distance to each structure [mm]
     std::vector<PathPoint> path;      // thinned out to steps of half a millimetre
+    std::vector<Vec3> entries;        // where the tip first touched the body on each way in [mm]
     std::vector<Vec3> marks;          // where the trainee marked something [mm]
     std::vector<MarkedEvent> events;  // the first 200
     std::uint64_t eventCount = 0;

@@ -13,70 +13,147 @@ namespace palpate::report {
 
 namespace {
 
-constexpr double plotWidth = 420, rowHeight = 14, pad = 8;  // of a strip of dots [px]
+// Of a drawing [px]: the strips of dots of all groups, below them an axis.
+constexpr double plotWidth = 430, rowHeight = 18, nameWidth = 96, right = 12, axisHeight = 20;
 
 std::string number(double value, int decimals)
 {
     return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
 }
 
-// One row of dots per group on a common axis, with a bar from the lower to the upper quartile and a line at the median.
-std::string strip(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
+// Which colour a group has in all drawings.
+std::string colourOf(std::size_t group)
 {
+    return fmt::format("var(--c{})", group % 7);
+}
+
+struct Range {
     double low = INFINITY, high = -INFINITY;
+};
+
+Range rangeOf(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
+{
+    Range range;
     for (const ScoredGroup& g : groups) {
         for (const double v : valuesOf(g, measure)) {
-            low = std::isfinite(v) ? std::min(low, v) : low;
-            high = std::isfinite(v) ? std::max(high, v) : high;
+            range.low = std::isfinite(v) ? std::min(range.low, v) : range.low;
+            range.high = std::isfinite(v) ? std::max(range.high, v) : range.high;
         }
     }
-    const double span = high > low ? high - low : 1.0;
-    const auto x = [&](double v) {
-        return std::isfinite(v) && std::isfinite(low) ? pad + (plotWidth - 2 * pad) * (v - low) / span : plotWidth - 2;
-    };
-    std::string out = fmt::format("<svg width=\"{:.0f}\" height=\"{:.0f}\" role=\"img\" aria-label=\"{}\">", plotWidth,
-                                  rowHeight * static_cast<double>(groups.size()), measure.key);
-    double y = rowHeight / 2;
+    return range;
+}
+
+// Whether no session differs from another: also not in having no value.
+bool constant(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
+{
+    std::vector<double> all;
     for (const ScoredGroup& g : groups) {
         const auto values = valuesOf(g, measure);
+        all.insert(all.end(), values.begin(), values.end());
+    }
+    return std::ranges::all_of(all, [&](double v) { return v == all.front(); });
+}
+
+// 1, 2 or 5 times a power of ten, so that a range has two to five steps.
+double stepOf(double span)
+{
+    const double ten = std::pow(10, std::floor(std::log10(span)));
+    const double part = span / ten;
+    return part >= 4 ? ten : part >= 2 ? ten / 2 : ten / 5;
+}
+
+std::string axisBelow(const Range& range, double y, const auto& x)
+{
+    const double step = stepOf(std::max(range.high - range.low, 1e-9));
+    const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
+    std::string out = fmt::format("<line x1=\"{:.0f}\" y1=\"{:.1f}\" x2=\"{:.0f}\" y2=\"{:.1f}\" class=\"axis\"/>",
+                                  nameWidth, y, plotWidth - right, y);
+    for (double at = std::ceil(range.low / step - 1e-9) * step; at <= range.high + 1e-9 * step; at += step) {
+        out += fmt::format(
+            "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" class=\"axis\"/><text x=\"{0:.1f}\" "
+            "y=\"{3:.1f}\" "
+            "text-anchor=\"middle\">{4:.{5}f}</text>",
+            x(at), y, y + 4, y + 15, at + 0.0, decimals);
+    }
+    return out;
+}
+
+// One row of dots per group on a common axis, with a bar from the lower to the upper quartile and a line at the median. A
+// value that is not there stands at the right edge.
+std::string strip(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
+{
+    const Range range = rangeOf(groups, measure);
+    const double span = range.high > range.low ? range.high - range.low : 1.0;
+    const auto x = [&](double v) {
+        return std::isfinite(v) ? nameWidth + 6 + (plotWidth - nameWidth - right - 14) * (v - range.low) / span
+                                : plotWidth - 5;
+    };
+    const double height = rowHeight * static_cast<double>(groups.size());
+    std::string out = fmt::format("<svg class=\"strip\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">",
+                                  plotWidth, height + axisHeight, measure.label);
+    double y = rowHeight / 2;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+        const auto values = valuesOf(groups[i], measure);
         const double first = x(quantile(values, 0.25)), last = x(quantile(values, 0.75)), middle = x(quantile(values, 0.5));
-        out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"10\" fill=\"#8ab\" opacity=\"0.4\"/>",
-                           first, y - 5, std::max(1.0, last - first));
+        const std::string name = groups[i].name.size() > 14 ? groups[i].name.substr(0, 13) + "." : groups[i].name;
+        out += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", nameWidth - 6, y + 4,
+                           escape(name));
+        out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"12\" fill=\"{}\" opacity=\"0.25\"/>",
+                           first, y - 6, std::max(1.0, last - first), colourOf(i));
         for (const double v : values) {
-            out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2\" fill=\"#357\" opacity=\"0.5\"/>", x(v), y);
+            out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.4\" fill=\"{}\" opacity=\"0.6\"/>", x(v), y,
+                               colourOf(i));
         }
-        out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"2\" height=\"12\" fill=\"#c33\"/>", middle - 1, y - 6);
+        out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"2.4\" height=\"14\" class=\"median\"/>", middle - 1.2,
+                           y - 7);
         y += rowHeight;
     }
-    return out + "</svg>";
+    return out + axisBelow(range, height, x) + "</svg>";
+}
+
+std::string titleOf(const haptics::Measure& measure)
+{
+    return fmt::format("{}{}{}{}", escape(measure.label), *measure.unit == 0 ? "" : " [", escape(measure.unit),
+                       *measure.unit == 0 ? "" : "]");
 }
 
 std::string row(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
 {
     const int decimals = measure.decimals + (measure.decimals == 0 ? 1 : 0);
     std::string medians, deltas;
-    for (const ScoredGroup& g : groups) {
-        const auto values = valuesOf(g, measure);
-        medians += fmt::format("{}{} ({} to {})", medians.empty() ? "" : "<br>", number(quantile(values, 0.5), decimals),
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+        const auto values = valuesOf(groups[i], measure);
+        medians += fmt::format("<div><i style=\"background:{}\"></i>{}: {} ({} to {})</div>", colourOf(i),
+                               escape(groups[i].name), number(quantile(values, 0.5), decimals),
                                number(quantile(values, 0.25), decimals), number(quantile(values, 0.75), decimals));
     }
     for (std::size_t b = 1; b < groups.size(); ++b) {
-        deltas += fmt::format("{}{:+.2f}", b > 1 ? "<br>" : "",
+        deltas += fmt::format("<div>over {}: {:+.2f}</div>", escape(groups[b].name),
                               cliffsDelta(valuesOf(groups[0], measure), valuesOf(groups[b], measure)));
     }
-    return fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>", escape(measure.title), medians,
-                       strip(groups, measure), deltas);
+    return fmt::format("<tr><th>{}</th><td class=\"key\">{}</td><td>{}</td><td class=\"n\">{}</td></tr>", titleOf(measure),
+                       medians, strip(groups, measure), deltas);
 }
 
 }  // namespace
 
 std::vector<double> valuesOf(const ScoredGroup& group, const haptics::Measure& measure)
 {
+    const auto column = static_cast<std::size_t>(&measure - haptics::measures().data());
     std::vector<double> values;
-    for (const haptics::Score& s : group.scores) {
-        values.push_back(measure.value(s));
+    for (const std::vector<double>& session : group.sessions) {
+        values.push_back(session[column]);
     }
     return values;
+}
+
+std::vector<double> rowOf(const haptics::Score& score)
+{
+    std::vector<double> row;
+    for (const haptics::Measure& m : haptics::measures()) {
+        row.push_back(m.value(score));
+    }
+    return row;
 }
 
 double quantile(std::vector<double> values, double share)
@@ -101,29 +178,44 @@ double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b)
     return above / static_cast<double>(a.size() * b.size());
 }
 
+std::string groupsPart(const std::vector<ScoredGroup>& groups)
+{
+    std::string names, same;
+    for (std::size_t i = 0; i < groups.size(); ++i) {
+        names += fmt::format("<span><i style=\"background:{}\"></i>{} ({} sessions)</span>", colourOf(i),
+                             escape(groups[i].name), groups[i].sessions.size());
+    }
+    std::string rows;
+    for (const haptics::Measure& m : haptics::measures()) {
+        if (!constant(groups, m)) {
+            rows += row(groups, m);
+            continue;
+        }
+        const double value = groups[0].sessions.empty() ? INFINITY : valuesOf(groups[0], m)[0];
+        same += fmt::format("{}{} {}", same.empty() ? "" : ", ", titleOf(m),
+                            std::isfinite(value) ? number(value, m.decimals) : "without a value");
+    }
+    std::string body = "<header><div><h1>Groups compared</h1><p class=\"key\">" + names +
+                       "</p><p>A dot is a session, the bar goes from the lower to the upper quartile, the line is the "
+                       "median; a dot beyond the "
+                       "axis has no value. Cliff's delta says how much more often a value of " +
+                       escape(groups[0].name) +
+                       " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 "
+                       "are small, medium and "
+                       "large.</p></div></header><section class=\"card\"><div class=\"scroll\"><table "
+                       "class=\"plain\"><thead><tr><th>Measure</th>"
+                       "<th>Median (quartiles)</th><th>Sessions</th><th class=\"n\">" +
+                       (groups.size() > 1 ? "Cliff's delta of " + escape(groups[0].name) : "") +
+                       "</th></tr></thead><tbody>" + rows + "</tbody></table></div>";
+    if (!same.empty()) {
+        body += "<p class=\"note\">The same in all sessions: " + same + ".</p>";
+    }
+    return body + "</section>";
+}
+
 void writeGroupReport(const std::filesystem::path& html, const std::vector<ScoredGroup>& groups)
 {
-    std::string names, others;
-    for (const ScoredGroup& g : groups) {
-        names += fmt::format("{}{} ({} sessions)", names.empty() ? "" : ", ", escape(g.name), g.scores.size());
-        others += &g == groups.data() ? "" : (others.empty() ? "" : "<br>") + escape(g.name);
-    }
-    std::string body =
-        "<header><div><h1>Groups compared</h1><p>From top to bottom in every row: " + names +
-        ". A dot is a session, the bar goes from the lower to the upper quartile, the line is the median. "
-        "Cliff's delta says how much more often a value of " +
-        escape(groups[0].name) +
-        " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 are "
-        "small, medium and large.</p></div></header><section class=\"card\"><table><tr><th>measure</th><th>median "
-        "(quartiles)</th><th></th><th>Cliff's delta over<br>" +
-        others + "</th></tr>";
-    for (const haptics::Measure& m : haptics::measures()) {
-        const bool any = std::ranges::any_of(groups, [&](const ScoredGroup& g) {
-            return std::ranges::any_of(valuesOf(g, m), [](double v) { return std::isfinite(v); });
-        });
-        body += any ? row(groups, m) : "";
-    }
-    base::writeWhole(html, page("Groups - Palpate", body + "</table></section>", {{"charts", nlohmann::json::object()}}));
+    base::writeWhole(html, page("Groups - Palpate", groupsPart(groups), {{"charts", nlohmann::json::object()}}));
 }
 
 }  // namespace palpate::report

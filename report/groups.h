@@ -13,8 +13,11 @@ namespace palpate::report {
 /// Sessions of one kind of trainee.
 struct ScoredGroup {
     std::string name;
-    std::vector<haptics::Score> scores;
+    std::vector<std::vector<double>> sessions;  // a row each: its values in the order of haptics::measures()
 };
+
+/// A row of a group.
+std::vector<double> rowOf(const haptics::Score& score);
 
 std::vector<double> valuesOf(const ScoredGroup& group, const haptics::Measure& measure);
 
@@ -27,8 +30,13 @@ double quantile(std::vector<double> values, double share);
 /// 1993.
 double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b);
 
-/// Writes the page: every session as a dot, medians and quartiles of each group, Cliff's delta of the first group over the
-/// others. Needs no other file. Throws std::runtime_error.
+/// The comparison as part of a page: heading, what the drawings mean, a table.
+/// @pre  at least one group; every row is whole
+std::string groupsPart(const std::vector<ScoredGroup>& groups);
+
+/// Writes the page: every session as a dot on a common axis, medians and quartiles of each group, Cliff's delta of the
+/// first group over the others. Measures that are the same in all sessions are only named. Needs no other file. Throws
+/// std::runtime_error.
 void writeGroupReport(const std::filesystem::path& html, const std::vector<ScoredGroup>& groups);
 
 }  // namespace palpate::report

@@ -1,5 +1,7 @@
 #include <report/html.h>
 
+#include <base/spoken.h>
+#include <datasets/tables.h>
 #include <haptics/measures.h>
 #include <haptics/record_check.h>
 #include <report/assets.h>
@@ -46,14 +48,15 @@ std::string escape(std::string_view text)
 
 namespace {
 
-std::string colour(std::size_t i)
+// For tissues that the built-in table does not have.
+std::string otherColour(std::size_t i)
 {
-    return "c" + std::to_string(i % 8);
+    return "var(--c" + std::to_string(i % 8) + ")";
 }
 
 std::string nameOf(const std::vector<std::string>& names, std::size_t i)
 {
-    return i < names.size() ? names[i] : "row " + std::to_string(i);
+    return i < names.size() ? base::spoken(names[i]) : "row " + std::to_string(i);
 }
 
 std::string plural(std::uint32_t n, std::string_view one, std::string_view many)
@@ -111,6 +114,17 @@ std::string lateness(const haptics::Record& record)
 
 }  // namespace
 
+std::string tissueColour(const std::string& tissue)
+{
+    static const volume::TissueTable table = datasets::defaultTissues();
+    const auto row = std::ranges::find(table.rows, tissue, &volume::TissueRow::name);
+    if (row == table.rows.end()) {
+        return {};
+    }
+    const auto byte = [](float v) { return std::lround(255 * std::clamp(v, 0.0F, 1.0F)); };
+    return fmt::format("#{:02x}{:02x}{:02x}", byte(row->colour.x), byte(row->colour.y), byte(row->colour.z));
+}
+
 std::string embedded(const nlohmann::json& data)
 {
     const std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -145,7 +159,7 @@ std::string page(std::string_view title, std::string_view body, const nlohmann::
     return out + "</body></html>\n";
 }
 
-std::string header(const ReportData& d, const haptics::Record& record)
+std::string header(const ReportData& d, const haptics::Record& record, const std::string& file)
 {
     const haptics::SessionInfo& info = record.info();
     constexpr double round = 2 * 3.14159265 * 52;
@@ -157,8 +171,10 @@ std::string header(const ReportData& d, const haptics::Record& record)
         d.score.total, std::max(d.score.total / 100 * round, 0.01), round);
     out += fmt::format(
         "<div><p class=\"eyebrow\">Palpate session &middot; model {} &middot; device {}</p><h1>{}</h1>"
-        "<p class=\"outcome\">{}</p></div></header>",
-        escape(info.model), escape(info.device), escape(info.scene), outcome(d, record));
+        "<p class=\"outcome\">{}</p>{}</div></header>",
+        escape(info.model), escape(info.device), escape(info.scene), outcome(d, record),
+        file.empty() ? ""
+                     : "<p class=\"note\">To see it again: <code>palpate-view --replay " + escape(file) + "</code></p>");
     if (!record.complete()) {
         out +=
             "<p class=\"warning\">The program that wrote this record was stopped before the session ended. Everything up "
@@ -173,17 +189,26 @@ std::string header(const ReportData& d, const haptics::Record& record)
     return out;
 }
 
-std::string scoreCard(const haptics::Score& score)
+std::string scoreCard(const ReportData& d)
 {
-    const haptics::ScoreParts p = haptics::parts(score);
+    const haptics::ScoreParts p = haptics::parts(d.score);
     std::string out = "<section class=\"card\"><h2>Score</h2><div class=\"parts\">";
     for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
         out += fmt::format(
             "<div><span>{} <b>{:.0f} of {:.0f}</b></span><div class=\"meter\"><i style=\"width:{:.1f}%\"></i></div></div>",
             part.label, p.*part.points, part.most, 100 * p.*part.points / part.most);
     }
-    out += "</div><dl class=\"figures\">";
-    for (const auto& [label, value] : haptics::describeMeasures(score)) {
+    out += "</div>";
+    if (!d.losses.empty()) {
+        out += "<h3>Where points were lost</h3><table class=\"plain losses\"><tbody>";
+        for (const haptics::Loss& loss : d.losses) {
+            out += fmt::format("<tr><td class=\"n\">&minus;{:.1f}</td><td>{}.</td><td class=\"n\">{}</td></tr>",
+                               loss.points, escape(loss.words), loss.at ? fmt::format("at {:.1f} s", *loss.at) : "");
+        }
+        out += "</tbody></table>";
+    }
+    out += "<dl class=\"figures\">";
+    for (const auto& [label, value] : haptics::describeMeasures(d.score)) {
         out += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", escape(label), escape(value));
     }
     return out + "</dl></section>";
@@ -195,8 +220,7 @@ std::string coresCard(const ReportData& d, const haptics::SessionInfo& info)
     if (d.cores.empty()) {
         return out + "<p class=\"note\">The gun was not fired.</p></section>";
     }
-    out += "<p class=\"note\">Tissue in the notch at each firing, by volume.</p>";
-    // Colours go to the tissues that were met, so that neighbours in a bar differ.
+    out += "<p class=\"note\">Tissue in the notch at each firing, by volume, in the viewer's colours.</p>";
     std::map<std::size_t, std::size_t> met;
     for (const auto& core : d.cores) {
         for (std::size_t t = 0; t < core.sample.fraction.size(); ++t) {
@@ -217,10 +241,11 @@ std::string coresCard(const ReportData& d, const haptics::SessionInfo& info)
                 continue;
             }
             const std::string name = escape(nameOf(info.tissues, t));
-            bar += fmt::format("<i style=\"width:{:.2f}%;background:var(--{})\" title=\"{}: {:.1f} %\"></i>", percent,
-                               colour(met.at(t)), name, percent);
-            key += fmt::format("<span><i style=\"background:var(--{})\"></i>{} {:.1f} %</span>", colour(met.at(t)), name,
-                               percent);
+            std::string colour = t < info.tissues.size() ? tissueColour(info.tissues[t]) : "";
+            colour = colour.empty() ? otherColour(met.at(t)) : colour;
+            bar += fmt::format("<i style=\"width:{:.2f}%;background:{}\" title=\"{}: {:.1f} %\"></i>", percent, colour,
+                               name, percent);
+            key += fmt::format("<span><i style=\"background:{}\"></i>{} {:.1f} %</span>", colour, name, percent);
         }
         out += "<div class=\"core-bar\">" + bar + "</div><div class=\"key\">" +
                (key.empty() ? "nothing in the notch" : key) + "</div></div>";

@@ -29,8 +29,13 @@ std::string page(std::string_view title, std::string_view body, const nlohmann::
 /// A few words for a mark in a chart; not escaped.
 std::string eventLabel(const haptics::Event& event, const haptics::SessionInfo& info);
 
-std::string header(const ReportData& data, const haptics::Record& record);
-std::string scoreCard(const haptics::Score& score);
+/// The colour of a tissue as viewers show it, "#208020": that of the built-in table; empty for a tissue that it does not
+/// have.
+std::string tissueColour(const std::string& tissue);
+
+/// @param file  of the record: how to play it again is said; empty: it is not
+std::string header(const ReportData& data, const haptics::Record& record, const std::string& file);
+std::string scoreCard(const ReportData& data);
 std::string coresCard(const ReportData& data, const haptics::SessionInfo& info);
 /// An empty place for a chart; the page's script fills it. `title` and `note` are HTML.
 std::string chartCard(std::string_view id, std::string_view title, std::string_view note);

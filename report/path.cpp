@@ -1,5 +1,7 @@
 #include <report/path.h>
 
+#include <report/html.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -108,19 +110,29 @@ void drawPath(const std::vector<PathPoint>& path, Drawing& drawing)
 }
 
 std::string draw(const View& view, const Frame& frame, const ReportData& d,
-                 const std::optional<haptics::TargetShape>& target)
+                 const std::optional<haptics::TargetShape>& target, const std::string& colour)
 {
     Drawing drawing(view, frame);
     if (target) {
-        drawing.circle(target->middle * 1e3, target->diameter * 500, "fill=\"#b59\" opacity=\"0.4\"");
+        const std::string style = fmt::format("fill=\"{}\" opacity=\"0.45\"", colour);
+        drawing.circle(target->middle * 1e3, target->diameter * 500, style.c_str());
+    }
+    if (target) {
+        // The way that was planned leads to the middle of the target, or near it.
+        const Vec3 middle = target->middle * 1e3;
+        drawing.line({middle - 150.0 * target->axis, middle},
+                     "stroke=\"#26c\" stroke-width=\"1\" stroke-dasharray=\"6 3\"");
     }
     drawPath(d.path, drawing);
+    for (const Vec3& entry : d.entries) {
+        drawing.circle(entry, 0.9, "fill=\"#b07040\"");
+    }
     for (const Core& core : d.cores) {
         drawing.line({core.sample.notchStart * 1e3, core.sample.notchEnd * 1e3},
-                     "stroke=\"#085\" stroke-width=\"4\" opacity=\"0.6\"");
+                     "stroke=\"#111\" stroke-width=\"4\" opacity=\"0.55\"");
     }
     for (const Vec3& mark : d.marks) {
-        drawing.circle(mark, 1, "fill=\"#085\"");
+        drawing.circle(mark, 1, "fill=\"#111\"");
     }
     return drawing.finish();
 }
@@ -134,12 +146,18 @@ std::string pathCard(const ReportData& d, const haptics::SessionInfo& info)
     }
     const auto target = haptics::targetShapeOf(info);
     const Frame frame = frameOf(d, target);
+    std::string colour = info.structures.empty() ? "" : tissueColour(info.structures[0]);
+    colour = colour.empty() ? tissueColour("idc_high_grade") : colour;
     std::string out =
-        "<section class=\"card\"><h2>Path of the tip</h2><p>Dashed outside the body, red inside; green are the notches at "
-        "firing and the trainee's marks. The disc is a ball of the target's volume where it lies at rest.</p><div "
-        "class=\"pictures\" style=\"grid-template-columns:repeat(3,1fr)\">";
+        "<section class=\"card\"><h2>Path of the tip</h2><p class=\"note\">Grey and dashed outside the body, red "
+        "inside; brown dots where the tip met the skin, the blue dashed line along the planned direction through the "
+        "target's "
+        "middle; dark bars are the notches at firing, dark dots the trainee's marks. The disc is a ball of the target's "
+        "volume "
+        "where it lies at rest, in the viewer's colour.</p><div "
+        "class=\"pictures\" style=\"grid-template-columns:repeat(auto-fit,minmax(220px,1fr))\">";
     for (const View& view : views) {
-        out += draw(view, frame, d, target);
+        out += draw(view, frame, d, target, colour);
     }
     return out + "</div></section>";
 }

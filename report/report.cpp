@@ -1,6 +1,7 @@
 #include <report/report.h>
 
 #include <base/outputs.h>
+#include <base/spoken.h>
 #include <report/data.h>
 #include <report/html.h>
 #include <report/path.h>
@@ -126,6 +127,16 @@ std::vector<bool> shownAtFirst(const ReportData& d, std::size_t structures)
     return shown;
 }
 
+// As viewers colour it: of the tissue of its name; a target of another name is a tumour.
+std::string colourOf(const std::vector<std::string>& structures, std::size_t i)
+{
+    std::string colour = tissueColour(structures[i]);
+    if (colour.empty() && i == 0) {
+        colour = tissueColour("idc_high_grade");
+    }
+    return colour.empty() ? "c" + std::to_string(i % 7) : colour;
+}
+
 json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
 {
     const std::size_t structures = std::min(info.structures.size(), haptics::maxStructures);
@@ -133,18 +144,16 @@ json distanceChart(const ReportData& d, const haptics::SessionInfo& info)
     json series = {{{"label", "inserted"}, {"colour", "c7"}, {"fill", true}, {"width", 1}}};
     json lines = json::array();
     for (std::size_t i = 0; i < structures; ++i) {
-        const std::string colour = "c" + std::to_string(i % 7);
-        json one = {{"label", info.structures[i]},
-                    {"colour", colour},
-                    {"width", i == 0 ? 2.2 : 1.6},
-                    {"show", shown[i] ? true : false}};
+        const std::string name = base::spoken(info.structures[i]);
+        const std::string colour = colourOf(info.structures, i);
+        json one = {{"label", name}, {"colour", colour}, {"width", i == 0 ? 2.2 : 1.6}, {"show", shown[i] ? true : false}};
         if (i >= 7) {
             one["dash"] = {6, 3};
         }
         series.push_back(std::move(one));
         const double warning = i < info.warnDistances.size() ? info.warnDistances[i] * 1e3 : 0;
         if (i > 0 && warning > 0 && shown[i]) {
-            lines.push_back({{"at", warning}, {"label", "warning: " + info.structures[i]}, {"colour", colour}});
+            lines.push_back({{"at", warning}, {"label", "warning: " + name}, {"colour", colour}});
         }
     }
     return {{"columns", columnsOf(d.distances)},
@@ -227,7 +236,8 @@ std::string picturesCard(const std::filesystem::path& folder)
     return out + "</div></section>";
 }
 
-std::string sessionPage(const haptics::Record& record, const std::filesystem::path& pictures)
+std::string sessionPage(const haptics::Record& record, const std::filesystem::path& pictures,
+                        const std::filesystem::path& file)
 {
     const ReportData d = collect(record);
     const haptics::SessionInfo& info = record.info();
@@ -245,7 +255,7 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
                          {"distances", distanceChart(d, info)},
                          {"nearest", nearestChart(d, info)}}}};
 
-    std::string out = header(d, record) + scoreCard(d.score) + coresCard(d, info);
+    std::string out = header(d, record, file.string()) + scoreCard(d) + coresCard(d, info);
     out +=
         chartCard("forces", "Force against time",
                   "Basic force of the tissue, additional force that warns, and the total as sent to the hand. Drag to look "
@@ -271,9 +281,10 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
 
 }  // namespace
 
-void writeReport(const std::filesystem::path& html, const haptics::Record& record, const std::filesystem::path& pictures)
+void writeReport(const std::filesystem::path& html, const haptics::Record& record, const std::filesystem::path& pictures,
+                 const std::filesystem::path& file)
 {
-    base::writeWhole(html, sessionPage(record, pictures));
+    base::writeWhole(html, sessionPage(record, pictures, file));
 }
 
 }  // namespace palpate::report

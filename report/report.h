@@ -10,9 +10,10 @@ namespace palpate::report {
 /// timing, scene and build.
 ///
 /// @param pictures  a folder of which up to eight PNG files are put in, or empty
+/// @param file      of the record, so that the page says how to play it again; may be empty
 ///
 /// The file appears whole or not at all; one that is there is replaced. Throws std::runtime_error.
 void writeReport(const std::filesystem::path& html, const haptics::Record& record,
-                 const std::filesystem::path& pictures = {});
+                 const std::filesystem::path& pictures = {}, const std::filesystem::path& file = {});
 
 }  // namespace palpate::report

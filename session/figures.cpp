@@ -32,6 +32,25 @@ nlohmann::json timingFigures(const haptics::ServoTiming& timing)
             {"tasks_us", tasks}};
 }
 
+nlohmann::json coreFigures(const std::vector<haptics::CoreSample>& cores, const std::vector<std::string>& tissues)
+{
+    auto out = nlohmann::json::array();
+    for (const auto& core : cores) {
+        nlohmann::json fraction = nlohmann::json::object();
+        for (std::size_t i = 0; i < tissues.size(); ++i) {
+            if (core.fraction[i] > 0.0) {
+                fraction[tissues[i]] = core.fraction[i];
+            }
+        }
+        out.push_back({{"fraction", fraction},
+                       {"target_fraction", core.targetFraction},
+                       {"length_in_lesion_mm", 1e3 * core.targetLength},
+                       {"fragments", core.fragments},
+                       {"volume_mm3", 1e9 * core.volume}});
+    }
+    return out;
+}
+
 std::string hexadecimal(std::uint64_t hash)
 {
     return fmt::format("{:016x}", hash);
@@ -44,7 +63,7 @@ double peakMemoryMb()
     return static_cast<double>(use.ru_maxrss) / 1024.0;
 }
 
-nlohmann::json scoreFigures(const haptics::Score& score)
+nlohmann::json scoreFigures(const haptics::Score& score, const std::vector<haptics::Loss>& losses)
 {
     nlohmann::json out;
     for (const haptics::Measure& m : haptics::measures()) {
@@ -53,6 +72,13 @@ nlohmann::json scoreFigures(const haptics::Score& score)
     const haptics::ScoreParts points = haptics::parts(score);
     for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
         out["points"][part.key] = points.*part.points;
+    }
+    out["losses"] = nlohmann::json::array();
+    for (const haptics::Loss& loss : losses) {
+        out["losses"].push_back({{"measure", loss.measure},
+                                 {"points", loss.points},
+                                 {"words", loss.words},
+                                 {"at_s", loss.at ? nlohmann::json(*loss.at) : nlohmann::json()}});
     }
     return out;
 }

@@ -15,7 +15,7 @@ constexpr std::uint64_t flushPeriod = 1024;  // ticks between waits for the reco
 
 }  // namespace
 
-Session::Session(const SessionModel& model, const SessionInfo& info) : simulation_(model), scorer_(info)
+Session::Session(const SessionModel& model, const SessionInfo& info) : simulation_(model), info_(info), watch_(info)
 {
     figures_.cores.reserve(maxCores);
     figures_.nearest.fill(std::numeric_limits<double>::infinity());
@@ -50,14 +50,15 @@ ServoTiming Session::run(Device& device, const RunOptions& options, const TickSi
 SessionFigures Session::figures() const
 {
     SessionFigures figures = figures_;
-    figures.score = scorer_.score();
+    figures.score = watch_.score();
+    figures.losses = watch_.losses(info_);
     figures.forceHash = hash_.value();
     return figures;
 }
 
 void Session::add(const TickRecord& r) noexcept
 {
-    scorer_.add(r);
+    watch_.add(r);
     hash_.add(r);
     SessionFigures& f = figures_;
     f.peakBasic = std::max(f.peakBasic, glm::length(r.basic));

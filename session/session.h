@@ -1,5 +1,6 @@
 #pragma once
 
+#include <haptics/losses.h>
 #include <haptics/recorder.h>
 #include <haptics/replay.h>
 #include <haptics/score.h>
@@ -18,6 +19,7 @@ namespace palpate::session {
 /// What a session came to, from all its ticks.
 struct SessionFigures {
     haptics::Score score;                                  // of all ticks so far
+    std::vector<haptics::Loss> losses;                     // where its points went, the largest first
     std::vector<haptics::CoreSample> cores;                // at most 64, in their order
     std::array<double, haptics::maxStructures> nearest{};  // least distance to each structure [m]
     std::uint64_t contacts = 0;                            // events: the tool touched the body
@@ -69,7 +71,8 @@ private:
     void add(const haptics::TickRecord& record) noexcept;
 
     haptics::Simulation simulation_;
-    haptics::Scorer scorer_;
+    haptics::SessionInfo info_;
+    haptics::LossWatch watch_;
     haptics::ForceHash hash_;
     SessionFigures figures_;
 };

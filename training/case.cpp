@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <set>
 #include <stdexcept>
 
 namespace palpate::training {
@@ -149,19 +148,12 @@ bool isCaseFolder(const fs::path& what)
 std::vector<Case> allCases(std::vector<std::string>* faults)
 {
     std::vector<Case> all;
-    std::set<std::string> seen;
-    for (const fs::path& folder : dataFolders("cases")) {
-        std::error_code none;
-        for (const auto& entry : fs::directory_iterator(folder, none)) {
-            if (!isCaseFolder(entry.path()) || !seen.insert(entry.path().filename().string()).second) {
-                continue;
-            }
-            try {
-                all.push_back(loadCase(entry.path()));
-            } catch (const std::runtime_error& e) {
-                if (faults != nullptr) {
-                    faults->emplace_back(e.what());
-                }
+    for (const fs::path& folder : entriesOf("cases", [](const fs::path& p) { return isCaseFolder(p); })) {
+        try {
+            all.push_back(loadCase(folder));
+        } catch (const std::runtime_error& e) {
+            if (faults != nullptr) {
+                faults->emplace_back(e.what());
             }
         }
     }

@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <set>
 #include <stdexcept>
 
 namespace palpate::training {
@@ -162,19 +161,12 @@ Curriculum loadCurriculum(const fs::path& file)
 std::vector<Curriculum> allCurricula(std::vector<std::string>* faults)
 {
     std::vector<Curriculum> all;
-    std::set<std::string> seen;
-    for (const fs::path& folder : dataFolders("curricula")) {
-        std::error_code none;
-        for (const auto& entry : fs::directory_iterator(folder, none)) {
-            if (entry.path().extension() != ".toml" || !seen.insert(entry.path().stem().string()).second) {
-                continue;
-            }
-            try {
-                all.push_back(loadCurriculum(entry.path()));
-            } catch (const std::runtime_error& e) {
-                if (faults != nullptr) {
-                    faults->emplace_back(e.what());
-                }
+    for (const fs::path& file : entriesOf("curricula", [](const fs::path& p) { return p.extension() == ".toml"; })) {
+        try {
+            all.push_back(loadCurriculum(file));
+        } catch (const std::runtime_error& e) {
+            if (faults != nullptr) {
+                faults->emplace_back(e.what());
             }
         }
     }

@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 
 #include <cstdlib>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -41,6 +42,21 @@ std::vector<fs::path> dataFolders(const char* kind)
     }
     folders.push_back(installedData() / kind);
     return folders;
+}
+
+std::vector<fs::path> entriesOf(const char* kind, const std::function<bool(const fs::path&)>& wanted)
+{
+    std::vector<fs::path> all;
+    std::set<std::string> seen;
+    for (const fs::path& folder : dataFolders(kind)) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder, none)) {
+            if (wanted(entry.path()) && seen.insert(entry.path().filename().string()).second) {
+                all.push_back(entry.path());
+            }
+        }
+    }
+    return all;
 }
 
 }  // namespace palpate::training

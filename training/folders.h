@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 namespace palpate::training {
@@ -14,5 +15,9 @@ std::filesystem::path userData();
 
 /// Folders in which things of a kind ("cases", "curricula") are looked for: the user's, then those that come along.
 std::vector<std::filesystem::path> dataFolders(const char* kind);
+
+/// What lies in these folders and is wanted, one of each name: the user's hides one of the same name that came along.
+std::vector<std::filesystem::path> entriesOf(const char* kind,
+                                             const std::function<bool(const std::filesystem::path&)>& wanted);
 
 }  // namespace palpate::training

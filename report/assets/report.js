@@ -1,7 +1,20 @@
 "use strict";
 // Draws the charts of a report from the data in the page. uPlot and scatter.js come before this script.
 const data = JSON.parse(document.getElementById("data").textContent);
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+const variable = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+const parts = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+const luminance = (rgb) => rgb.map((v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+
+// A tissue's colour ("#rrggbb") as a line on this page: darker or lighter until it stands out from the card (3:1, WCAG 2.2).
+function readable(hex) {
+  const card = variable("card"), paper = luminance(parts(card.length === 4 ? "#" + [...card.slice(1)].map((c) => c + c).join("") : card));
+  for (let rgb = parts(hex), step = 0; ; ++step) {
+    const own = luminance(rgb), contrast = (Math.max(own, paper) + 0.05) / (Math.min(own, paper) + 0.05);
+    if (contrast >= 3 || step > 20) return `#${rgb.map((v) => Math.round(v).toString(16).padStart(2, "0")).join("")}`;
+    rgb = rgb.map((v) => (paper > 0.5 ? 0.9 * v : v + 0.1 * (255 - v)));
+  }
+}
+const colour = (name) => (name[0] === "#" ? readable(name) : variable(name));
 const charts = [];
 
 const eventColours = { "warning": "c6", "vital touch": "c4", "fire": "c0", "puncture": "c7", "fault": "c4" };
@@ -81,7 +94,7 @@ function draw(id, chart) {
     charts.push({ plot: scatter(place, chart, axis), place });
     return;
   }
-  if (chart.columns[0].length < 2) {
+  if (chart.columns[0].length < (chart.points ? 1 : 2)) {
     place.className = "note";
     place.textContent = "The record is too short to draw.";
     return;
@@ -90,7 +103,7 @@ function draw(id, chart) {
   const limits = (chart.lines || []).map((line) => line.at);
   const options = {
     width: Math.max(place.clientWidth, 240),
-    height: innerWidth < 640 ? 230 : 300,
+    height: chart.height || (innerWidth < 640 ? 230 : 300),
     scales: {
       x: { time: false },
       y: { range: (u, low, high) => {
@@ -99,12 +112,12 @@ function draw(id, chart) {
         return [bottom < 0 ? bottom - room : 0, top + (chart.events ? 3 : 1) * room];
       } },
     },
-    axes: [axis(chart.x.label, 40), axis(chart.y.label, 46)],
+    axes: [{ ...axis(chart.x.label, 40), ...(chart.points ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500] } : {}) }, axis(chart.y.label, 46)],
     cursor: { points: { size: 7 }, sync: chart.sync ? { key: chart.sync } : undefined },
     legend: { markers: { fill: (u, i) => u.series[i].stroke(u, i), width: 0 } },
     series: [{ label: chart.x.name, value: value(chart.x.unit) }].concat(chart.series.map((s) => ({
       label: s.label, stroke: () => colour(s.colour), width: s.width || 1.6, dash: s.dash, show: s.show !== false,
-      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: { show: false }, spanGaps: false,
+      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: chart.points ? { show: true, size: 6, fill: colour("card") } : { show: false }, spanGaps: false,
     }))),
     hooks: { draw: [(u) => { horizontal(u, chart.lines || []); vertical(u, chart.events ? data.events : []); }] },
   };

@@ -9,6 +9,7 @@
 
 #include <map>
 #include <regex>
+#include <set>
 #include <sstream>
 
 namespace palpate::apps {
@@ -131,16 +132,18 @@ TEST(Documents, CommandsAndOptionsExist)
     std::string line;
     std::smatch m;
     const std::string pages = readText(PALPATE_SOURCE_DIR "/README.md") + readText(PALPATE_SOURCE_DIR "/docs/trainer.md") +
-                              readText(PALPATE_SOURCE_DIR "/docs/experiments.md");
+                              readText(PALPATE_SOURCE_DIR "/docs/experiments.md") +
+                              readText(PALPATE_SOURCE_DIR "/docs/curriculum.md");
     for (std::istringstream in(pages); std::getline(in, line);) {
         if (!std::regex_match(line, m, call) || !built(m[1])) {
             continue;
         }
         const std::string program = m[1], rest = m[2];
         std::vector<std::string> command{"--help"};
-        if (rest.starts_with("bench ")) {
-            const std::size_t second = rest.find_first_not_of(' ', 6);
-            command = {"bench", rest.substr(second, rest.find(' ', second) - second), "--help"};
+        const std::string first = rest.substr(0, rest.find(' '));
+        if (std::set<std::string>{"bench", "case", "curriculum", "profile"}.contains(first)) {
+            const std::size_t second = rest.find_first_not_of(' ', first.size());
+            command = {first, rest.substr(second, rest.find(' ', second) - second), "--help"};
         } else if (program == "palpate") {
             command = {rest.substr(0, rest.find(' ')), "--help"};
         }

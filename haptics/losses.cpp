@@ -1,0 +1,212 @@
+#include <haptics/losses.h>
+
+#include <base/spoken.h>
+
+#include <fmt/format.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::haptics {
+
+namespace {
+
+constexpr double worthSaying = 1e-3;   // [m]; shorter ways have no direction
+constexpr double worthDepth = 3e-3;    // along the needle [m]: the notch is 20 mm long
+constexpr double leastPoints = 0.005;  // less is no loss
+
+double points(double most, double share)
+{
+    return most * (1 - share);
+}
+
+// As in score.cpp.
+double ramp(double value, double full, double none)
+{
+    return std::clamp((none - value) / (none - full), 0.0, 1.0);
+}
+
+std::string timesInWords(std::uint32_t n)
+{
+    return n == 1 ? "once" : fmt::format("{} times", n);
+}
+
+}  // namespace
+
+// LPS: x to the patient's left, y to the back, z to the head.
+std::string directionInWords(Vec3 way)
+{
+    constexpr const char* names[3][2] = {
+        {"the patient's right", "the patient's left"}, {"the front", "the back"}, {"the feet", "the head"}};
+    if (glm::length(way) < worthSaying) {
+        return "";
+    }
+    std::array<int, 3> order{0, 1, 2};
+    std::ranges::sort(order, [&](int a, int b) { return std::abs(way[a]) > std::abs(way[b]); });
+    const auto named = [&](int axis) { return names[axis][way[axis] > 0 ? 1 : 0]; };
+    std::string words = fmt::format("towards {}", named(order[0]));
+    if (std::abs(way[order[1]]) > 0.5 * std::abs(way[order[0]])) {
+        words += fmt::format(" and {}", named(order[1]));
+    }
+    return words;
+}
+
+LossWatch::LossWatch(const SessionInfo& info) : rate_(info.rate), scorer_(info), target_(targetShapeOf(info))
+{
+    at_.fill(-1);
+}
+
+void LossWatch::note(Moment moment, bool now, double seconds) noexcept
+{
+    if (now) {
+        at_[moment] = seconds;
+    }
+}
+
+std::optional<double> LossWatch::at(Moment moment) const noexcept
+{
+    return at_[moment] < 0 ? std::nullopt : std::optional(at_[moment]);
+}
+
+void LossWatch::add(const TickRecord& record) noexcept
+{
+    scorer_.add(record);
+    const Score now = scorer_.score();
+    const double seconds = static_cast<double>(record.tick) / rate_;
+    const bool better = now.bestTargetFraction > before_.bestTargetFraction || now.targetingError < before_.targetingError;
+    if (record.fired && (better || now.passes == 1)) {
+        core_ = record.core;
+        at_[shot] = seconds;
+    }
+    note(secondShot, now.passes == 2 && before_.passes == 1, seconds);
+    note(secondContact, now.skinContacts == 2 && before_.skinContacts == 1, seconds);
+    note(redirect, now.redirects == 1 && before_.redirects == 0, seconds);
+    note(force, now.peakForce > before_.peakForce, seconds);
+    note(beyond, now.beyondTarget > before_.beyondTarget, seconds);
+    for (std::uint32_t i = 0; i < std::min<std::uint32_t>(record.eventCount, maxEventsPerTick); ++i) {
+        const Event& event = record.events[i];
+        if (event.kind == EventKind::vitalTouch && at_[touch] < 0) {
+            at_[touch] = seconds;
+            touched_ = event.structure;
+        }
+    }
+    const bool down = (record.device.buttons & buttonMark) != 0;
+    if (down && !markDown_) {
+        marks_ += record.device.position;
+        at_[mark] = seconds;
+    }
+    markDown_ = down;
+    before_ = now;
+}
+
+// Where the best core lay, from the target.
+std::string LossWatch::miss(const Score& s, const std::string& target) const
+{
+    std::string words = s.bestTargetFraction > 0 ? fmt::format("The best core is {:.0f} % {} over {:.1f} mm",
+                                                               100 * s.bestTargetFraction, target, 1e3 * s.bestTargetLength)
+                                                 : fmt::format("No core hit the {}", target);
+    if (s.bestTargetFraction <= 0 && std::isfinite(s.targetingError)) {
+        words += fmt::format(": the nearest lay {:.1f} mm beside it", 1e3 * s.targetingError);
+    }
+    const Vec3 notch = core_.restEnd - core_.restStart;
+    if (!target_ || glm::length(notch) < worthSaying) {
+        return words;
+    }
+    const Vec3 axis = glm::normalize(notch);
+    const Vec3 away = 0.5 * (core_.restStart + core_.restEnd) - target_->middle;
+    const double along = glm::dot(away, axis);
+    const Vec3 across = away - along * axis;
+    std::string where;
+    if (glm::length(across) >= worthSaying) {
+        where = fmt::format("{:.1f} mm off its middle {}", 1e3 * glm::length(across), directionInWords(across));
+    }
+    if (std::abs(along) >= worthDepth) {
+        where += fmt::format("{}{:.1f} mm {}", where.empty() ? "" : ", ", 1e3 * std::abs(along),
+                             along > 0 ? "too deep" : "not deep enough");
+    }
+    return words + (where.empty() ? "" : "; it lay " + where);
+}
+
+std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) const
+{
+    const std::string target = info.structures.empty() ? "target" : base::spoken(info.structures[0]);
+    if (s.passes == 0) {
+        return {{"passes", 75, "The gun was not fired: there is no core", std::nullopt}};
+    }
+    const double hit = std::min(1.0, s.bestTargetFraction / 0.1);
+    const double stays = ramp(s.beyondTarget, 3e-3, 15e-3);
+    const double economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1;
+    const double each = 5 * hit * stays;
+    return {{"best_target_pct", points(50, parts(s).core / 50) + points(25, hit), miss(s, target), at(shot)},
+            {"beyond_target_mm", 25 * hit * (1 - stays),
+             fmt::format("The needle was pushed {:.1f} mm deeper than the {}", 1e3 * s.beyondTarget, target), at(beyond)},
+            {"passes", points(each, ramp(s.passes, 1, 5)), fmt::format("{} cores were taken; one can do", s.passes),
+             at(secondShot)},
+            {"skin_contacts", points(each, ramp(s.skinContacts, 1, 5)),
+             fmt::format("The skin was touched {}", timesInWords(s.skinContacts)), at(secondContact)},
+            {"redirects", points(each, ramp(s.redirects, 0, 4)),
+             fmt::format("The needle was drawn back and pushed on again {}", timesInWords(s.redirects)), at(redirect)},
+            {"inserted_path_mm", points(each, economy),
+             fmt::format("The tip went {:.0f} mm inside the body, {:.0f} mm would have done", 1e3 * s.insertedPath,
+                         2e3 * s.deepest),
+             std::nullopt},
+            {"peak_force_n", points(each, ramp(s.peakForce, 4, 8.5)),
+             fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+}
+
+std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info) const
+{
+    const std::string target = info.structures.empty() ? "lump" : base::spoken(info.structures[0]);
+    const double near = ramp(s.markError, 10e-3, 20e-3), gentle = ramp(s.peakForce, 4, 8.5);
+    const double size = ramp(s.markSizeError, 2e-3, 15e-3);
+    std::string where = std::isfinite(s.markError) ? fmt::format("The marks' middle lies {:.1f} mm beside that of the {}",
+                                                                 1e3 * s.markError, target)
+                                                   : fmt::format("What was marked cannot be compared with the {}", target);
+    if (target_) {
+        const Vec3 away = marks_ / static_cast<double>(s.marks) - target_->middle;
+        const std::string direction = directionInWords(away - glm::dot(away, target_->axis) * target_->axis);
+        where += direction.empty() ? "" : ", " + direction;
+    }
+    return {{"mark_error_mm", points(30, ramp(s.markError, 2e-3, 20e-3)) + (20 * size + 25 * gentle) * (1 - near), where,
+             at(mark)},
+            {"mark_size_error_mm", points(20, size),
+             fmt::format("The size was marked {:.1f} mm wrong", 1e3 * s.markSizeError), at(mark)},
+            {"peak_force_n", points(25, gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+}
+
+std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
+{
+    const Score s = scorer_.score();
+    if (s.skinContacts == 0) {
+        return {{"skin_contacts", 100, "The tool never touched the body", std::nullopt}};
+    }
+    std::vector<Loss> all = s.marks > 0 ? ofPalpation(s, info) : ofBiopsy(s, info);
+    const std::string structure =
+        touched_ < info.structures.size() ? base::spoken(info.structures[touched_]) : "a vital structure";
+    all.push_back({"vital_contacts", points(25, parts(s).vital / 25),
+                   s.vitalContacts == 0
+                       ? fmt::format("The tip was in a vital structure for {:.1f} s", s.vitalSeconds)
+                       : fmt::format("Vital structures were touched {}, first {}, for {:.1f} s and up to {:.1f} mm deep",
+                                     timesInWords(s.vitalContacts), structure, s.vitalSeconds, 1e3 * s.vitalDepth),
+                   at(touch)});
+    std::erase_if(all, [](const Loss& loss) { return loss.points < leastPoints; });
+    std::ranges::stable_sort(all, std::ranges::greater{}, &Loss::points);
+    return all;
+}
+
+std::string inWords(const Loss& loss)
+{
+    return fmt::format("-{:.0f} {}: {}{}", std::max(1.0, loss.points), loss.points < 1.5 ? "point" : "points", loss.words,
+                       loss.at ? fmt::format(" (at {:.1f} s)", *loss.at) : "");
+}
+
+std::vector<Loss> lossesOf(const Record& record)
+{
+    LossWatch watch(record.info());
+    record.each([&](const TickRecord& tick) { watch.add(tick); });
+    return watch.losses(record.info());
+}
+
+}  // namespace palpate::haptics

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <haptics/score.h>
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace palpate::haptics {
+
+/// Points that a session lost for one reason.
+struct Loss {
+    std::string measure;       // the key of the measure that says most about it
+    double points = 0;         // of 100
+    std::string words;         // a sentence, without its full stop
+    std::optional<double> at;  // when it happened, of the session [s]; nothing: at no one moment
+};
+
+/// Scores a session tick by tick, as Scorer does, and remembers when points were lost and where the best core lay. For a
+/// live session and a record alike. add() allocates nothing.
+class LossWatch {
+public:
+    explicit LossWatch(const SessionInfo& info);
+    void add(const TickRecord& record) noexcept;
+    Score score() const noexcept { return scorer_.score(); }
+
+    /// All losses, the largest first. With the total their points add up to 100. Allocates.
+    /// @param info  that of the constructor: names of structures
+    std::vector<Loss> losses(const SessionInfo& info) const;
+
+private:
+    /// Moments that can be jumped to.
+    enum Moment : std::uint8_t { shot, secondShot, touch, secondContact, redirect, force, beyond, mark, moments };
+
+    void note(Moment moment, bool now, double seconds) noexcept;
+    std::optional<double> at(Moment moment) const noexcept;
+    std::string miss(const Score& score, const std::string& target) const;
+    std::vector<Loss> ofBiopsy(const Score& score, const SessionInfo& info) const;
+    std::vector<Loss> ofPalpation(const Score& score, const SessionInfo& info) const;
+
+    double rate_ = 1000;  // [Hz]
+    Scorer scorer_;
+    Score before_;                      // after the tick before
+    std::array<double, moments> at_{};  // [s]; below 0: never
+    CoreSample core_;                   // the best
+    std::uint8_t touched_ = 0xFF;       // the vital structure that was touched first
+    Vec3 marks_{0.0};                   // sum of the marks' places [m]
+    bool markDown_ = false;
+    std::optional<TargetShape> target_;
+};
+
+/// The losses of a whole record, as LossWatch::losses().
+std::vector<Loss> lossesOf(const Record& record);
+
+/// "-12 points: No core hit the tumour (at 4.2 s)".
+std::string inWords(const Loss& loss);
+
+/// Where somebody finds a place, e.g. "towards the feet and the patient's left"; empty for a shorter way than 1 mm.
+/// @param way  patient frame [m]
+std::string directionInWords(Vec3 way);
+
+}  // namespace palpate::haptics

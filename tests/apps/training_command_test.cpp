@@ -1,0 +1,102 @@
+#include <tests/apps/program.h>
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+namespace palpate::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The commands with a home of their own.
+class TrainingCommands : public ::testing::Test {
+protected:
+    TrainingCommands() { ::setenv("XDG_DATA_HOME", folder_.path().c_str(), 1); }
+    ~TrainingCommands() override { ::unsetenv("XDG_DATA_HOME"); }
+
+    // What somebody does in one session of an exercise.
+    static Outcome session(const std::string& exercise, const std::vector<std::string>& more = {})
+    {
+        std::vector<std::string> words{
+            "train",      "--profile", "anna",      "--exercise", "breast-core-biopsy/" + exercise,
+            "--headless", "--unpaced", "--setting", "fast"};
+        words.insert(words.end(), more.begin(), more.end());
+        return palpate(words);
+    }
+
+    Folder folder_;
+};
+
+TEST_F(TrainingCommands, SessionsOfATraineeOpenTheGateAndTheNextExercise)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna", "--hand", "left"}).status, 0);
+    expectRefusal({"train", "--profile", "anna", "--exercise", "breast-core-biopsy/first-core", "--headless", "--unpaced"},
+                  "its gate is shut for anna; next is breast-core-biopsy/touch");
+    auto next = figures({"curriculum", "next", "breast-core-biopsy", "--profile", "anna"});
+    EXPECT_EQ(next["next"][0]["exercise"], "touch");
+
+    // Touched and no more: each session ends before the skin is pierced.
+    for (int n = 0; n < 3; ++n) {
+        const Outcome done = session("touch", {"--seconds", "1.5"});
+        ASSERT_EQ(done.status, 0) << done.err;
+    }
+    const auto progress = figures({"progress", "anna"});
+    ASSERT_EQ(progress["sessions"].size(), 3U);
+    const auto& measures = progress["sessions"][0]["measures"];
+    const bool level = measures["skin_contacts"] >= 1 && measures["peak_force_n"] <= 2 && measures["deepest_mm"] <= 3;
+    next = figures({"curriculum", "next", "--profile", "anna"});
+    EXPECT_EQ(next["next"][0]["exercise"], level ? "advance" : "touch") << measures;
+    for (const auto& s : progress["sessions"]) {
+        EXPECT_EQ(s["exercise"], "touch");
+        EXPECT_EQ(s["mode"], "practice");
+        EXPECT_TRUE(fs::exists(s["record"].get<std::string>()));
+    }
+}
+
+TEST_F(TrainingCommands, ARecordFromAnotherMachineCountsAsWhatItWas)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    ASSERT_EQ(palpate({"profile", "new", "bert"}).status, 0);
+    ASSERT_EQ(session("touch", {"--seconds", "1", "--test", "--record", folder_ / "r.db"}).status, 0);
+    ASSERT_EQ(palpate({"profile", "add-record", "bert", folder_ / "r.db"}).status, 0);
+    expectRefusal({"profile", "add-record", "bert", folder_ / "r.db"}, "bert has this session already");
+    const auto one = figures({"progress", "anna"})["sessions"][0], other = figures({"progress", "bert"})["sessions"][0];
+    for (const char* key : {"started", "case", "curriculum", "exercise", "mode", "measures"}) {
+        EXPECT_EQ(one[key], other[key]) << key;
+    }
+    EXPECT_EQ(one["mode"], "test");
+    ASSERT_EQ(palpate({"profile", "erase", "anna", "--yes"}).status, 0);
+    EXPECT_TRUE(fs::exists(folder_ / "r.db")) << "a record that somebody put elsewhere stays";
+    expectRefusal({"progress", "anna"}, "there is no such profile");
+}
+
+TEST_F(TrainingCommands, ACaseIsMadeOfAVolumeAndTrained)
+{
+    const std::string volume = folder_ / "v.vdb";
+    ASSERT_EQ(palpate({"phantom", "layered", "-o", volume}).status, 0);
+    ASSERT_EQ(palpate({"case", "new", volume, "-o", folder_ / "mine", "--licence", "CC0-1.0"}).status, 0);
+    expectRefusal({"case", "new", volume, "-o", folder_ / "mine"}, "exists already");
+    const Outcome checked = palpate({"case", "check", folder_ / "mine"});
+    EXPECT_EQ(checked.status, 1);
+    EXPECT_NE(checked.out.find("picture: there is none"), std::string::npos) << checked.out;
+    EXPECT_EQ(checked.out.find("trains"), std::string::npos) << checked.out;
+    // The volume went along: the folder can be given away.
+    fs::remove(volume);
+    const auto trained = figures({"train", "--case", folder_ / "mine", "--headless", "--unpaced", "--seconds", "0.5"});
+    EXPECT_EQ(trained["scene"], "mine");
+    EXPECT_EQ(figures({"train", folder_ / "mine", "--headless", "--unpaced", "--seconds", "0.5"})["force_hash"],
+              trained["force_hash"]);
+}
+
+TEST_F(TrainingCommands, RefuseWhatIsNotThere)
+{
+    expectRefusal({"case", "show", "near-vesel"}, "did you mean near-vessel?");
+    expectRefusal({"curriculum", "check", "palpaton"}, "did you mean palpation?");
+    expectRefusal({"train", "--profile", "nobody", "--headless", "--unpaced"}, "there is no such profile");
+    expectRefusal({"train", "layered", "--case", "layered", "--headless", "--unpaced"}, "a case has a scene of its own");
+    expectRefusal({"progress"}, "give a profile's name");
+}
+
+}  // namespace
+}  // namespace palpate::apps

@@ -1,0 +1,105 @@
+#include <training/progress_page.h>
+#include <training/simulate.h>
+
+#include <tests/folder.h>
+#include <tests/training/courses.h>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+#include <iterator>
+#include <regex>
+#include <set>
+#include <sstream>
+
+namespace palpate::training {
+namespace {
+
+std::string textOf(const std::filesystem::path& file)
+{
+    std::ifstream in(file);
+    return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+struct Somebody {
+    Curriculum curriculum = breastCourse();
+    std::vector<PersonProgress> people;
+
+    explicit Somebody(const std::string& name)
+    {
+        PersonProgress p;
+        p.person.name = name;
+        p.person.created = "2026-01-01T00:00:00Z";
+        p.sessions = simulate(curriculum, learningLaws()[0], 5, 40).sessions;
+        p.curricula.push_back(progressOf(curriculum, p.sessions, p.sessions.back().started));
+        people.push_back(std::move(p));
+    }
+};
+
+TEST(ProgressPage, SaysWhatIsNextAndWhatTheChartAssumes)
+{
+    const tests::Folder folder;
+    const Somebody somebody("<b>Eve</b>");
+    writeProgressPage(folder / "p.html", somebody.people, {});
+    const std::string page = textOf(folder / "p.html");
+    EXPECT_NE(page.find("&lt;b&gt;Eve&lt;/b&gt;"), std::string::npos);
+    EXPECT_EQ(page.find("<b>Eve</b>"), std::string::npos);
+    EXPECT_NE(page.find("p0 = 0.1, p1 = 0.3, alpha = 0.05, beta = 0.1"), std::string::npos);
+    const auto* const next = somebody.people[0].curricula[0].next();
+    ASSERT_NE(next, nullptr);
+    EXPECT_NE(page.find("Next: " + next->exercise->title), std::string::npos);
+    // Every chart has its place, and every place its chart.
+    std::set<std::string> places;
+    const std::regex place("class=\"chart small\" id=\"(chart[0-9]+)\"");
+    for (std::sregex_iterator at(page.begin(), page.end(), place); at != std::sregex_iterator(); ++at) {
+        EXPECT_TRUE(places.insert((*at)[1]).second);
+        EXPECT_NE(page.find("\"" + (*at)[1].str() + "\":{"), std::string::npos);
+    }
+    EXPECT_GE(places.size(), 4U);
+}
+
+TEST(ProgressCsv, HasALineForEachSession)
+{
+    const tests::Folder folder;
+    const Somebody somebody("=cmd,\"x\"");
+    writeProgressCsv(folder / "p.csv", somebody.people);
+    std::istringstream in(textOf(folder / "p.csv"));
+    std::string line;
+    std::getline(in, line);
+    EXPECT_EQ(line.find("name,session,started,curriculum,exercise,case,mode,guidance,met"), 0U);
+    std::size_t lines = 0;
+    for (; std::getline(in, line); ++lines) {
+        EXPECT_EQ(line.find("\"'=cmd,\"\"x\"\"\","), 0U) << line;
+    }
+    EXPECT_EQ(lines, somebody.people[0].sessions.size());
+}
+
+// What the specification of xAPI asks of each statement: actor, verb and object with absolute IRIs, a UUID.
+TEST(Xapi, StatementsAreWholeAndTheSameAgain)
+{
+    const tests::Folder folder;
+    const Somebody somebody("P-07");
+    writeXapi(folder / "a.json", somebody.people);
+    writeXapi(folder / "b.json", somebody.people);
+    EXPECT_EQ(textOf(folder / "a.json"), textOf(folder / "b.json"));
+    const auto statements = nlohmann::json::parse(textOf(folder / "a.json"));
+    ASSERT_EQ(statements.size(), somebody.people[0].sessions.size());
+    const std::regex uuid("[0-9a-f]{8}-[0-9a-f]{4}-5[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}"), iri("[a-z]+:.+");
+    std::set<std::string> ids;
+    for (std::size_t i = 0; i < statements.size(); ++i) {
+        const auto& s = statements[i];
+        EXPECT_TRUE(std::regex_match(s["id"].get<std::string>(), uuid)) << s["id"];
+        EXPECT_TRUE(ids.insert(s["id"]).second);
+        EXPECT_TRUE(std::regex_match(s["verb"]["id"].get<std::string>(), iri));
+        EXPECT_TRUE(std::regex_match(s["object"]["id"].get<std::string>(), iri));
+        EXPECT_EQ(s["actor"]["account"]["name"], "P-07");
+        const bool met = meets(somebody.curriculum.exercise(somebody.people[0].sessions[i].exercise)->gate,
+                               somebody.people[0].sessions[i].values);
+        EXPECT_EQ(s["result"]["success"], met);
+        EXPECT_TRUE(s["verb"]["id"].get<std::string>().ends_with(met ? "passed" : "failed"));
+    }
+}
+
+}  // namespace
+}  // namespace palpate::training

@@ -1,0 +1,286 @@
+#include <training/progress_page.h>
+
+#include <base/outputs.h>
+#include <haptics/measures.h>
+#include <report/html.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+namespace palpate::training {
+
+using nlohmann::json;
+using report::escape;
+
+namespace {
+
+const haptics::Measure& measureCalled(std::string_view key)
+{
+    const auto all = haptics::measures();
+    const auto at = std::ranges::find(all, key, &haptics::Measure::key);
+    return at == all.end() ? all.front() : *at;
+}
+
+json number(double v)
+{
+    return std::isfinite(v) ? json(std::round(v * 1e4) / 1e4) : json();
+}
+
+json trialNumbers(std::size_t count)
+{
+    json x = json::array();
+    for (std::size_t n = 1; n <= count; ++n) {
+        x.push_back(n);
+    }
+    return x;
+}
+
+// What a measure has to be, as lines across its chart.
+json levelLines(const Exercise& exercise, std::string_view key)
+{
+    json lines = json::array();
+    for (const Level& level : exercise.gate.levels) {
+        if (level.measure != key) {
+            continue;
+        }
+        if (level.atLeast) {
+            lines.push_back({{"at", *level.atLeast}, {"label", "at least"}, {"colour", "good"}});
+        }
+        if (level.atMost) {
+            lines.push_back({{"at", *level.atMost}, {"label", "at most"}, {"colour", "good"}});
+        }
+    }
+    return lines;
+}
+
+json axis(std::string_view name, std::string_view unit)
+{
+    return {
+        {"name", name}, {"unit", unit}, {"label", unit.empty() ? std::string(name) : fmt::format("{} [{}]", name, unit)}};
+}
+
+json measureChart(const ExerciseProgress& p, const haptics::Measure& m)
+{
+    json y = json::array();
+    for (const StoredSession& s : p.sessions) {
+        const auto at = s.values.find(m.key);
+        y.push_back(at == s.values.end() ? json() : number(at->second));
+    }
+    return {{"columns", json::array({trialNumbers(p.sessions.size()), y})},
+            {"x", axis("session", "")},
+            {"y", axis(m.label, m.unit)},
+            {"lines", levelLines(*p.exercise, m.key)},
+            {"points", true},
+            {"height", 210},
+            {"series", json::array({{{"label", m.label}, {"colour", "c0"}, {"width", 2}}})}};
+}
+
+json cusumChart(const ExerciseProgress& p, const CusumPlan& plan)
+{
+    json alarm = json::array(), learning = json::array();
+    for (const CusumPoint& point : p.chart) {
+        alarm.push_back(number(point.alarm));
+        learning.push_back(number(point.learning));
+    }
+    return {{"columns", json::array({trialNumbers(p.chart.size()), alarm, learning})},
+            {"x", axis("session", "")},
+            {"y", axis("CUSUM", "")},
+            {"lines", json::array({{{"at", plan.alarmLimit()}, {"label", "alarm"}, {"colour", "bad"}},
+                                   {{"at", plan.learningLimit()}, {"label", "has learnt it"}, {"colour", "good"}}})},
+            {"points", true},
+            {"height", 210},
+            {"series", json::array({{{"label", "alarm: fails too often"}, {"colour", "bad"}, {"width", 2}},
+                                    {{"label", "learning: fails seldom"}, {"colour", "good"}, {"width", 2}}})}};
+}
+
+std::string days(double count)
+{
+    return count < 1 ? "today" : fmt::format("{:.0f} {} ago", std::floor(count), count < 2 ? "day" : "days");
+}
+
+// Colour and words, so that neither is needed alone.
+std::pair<const char*, const char*> stateOf(const ExerciseProgress& e, const ExerciseProgress* next)
+{
+    if (e.refresh) {
+        return {"bad", "to be refreshed"};
+    }
+    if (e.gate.open) {
+        return {"good", "reached"};
+    }
+    return &e == next                           ? std::pair{"accent", "next"}
+           : e.available && !e.sessions.empty() ? std::pair{"accent", "in training"}
+           : e.available                        ? std::pair{"muted", "open"}
+                                                : std::pair{"muted", "locked"};
+}
+
+std::string signals(const ExerciseProgress& e)
+{
+    const auto alarms = std::ranges::count_if(e.chart, &CusumPoint::alarmed);
+    const auto learnt = std::ranges::find_if(e.chart, &CusumPoint::proficient);
+    std::string words = alarms == 0 ? "" : fmt::format("{} {}", alarms, alarms == 1 ? "alarm" : "alarms");
+    if (learnt != e.chart.end()) {
+        words += fmt::format("{}learnt by session {}", words.empty() ? "" : ", ", learnt - e.chart.begin() + 1);
+    }
+    return words.empty() ? "none yet" : words;
+}
+
+std::string overview(const CurriculumProgress& c)
+{
+    const ExerciseProgress* const next = c.next();
+    std::string out =
+        "<div class=\"scroll\"><table class=\"plain\"><thead><tr><th>Exercise</th><th>State</th><th "
+        "class=\"n\">Sessions</th>"
+        "<th class=\"n\">At its level</th><th>CUSUM</th><th>Last practised</th></tr></thead><tbody>";
+    int number = 0;
+    for (const ExerciseProgress& e : c.exercises) {
+        const auto [colour, words] = stateOf(e, next);
+        out += fmt::format(
+            "<tr><th>{}. {}</th><td><b class=\"state\" style=\"color:var(--{})\">{}</b></td><td class=\"n\">{}</td><td "
+            "class=\"n\">{} of last {} ({} of {})</td><td>{}</td><td>{}</td></tr>",
+            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), e.gate.recentMet, e.gate.recentTried,
+            e.exercise->gate.pass, e.exercise->gate.of, e.sessions.empty() ? "-" : signals(e),
+            e.daysSince ? days(*e.daysSince) : "never");
+    }
+    return out + "</tbody></table></div><p class=\"note\">In brackets: what opens the gate.</p>";
+}
+
+std::string whatNext(const CurriculumProgress& c, const Person& person)
+{
+    const ExerciseProgress* const next = c.next();
+    if (next == nullptr) {
+        return "<p class=\"outcome\">All exercises are reached.</p>";
+    }
+    const bool test = next->exercise->gate.testOnly && !next->gate.open;
+    return fmt::format(
+        "<p class=\"outcome\"><b>Next: {}</b>. It {}.</p><pre>palpate train --profile '{}' --exercise {}/{}{}</pre>",
+        escape(next->exercise->title), escape(reasonFor(*next)), escape(person.name), escape(c.curriculum->id),
+        escape(next->exercise->id), test ? " --test" : "");
+}
+
+std::string assumptions(const CusumPlan& plan)
+{
+    const auto length = [&](CusumChart chart, double p) {
+        const double n = averageRunLength(plan, chart, p);
+        return std::isfinite(n) ? fmt::format("{:.0f}", n) : "never";
+    };
+    return fmt::format(
+        "A session fails when it misses a level of its exercise. CUSUM with p0 = {:g}, p1 = {:g}, alpha = {:g}, beta = "
+        "{:g}: "
+        "who fails {:.0f} % of the time gets an alarm by chance every {} sessions in the mean, who fails {:.0f} % after "
+        "{}; "
+        "\"has learnt it\" comes after {} and, by chance, {} sessions.",
+        plan.p0, plan.p1, plan.alpha, plan.beta, 100 * plan.p0, length(CusumChart::alarm, plan.p0), 100 * plan.p1,
+        length(CusumChart::alarm, plan.p1), length(CusumChart::learning, plan.p0), length(CusumChart::learning, plan.p1));
+}
+
+// The charts of an exercise: its levels' measures, the total, the CUSUM.
+std::string exerciseCard(const ExerciseProgress& e, const CusumPlan& plan, json& charts)
+{
+    std::vector<std::string> keys{"total"};
+    for (const Level& level : e.exercise->gate.levels) {
+        if (std::ranges::find(keys, level.measure) == keys.end()) {
+            keys.push_back(level.measure);
+        }
+    }
+    std::string out = fmt::format(
+        "<section class=\"card\"><h2>{}</h2><p class=\"note\">{} sessions, {} at the level.</p>"
+        "<div class=\"charts\">",
+        escape(e.exercise->title), e.sessions.size(), std::ranges::count(e.met, true));
+    const auto place = [&](json chart, std::string_view title) {
+        const std::string id = fmt::format("chart{}", charts.size());
+        charts[id] = std::move(chart);
+        out += fmt::format("<div><h3>{}</h3><div class=\"chart small\" id=\"{}\"></div></div>", escape(title), id);
+    };
+    place(cusumChart(e, plan), "CUSUM");
+    for (const std::string& key : keys) {
+        const haptics::Measure& m = measureCalled(key);
+        place(measureChart(e, m), m.label);
+    }
+    out += "</div>";
+    std::string notes;
+    for (const StoredSession& s : e.sessions) {
+        if (!s.note.empty() || s.rating > 0) {
+            notes += fmt::format("<li>{}: {}{}</li>", s.started.substr(0, 10),
+                                 s.rating > 0 ? fmt::format("rated {} of 5. ", s.rating) : "", escape(s.note));
+        }
+    }
+    return out + (notes.empty() ? "" : "<ul>" + notes + "</ul>") + "</section>";
+}
+
+// Sessions outside a curriculum, by case.
+std::string freeCard(const PersonProgress& p)
+{
+    std::map<std::string, std::vector<double>> totals;
+    for (const StoredSession& s : p.sessions) {
+        const auto at = s.values.find("total");
+        if (s.exercise.empty() && at != s.values.end()) {
+            totals[s.caseId.empty() ? s.scene : s.caseId].push_back(at->second);
+        }
+    }
+    if (totals.empty()) {
+        return {};
+    }
+    std::string out =
+        "<section class=\"card\"><h2>Free practice</h2><div class=\"scroll\"><table "
+        "class=\"plain\"><thead><tr><th>Case</th><th "
+        "class=\"n\">Sessions</th><th class=\"n\">Last total</th><th class=\"n\">Best total</th></tr></thead><tbody>";
+    for (const auto& [name, values] : totals) {
+        out +=
+            fmt::format("<tr><th>{}</th><td class=\"n\">{}</td><td class=\"n\">{:.0f}</td><td class=\"n\">{:.0f}</td></tr>",
+                        escape(name), values.size(), values.back(), *std::ranges::max_element(values));
+    }
+    return out + "</tbody></table></div></section>";
+}
+
+std::string personPart(const PersonProgress& p, json& charts)
+{
+    std::string out =
+        fmt::format("<header><div><p class=\"eyebrow\">{} hand &middot; {} sessions since {}</p><h1>{}</h1></div></header>",
+                    p.person.hand == Hand::left ? "left" : "right", p.sessions.size(), p.person.created.substr(0, 10),
+                    escape(p.person.name));
+    if (p.sessions.empty()) {
+        out += "<section class=\"card\"><p>No sessions yet.</p></section>";
+    }
+    for (const CurriculumProgress& c : p.curricula) {
+        out += "<section class=\"card\"><h2>" + escape(c.curriculum->title) + "</h2>" + whatNext(c, p.person) +
+               overview(c) + "<p class=\"note\">" + assumptions(c.curriculum->cusum) + "</p></section>";
+        for (const ExerciseProgress& e : c.exercises) {
+            out += e.sessions.empty() ? "" : exerciseCard(e, c.curriculum->cusum, charts);
+        }
+    }
+    return out + freeCard(p);
+}
+
+}  // namespace
+
+std::vector<double> rowOf(const StoredSession& session)
+{
+    std::vector<double> row;
+    for (const haptics::Measure& m : haptics::measures()) {
+        const auto at = session.values.find(m.key);
+        row.push_back(at == session.values.end() ? std::numeric_limits<double>::infinity() : at->second);
+    }
+    return row;
+}
+
+void writeProgressPage(const std::filesystem::path& html, const std::vector<PersonProgress>& people,
+                       const std::vector<report::ScoredGroup>& groups)
+{
+    json charts = json::object();
+    std::string body;
+    for (const PersonProgress& p : people) {
+        body += personPart(p, charts);
+    }
+    if (!groups.empty()) {
+        body += report::groupsPart(groups);
+    }
+    base::writeWhole(html, report::page("Progress - Palpate", body, {{"events", json::array()}, {"charts", charts}}));
+}
+
+}  // namespace palpate::training
