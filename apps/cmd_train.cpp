@@ -1,6 +1,7 @@
 #include <apps/command.h>
 
 #include <apps/temporary_folder.h>
+#include <apps/train_figures.h>
 #include <apps/train_profile.h>
 #include <apps/viewers.h>
 #include <base/memory.h>
@@ -12,7 +13,6 @@
 #include <report/report.h>
 #include <session/falcon.h>
 #include <session/faults.h>
-#include <session/figures.h>
 #include <session/machine.h>
 #include <session/open.h>
 #include <session/rehearsal.h>
@@ -63,6 +63,8 @@ struct Options {
     std::string layout = "trainee";
     bool view = false;
     bool noView = false;
+    bool showTarget = false;  // of a palpation
+    bool closeAtEnd = false;  // the window, instead of showing the result
     bool unpaced = false;
     bool anyway = false;
     double seconds = 0;
@@ -72,83 +74,6 @@ struct Options {
     std::vector<std::string> inject;
     session::Faults faults;  // what `inject` says
 };
-
-nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
-                         const datasets::ModelSettings& model)
-{
-    auto figures = session::timingFigures(result.timing);
-    figures["scene"] = info.scene;
-    figures["model"] = info.model;
-    if (model.level == datasets::ModelLevel::elastic) {
-        figures["setting"] = model.setting;
-    }
-    figures["device"] = info.device;
-    figures["build"] = info.build;
-    figures["contacts"] = result.contacts;
-    figures["punctures"] = result.punctures;
-    figures["peak_force_n"] = {
-        {"basic", result.peakBasic}, {"additional", result.peakAdditional}, {"total", result.peakTotal}};
-    figures["energy_mj"] = {{"made", 1e3 * result.energyMade}, {"damped", 1e3 * result.energyDamped}};
-    nlohmann::json nearest = nlohmann::json::object();
-    for (std::size_t i = 0; i < info.structures.size(); ++i) {
-        nearest[info.structures[i]] = 1e3 * result.nearest[i];
-    }
-    figures["nearest_mm"] = nearest;
-    figures["score"] = session::scoreFigures(result.score, result.losses);
-    figures["core"] = session::coreFigures(result.cores, info.tissues);
-    figures["force_hash"] = session::hexadecimal(result.forceHash);
-    figures["peak_memory_mb"] = session::peakMemoryMb();
-    figures["lost_records"] = result.lostRecords;
-    figures["warnings"] = result.warnings;
-    return figures;
-}
-
-std::string missesInWords(const haptics::ServoTiming& timing)
-{
-    if (timing.missed == 0) {
-        return "";
-    }
-    return fmt::format(" in {} gaps of up to {} ms ({} ticks took over 1 ms)", timing.gaps, timing.longestGap,
-                       timing.overruns);
-}
-
-// What to do about a machine that is too slow for the tissue model, or nothing.
-std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model)
-{
-    constexpr double bearable = 0.01;  // of the ticks
-    const double share =
-        static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
-    if (share <= bearable) {
-        return "";
-    }
-    const bool coarser =
-        model.level == datasets::ModelLevel::elastic && model.setting != datasets::elasticSettings().front();
-    return fmt::format(
-        "{:.0f} % of the ticks took over 1 ms: this machine is too slow or too busy for the tissue model; {}\n",
-        100 * share, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
-}
-
-void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
-{
-    const auto tick = result.timing.work.percentiles();
-    const auto late = result.timing.lateness.percentiles();
-    fmt::print(
-        "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
-        result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
-        1e6 * late.p50, 1e6 * late.p99);
-    fmt::print("{}", slowness(result.timing, model));
-    fmt::print("peak force {:.2f} N (tissue {:.2f} N, guidance {:.2f} N)\n", result.peakTotal, result.peakBasic,
-               result.peakAdditional);
-    for (std::size_t i = 0; i < result.cores.size(); ++i) {
-        const auto& core = result.cores[i];
-        fmt::print("core {}: {:.0f} % {}, {:.1f} mm of it in the {}; {}\n", i + 1, 100.0 * core.targetFraction,
-                   info.structures[0], 1e3 * core.targetLength, info.structures[0],
-                   core.fragments == 1 ? "in one piece" : fmt::format("in {} pieces", core.fragments));
-    }
-    for (const auto& [label, value] : haptics::describe(result.score)) {
-        fmt::print("  {:<28} {}\n", label, value);
-    }
-}
 
 bool wantsWindow(const Options& o)
 {
@@ -258,6 +183,22 @@ void checkOutputs(const Options& o)
     }
 }
 
+// Names of the tissues that are to be found, and so not shown.
+std::vector<std::string> concealed(const Options& o, const haptics::SessionModel& model)
+{
+    std::vector<std::string> names;
+    if (model.scene.tool.kind == datasets::ToolKind::needle || o.showTarget) {
+        return names;
+    }
+    for (const auto& structure : model.tissue->structures()) {
+        const auto& labels = model.structures[0].labels;
+        if (std::ranges::find(labels, structure.value) != labels.end()) {
+            names.push_back(model.tissue->table().rows[structure.tissue].name);
+        }
+    }
+    return names;
+}
+
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
 // is now, as it is told.
 std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
@@ -349,17 +290,43 @@ void tell(const std::string& fitted, const std::vector<std::pair<const char*, st
     }
 }
 
-void train(Options o)
+// Where the figures lie that the window shows at the end: of a session that somebody holds.
+std::optional<TemporaryFolder> forResult(const Options& o)
+{
+    const bool shown = session::deviceKind(o.device).somebodyHolds && wantsWindow(o) && !o.closeAtEnd;
+    return shown ? std::optional<TemporaryFolder>(std::in_place, "the result that the window shows") : std::nullopt;
+}
+
+ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, const fs::path& result)
+{
+    ViewersWanted wanted;
+    wanted.session = sessionName(o);
+    wanted.layout = o.layout;
+    wanted.pictures = o.unpaced ? "" : o.pictures;
+    wanted.result = result;
+    wanted.hidden = concealed(o, model);
+    wanted.test = o.training.test;
+    wanted.window = wantsWindow(o);
+    wanted.handIsHere = session::deviceKind(o.device).needsViewer;
+    return wanted;
+}
+
+void prepare(Options& o, const Training& training)
 {
     for (const auto& text : o.inject) {
         const auto faults = session::parseFaults(text);
         o.faults.insert(o.faults.end(), faults.begin(), faults.end());
     }
-    Training training(o.training);
     applyTraining(o, training);
     checkDevice(o);
     checkFaults(o);
     checkOutputs(o);
+}
+
+void train(Options o)
+{
+    Training training(o.training);
+    prepare(o, training);
     std::optional<TemporaryFolder> temporary;
     if (o.unpaced && !o.pictures.empty() && recordFile(o).empty()) {
         o.record = temporary.emplace("the record that the pictures are drawn of").path() / "session.db";
@@ -400,8 +367,9 @@ void train(Options o)
     options.faults = o.faults;
 
     // Before the record is made, so that a viewer that cannot be started leaves none.
-    Viewers viewers({options.session, o.layout, o.unpaced ? "" : o.pictures, wantsWindow(o),
-                     session::deviceKind(o.device).needsViewer});
+    const std::optional<TemporaryFolder> resultFolder = forResult(o);
+    const fs::path toShow = resultFolder ? resultFolder->path() / "result.json" : fs::path();
+    Viewers viewers(viewersFor(o, model, toShow));
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };
@@ -417,6 +385,11 @@ void train(Options o)
     if (o.json != "-") {
         summarise(result, info, model.scene.model);
         tell(fitted, written, kept);
+    }
+    if (resultFolder && result.signal == 0) {
+        command::writeJson(toShow, figuresOf(result, info, model.scene.model));
+        std::fflush(stdout);
+        viewers.waitForWindow();
     }
     if (result.signal != 0) {
         throw command::Interrupted(
@@ -499,6 +472,9 @@ void addTrain(CLI::App& app)
         ->check(CLI::IsMember({"trainee", "instructor"}))
         ->capture_default_str();
     c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
+    c->add_flag("--show-target", o->showTarget, "Show the target of a palpation, which the window hides");
+    c->add_flag("--close-at-end", o->closeAtEnd,
+                "With mouse or falcon: close the window when the session has ended, instead of showing its result");
     c->add_option("--session", o->session, "Name under which viewers find the session");
     c->add_option("--operator", o->operatorName, "Who holds the device, or a pseudonym: for the record")
         ->check(operatorFault, "up to 200 bytes of text");

@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/build.h>
+#include <base/child_process.h>
 #include <base/nearest.h>
 #include <command/interrupted.h>
 #include <studies/accuracy/command.h>
@@ -10,11 +11,15 @@
 
 #include <CLI/CLI.hpp>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -35,6 +40,19 @@ std::vector<std::string> wordsOf(int argc, char** argv)
     return words;
 }
 
+// `palpate` alone, on a desktop, is the trainer's window. Returns where there is none.
+void openTrainer(const char* program)
+{
+    const auto set = [](const char* name) {
+        const char* value = std::getenv(name);
+        return value != nullptr && *value != '\0';
+    };
+    const auto trainer = palpate::base::programFolder() / "palpate-trainer";
+    if ((set("DISPLAY") || set("WAYLAND_DISPLAY")) && std::filesystem::exists(trainer)) {
+        ::execl(trainer.c_str(), program, static_cast<char*>(nullptr));
+    }
+}
+
 // What a command printed and nobody got is no success: a full disk behind `>`, a closed pipe.
 void checkStandardOutput()
 {
@@ -49,6 +67,9 @@ void checkStandardOutput()
 
 int main(int argc, char** argv)
 {
+    if (argc == 1) {
+        openTrainer("palpate-trainer");
+    }
     CLI::App app("Palpate: feel inside a segmented volume", "palpate");
     app.set_version_flag("--version", std::string(palpate::base::build()));
     app.require_subcommand(1);

@@ -90,6 +90,11 @@ int main(int argc, char** argv)
     app.add_flag("--ultrasound", options.ultrasound, "Begin with the ultrasound picture (key U)");
     app.add_option("--images", options.images, "Folder for ultrasound pictures that are stored (key P)")
         ->capture_default_str();
+    app.add_option("--hide", options.concealed.tissues,
+                   "Show this tissue as what lies around it, and not where the target is: for a test");
+    app.add_flag("--no-plan", options.concealed.plan, "Without planned line and distance to the target: for a test");
+    app.add_flag("!--no-steps", options.steps, "Without the steps in words, which a window shows");
+    app.add_option("--result", options.result, "Figures of the session (train --json), shown when it has ended");
     app.add_flag("--hidden", options.hidden, "Draw as in a window, on a display that nobody sees (Xvfb): to measure");
     app.add_option("--timeline", timeline, "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");
     app.add_option("--size", size, "WIDTHxHEIGHT in pixels")->capture_default_str();

@@ -38,6 +38,14 @@ bool Viewers::lookAfter()
     return true;
 }
 
+void Viewers::waitForWindow()
+{
+    constexpr double longer = 400;  // than the window shows a result [s]
+    if (window) {
+        window->wait(longer);
+    }
+}
+
 void Viewers::stall(bool stopped)
 {
     const std::lock_guard lock(guard_);
@@ -50,7 +58,17 @@ void Viewers::stall(bool stopped)
 
 void Viewers::openWindow()
 {
-    start(window, {"--layout", wanted_.layout});
+    std::vector<std::string> arguments{"--layout", wanted_.layout};
+    for (const std::string& tissue : wanted_.hidden) {
+        arguments.insert(arguments.end(), {"--hide", tissue});
+    }
+    if (wanted_.test) {
+        arguments.insert(arguments.end(), {"--no-plan", "--no-steps"});
+    }
+    if (!wanted_.result.empty()) {
+        arguments.insert(arguments.end(), {"--result", wanted_.result.string()});
+    }
+    start(window, std::move(arguments));
     opened_ = std::chrono::steady_clock::now();
 }
 

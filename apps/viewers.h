@@ -13,9 +13,12 @@ namespace palpate::apps {
 
 /// Which viewers a session starts.
 struct ViewersWanted {
-    std::string session;   // its name
-    std::string layout;    // of the window
-    std::string pictures;  // folder of pictures to write; empty: none
+    std::string session;              // its name
+    std::string layout;               // of the window
+    std::string pictures;             // folder of pictures to write; empty: none
+    std::filesystem::path result;     // figures that will be there at the end, for the window; empty: none
+    std::vector<std::string> hidden;  // tissues that the window does not show
+    bool test = false;                // no hints in the window
     bool window = false;
     bool handIsHere = false;  // the window is the hand
 };
@@ -29,6 +32,8 @@ public:
     /// Opens a window that has crashed again, twice a second at most. False when the window that was the hand has been
     /// closed: nobody could move the tool any more.
     bool lookAfter();
+    /// Until the window is closed; it closes itself when nobody has looked at the result for long.
+    void waitForWindow();
     /// Stops them or lets them go on; also from another thread.
     void stall(bool stopped);
 

@@ -64,6 +64,8 @@ endif()
 if(PALPATE_VIEWER)
   find_package(glfw3 3.3 CONFIG REQUIRED)
   find_package(GLEW REQUIRED)
+  find_package(OpenGL REQUIRED)
+  pkg_check_modules(imgui REQUIRED IMPORTED_TARGET GLOBAL imgui)
   find_package(VTK 9.1 REQUIRED COMPONENTS
     CommonCore CommonDataModel CommonExecutionModel CommonTransforms FiltersCore FiltersGeneral FiltersSources ImagingCore
     InteractionStyle IOImage RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2

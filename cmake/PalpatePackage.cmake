@@ -11,4 +11,9 @@ install(FILES
   DESTINATION ${palpate_package_dir})
 
 install(FILES README.md LICENSE NOTICE CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+if(PALPATE_VIEWER)
+  # The trainer in the desktop's menu.
+  install(FILES packaging/palpate.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications)
+  install(FILES packaging/palpate.svg DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps)
+endif()
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR})

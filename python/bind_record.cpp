@@ -82,13 +82,15 @@ py::dict replay(const RecordBox& box)
 py::dict score(const RecordBox& box)
 {
     haptics::Score found;
+    std::vector<haptics::Loss> losses;
     haptics::RecordCheck check;
     {
         const py::gil_scoped_release others;
         found = haptics::scoreOf(box.record);
+        losses = haptics::lossesOf(box.record);
         check = haptics::checkRecord(box.record, base::build());
     }
-    py::dict out = toPython(session::scoreFigures(found));
+    py::dict out = toPython(session::scoreFigures(found, losses));
     out["doubts"] = check.warnings;
     return out;
 }

@@ -309,7 +309,10 @@ void bindSession(py::module_& module)
                  box.live.close();
              })
         .def("score",
-             [](const SessionBox& box) { return toPython(session::scoreFigures(box.live.session().figures().score)); })
+             [](const SessionBox& box) {
+                 const session::SessionFigures figures = box.live.session().figures();
+                 return toPython(session::scoreFigures(figures.score, figures.losses));
+             })
         .def("ultrasound", &ultrasoundOf, py::arg("width") = 640, py::arg("height") = 640, py::kw_only(),
              py::arg("face") = py::none(), py::arg("direction") = py::make_tuple(0, 1, 0),
              py::arg("lateral") = py::make_tuple(1, 0, 0), py::arg("depth") = 0.0)

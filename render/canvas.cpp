@@ -4,6 +4,7 @@
 #include <vtkPolyDataMapper2D.h>
 #include <vtkProperty2D.h>
 #include <vtkTextProperty.h>
+#include <vtkTextRenderer.h>
 
 #include <algorithm>
 #include <cmath>
@@ -97,6 +98,27 @@ void Canvas::text(Point2 at, const std::string& words, double size, const Colour
     look.SetJustification(align == Align::left     ? VTK_TEXT_LEFT
                           : align == Align::centre ? VTK_TEXT_CENTERED
                                                    : VTK_TEXT_RIGHT);
+}
+
+double Canvas::widthOf(const std::string& words, double size, bool bold) const
+{
+    constexpr int screenDpi = 72;  // of all text actors: a font's size is in pixels
+    constexpr std::size_t most = 4096;
+    const int pixels = static_cast<int>(std::lround(size));
+    const auto key = std::make_pair(words, bold ? -pixels : pixels);
+    if (const auto known = widths_.find(key); known != widths_.end())
+        return known->second;
+    if (widths_.size() > most)
+        widths_.clear();
+    vtkNew<vtkTextProperty> look;
+    look->SetFontFamilyToArial();
+    look->SetFontSize(pixels);
+    look->SetBold(bold ? 1 : 0);
+    std::array<int, 4> box{};
+    vtkTextRenderer* const renderer = vtkTextRenderer::GetInstance();
+    const bool measured = renderer != nullptr && renderer->GetBoundingBox(look, words, box.data(), screenDpi);
+    const double width = measured ? box[1] - box[0] + 1 : 0.6 * size * static_cast<double>(words.size());
+    return widths_[key] = width;
 }
 
 void Canvas::end()

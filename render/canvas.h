@@ -11,8 +11,10 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <array>
+#include <map>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::render {
@@ -36,6 +38,8 @@ public:
     void text(Point2 at, const std::string& words, double size, const Colour& colour, Align align = Align::left,
               bool bold = false);
     void end();
+    /// How wide text() draws these words [pixels].
+    double widthOf(const std::string& words, double size, bool bold = false) const;
 
 private:
     vtkRenderer& renderer_;
@@ -45,6 +49,7 @@ private:
     vtkNew<vtkPolyData> shapes_;
     std::vector<vtkSmartPointer<vtkTextActor>> texts_;
     std::size_t used_ = 0;
+    mutable std::map<std::pair<std::string, int>, double> widths_;  // of words already measured
 };
 
 }  // namespace palpate::render

@@ -27,6 +27,12 @@ bool shiftIn(GLFWwindow* window)
     return glfwGetKey(window, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS || glfwGetKey(window, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
 }
 
+bool controlIn(GLFWwindow* window)
+{
+    return glfwGetKey(window, GLFW_KEY_LEFT_CONTROL) == GLFW_PRESS ||
+           glfwGetKey(window, GLFW_KEY_RIGHT_CONTROL) == GLFW_PRESS;
+}
+
 // Where the cursor is in the frame buffer, which has more pixels than the window has points on high-density screens.
 glm::dvec2 pixelAt(GLFWwindow* window, double x, double y)
 {
@@ -53,20 +59,22 @@ ultrasound::ProbeMove probeMove(glm::dvec2 pixels, bool turned)
 }  // namespace
 
 Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture,
-                   const Follower& follower, Playback* playback, std::filesystem::path images)
+                   const Follower& follower, Playback* playback, std::filesystem::path images, bool steps)
     : window_(window),
       interactor_(interactor),
       picture_(picture),
       follower_(follower),
       playback_(playback),
-      images_(std::move(images))
+      images_(std::move(images)),
+      steps_(steps)
 {
     glfwSetWindowUserPointer(window, this);
     glfwSetMouseButtonCallback(
         window, [](GLFWwindow* w, int button, int action, int) { controlsOf(w).button(button, action == GLFW_PRESS); });
     glfwSetCursorPosCallback(window,
                              [](GLFWwindow* w, double x, double y) { controlsOf(w).moved(pixelAt(w, x, y), shiftIn(w)); });
-    glfwSetScrollCallback(window, [](GLFWwindow* w, double, double y) { controlsOf(w).wheel(y, shiftIn(w)); });
+    glfwSetScrollCallback(window,
+                          [](GLFWwindow* w, double, double y) { controlsOf(w).wheel(y, shiftIn(w), controlIn(w)); });
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
         const char* name = glfwGetKeyName(key, scancode);
         if (action != GLFW_RELEASE)
@@ -86,6 +94,8 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
 void Controls::keep()
 {
     hand_.keep(follower_);
+    const auto input = follower_.session() != nullptr ? follower_.session()->input() : std::nullopt;
+    picture_.setSteps(steps_, input ? input->marks : 0, hand_.is());
     picture_.setCaption(caption());
     picture_.setHand(hand_.is() && hand_.held() ? std::optional(hand_.target()) : std::nullopt);
     if (playback_ != nullptr)
@@ -116,6 +126,10 @@ void Controls::button(int button, bool down)
             picture_.ultrasound().beginCaliper(point(cursor_));
         return;
     }
+    if (button == GLFW_MOUSE_BUTTON_RIGHT && down && hand_.held())
+        return hand_.fire();
+    if (button == GLFW_MOUSE_BUTTON_LEFT && down && hand_.is() && picture_.endsAt(point(cursor_)))
+        return hand_.end();
     if (button == GLFW_MOUSE_BUTTON_LEFT && hand_.is())
         return down ? hand_.press(follower_.state()) : hand_.release();
     if (button == GLFW_MOUSE_BUTTON_LEFT && playback_ != nullptr) {
@@ -146,13 +160,13 @@ void Controls::moved(glm::dvec2 to, bool fine)
     camera(vtkCommand::MouseMoveEvent);
 }
 
-void Controls::wheel(double notches, bool fine)
+void Controls::wheel(double notches, bool fine, bool intoPicture)
 {
     used_ = true;
     if (onUltrasound())
         picture_.ultrasound().turn(Knob::depth, notches > 0 ? -1 : 1);
     else if (hand_.is())
-        hand_.move((fine ? fineShare : 1.0) * notches * depthStep * screen().into);
+        hand_.move((fine ? fineShare : 1.0) * notches * depthStep * (intoPicture ? screen().into : hand_.axis()));
     else
         camera(notches > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
 }

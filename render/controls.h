@@ -18,7 +18,7 @@ namespace palpate::render {
 
 /// What keys and mouse do in a window: the hand, the camera, what is shown, and a record that is played.
 ///
-///     session with a hand of a viewer   left: hold to move the tool, wheel: its depth; right: camera
+///     session with a hand of a viewer   left: hold to move the tool, wheel: along itself; right: camera
 ///     any other session                 left or right: camera, wheel: zoom
 ///     record                            left: drag through the time, right: camera, wheel: zoom
 ///
@@ -30,7 +30,7 @@ public:
     /// Listens to `window` until it is destroyed. All must outlive that. @param playback  of a record; null = a live
     /// session
     Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture, const Follower& follower,
-             Playback* playback, std::filesystem::path images);
+             Playback* playback, std::filesystem::path images, bool steps);
     Controls(const Controls&) = delete;
     Controls& operator=(const Controls&) = delete;
 
@@ -71,7 +71,7 @@ private:
     };
     void button(int button, bool down);
     void moved(glm::dvec2 to, bool fine);
-    void wheel(double notches, bool fine);
+    void wheel(double notches, bool fine, bool intoPicture);
     void key(int key, const std::string& name, bool again, bool shift);
     bool applies(const Key& key) const;
     std::vector<KeyHelp> help() const;
@@ -91,6 +91,7 @@ private:
     std::filesystem::path images_;  // folder for stored ultrasound pictures
     MouseHand hand_;
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
+    bool steps_ = true;       // are told in words
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture
 };

@@ -1,5 +1,7 @@
 #include <render/follower.h>
 
+#include <render/result_file.h>
+
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
@@ -65,11 +67,16 @@ std::string onlySession(const std::vector<std::string>& running)
 
 }  // namespace
 
-Follower::Follower(std::string session, double wait) : wanted_(std::move(session)), wait_(wait) {}
+Follower::Follower(std::string session, double wait, std::filesystem::path result)
+    : wanted_(std::move(session)), wait_(wait), result_(std::move(result))
+{
+}
 
 bool Follower::over() const noexcept
 {
-    return !subscriber_ && ending_ == channel::Ending::finished && seconds(Clock::now() - since_) > wait_;
+    constexpr double toRead = 300;  // a result [s]
+    const double wait = resultShown_ ? std::max(wait_, toRead) : wait_;
+    return !subscriber_ && ending_ == channel::Ending::finished && seconds(Clock::now() - since_) > wait;
 }
 
 bool Follower::moving() const noexcept
@@ -91,6 +98,7 @@ void Follower::tryAttach(Picture& picture)
     if (!found || !found->alive())
         return;
     subscriber_ = std::move(found);
+    resultShown_ = false;
     ++attached_;
     silent_ = false;
     name_ = wanted_ = name;
@@ -163,6 +171,17 @@ void Follower::leave(Picture& picture)
     since_ = Clock::now();
 }
 
+void Follower::lookForResult(Picture& picture)
+{
+    if (resultShown_ || result_.empty() || ending_ != channel::Ending::finished)
+        return;
+    if (auto card = readResult(result_)) {
+        resultShown_ = true;
+        picture.setResult(std::move(*card));
+        picture.setNotice("session ended", "Q closes the window");
+    }
+}
+
 void Follower::giveUp() const
 {
     if (ending_ == channel::Ending::torn)
@@ -184,6 +203,7 @@ void Follower::poll(Picture& picture)
         tryAttach(picture);
     }
     if (!subscriber_) {
+        lookForResult(picture);
         if (seconds(polled_ - since_) > wait_)
             giveUp();
         return;

@@ -7,6 +7,7 @@
 
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -21,8 +22,9 @@ using Clock = std::chrono::steady_clock;
 /// there is to wait for, and measures.
 class Follower {
 public:
-    /// `session` may be empty: then the only session that runs is taken.
-    Follower(std::string session, double wait);
+    /// `session` may be empty: then the only session that runs is taken. `result`: file that the session's figures come in
+    /// when it has ended; empty: none.
+    Follower(std::string session, double wait, std::filesystem::path result = {});
 
     /// Looks what has come; to be called often. Throws std::runtime_error when there has been no session for `wait`
     /// seconds, or the one that there was has been killed and has not come back.
@@ -55,9 +57,12 @@ private:
     void leave(Picture& picture);
     void giveUp() const;
     void notice(Picture& picture);
+    void lookForResult(Picture& picture);
 
     std::string wanted_, name_;
     double wait_;
+    std::filesystem::path result_;
+    bool resultShown_ = false;
     std::optional<channel::Subscriber> subscriber_;
     std::unique_ptr<channel::Displaced> displaced_ = std::make_unique<channel::Displaced>();
     std::vector<channel::Displacement> displacedBefore_;  // when tissue moved last

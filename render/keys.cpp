@@ -31,7 +31,8 @@ SliceLook following(SliceLook look)
 // A new key is a row here, and in docs/viewer.md. A row without keys tells what the mouse does (controls.cpp).
 const std::vector<Controls::Key> Controls::keys{
     {hand, "hold left", "take the tool and move it in the plane of the picture", {}, nullptr},
-    {hand, "  wheel", "push it into the picture, or pull it out: 1 mm a notch", {}, nullptr},
+    {hand, "  wheel", "push it along itself, or pull it back: 1 mm a notch", {}, nullptr},
+    {hand, "  Ctrl wheel", "move it into the picture, or out of it: 1 mm a notch", {}, nullptr},
     {hand, "  Shift", "five times finer", {}, nullptr},
     {hand,
      "  right left",
@@ -45,7 +46,7 @@ const std::vector<Controls::Key> Controls::keys{
      [](Controls& c, const Press& p) { c.hand_.turn(c.screen().right, p.sign * turnStep); }},
     {hand,
      "  Space",
-     "fire the biopsy gun",
+     "fire the biopsy gun; so does the right button",
      {{GLFW_KEY_SPACE, 0, once}},
      [](Controls& c, const Press&) { c.hand_.fire(); }},
     {hand, "M", "mark the place of the tool", {{0, 'm', once}}, [](Controls& c, const Press&) { c.hand_.mark(); }},

@@ -51,6 +51,11 @@ glm::dvec3 MouseHand::target() const noexcept
     return vec(input_.target);
 }
 
+glm::dvec3 MouseHand::axis() const noexcept
+{
+    return vec(input_.axis);
+}
+
 void MouseHand::move(glm::dvec3 by) noexcept
 {
     if (input_.held != 0)

@@ -24,6 +24,8 @@ public:
     bool held() const noexcept { return is() && input_.held != 0; }
     /// Where the hand is [m].
     glm::dvec3 target() const noexcept;
+    /// Of the tool, from its shaft to its tip; a unit vector.
+    glm::dvec3 axis() const noexcept;
     /// While the switch is held, and only then: moves the hand [m].
     void move(glm::dvec3 by) noexcept;
     /// ... turns the tool by `angle` [rad] about the unit vector `about`.

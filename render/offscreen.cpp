@@ -224,10 +224,11 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool
     window->SetSize(options.width, options.height);
     Outputs outputs(options, *window);
     Picture picture(*window);
+    picture.conceal(options.concealed);
     picture.show(options.instructor ? Layout::instructor : Layout::trainee);
     picture.show(options.slices);
     picture.showUltrasound(options.ultrasound);
-    Follower follower(options.session, options.wait);
+    Follower follower(options.session, options.wait, options.result);
     writeAll(options, stop, picture, follower, outputs);
     outputs.finish();
     ViewerFigures figures = follower.figures();

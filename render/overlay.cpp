@@ -38,8 +38,12 @@ struct Pen {
     void pair(const std::string& name, const std::string& value, const Colour& colour)
     {
         down();
-        canvas.text({left, y}, name, font, colour);
-        canvas.text({right, y}, value, font, colour, Align::right);
+        // Smaller where a narrow window has no room for both.
+        const double room = right - left - (value.empty() ? 0 : 0.6 * font);
+        const double both = canvas.widthOf(name, font) + canvas.widthOf(value, font);
+        const double size = font * std::clamp(room / std::max(both, 1.0), 0.6, 1.0);
+        canvas.text({left, y}, name, size, colour);
+        canvas.text({right, y}, value, size, colour, Align::right);
     }
 };
 
@@ -88,7 +92,7 @@ void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::Stat
         pen.pair(name + when, millimetres(distance), white);
 }
 
-void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, int lines)
+void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, int lines, bool targetHidden)
 {
     pen.heading("FROM THE TIP TO");
     const std::size_t count = std::min<std::size_t>(scenery.structures, channel::maxStructures);
@@ -100,7 +104,9 @@ void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::Sta
     std::sort(order.begin() + 1, order.end(),
               [&](std::size_t a, std::size_t b) { return state.distance[a] < state.distance[b]; });
     const auto shown = std::min(count, static_cast<std::size_t>(lines));
-    for (std::size_t i = 0; i < shown; ++i)
+    if (targetHidden)
+        pen.pair(text(scenery.structure[0]), "to be found", good);
+    for (std::size_t i = targetHidden ? 1 : 0; i < shown; ++i)
         if (i + 1 == shown && shown < count)
             pen.pair(fmt::format("and {} more", count - i), "from " + millimetres(state.distance[order[i]]), grey);
         else
@@ -122,7 +128,8 @@ std::string phaseWords(const channel::State& state)
 
 void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::State& state)
 {
-    pen.heading("NEEDLE");
+    const bool needle = scenery.tool == channel::ToolKind::needle;
+    pen.heading(needle ? "NEEDLE" : "FINGERTIP");
     const bool known = state.tissue > 0 && state.tissue < scenery.tissues;
     pen.pair(phaseWords(state), known ? "tip in " + text(scenery.tissue[state.tissue].name) : std::string(), white);
     if (state.aheadTissue > 0 && state.aheadTissue < scenery.tissues)
@@ -130,32 +137,8 @@ void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::Stat
     if (state.cores > 0)
         pen.pair(fmt::format("core {}: {:.0f} % target", state.cores, 100 * state.coreTarget),
                  fmt::format("{:.1f} mm of it", state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);
-    else
+    else if (needle)
         pen.pair("no core taken yet", "", grey);
-}
-
-void drawWarning(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state)
-{
-    const std::size_t s = std::min<std::size_t>(state.warned, channel::maxStructures - 1);
-    std::string words;
-    Colour colour = amber;
-    if (state.status == channel::Status::faulted) {
-        words = "FAULT: forces are off";
-        colour = red;
-    } else if (state.warning == channel::Warning::touching) {
-        words = "STOP: touching " + text(scenery.structure[s]);
-        colour = red;
-    } else if (state.warning != channel::Warning::none) {
-        words = fmt::format("{}: {} at {}", state.warning == channel::Warning::near ? "CAREFUL" : "VERY NEAR",
-                            text(scenery.structure[s]), millimetres(state.distance[s]));
-    } else {
-        return;
-    }
-    const double size = 1.35 * plan.font, middle = plan.banner.x + 0.5 * plan.banner.width;
-    const double width = std::min(0.66 * size * static_cast<double>(words.size()) + 2 * size, 0.96 * plan.banner.width);
-    const double y = plan.banner.y;
-    canvas.rectangle({middle - width / 2, y - 0.4 * size}, {width, 1.9 * size}, colour);
-    canvas.text({middle, y}, words, size, {0.05, 0.05, 0.05}, Align::centre, true);
 }
 
 struct Entry {
@@ -165,8 +148,14 @@ struct Entry {
 
 std::vector<Entry> legendEntries(const channel::Scenery& scenery, const Legend& legend, std::size_t room)
 {
-    std::vector<Entry> entries{{toolColour, scenery.tool == channel::ToolKind::needle ? "needle" : "probe"},
-                               {planColour, "planned line, target"}};
+    const bool needle = scenery.tool == channel::ToolKind::needle;
+    std::vector<Entry> entries{{toolColour, needle ? "needle" : "fingertip"}};
+    if (scenery.entry != scenery.aim)
+        entries.push_back({planColour, "planned line, target"});
+    if (needle) {
+        entries.push_back({trailColour, "way of the tip"});
+        entries.push_back({coreColour, "core taken"});
+    }
     for (std::size_t s = 1; s < std::min<std::size_t>(scenery.structures, channel::maxStructures); ++s)
         if (scenery.warnDistance[s] > 0) {
             entries.push_back({{shellColour[0], shellColour[1], shellColour[2]}, "warning distance"});
@@ -230,7 +219,7 @@ void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
 }
 
 void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
-                 const Health& health, const std::string& session)
+                 const Health& health, bool targetHidden)
 {
     const double font = plan.font, edge = margin * font;
     canvas.rectangle({static_cast<double>(plan.panel.x), 0},
@@ -242,17 +231,8 @@ void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     drawProgress(pen, scenery, state);
     pen.down(0.3);
     constexpr int distanceLines = 7;
-    drawDistances(pen, scenery, state, distanceLines);
+    drawDistances(pen, scenery, state, distanceLines, targetHidden);
 
-    const double x = plan.title.x + edge, top = plan.title.y + plan.title.height;
-    // Over the body as well: dark below bright.
-    const auto words = [&](double y, const std::string& what, double size, const Colour& colour, bool bold) {
-        canvas.text({x + 1, y - 1}, what, size, {0, 0, 0}, Align::left, bold);
-        canvas.text({x, y}, what, size, colour, Align::left, bold);
-    };
-    words(top - 1.8 * font, text(scenery.scene), 1.25 * font, white, true);
-    words(top - 3.2 * font, fmt::format("session {}   {:.1f} s", session, state.time), font, white, false);
-    drawWarning(canvas, plan, scenery, state);
     drawHealth(canvas, plan, state, health);
 }
 
@@ -272,41 +252,6 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
         const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;
         pen.pair(words(*event, scenery), fmt::format("{:.1f} s", event->time), colour);
     }
-}
-
-void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller)
-{
-    const double size = 1.8 * plan.font, y = 0.5 * plan.height, x = plan.banner.x + 0.5 * plan.banner.width;
-    const double width = std::min(0.98 * plan.banner.width, 0.62 * size * static_cast<double>(words.size()) + 3 * size);
-    canvas.rectangle({x - width / 2, y - 1.3 * size}, {width, 3.4 * size}, {0.05, 0.06, 0.09}, 0.88);
-    canvas.text({x, y + 0.4 * size}, words, size, white, Align::centre, true);
-    canvas.text({x, y - 0.8 * size}, smaller, plan.font, grey, Align::centre);
-}
-
-void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys)
-{
-    const double font = plan.font, row = lineHeight * font, x = plan.banner.x + margin * font;
-    const double high = row * static_cast<double>(keys.size()) + font, y = 0.5 * (plan.height - high);
-    const double wide = std::min(0.98 * plan.banner.width, 34 * font);
-    canvas.rectangle({x, y}, {wide, high}, {0.05, 0.06, 0.09}, 0.92);
-    double line = y + high - 0.5 * font;
-    for (const KeyHelp& key : keys) {
-        line -= row;
-        canvas.text({x + font, line + 0.2 * font}, key.key, font, amber, Align::left, true);
-        canvas.text({x + 10 * font, line + 0.2 * font}, key.what, font, white);
-    }
-}
-
-void drawCaption(Canvas& canvas, const ScreenPlan& plan, const std::string& words, double timeline)
-{
-    const double font = plan.font, left = plan.banner.x + 0.25 * plan.banner.width, width = 0.5 * plan.banner.width;
-    const double y = plan.height - 1.6 * font;
-    if (!words.empty())
-        canvas.text({left + width, y}, words, 1.1 * font, amber, Align::right, true);
-    if (timeline < 0)
-        return;
-    canvas.rectangle({left, y - 0.6 * font}, {width, 0.3 * font}, dark);
-    canvas.rectangle({left, y - 0.6 * font}, {width * std::min(timeline, 1.0), 0.3 * font}, amber);
 }
 
 }  // namespace palpate::render

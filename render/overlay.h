@@ -36,16 +36,12 @@ struct KeyHelp {
     std::string key, what;
 };
 
-/// Forces, distances with times to contact, warning, phase, core, health.
+/// Forces, distances with times to contact, phase, core, health. `targetHidden`: nothing of the target, which is to be
+/// found.
 void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
-                 const Health& health, const std::string& session);
+                 const Health& health, bool targetHidden);
 void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const Legend& legend);
 /// The last ones first.
 void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const std::deque<Event>& events);
-/// Words across the picture: "waiting for session x", "simulation ended".
-void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller);
-void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys);
-/// On top: a few words, and how much of a record is over, in [0, 1]; negative = no record.
-void drawCaption(Canvas& canvas, const ScreenPlan& plan, const std::string& words, double timeline);
 
 }  // namespace palpate::render

@@ -52,6 +52,18 @@ std::vector<std::uint8_t> tissuesIn(const channel::Scenery& scenery, std::span<c
     return rows;
 }
 
+// Where the camera looks from: turned about the planned line out of the slice's plane, so that the picture has depth and
+// the line still lies in the plane of the picture, in which the mouse moves the tool.
+glm::dvec3 cameraDirection(const channel::Scenery& scenery, const ViewFrame& frame)
+{
+    const glm::dvec3 line = vec(scenery.aim) - vec(scenery.entry);
+    if (glm::length(line) < 1e-4)
+        return glm::normalize(frame.towards + 0.35 * frame.up + 0.30 * frame.right);
+    const glm::dvec3 across = glm::normalize(glm::cross(glm::normalize(line), frame.towards));
+    const bool flipped = glm::dot(across, frame.right + frame.up) < 0;
+    return glm::normalize(frame.towards + (flipped ? -0.30 : 0.30) * across);
+}
+
 }  // namespace
 
 struct Picture::Session {
@@ -74,9 +86,11 @@ struct Picture::Session {
     void repaint() { volume.paint(scenery, deformation, factor); }
     glm::dvec3 aim() const { return deformation.seen(vec(scenery.aim)); }
 
-    channel::Scenery scenery;
+    channel::Scenery scenery;  // as it is shown
     std::string name;
     ViewFrame frame;
+    glm::dvec3 entry{0.0}, line{0.0};  // of the plan, shown or not [m]
+    glm::dvec3 from{0.0};              // where the camera looks from at first
     Deformation deformation;
     GreyImage grey;
     std::vector<std::uint8_t> coarse, fine;  // labels, for a scanner that begins later
@@ -118,7 +132,17 @@ void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t
                    std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
 {
     close();
-    session_ = std::make_unique<Session>(scenery, labels, image, fine, session, *view_);
+    result_.reset();
+    channel::Scenery shown = scenery;
+    std::vector<std::uint8_t> coarse(labels.begin(), labels.end()), finer(fine.begin(), fine.end());
+    palpate::render::conceal(concealed_, scenery, scenery.labels, coarse);
+    palpate::render::conceal(concealed_, scenery, scenery.fine, finer);
+    palpate::render::conceal(concealed_, shown);
+    session_ = std::make_unique<Session>(shown, coarse, image, finer, session, *view_);
+    session_->frame = viewFrame(scenery);
+    session_->entry = vec(scenery.entry);
+    session_->line = vec(scenery.aim) - vec(scenery.entry);
+    session_->from = cameraDirection(scenery, session_->frame);
     aimCamera();
     showUltrasound(ultrasoundShown_);
 }
@@ -133,8 +157,7 @@ void Picture::close()
         slice.hide();
 }
 
-// Looks onto the plane of the slice from a little to the side and above, so that both pictures have the same directions and
-// this one has depth; as near as the body's box allows.
+// Looks onto the plane of the slice, as near as the body's box and the tool, which waits before the entry, allow.
 void Picture::aimCamera()
 {
     auto [low, high] = bodyBox(session_->deformation);
@@ -144,7 +167,13 @@ void Picture::aimCamera()
     const double around = std::max(wideEnough, 0.75 * frame.extent);
     low = glm::max(low, glm::min(frame.centre - around, high));
     high = glm::min(high, glm::max(frame.centre + around, low));
-    const glm::dvec3 from = glm::normalize(frame.towards + 0.35 * frame.up + 0.30 * frame.right);
+    if (const glm::dvec3 line = session_->line; glm::length(line) > 1e-4) {
+        constexpr double waiting = 48e-3;  // from the body to the shaft, with room for the words above it [m]
+        const glm::dvec3 tool = session_->entry - waiting * glm::normalize(line);
+        low = glm::min(low, tool);
+        high = glm::max(high, tool);
+    }
+    const glm::dvec3 from = session_->from;
     const glm::dvec3 right = glm::normalize(glm::cross(frame.up, from)), up = glm::cross(from, right);
     const ScreenPlan plan = screenPlan();
     constexpr double angle = 25.0;  // of the view, upright [degrees]
@@ -166,10 +195,12 @@ void Picture::aimCamera()
     camera.SetViewUp(frame.up.x, frame.up.y, frame.up.z);
 }
 
-void Picture::update(const channel::State& state, const channel::Displaced* displaced, const Health& health)
+void Picture::update(const channel::State& told, const channel::Displaced* displaced, const Health& health)
 {
     if (!session_)
         return;
+    channel::State state = told;
+    palpate::render::conceal(concealed_, state);
     if (displaced != nullptr) {
         const VoxelBox changed = session_->deformation.apply(*displaced);
         session_->volume.update(session_->deformation);
@@ -181,14 +212,17 @@ void Picture::update(const channel::State& state, const channel::Displaced* disp
     session_->state = state;
     session_->health = health;
     session_->known = true;
-    session_->tool.update(session_->scenery, state, session_->aim());
-    note(state);
+    session_->tool.update(session_->scenery, state, session_->deformation);
+    note(told);
 }
 
 void Picture::note(const channel::State& state)
 {
-    if (session_)
-        session_->history.add(state);
+    if (!session_)
+        return;
+    channel::State shown = state;
+    palpate::render::conceal(concealed_, shown);
+    session_->history.add(shown);
 }
 
 void Picture::setNotice(const std::string& words, const std::string& smaller)
@@ -235,12 +269,14 @@ void Picture::render(Quality quality)
                              quality == Quality::still);
         drawFlat(plan);
     }
-    if (!words_.empty())
+    if (result_ && session_)
+        drawResult(canvas_, plan, *result_, smaller_);
+    else if (!words_.empty())
         drawNotice(canvas_, plan, words_, smaller_);
     canvas_.end();
     view_->ResetCameraClippingRange();
     window_.Render();
-    if (session_ && !session_->volume.shown())
+    if (session_ && (!session_->volume.shown() || session_->volume.renewed()))
         window_.Render();
     awaitSlices();
 }
@@ -318,20 +354,53 @@ void Picture::awaitSlices()
 void Picture::drawFlat(const ScreenPlan& plan)
 {
     Session& s = *session_;
-    drawFigures(canvas_, plan, s.scenery, s.state, s.health, s.name);
+    drawFigures(canvas_, plan, s.scenery, s.state, s.health, !concealed_.tissues.empty());
     drawEvents(canvas_, plan, s.scenery, s.history.events);
     if (!plan.forces.empty())
         drawForceTraces(canvas_, plan.forces, plan.font, s.scenery, s.history);
     if (!plan.distances.empty())
         drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
     // Where the legend has a place of its own help does not cover it.
-    if (!plan.legend.empty() && (help_.empty() || !plan.events.empty())) {
+    const bool covered = !words_.empty() && plan.events.empty();  // by a notice
+    if (!plan.legend.empty() && !covered && (help_.empty() || !plan.events.empty())) {
         const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
         drawLegend(canvas_, plan, s.scenery, {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1});
     }
-    if (!help_.empty())
+    step_ = {};
+    if (!help_.empty()) {
         drawHelp(canvas_, plan, help_);
-    drawCaption(canvas_, plan, caption_, timeline_);
+    } else if (s.known) {
+        const Header words = header();
+        lastStep_ = words.coaching.last;
+        step_ = drawHeader(canvas_, plan, s.scenery, s.state, words);
+    }
+}
+
+Header Picture::header() const
+{
+    const Session& s = *session_;
+    Header header{s.name, caption_, timeline_, {}};
+    if (!stepsTold_ || !words_.empty())
+        return header;
+    CoachView view = coached_;
+    view.aim = s.aim();
+    view.planned = !concealed_.any();
+    view.targetHidden = !concealed_.tissues.empty();
+    header.coaching = coach(s.scenery, s.state, view);
+    return header;
+}
+
+void Picture::setSteps(bool told, std::uint32_t marks, bool handIsHere)
+{
+    stepsTold_ = told;
+    coached_.marks = marks;
+    coached_.handIsHere = handIsHere;
+}
+
+bool Picture::endsAt(Point2 pixel) const noexcept
+{
+    return lastStep_ && !step_.empty() && pixel[0] >= step_.x && pixel[1] >= step_.y && pixel[0] < step_.x + step_.width &&
+           pixel[1] < step_.y + step_.height;
 }
 
 void Picture::show(Layout layout)

@@ -2,7 +2,9 @@
 
 #include <channel/channel.h>
 #include <render/canvas.h>
+#include <render/concealment.h>
 #include <render/deformation.h>
+#include <render/header.h>
 #include <render/overlay.h>
 #include <render/screen_plan.h>
 #include <render/slice_picture.h>
@@ -39,12 +41,20 @@ public:
     void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
               std::span<const std::uint16_t> image = {}, std::span<const std::uint8_t> fine = {});
     void close();
+    /// From the next session on: what is not shown.
+    void conceal(Concealment what) { concealed_ = std::move(what); }
     /// Shows what has come. `displaced` is null when there is nothing newer.
     void update(const channel::State& state, const channel::Displaced* displaced, const Health& health);
     /// Takes a state down for traces and events, also between pictures.
     void note(const channel::State& state);
     /// Words across the picture until the next setNotice(); empty = none.
     void setNotice(const std::string& words, const std::string& smaller);
+    /// What a session came to, instead of the notice, until the next open().
+    void setResult(ResultCard result) { result_ = std::move(result); }
+    /// Of the hand, for the steps in words: places marked, and whether it is this window. `told`: steps are shown.
+    void setSteps(bool told, std::uint32_t marks, bool handIsHere);
+    /// Whether a click there ends the session: on the words of the last step.
+    bool endsAt(Point2 pixel) const noexcept;
     /// `moving`: coarser where the renderer is software, so that the picture is finished in time.
     void render(Quality quality);
     /// Waits until the picture is drawn, and reckons with the time since `began`, when the work on it did begin, for the
@@ -99,6 +109,7 @@ private:
     void drawSlices(const ScreenPlan& plan, int step);
     void awaitSlices();
     void drawFlat(const ScreenPlan& plan);
+    Header header() const;
 
     vtkRenderWindow& window_;
     vtkNew<vtkRenderer> view_, flat_;
@@ -109,6 +120,11 @@ private:
     std::unique_ptr<Session> session_;
     std::future<void> painting_;  // of the slices, while the body is drawn
     std::string words_, smaller_, caption_;
+    Concealment concealed_;
+    std::optional<ResultCard> result_;
+    CoachView coached_;
+    bool stepsTold_ = false, lastStep_ = false;
+    Area step_;  // where the words of the step are
     std::vector<KeyHelp> help_;
     Layout layout_ = Layout::trainee;
     SliceLook look_ = SliceLook::tinted;

@@ -233,6 +233,15 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
         canvas.ring(pixel(aim), 0.55 * font, 0.36 * font, {0, 0, 0});
         canvas.ring(pixel(aim), 0.55 * font, 0.18 * font, planColour);
     }
+    for (std::size_t i = 0; i < std::min<std::size_t>(state.holes, channel::maxHoles); ++i) {
+        const auto seen = [&](const std::array<float, 3>& p) {
+            return pixel(anatomy.deformation.seen(glm::dvec3(p[0], p[1], p[2])));
+        };
+        if (const auto core = clipped(seen(state.hole[i].from), seen(state.hole[i].to), area_)) {
+            canvas.line(core->first, core->second, 0.6 * font, {0, 0, 0});
+            canvas.line(core->first, core->second, 0.4 * font, coreColour);
+        }
+    }
     drawTool(canvas, scenery, state);
 
     const double left = area_.x, bottom = area_.y, right = left + area_.width, top = bottom + area_.height;

@@ -1,7 +1,6 @@
 #include <render/tool_picture.h>
 
 #include <channel/needle_shape.h>
-#include <render/deformation.h>
 
 #include <vtkAppendPolyData.h>
 #include <vtkCellArray.h>
@@ -165,6 +164,12 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
     if (scenery.tool == channel::ToolKind::needle) {
         setLine(*shaft_, {});
         showTube(renderer, *shaft_, radius, facets, toolColour);
+        for (auto& core : cores_) {
+            setLine(*core, {});
+            showTube(renderer, *core, 1.3 * radius, facets, coreColour);
+        }
+        setLine(*thrown_, {});
+        showTube(renderer, *thrown_, 0.7 * radius, facets, toolColour);
     }
     constexpr double trail = 0.3;  // [mm]
     setLine(*trail_, {});
@@ -228,6 +233,29 @@ void ToolPicture::leaveTrail(const channel::State& state)
     setLine(*trail_, trailPoints_);
 }
 
+// The notch takes its core at the end of the throw: from the tip to there the inner needle is out.
+void ToolPicture::showCores(const channel::State& state, const Deformation& deformation)
+{
+    const auto place = [&](const std::array<float, 3>& p) { return deformation.seen(glm::dvec3(p[0], p[1], p[2])); };
+    const auto count = std::min<std::size_t>(state.holes, channel::maxHoles);
+    for (std::size_t i = 0; i < cores_.size(); ++i) {
+        const std::array ends{place(state.hole[i].from), place(state.hole[i].to)};
+        setLine(*cores_[i], i < count ? std::span<const glm::dvec3>(ends) : std::span<const glm::dvec3>());
+    }
+    constexpr double out = 0.5;  // [s]
+    if (state.cores > fired_)
+        firedAt_ = state.time;
+    fired_ = state.cores;
+    if (state.cores == 0 || state.time < firedAt_ || state.time > firedAt_ + out)
+        firedAt_ = -1;
+    if (firedAt_ < 0 || count == 0) {
+        setLine(*thrown_, {});
+        return;
+    }
+    const std::array inner{vec(state.tip), place(state.hole[(state.cores - 1) % channel::maxHoles].to)};
+    setLine(*thrown_, inner);
+}
+
 void ToolPicture::showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip)
 {
     if (!hand && hand_->GetVisibility() == 0)
@@ -239,8 +267,10 @@ void ToolPicture::showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip)
     setLine(*lead_, hand ? std::span<const glm::dvec3>(line) : std::span<const glm::dvec3>());
 }
 
-void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim)
+void ToolPicture::update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation)
 {
+    const glm::dvec3 aim = deformation.seen(vec(scenery.aim));
+    showCores(state, deformation);
     const glm::dvec3 tip = vec(state.tip) * mm, proxy = vec(state.proxy) * mm;
     aim_->SetPosition(aim.x * mm, aim.y * mm, aim.z * mm);
     leaveTrail(state);

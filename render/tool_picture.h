@@ -1,6 +1,7 @@
 #pragma once
 
 #include <channel/layout.h>
+#include <render/deformation.h>
 
 #include <vtkActor.h>
 #include <vtkNew.h>
@@ -11,6 +12,7 @@
 #include <glm/vec3.hpp>
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -22,14 +24,15 @@ inline constexpr std::array<double, 3> planColour{1.0, 1.0, 1.0};
 inline constexpr std::array<double, 3> proxyColour{1.0, 0.9, 0.2};
 inline constexpr std::array<double, 3> trailColour{1.0, 0.45, 0.85};
 inline constexpr std::array<double, 3> handColour{0.55, 1.0, 0.35};
+inline constexpr std::array<double, 3> coreColour{1.0, 0.95, 0.45};
 
 /// The tool, a needle as it is bent; the way that its tip has come since it went in; the point on the surface that it would
-/// be at without penetration; the planned line and its aim.
+/// be at without penetration; the planned line and its aim; the gun's throw, for half a second after it was fired, and the
+/// places of the cores.
 class ToolPicture {
 public:
     ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer);
-    /// `aim`: where the line's end lies now [m].
-    void update(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim);
+    void update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation);
     /// Where the hand is that holds the tool [m], with a line to the `tip`; nothing: not shown.
     void showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip);
 
@@ -37,12 +40,17 @@ private:
     void addPlan(const channel::Scenery& scenery, vtkRenderer& renderer);
     void moveNeedle(const channel::Scenery& scenery, const channel::State& state);
     void leaveTrail(const channel::State& state);
+    void showCores(const channel::State& state, const Deformation& deformation);
 
     bool turns_ = false;         // with the axis: no sphere
     vtkNew<vtkTransform> pose_;  // of the tool; of a needle, of its point
     vtkNew<vtkActor> proxy_, aim_, hand_;
     vtkNew<vtkPolyData> shaft_, trail_, lead_;  // middle line of a needle, way of its tip, from the tip to the hand [mm]
-    std::vector<glm::dvec3> trailPoints_;       // [m]
+    std::array<vtkNew<vtkPolyData>, channel::maxHoles> cores_;  // [mm]
+    vtkNew<vtkPolyData> thrown_;                                // the inner needle while it is out [mm]
+    std::uint32_t fired_ = 0;
+    double firedAt_ = -1;                  // [s]; negative: not lately
+    std::vector<glm::dvec3> trailPoints_;  // [m]
     channel::Phase phase_ = channel::Phase::free;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <render/concealment.h>
 #include <render/screen_plan.h>
 
 #include <atomic>
@@ -28,6 +29,9 @@ struct ViewerOptions {
     std::string session;                   // name; empty = the only one that runs
     std::filesystem::path offscreen;       // folder for PNG files
     std::filesystem::path movie;           // MP4 file; neither = a window
+    Concealment concealed;                 // what is not shown, in a test
+    bool steps = true;                     // the step that one is at and what is wrong, in words (windows only)
+    std::filesystem::path result;          // figures of the session, once it has ended: shown in its window
     bool hidden = false;                   // the window is on a display of its own that nobody sees, for measurements
     bool instructor = false;               // layout to begin with
     SliceLook slices = SliceLook::tinted;  // to begin with, where there is an image

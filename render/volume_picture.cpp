@@ -274,13 +274,19 @@ void VolumePicture::prepare(Quality quality, bool software, double pixels)
     const glm::dvec3 extent = glm::dvec3(grid_.size[0], grid_.size[1], grid_.size[2]) * grid_.spacing * mm;
     const double voxel = std::max(grid_.spacing * mm, std::max({extent.x, extent.y, extent.z}) / 128);
     if (!software || quality == Quality::still) {
-        mapper_->SetImageSampleDistance(1.0F);
-        mapper_->SetSampleDistance(static_cast<float>((software ? 1.0 : 0.5) * voxel));
+        setSteps(1, (software ? 1.0 : 0.5) * voxel);
         return;
     }
     const double apart = budget_.apart(pixels);
-    mapper_->SetImageSampleDistance(static_cast<float>(apart));
-    mapper_->SetSampleDistance(static_cast<float>(std::clamp(0.75 * apart, 1.0, 3.0) * voxel));
+    setSteps(apart, std::clamp(0.75 * apart, 1.0, 3.0) * voxel);
+}
+
+void VolumePicture::setSteps(double pixels, double length)
+{
+    const auto apart = static_cast<float>(pixels), along = static_cast<float>(length);
+    renewed_ = mapper_->GetImageSampleDistance() != apart || mapper_->GetSampleDistance() != along;
+    mapper_->SetImageSampleDistance(apart);
+    mapper_->SetSampleDistance(along);
 }
 
 void VolumePicture::took(double seconds)

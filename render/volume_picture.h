@@ -50,6 +50,9 @@ public:
     void prepare(Quality quality, bool software, double pixels);
     /// False when the picture was made without a body: VTK asks for what its shader needs from the second one on.
     bool shown() const noexcept { return shown_; }
+    /// Whether this picture has other distances between rays or along them than the one before: VTK then makes buffers and
+    /// textures anew in the midst of it, and in a window the body may be missing from what comes out.
+    bool renewed() const noexcept { return renewed_; }
     /// After it: how long the whole picture took [s], from the state on. What moves is cast as finely as 30 pictures a
     /// second allow.
     void took(double seconds);
@@ -57,6 +60,8 @@ public:
 private:
     void computeLight(const channel::Scenery& scenery, const Deformation& deformation);
     void teachShader();
+    /// Rays so many pixels apart, with steps of so many millimetres.
+    void setSteps(double pixels, double length);
     void setUniforms(vtkShaderProgram& program);
     void setView(vtkShaderProgram& program, glm::dvec3 corner, glm::dvec3 whole);
     void upload();
@@ -68,7 +73,7 @@ private:
     ShiftField field_;
     bool changed_ = true;
     bool moving_ = false;
-    bool shown_ = false;
+    bool shown_ = false, renewed_ = false;
     RayBudget budget_;
     vtkNew<vtkImageData> image_;
     vtkNew<vtkTextureObject> shifts_, leaps_;

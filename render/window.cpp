@@ -180,6 +180,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     target->SetSize(width, height);
 
     Picture picture(*target);
+    picture.conceal(options.concealed);
     picture.show(options.instructor ? Layout::instructor : Layout::trainee);
     picture.show(options.slices);
     picture.showUltrasound(options.ultrasound);
@@ -191,8 +192,8 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     interactor->Initialize();
     const Target shown{*target, *interactor};
 
-    Follower follower(options.session, options.wait);
-    Controls controls(window.get(), *interactor, picture, follower, options.playback, options.images);
+    Follower follower(options.session, options.wait, options.result);
+    Controls controls(window.get(), *interactor, picture, follower, options.playback, options.images, options.steps);
     FrameClock clock;
     auto used = Clock::now();
     const auto nothingToShow = [&] { return options.playback != nullptr && options.playback->length < 0; };

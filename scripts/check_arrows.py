@@ -30,10 +30,11 @@ ARROWS = {
     "python": {
         "base", "volume", "volume/prepare", "datasets", "channel", "haptics", "session", "ultrasound", "planner", "report", "sweep",
     },
+    "trainer": {"base"},
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
-        "studies", "planner", "sweep", "training", "ultrasound", "render", "reference",
+        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "render", "reference",
     },
 }
 # Third-party headers that stay in one folder.
@@ -44,7 +45,9 @@ OWNERS = {
     "openjpeg": {"volume"},
     "itk": {"tests"},  # an independent reader to compare with
     "vtk": {"render", "reference"},
-    "GLFW/": {"render"},
+    "GLFW/": {"render", "trainer"},
+    "imgui": {"trainer"},
+    "stb/": {"trainer"},
     "sqlite3": {"haptics", "sweep", "training"},
     "libusb": {"haptics"},
     "CGAL/": {"reference"},

@@ -42,13 +42,13 @@ public:
         wait(0.5);
     }
 
-    // How the tip goes when the mouse goes to the right, down, and the wheel turns.
+    // How the tip goes when the mouse goes to the right, down, and the wheel turns with Ctrl.
     void learn()
     {
         constexpr int step = 24;
         pixelRight_ = tried({"mousemove_relative", "--", std::to_string(step), "0"}) / double(step);
         pixelDown_ = tried({"mousemove_relative", "--", "0", std::to_string(step)}) / double(step);
-        notch_ = tried({"click", "4"});
+        notch_ = tried({"keydown", "ctrl", "click", "4", "keyup", "ctrl"});
     }
 
     // By at least half a pixel.
@@ -61,8 +61,12 @@ public:
         std::vector<std::string> words;
         if (right != 0 || down != 0)
             words = {"mousemove_relative", "--", std::to_string(right), std::to_string(down)};
+        if (notches != 0)
+            words.insert(words.end(), {"keydown", "ctrl"});
         for (long i = 0; i < std::abs(notches); ++i)
             words.insert(words.end(), {"click", notches > 0 ? "4" : "5"});
+        if (notches != 0)
+            words.insert(words.end(), {"keyup", "ctrl"});
         if (!words.empty())
             desktop_.xdotool(words);
         wait(0.15);
@@ -145,6 +149,8 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     withdraw(user, axis);
     EXPECT_EQ(user.sees().phase, channel::Phase::free);
     user.key("e");
+    wait(3);
+    user.key("q");  // the result is read
     const Outcome outcome = train->wait();
     ASSERT_EQ(outcome.status, 0) << outcome.err;
 

@@ -16,6 +16,7 @@
 #include <vtkWindowToImageFilter.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <exception>
@@ -307,6 +308,26 @@ TEST_F(PictureTest, TheChosenTissueBecomesClearAndComesBack)
     picture.resetView();
     picture.render(Quality::still);
     EXPECT_EQ(before.differing(studio->grab(), view), 0);
+}
+
+// Whatever the number of rays was before: a picture without the body stays on the screen while the next is computed.
+TEST_F(PictureTest, TheBodyIsInEveryPictureWhenMotionBeginsAndStops)
+{
+    const Image whole = studio->take(0.05, Layout::trainee);
+    const Area view = ScreenPlan(width, height).view;
+    constexpr Pixel background{15, 18, 26};
+    const int body = view.width * view.height - whole.count(view, background, 6);
+    ASSERT_GT(body, view.width * view.height / 10);
+    Picture& picture = studio->picture();
+    int number = 0;
+    for (const Quality quality :
+         {Quality::moving, Quality::moving, Quality::still, Quality::still, Quality::moving, Quality::still}) {
+        picture.render(quality);
+        const Image now = studio->grab();
+        picture.finish(std::chrono::steady_clock::now() - std::chrono::milliseconds(quality == Quality::moving ? 60 : 0));
+        EXPECT_GT(view.width * view.height - now.count(view, background, 6), 0.9 * body) << "picture " << number;
+        ++number;
+    }
 }
 
 TEST_F(PictureTest, WithoutTheCutTheBodyHidesWhatIsInside)

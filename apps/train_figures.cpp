@@ -1,0 +1,97 @@
+#include <apps/train_figures.h>
+
+#include <haptics/measures.h>
+#include <haptics/score.h>
+#include <session/figures.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+
+namespace palpate::apps {
+
+namespace {
+
+std::string missesInWords(const haptics::ServoTiming& timing)
+{
+    if (timing.missed == 0) {
+        return "";
+    }
+    return fmt::format(" in {} gaps of up to {} ms ({} ticks took over 1 ms)", timing.gaps, timing.longestGap,
+                       timing.overruns);
+}
+
+// What to do about a machine that is too slow for the tissue model, or nothing.
+std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model)
+{
+    constexpr double bearable = 0.01;  // of the ticks
+    const double share =
+        static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
+    if (share <= bearable) {
+        return "";
+    }
+    const bool coarser =
+        model.level == datasets::ModelLevel::elastic && model.setting != datasets::elasticSettings().front();
+    return fmt::format(
+        "{:.0f} % of the ticks took over 1 ms: this machine is too slow or too busy for the tissue model; {}\n",
+        100 * share, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
+}
+
+}  // namespace
+
+nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
+                         const datasets::ModelSettings& model)
+{
+    auto figures = session::timingFigures(result.timing);
+    figures["scene"] = info.scene;
+    figures["model"] = info.model;
+    if (model.level == datasets::ModelLevel::elastic) {
+        figures["setting"] = model.setting;
+    }
+    figures["device"] = info.device;
+    figures["build"] = info.build;
+    figures["contacts"] = result.contacts;
+    figures["punctures"] = result.punctures;
+    figures["peak_force_n"] = {
+        {"basic", result.peakBasic}, {"additional", result.peakAdditional}, {"total", result.peakTotal}};
+    figures["energy_mj"] = {{"made", 1e3 * result.energyMade}, {"damped", 1e3 * result.energyDamped}};
+    nlohmann::json nearest = nlohmann::json::object();
+    for (std::size_t i = 0; i < info.structures.size(); ++i) {
+        nearest[info.structures[i]] = 1e3 * result.nearest[i];
+    }
+    figures["nearest_mm"] = nearest;
+    figures["score"] = session::scoreFigures(result.score, result.losses);
+    figures["core"] = session::coreFigures(result.cores, info.tissues);
+    figures["force_hash"] = session::hexadecimal(result.forceHash);
+    figures["peak_memory_mb"] = session::peakMemoryMb();
+    figures["lost_records"] = result.lostRecords;
+    figures["warnings"] = result.warnings;
+    return figures;
+}
+
+void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
+{
+    const auto tick = result.timing.work.percentiles();
+    const auto late = result.timing.lateness.percentiles();
+    fmt::print(
+        "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
+        result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
+        1e6 * late.p50, 1e6 * late.p99);
+    fmt::print("{}", slowness(result.timing, model));
+    fmt::print("peak force {:.2f} N (tissue {:.2f} N, guidance {:.2f} N)\n", result.peakTotal, result.peakBasic,
+               result.peakAdditional);
+    for (std::size_t i = 0; i < result.cores.size(); ++i) {
+        const auto& core = result.cores[i];
+        fmt::print("core {}: {:.0f} % {}, {:.1f} mm of it in the {}; {}\n", i + 1, 100.0 * core.targetFraction,
+                   info.structures[0], 1e3 * core.targetLength, info.structures[0],
+                   core.fragments == 1 ? "in one piece" : fmt::format("in {} pieces", core.fragments));
+    }
+    for (const auto& [label, value] : haptics::describe(result.score)) {
+        fmt::print("  {:<28} {}\n", label, value);
+    }
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,151 @@
+#include <render/coach.h>
+
+#include <base/direction.h>
+#include <render/deformation.h>
+#include <render/events.h>
+
+#include <fmt/format.h>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::render {
+namespace {
+
+constexpr double throwLength = 22e-3;  // of the gun [m], as in haptics/biopsy.h
+constexpr double atRim = 3e-3;         // from the target's surface: near enough to fire [m]
+constexpr double offLine = 3e-3;       // of tip from planned line that is told [m]
+constexpr double hit = 0.1;            // share of target in a core that is worth taking out
+
+const char* directionInWords(glm::dvec3 way)
+{
+    return base::directionInWords(way.x, way.y, way.z);
+}
+
+double millimetres(double metres)
+{
+    return metres * 1e3;
+}
+
+std::string target(const channel::Scenery& scenery)
+{
+    const std::string name = text(scenery.structure[0]);
+    return name.empty() ? "target" : name;
+}
+
+// From the planned line to the tip, across the line [m].
+glm::dvec3 offPlan(const channel::Scenery& scenery, const channel::State& state)
+{
+    const glm::dvec3 entry = vec(scenery.entry), line = glm::normalize(vec(scenery.aim) - entry);
+    const glm::dvec3 off = vec(state.tip) - entry;
+    return off - glm::dot(off, line) * line;
+}
+
+std::string lineFault(const channel::Scenery& scenery, const channel::State& state)
+{
+    const glm::dvec3 off = offPlan(scenery, state);
+    return glm::length(off) > offLine ? fmt::format("The tip is {:.0f} mm off the line, towards {}",
+                                                    millimetres(glm::length(off)), directionInWords(off))
+                                      : "";
+}
+
+// Where the needle goes from here: past the target, or beyond it.
+std::string wayFault(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim)
+{
+    if (state.distance[0] <= 0)
+        return -state.distance[0] > atRim ? fmt::format("The tip is {:.0f} mm inside the {}: draw back to its near rim",
+                                                        millimetres(-state.distance[0]), target(scenery))
+                                          : "";
+    if (std::isfinite(state.ahead[0]))
+        return "";
+    const glm::dvec3 way = aim - vec(state.tip), axis = vec(state.axis);
+    const double along = glm::dot(way, axis);
+    if (along < 0)
+        return fmt::format("The tip is beyond the {}: draw back", target(scenery));
+    const glm::dvec3 across = way - along * axis;
+    return fmt::format("The needle passes the {}: its middle lies {:.0f} mm towards {}", target(scenery),
+                       millimetres(glm::length(across)), directionInWords(across));
+}
+
+// What else the gun would hit.
+std::string throwFault(const channel::Scenery& scenery, const channel::State& state)
+{
+    for (std::size_t s = 1; s < std::min<std::size_t>(scenery.structures, channel::maxStructures); ++s)
+        if (state.ahead[s] >= 0 && state.ahead[s] < throwLength)
+            return fmt::format("Do not fire: the {:.0f} mm of the throw would reach {}", millimetres(throwLength),
+                               text(scenery.structure[s]));
+    return "";
+}
+
+Coaching approach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
+{
+    Coaching c{0, 5, "", "", false};
+    const bool told = view.planned && scenery.entry != scenery.aim;
+    if (state.phase == channel::Phase::free) {
+        c.step = 1;
+        c.now = told ? "Touch the skin at the mark, where the planned line begins" : "Touch the skin with the needle";
+        c.wrong = told ? lineFault(scenery, state) : "";
+    } else if (state.phase == channel::Phase::contact) {
+        c.step = 2;
+        c.now = "Push along the needle until the skin gives way";
+        c.wrong = told ? lineFault(scenery, state) : "";
+    } else if (state.distance[0] > atRim) {
+        c.step = 3;
+        const double left = std::isfinite(state.ahead[0]) ? state.ahead[0] : state.distance[0];
+        c.now = fmt::format("Advance until the tip is at the {}'s rim{}", target(scenery),
+                            view.planned ? fmt::format(" ({:.0f} mm to go)", millimetres(left)) : "");
+        c.wrong = view.planned ? wayFault(scenery, state, view.aim) : "";
+    } else {
+        c.step = 4;
+        c.now = view.handIsHere ? "Fire the gun (Space, or the right button)" : "Fire the gun";
+        const std::string danger = throwFault(scenery, state);
+        c.wrong = !danger.empty() ? danger : view.planned ? wayFault(scenery, state, view.aim) : "";
+    }
+    if (state.cores > 0 && state.coreTarget < hit && c.wrong.empty())
+        c.wrong =
+            fmt::format("Core {} holds {:.0f} % {}: take another", state.cores, 100 * state.coreTarget, target(scenery));
+    return c;
+}
+
+Coaching biopsy(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
+{
+    if (state.cores == 0 || state.coreTarget < hit)
+        return approach(scenery, state, view);
+    if (state.phase != channel::Phase::free)
+        return {5, 5,
+                fmt::format("Core {} holds {:.0f} % {}: draw the needle out", state.cores, 100 * state.coreTarget,
+                            target(scenery)),
+                "", false};
+    return {5, 5,
+            view.handIsHere ? "Done: end the session (E, or click here), or take another core" : "Done: the core is out",
+            "", view.handIsHere};
+}
+
+Coaching palpation(const channel::State& state, const CoachView& view)
+{
+    if (view.marks >= 2)
+        return {3, 3,
+                view.handIsHere ? "End the session (E, or click here), or mark another edge (M)"
+                                : "Done: both edges are marked",
+                "", view.handIsHere};
+    if (state.phase == channel::Phase::free)
+        return {1, 3, "Touch the skin with the fingertip", "", false};
+    std::string now = view.marks == 0 ? "Press here and there: where is it harder? Mark one edge of it"
+                                      : "Mark the opposite edge of the lump";
+    return {2, 3, now + (view.handIsHere ? " (M)" : ""), "", false};
+}
+
+}  // namespace
+
+Coaching coach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
+{
+    if (state.status == channel::Status::finished)
+        return {};
+    if (state.status == channel::Status::faulted)
+        return {1, 1, "End the session", "The forces are off", view.handIsHere};
+    const bool needle = scenery.tool == channel::ToolKind::needle;
+    return needle && !view.targetHidden ? biopsy(scenery, state, view) : palpation(state, view);
+}
+
+}  // namespace palpate::render

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <channel/layout.h>
+
+#include <glm/vec3.hpp>
+
+#include <cstdint>
+#include <string>
+
+namespace palpate::render {
+
+/// What a trainee is to do now, and what is wrong, in words.
+struct Coaching {
+    int step = 0, steps = 0;  // from 1; 0: there is nothing to do
+    std::string now;          // what to do
+    std::string wrong;        // empty: nothing
+    bool last = false;        // a click on the words ends the session
+};
+
+/// What somebody who holds the tool has to be told.
+struct CoachView {
+    glm::dvec3 aim{0.0};        // of the planned line, where the deformed tissue has it now [m]
+    std::uint32_t marks = 0;    // places that were marked
+    bool planned = true;        // the planned line is shown
+    bool targetHidden = false;  // it is to be found
+    bool handIsHere = false;    // the window is the hand: steps name the keys
+};
+
+/// The step of a biopsy (needle) or palpation (any other tool) that the session is at.
+///
+/// A core without target begins the biopsy again. A length that is off is told with its direction in the patient: towards
+/// the head, feet, front, back, left or right.
+Coaching coach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view);
+
+}  // namespace palpate::render

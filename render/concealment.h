@@ -1,0 +1,29 @@
+#pragma once
+
+#include <channel/layout.h>
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace palpate::render {
+
+/// What a trainee who is tested does not get to see.
+struct Concealment {
+    bool plan = false;                 // planned line, and how far the target is
+    std::vector<std::string> tissues;  // by name: shown as what lies around them
+
+    bool any() const noexcept { return plan || !tissues.empty(); }
+};
+
+/// Takes the planned line and the warning distances' names out of a scenery.
+void conceal(const Concealment& what, channel::Scenery& scenery);
+/// Takes distances to the target, and what lies ahead, out of a state.
+void conceal(const Concealment& what, channel::State& state);
+/// Gives voxels of the tissues `what` names the label of what lies around them, from outside inwards. `labels` are on
+/// `grid`, x fastest. Voxels with nothing else around (a body of that tissue alone) stay as they are.
+void conceal(const Concealment& what, const channel::Scenery& scenery, const channel::Grid& grid,
+             std::span<std::uint8_t> labels);
+
+}  // namespace palpate::render

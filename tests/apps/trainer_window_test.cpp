@@ -1,0 +1,172 @@
+#include <channel/channel.h>
+#include <tests/apps/desktop.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace palpate::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int wide = 1000, high = 700;
+
+void wait(double seconds)
+{
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+bool can()
+{
+    return built("palpate-trainer") && built("palpate-view") && installed("Xvfb") && installed("xdotool");
+}
+
+std::vector<fs::path> filesIn(const fs::path& folder, const std::string& extension)
+{
+    std::vector<fs::path> files;
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder, none))
+        if (entry.path().extension() == extension)
+            files.push_back(entry.path());
+    return files;
+}
+
+// The trainer's window, and who uses it.
+struct Trainer {
+    const Folder folder;
+    const Desktop desktop;
+    const std::vector<std::string> before = channel::sessions();
+    std::unique_ptr<Program> program = desktop.start(
+        "palpate-trainer", {"--size", std::to_string(wide) + "x" + std::to_string(high), "--sessions", folder / "s"});
+    bool open = !desktop.window("Palpate trainer").empty();
+
+    void click(int x, int y, const std::string& button = "1") const
+    {
+        desktop.xdotool({"mousemove", std::to_string(x), std::to_string(y)});
+        wait(0.4);
+        desktop.xdotool({"click", button});
+        wait(1.0);
+    }
+    void mainButton() const { click(wide - 60, high - 38); }
+    void key(const std::string& name) const
+    {
+        desktop.xdotool({"key", name});
+        wait(1.0);
+    }
+    std::optional<channel::Subscriber> session() const
+    {
+        for (int i = 0; i < 600; ++i) {
+            for (const std::string& name : channel::sessions())
+                if (std::ranges::find(before, name) == before.end())
+                    if (auto found = channel::Subscriber::attach(name); found && found->state() && found->input())
+                        return found;
+            wait(0.1);
+        }
+        return std::nullopt;
+    }
+    // The figures of the one session, once it has ended.
+    nlohmann::json result() const
+    {
+        for (int i = 0; i < 300; ++i) {
+            if (const auto files = filesIn(folder / "s", ".json"); !files.empty())
+                return nlohmann::json::parse(readText(files[0]));
+            wait(0.1);
+        }
+        return {};
+    }
+    bool windowIsThere(const std::string& name) const { return !desktop.window(name).empty(); }
+};
+
+TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Trainer t;
+    ASSERT_TRUE(t.open);
+    wait(1);
+    t.click(300, 120);
+    for (int i = 0; i < 3; ++i)
+        t.mainButton();
+    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
+    const auto eyes = t.session();
+    ASSERT_TRUE(eyes);
+    wait(1);
+    // The needle waits on the planned line: the wheel alone goes along it.
+    t.desktop.xdotool({"mousemove", "250", "400", "mousedown", "1"});
+    wait(0.6);
+    const auto roll = [&](const char* way, auto until) {
+        for (int i = 0; i < 150 && !until(*eyes->state()); ++i) {
+            t.desktop.xdotool({"click", way});
+            wait(0.12);
+        }
+    };
+    roll("4", [](const channel::State& s) { return s.phase == channel::Phase::inserted && s.distance[0] < 4e-3; });
+    t.desktop.xdotool({"click", "3"});
+    wait(0.8);
+    EXPECT_EQ(eyes->state()->cores, 1U);
+    roll("5", [](const channel::State& s) { return s.phase == channel::Phase::free; });
+    t.desktop.xdotool({"mouseup", "1"});
+    wait(2);
+    // On the words of the last step, below title and caption.
+    for (int y = 40; y < 110 && eyes->ending() == channel::Ending::none; y += 8)
+        t.click(60, y);
+    const auto json = t.result();
+    ASSERT_EQ(json["core"].size(), 1U);
+    EXPECT_GT(json["core"][0]["target_fraction"], 0.2);
+    EXPECT_GT(json["score"]["total"], 60);
+    wait(2);
+    t.click(250, high - 79);  // debrief
+    EXPECT_TRUE(t.windowIsThere("^Palpate$"));
+    EXPECT_EQ(figures({"replay", filesIn(t.folder / "s", ".db").at(0).string()})["identical"], true);
+}
+
+TEST(TrainerWindow, FromTheStartToTheDebriefAndOutByKeys)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Trainer t;
+    ASSERT_TRUE(t.open);
+    wait(1);
+    for (int i = 0; i < 3; ++i)
+        t.key("Return");
+    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
+    ASSERT_TRUE(t.session());
+    wait(2);
+    t.key("e");
+    EXPECT_EQ(t.result()["score"]["total"], 0);
+    wait(2);
+    t.key("d");
+    EXPECT_TRUE(t.windowIsThere("^Palpate$"));
+    wait(2);
+    t.key("q");
+    wait(1);
+    t.key("Escape");
+    t.key("Escape");
+    EXPECT_EQ(t.program->wait().status, 0);
+}
+
+TEST(TrainerWindow, PalpateAloneOpensItOnADesktopAndItsHelpElsewhere)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Desktop desktop;
+    const auto program = desktop.start("palpate", {});
+    ASSERT_FALSE(desktop.window("Palpate trainer").empty());
+    desktop.xdotool({"key", "Escape"});
+    EXPECT_EQ(program->wait().status, 0);
+    const Outcome bare =
+        Program("/usr/bin/env", {"-u", "DISPLAY", "-u", "WAYLAND_DISPLAY", std::string(PALPATE_BIN_DIR) + "/palpate"})
+            .wait();
+    EXPECT_EQ(bare.status, 2);
+    EXPECT_NE(bare.err.find("palpate --help"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace palpate::apps

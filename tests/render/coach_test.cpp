@@ -1,0 +1,163 @@
+#include <render/coach.h>
+#include <render/concealment.h>
+#include <render/deformation.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace palpate::render {
+namespace {
+
+constexpr double none = std::numeric_limits<double>::infinity();
+
+channel::Name named(const char* words)
+{
+    channel::Name name{};
+    std::strncpy(name.data(), words, name.size() - 1);
+    return name;
+}
+
+// A needle that goes to the back (+y), 20 mm to a tumour's middle.
+channel::Scenery needleScenery()
+{
+    channel::Scenery s;
+    s.structures = 2;
+    s.structure[0] = named("tumour");
+    s.structure[1] = named("vein");
+    s.entry = {0, 0, 0};
+    s.aim = {0, 20e-3, 0};
+    return s;
+}
+
+channel::State stateAt(double x, double y, double z, channel::Phase phase)
+{
+    channel::State s;
+    s.tip = {x, y, z};
+    s.axis = {0, 1, 0};
+    s.phase = phase;
+    s.distance.fill(1);
+    s.ahead.fill(none);
+    return s;
+}
+
+const CoachView view{{0, 20e-3, 0}, 0, true, false, true};
+
+TEST(Coach, LeadsThroughABiopsyStepByStep)
+{
+    const channel::Scenery scenery = needleScenery();
+    channel::State s = stateAt(0, -0.03, 0, channel::Phase::free);
+    EXPECT_EQ(coach(scenery, s, view).step, 1);
+    s.phase = channel::Phase::contact;
+    EXPECT_EQ(coach(scenery, s, view).step, 2);
+    s = stateAt(0, 5e-3, 0, channel::Phase::inserted);
+    s.distance[0] = s.ahead[0] = 10e-3;
+    EXPECT_EQ(coach(scenery, s, view).step, 3);
+    EXPECT_NE(coach(scenery, s, view).now.find("tumour's rim (10 mm to go)"), std::string::npos);
+    EXPECT_EQ(coach(scenery, s, view).wrong, "");
+    s.distance[0] = s.ahead[0] = 1e-3;
+    EXPECT_EQ(coach(scenery, s, view).now, "Fire the gun (Space, or the right button)");
+    s.cores = 1;
+    s.coreTarget = 0.6;
+    EXPECT_NE(coach(scenery, s, view).now.find("60 % tumour: draw the needle out"), std::string::npos);
+    s.phase = channel::Phase::free;
+    EXPECT_NE(coach(scenery, s, view).now.find("end the session (E, or click here)"), std::string::npos);
+}
+
+TEST(Coach, SaysHowFarOffAndTowardsWhat)
+{
+    const channel::Scenery scenery = needleScenery();
+    channel::State s = stateAt(0, -0.01, -12e-3, channel::Phase::free);
+    EXPECT_EQ(coach(scenery, s, view).wrong, "The tip is 12 mm off the line, towards the feet");
+    s = stateAt(9e-3, 5e-3, 0, channel::Phase::inserted);
+    s.distance[0] = 12e-3;
+    EXPECT_EQ(coach(scenery, s, view).wrong,
+              "The needle passes the tumour: its middle lies 9 mm towards the patient's right");
+    s = stateAt(0, 40e-3, 0, channel::Phase::inserted);
+    s.distance[0] = 15e-3;
+    EXPECT_EQ(coach(scenery, s, view).wrong, "The tip is beyond the tumour: draw back");
+}
+
+TEST(Coach, WarnsOfWhatTheThrowWouldReach)
+{
+    channel::State s = stateAt(0, 15e-3, 0, channel::Phase::inserted);
+    s.distance[0] = s.ahead[0] = 1e-3;
+    s.ahead[1] = 18e-3;
+    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "Do not fire: the 22 mm of the throw would reach vein");
+    s.ahead[1] = 23e-3;
+    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "");
+}
+
+TEST(Coach, AMissBeginsAnew)
+{
+    channel::State s = stateAt(0, 5e-3, 0, channel::Phase::inserted);
+    s.distance[0] = s.ahead[0] = 10e-3;
+    s.cores = 1;
+    const Coaching c = coach(needleScenery(), s, view);
+    EXPECT_EQ(c.step, 3);
+    EXPECT_EQ(c.wrong, "Core 1 holds 0 % tumour: take another");
+}
+
+TEST(Coach, APalpationAsksForTwoMarksAndSaysNothingOfTheLump)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.tool = channel::ToolKind::capsule;
+    CoachView hidden = view;
+    hidden.targetHidden = true;
+    hidden.planned = false;
+    channel::State s = stateAt(30e-3, 0, 0, channel::Phase::contact);
+    for (std::uint32_t marks : {0U, 1U, 2U}) {
+        hidden.marks = marks;
+        const Coaching c = coach(scenery, s, hidden);
+        EXPECT_EQ(c.step, marks < 2 ? 2 : 3);
+        EXPECT_EQ(c.wrong, "");
+        EXPECT_EQ(c.now.find("tumour"), std::string::npos);
+    }
+}
+
+// A ball of tissue 2 in tissue 1 in air: after it there is as much tissue 1 as there was of both, and not one voxel else
+// changes.
+TEST(Concealment, TheHiddenTissueBecomesWhatLiesAroundIt)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.tissues = 3;
+    scenery.tissue[1].name = named("fat");
+    scenery.tissue[2].name = named("idc_high_grade");
+    channel::Grid grid{{15, 15, 15}, 0, {0, 0, 0}, 1e-3};
+    std::vector<std::uint8_t> labels;
+    for (int z = 0; z < 15; ++z)
+        for (int y = 0; y < 15; ++y)
+            for (int x = 0; x < 15; ++x) {
+                const double r = std::hypot(x - 7, y - 7, z - 7);
+                labels.push_back(r < 4 ? 2 : r < 6.5 ? 1 : 0);
+            }
+    const auto before = labels;
+    const Concealment what{false, {"idc_high_grade"}};
+    conceal(what, scenery, grid, labels);
+    for (std::size_t i = 0; i < labels.size(); ++i)
+        ASSERT_EQ(labels[i], before[i] == 0 ? 0 : 1) << i;
+    channel::State s = stateAt(0, 0, 0, channel::Phase::contact);
+    s.distance[0] = 3e-3;
+    s.aheadTissue = 2;
+    conceal(what, s);
+    conceal(what, scenery);
+    EXPECT_TRUE(std::isinf(s.distance[0]));
+    EXPECT_EQ(s.aheadTissue, 0U);
+    EXPECT_EQ(scenery.entry, scenery.aim);
+}
+
+TEST(Concealment, NothingHiddenChangesNothing)
+{
+    channel::State s = stateAt(0, 0, 0, channel::Phase::contact);
+    const channel::State before = s;
+    conceal({}, s);
+    EXPECT_EQ(std::memcmp(&s, &before, sizeof s), 0);
+}
+
+}  // namespace
+}  // namespace palpate::render

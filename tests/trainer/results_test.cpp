@@ -1,0 +1,88 @@
+#include <tests/folder.h>
+#include <trainer/results.h>
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <string>
+
+namespace palpate::trainer {
+using tests::Folder;
+
+namespace {
+
+void write(const std::filesystem::path& file, const std::string& text)
+{
+    std::ofstream(file) << text;
+}
+
+constexpr const char* figures = R"({"score": {"total": 71.5, "points": {"core": 38, "vital": 25, "technique": 8.5},
+    "passes": 2, "peak_force_n": 2.04, "targeting_error_mm": null,
+    "losses": [{"measure": "best_target_pct", "points": 12, "words": "The core missed", "at_s": 4.2}]}})";
+
+TEST(Results, AreReadAsTheCommandWroteThem)
+{
+    const Folder folder;
+    write(folder / "a.json", figures);
+    const Result r = readResult(folder / "a.json");
+    EXPECT_EQ(r.problem, "");
+    EXPECT_EQ(r.total, 71.5);
+    ASSERT_EQ(r.parts.size(), 3U);
+    EXPECT_EQ(r.parts[2].points, 8.5);
+    ASSERT_EQ(r.losses.size(), 1U);
+    EXPECT_EQ(r.losses[0].words, "The core missed");
+    ASSERT_EQ(r.measures.size(), 2U) << "what was not measured is not shown";
+    EXPECT_EQ(r.measures[1].second, "2.04 N");
+}
+
+TEST(Results, ABrokenFileIsAProblemAndNoCrash)
+{
+    const Folder folder;
+    EXPECT_NE(readResult(folder / "none.json").problem, "");
+    for (const char* text :
+         {"", "[]", "{", "{\"score\": 3}", "{\"score\": {\"total\": \"x\"}}", "{\"score\": {\"total\": 3}}"}) {
+        write(folder / "b.json", text);
+        EXPECT_NE(readResult(folder / "b.json").problem, "") << text;
+        EXPECT_TRUE(readDevices(folder / "b.json").done) << text;
+    }
+}
+
+TEST(Results, TheBestOfACaseIsThatOfItsOwnFiles)
+{
+    const Folder folder;
+    SessionFolder sink(folder / "sessions");
+    CaseEntry layered, other;
+    layered.id = "layered";
+    other.id = "layered-2";
+    EXPECT_FALSE(sink.best(layered)) << "the folder is not there yet";
+    const SessionFiles first = sink.filesFor(layered);
+    write(first.figures, figures);
+    EXPECT_EQ(sink.best(layered), 71.5);
+    EXPECT_FALSE(sink.best(other));
+    const SessionFiles second = sink.filesFor(layered);
+    EXPECT_NE(second.figures, first.figures) << "in the same second too";
+    write(sink.filesFor(other).figures,
+          "{\"score\": {\"total\": 99, \"points\": {\"core\": 1, \"vital\": 1, \"technique\": 1}}}");
+    EXPECT_EQ(sink.best(layered), 71.5);
+    EXPECT_EQ(sink.best(other), 99);
+}
+
+TEST(Devices, AreToldWithWhatToDo)
+{
+    const Folder folder;
+    const auto check = [&](const std::string& text) {
+        write(folder / "d.json", text);
+        return readDevices(folder / "d.json");
+    };
+    EXPECT_FALSE(check(R"({"falcons": []})").falconReady);
+    const DeviceCheck closed = check(R"({"falcons": [{"allowed": false}]})");
+    EXPECT_FALSE(closed.falconReady);
+    EXPECT_NE(closed.remedy.find("--install-udev"), std::string::npos);
+    EXPECT_TRUE(check(R"({"falcons": [{"allowed": true, "firmware_runs": false}]})").falconReady);
+    const DeviceCheck ready = check(R"({"falcons": [{"allowed": true, "firmware_runs": true, "homed": true}]})");
+    EXPECT_TRUE(ready.falconReady);
+    EXPECT_EQ(ready.remedy, "");
+}
+
+}  // namespace
+}  // namespace palpate::trainer

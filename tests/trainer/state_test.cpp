@@ -1,0 +1,132 @@
+#include <trainer/case_pictures.h>
+#include <trainer/state.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace palpate::trainer {
+namespace {
+
+State firstState()
+{
+    State state;
+    state.cases = builtInCases();
+    return state;
+}
+
+Result scored(double total)
+{
+    Result result;
+    result.total = total;
+    return result;
+}
+
+TEST(State, TheMainButtonAloneLeadsFromTheCaseToTheResultAndToTheNextCase)
+{
+    State state = firstState();
+    EXPECT_EQ(goOn(state), Errand::checkDevices);
+    EXPECT_EQ(state.screen, Screen::devices);
+    EXPECT_EQ(goOn(state), Errand::none);
+    EXPECT_EQ(state.screen, Screen::briefing);
+    EXPECT_EQ(goOn(state), Errand::startSession);
+    EXPECT_EQ(state.screen, Screen::briefing) << "only a session that has started leaves the briefing";
+    sessionStarted(state, {"a.db", "a.json"}, "palpate train");
+    EXPECT_EQ(state.screen, Screen::session);
+    EXPECT_EQ(goOn(state), Errand::endSession);
+    sessionEnded(state, scored(71));
+    EXPECT_EQ(state.screen, Screen::result);
+    EXPECT_EQ(debrief(state), Errand::startDebrief);
+    EXPECT_EQ(goOn(state), Errand::none);
+    EXPECT_EQ(state.screen, Screen::cases);
+    EXPECT_EQ(state.chosen, 1U);
+}
+
+TEST(State, TheBestScoreNeverFallsAndAFailedSessionIsNone)
+{
+    State state = firstState();
+    for (const double total : {40.0, 71.0, 55.0}) {
+        sessionStarted(state, {}, "");
+        sessionEnded(state, scored(total));
+    }
+    EXPECT_EQ(state.cases[0].best, 71.0);
+    state.chosen = 1;
+    sessionStarted(state, {}, "");
+    Result failed;
+    failed.problem = "palpate: no display";
+    sessionEnded(state, failed);
+    EXPECT_FALSE(state.cases[1].best);
+    EXPECT_EQ(debrief(state), Errand::none) << "there is nothing to see again";
+}
+
+// Whatever is pressed in whatever order: a session runs on its own screen and on no other, and one case is chosen.
+TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
+{
+    std::mt19937 random(7);
+    State state = firstState();
+    for (int i = 0; i < 20000; ++i) {
+        Errand errand = Errand::none;
+        switch (random() % 5) {
+            case 0:
+            case 1:
+                errand = goOn(state);
+                break;
+            case 2:
+                errand = goBack(state);
+                break;
+            case 3:
+                errand = again(state);
+                break;
+            default:
+                errand = debrief(state);
+        }
+        if (errand == Errand::startSession) {
+            ASSERT_FALSE(state.running);
+            sessionStarted(state, {"a.db", "a.json"}, "");
+        } else if (errand == Errand::endSession) {
+            ASSERT_TRUE(state.running);
+            sessionEnded(state, scored(static_cast<double>(random() % 101)));
+        }
+        ASSERT_EQ(state.running, state.screen == Screen::session);
+        ASSERT_LT(state.chosen, state.cases.size());
+    }
+}
+
+TEST(State, TheCommandIsWhatAShellUnderstands)
+{
+    EXPECT_EQ(asTyped("palpate", {"train", "near-vessel", "--record", "a b.db"}),
+              "palpate train near-vessel --record 'a b.db'");
+    EXPECT_EQ(asTyped("palpate", {"it's", ""}), "palpate 'it'\\''s' ''");
+}
+
+TEST(State, TheCommandSaysDeviceTestAndFiles)
+{
+    State state = firstState();
+    const auto has = [&](const std::string& word) {
+        const auto words = trainArguments(state, {"r.db", "r.json"});
+        return std::ranges::find(words, word) != words.end();
+    };
+    EXPECT_TRUE(has("mouse") && has("r.db") && has("r.json") && !has("--test"));
+    state.test = state.useFalcon = true;
+    state.firmware = "f.bin";
+    EXPECT_TRUE(has("falcon") && has("f.bin") && has("--test") && !has("mouse"));
+}
+
+TEST(Cases, EachHasAPictureABriefingAndANameOfItsOwn)
+{
+    std::set<std::string> names;
+    for (const CaseEntry& c : builtInCases()) {
+        EXPECT_TRUE(names.insert(c.id).second) << c.id;
+        EXPECT_FALSE(casePicture(c.picture).rgb.empty()) << c.picture;
+        EXPECT_GE(c.steps.size(), 3U) << c.id;
+        EXPECT_FALSE(c.arguments.empty()) << c.id;
+    }
+    EXPECT_TRUE(casePicture("no such picture").rgb.empty());
+}
+
+}  // namespace
+}  // namespace palpate::trainer

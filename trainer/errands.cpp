@@ -1,0 +1,194 @@
+#include <trainer/errands.h>
+
+#include <base/process.h>
+
+#include <fcntl.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cstring>
+#include <fstream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace palpate::trainer {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// A command that runs; what it prints is kept in a file.
+class Running {
+public:
+    Running(const fs::path& program, const std::vector<std::string>& arguments, fs::path log) : log_(std::move(log))
+    {
+        const int out = ::open(log_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+        base::Program started{{program.string()}, {-1, out, out}, true};
+        started.words.insert(started.words.end(), arguments.begin(), arguments.end());
+        const auto [pid, error] = base::start(started);
+        if (out >= 0) {
+            ::close(out);
+        }
+        if (error != 0) {
+            throw std::runtime_error(program.string() + ": cannot be started (" + std::strerror(error) + ")");
+        }
+        pid_ = pid;
+    }
+    ~Running()
+    {
+        end();
+        for (int i = 0; i < 100 && !ended(); ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(50));
+        }
+        if (pid_ > 0) {
+            ::kill(pid_, SIGKILL);
+            ::waitpid(pid_, nullptr, 0);
+        }
+    }
+    Running(const Running&) = delete;
+    Running& operator=(const Running&) = delete;
+
+    void end() const noexcept
+    {
+        if (pid_ > 0) {
+            ::kill(pid_, SIGTERM);
+        }
+    }
+    bool ended() noexcept
+    {
+        if (pid_ > 0 && ::waitpid(pid_, &status_, WNOHANG) == pid_) {
+            pid_ = -1;
+        }
+        return pid_ < 0;
+    }
+    // The last line that the command printed as its own message.
+    std::string message() const
+    {
+        std::ifstream in(log_);
+        std::string last;
+        for (std::string line; std::getline(in, line);) {
+            if (line.starts_with("palpate")) {
+                last = line;
+            }
+        }
+        return last;
+    }
+
+private:
+    fs::path log_;
+    pid_t pid_ = -1;
+    int status_ = 0;
+};
+
+}  // namespace
+
+struct Errands::Impl {
+    Impl(fs::path where, ResultSink& to) : programs(std::move(where)), sink(to)
+    {
+        std::string name = (fs::temp_directory_path() / "palpate-trainer-XXXXXX").string();
+        if (::mkdtemp(name.data()) == nullptr) {
+            throw std::runtime_error(name + ": no folder can be made there");
+        }
+        scratch = name;
+    }
+    ~Impl()
+    {
+        session.reset();
+        devices.reset();
+        replay.reset();
+        std::error_code ignored;
+        fs::remove_all(scratch, ignored);
+    }
+
+    void startSession(State& state)
+    {
+        const SessionFiles files = sink.filesFor(chosenCase(state));
+        const auto arguments = trainArguments(state, files);
+        session.emplace(programs / "palpate", arguments, scratch / "session.log");
+        sessionStarted(state, files, asTyped("palpate", arguments));
+    }
+    void startDebrief(State& state)
+    {
+        const auto arguments = debriefArguments(state);
+        replay.emplace(programs / "palpate-view", arguments, scratch / "replay.log");
+        state.command = asTyped("palpate-view", arguments);
+        state.replaying = true;
+    }
+    void checkDevices()
+    {
+        fs::remove(scratch / "devices.json");
+        devices.emplace(programs / "palpate", std::vector<std::string>{"devices", "--json", scratch / "devices.json"},
+                        scratch / "devices.log");
+    }
+
+    fs::path programs, scratch;
+    ResultSink& sink;
+    std::optional<Running> session, devices, replay;
+};
+
+Errands::Errands(fs::path programs, ResultSink& sink) : impl_(std::make_unique<Impl>(std::move(programs), sink)) {}
+
+Errands::~Errands() = default;
+
+void Errands::run(Errand errand, State& state)
+{
+    try {
+        switch (errand) {
+            case Errand::checkDevices:
+                state.devices = {};
+                return impl_->checkDevices();
+            case Errand::startSession:
+                return impl_->startSession(state);
+            case Errand::endSession:
+                if (impl_->session) {
+                    impl_->session->end();
+                }
+                return;
+            case Errand::startDebrief:
+                return impl_->startDebrief(state);
+            case Errand::none:
+            case Errand::quit:
+                return;
+        }
+    } catch (const std::exception& e) {
+        state.notice = e.what();
+    }
+}
+
+bool Errands::look(State& state)
+{
+    bool changed = false;
+    if (impl_->devices && impl_->devices->ended()) {
+        impl_->devices.reset();
+        state.devices = readDevices(impl_->scratch / "devices.json");
+        state.useFalcon = state.useFalcon && state.devices.falconReady;
+        changed = true;
+    }
+    if (impl_->session && impl_->session->ended()) {
+        Result result = readResult(state.files.figures);
+        if (!result.problem.empty()) {
+            const std::string said = impl_->session->message();
+            result.problem = said.empty() ? result.problem : said;
+        } else {
+            impl_->sink.keep(chosenCase(state), state.files, result);
+        }
+        impl_->session.reset();
+        sessionEnded(state, std::move(result));
+        changed = true;
+    }
+    if (impl_->replay && impl_->replay->ended()) {
+        impl_->replay.reset();
+        state.replaying = false;
+        changed = true;
+    }
+    return changed;
+}
+
+}  // namespace palpate::trainer

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <trainer/results.h>
+#include <trainer/state.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+namespace palpate::trainer {
+
+/// Does what the window's buttons ask for, each by a command in a process of its own.
+class Errands {
+public:
+    /// @param programs  folder of palpate and palpate-view
+    /// @param sink      must outlive this
+    Errands(std::filesystem::path programs, ResultSink& sink);
+    /// Ends what runs, in order.
+    ~Errands();
+    Errands(const Errands&) = delete;
+    Errands& operator=(const Errands&) = delete;
+
+    /// Never throws for what the user can mend: that stands in the state's notice.
+    void run(Errand errand, State& state);
+    /// Looks what has ended, and tells the state. To be called often. Returns whether something changed.
+    bool look(State& state);
+
+private:
+    struct Impl;
+    std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace palpate::trainer

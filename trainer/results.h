@@ -1,0 +1,45 @@
+#pragma once
+
+#include <trainer/state.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+namespace palpate::trainer {
+
+/// What `palpate train --json` wrote. A file that is not there or says no score is a result with a problem.
+Result readResult(const std::filesystem::path& figures);
+/// What `palpate devices --json` wrote.
+DeviceCheck readDevices(const std::filesystem::path& figures);
+
+/// Takes the sessions that are done, and knows the earlier ones.
+class ResultSink {
+public:
+    virtual ~ResultSink() = default;
+    /// Where the files of a new session of this case go; nothing is there yet. Throws std::runtime_error where nothing can
+    /// be written.
+    virtual SessionFiles filesFor(const CaseEntry& of) = 0;
+    /// A session that has ended with a score.
+    virtual void keep(const CaseEntry& of, const SessionFiles& files, const Result& result) = 0;
+    /// Points of the best session of a case.
+    virtual std::optional<double> best(const CaseEntry& of) const = 0;
+};
+
+/// Keeps record (.db) and figures (.json) of each session in one folder, named by case and date.
+class SessionFolder : public ResultSink {
+public:
+    explicit SessionFolder(std::filesystem::path folder);
+    SessionFiles filesFor(const CaseEntry& of) override;
+    /// Both files are there already.
+    void keep(const CaseEntry&, const SessionFiles&, const Result&) override {}
+    std::optional<double> best(const CaseEntry& of) const override;
+
+private:
+    std::filesystem::path folder_;
+};
+
+/// $XDG_DATA_HOME/palpate/sessions, or ~/.local/share/palpate/sessions.
+std::filesystem::path sessionsFolder();
+
+}  // namespace palpate::trainer

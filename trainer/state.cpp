@@ -1,0 +1,152 @@
+#include <trainer/state.h>
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+namespace palpate::trainer {
+
+const CaseEntry& chosenCase(const State& state)
+{
+    assert(!state.cases.empty());
+    return state.cases[std::min(state.chosen, state.cases.size() - 1)];
+}
+
+const char* mainButton(const State& state) noexcept
+{
+    switch (state.screen) {
+        case Screen::cases:
+            return "Choose this case";
+        case Screen::devices:
+            return "Go on";
+        case Screen::briefing:
+            return "Start";
+        case Screen::session:
+            return "End the session";
+        case Screen::result:
+            break;
+    }
+    return "Next case";
+}
+
+Errand goOn(State& state)
+{
+    switch (state.screen) {
+        case Screen::cases:
+            if (state.cases.empty()) {
+                return Errand::none;
+            }
+            state.screen = Screen::devices;
+            return Errand::checkDevices;
+        case Screen::devices:
+            state.screen = Screen::briefing;
+            return Errand::none;
+        case Screen::briefing:
+            return state.running ? Errand::none : Errand::startSession;
+        case Screen::session:
+            return state.running ? Errand::endSession : Errand::none;
+        case Screen::result:
+            break;
+    }
+    // The next one in the list; from the last one back to the list's beginning.
+    state.chosen = (state.chosen + 1) % std::max<std::size_t>(state.cases.size(), 1);
+    state.screen = Screen::cases;
+    return Errand::none;
+}
+
+Errand goBack(State& state)
+{
+    switch (state.screen) {
+        case Screen::cases:
+            return Errand::quit;
+        case Screen::devices:
+        case Screen::result:
+            state.screen = Screen::cases;
+            return Errand::none;
+        case Screen::briefing:
+            state.screen = Screen::devices;
+            return Errand::none;
+        case Screen::session:
+            break;
+    }
+    return state.running ? Errand::endSession : Errand::none;
+}
+
+Errand again(State& state)
+{
+    if (state.screen != Screen::result) {
+        return Errand::none;
+    }
+    state.screen = Screen::briefing;
+    return Errand::none;
+}
+
+Errand debrief(State& state)
+{
+    return state.screen == Screen::result && state.result.problem.empty() && !state.replaying ? Errand::startDebrief
+                                                                                              : Errand::none;
+}
+
+void sessionStarted(State& state, SessionFiles files, std::string command)
+{
+    state.files = std::move(files);
+    state.command = std::move(command);
+    state.result = {};
+    state.notice.clear();
+    state.running = true;
+    state.screen = Screen::session;
+}
+
+void sessionEnded(State& state, Result result)
+{
+    state.running = false;
+    state.result = std::move(result);
+    state.screen = Screen::result;
+    if (state.result.problem.empty() && !state.cases.empty()) {
+        auto& best = state.cases[std::min(state.chosen, state.cases.size() - 1)].best;
+        best = std::max(best.value_or(0), state.result.total);
+    }
+}
+
+std::vector<std::string> trainArguments(const State& state, const SessionFiles& files)
+{
+    std::vector<std::string> words{"train"};
+    const auto add = [&words](std::initializer_list<std::string> more) { words.insert(words.end(), more); };
+    const CaseEntry& chosen = chosenCase(state);
+    words.insert(words.end(), chosen.arguments.begin(), chosen.arguments.end());
+    add({"--device", state.useFalcon ? "falcon" : "mouse"});
+    if (state.useFalcon && !state.firmware.empty()) {
+        add({"--falcon-firmware", state.firmware});
+    }
+    add({"--view", "--close-at-end"});
+    if (state.test) {
+        add({"--test"});
+    }
+    add({"--record", files.record.string(), "--json", files.figures.string()});
+    return words;
+}
+
+std::vector<std::string> debriefArguments(const State& state)
+{
+    return {"--replay", state.files.record.string(), "--layout", "trainee"};
+}
+
+std::string asTyped(const std::string& program, const std::vector<std::string>& arguments)
+{
+    constexpr const char* plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_./=:,+@";
+    std::string line = program;
+    for (const std::string& word : arguments) {
+        if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) {
+            line += " " + word;
+            continue;
+        }
+        line += " '";
+        for (const char c : word) {
+            line += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        }
+        line += "'";
+    }
+    return line;
+}
+
+}  // namespace palpate::trainer

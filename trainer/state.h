@@ -1,0 +1,93 @@
+#pragma once
+
+#include <trainer/case_entry.h>
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace palpate::trainer {
+
+enum class Screen { cases, devices, briefing, session, result };
+
+/// What was found of devices, in words.
+struct DeviceCheck {
+    bool done = false;
+    bool falconReady = false;
+    std::string falcon;  // what was found
+    std::string remedy;  // what to do about it; empty: nothing
+};
+
+struct PartOfScore {
+    std::string name;
+    double points = 0, most = 0;
+};
+
+struct LossOfPoints {
+    double points = 0;
+    std::string words;
+};
+
+/// What a session came to, or why it did not.
+struct Result {
+    std::string problem;  // not empty: the session failed, and there is no score
+    double total = 0;     // of 100
+    std::vector<PartOfScore> parts;
+    std::vector<LossOfPoints> losses;                           // the largest first
+    std::vector<std::pair<std::string, std::string>> measures;  // label, value with unit
+};
+
+/// Where a session's files are.
+struct SessionFiles {
+    std::filesystem::path record, figures;
+};
+
+/// Everything that the window shows. The functions below are all that changes its screen; drawing changes nothing but the
+/// choices.
+struct State {
+    Screen screen = Screen::cases;
+    std::vector<CaseEntry> cases;
+    std::size_t chosen = 0;
+    DeviceCheck devices;
+    bool useFalcon = false;  // else the mouse
+    std::string firmware;    // of the Falcon, a file
+    bool test = false;       // without hints
+    SessionFiles files;      // of the last session
+    std::string command;     // that runs, or ran last, as one would type it
+    bool running = false;    // a session is going on
+    Result result;
+    bool replaying = false;  // the debrief is open
+    std::string notice;      // something that went wrong outside a session
+};
+
+/// What has to be done outside the window.
+enum class Errand { none, checkDevices, startSession, endSession, startDebrief, quit };
+
+/// The screen's main button. @returns  what has to be done for it
+Errand goOn(State& state);
+/// Back to the screen before; quits from the first.
+Errand goBack(State& state);
+/// Result screen: the same case again.
+Errand again(State& state);
+/// Result screen: replay of the session.
+Errand debrief(State& state);
+
+void sessionStarted(State& state, SessionFiles files, std::string command);
+/// The best score of the case follows.
+void sessionEnded(State& state, Result result);
+
+const CaseEntry& chosenCase(const State& state);
+/// What the main button of the screen says.
+const char* mainButton(const State& state) noexcept;
+
+/// `palpate train ...` for the chosen case.
+std::vector<std::string> trainArguments(const State& state, const SessionFiles& files);
+/// `palpate-view --replay ...` for the last session.
+std::vector<std::string> debriefArguments(const State& state);
+/// Words as one would type them in a shell.
+std::string asTyped(const std::string& program, const std::vector<std::string>& arguments);
+
+}  // namespace palpate::trainer

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <trainer/results.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+namespace palpate::trainer {
+
+struct WindowOptions {
+    std::filesystem::path programs;  // folder of palpate and palpate-view
+    int width = 1280, height = 720;  // [pixels]
+    double textScale = 1;            // 0.5 to 3
+    std::uint64_t frames = 0;        // end after so many pictures, drawn one after the other; 0: no limit
+};
+
+struct WindowFigures {
+    std::uint64_t frames = 0;
+    double frameP50 = 0, frameP90 = 0;  // processor and driver, from the input to the finished picture [s]
+    std::string display;                // what draws
+};
+
+/// Shows the trainer until its window is closed. Throws std::runtime_error where there is no display with OpenGL 3.2.
+WindowFigures runWindow(const WindowOptions& options, ResultSink& sink);
+
+}  // namespace palpate::trainer
