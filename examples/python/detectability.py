@@ -19,7 +19,7 @@ import palpate
 DIAMETER = 10.0                              # of the lump [mm]
 STIFFNESS = [4.5, 6.4, 10.4, 16.4, 42.5]     # [kPa]; fibroadenoma to high-grade carcinoma: Samani 2007
 DEPTHS = [4.0, 6.0, 8.0, 11.0, 15.0]         # from the surface to the lump [mm]
-JUST_NOTICEABLE = [7.0, 10.0]                # of a force [%]; Jones 1989, Pang 1991
+JUST_NOTICEABLE = [7.0, 10.0]                # of a force [%]: at best, and commonly; docs/sweeps.md
 
 
 def main():
@@ -40,13 +40,15 @@ def main():
     change = np.array([np.nan if v is None else v for v in result["force_n_change_pct"]], float)
     change = change.reshape(len(DEPTHS), len(STIFFNESS))
 
-    figure, axes = plt.subplots(figsize=(7, 4.5))
+    figure, axes = plt.subplots(figsize=(7, 5))
     image = axes.pcolormesh(range(len(STIFFNESS)), range(len(DEPTHS)), change, cmap="viridis", shading="nearest")
     for i, row in enumerate(change):
         for j, value in enumerate(row):
             axes.text(j, i, f"{value:.1f}", ha="center", va="center", color="white" if value < 0.6 * np.nanmax(change) else "black")
-    lines = axes.contour(change, levels=JUST_NOTICEABLE, colors=["#ffffff", "#ffcc66"], linewidths=2)
-    axes.clabel(lines, fmt=lambda level: f"felt: {level:g} %", fontsize=8)
+    axes.contour(change, levels=JUST_NOTICEABLE, colors=["#ffffff", "#ffcc66"], linewidths=2)
+    handles = [plt.Line2D([], [], color=colour, linewidth=2) for colour in ("#ffffff", "#ffcc66")]
+    axes.legend(handles, [f"felt from {level:g} % on" for level in JUST_NOTICEABLE], loc="upper center", facecolor="#777777",
+                labelcolor="white", fontsize=8, ncol=2, bbox_to_anchor=(0.5, -0.14))
     axes.set_xticks(range(len(STIFFNESS)), [f"{s:g}" for s in STIFFNESS])
     axes.set_yticks(range(len(DEPTHS)), [f"{d:g}" for d in DEPTHS])
     axes.invert_yaxis()

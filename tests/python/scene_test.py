@@ -57,9 +57,9 @@ class Scenes(InFolder):
 
 class Models(InFolder):
     def test_a_volume_in_memory_is_pressed_like_its_file(self):
-        labels = np.zeros((30, 20, 30), np.uint16)
-        labels[2:-2, 2:-2, 2:-2] = 1
-        labels[12:18, 8:13, 12:18] = 2
+        labels = np.zeros((44, 34, 44), np.uint16)
+        labels[5:-5, 5:-5, 5:-5] = 1
+        labels[19:25, 14:20, 19:25] = 2
         affine = np.diag([2e-3, 2e-3, 2e-3, 1.0])
         volume = palpate.Volume.from_numpy(labels, affine, {1: "fat", 2: ("lump", "idc_high_grade")})
         scene = palpate.Scene.for_volume(volume, "lump")
