@@ -1,6 +1,6 @@
 #include <apps/command.h>
 #include <apps/temporary_folder.h>
-#include <apps/viewers.h>
+#include <base/child_process.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -14,7 +14,6 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <memory>
 #include <stdexcept>
 
@@ -26,12 +25,12 @@ namespace fs = std::filesystem;
 using training::Case;
 
 constexpr double pictureTimeout = 600;  // [s]
+constexpr const char* pictureSize = "800x600";
 
 struct Options {
     std::string id;
     fs::path json, picture;
     training::NewCase made;
-    double at = -1;  // of a picture: how far through the session, 0 to 1
 };
 
 nlohmann::json figuresOf(const Case& c)
@@ -120,8 +119,8 @@ void make(const Options& o)
     fmt::print("{}: made; edit its case.toml, then palpate case picture and palpate case check\n", c.folder.string());
 }
 
-// A session of the scripted hand, recorded for the picture.
-void recordSession(const Case& c, const fs::path& file)
+// The beginning of a session of the scripted hand: the needle before the body.
+void recordBeginning(const Case& c, const fs::path& file)
 {
     const haptics::SessionModel model = session::openSession(c.scene, {});
     const haptics::SessionInfo info = session::describeSession(model, c.scene, "hand");
@@ -131,6 +130,7 @@ void recordSession(const Case& c, const fs::path& file)
     session::Session session(model, info);
     session::RunOptions options;
     options.servo.paced = false;
+    options.servo.seconds = 0.2;
     options.recorder = &recorder;
     session.run(*device, options);
     recorder.finish({});
@@ -144,22 +144,25 @@ void draw(const Options& o)
     const TemporaryFolder folder("the session that is drawn");
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("drawing " + c.id);
-    recordSession(c, folder.path() / "session.db");
-    drawRecord(folder.path() / "session.db", (folder.path() / "pictures").string(), pictureTimeout);
-    std::vector<fs::path> pictures;
-    for (const auto& entry : fs::directory_iterator(folder.path() / "pictures")) {
-        pictures.push_back(entry.path());
+    recordBeginning(c, folder.path() / "session.db");
+    const fs::path pictures = folder.path() / "pictures";
+    base::ChildProcess viewer(base::programFolder() / "palpate-view",
+                              {"--replay", (folder.path() / "session.db").string(), "--offscreen", pictures.string(),
+                               "--size", pictureSize, "--frames", "1"},
+                              "build it with -DPALPATE_VIEWER=ON");
+    std::vector<fs::path> drawn;
+    if (viewer.wait(pictureTimeout) == 0) {
+        for (const auto& entry : fs::directory_iterator(pictures)) {
+            drawn.push_back(entry.path());
+        }
     }
-    std::ranges::sort(pictures);
-    if (pictures.empty()) {
-        throw std::runtime_error(c.id + ": the viewer drew no picture");
+    if (drawn.empty()) {
+        throw std::runtime_error(c.id + ": the viewer drew no picture, or took too long");
     }
-    const double at = o.at < 0 ? 0.6 : o.at;
-    fs::copy_file(pictures[static_cast<std::size_t>(at * static_cast<double>(pictures.size() - 1))], to,
-                  fs::copy_options::overwrite_existing);
+    fs::copy_file(drawn.front(), to, fs::copy_options::overwrite_existing);
     progress.clear();
     fmt::print("{}\n", to.string());
-    if (c.picture.empty()) {
+    if (c.picture.empty() && o.picture.empty()) {
         fmt::print("name it in {}: picture = \"{}\"\n", (c.folder / training::caseFile).string(), to.filename().string());
     }
 }
@@ -184,9 +187,8 @@ void addCase(CLI::App& app)
     shown->add_option("--json", o->json, "write it here (- for standard output)");
     shown->final_callback([o] { show(*o); });
     one("check", "What is wrong with a case; exit status 1 where something is")->final_callback([o] { check(*o); });
-    CLI::App* const picture = one("picture", "Draw a case's picture, from a session of the scripted hand");
+    CLI::App* const picture = one("picture", "Draw a case's picture: the body and the needle before it");
     picture->add_option("-o,--output", o->picture, "file (.png; the case's picture.png where it is left out)");
-    picture->add_option("--at", o->at, "how far through the session")->check(CLI::Range(0.0, 1.0));
     picture->final_callback([o] { draw(*o); });
 
     CLI::App* const made = c->add_subcommand("new", "Make a case of a volume");

@@ -14,7 +14,7 @@ namespace palpate::haptics {
 namespace {
 
 constexpr double worthSaying = 1e-3;   // [m]; shorter ways have no direction
-constexpr double worthDepth = 3e-3;    // along the needle [m]: the notch is 20 mm long
+constexpr double worthDepth = 5e-3;    // along the needle [m]: the notch is 20 mm long, and tissue is dragged along
 constexpr double leastPoints = 0.005;  // less is no loss
 
 double points(double most, double share)
@@ -101,7 +101,7 @@ void LossWatch::add(const TickRecord& record) noexcept
     before_ = now;
 }
 
-// Where the best core lay, from the target.
+// Where the best core lay, from the target at rest: records hold no more, and say the same as the session did.
 std::string LossWatch::miss(const Score& s, const std::string& target) const
 {
     std::string words = s.bestTargetFraction > 0 ? fmt::format("The best core is {:.0f} % {} over {:.1f} mm",
@@ -110,12 +110,12 @@ std::string LossWatch::miss(const Score& s, const std::string& target) const
     if (s.bestTargetFraction <= 0 && std::isfinite(s.targetingError)) {
         words += fmt::format(": the nearest lay {:.1f} mm beside it", 1e3 * s.targetingError);
     }
-    const Vec3 notch = core_.restEnd - core_.restStart;
+    const Vec3 notch = core_.notchEnd - core_.notchStart;
     if (!target_ || glm::length(notch) < worthSaying) {
         return words;
     }
     const Vec3 axis = glm::normalize(notch);
-    const Vec3 away = 0.5 * (core_.restStart + core_.restEnd) - target_->middle;
+    const Vec3 away = 0.5 * (core_.notchStart + core_.notchEnd) - target_->middle;
     const double along = glm::dot(away, axis);
     const Vec3 across = away - along * axis;
     std::string where;

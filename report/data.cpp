@@ -136,8 +136,14 @@ struct Collector {
     {
         const double depth = r.inserted * 1e3;
         if (!(depth > 0 && depth < 1000)) {
+            furthest = 0;
             return;
         }
+        // On the way in: on the way out the tissue hangs on the needle, and the two ways alternate from bin to bin.
+        if (depth < furthest - depthBin) {
+            return;
+        }
+        furthest = std::max(furthest, depth);
         const auto bin = static_cast<std::size_t>(depth / depthBin);
         nearest.resize(std::max(nearest.size(), bin + 1), std::vector<double>(structures, nothing));
         for (std::size_t i = 0; i < structures; ++i) {
@@ -180,6 +186,7 @@ struct Collector {
     double rate;
     std::size_t structures;
     bool markDown = false, outside = true;
+    double furthest = 0;                       // inside, on this way in [mm]
     std::vector<std::vector<double>> nearest;  // by bin, then structure [mm]
     haptics::LossWatch watch;
     Decimator forces, distances, energy;

@@ -175,6 +175,9 @@ json nearestChart(const ReportData& d, const haptics::SessionInfo& info)
     chart.erase("sync");
     chart.erase("events");
     chart["series"].erase(0);
+    for (json& series : chart["series"]) {
+        series["gaps"] = false;  // a fast push leaves bins out
+    }
     return chart;
 }
 
@@ -267,8 +270,9 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
     if (d.profile.depth.size() > 1) {
         out += chartCard("depth", "Force against depth",
                          "Total force by the length of the shaft inside, in bins of half a millimetre.");
-        out += chartCard("nearest", "Distances against depth",
-                         "The least distance from the tip to target and vital structures at each length inside.");
+        out += chartCard(
+            "nearest", "Distances against depth",
+            "The least distance from the tip to target and vital structures at each length inside, on the way in.");
     }
     out += pathCard(d, info) + picturesCard(pictures);
     out += chartCard(

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 
 namespace palpate::training {
@@ -89,7 +90,7 @@ bool CurriculumProgress::finished() const noexcept
 std::string reasonFor(const ExerciseProgress& next)
 {
     if (next.refresh) {
-        return fmt::format("was reached, and not practised for {:.0f} days", *next.daysSince);
+        return fmt::format("was reached, and not practised for {:.0f} days", std::floor(*next.daysSince));
     }
     const Gate& gate = next.exercise->gate;
     if (next.sessions.empty()) {

@@ -74,7 +74,7 @@ json measureChart(const ExerciseProgress& p, const haptics::Measure& m)
     }
     return {{"columns", json::array({trialNumbers(p.sessions.size()), y})},
             {"x", axis("session", "")},
-            {"y", axis(m.label, m.unit)},
+            {"y", {{"name", m.label}, {"unit", m.unit}, {"label", *m.unit == 0 ? "number" : m.unit}}},
             {"lines", levelLines(*p.exercise, m.key)},
             {"points", true},
             {"height", 210},
@@ -130,11 +130,16 @@ std::string signals(const ExerciseProgress& e)
     return words.empty() ? "none yet" : words;
 }
 
+std::string recentInWords(const GateState& gate)
+{
+    return gate.recentTried == 0 ? "-" : fmt::format("{} of last {}", gate.recentMet, gate.recentTried);
+}
+
 std::string overview(const CurriculumProgress& c)
 {
     const ExerciseProgress* const next = c.next();
     std::string out =
-        "<div class=\"scroll\"><table class=\"plain\"><thead><tr><th>Exercise</th><th>State</th><th "
+        "<div class=\"scroll\"><table class=\"plain progress\"><thead><tr><th>Exercise</th><th>State</th><th "
         "class=\"n\">Sessions</th>"
         "<th class=\"n\">At its level</th><th>CUSUM</th><th>Last practised</th></tr></thead><tbody>";
     int number = 0;
@@ -142,8 +147,8 @@ std::string overview(const CurriculumProgress& c)
         const auto [colour, words] = stateOf(e, next);
         out += fmt::format(
             "<tr><th>{}. {}</th><td><b class=\"state\" style=\"color:var(--{})\">{}</b></td><td class=\"n\">{}</td><td "
-            "class=\"n\">{} of last {} ({} of {})</td><td>{}</td><td>{}</td></tr>",
-            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), e.gate.recentMet, e.gate.recentTried,
+            "class=\"n\">{} ({} of {})</td><td>{}</td><td>{}</td></tr>",
+            ++number, escape(e.exercise->title), colour, words, e.sessions.size(), recentInWords(e.gate),
             e.exercise->gate.pass, e.exercise->gate.of, e.sessions.empty() ? "-" : signals(e),
             e.daysSince ? days(*e.daysSince) : "never");
     }
@@ -158,7 +163,8 @@ std::string whatNext(const CurriculumProgress& c, const Person& person)
     }
     const bool test = next->exercise->gate.testOnly && !next->gate.open;
     return fmt::format(
-        "<p class=\"outcome\"><b>Next: {}</b>. It {}.</p><pre>palpate train --profile '{}' --exercise {}/{}{}</pre>",
+        "<p class=\"outcome\"><b>Next: {}</b>. It {}.</p><pre class=\"command\">palpate train --profile '{}' --exercise "
+        "{}/{}{}</pre>",
         escape(next->exercise->title), escape(reasonFor(*next)), escape(person.name), escape(c.curriculum->id),
         escape(next->exercise->id), test ? " --test" : "");
 }

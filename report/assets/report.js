@@ -117,7 +117,7 @@ function draw(id, chart) {
     legend: { markers: { fill: (u, i) => u.series[i].stroke(u, i), width: 0 } },
     series: [{ label: chart.x.name, value: value(chart.x.unit) }].concat(chart.series.map((s) => ({
       label: s.label, stroke: () => colour(s.colour), width: s.width || 1.6, dash: s.dash, show: s.show !== false,
-      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: chart.points ? { show: true, size: 6, fill: colour("card") } : { show: false }, spanGaps: false,
+      fill: s.fill ? () => colour(s.colour) + "26" : undefined, value: value(chart.y.unit), points: chart.points ? { show: true, size: 6, fill: colour("card") } : { show: false }, spanGaps: s.gaps === false,
     }))),
     hooks: { draw: [(u) => { horizontal(u, chart.lines || []); vertical(u, chart.events ? data.events : []); }] },
   };

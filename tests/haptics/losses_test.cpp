@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <functional>
 #include <numeric>
 #include <random>
 
@@ -29,8 +31,8 @@ std::vector<Loss> lossesOfCore(Vec3 away, double fraction, double error)
     shot.fired = true;
     shot.core.targetFraction = fraction;
     shot.core.targetLength = 0.02 * fraction;
-    shot.core.restStart = away - Vec3(0, 0.01, 0);
-    shot.core.restEnd = away + Vec3(0, 0.01, 0);
+    shot.core.notchStart = away - Vec3(0, 0.01, 0);
+    shot.core.notchEnd = away + Vec3(0, 0.01, 0);
     synthetic::addEvent(shot, synthetic::event(EventKind::fire, 0, 4, error));
     for (const TickRecord& tick : ticks) {
         watch.add(tick);

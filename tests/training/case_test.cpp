@@ -36,8 +36,8 @@ TEST_P(EachCase, IsWithoutFault)
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Own, EachCase, ::testing::ValuesIn(ownCases()), [](const auto& info) {
-    std::string name = info.param;
+INSTANTIATE_TEST_SUITE_P(Own, EachCase, ::testing::ValuesIn(ownCases()), [](const auto& one) {
+    std::string name = one.param;
     std::erase(name, '-');
     return name;
 });
@@ -118,7 +118,8 @@ TEST(Curriculum, ErrorsNameFileLineAndKey)
 
 TEST(Curriculum, GuidanceFadesFromTheFirstTrialToNone)
 {
-    const Exercise fading{.id = "e", .guidance = Guidance::fade, .fadeTrials = 5};
+    Exercise fading;
+    fading.fadeTrials = 5;
     for (int n = 1; n <= 8; ++n) {
         EXPECT_DOUBLE_EQ(guidanceOf(fading, n, false), n < 5 ? 1 - 0.25 * (n - 1) : 0);
         EXPECT_EQ(guidanceOf(fading, n, true), 0);

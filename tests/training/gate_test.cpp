@@ -10,12 +10,12 @@ namespace {
 
 Gate gateOf(int pass, int of)
 {
-    return {.levels = {{.measure = "total", .atLeast = 50, .atMost = {}}}, .pass = pass, .of = of};
+    return {.levels = {{.measure = "total", .atLeast = 50, .atMost = {}}}, .pass = pass, .of = of, .testOnly = false};
 }
 
 TEST(Gate, WhatIsNotThereMeetsNothing)
 {
-    const Gate gate{.levels = {{.measure = "passes", .atLeast = 1, .atMost = 3}}};
+    const Gate gate{.levels = {{.measure = "passes", .atLeast = 1, .atMost = 3}}, .pass = 1, .of = 1, .testOnly = false};
     EXPECT_TRUE(meets(gate, {{"passes", 3}}));
     EXPECT_FALSE(meets(gate, {{"passes", 4}}));
     EXPECT_FALSE(meets(gate, {{"passes", std::nan("")}}));
