@@ -276,15 +276,14 @@ Errand drawFoot(State& state, bool entered)
 
 void drawWay(const State& state)
 {
-    constexpr std::array<const char*, 5> names{"Case", "Device", "Briefing", "Session", "Result"};
-    for (std::size_t i = 0; i < names.size(); ++i) {
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(Screen::result); ++i) {
         if (i > 0) {
             ImGui::SameLine();
             ImGui::TextColored(vec(quiet), ">");
             ImGui::SameLine();
         }
         const bool here = i == static_cast<std::size_t>(state.screen);
-        ImGui::TextColored(here ? vec(orange) : vec(quiet), "%s", names[i]);
+        ImGui::TextColored(here ? vec(orange) : vec(quiet), "%s", nameOf(static_cast<Screen>(i)));
     }
     ImGui::Separator();
 }

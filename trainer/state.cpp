@@ -1,6 +1,7 @@
 #include <trainer/state.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <utility>
 
@@ -10,6 +11,12 @@ const CaseEntry& chosenCase(const State& state)
 {
     assert(!state.cases.empty());
     return state.cases[std::min(state.chosen, state.cases.size() - 1)];
+}
+
+const char* nameOf(Screen screen) noexcept
+{
+    constexpr std::array names{"Case", "Device", "Briefing", "Session", "Result"};
+    return names[static_cast<std::size_t>(screen)];
 }
 
 const char* mainButton(const State& state) noexcept

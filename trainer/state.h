@@ -13,6 +13,9 @@ namespace palpate::trainer {
 
 enum class Screen { cases, devices, briefing, session, result };
 
+/// "Case", "Device", "Briefing", "Session", "Result".
+const char* nameOf(Screen screen) noexcept;
+
 /// What was found of devices, in words.
 struct DeviceCheck {
     bool done = false;

@@ -17,6 +17,7 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -262,6 +263,9 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
         gui.begin();
         scale.heed();
         const bool entered = shown != state.screen;
+        if (entered) {
+            glfwSetWindowTitle(window.get(), (std::string("Palpate trainer: ") + nameOf(state.screen)).c_str());
+        }
         shown = state.screen;
         const ImVec2 size = ImGui::GetIO().DisplaySize;
         const Errand errand = drawScreen(

@@ -55,6 +55,8 @@ struct Trainer {
         wait(1.0);
     }
     void mainButton() const { click(wide - 60, high - 38); }
+    // Its window says in its title which screen it is at.
+    bool isAt(const std::string& screen) const { return windowIsThere("^Palpate trainer: " + screen + "$"); }
     void key(const std::string& name) const
     {
         desktop.xdotool({"key", name});
@@ -90,13 +92,17 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Trainer t;
     ASSERT_TRUE(t.open);
+    ASSERT_TRUE(t.isAt("Case"));
     wait(1);
     t.click(300, 120);
-    for (int i = 0; i < 3; ++i)
+    for (const char* next : {"Device", "Briefing", "Session"}) {
         t.mainButton();
-    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
+        ASSERT_TRUE(t.isAt(next));
+        wait(1);
+    }
     const auto eyes = t.session();
     ASSERT_TRUE(eyes);
+    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
     wait(1);
     // The needle waits on the planned line: the wheel alone goes along it.
     t.desktop.xdotool({"mousemove", "250", "400", "mousedown", "1"});
@@ -110,7 +116,9 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
     roll("4", [](const channel::State& s) { return s.phase == channel::Phase::inserted && s.distance[0] < 4e-3; });
     t.desktop.xdotool({"click", "3"});
     wait(0.8);
-    EXPECT_EQ(eyes->state()->cores, 1U);
+    ASSERT_EQ(eyes->state()->cores, 1U) << "inserted by " << eyes->state()->inserted << " m, target at "
+                                        << eyes->state()->distance[0] << " m, phase "
+                                        << static_cast<int>(eyes->state()->phase);
     roll("5", [](const channel::State& s) { return s.phase == channel::Phase::free; });
     t.desktop.xdotool({"mouseup", "1"});
     wait(2);
@@ -121,7 +129,8 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
     ASSERT_EQ(json["core"].size(), 1U);
     EXPECT_GT(json["core"][0]["target_fraction"], 0.2);
     EXPECT_GT(json["score"]["total"], 60);
-    wait(2);
+    ASSERT_TRUE(t.isAt("Result"));
+    wait(1);
     t.click(250, high - 79);  // debrief
     EXPECT_TRUE(t.windowIsThere("^Palpate$"));
     EXPECT_EQ(figures({"replay", filesIn(t.folder / "s", ".db").at(0).string()})["identical"], true);
@@ -133,15 +142,20 @@ TEST(TrainerWindow, FromTheStartToTheDebriefAndOutByKeys)
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Trainer t;
     ASSERT_TRUE(t.open);
+    ASSERT_TRUE(t.isAt("Case"));
     wait(1);
-    for (int i = 0; i < 3; ++i)
+    for (const char* next : {"Device", "Briefing", "Session"}) {
         t.key("Return");
-    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
+        ASSERT_TRUE(t.isAt(next));
+        wait(1);
+    }
     ASSERT_TRUE(t.session());
+    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
     wait(2);
     t.key("e");
     EXPECT_EQ(t.result()["score"]["total"], 0);
-    wait(2);
+    ASSERT_TRUE(t.isAt("Result"));
+    wait(1);
     t.key("d");
     EXPECT_TRUE(t.windowIsThere("^Palpate$"));
     wait(2);

@@ -126,8 +126,8 @@ TEST(ViewerFaults, AWindowThatCrashesComesBackByItself)
         GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const std::string name = "crash-" + std::to_string(::getpid());
     const Desktop desktop;
-    const auto train =
-        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--seconds", "60", "--session", name});
+    const auto train = desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--close-at-end",
+                                                 "--seconds", "60", "--session", name});
     ASSERT_FALSE(desktop.window("Palpate").empty());
     const auto eyes = channel::Subscriber::attach(name);
     ASSERT_TRUE(eyes);
