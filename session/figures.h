@@ -19,6 +19,7 @@ nlohmann::json microseconds(const haptics::Percentiles& p);
 nlohmann::json timingFigures(const haptics::ServoTiming& timing);
 
 /// Cores as `train` gives them: core[]{fraction{tissue:..}, target_fraction, length_in_lesion_mm, fragments, volume_mm3}.
+/// @param cores    in their order
 /// @param tissues  names of the tissue table's rows
 nlohmann::json coreFigures(const std::vector<haptics::CoreSample>& cores, const std::vector<std::string>& tissues);
 
