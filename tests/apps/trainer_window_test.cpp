@@ -3,9 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <thread>
@@ -38,11 +39,20 @@ std::vector<fs::path> filesIn(const fs::path& folder, const std::string& extensi
     return files;
 }
 
+// 0: the process is gone.
+int parentOf(std::uint64_t pid)
+{
+    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("PPid:"))
+            return std::stoi(line.substr(5));
+    return 0;
+}
+
 // The trainer's window, and who uses it.
 struct Trainer {
     const Folder folder;
     const Desktop desktop;
-    const std::vector<std::string> before = channel::sessions();
     std::unique_ptr<Program> program = desktop.start(
         "palpate-trainer", {"--size", std::to_string(wide) + "x" + std::to_string(high), "--sessions", folder / "s"});
     bool open = !desktop.window("Palpate trainer").empty();
@@ -65,10 +75,11 @@ struct Trainer {
     std::optional<channel::Subscriber> session() const
     {
         for (int i = 0; i < 600; ++i) {
-            for (const std::string& name : channel::sessions())
-                if (std::ranges::find(before, name) == before.end())
-                    if (auto found = channel::Subscriber::attach(name); found && found->state() && found->input())
-                        return found;
+            for (const std::string& name : channel::sessions()) {
+                auto found = name.starts_with("train-") ? channel::Subscriber::attach(name) : std::nullopt;
+                if (found && parentOf(found->ownerPid()) == program->pid() && found->state() && found->input())
+                    return found;
+            }
             wait(0.1);
         }
         return std::nullopt;
