@@ -202,9 +202,15 @@ py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object
     request.width = width;
     request.height = height;
     request.depth = depth;
+    if (!(depth >= 0)) {
+        throw py::value_error("depth: has to be 0 or more, in metres");
+    }
     if (!face.is_none()) {
-        request.pose = ultrasound::poseOf(vec3Of(face, "face"), unit(vec3Of(direction, "direction")),
-                                          unit(vec3Of(lateral, "lateral")));
+        const Vec3 inwards = vec3Of(direction, "direction"), along = vec3Of(lateral, "lateral");
+        if (!(glm::length(glm::cross(inwards, along)) > 1e-6 * glm::length(inwards) * glm::length(along))) {
+            throw py::value_error("direction, lateral: have to be two directions with lengths");
+        }
+        request.pose = ultrasound::poseOf(vec3Of(face, "face"), unit(inwards), unit(along));
     }
     UltrasoundPicture picture;
     {

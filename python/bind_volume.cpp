@@ -123,7 +123,7 @@ Labels labelArray(const py::array& given)
     if (given.ndim() != 3) {
         throw py::value_error("labels: give an array of three dimensions, indexed (i, j, k)");
     }
-    if (given.size() > 0) {
+    if (given.size() > 0 && kind != 'b') {
         const auto low = given.attr("min")().cast<std::int64_t>();
         const auto high = given.attr("max")().cast<std::int64_t>();
         if (low < 0 || high > std::numeric_limits<std::uint16_t>::max()) {

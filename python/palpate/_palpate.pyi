@@ -310,6 +310,9 @@ class Session:
         Returns:
             pixels (height x width, uint8), lines (samples x lines, uint8, before scan conversion), metres_per_pixel,
             depth [m], frequency [Hz], face, direction, lateral, tick.
+
+        Raises:
+            ValueError: a direction without length, both along each other, a depth below 0. palpate.Error: the size.
         """
     @property
     def events(self) -> NDArray[np.void]:
@@ -356,6 +359,9 @@ def plan(
 
     Returns:
         found, and where True level, spacing_mm, windows, sweeps, predicted_error_pct, predicted_us; candidates.
+
+    Raises:
+        ValueError: an error, budget or speed that is none. palpate.SceneError.
     """
 
 def phantoms() -> list[str]: ...

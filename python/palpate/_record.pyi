@@ -2,7 +2,7 @@ import os
 from typing import Any
 
 import numpy as np
-import pandas
+import pandas  # type: ignore[import]
 from numpy.typing import NDArray
 
 from ._palpate import Model, Session

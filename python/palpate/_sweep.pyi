@@ -3,7 +3,7 @@ import pathlib
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import pandas
+import pandas  # type: ignore[import]
 
 _Path = str | os.PathLike[str]
 

@@ -117,6 +117,10 @@ class Shape(unittest.TestCase):
         self.assertGreater(pictures[0]["pixels"].std(), 10)
         deeper = session.ultrasound(320, 320, depth=0.03)
         self.assertAlmostEqual(deeper["depth"], 0.03, places=6)
+        for wrong in ({"depth": -1}, {"face": [0, 0, 0], "direction": [0, 0, 0]},
+                      {"face": [0, 0, 0], "direction": [0, 1, 0], "lateral": [0, 2, 0]}):
+            with self.subTest(wrong), self.assertRaises(ValueError):
+                session.ultrasound(320, 320, **wrong)
         elsewhere = session.ultrasound(320, 320, face=[0.01, 0, 0])
         self.assertGreater(np.count_nonzero(elsewhere["pixels"] != pictures[0]["pixels"]), 1000)
 

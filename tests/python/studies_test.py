@@ -97,6 +97,9 @@ class Plans(unittest.TestCase):
         self.assertLessEqual(ours["predicted_error_pct"], 20)
         self.assertLessEqual(ours["predicted_us"], 1000)
         self.assertGreater(len(ours["candidates"]), 3)
+        for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}):
+            with self.subTest(wrong), self.assertRaises(ValueError):
+                palpate.plan(scene, **wrong)
 
 
 class Accuracy(InFolder):
