@@ -158,8 +158,10 @@ void readDesign(Section& top, SweepPlan& plan)
         plan.design = static_cast<DesignKind>(*kind);
     }
     const auto samples = section->integer("samples", "", 1, mostSamples);
-    if ((plan.design == DesignKind::grid || plan.design == DesignKind::list) == samples.has_value()) {
-        section->missing("samples", samples ? "a grid or a list has none: leave it out" : "how many");
+    const bool isList = plan.design == DesignKind::list;
+    if ((plan.design == DesignKind::grid || isList) == samples.has_value()) {
+        const char* const none = isList ? "a list has none: leave it out" : "a grid has none: leave it out";
+        section->missing("samples", samples ? none : "how many");
     }
     plan.samples = static_cast<std::size_t>(samples.value_or(0));
     section->finish();
