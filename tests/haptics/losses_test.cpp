@@ -48,8 +48,8 @@ TEST(Losses, SayWhereTheCoreLay)
     EXPECT_EQ(feet[0].words,
               "No core hit the tumour: the nearest lay 9.0 mm beside it; it lay 14.0 mm off its middle towards the feet");
     EXPECT_DOUBLE_EQ(feet[0].at.value(), 2.0);
-    EXPECT_EQ(lossesOfCore({8 * millimetre, 0, 8 * millimetre}, 0, 1)[0].words.substr(48),
-              "000.0 mm beside it; it lay 11.3 mm off its middle towards the patient's left and the head");
+    EXPECT_TRUE(lossesOfCore({8 * millimetre, 0, 8 * millimetre}, 0, 0.003)[0].words.ends_with(
+        "it lay 11.3 mm off its middle towards the patient's left and the head"));
     EXPECT_NE(lossesOfCore({0, 12 * millimetre, 0}, 0.2, 0)[0].words.find("it lay 12.0 mm too deep"), std::string::npos);
     EXPECT_NE(lossesOfCore({0, -12 * millimetre, 0}, 0.2, 0)[0].words.find("12.0 mm not deep enough"), std::string::npos);
 }
