@@ -74,7 +74,7 @@ struct ReportData {
     std::vector<std::vector<double>> energy;     // seconds; given to the hand, taken by damping [mJ]
     DepthProfile profile;
     std::vector<std::vector<double>>
-        nearest;  // by bin of the profile: its depth, then the least distance to each structure on the way in [mm]
+        nearest;  // by bin of the profile: its depth, then the least distance to each structure, going in [mm]
     std::vector<PathPoint> path;      // thinned out to steps of half a millimetre
     std::vector<Vec3> entries;        // where the tip first touched the body on each way in [mm]
     std::vector<Vec3> marks;          // where the trainee marked something [mm]
