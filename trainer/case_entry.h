@@ -1,5 +1,7 @@
 #pragma once
 
+#include <nlohmann/json_fwd.hpp>
+
 #include <optional>
 #include <string>
 #include <vector>
@@ -8,21 +10,24 @@ namespace palpate::trainer {
 
 /// A case as somebody chooses it.
 struct CaseEntry {
-    std::string id;                      // a word, part of the names of its files
-    std::string title;                   // "Core biopsy between two vessels"
-    std::string picture;                 // PNG file, or name of a picture that comes with the program
-    int difficulty = 1;                  // 1 (first steps) to 5
-    std::string trains;                  // what it is good for, in a sentence
-    std::vector<std::string> steps;      // of the briefing
-    std::vector<std::string> arguments;  // that `palpate train` takes for it
-    bool palpation = false;              // with a fingertip
-    std::optional<double> best;          // points of the best session so far; nothing: not done yet
+    std::string id;                  // a word, part of the names of its files; `palpate train --case` takes it
+    std::string title;               // "Core biopsy between two vessels"
+    std::string picture;             // PNG file
+    int difficulty = 1;              // 1 (first steps) to 5
+    std::string trains;              // what it is good for, in a line
+    std::vector<std::string> steps;  // of the briefing
+    bool palpation = false;          // with a fingertip
+    std::optional<double> best;      // points of the best session so far; nothing: not done yet
 };
 
 /// "first steps", "easy", "medium", "hard", "very hard".
 const char* difficultyInWords(int difficulty) noexcept;
 
-/// The cases that come with the program, easiest first.
-std::vector<CaseEntry> builtInCases();
+/// What `palpate case list --json` gives, easiest first; the briefings begin and end with what the mouse does. Cases that
+/// are not whole are left out.
+std::vector<CaseEntry> casesOf(const nlohmann::json& list);
+
+/// The names that `palpate profile list --json` gives.
+std::vector<std::string> peopleOf(const nlohmann::json& list);
 
 }  // namespace palpate::trainer

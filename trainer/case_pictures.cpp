@@ -11,11 +11,8 @@ namespace palpate::trainer {
 
 Pixels casePicture(const std::string& picture)
 {
-    std::string bytes(embeddedPicture("pictures/" + picture));
-    if (bytes.empty()) {
-        std::ifstream file(picture, std::ios::binary);
-        bytes.assign(std::istreambuf_iterator<char>(file), {});
-    }
+    std::ifstream file(picture, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(file), {}};
     Pixels pixels;
     int channels = 0;
     constexpr std::size_t most = 64U << 20U;  // [bytes]

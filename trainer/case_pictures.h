@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace palpate::trainer {
@@ -12,10 +11,7 @@ struct Pixels {
     std::vector<std::uint8_t> rgb;  // height x width x 3, from the upper left; empty: there is no such picture
 };
 
-/// A picture that comes with the program, by name, or a PNG file.
+/// A PNG file of 64 MiB at most.
 Pixels casePicture(const std::string& picture);
-
-/// The bytes of pictures/NAME.
-std::string_view embeddedPicture(std::string_view name) noexcept;
 
 }  // namespace palpate::trainer

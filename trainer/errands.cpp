@@ -2,12 +2,15 @@
 
 #include <base/process.h>
 
+#include <nlohmann/json.hpp>
+
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <fstream>
@@ -121,6 +124,45 @@ struct Errands::Impl {
         state.command = asTyped("palpate-view", arguments);
         state.replaying = true;
     }
+    // What a short command writes as JSON; null where it fails, and the state says why.
+    nlohmann::json answerOf(State& state, std::vector<std::string> arguments)
+    {
+        const fs::path file = scratch / "answer.json";
+        fs::remove(file);
+        arguments.insert(arguments.end(), {"--json", file.string()});
+        Running command(programs / "palpate", arguments, scratch / "answer.log");
+        for (int i = 0; i < 200 && !command.ended(); ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(25));
+        }
+        std::ifstream in(file);
+        auto answer = nlohmann::json::parse(in, nullptr, false);
+        if (answer.is_discarded()) {
+            const std::string said = command.message();
+            state.notice = said.empty() ? asTyped("palpate", arguments) + ": no answer" : said;
+        }
+        return answer;
+    }
+    void listPeople(State& state)
+    {
+        state.people = peopleOf(answerOf(state, {"profile", "list"}));
+        if (std::ranges::find(state.people, state.person) == state.people.end()) {
+            state.person.clear();
+        }
+    }
+    void addPerson(State& state)
+    {
+        const std::string name = state.newPerson;
+        Running command(programs / "palpate", {"profile", "new", name}, scratch / "person.log");
+        for (int i = 0; i < 200 && !command.ended(); ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(25));
+        }
+        state.notice = command.message();
+        listPeople(state);
+        if (std::ranges::find(state.people, name) != state.people.end()) {
+            state.person = name;
+            state.newPerson.clear();
+        }
+    }
     void checkDevices()
     {
         fs::remove(scratch / "devices.json");
@@ -137,10 +179,25 @@ Errands::Errands(fs::path programs, ResultSink& sink) : impl_(std::make_unique<I
 
 Errands::~Errands() = default;
 
+void Errands::list(State& state)
+{
+    try {
+        state.cases = casesOf(impl_->answerOf(state, {"case", "list"}));
+        for (CaseEntry& c : state.cases) {
+            c.best = impl_->sink.best(c);
+        }
+        impl_->listPeople(state);
+    } catch (const std::exception& e) {
+        state.notice = e.what();
+    }
+}
+
 void Errands::run(Errand errand, State& state)
 {
     try {
         switch (errand) {
+            case Errand::addPerson:
+                return impl_->addPerson(state);
             case Errand::checkDevices:
                 state.devices = {};
                 return impl_->checkDevices();

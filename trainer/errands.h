@@ -20,6 +20,8 @@ public:
     Errands(const Errands&) = delete;
     Errands& operator=(const Errands&) = delete;
 
+    /// The cases and the profiles that there are.
+    void list(State& state);
     /// Never throws for what the user can mend: that stands in the state's notice.
     void run(Errand errand, State& state);
     /// Looks what has ended, and tells the state. To be called often. Returns whether something changed.

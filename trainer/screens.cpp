@@ -52,13 +52,13 @@ void drawPicture(const Texture& texture, float wide, float high)
 }
 
 // What a case is, beside its picture.
-void drawCaseFacts(const CaseEntry& c)
+void drawCaseFacts(const CaseEntry& c, Rgb facts = skyBlue)
 {
     heading(c.title, 1.15F);
     words(fmt::format("{}, difficulty {} of 5 ({});  {}", c.palpation ? "Palpation" : "Core biopsy", c.difficulty,
                       difficultyInWords(c.difficulty),
                       c.best ? fmt::format("best so far {:.0f} of 100", *c.best) : "not done yet"),
-          skyBlue);
+          facts);
     words(c.trains);
 }
 
@@ -67,11 +67,41 @@ bool enterPressed()
     return ImGui::IsKeyPressed(ImGui::GetIO().KeyMap[ImGuiKey_Enter], false);
 }
 
+// Whose session it will be: one of the profiles, a new one, or nobody's.
+Errand drawPeople(State& state)
+{
+    const float em = ImGui::GetFontSize();
+    Errand errand = Errand::none;
+    ImGui::SetNextItemWidth(14 * em);
+    if (ImGui::BeginCombo("Who trains", state.person.empty() ? "nobody: no progress is kept" : state.person.c_str())) {
+        if (ImGui::Selectable("nobody: no progress is kept", state.person.empty())) {
+            state.person.clear();
+        }
+        for (const std::string& name : state.people) {
+            if (ImGui::Selectable(name.c_str(), state.person == name)) {
+                state.person = name;
+            }
+        }
+        ImGui::EndCombo();
+    }
+    ImGui::SameLine();
+    ImGui::SetNextItemWidth(12 * em);
+    const bool typed =
+        ImGui::InputTextWithHint("##name", "a new name", &state.newPerson, ImGuiInputTextFlags_EnterReturnsTrue);
+    ImGui::SameLine();
+    ImGui::BeginDisabled(state.newPerson.empty());
+    if ((ImGui::Button("Add") || typed) && !state.newPerson.empty()) {
+        errand = Errand::addPerson;
+    }
+    ImGui::EndDisabled();
+    return errand;
+}
+
 Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
 {
     heading("Choose a case");
     const float em = ImGui::GetFontSize(), high = 5.4F * em;
-    Errand errand = Errand::none;
+    Errand errand = drawPeople(state);
     ImGui::BeginChild("list", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
     for (std::size_t i = 0; i < state.cases.size(); ++i) {
         const CaseEntry& c = state.cases[i];
@@ -94,7 +124,7 @@ Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
         drawPicture(textureOf(c.picture), 7 * em, high - 0.6F * em);
         ImGui::SetCursorPos({at.x + 7.2F * em, at.y + 0.3F * em});
         ImGui::BeginGroup();
-        drawCaseFacts(c);
+        drawCaseFacts(c, state.chosen == i ? Rgb{1, 1, 1} : skyBlue);
         ImGui::EndGroup();
         ImGui::SetCursorPos(next);
         ImGui::PopID();

@@ -120,7 +120,10 @@ std::vector<std::string> trainArguments(const State& state, const SessionFiles& 
     std::vector<std::string> words{"train"};
     const auto add = [&words](std::initializer_list<std::string> more) { words.insert(words.end(), more); };
     const CaseEntry& chosen = chosenCase(state);
-    words.insert(words.end(), chosen.arguments.begin(), chosen.arguments.end());
+    add({"--case", chosen.id});
+    if (!state.person.empty()) {
+        add({"--profile", state.person});
+    }
     add({"--device", state.useFalcon ? "falcon" : "mouse"});
     if (state.useFalcon && !state.firmware.empty()) {
         add({"--falcon-firmware", state.firmware});

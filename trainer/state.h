@@ -54,6 +54,9 @@ struct State {
     Screen screen = Screen::cases;
     std::vector<CaseEntry> cases;
     std::size_t chosen = 0;
+    std::vector<std::string> people;  // profiles
+    std::string person;               // whose session it is; empty: nobody's
+    std::string newPerson;            // a name that is being typed
     DeviceCheck devices;
     bool useFalcon = false;  // else the mouse
     std::string firmware;    // of the Falcon, a file
@@ -67,7 +70,7 @@ struct State {
 };
 
 /// What has to be done outside the window.
-enum class Errand { none, checkDevices, startSession, endSession, startDebrief, quit };
+enum class Errand { none, addPerson, checkDevices, startSession, endSession, startDebrief, quit };
 
 /// The screen's main button. @returns  what has to be done for it
 Errand goOn(State& state);

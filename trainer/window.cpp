@@ -214,16 +214,6 @@ private:
     float set_ = 0;
 };
 
-State firstState(const ResultSink& sink)
-{
-    State state;
-    state.cases = builtInCases();
-    for (CaseEntry& c : state.cases) {
-        c.best = sink.best(c);
-    }
-    return state;
-}
-
 double quantile(std::vector<double> values, double share)
 {
     if (values.empty()) {
@@ -242,8 +232,12 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     Keys keys(window.get());
     Textures textures;
     TextScale scale(options.textScale);
-    State state = firstState(sink);
+    State state;
     Errands errands(options.programs, sink);
+    errands.list(state);
+    for (std::size_t i = 0; i < state.cases.size(); ++i) {
+        state.chosen = state.cases[i].id == options.caseId ? i : state.chosen;
+    }
     WindowFigures figures;
     const GLubyte* renderer = glGetString(GL_RENDERER);
     figures.display = renderer != nullptr ? reinterpret_cast<const char*>(renderer) : "unknown";

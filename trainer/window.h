@@ -12,6 +12,7 @@ struct WindowOptions {
     std::filesystem::path programs;  // folder of palpate and palpate-view
     int width = 1280, height = 720;  // [pixels]
     double textScale = 1;            // 0.5 to 3
+    std::string caseId;              // that is chosen at first; empty: the first
     std::uint64_t frames = 0;        // end after so many pictures, drawn one after the other; 0: no limit
 };
 

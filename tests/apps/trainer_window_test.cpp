@@ -54,7 +54,8 @@ struct Trainer {
     const Folder folder;
     const Desktop desktop;
     std::unique_ptr<Program> program = desktop.start(
-        "palpate-trainer", {"--size", std::to_string(wide) + "x" + std::to_string(high), "--sessions", folder / "s"});
+        "palpate-trainer",
+        {"--size", std::to_string(wide) + "x" + std::to_string(high), "--case", "layered", "--sessions", folder / "s"});
     bool open = !desktop.window("Palpate trainer").empty();
 
     void click(int x, int y, const std::string& button = "1") const
@@ -105,7 +106,6 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
     ASSERT_TRUE(t.open);
     ASSERT_TRUE(t.isAt("Case"));
     wait(1);
-    t.click(300, 120);
     for (const char* next : {"Device", "Briefing", "Session"}) {
         t.mainButton();
         ASSERT_TRUE(t.isAt(next));

@@ -3,9 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,11 @@ namespace {
 State firstState()
 {
     State state;
-    state.cases = builtInCases();
+    for (const char* id : {"first", "second", "third"}) {
+        CaseEntry c;
+        c.id = c.title = id;
+        state.cases.push_back(c);
+    }
     return state;
 }
 
@@ -111,20 +116,35 @@ TEST(State, TheCommandSaysDeviceTestAndFiles)
         return std::ranges::find(words, word) != words.end();
     };
     EXPECT_TRUE(has("mouse") && has("r.db") && has("r.json") && !has("--test"));
+    EXPECT_TRUE(has("--case") && has("first") && !has("--profile"));
+    state.person = "A. B.";
+    EXPECT_TRUE(has("--profile") && has("A. B."));
     state.test = state.useFalcon = true;
     state.firmware = "f.bin";
     EXPECT_TRUE(has("falcon") && has("f.bin") && has("--test") && !has("mouse"));
 }
 
-TEST(Cases, EachHasAPictureABriefingAndANameOfItsOwn)
+TEST(Cases, AreReadAsTheCommandListsThem)
 {
-    std::set<std::string> names;
-    for (const CaseEntry& c : builtInCases()) {
-        EXPECT_TRUE(names.insert(c.id).second) << c.id;
-        EXPECT_FALSE(casePicture(c.picture).rgb.empty()) << c.picture;
-        EXPECT_GE(c.steps.size(), 3U) << c.id;
-        EXPECT_FALSE(c.arguments.empty()) << c.id;
+    const auto list = nlohmann::json::parse(R"({"cases": [
+        {"id": "hard", "title": "Hard", "picture": "h.png", "difficulty": 5, "trains": ["a", "b"], "measures": ["total"],
+         "briefing": ["Reach it."]},
+        {"id": "torn", "title": 3},
+        {"id": "lump", "title": "Lump", "picture": "l.png", "difficulty": 1, "trains": [], "measures": ["mark_error_mm"],
+         "briefing": ["Feel.", "Mark."]}]})");
+    const auto cases = casesOf(list);
+    ASSERT_EQ(cases.size(), 2U);
+    EXPECT_EQ(cases[0].id, "lump");
+    EXPECT_TRUE(cases[0].palpation && !cases[1].palpation);
+    EXPECT_EQ(cases[0].steps.size(), 4U);
+    EXPECT_EQ(cases[1].trains, "a, b");
+    EXPECT_EQ(cases[1].steps[1], "Reach it.");
+    EXPECT_NE(cases[1].steps[0].find("needle"), std::string::npos);
+    for (const char* other : {"null", "[]", "{}", R"({"cases": 3})", R"({"cases": [1, "a", null]})"}) {
+        EXPECT_TRUE(casesOf(nlohmann::json::parse(other)).empty()) << other;
     }
+    EXPECT_EQ(peopleOf(nlohmann::json::parse(R"({"profiles": [{"name": "B"}, {}, {"name": "A"}]})")),
+              (std::vector<std::string>{"B", "A"}));
     EXPECT_TRUE(casePicture("no such picture").rgb.empty());
 }
 
