@@ -203,7 +203,7 @@ std::string groupsPart(const std::vector<ScoredGroup>& groups)
                        " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 "
                        "are small, medium and "
                        "large.</p></div></header><section class=\"card\"><div class=\"scroll\"><table "
-                       "class=\"plain\"><thead><tr><th>Measure</th>"
+                       "class=\"plain progress\"><thead><tr><th>Measure</th>"
                        "<th>Median (quartiles)</th><th>Sessions</th><th class=\"n\">" +
                        (groups.size() > 1 ? "Cliff's delta of " + escape(groups[0].name) : "") +
                        "</th></tr></thead><tbody>" + rows + "</tbody></table></div>";
