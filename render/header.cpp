@@ -185,6 +185,7 @@ void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result
 
 void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys)
 {
+    constexpr double below = 0.84;  // of the height: title, caption and warning stand above
     double font = plan.font, widestKey = 0, widest = 0;
     for (const KeyHelp& key : keys) {
         widestKey = std::max(widestKey, canvas.widthOf(key.key, font, true));
@@ -194,9 +195,9 @@ void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> k
     const double all = widestKey + widest + 3.5 * font, rows = static_cast<double>(keys.size()) + 1;
     const bool inBody = all < 0.98 * plan.banner.width;
     const double from = inBody ? plan.banner.x : 0, room = 0.98 * (inBody ? plan.banner.width : plan.width);
-    const double scale = std::min({1.0, room / all, 0.98 * plan.height / (rows * lineHeight * font)});
+    const double scale = std::min({1.0, room / all, below * plan.height / (rows * lineHeight * font)});
     font *= scale;
-    const double row = lineHeight * font, high = row * rows, y = 0.5 * (plan.height - high);
+    const double row = lineHeight * font, high = row * rows, y = 0.5 * (below * plan.height - high);
     canvas.rectangle({from + 0.5 * font, y}, {all * scale, high}, cardColour, 0.95);
     double line = y + high - 0.5 * font;
     for (const KeyHelp& key : keys) {

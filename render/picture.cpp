@@ -367,10 +367,13 @@ void Picture::drawFlat(const ScreenPlan& plan)
         drawLegend(canvas_, plan, s.scenery, {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1});
     }
     step_ = {};
-    if (!help_.empty()) {
+    if (!help_.empty())
         drawHelp(canvas_, plan, help_);
-    } else if (s.known) {
-        const Header words = header();
+    if (s.known) {
+        // Help leaves room for title, caption and warning.
+        Header words = header();
+        if (!help_.empty())
+            words.coaching = {};
         lastStep_ = words.coaching.last;
         step_ = drawHeader(canvas_, plan, s.scenery, s.state, words);
     }

@@ -250,8 +250,8 @@ TEST_F(PictureTest, WarnsInColourAndWordsOnlyWhenThereIsCause)
 {
     const auto banner = [&](const Image& image, Layout layout) {
         const ScreenPlan plan(width, height, layout);
-        const int font = static_cast<int>(plan.font);
-        return image.count({plan.banner.x, plan.banner.y, plan.banner.width, font}, pixelOf(amber), 4);
+        const int above = plan.height - plan.banner.y;
+        return image.count({plan.banner.x, plan.banner.y, plan.banner.width, above}, pixelOf(amber), 4);
     };
     for (const auto& [layout, layoutName] : layouts) {
         const int least = static_cast<int>(80 * ScreenPlan(width, height, layout).font);
