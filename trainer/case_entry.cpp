@@ -47,7 +47,7 @@ CaseEntry entryOf(const json& one)
     for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
         c.steps.push_back(step);
     }
-    c.steps.push_back(c.palpation ? "Mark with M, and end the session (E)." : "End the session (E).");
+    c.steps.push_back(c.palpation ? "M marks, E ends the session." : "E ends the session.");
     return c;
 }
 

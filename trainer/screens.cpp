@@ -173,11 +173,14 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     heading(c.title);
     words(c.trains, skyBlue);
     const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
-    const bool beside = wide > 40 * em;
+    const Texture texture = textureOf(c.picture);
+    const bool beside = wide > 40 * em && texture.id != 0;
     ImGui::BeginChild("briefing", {0, -6.6F * em}, false, ImGuiWindowFlags_NavFlattened);
-    ImGui::BeginGroup();
-    drawPicture(textureOf(c.picture), beside ? 0.42F * wide : wide, 17 * em);
-    ImGui::EndGroup();
+    if (texture.id != 0) {
+        ImGui::BeginGroup();
+        drawPicture(texture, beside ? 0.42F * wide : wide, 17 * em);
+        ImGui::EndGroup();
+    }
     if (beside) {
         ImGui::SameLine(0.45F * wide);
     }
