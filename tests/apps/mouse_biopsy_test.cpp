@@ -128,8 +128,8 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     const std::string session = "desktop-" + std::to_string(::getpid());
     const Desktop desktop;
     const auto train =
-        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--seconds", "120", "--session",
-                                  session, "--record", folder / "s.db", "--json", folder / "s.json"});
+        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--close-at-end", "--seconds", "120",
+                                  "--session", session, "--record", folder / "s.db", "--json", folder / "s.json"});
     const std::string window = desktop.window("Palpate");
     const auto eyes = sessionWithHand(session);
     ASSERT_FALSE(window.empty());
@@ -149,8 +149,6 @@ TEST(Desktop, MouseAndKeysCompleteABiopsyThatReplaysBitByBit)
     withdraw(user, axis);
     EXPECT_EQ(user.sees().phase, channel::Phase::free);
     user.key("e");
-    wait(3);
-    user.key("q");  // the result is read
     const Outcome outcome = train->wait();
     ASSERT_EQ(outcome.status, 0) << outcome.err;
 
