@@ -25,7 +25,11 @@ Enum fromName(std::string_view word, const std::array<std::string_view, n>& name
 {
     const auto found = std::ranges::find(names, word);
     if (found == names.end()) {
-        throw std::runtime_error("unknown word '" + std::string(word) + "'");
+        // It stands in a message of one line, and a damaged file may hold anything.
+        std::string shown(word.substr(0, 40));
+        std::ranges::replace_if(
+            shown, [](char c) { return c < 0x20 || c == 0x7F; }, '?');
+        throw std::runtime_error("unknown word '" + shown + "'");
     }
     return static_cast<Enum>(found - names.begin());
 }

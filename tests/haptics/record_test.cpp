@@ -420,6 +420,9 @@ TEST(Record, RefusesWhatIsNoRecordOnOneLine)
     const auto words = make("words");
     executeSql(words, "UPDATE ticks SET phase = 'nowhere' WHERE tick = 100");
     refuse(words, "unknown word 'nowhere'");
+    const auto torn = make("torn");
+    executeSql(torn, "UPDATE ticks SET phase = 'no' || char(10, 233) || 'where' WHERE tick = 100");
+    refuse(torn, "unknown word 'no???where'");
     const auto rate = make("rate");
     executeSql(rate, "UPDATE session SET value = -5 WHERE key = 'rate_hz'");
     refuse(rate, "a rate of -5 Hz is outside 100 to 20000 Hz");
