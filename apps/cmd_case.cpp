@@ -1,7 +1,7 @@
 #include <apps/command.h>
-#include <apps/temporary_folder.h>
 #include <base/child_process.h>
 #include <base/outputs.h>
+#include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <session/devices.h>
@@ -141,7 +141,7 @@ void draw(const Options& o)
     const Case c = training::findCase(o.id);
     const fs::path to = o.picture.empty() ? c.folder / "picture.png" : o.picture;
     base::checkOutput(to);
-    const TemporaryFolder folder("the session that is drawn");
+    const base::TemporaryFolder folder("the session that is drawn");
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("drawing " + c.id);
     recordBeginning(c, folder.path() / "session.db");

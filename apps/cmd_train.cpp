@@ -1,11 +1,11 @@
 #include <apps/command.h>
 
-#include <apps/temporary_folder.h>
 #include <apps/train_figures.h>
 #include <apps/train_profile.h>
 #include <apps/viewers.h>
 #include <base/memory.h>
 #include <base/outputs.h>
+#include <base/temporary_folder.h>
 #include <command/interrupted.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -291,10 +291,10 @@ void tell(const std::string& fitted, const std::vector<std::pair<const char*, st
 }
 
 // Where the figures lie that the window shows at the end: of a session that somebody holds.
-std::optional<TemporaryFolder> forResult(const Options& o)
+std::optional<base::TemporaryFolder> forResult(const Options& o)
 {
     const bool shown = session::deviceKind(o.device).somebodyHolds && wantsWindow(o) && !o.closeAtEnd;
-    return shown ? std::optional<TemporaryFolder>(std::in_place, "the result that the window shows") : std::nullopt;
+    return shown ? std::optional<base::TemporaryFolder>(std::in_place, "the result that the window shows") : std::nullopt;
 }
 
 ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, const fs::path& result)
@@ -327,7 +327,7 @@ void train(Options o)
 {
     Training training(o.training);
     prepare(o, training);
-    std::optional<TemporaryFolder> temporary;
+    std::optional<base::TemporaryFolder> temporary;
     if (o.unpaced && !o.pictures.empty() && recordFile(o).empty()) {
         o.record = temporary.emplace("the record that the pictures are drawn of").path() / "session.db";
         o.ownRecord = false;
@@ -367,7 +367,7 @@ void train(Options o)
     options.faults = o.faults;
 
     // Before the record is made, so that a viewer that cannot be started leaves none.
-    const std::optional<TemporaryFolder> resultFolder = forResult(o);
+    const std::optional<base::TemporaryFolder> resultFolder = forResult(o);
     const fs::path toShow = resultFolder ? resultFolder->path() / "result.json" : fs::path();
     Viewers viewers(viewersFor(o, model, toShow));
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };

@@ -4,16 +4,20 @@
 
 namespace palpate::base {
 
+const char* sideInWords(int axis, bool positive) noexcept
+{
+    constexpr const char* sides[3][2] = {
+        {"the patient's right", "the patient's left"}, {"the front", "the back"}, {"the feet", "the head"}};
+    return sides[axis][positive ? 1 : 0];
+}
+
 const char* directionInWords(double left, double back, double head) noexcept
 {
     const double x = std::abs(left), y = std::abs(back), z = std::abs(head);
     if (z >= x && z >= y) {
-        return head > 0 ? "the head" : "the feet";
+        return sideInWords(2, head > 0);
     }
-    if (x >= y) {
-        return left > 0 ? "the patient's left" : "the patient's right";
-    }
-    return back > 0 ? "the back" : "the front";
+    return x >= y ? sideInWords(0, left > 0) : sideInWords(1, back > 0);
 }
 
 }  // namespace palpate::base

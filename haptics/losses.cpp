@@ -1,5 +1,6 @@
 #include <haptics/losses.h>
 
+#include <base/direction.h>
 #include <base/spoken.h>
 
 #include <fmt/format.h>
@@ -22,12 +23,6 @@ double points(double most, double share)
     return most * (1 - share);
 }
 
-// As in score.cpp.
-double ramp(double value, double full, double none)
-{
-    return std::clamp((none - value) / (none - full), 0.0, 1.0);
-}
-
 std::string timesInWords(std::uint32_t n)
 {
     return n == 1 ? "once" : fmt::format("{} times", n);
@@ -38,14 +33,12 @@ std::string timesInWords(std::uint32_t n)
 // LPS: x to the patient's left, y to the back, z to the head.
 std::string directionInWords(Vec3 way)
 {
-    constexpr const char* names[3][2] = {
-        {"the patient's right", "the patient's left"}, {"the front", "the back"}, {"the feet", "the head"}};
     if (glm::length(way) < worthSaying) {
         return "";
     }
     std::array<int, 3> order{0, 1, 2};
     std::ranges::sort(order, [&](int a, int b) { return std::abs(way[a]) > std::abs(way[b]); });
-    const auto named = [&](int axis) { return names[axis][way[axis] > 0 ? 1 : 0]; };
+    const auto named = [&](int axis) { return base::sideInWords(axis, way[axis] > 0); };
     std::string words = fmt::format("towards {}", named(order[0]));
     if (std::abs(way[order[1]]) > 0.5 * std::abs(way[order[0]])) {
         words += fmt::format(" and {}", named(order[1]));
@@ -73,7 +66,7 @@ std::optional<double> LossWatch::at(Moment moment) const noexcept
 void LossWatch::add(const TickRecord& record) noexcept
 {
     scorer_.add(record);
-    const Score now = scorer_.score();
+    const Score& now = scorer_.counted();
     const double seconds = static_cast<double>(record.tick) / rate_;
     const bool better = now.bestTargetFraction > before_.bestTargetFraction || now.targetingError < before_.targetingError;
     if (record.fired && (better || now.passes == 1)) {
@@ -135,32 +128,28 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
     if (s.passes == 0) {
         return {{"passes", 75, "The gun was not fired: there is no core", std::nullopt}};
     }
-    const double hit = std::min(1.0, s.bestTargetFraction / 0.1);
-    const double stays = ramp(s.beyondTarget, 3e-3, 15e-3);
-    const double economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1;
-    const double each = 5 * hit * stays;
-    return {{"best_target_pct", points(50, parts(s).core / 50) + points(25, hit), miss(s, target), at(shot)},
-            {"beyond_target_mm", 25 * hit * (1 - stays),
-             fmt::format("The needle was pushed {:.1f} mm deeper than the {}", 1e3 * s.beyondTarget, target), at(beyond)},
-            {"passes", points(each, ramp(s.passes, 1, 5)), fmt::format("{} cores were taken; one can do", s.passes),
-             at(secondShot)},
-            {"skin_contacts", points(each, ramp(s.skinContacts, 1, 5)),
-             fmt::format("The skin was touched {}", timesInWords(s.skinContacts)), at(secondContact)},
-            {"redirects", points(each, ramp(s.redirects, 0, 4)),
-             fmt::format("The needle was drawn back and pushed on again {}", timesInWords(s.redirects)), at(redirect)},
-            {"inserted_path_mm", points(each, economy),
-             fmt::format("The tip went {:.0f} mm inside the body, {:.0f} mm would have done", 1e3 * s.insertedPath,
-                         2e3 * s.deepest),
-             std::nullopt},
-            {"peak_force_n", points(each, ramp(s.peakForce, 4, 8.5)),
-             fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+    const ScoreShares share = sharesOf(s);
+    const double each = 5 * share.hit * share.stays;
+    return {
+        {"best_target_pct", points(50, parts(s).core / 50) + points(25, share.hit), miss(s, target), at(shot)},
+        {"beyond_target_mm", 25 * share.hit * (1 - share.stays),
+         fmt::format("The needle was pushed {:.1f} mm deeper than the {}", 1e3 * s.beyondTarget, target), at(beyond)},
+        {"passes", points(each, share.passes), fmt::format("{} cores were taken; one can do", s.passes), at(secondShot)},
+        {"skin_contacts", points(each, share.contacts),
+         fmt::format("The skin was touched {}", timesInWords(s.skinContacts)), at(secondContact)},
+        {"redirects", points(each, share.redirects),
+         fmt::format("The needle was drawn back and pushed on again {}", timesInWords(s.redirects)), at(redirect)},
+        {"inserted_path_mm", points(each, share.economy),
+         fmt::format("The tip went {:.0f} mm inside the body, {:.0f} mm would have done", 1e3 * s.insertedPath,
+                     2e3 * s.deepest),
+         std::nullopt},
+        {"peak_force_n", points(each, share.gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
 }
 
 std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info) const
 {
     const std::string target = info.structures.empty() ? "lump" : base::spoken(info.structures[0]);
-    const double near = ramp(s.markError, 10e-3, 20e-3), gentle = ramp(s.peakForce, 4, 8.5);
-    const double size = ramp(s.markSizeError, 2e-3, 15e-3);
+    const ScoreShares share = sharesOf(s);
     std::string where = std::isfinite(s.markError) ? fmt::format("The marks' middle lies {:.1f} mm beside that of the {}",
                                                                  1e3 * s.markError, target)
                                                    : fmt::format("What was marked cannot be compared with the {}", target);
@@ -169,11 +158,11 @@ std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info
         const std::string direction = directionInWords(away - glm::dot(away, target_->axis) * target_->axis);
         where += direction.empty() ? "" : ", " + direction;
     }
-    return {{"mark_error_mm", points(30, ramp(s.markError, 2e-3, 20e-3)) + (20 * size + 25 * gentle) * (1 - near), where,
+    return {{"mark_error_mm", points(30, share.place) + (20 * share.size + 25 * share.gentle) * (1 - share.near), where,
              at(mark)},
-            {"mark_size_error_mm", points(20, size),
+            {"mark_size_error_mm", points(20, share.size),
              fmt::format("The size was marked {:.1f} mm wrong", 1e3 * s.markSizeError), at(mark)},
-            {"peak_force_n", points(25, gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+            {"peak_force_n", points(25, share.gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
 }
 
 std::vector<Loss> LossWatch::losses(const SessionInfo& info) const

@@ -71,18 +71,32 @@ std::optional<TargetShape> targetShapeOf(const SessionInfo& info)
 
 // Weights: the list of measures is of Johnson 2012 and tissue.md's summary of published simulators; the points and the
 // limits are ours, and docs/score.md states them.
+ScoreShares sharesOf(const Score& s) noexcept
+{
+    return {.hit = std::min(1.0, s.bestTargetFraction / 0.1),
+            .stays = ramp(s.beyondTarget, 3e-3, 15e-3),
+            .passes = ramp(s.passes, 1, 5),
+            .contacts = ramp(s.skinContacts, 1, 5),
+            .redirects = ramp(s.redirects, 0, 4),
+            .economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1,
+            .gentle = ramp(s.peakForce, 4, 8.5),
+            .place = ramp(s.markError, 2e-3, 20e-3),
+            .near = ramp(s.markError, 10e-3, 20e-3),
+            .size = ramp(s.markSizeError, 2e-3, 15e-3)};
+}
+
 ScoreParts parts(const Score& s) noexcept
 {
     ScoreParts p;
+    const ScoreShares share = sharesOf(s);
     if (s.skinContacts == 0) {
         return p;
     }
     p.vital = 25 * std::max(0.0, 1 - 0.4 * s.vitalContacts - 0.1 * s.vitalSeconds - 0.1 * s.vitalDepth * 1e3);
     if (s.marks > 0) {
         // Who marked another place has neither sized the target nor found it gently.
-        const double near = ramp(s.markError, 10e-3, 20e-3);
-        p.core = 30 * ramp(s.markError, 2e-3, 20e-3) + 20 * near * ramp(s.markSizeError, 2e-3, 15e-3);
-        p.technique = 25 * near * ramp(s.peakForce, 4, 8.5);
+        p.core = 30 * share.place + 20 * share.near * share.size;
+        p.technique = 25 * share.near * share.gentle;
         return p;
     }
     if (s.passes == 0) {
@@ -90,13 +104,9 @@ ScoreParts parts(const Score& s) noexcept
     }
     p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
              10 * ramp(s.targetingError, 0, 10e-3);
-    const double economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1;
     // However well it was done: who missed has no technique to be praised for.
-    const double hit = std::min(1.0, s.bestTargetFraction / 0.1);
-    const double stays = ramp(s.beyondTarget, 3e-3, 15e-3);
     p.technique =
-        hit * stays * 5 *
-        (ramp(s.passes, 1, 5) + ramp(s.skinContacts, 1, 5) + ramp(s.redirects, 0, 4) + economy + ramp(s.peakForce, 4, 8.5));
+        share.hit * share.stays * 5 * (share.passes + share.contacts + share.redirects + share.economy + share.gentle);
     return p;
 }
 

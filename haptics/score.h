@@ -56,6 +56,21 @@ struct ScoreParts {
 
 ScoreParts parts(const Score& score) noexcept;
 
+/// What points are given for, each as a share from 0 (nothing) to 1 (all of it): parts() weighs them.
+struct ScoreShares {
+    double hit = 0;       // enough target in the best core for technique to count
+    double stays = 0;     // not pushed beyond the target
+    double passes = 0;    // few of them
+    double contacts = 0;  // few touches of the skin
+    double redirects = 0;
+    double economy = 0;  // of the path inside
+    double gentle = 0;   // small forces
+    double place = 0;    // of the marks
+    double near = 0;     // enough for their size and technique to count
+    double size = 0;     // between the marks
+};
+ScoreShares sharesOf(const Score& score) noexcept;
+
 /// Length of a path, counted in steps of at least 0.2 mm so that noise of an encoder adds nothing; the last, shorter step
 /// counts too.
 struct PathMeter {
@@ -102,6 +117,8 @@ public:
     explicit Scorer(const SessionInfo& info);
     void add(const TickRecord& record) noexcept;
     Score score() const noexcept;
+    /// What add() counts as it stands: what score() computes from it (times, lengths, means, marks, total) is missing.
+    const Score& counted() const noexcept { return score_; }
 
 private:
     void addContact(const TickRecord& record) noexcept;

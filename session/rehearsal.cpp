@@ -7,18 +7,15 @@
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 
-#include <algorithm>
-
 namespace palpate::session {
 
 namespace {
 
 constexpr int ticks = 40;
-constexpr double stride = 1e-4;    // of the tool per tick [m]
-constexpr double patience = 0.3;   // [s]
-constexpr double tickTime = 1e-3;  // that there is for a tick [s]
-constexpr double pacedLimit = 5 * tickTime;
-constexpr double unpacedLimit = 60 * tickTime;
+constexpr double stride = 1e-4;   // of the tool per tick [m]
+constexpr double patience = 0.3;  // [s]
+constexpr double pacedLimit = 5 * haptics::tickSeconds;
+constexpr double unpacedLimit = 60 * haptics::tickSeconds;
 
 }  // namespace
 
@@ -30,7 +27,6 @@ Rehearsal rehearse(const haptics::SessionModel& model)
     const Vec3 touch = model.approach.entry - (needle ? 0.0 : model.scene.tool.radius) * way;
     haptics::DeviceSample sample{.position = touch, .axis = way, .buttons = haptics::buttonDeadMan};
     haptics::Histogram times;
-    Rehearsal rehearsal;
     double spent = 0;
     for (int i = 0; i < ticks && spent < patience; ++i) {
         sample.position = touch + stride * i * way;
@@ -39,10 +35,9 @@ Rehearsal rehearse(const haptics::SessionModel& model)
         const double took = base::processorTime() - start;
         spent += took;
         times.add(took);
-        rehearsal.worst = std::max(rehearsal.worst, took);
     }
-    rehearsal.p50 = times.percentiles().p50;
-    return rehearsal;
+    const haptics::Percentiles p = times.percentiles();
+    return {p.p50, p.max};
 }
 
 std::string whyTooSlow(const Rehearsal& rehearsal, bool paced)
@@ -53,11 +48,11 @@ std::string whyTooSlow(const Rehearsal& rehearsal, bool paced)
     const std::string takes = fmt::format("a tick of this model takes {:.0f} ms here ({:.0f} ms at worst)",
                                           1e3 * rehearsal.p50, 1e3 * rehearsal.worst);
     return paced ? fmt::format("{}, and there is {:.0f} ms: choose a coarser [model] or --setting, or go on with --anyway",
-                               takes, 1e3 * tickTime)
+                               takes, 1e3 * haptics::tickSeconds)
                  : fmt::format(
                        "{}, so that a second of the session takes {:.0f} s: choose a coarser [model] or --setting, "
                        "or go on with --anyway",
-                       takes, rehearsal.p50 / tickTime);
+                       takes, rehearsal.p50 / haptics::tickSeconds);
 }
 
 }  // namespace palpate::session

@@ -1,12 +1,12 @@
 #include <trainer/errands.h>
 
 #include <base/process.h>
+#include <base/temporary_folder.h>
 
 #include <nlohmann/json.hpp>
 
 #include <fcntl.h>
 #include <signal.h>
-#include <stdlib.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -47,10 +47,7 @@ public:
     ~Running()
     {
         end();
-        for (int i = 0; i < 100 && !ended(); ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(50));
-        }
-        if (pid_ > 0) {
+        if (!finish()) {
             ::kill(pid_, SIGKILL);
             ::waitpid(pid_, nullptr, 0);
         }
@@ -58,6 +55,14 @@ public:
     Running(const Running&) = delete;
     Running& operator=(const Running&) = delete;
 
+    // Waits five seconds at most for its end.
+    bool finish() noexcept
+    {
+        for (int i = 0; i < 200 && !ended(); ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(25));
+        }
+        return ended();
+    }
     void end() const noexcept
     {
         if (pid_ > 0) {
@@ -93,22 +98,7 @@ private:
 }  // namespace
 
 struct Errands::Impl {
-    Impl(fs::path where, ResultSink& to) : programs(std::move(where)), sink(to)
-    {
-        std::string name = (fs::temp_directory_path() / "palpate-trainer-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error(name + ": no folder can be made there");
-        }
-        scratch = name;
-    }
-    ~Impl()
-    {
-        session.reset();
-        devices.reset();
-        replay.reset();
-        std::error_code ignored;
-        fs::remove_all(scratch, ignored);
-    }
+    Impl(fs::path where, ResultSink& to) : programs(std::move(where)), sink(to) {}
 
     void startSession(State& state)
     {
@@ -131,9 +121,7 @@ struct Errands::Impl {
         fs::remove(file);
         arguments.insert(arguments.end(), {"--json", file.string()});
         Running command(programs / "palpate", arguments, scratch / "answer.log");
-        for (int i = 0; i < 200 && !command.ended(); ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(25));
-        }
+        command.finish();
         std::ifstream in(file);
         auto answer = nlohmann::json::parse(in, nullptr, false);
         if (answer.is_discarded()) {
@@ -153,9 +141,7 @@ struct Errands::Impl {
     {
         const std::string name = state.newPerson;
         Running command(programs / "palpate", {"profile", "new", name}, scratch / "person.log");
-        for (int i = 0; i < 200 && !command.ended(); ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(25));
-        }
+        command.finish();
         state.notice = command.message();
         listPeople(state);
         if (std::ranges::find(state.people, name) != state.people.end()) {
@@ -170,7 +156,8 @@ struct Errands::Impl {
                         scratch / "devices.log");
     }
 
-    fs::path programs, scratch;
+    fs::path programs;
+    const base::TemporaryFolder scratch{"what the commands print"};  // goes after those that run
     ResultSink& sink;
     std::optional<Running> session, devices, replay;
 };

@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/outputs.h>
 #include <base/quantiles.h>
+#include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <datasets/phantom_random.h>
@@ -79,7 +80,7 @@ std::string timeGraphics(haptics::SessionModel& model, const EventOptions& optio
     if (!std::filesystem::exists(program)) {
         return "palpate-view is not beside palpate: build it with -DPALPATE_VIEWER=ON";
     }
-    const ScratchFolder scratch;
+    const base::TemporaryFolder scratch("what the viewers write");
     const auto timeline = scratch / "timeline.csv";
     const std::string session = fmt::format("bench-tasks-{}", getpid());
     haptics::Broadcast broadcast(session, model, true);

@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/outputs.h>
 #include <base/quantiles.h>
+#include <base/temporary_folder.h>
 #include <channel/layout.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -167,7 +168,7 @@ void benchSync(const SyncOptions& o)
     base::checkOutput(o.json);
     const auto model = session::openSession(o.scene, o.changes);
     const auto info = session::describeSession(model, o.scene, "hand");
-    const ScratchFolder scratch;
+    const base::TemporaryFolder scratch("what the viewers write");
     session::TrainOptions options;
     options.session = fmt::format("bench-sync-{}", getpid());
     options.servo = {true, o.seconds, 0};

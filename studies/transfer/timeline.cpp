@@ -1,9 +1,7 @@
 #include <studies/transfer/timeline.h>
 
-#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
-#include <system_error>
 
 namespace palpate::studies {
 
@@ -23,21 +21,6 @@ std::vector<TimelinePicture> readTimeline(const fs::path& file)
         throw std::runtime_error("a viewer showed no pictures: its message is above");
     }
     return pictures;
-}
-
-ScratchFolder::ScratchFolder()
-{
-    std::string name = fs::temp_directory_path() / "palpate-bench-XXXXXX";
-    if (mkdtemp(name.data()) == nullptr) {
-        throw std::runtime_error(name + ": no folder can be made here");
-    }
-    folder_ = name;
-}
-
-ScratchFolder::~ScratchFolder()
-{
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
 }
 
 }  // namespace palpate::studies

@@ -16,17 +16,4 @@ struct TimelinePicture {
 /// What `palpate-view --timeline FILE` wrote. Throws std::runtime_error for fewer than two pictures.
 std::vector<TimelinePicture> readTimeline(const std::filesystem::path& file);
 
-/// A folder for what this program's children write, removed at its end. Throws std::runtime_error.
-class ScratchFolder {
-public:
-    ScratchFolder();
-    ScratchFolder(const ScratchFolder&) = delete;
-    ScratchFolder& operator=(const ScratchFolder&) = delete;
-    ~ScratchFolder();
-    std::filesystem::path operator/(const std::string& name) const { return folder_ / name; }
-
-private:
-    std::filesystem::path folder_;
-};
-
 }  // namespace palpate::studies

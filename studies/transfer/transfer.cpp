@@ -1,5 +1,6 @@
 #include <studies/transfer/transfer.h>
 
+#include <base/temporary_folder.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
@@ -179,22 +180,15 @@ class Pipe {
 public:
     Pipe()
     {
-        std::string name = std::filesystem::temp_directory_path() / "palpate-pipe-XXXXXX";
-        if (::mkdtemp(name.data()) == nullptr || ::mkfifo((name + "/position").c_str(), 0600) != 0) {
-            throw std::runtime_error(failure(name + ": no named pipe can be made here"));
+        if (::mkfifo(name().c_str(), 0600) != 0) {
+            throw std::runtime_error(failure(name() + ": no named pipe can be made here"));
         }
-        folder_ = name;
         // A reader that is gone is an error of write(), and no signal.
         std::signal(SIGPIPE, SIG_IGN);
     }
     Pipe(const Pipe&) = delete;
     Pipe& operator=(const Pipe&) = delete;
-    ~Pipe()
-    {
-        close();
-        std::error_code ignored;
-        std::filesystem::remove_all(folder_, ignored);
-    }
+    ~Pipe() { close(); }
 
     std::string name() const { return folder_ / "position"; }
     /// Waits for the reader. Never blocks on a full pipe afterwards.
@@ -216,7 +210,7 @@ public:
     }
 
 private:
-    std::filesystem::path folder_;
+    base::TemporaryFolder folder_{"a named pipe"};
     int file_ = -1;
 };
 

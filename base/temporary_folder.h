@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace palpate::apps {
+namespace palpate::base {
 
 /// A folder that goes away at the end.
 class TemporaryFolder {
@@ -28,9 +28,10 @@ public:
     TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
     const std::filesystem::path& path() const { return path_; }
+    std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
 
 private:
     std::filesystem::path path_;
 };
 
-}  // namespace palpate::apps
+}  // namespace palpate::base
