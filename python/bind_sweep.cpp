@@ -29,18 +29,29 @@ std::size_t runSweep(const std::filesystem::path& folder, const std::string& pla
     const sweep::CasesWanted wanted{sweep::allCases(held.plan()), retry, false};
     const auto cases = sweep::remainingCases(held, wanted, [](const std::string&) {});
     const std::size_t all = held.plan().cases(), before = all - cases.size();
-    bool interrupted = false;
+    // An interrupt may come while Python reports: the cases in flight are finished and the tables written in any case.
+    std::optional<py::error_already_set> stopped;
     const auto goOn = [&](std::size_t done, std::size_t) {
         held.lock().check();
-        interrupted = interrupted || PyErr_CheckSignals() != 0;
-        return !interrupted && told(before + done, all).cast<bool>();
+        if (stopped) {
+            return false;
+        }
+        try {
+            if (PyErr_CheckSignals() != 0) {
+                throw py::error_already_set();
+            }
+            return told(before + done, all).cast<bool>();
+        } catch (const py::error_already_set& error) {
+            stopped = error;
+            return false;
+        }
     };
     if (!cases.empty()) {
         sweep::runLocally(held, cases, jobs, std::string(base::build()), goOn, [] { return false; });
     }
     const std::size_t rows = sweep::writeTables(held, held.rows()).rows.size();
-    if (interrupted) {
-        throw py::error_already_set();
+    if (stopped) {
+        throw *stopped;
     }
     return rows;
 }
