@@ -174,6 +174,9 @@ void printTable(const std::vector<std::string>& heads, const std::vector<std::ve
         text += fmt::format("  {:>{}}", heads[c], widths[c]);
     }
     for (std::size_t m = 0; m < haptics::measures().size(); ++m) {
+        if (std::ranges::all_of(columns, [&](const auto& column) { return column[m] == "-"; })) {
+            continue;
+        }
         text += fmt::format("\n{:<12}", haptics::measures()[m].title);
         for (std::size_t c = 0; c < heads.size(); ++c) {
             text += fmt::format("  {:>{}}", columns[c][m], widths[c]);

@@ -84,6 +84,8 @@ public:
     /// the displacement itself stands here.)
     Vec3 toolForce(std::size_t i) const noexcept { return force(i, false); }
     Vec3 tieForce(std::size_t i) const noexcept { return force(i, true); }
+    /// By how much tool `i` of the last load is held back, see HeldTool [m].
+    double behind(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].behind; }
     /// Displacement of the material that is at `rest` [m].
     Vec3 displacement(Vec3 rest) const noexcept;
     bool atRest() const noexcept { return atRest_; }

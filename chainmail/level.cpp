@@ -80,14 +80,21 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
 
 ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
 {
+    const std::size_t others = std::min(grip.others.size(), mostOthers);
+    std::copy_n(grip.others.begin(), others, tools_.begin());
+    ElasticLoad load{{}, {}, focusAt(surface_, grip.position)};
     if (grip.kind == Grip::Kind::press) {
-        tool_.shape = grip.shape;
-        tool_.pushed = grip.position - grip.proxy;
-        tool_.friction = grip.friction;
+        ElasticTool& tool = tools_[others];
+        tool.shape = grip.shape;
+        tool.pushed = grip.position - grip.proxy;
+        tool.friction = grip.friction;
         const Vec3 under = grip.proxy - surface_.distance(grip.proxy) * surface_.normal(grip.proxy);
-        return {{&tool_, 1}, {}, focusAt(surface_, under)};
+        load.focus = focusAt(surface_, under);
+    } else if (grip.kind == Grip::Kind::point) {
+        load = tie(grip);
     }
-    return grip.kind == Grip::Kind::point ? tie(grip) : ElasticLoad{{}, {}, focusAt(surface_, grip.position)};
+    load.tools = std::span(tools_).first(others + (grip.kind == Grip::Kind::press ? 1 : 0));
+    return load;
 }
 
 double tieStiffnessAt(const ElasticBody& body, Vec3 rest) noexcept
@@ -122,9 +129,10 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
 
 Reaction ElasticLevel::deform(const Grip& grip) noexcept
 {
-    // Of a tip that holds the tissue only the shape is asked for, not the force: solving and writing take turns.
-    const bool takesTurns = grip.kind == Grip::Kind::point && isHeld_ && period_ > 1;
-    isHeld_ = grip.kind == Grip::Kind::point;
+    // Where no hand presses, only the shape is asked for, not the force: solving and writing take turns.
+    const bool isShapeOnly = grip.kind == Grip::Kind::point || (grip.kind == Grip::Kind::none && !grip.others.empty());
+    const bool takesTurns = isShapeOnly && isShapeOnly_ && period_ > 1;
+    isShapeOnly_ = isShapeOnly;
     turn_ = takesTurns ? (turn_ + 1) % period_ : 0;
     const bool wasAtRest = elastic_.atRest();
     if (turn_ == 0) {
@@ -141,9 +149,13 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
         revisitMoved();
     }
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
+    const std::size_t others = std::min(grip.others.size(), mostOthers);
     if (grip.kind == Grip::Kind::press) {
-        reaction.force = elastic_.toolForce(0);
-        reaction.behind = last_.behind;
+        reaction.force = elastic_.toolForce(others);
+        reaction.behind = elastic_.behind(others);
+    }
+    for (std::size_t i = 0; i < others; ++i) {
+        reaction.othersForce += elastic_.toolForce(i);
     }
     return reaction;
 }

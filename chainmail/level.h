@@ -7,6 +7,7 @@
 #include <concepts>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -18,15 +19,17 @@ struct Grip {
         press,  // from outside, with its surface
         point,  // a tip has hold of the material point `proxy`, at the surface or inside
     } kind = Kind::none;
-    occupancy::RoundCone shape;  // of a tool that presses, where it is now [m]
-    Vec3 proxy{0.0};             // what it holds, at rest: of a sphere its centre without penetration [m]
-    Vec3 position{0.0};          // where the tool has it now [m]
-    double radius = 0;           // of a tip that holds a point [m]
-    bool inside = false;         // that point is inside the tissue
-    Vec3 entry{0.0};             // where the shaft went in, at rest [m]
-    Vec3 axis{0, 1, 0};          // along the tool, towards its tip
-    double drag = 0;             // how far a shaft carries the tissue around it along `axis` [m]
-    double friction = 0;         // of a tool that presses (Coulomb) [-]
+    occupancy::RoundCone shape;           // of a tool that presses, where it is now [m]
+    Vec3 proxy{0.0};                      // what it holds, at rest: of a sphere its centre without penetration [m]
+    Vec3 position{0.0};                   // where the tool has it now [m]
+    double radius = 0;                    // of a tip that holds a point [m]
+    bool inside = false;                  // that point is inside the tissue
+    Vec3 entry{0.0};                      // where the shaft went in, at rest [m]
+    Vec3 axis{0, 1, 0};                   // along the tool, towards its tip
+    double drag = 0;                      // how far a shaft carries the tissue around it along `axis` [m]
+    double friction = 0;                  // of a tool that presses (Coulomb) [-]
+    std::span<const ElasticTool> others;  // tools that press besides, ElasticLevel::mostOthers at most; only level elastic
+                                          // knows them. They must live until the next call
 };
 
 struct Reaction {
@@ -34,6 +37,7 @@ struct Reaction {
     double residual = 0;        // of the level's own: largest violated link [m]
     std::optional<Vec3> force;  // of the tissue on the tool; none where the level does not know it [N]
     double behind = 0;          // by how much the level holds the tool back, see HeldTool [m]
+    Vec3 othersForce{0.0};      // of the tissue on Grip::others together [N]
 };
 
 /// A level of the model ladder: leaves the displaced lattice behind for collision, distances and the viewer. Bounded work,
@@ -76,9 +80,10 @@ double tieStiffnessAt(const ElasticBody& body, Vec3 rest) noexcept;
 /// Level 2: elastic equilibrium on nested windows; forces of a pressing tool come from its energy, from first touch on.
 ///
 /// The lattice gets the windows' displacement at the middles of their cells: around the tool in every call, further out by
-/// turns, a fixed number of nodes per call. While a tip holds the tissue, which has no force from here, solving and writing
-/// take turns too: the shape is that of up to ElasticOptions::heldPeriod calls ago. Tissue that would turn inside out keeps
-/// the shape it had: the lattice goes towards the windows' shape only as far as every cell keeps its orientation.
+/// turns, a fixed number of nodes per call. While a tip holds the tissue, or only Grip::others press, the hand has no force
+/// from here, and solving and writing take turns too: the shape is that of up to ElasticOptions::heldPeriod calls ago.
+/// Tissue that would turn inside out keeps the shape it had: the lattice goes towards the windows' shape only as far as
+/// every cell keeps its orientation.
 class ElasticLevel {
 public:
     /// All must outlive it. The body's cells are the lattice's nodes.
@@ -86,6 +91,7 @@ public:
                  const ElasticOptions& options, Vec3 start);
     Reaction deform(const Grip& grip) noexcept;
     const Elastic& elastic() const noexcept { return elastic_; }
+    static constexpr std::size_t mostOthers = 7;
 
 private:
     static constexpr std::size_t mostShaftTies = 8;
@@ -109,10 +115,10 @@ private:
     Elastic elastic_;
     int period_;  // calls from one solution to the next while a tip holds the tissue
     int turn_ = 0;
-    bool isHeld_ = false;
-    ElasticTool tool_;
-    std::array<Tie, 1 + mostShaftTies> ties_;  // the tip's, then the shaft's
-    std::vector<Vec3f> before_;                // nodes of a box as they were, and as the windows have them
+    bool isShapeOnly_ = false;                       // the last call's force on the hand was not from here
+    std::array<ElasticTool, mostOthers + 1> tools_;  // the others, then the hand's: so each keeps its place
+    std::array<Tie, 1 + mostShaftTies> ties_;        // the tip's, then the shaft's
+    std::vector<Vec3f> before_;                      // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;
     std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
     std::vector<Index3> turns_;           // by level: where its turn is

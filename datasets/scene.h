@@ -1,6 +1,7 @@
 #pragma once
 
 #include <datasets/phantom.h>
+#include <datasets/probe.h>
 #include <volume/geometry.h>
 #include <volume/tissue.h>
 
@@ -123,41 +124,6 @@ struct VolumeSource {
     PhantomSpec phantom;
     std::vector<Insert> inserts;  // one after the other
 };
-
-enum class ProbeKind : std::uint8_t { none, linear, curved };
-/// Their names in scenes, in the order of the enum.
-inline constexpr std::array<std::string_view, 3> probeKinds{"none", "linear", "curved"};
-
-/// Where the probe is at one moment, from where it begins; between two moments it goes straight.
-struct ProbeStep {
-    double time = 0;   // of the session [s]
-    double press = 0;  // along its axis into the body [m]
-    double slide = 0;  // along its face [m]
-    double sweep = 0;  // across the picture's plane [m]
-    double rock = 0;   // turned within the picture's plane about the middle of its face [rad]
-};
-
-/// The ultrasound probe of a scene.
-struct ProbeSpec {
-    ProbeKind kind = ProbeKind::none;  // none: the viewer may put one on the skin where it likes
-    Vec3 face{0.0};                    // middle of its face at first [m]
-    Vec3 direction{0, 1, 0};           // into the body, unit vector
-    Vec3 lateral{1, 0, 0};             // along its face, unit vector across `direction`
-    double depth = 0;                  // of the picture [m]; 0: the probe's own
-    double frequency = 0;              // [Hz]; 0: the probe's own
-    double focus = 0;                  // [m]; 0: the probe's own
-    std::vector<ProbeStep> script;     // by time; none: it stays
-};
-
-/// A pose of the probe, patient frame.
-struct ProbePlace {
-    Vec3 face{0.0};           // middle of its face [m]
-    Vec3 direction{0, 1, 0};  // into the body, unit vector
-    Vec3 lateral{1, 0, 0};    // along its face, unit vector
-};
-
-/// Where the probe's script has it at `time` [s]. Allocates nothing.
-ProbePlace probeAt(const ProbeSpec& probe, double time) noexcept;
 
 /// What a scene changes in one row of its volume's tissue table, by the keys of tissue tables and in their units.
 struct TissueChange {

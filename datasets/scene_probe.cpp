@@ -21,12 +21,15 @@ constexpr std::array<Field<ProbeSpec>, 3> probeFields{{
     {"focus_mm", "mm", 5, 200, 1e-3, &ProbeSpec::focus},
 }};
 
-constexpr std::array<Field<ProbeStep>, 5> stepFields{{
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr std::array<Field<ProbeStep>, 7> stepFields{{
     {"at_s", "s", 0, 86400, 1, &ProbeStep::time},
     {"press_mm", "mm", -50, 50, 1e-3, &ProbeStep::press},
     {"slide_mm", "mm", -200, 200, 1e-3, &ProbeStep::slide},
     {"sweep_mm", "mm", -200, 200, 1e-3, &ProbeStep::sweep},
-    {"rock_deg", "deg", -80, 80, std::numbers::pi / 180.0, &ProbeStep::rock},
+    {"rock_deg", "deg", -80, 80, degree, &ProbeStep::rock},
+    {"tilt_deg", "deg", -80, 80, degree, &ProbeStep::tilt},
+    {"turn_deg", "deg", -180, 180, degree, &ProbeStep::turn},
 }};
 
 // Any length but 0, given as three numbers; the unit vector.
@@ -47,6 +50,23 @@ std::string triple(Vec3 v)
     return fmt::format("[{:.12g}, {:.12g}, {:.12g}]", v.x, v.y, v.z);
 }
 
+void readPlace(Section& section, ProbeSpec& probe)
+{
+    const auto face = section.point("face_mm", farthest);
+    if (!face) {
+        section.missing("face_mm", "the middle of the probe's face: [x, y, z] in mm, or over_target = true");
+    }
+    probe.face = *face;
+    probe.direction = readDirection(section, "direction");
+    probe.lateral = readDirection(section, "lateral");
+    const Vec3 across = probe.lateral - glm::dot(probe.lateral, probe.direction) * probe.direction;
+    constexpr double least = 0.2;
+    if (glm::length(across) < least) {
+        section.refuse("lateral", "must not be along direction");
+    }
+    probe.lateral = glm::normalize(across);
+}
+
 }  // namespace
 
 void readProbe(Section& top, ProbeSpec& probe)
@@ -57,19 +77,10 @@ void readProbe(Section& top, ProbeSpec& probe)
             section->missing("kind", "linear or curved");
         }
         probe.kind = static_cast<ProbeKind>(*kind + 1);
-        const auto face = section->point("face_mm", farthest);
-        if (!face) {
-            section->missing("face_mm", "the middle of the probe's face: [x, y, z] in mm");
+        probe.overTarget = section->flag("over_target").value_or(false);
+        if (!probe.overTarget) {
+            readPlace(*section, probe);
         }
-        probe.face = *face;
-        probe.direction = readDirection(*section, "direction");
-        probe.lateral = readDirection(*section, "lateral");
-        const Vec3 across = probe.lateral - glm::dot(probe.lateral, probe.direction) * probe.direction;
-        constexpr double least = 0.2;
-        if (glm::length(across) < least) {
-            section->refuse("lateral", "must not be along direction");
-        }
-        probe.lateral = glm::normalize(across);
         readFields<ProbeSpec>(*section, probeFields, probe, Need::some);
         section->finish();
     }
@@ -98,9 +109,10 @@ std::string probeText(const ProbeSpec& probe)
     if (probe.kind == ProbeKind::none) {
         return {};
     }
-    std::string out = fmt::format("\n[probe]\nkind = \"{}\"\nface_mm = {}\ndirection = {}\nlateral = {}\n",
-                                  probeKinds[static_cast<std::size_t>(probe.kind)], triple(1e3 * probe.face),
-                                  triple(probe.direction), triple(probe.lateral));
+    std::string out = fmt::format("\n[probe]\nkind = \"{}\"\n", probeKinds[static_cast<std::size_t>(probe.kind)]);
+    out += probe.overTarget ? "over_target = true\n"
+                            : fmt::format("face_mm = {}\ndirection = {}\nlateral = {}\n", triple(1e3 * probe.face),
+                                          triple(probe.direction), triple(probe.lateral));
     out += probe.depth > 0 ? fmt::format("depth_mm = {:.12g}\n", 1e3 * probe.depth) : "";
     out += probe.frequency > 0 ? fmt::format("frequency_mhz = {:.12g}\n", 1e-6 * probe.frequency) : "";
     out += probe.focus > 0 ? fmt::format("focus_mm = {:.12g}\n", 1e3 * probe.focus) : "";
@@ -110,28 +122,41 @@ std::string probeText(const ProbeSpec& probe)
     return out;
 }
 
-ProbePlace probeAt(const ProbeSpec& probe, double time) noexcept
+ProbeMove operator+(const ProbeMove& a, const ProbeMove& b) noexcept
 {
-    ProbeStep now;
-    if (!probe.script.empty()) {
-        std::size_t next = 0;
-        while (next < probe.script.size() && probe.script[next].time <= time) {
-            ++next;
-        }
-        const ProbeStep start;  // where it begins, at time 0
-        const ProbeStep& from = next > 0 ? probe.script[next - 1] : start;
-        const ProbeStep& to = next < probe.script.size() ? probe.script[next] : probe.script.back();
-        const double span = to.time - from.time, t = span > 0 ? (time - from.time) / span : 0.0;
-        const auto between = [&](double ProbeStep::*m) { return from.*m + t * (to.*m - from.*m); };
-        now = {time, between(&ProbeStep::press), between(&ProbeStep::slide), between(&ProbeStep::sweep),
-               between(&ProbeStep::rock)};
+    return {a.press + b.press, a.slide + b.slide, a.sweep + b.sweep, a.rock + b.rock, a.tilt + b.tilt, a.turn + b.turn};
+}
+
+ProbeMove scriptedMove(const ProbeSpec& probe, double time) noexcept
+{
+    if (probe.script.empty()) {
+        return {};
     }
-    const Vec3 elevation = glm::cross(probe.direction, probe.lateral);
+    std::size_t next = 0;
+    while (next < probe.script.size() && probe.script[next].time <= time) {
+        ++next;
+    }
+    const ProbeStep start;  // where it begins, at time 0
+    const ProbeStep& from = next > 0 ? probe.script[next - 1] : start;
+    const ProbeStep& to = next < probe.script.size() ? probe.script[next] : probe.script.back();
+    const double span = to.time - from.time, t = span > 0 ? (time - from.time) / span : 0.0;
+    const auto between = [&](double ProbeStep::*m) { return from.*m + t * (to.*m - from.*m); };
+    return {between(&ProbeStep::press), between(&ProbeStep::slide), between(&ProbeStep::sweep),
+            between(&ProbeStep::rock),  between(&ProbeStep::tilt),  between(&ProbeStep::turn)};
+}
+
+ProbePlace probeAfter(const ProbeSpec& probe, const ProbeMove& move) noexcept
+{
+    const Vec3 across = glm::cross(probe.direction, probe.lateral);
     ProbePlace place;
-    place.face = probe.face + now.press * probe.direction + now.slide * probe.lateral + now.sweep * elevation;
-    const double c = std::cos(now.rock), s = std::sin(now.rock);
-    place.direction = c * probe.direction + s * probe.lateral;
-    place.lateral = c * probe.lateral - s * probe.direction;
+    place.face = probe.face + move.press * probe.direction + move.slide * probe.lateral + move.sweep * across;
+    const double ct = std::cos(move.turn), st = std::sin(move.turn);
+    const Vec3 lateral = ct * probe.lateral + st * across;
+    const Vec3 elevation = ct * across - st * probe.lateral;
+    const Vec3 direction = std::cos(move.tilt) * probe.direction + std::sin(move.tilt) * elevation;
+    const double c = std::cos(move.rock), s = std::sin(move.rock);
+    place.direction = c * direction + s * lateral;
+    place.lateral = c * lateral - s * direction;
     return place;
 }
 

@@ -407,7 +407,7 @@ Scene loadScene(const std::filesystem::path& file)
 
 std::vector<std::string> builtInScenes()
 {
-    return {"breast", "near-vessel", "behind-rib", "find-lump", "layered", "block", "plate", "pair"};
+    return {"breast", "us-core-biopsy", "near-vessel", "behind-rib", "find-lump", "layered", "block", "plate", "pair"};
 }
 
 std::optional<Scene> builtInScene(const std::string& name)

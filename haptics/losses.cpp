@@ -16,6 +16,7 @@ namespace {
 
 constexpr double worthSaying = 1e-3;   // [m]; shorter ways have no direction
 constexpr double worthDepth = 5e-3;    // along the needle [m]: the notch is 20 mm long, and tissue is dragged along
+constexpr double blindFrom = 3e-3;     // way without the tip in the picture that costs points [m]
 constexpr double leastPoints = 0.005;  // less is no loss
 
 double points(double most, double share)
@@ -77,6 +78,7 @@ void LossWatch::add(const TickRecord& record) noexcept
     note(secondContact, now.skinContacts == 2 && before_.skinContacts == 1, seconds);
     note(redirect, now.redirects == 1 && before_.redirects == 0, seconds);
     note(force, now.peakForce > before_.peakForce, seconds);
+    note(blind, before_.blindAdvance < blindFrom && now.blindAdvance >= blindFrom, seconds);
     note(beyond, now.beyondTarget > before_.beyondTarget, seconds);
     for (std::uint32_t i = 0; i < std::min<std::uint32_t>(record.eventCount, maxEventsPerTick); ++i) {
         const Event& event = record.events[i];
@@ -129,8 +131,8 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
         return {{"passes", 75, "The gun was not fired: there is no core", std::nullopt}};
     }
     const ScoreShares share = sharesOf(s);
-    const double each = 5 * share.hit * share.stays;
-    return {
+    const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * share.hit * share.stays;
+    std::vector<Loss> all{
         {"best_target_pct", points(50, parts(s).core / 50) + points(25, share.hit), miss(s, target), at(shot)},
         {"beyond_target_mm", 25 * share.hit * (1 - share.stays),
          fmt::format("The needle was pushed {:.1f} mm deeper than the {}", 1e3 * s.beyondTarget, target), at(beyond)},
@@ -144,6 +146,12 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
                      2e3 * s.deepest),
          std::nullopt},
         {"peak_force_n", points(each, share.gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+    if (s.hasProbe) {
+        all.push_back({"blind_advance_mm", points(each, share.seen),
+                       fmt::format("The needle went on {:.0f} mm without its tip in the picture", 1e3 * s.blindAdvance),
+                       at(blind)});
+    }
+    return all;
 }
 
 std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info) const

@@ -31,7 +31,7 @@ public:
 
 private:
     /// Moments that can be jumped to.
-    enum Moment : std::uint8_t { shot, secondShot, touch, secondContact, redirect, force, beyond, mark, moments };
+    enum Moment : std::uint8_t { shot, secondShot, touch, secondContact, redirect, force, beyond, mark, blind, moments };
 
     void note(Moment moment, bool now, double seconds) noexcept;
     std::optional<double> at(Moment moment) const noexcept;

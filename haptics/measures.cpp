@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace palpate::haptics {
 
@@ -11,7 +12,13 @@ namespace {
 
 using Listed = Measure::Listed;
 
-constexpr std::array<Measure, 24> all{{
+// Nothing where the scene holds no probe.
+double ofProbe(const Score& s, double value)
+{
+    return s.hasProbe ? value : std::numeric_limits<double>::infinity();
+}
+
+constexpr std::array<Measure, 32> all{{
     {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
     {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
@@ -52,6 +59,22 @@ constexpr std::array<Measure, 24> all{{
      [](const Score& s) { return s.markError * 1e3; }},
     {"mark_size_error_mm", "size mm", "Size marked wrong by", "mm", 1, Listed::ifMarked,
      [](const Score& s) { return s.markSizeError * 1e3; }},
+    {"probe_s", "probe s", "Probe on the skin", "s", 1, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, s.probeSeconds); }},
+    {"needle_in_beam_mm", "beam mm", "Needle in the picture (mean)", "mm", 1, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, s.needleInBeam * 1e3); }},
+    {"needle_in_beam_pct", "beam %", "Shaft in the picture", "%", 0, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, s.needleShare * 100); }},
+    {"least_in_beam_mm", "least mm", "Needle in the picture (least)", "mm", 1, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, s.leastInBeam * 1e3); }},
+    {"tip_in_beam_pct", "tip %", "Tip in the picture", "%", 0, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, s.tipShare * 100); }},
+    {"blind_advance_mm", "blind mm", "Advanced without seeing it", "mm", 1, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, s.blindAdvance * 1e3); }},
+    {"pictures_before", "before", "Pictures before the shot", "", 0, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, static_cast<double>(s.picturesBefore)); }},
+    {"pictures_after", "after", "Pictures after a shot", "", 0, Listed::ifProbe,
+     [](const Score& s) { return ofProbe(s, static_cast<double>(s.picturesAfter)); }},
 }};
 
 }  // namespace
@@ -75,7 +98,8 @@ LabelledValues describeMeasures(const Score& score)
 {
     LabelledValues lines;
     for (const Measure& m : all) {
-        if (m.listed == Listed::never || (m.listed == Listed::ifMarked && score.marks == 0)) {
+        if (m.listed == Listed::never || (m.listed == Listed::ifMarked && score.marks == 0) ||
+            (m.listed == Listed::ifProbe && !score.hasProbe)) {
             continue;
         }
         const double value = m.value(score);

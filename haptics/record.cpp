@@ -190,6 +190,7 @@ struct Record::Impl {
             info.structures.emplace_back(structures.text(1));
             info.warnDistances.push_back(format::realOf(structures, 2, "warn_distance_m"));
         }
+        info.probe = version >= format::probeVersion && statementOf("ticks").find("probe_press_m") != std::string::npos;
         Statement tissues(*database, "SELECT tissue, name FROM tissues ORDER BY tissue");
         while (tissues.step()) {
             inOrder(tissues, "tissues", info.tissues.size());
@@ -245,7 +246,7 @@ struct Record::Impl {
         guarded([&] {
             snapshot.emplace(*database);
             ticks.emplace(*database,
-                          "SELECT " + format::columnList(info.structures.size(), version) + " FROM ticks ORDER BY tick");
+                          "SELECT " + format::columnList(format::columnsOf(info, version)) + " FROM ticks ORDER BY tick");
             events.emplace(*database, "events",
                            "SELECT tick, kind, structure, tissue, value, position FROM events ORDER BY tick, position");
             cores.emplace(*database, "cores", "SELECT * FROM cores ORDER BY tick");
@@ -283,7 +284,7 @@ struct Record::Impl {
     void readTick(const Statement& row, TickRecord& record) const
     {
         try {
-            format::eachColumn(record, info.structures.size(), format::Reader{row}, version);
+            format::eachColumn(record, format::columnsOf(info, version), format::Reader{row});
         } catch (const std::runtime_error& e) {
             throw std::runtime_error(fmt::format("tick {}: {}", row.integer(0), e.what()));
         }
@@ -306,7 +307,7 @@ struct Record::Impl {
             }
             seal.sha256 = whole.sha256;
             std::vector<format::SealedPart> found = format::sealOfSmallTables(*database);
-            for (format::SealedPart& part : format::sealOfTicks(*database, info.structures.size())) {
+            for (format::SealedPart& part : format::sealOfTicks(*database, format::columnsOf(info, version))) {
                 found.push_back(std::move(part));
             }
             seal.changed = format::compareSeals(sealed, found);

@@ -132,6 +132,13 @@ void checkTick(const TickRecord& t, const SessionInfo& info)
         check.optionalRow("structure of an event", t.events[i].structure, structures);
         check.row("tissue of an event", t.events[i].tissue, tissues);
     }
+    if (info.probe) {
+        check.place("the probe's distance from the origin [m]", t.probeFace);
+        check.within("the length of the probe's axis", glm::length(t.probeAxis), 1 - unitWithin, 1 + unitWithin);
+        check.within("the length of the probe's lateral", glm::length(t.probeLateral), 1 - unitWithin, 1 + unitWithin);
+        check.force("the probe's force [N]", t.probeForce);
+        check.within("needle_in_beam_m", t.needleInBeam, 0, furthest);
+    }
     if (t.fired) {
         checkCore(check, t.core, tissues);
     }

@@ -20,8 +20,8 @@ std::vector<std::pair<std::string, std::string>> schema(const SessionInfo& info)
             {"structures", "CREATE TABLE structures (structure INTEGER PRIMARY KEY, name TEXT, warn_distance_m)"},
             {"tissues", "CREATE TABLE tissues (tissue INTEGER PRIMARY KEY, name TEXT)"},
             {"ticks", "CREATE TABLE ticks (tick INTEGER PRIMARY KEY" +
-                          columnList(info.structures.size()).substr(std::string_view("tick").size()) +
-                          ", seconds AS (tick / " + rate.str() + ") VIRTUAL)"},
+                          columnList(columnsOf(info)).substr(std::string_view("tick").size()) + ", seconds AS (tick / " +
+                          rate.str() + ") VIRTUAL)"},
             {"events",
              "CREATE TABLE events (tick INTEGER, position INTEGER, kind TEXT, structure INTEGER, tissue INTEGER, value)"},
             {"cores",
@@ -31,17 +31,14 @@ std::vector<std::pair<std::string, std::string>> schema(const SessionInfo& info)
             {"seal", "CREATE TABLE seal (part TEXT PRIMARY KEY, rows INTEGER, sha256 TEXT)"}};
 }
 
-std::string columnList(std::size_t structures, int of)
+std::string columnList(const TickColumns& columns)
 {
     std::string list;
     const TickRecord names;
-    eachColumn(
-        names, structures,
-        [&](const char* column, const auto&) {
-            list += list.empty() ? "" : ", ";
-            list += column;
-        },
-        of);
+    eachColumn(names, columns, [&](const char* column, const auto&) {
+        list += list.empty() ? "" : ", ";
+        list += column;
+    });
     return list;
 }
 

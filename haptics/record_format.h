@@ -18,9 +18,10 @@
 namespace palpate::haptics::format {
 
 inline constexpr int applicationId = 0x50414C50;  // "PALP", in the file's header
-inline constexpr int version = 4;                 // user_version; raise it when a table changes
+inline constexpr int version = 5;                 // user_version; raise it when a table changes
 inline constexpr int oldestVersion = 2;           // that is still read: its ticks have no tissue force
 inline constexpr int sealedVersion = 4;           // the first whose records are sealed when they are closed
+inline constexpr int probeVersion = 5;            // the first that has the ultrasound probe, where the scene holds one
 
 inline constexpr std::uint8_t none = 0xFF;  // a structure that is not there; NULL in the file
 
@@ -50,11 +51,21 @@ struct Microseconds {
 template <class Seconds>
 Microseconds(Seconds&) -> Microseconds<Seconds>;
 
+/// What decides which columns table `ticks` has.
+struct TickColumns {
+    std::size_t structures = 0;
+    bool probe = false;  // the scene holds an ultrasound probe
+    int of = version;    // version of the file
+};
+inline TickColumns columnsOf(const SessionInfo& info, int of = version)
+{
+    return {info.structures.size(), info.probe, of};
+}
+
 /// Calls `visit(column, field)` for every column of table `ticks`, in the order of the file. One list serves the table's
 /// making, the writing (Tick = const TickRecord) and the reading (Tick = TickRecord).
-/// @param of  version of the file
 template <class Tick, class Visit>
-void eachColumn(Tick& t, std::size_t structures, Visit&& visit, int of = version)
+void eachColumn(Tick& t, const TickColumns& columns, Visit&& visit)
 {
     const auto vector = [&](const char* x, const char* y, const char* z, auto& v) {
         visit(x, v.x);
@@ -67,7 +78,7 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit, int of = version
     visit("buttons", t.device.buttons);
     visit("fresh", t.device.fresh);
     vector("proxy_x_m", "proxy_y_m", "proxy_z_m", t.proxy);
-    if (of > oldestVersion) {
+    if (columns.of > oldestVersion) {
         vector("tissue_force_x_n", "tissue_force_y_n", "tissue_force_z_n", t.tissueForce);
     }
     vector("basic_x_n", "basic_y_n", "basic_z_n", t.basic);
@@ -91,17 +102,31 @@ void eachColumn(Tick& t, std::size_t structures, Visit&& visit, int of = version
     visit("ahead_m_s", t.ahead.speed);
     visit("fired", t.fired);
     visit("faulted", t.faulted);
-    for (std::size_t i = 0; i < structures && i < maxStructures; ++i) {
+    for (std::size_t i = 0; i < columns.structures && i < maxStructures; ++i) {
         visit(distanceColumns[i], t.distance[i]);
         visit(aheadColumns[i], t.ahead.structure[i]);
     }
     for (std::size_t i = 0; i < taskCount; ++i) {
         visit(taskColumns[i], Microseconds{t.seconds[i]});
     }
+    if (columns.probe) {
+        visit("probe_press_m", t.device.probe.press);
+        visit("probe_slide_m", t.device.probe.slide);
+        visit("probe_sweep_m", t.device.probe.sweep);
+        visit("probe_rock_rad", t.device.probe.rock);
+        visit("probe_tilt_rad", t.device.probe.tilt);
+        visit("probe_turn_rad", t.device.probe.turn);
+        vector("probe_face_x_m", "probe_face_y_m", "probe_face_z_m", t.probeFace);
+        vector("probe_axis_x", "probe_axis_y", "probe_axis_z", t.probeAxis);
+        vector("probe_lateral_x", "probe_lateral_y", "probe_lateral_z", t.probeLateral);
+        vector("probe_force_x_n", "probe_force_y_n", "probe_force_z_n", t.probeForce);
+        visit("needle_in_beam_m", t.needleInBeam);
+        visit("tip_in_beam", t.tipInBeam);
+    }
 }
 
 /// The names of all columns, separated by commas.
-std::string columnList(std::size_t structures, int of = version);
+std::string columnList(const TickColumns& columns);
 
 /// The statements that make the tables of a session, by table.
 std::vector<std::pair<std::string, std::string>> schema(const SessionInfo& info);

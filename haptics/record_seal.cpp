@@ -167,10 +167,10 @@ std::vector<SealedPart> sealOfSmallTables(Database& database)
     return parts;
 }
 
-std::vector<SealedPart> sealOfTicks(Database& database, std::size_t structures)
+std::vector<SealedPart> sealOfTicks(Database& database, const TickColumns& columns)
 {
     RunningSeal seal;
-    Statement ticks(database, "SELECT " + columnList(structures) + " FROM ticks ORDER BY tick");
+    Statement ticks(database, "SELECT " + columnList(columns) + " FROM ticks ORDER BY tick");
     while (ticks.step()) {
         ticks.digestRow(seal.ticks(static_cast<std::uint64_t>(ticks.integer(0))));
     }

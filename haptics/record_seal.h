@@ -15,6 +15,7 @@ struct evp_md_ctx_st;
 namespace palpate::haptics::format {
 
 class Database;
+struct TickColumns;
 
 /// SHA-256 of rows: each value with its type, each row with its end.
 class RowDigest {
@@ -75,7 +76,7 @@ private:
 std::vector<SealedPart> sealOfSmallTables(Database& database);
 
 /// The parts of the tables that grow, from the file.
-std::vector<SealedPart> sealOfTicks(Database& database, std::size_t structures);
+std::vector<SealedPart> sealOfTicks(Database& database, const TickColumns& columns);
 
 /// The digest of all parts.
 SealedPart sealOf(const std::vector<SealedPart>& parts);

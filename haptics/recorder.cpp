@@ -162,9 +162,9 @@ struct Binder {
     }
 };
 
-std::string tickInsert(std::size_t structures)
+std::string tickInsert(const format::TickColumns& of)
 {
-    const std::string columns = format::columnList(structures);
+    const std::string columns = format::columnList(of);
     std::string places = "?";
     for (auto n = std::ranges::count(columns, ','); n > 0; --n) {
         places += ", ?";
@@ -175,10 +175,10 @@ std::string tickInsert(std::size_t structures)
 // The prepared statements of a session, and the digests of what they write.
 class Writer {
 public:
-    Writer(Database& database, std::size_t structures)
+    Writer(Database& database, const format::TickColumns& columns)
         : database_(database),
-          structures_(structures),
-          tick_(database, tickInsert(structures)),
+          columns_(columns),
+          tick_(database, tickInsert(columns)),
           event_(database, "INSERT INTO events VALUES (?, ?, ?, ?, ?, ?)"),
           core_(database, "INSERT INTO cores VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"),
           fraction_(database, "INSERT INTO core_fractions VALUES (?, ?, ?)")
@@ -191,7 +191,7 @@ public:
     void write(const TickRecord& record)
     {
         tick_.digestInto(&seal_.ticks(record.tick));
-        format::eachColumn(record, structures_, Binder{tick_});
+        format::eachColumn(record, columns_, Binder{tick_});
         tick_.run();
         for (std::uint32_t i = 0; i < std::min<std::size_t>(record.eventCount, maxEventsPerTick); ++i) {
             const Event& event = record.events[i];
@@ -250,7 +250,7 @@ private:
     }
 
     Database& database_;
-    std::size_t structures_;
+    format::TickColumns columns_;
     format::RunningSeal seal_;
     Statement tick_, event_, core_, fraction_;
 };
@@ -309,7 +309,7 @@ struct Recorder::Impl {
             // left to the end: a sync may take a second on a busy disk.
             database->execute("PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 0");
             database->execute("UPDATE session SET value = value");
-            writer.emplace(*database, info.structures.size());
+            writer.emplace(*database, format::columnsOf(info));
             const SignalsBlocked inherited;
             thread = std::thread([this] { work(); });
         } catch (const std::exception& e) {

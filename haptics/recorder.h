@@ -28,6 +28,7 @@ struct SessionInfo {
     double rate = 1000;        // [Hz]
     std::uint64_t seed = 1;
     std::vector<std::string> structures;  // target first, then vital structures
+    bool probe = false;                   // the scene holds an ultrasound probe
     std::vector<std::string> tissues;     // rows of the tissue table
     std::vector<double> warnDistances;    // by structure [m]; 0 for the target
     std::vector<std::pair<std::string, std::string>> extra;
@@ -87,7 +88,7 @@ public:
 
     const SessionInfo& info() const noexcept;
     bool complete() const noexcept;  // false when the writer was killed
-    int format() const noexcept;     // version of the file's tables: 2 to 4
+    int format() const noexcept;     // version of the file's tables: 2 to 5
     /// Computes the digests of all tables again: reads the whole file.
     Seal seal() const;
     std::uint64_t ticks() const;

@@ -99,6 +99,7 @@ SessionInfo infoOf(const SessionModel& model)
     info.volumeHash = modelHash(model);
     info.model = datasets::modelLevels[static_cast<std::size_t>(model.scene.model.level)];
     info.extra.emplace_back(targetShapeKey, toText(shapeOfTarget(model)));
+    info.probe = model.scene.probe.kind != datasets::ProbeKind::none;
     for (const auto& s : model.structures) {
         info.structures.push_back(s.name);
         info.warnDistances.push_back(s.warnDistance);

@@ -64,6 +64,7 @@ private:
     void compareCores(const TickRecord& then, const TickRecord& now);
 
     std::size_t structures_;
+    bool probe_;
     int format_;
     std::vector<std::string> tissues_;
     std::vector<Difference> differences_;

@@ -18,6 +18,8 @@ constexpr double pathStep = 0.2e-3;      // [m]
 constexpr double redirectLength = 5e-3;  // [m]
 constexpr double jerkBlock = 25e-3;      // means over so long [s]
 constexpr double contactPause = 0.1;     // off the body, before a touch counts as another one [s]
+constexpr double probeTouches = 0.02;    // force of a probe that lies on the skin [N]
+constexpr double wellInside = 10e-3;     // from so deep on the needle can be seen [m]
 
 // 1 at `full` or before it, 0 at `none` or beyond it, straight between them. The two may lie either way round.
 double ramp(double value, double full, double none) noexcept
@@ -80,6 +82,7 @@ ScoreShares sharesOf(const Score& s) noexcept
             .redirects = ramp(s.redirects, 0, 4),
             .economy = s.insertedPath > 0 ? std::min(1.0, 2 * s.deepest / s.insertedPath) : 1,
             .gentle = ramp(s.peakForce, 4, 8.5),
+            .seen = ramp(s.blindAdvance, 3e-3, 20e-3),
             .place = ramp(s.markError, 2e-3, 20e-3),
             .near = ramp(s.markError, 10e-3, 20e-3),
             .size = ramp(s.markSizeError, 2e-3, 15e-3)};
@@ -105,8 +108,8 @@ ScoreParts parts(const Score& s) noexcept
     p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
              10 * ramp(s.targetingError, 0, 10e-3);
     // However well it was done: who missed has no technique to be praised for.
-    p.technique =
-        share.hit * share.stays * 5 * (share.passes + share.contacts + share.redirects + share.economy + share.gentle);
+    const double done = share.passes + share.contacts + share.redirects + share.economy + share.gentle;
+    p.technique = share.hit * share.stays * (s.hasProbe ? 25.0 / 6.0 * (done + share.seen) : 5.0 * done);
     return p;
 }
 
@@ -171,6 +174,7 @@ Scorer::Scorer(const SessionInfo& info)
       structures_(std::min<std::size_t>(info.structures.size(), maxStructures)),
       target_(targetShapeOf(info))
 {
+    score_.hasProbe = info.probe;
 }
 
 void Scorer::add(const TickRecord& record) noexcept
@@ -192,6 +196,9 @@ void Scorer::add(const TickRecord& record) noexcept
     addVital(record);
     if (record.fired) {
         addFiring(record);
+    }
+    if (score_.hasProbe) {
+        addPicture(record);
     }
     tip_ = tip;
     lastTick_ = record.tick;
@@ -319,6 +326,45 @@ void Scorer::addMark(const TickRecord& record) noexcept
     markDown_ = down;
 }
 
+void Scorer::addPicture(const TickRecord& record) noexcept
+{
+    probeTicks_ += glm::length(record.probeForce) > probeTouches ? 1 : 0;
+    const bool down = (record.device.buttons & buttonPicture) != 0;
+    if (down && !pictureDown_) {
+        score_.picturesAfter += score_.passes > 0 ? 1 : 0;
+        score_.picturesBefore += score_.passes == 0 && record.phase == Phase::inserted ? 1 : 0;
+    }
+    pictureDown_ = down;
+    if (record.phase != Phase::inserted) {
+        reached_ = 0;
+        return;
+    }
+    ++insideTicks_;
+    tipTicks_ += record.tipInBeam ? 1 : 0;
+    inBeamSum_ += record.needleInBeam;
+    shareSum_ += record.inserted > 0 ? record.needleInBeam / record.inserted : 0.0;
+    const double further = record.inserted - reached_;
+    if (further > 0) {
+        score_.blindAdvance += record.tipInBeam ? 0.0 : further;
+        leastInBeam_ = record.inserted > wellInside ? std::min(leastInBeam_, record.needleInBeam) : leastInBeam_;
+        reached_ = record.inserted;
+    } else if (record.inserted < reached_ - redirectLength) {
+        reached_ = record.inserted;  // drawn back: what follows is another way in
+    }
+}
+
+void Scorer::judgeProbe(Score& s) const noexcept
+{
+    s.probeSeconds = static_cast<double>(probeTicks_) / rate_;
+    if (insideTicks_ > 0) {
+        const auto n = static_cast<double>(insideTicks_);
+        s.needleInBeam = inBeamSum_ / n;
+        s.needleShare = shareSum_ / n;
+        s.tipShare = static_cast<double>(tipTicks_) / n;
+    }
+    s.leastInBeam = std::isfinite(leastInBeam_) ? leastInBeam_ : 0.0;
+}
+
 void Scorer::judgeMarks(Score& s) const noexcept
 {
     if (s.marks == 0 || !target_) {
@@ -346,6 +392,7 @@ Score Scorer::score() const noexcept
     s.meanForce = contactTicks_ > 0 ? forceSum_ / static_cast<double>(contactTicks_) : 0;
     s.jerk = jerk_.rms();
     judgeMarks(s);
+    judgeProbe(s);
     s.vitalSeconds = static_cast<double>(vitalTicks_) / rate_;
     const ScoreParts p = parts(s);
     s.total = p.core + p.vital + p.technique;

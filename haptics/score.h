@@ -44,7 +44,17 @@ struct Score {
     std::uint32_t marks = 0;
     double markError = std::numeric_limits<double>::infinity();      // from the target's middle, across the tool [m]
     double markSizeError = std::numeric_limits<double>::infinity();  // of the diameter, without its sign [m]
-    double total = 0;                                                // 0-100; the formula is in score.cpp and docs/score.md
+    // Ultrasound, where the scene holds a probe.
+    bool hasProbe = false;
+    double probeSeconds = 0;  // time with the probe on the skin; only level `elastic` knows it
+    double needleInBeam = 0;  // of the shaft in tissue, what the picture has: mean over the time inside [m]
+    double needleShare = 0;   // the same as a share of the shaft in tissue
+    double leastInBeam = 0;   // least of it while the needle goes on at over 10 mm inside [m]
+    double tipShare = 0;      // of the time inside, with the tip in the picture
+    double blindAdvance = 0;  // way that the needle went on inside without its tip in the picture [m]
+    std::uint32_t picturesBefore = 0,
+                  picturesAfter = 0;  // stored with the needle inside before the first shot; after a shot
+    double total = 0;                 // 0-100; the formula is in score.cpp and docs/score.md
 };
 
 /// Where the points of a total come from.
@@ -65,6 +75,7 @@ struct ScoreShares {
     double redirects = 0;
     double economy = 0;  // of the path inside
     double gentle = 0;   // small forces
+    double seen = 0;     // with a probe: the tip is in the picture while it goes on
     double place = 0;    // of the marks
     double near = 0;     // enough for their size and technique to count
     double size = 0;     // between the marks
@@ -128,6 +139,8 @@ private:
     void addVital(const TickRecord& record) noexcept;
     void addMark(const TickRecord& record) noexcept;
     void judgeMarks(Score& score) const noexcept;
+    void addPicture(const TickRecord& record) noexcept;
+    void judgeProbe(Score& score) const noexcept;
 
     double rate_ = 1000;  // [Hz]
     std::size_t structures_ = 0;
@@ -142,6 +155,10 @@ private:
     // Of this way in: least distance to the target, length inside where that was, and the largest.
     double nearest_ = std::numeric_limits<double>::infinity(), atTarget_ = 0, furthest_ = 0;  // [m]
     JerkMeter jerk_;
+    // Ultrasound: sums over the ticks inside, and the depth that the needle has been to in this way in.
+    std::uint64_t probeTicks_ = 0, insideTicks_ = 0, tipTicks_ = 0;
+    double inBeamSum_ = 0, shareSum_ = 0, leastInBeam_ = std::numeric_limits<double>::infinity(), reached_ = 0;
+    bool pictureDown_ = false;
     std::array<Vec3, 32> marks_{};  // [m]
     bool markDown_ = false;
     std::optional<TargetShape> target_;

@@ -1,6 +1,7 @@
 #include <haptics/session_model.h>
 
 #include <chainmail/deformation.h>
+#include <haptics/probe_placement.h>
 
 #include <fmt/format.h>
 
@@ -70,6 +71,20 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     return s;
 }
 
+// The planned line. A probe that is to lie over the target gets its place.
+datasets::Approach approachOf(datasets::Scene& scene, const volume::Tissue& tissue, const volume::DistanceField& surface,
+                              const std::vector<GuardedStructure>& structures)
+{
+    if (!scene.probe.overTarget) {
+        return datasets::planApproach(scene, tissue);
+    }
+    const ProbePlan plan = planProbe(scene, tissue, surface, structures);
+    scene.probe.face = plan.face;
+    scene.probe.direction = plan.direction;
+    scene.probe.lateral = plan.lateral;
+    return plan.approach;
+}
+
 }  // namespace
 
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue)
@@ -87,8 +102,8 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
         structures.back().warnDistance = vital.warnDistance;
         structures.back().gain = vital.gain;
     }
-    const auto approach = datasets::planApproach(scene, *tissue);
     auto surface = tissue->distanceToBody(grid);
+    const auto approach = approachOf(scene, *tissue, surface, structures);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
     if (chainmail::mostPressSeeds(lattice, scene.tool.radius) > mostSeeds) {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numbers>
 
 namespace palpate::haptics {
 
@@ -63,6 +64,14 @@ bool isPose(const DeviceSample& device) noexcept
     return glm::length(device.position) < 10.0 && std::abs(glm::length(device.axis) - 1.0) < 1e-3;
 }
 
+// Within a metre and a turn of where the probe begins; NaN fails.
+bool isMove(const datasets::ProbeMove& m) noexcept
+{
+    constexpr double turn = 2.0 * std::numbers::pi;
+    return std::abs(m.press) <= 1.0 && std::abs(m.slide) <= 1.0 && std::abs(m.sweep) <= 1.0 && std::abs(m.rock) <= turn &&
+           std::abs(m.tilt) <= turn && std::abs(m.turn) <= turn;
+}
+
 }  // namespace
 
 chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settings, double period) noexcept
@@ -85,6 +94,7 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
       level_(model.scene.model.level),
       body_(deformation_.shape().body(model.surface)),
       contacts_(std::make_unique<occupancy::ContactSet>()),
+      probe_(model.scene.probe),
       stabiliserOptions_{options.device ? *options.device : deviceParameters(model.scene.device), options.period,
                          model.scene.forceCap}
 {
@@ -106,6 +116,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     tool_ = bentTool(hand_, tip_.needle);
     const Vec3 position = tool_.position;
 
+    placeProbe();
     const auto way = collide();
     clock.done(Task::h3);
     const Vec3 law = moveTip(model_, reader_, body_, tool_, way, stabiliserOptions_.period, tip_, record_);
@@ -123,10 +134,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     if (sent.faulted && !wasFaulted) {
         addEvent(record_, {EventKind::fault, 0xFF, 0, 0.0});
     }
-    const auto probe = datasets::probeAt(model_.scene.probe, static_cast<double>(ticks_) * stabiliserOptions_.period);
-    record_.probeFace = probe.face;
-    record_.probeAxis = probe.direction;
-    record_.probeLateral = probe.lateral;
+    seeNeedle();
     record_.proxy = tip_.proxy;
     record_.phase = tip_.phase;
     record_.tissue = tip_.tissue;
@@ -148,6 +156,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
 // What is no pose is replaced by the last that was one, and marked: the stabiliser latches the fault.
 void Simulation::accept(const DeviceSample& device) noexcept
 {
+    const datasets::ProbeMove probeBefore = record_.device.probe;
     if (isPose(device) && (device.buttons & poseInvalid) == 0) {
         record_.device = device;
         // One zero and not two: -0 becomes +0.
@@ -157,6 +166,7 @@ void Simulation::accept(const DeviceSample& device) noexcept
         record_.device.buttons = (device.buttons & ~buttonFire) | poseInvalid;
         record_.device.fresh = false;
     }
+    record_.device.probe = isMove(device.probe) ? device.probe : probeBefore;
     hand_ = record_.device;
     hand_.position =
         betweenSteps(record_.device.position, stabiliserOptions_.device.encoder, stabiliserOptions_.period, encoder_);
@@ -210,6 +220,7 @@ chainmail::Grip Simulation::grip() const noexcept
     grip.position = tip;
     grip.radius = tool.radius;
     grip.friction = model_.scene.model.elastic.friction;
+    grip.others = probe_.tools();
     if (tip_.phase == Phase::free) {
         return grip;
     }
@@ -239,6 +250,7 @@ chainmail::Reaction Simulation::deform() noexcept
     }
     record_.moved = reaction.moved;
     record_.residual = reaction.residual;
+    record_.probeForce = reaction.othersForce;
     return reaction;
 }
 
@@ -253,6 +265,25 @@ Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) con
     const double depth = glm::distance(tool_.position, tip_.proxy);
     const Vec3 least = depth > 0.0 ? std::min(reaction.behind / depth, 1.0) * law : Vec3(0.0);
     return glm::length(*reaction.force) >= glm::length(least) ? *reaction.force : least;
+}
+
+// Where the script and the hand have it in this tick.
+void Simulation::placeProbe() noexcept
+{
+    const double time = static_cast<double>(ticks_) * stabiliserOptions_.period;
+    probe_.place(datasets::scriptedMove(model_.scene.probe, time) + record_.device.probe, model_.surface);
+    record_.probeFace = probe_.at().face;
+    record_.probeAxis = probe_.at().direction;
+    record_.probeLateral = probe_.at().lateral;
+}
+
+void Simulation::seeNeedle() noexcept
+{
+    if (tip_.phase == Phase::inserted) {
+        const auto seen = probe_.look(tool_.position, tool_.axis, tip_.needle.inserted, model_.scene.tool.radius);
+        record_.needleInBeam = seen.length;
+        record_.tipInBeam = seen.tip;
+    }
 }
 
 // The gun fires once per press of its button, and only a needle that is inside takes a core.

@@ -4,6 +4,7 @@
 #include <haptics/dffb.h>
 #include <haptics/monitor.h>
 #include <haptics/motion.h>
+#include <haptics/probe.h>
 #include <haptics/session_model.h>
 #include <haptics/stabiliser.h>
 #include <haptics/tick.h>
@@ -56,6 +57,8 @@ private:
     chainmail::Grip grip() const noexcept;
     chainmail::Reaction deform() noexcept;
     Vec3 contactForce(Vec3 law, const chainmail::Reaction& reaction) const noexcept;
+    void placeProbe() noexcept;
+    void seeNeedle() noexcept;
     void fire() noexcept;
 
     const SessionModel& model_;
@@ -73,6 +76,7 @@ private:
     DeviceSample tool_;  // that of the tool: a bent needle's tip is elsewhere
     EncoderState encoder_;
     TipState tip_;
+    Probe probe_;
     MonitorState monitor_;
     DffbState dffb_;
     StabiliserOptions stabiliserOptions_;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <datasets/probe.h>
 #include <volume/geometry.h>
 
 #include <array>
@@ -21,16 +22,18 @@ inline constexpr std::size_t maxEventsPerTick = 16;
 inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
 inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
 inline constexpr std::uint32_t buttonMark = 1U << 2;     // "here": the trainee marks the place of the tool
+inline constexpr std::uint32_t buttonPicture = 1U << 8;  // stores the ultrasound picture
 inline constexpr std::uint32_t modelTooSlow = 1U << 30;  // the loop cannot keep up: use a cheaper model from now on
 inline constexpr std::uint32_t poseInvalid = 1U
                                              << 31;  // the pose was none (not finite, out of bounds); records keep the last
 
 /// What a device says in one tick.
 struct DeviceSample {
-    Vec3 position{0.0};         // of the tool's tip (sphere: its centre), patient frame [m]
-    Vec3 axis{0, 1, 0};         // unit vector along the tool, towards the tip
-    std::uint32_t buttons = 0;  // button.. and the two marks above, added up
-    bool fresh = true;          // false when the device had no new pose for this tick
+    Vec3 position{0.0};           // of the tool's tip (sphere: its centre), patient frame [m]
+    Vec3 axis{0, 1, 0};           // unit vector along the tool, towards the tip
+    std::uint32_t buttons = 0;    // button.. and the two marks above, added up
+    bool fresh = true;            // false when the device had no new pose for this tick
+    datasets::ProbeMove probe{};  // of the hand that holds the ultrasound probe, beside the scene's script
 };
 
 /// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
@@ -137,7 +140,9 @@ struct TickRecord {
     Vec3 probeFace{0.0};         // of the ultrasound probe, where the scene holds one: middle of its face [m]
     Vec3 probeAxis{0, 1, 0};     // unit vector into the body
     Vec3 probeLateral{1, 0, 0};  // unit vector along the face
-    Vec3 probeForce{0.0};        // that the body presses it back with [N]
+    Vec3 probeForce{0.0};        // that the body presses it back with; only level `elastic` knows it [N]
+    double needleInBeam = 0;     // of the needle's shaft in tissue, what the ultrasound picture has [m]
+    bool tipInBeam = false;      // the picture has its tip
     std::array<Event, maxEventsPerTick> events{};  // in their order; the first eventCount count
     std::uint32_t eventCount = 0;                  // of this tick
     std::array<float, taskCount> seconds{};        // by task, wall time [s]

@@ -53,10 +53,10 @@ private:
     }
 };
 
-Columns columnsOf(const TickRecord& tick, std::size_t structures, int format)
+Columns columnsOf(const TickRecord& tick, const format::TickColumns& of)
 {
     Columns columns;
-    format::eachColumn(tick, structures, columns, format);
+    format::eachColumn(tick, of, columns);
     return columns;
 }
 
@@ -74,7 +74,10 @@ std::string textOf(const Event& e)
 }  // namespace
 
 TickComparison::TickComparison(const Record& record)
-    : structures_(record.info().structures.size()), format_(record.format()), tissues_(record.info().tissues)
+    : structures_(record.info().structures.size()),
+      probe_(record.info().probe),
+      format_(record.format()),
+      tissues_(record.info().tissues)
 {
 }
 
@@ -106,7 +109,8 @@ bool TickComparison::add(const TickRecord& then, const TickRecord& now)
 
 void TickComparison::compareColumns(const TickRecord& then, const TickRecord& now)
 {
-    const Columns a = columnsOf(then, structures_, format_), b = columnsOf(now, structures_, format_);
+    const format::TickColumns of{structures_, probe_, format_};
+    const Columns a = columnsOf(then, of), b = columnsOf(now, of);
     for (std::size_t i = 0; i < a.count; ++i) {
         if (a.bits[i] != b.bits[i]) {
             found(then.tick, a.name[i], a.text(i), b.text(i));

@@ -13,9 +13,9 @@ namespace palpate::haptics {
 namespace {
 
 constexpr std::array<Skill, 3> skills{{
-    {"novice", 0.20e-3, 4.5e-3, 4e-3, 12e-3, 6e-3, 0.25, 0.35, 0.35, 0.25, 5, 0.22, 10e-3},
-    {"resident", 0.10e-3, 2.5e-3, 2.5e-3, 14e-3, 9e-3, 0.15, 0.28, 0.70, 0.35, 4, 0.12, 8e-3},
-    {"expert", 0.05e-3, 1.2e-3, 1.5e-3, 16e-3, 15e-3, 0.08, 0.22, 0.95, 0.45, 3, 0.06, 7e-3},
+    {"novice", 0.20e-3, 4.5e-3, 4e-3, 12e-3, 6e-3, 0.25, 0.35, 0.35, 0.25, 5, 0.22, 10e-3, 2.5e-3, 1.2e-3},
+    {"resident", 0.10e-3, 2.5e-3, 2.5e-3, 14e-3, 9e-3, 0.15, 0.28, 0.70, 0.35, 4, 0.12, 8e-3, 1.2e-3, 0.7e-3},
+    {"expert", 0.05e-3, 1.2e-3, 1.5e-3, 16e-3, 15e-3, 0.08, 0.22, 0.95, 0.45, 3, 0.06, 7e-3, 0.5e-3, 0.3e-3},
 }};
 
 constexpr double standOff = 3e-3;       // the tip waits so far before the skin [m]
@@ -34,6 +34,7 @@ constexpr double learnt = 0.5;          // share of an aim's error that stays wh
 constexpr int mostRedirects = 4;        // in one pass; then it fires or gives up
 constexpr int mostEntries = 8;
 constexpr int mostStrokes = 12;  // on one line
+constexpr int mostLooks = 4;     // at one picture without the tip; then it goes on blind
 
 }  // namespace
 
@@ -63,7 +64,8 @@ Trainee::Trainee(const SessionModel& model, const Skill& skill, std::uint64_t se
       random_(seed ^ 0x7261696E6565U),
       arm_(deviceParameters(model.scene.device), {},
            model.approach.entry - distance * glm::normalize(model.approach.aim - model.approach.entry), period),
-      tremor_(skill.tremor, random_)
+      tremor_(skill.tremor, random_),
+      probe_(model.scene.probe, skill, seed, period)
 {
     goal_ = arm_.position();
     axis_ = glm::normalize(model.approach.aim - model.approach.entry);
@@ -147,6 +149,14 @@ void Trainee::begin(Act act) noexcept
             break;
         case Act::retreat:
             go(entry_ - distance_ * axis_, axis_);
+            break;
+        case Act::look:
+            probe_.look();
+            go(arm_.position(), axis_);
+            break;
+        case Act::check:
+            storePicture();
+            go(arm_.position(), axis_);
             break;
         default:
             go(arm_.position(), axis_);
@@ -245,7 +255,11 @@ void Trainee::advanceAct() noexcept
             }
             return;
         case Act::look:
-            if (inAct_ >= skill_.reaction) {
+            if (inAct_ >= skill_.reaction + (probe_.holds() ? ProbeHand::lookTime : 0.0)) {
+                if (++looks_ < mostLooks && probe_.wantsAnother()) {
+                    return begin(Act::look);
+                }
+                looks_ = 0;
                 const double left = depthToFire() - inserted_;
                 const bool deep = (left <= tooShallow && left >= -tooDeep) || strokes_ >= mostStrokes;
                 begin(deep ? Act::check : Act::advance);
@@ -254,7 +268,11 @@ void Trainee::advanceAct() noexcept
         case Act::check:
             return inAct_ >= skill_.reaction ? afterCheck() : void();
         case Act::fire:
-            return inAct_ >= 2.0 * triggerTime + skill_.reaction ? begin(Act::retreat) : void();
+            if (inAct_ >= 2.0 * triggerTime + skill_.reaction) {
+                storePicture();
+                begin(Act::retreat);
+            }
+            return;
         case Act::drawBack:
             return there ? begin(Act::advance) : void();
         case Act::retreat:
@@ -264,6 +282,12 @@ void Trainee::advanceAct() noexcept
         case Act::done:
             return;
     }
+}
+
+// One before and one after the shot belong to the task.
+void Trainee::storePicture() noexcept
+{
+    storing_ = probe_.stores() ? triggerTime : 0.0;
 }
 
 DeviceSample Trainee::read() noexcept
@@ -279,12 +303,16 @@ DeviceSample Trainee::read() noexcept
     sample.position = arm_.read();
     sample.axis = axis_;
     sample.buttons = buttonDeadMan | (act_ == Act::fire && inAct_ < triggerTime ? buttonFire : 0U);
+    sample.probe = probe_.read();
+    sample.buttons |= storing_ > 0.0 ? buttonPicture : 0U;
+    storing_ -= period_;
     return sample;
 }
 
 void Trainee::observe(const TickRecord& record) noexcept
 {
     const auto since = [this](bool now, double before) { return now ? std::max(before, 0.0) + period_ : -1.0; };
+    probe_.observe(record);
     inserted_ = record.inserted;
     ahead_ = record.ahead;
     insideSince_ = since(record.phase == Phase::inserted, insideSince_);

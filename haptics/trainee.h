@@ -3,7 +3,9 @@
 #include <haptics/arm.h>
 #include <haptics/device.h>
 #include <haptics/motor.h>
+#include <haptics/probe_hand.h>
 #include <haptics/session_model.h>
+#include <haptics/trainee_skill.h>
 
 #include <array>
 #include <cstdint>
@@ -12,27 +14,6 @@
 #include <vector>
 
 namespace palpate::haptics {
-
-/// How well a scripted trainee does it. docs/score.md has the sources; what has none there is assumed.
-struct Skill {
-    std::string_view name;
-    double tremor = 0;      // root mean square, of the vector [m]
-    double aimError = 0;    // of the aim as the trainee takes it from the picture, standard deviation per axis [m]
-    double entryError = 0;  // of the place where the needle is set on the skin, likewise [m]
-    double speed = 0;       // mean over a movement [m/s]
-    double stroke = 0;      // longest movement without a look at the picture [m]
-    double overshoot = 0;   // of a movement's length, standard deviation as a share of it
-    double reaction = 0;    // to what is felt or seen [s]
-    double vigilance = 0;   // probability of seeing before firing that the line misses, or that a vital structure is on it
-    double content = 0;     // share of target in the cores seen that is enough
-    int passes = 1;         // at most
-    double touch = 0;       // palpation: of a stiffness that is felt, standard deviation as a share of it
-    double raster = 8e-3;   // palpation: between presses of the first search [m]
-};
-
-/// "novice", "resident", "expert". Throws std::runtime_error for another name.
-const Skill& skillCalled(std::string_view name);
-std::vector<std::string> skillNames();
 
 /// A hand with eyes: takes a biopsy under view. It sets the needle on the skin, pushes through, advances in minimum-jerk
 /// movements (Flash and Hogan, "The coordination of arm movements", J. Neuroscience 5, 1985) with a look at the picture
@@ -70,6 +51,7 @@ private:
     bool dangerAhead() const noexcept;
     Vec3 inward() const noexcept;
     double depthToFire() const noexcept;
+    void storePicture() noexcept;
 
     const SessionModel& model_;
     Skill skill_;
@@ -78,6 +60,7 @@ private:
     datasets::Random random_;
     Arm arm_;
     Tremor tremor_;
+    ProbeHand probe_;
     Act act_ = Act::approach;
     double inAct_ = 0;  // time since it began [s]
     // Its plan: where it means to go in and what it takes for the middle of the target [m].
@@ -91,7 +74,8 @@ private:
     double insideSince_ = -1, warnedSince_ = -1;  // for so long [s]; below 0: not
     double bestCore_ = 0;                         // share of target
     std::uint64_t ticks_ = 0;
-    int fired_ = 0, entries_ = 0, redirects_ = 0, strokes_ = 0;
+    int fired_ = 0, entries_ = 0, redirects_ = 0, strokes_ = 0, looks_ = 0;
+    double storing_ = 0;  // the button that stores a picture stays down so long yet [s]
 };
 
 }  // namespace palpate::haptics

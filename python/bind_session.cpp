@@ -48,11 +48,21 @@ Vec3 unit(Vec3 axis)
     return std::abs(length - 1) < 1e-12 ? axis : axis / length;
 }
 
+constexpr py::ssize_t withProbe = 12;  // numbers of a pose that has the probe's move, too
+
+bool isPoseOf(py::ssize_t numbers)
+{
+    return numbers == 3 || numbers == 6 || numbers == withProbe;
+}
+
 DeviceSample sampleOf(const double* pose, py::ssize_t numbers, Vec3 axis, std::uint32_t buttons, bool fresh)
 {
     DeviceSample sample;
     sample.position = {pose[0], pose[1], pose[2]};
-    sample.axis = numbers == 6 ? unit({pose[3], pose[4], pose[5]}) : axis;
+    sample.axis = numbers >= 6 ? unit({pose[3], pose[4], pose[5]}) : axis;
+    if (numbers == withProbe) {
+        sample.probe = {pose[6], pose[7], pose[8], pose[9], pose[10], pose[11]};
+    }
     sample.buttons = buttons;
     sample.fresh = fresh;
     return sample;
@@ -61,9 +71,11 @@ DeviceSample sampleOf(const double* pose, py::ssize_t numbers, Vec3 axis, std::u
 TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, bool fresh)
 {
     const auto numbers = Doubles::ensure(pose);
-    if (!numbers || numbers.ndim() != 1 || (numbers.shape(0) != 3 && numbers.shape(0) != 6)) {
+    if (!numbers || numbers.ndim() != 1 || !isPoseOf(numbers.shape(0))) {
         PyErr_Clear();
-        throw py::value_error("pose: give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres");
+        throw py::value_error(
+            "pose: give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres; or these and the six numbers of the "
+            "probe's move");
     }
     const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), buttons, fresh);
     const py::gil_scoped_release others;
@@ -82,8 +94,9 @@ void checkColumn(const Array& column, py::ssize_t rows, const char* name)
 
 std::vector<DeviceSample> samplesOf(const Doubles& poses, const Buttons& buttons, const Flags& fresh, Vec3 axis)
 {
-    if (poses.ndim() != 2 || (poses.shape(1) != 3 && poses.shape(1) != 6)) {
-        throw py::value_error("poses: give an array of n x 3 (positions) or n x 6 (and axes), in metres");
+    if (poses.ndim() != 2 || !isPoseOf(poses.shape(1))) {
+        throw py::value_error(
+            "poses: give an array of n x 3 (positions), n x 6 (and axes) or n x 12 (and the probe's moves), in metres");
     }
     const py::ssize_t rows = poses.shape(0);
     checkColumn(buttons, rows, "buttons");
@@ -260,6 +273,8 @@ void bindTick(py::module_& module)
         .def_property_readonly("warning", [](const TickBox& t) { return haptics::warningNames[t.row.warning]; })
         .def_property_readonly("tissue", [](const TickBox& t) { return t.row.tissue; })
         .def_property_readonly("inserted", [](const TickBox& t) { return t.row.inserted; })
+        .def_property_readonly("needle_in_beam", [](const TickBox& t) { return t.row.needleInBeam; })
+        .def_property_readonly("tip_in_beam", [](const TickBox& t) { return t.row.tipInBeam != 0; })
         .def_property_readonly("contacts", [](const TickBox& t) { return t.row.contacts; })
         .def_property_readonly("penetration", [](const TickBox& t) { return t.row.penetration; })
         .def_property_readonly("ahead", [](const TickBox& t) { return t.row.ahead; })

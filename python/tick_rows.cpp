@@ -58,6 +58,12 @@ TickRow rowOf(const haptics::TickRecord& t) noexcept
     row.damped = t.damped;
     row.inserted = t.inserted;
     row.deflection = arrayOf(t.deflection);
+    const auto& move = t.device.probe;
+    row.probeMove = {move.press, move.slide, move.sweep, move.rock, move.tilt, move.turn};
+    row.probeFace = arrayOf(t.probeFace);
+    row.probeForce = arrayOf(t.probeForce);
+    row.needleInBeam = t.needleInBeam;
+    row.tipInBeam = t.tipInBeam ? 1 : 0;
     row.penetration = t.penetration;
     row.residual = t.residual;
     row.ahead = t.ahead.tissueDistance;
@@ -115,6 +121,11 @@ py::dtype tickType(std::size_t structures)
         .add("events", "u4", offsetof(TickRow, events))
         .add("fired", "?", offsetof(TickRow, fired))
         .add("faulted", "?", offsetof(TickRow, faulted))
+        .add("probe_move", "(6,)f8", offsetof(TickRow, probeMove))
+        .add("probe_face", "(3,)f8", offsetof(TickRow, probeFace))
+        .add("probe_force", "(3,)f8", offsetof(TickRow, probeForce))
+        .add("needle_in_beam", "f8", offsetof(TickRow, needleInBeam))
+        .add("tip_in_beam", "?", offsetof(TickRow, tipInBeam))
         .type(sizeof(TickRow));
 }
 

@@ -18,13 +18,16 @@ struct TickRow {
     double energy, damped;                                        // [J]
     double inserted;                                              // [m]
     std::array<double, 3> deflection;                             // [m]
+    std::array<double, 6> probeMove;                              // press, slide, sweep [m], rock, tilt, turn [rad]
+    std::array<double, 3> probeFace, probeForce;                  // [m], [N]
+    double needleInBeam;                                          // [m]
     double penetration, residual;                                 // [m]
     double ahead, aheadSpeed;                                     // [m], [m/s]
     std::array<double, haptics::maxStructures> distance;          // [m]
     std::uint32_t buttons, events, contacts, moved;               // events: bit k is kind k
     std::uint8_t phase, tissue, warning, aheadTissue;             // numbers of names
     std::int8_t nearestVital, warned;                             // numbers of structures; -1: none
-    std::uint8_t fresh, fired, faulted;                           // 0 or 1
+    std::uint8_t fresh, fired, faulted, tipInBeam;                // 0 or 1
 };
 
 TickRow rowOf(const haptics::TickRecord& tick) noexcept;

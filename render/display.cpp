@@ -83,12 +83,13 @@ bool displayWorks()
     return true;
 }
 
-PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
+// Starts a server. Its number is empty when it did not come up; then `status` is that which it ended with, and its process
+// is gone.
+std::string PrivateDisplay::start(const std::string& cookieFile, int& status)
 {
     std::array<int, 2> answer{};
-    if (cookie_ < 0 || ::pipe(answer.data()) != 0)
+    if (::pipe(answer.data()) != 0)
         throw std::runtime_error("cannot start a display: out of file descriptors");
-    const std::string cookieFile = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(cookie_);
     const pid_t parent = ::getpid();
     server_ = ::fork();
     if (server_ == 0) {
@@ -96,14 +97,27 @@ PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
         becomeServer(parent, answer[1], cookieFile);
     }
     ::close(answer[1]);
-    const std::string number = server_ > 0 ? readNumber(answer[0]) : std::string();
+    std::string number = server_ > 0 ? readNumber(answer[0]) : std::string();
     ::close(answer[0]);
+    if (number.empty() && server_ > 0) {
+        ::kill(server_, SIGKILL);
+        ::waitpid(server_, &status, 0);
+    }
+    return number;
+}
+
+PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
+{
+    if (cookie_ < 0)
+        throw std::runtime_error("cannot start a display: out of file descriptors");
+    const std::string cookieFile = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(cookie_);
+    // Two servers that start at the same moment may take the same number, and one of them ends: it looks again.
+    constexpr int attempts = 4;
+    int status = 0;
+    std::string number;
+    for (int i = 0; i < attempts && number.empty() && (i == 0 || (WIFEXITED(status) && WEXITSTATUS(status) != 127)); ++i)
+        number = start(cookieFile, status);
     if (number.empty()) {
-        int status = 0;
-        if (server_ > 0) {
-            ::kill(server_, SIGKILL);
-            ::waitpid(server_, &status, 0);
-        }
         ::close(cookie_);
         const bool missing = WIFEXITED(status) && WEXITSTATUS(status) == 127;
         throw std::runtime_error(missing ? "no display: set DISPLAY, or install the package xvfb for --offscreen"

@@ -2,6 +2,8 @@
 
 #include <sys/types.h>
 
+#include <string>
+
 namespace palpate::render {
 
 /// True when the display that the environment names can be opened.
@@ -18,6 +20,8 @@ public:
     ~PrivateDisplay();
 
 private:
+    std::string start(const std::string& cookieFile, int& status);
+
     pid_t server_ = 0;
     int cookie_ = -1;
 };

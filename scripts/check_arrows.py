@@ -18,7 +18,7 @@ ARROWS = {
     "channel": {"base"},
     "ultrasound": {"base", "channel"},
     "render": {"base", "channel", "ultrasound"},
-    "haptics": {"base", "volume", "occupancy", "chainmail", "datasets", "channel"},
+    "haptics": {"base", "volume", "occupancy", "chainmail", "datasets", "channel", "ultrasound"},
     "haptics/falcon": {"base", "volume", "datasets", "haptics"},
     "session": {"base", "volume", "datasets", "haptics", "haptics/falcon", "channel"},
     "report": {"base", "volume", "datasets", "haptics"},

@@ -235,6 +235,10 @@ class Tick:
     def fired(self) -> bool: ...
     @property
     def faulted(self) -> bool: ...
+    @property
+    def needle_in_beam(self) -> float: ...
+    @property
+    def tip_in_beam(self) -> bool: ...
 
 class Session:
     """One session: poses in, ticks out. From any thread, one at a time; a `with` block closes it."""
@@ -254,7 +258,8 @@ class Session:
 
         Args:
             pose: (x, y, z) of the tool's tip, or a sphere's centre [m]; or with the tool's axis behind it (6). Without an
-                axis the last one stays; the first is that of the planned line.
+                axis the last one stays; the first is that of the planned line. With 12 numbers the last six are how far the hand has
+                moved the scene's ultrasound probe: press, slide, sweep [m], rock, tilt, turn [rad].
             buttons: DEADMAN (held: forces are sent), FIRE, MARK, added up.
             fresh: False says that the device had no new pose.
 
@@ -265,7 +270,7 @@ class Session:
         """A tick for each pose; the GIL is released. The same poses give the same bits as step() and `palpate replay`.
 
         Args:
-            poses: n x 3 or n x 6 [m].
+            poses: n x 3, n x 6 [m], or n x 12 as step().
             buttons, fresh: one value, or n.
 
         Returns:

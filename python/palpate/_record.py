@@ -10,14 +10,16 @@ from ._palpate import RecordFile
 _VECTORS = {
     "position": "tip_{}_m", "axis": "axis_{}", "proxy": "proxy_{}_m", "tissue_force": "tissue_force_{}_n",
     "basic": "basic_{}_n", "additional": "additional_{}_n", "total": "total_{}_n", "deflection": "deflection_{}_m",
+    "probe_face": "probe_face_{}_m", "probe_force": "probe_force_{}_n",
 }
 _NUMBERS = {
     "tick": "tick", "buttons": "buttons", "fresh": "fresh", "energy": "energy_j", "damped": "damped_j", "phase": "phase",
     "tissue": "tissue", "inserted": "inserted_m", "contacts": "contacts", "penetration": "penetration_m", "moved": "moved",
     "residual": "residual_m", "nearest_vital": "nearest_vital", "warning": "warning", "warned": "warned",
     "ahead": "ahead_m", "ahead_tissue": "ahead_tissue", "ahead_speed": "ahead_m_s", "fired": "fired", "faulted": "faulted",
-    "events": "events",
+    "events": "events", "needle_in_beam": "needle_in_beam_m", "tip_in_beam": "tip_in_beam",
 }
+_MOVES = ("probe_press_m", "probe_slide_m", "probe_sweep_m", "probe_rock_rad", "probe_tilt_rad", "probe_turn_rad")
 
 
 def columns_of(ticks, structures=None):
@@ -32,6 +34,9 @@ def columns_of(ticks, structures=None):
         if field in _VECTORS:
             for axis, letter in enumerate("xyz"):
                 out[_VECTORS[field].format(letter)] = ticks[field][:, axis]
+        elif field == "probe_move":
+            for i, name in enumerate(_MOVES):
+                out[name] = ticks[field][:, i]
         elif field == "distance":
             for i in range(ticks["distance"].shape[1]):
                 name = structures[i] if structures is not None else i
@@ -86,8 +91,11 @@ class Record:
 
     @property
     def poses(self):
-        """n x 6: positions [m] and axes, as Session.run() takes them."""
-        return np.concatenate([self.ticks["position"], self.ticks["axis"]], axis=1)
+        """Positions [m] and axes, as Session.run() takes them: n x 6; n x 12 with the probe's moves, where one moved."""
+        parts = [self.ticks["position"], self.ticks["axis"]]
+        if self.ticks["probe_move"].any():
+            parts.append(self.ticks["probe_move"])
+        return np.concatenate(parts, axis=1)
 
     @property
     def samples(self):

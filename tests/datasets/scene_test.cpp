@@ -63,10 +63,23 @@ Scene fullScene(std::mt19937_64& random)
                     {Kind::press, *scene.aim, draw(0.01, 0.1), 3, 2e-3},
                     {Kind::fire, Vec3(0), 0.02, 0, 1e-3},
                     {Kind::wait, Vec3(0), 0.02, draw(0.1, 1), 1e-3}};
-    scene.probe = {ProbeKind::curved, *scene.entry,
-                   {0.6, 0.8, 0},     {-0.8, 0.6, 0},
-                   draw(0.03, 0.2),   draw(2e6, 9e6),
-                   draw(0.01, 0.1),   {{draw(0, 1), 1e-3, draw(-0.1, 0.1), 0, 0.1}, {2, draw(0, 0.04)}}};
+    scene.probe = {.kind = ProbeKind::curved,
+                   .face = *scene.entry,
+                   .direction = {0.6, 0.8, 0},
+                   .lateral = {-0.8, 0.6, 0},
+                   .depth = draw(0.03, 0.2),
+                   .frequency = draw(2e6, 9e6),
+                   .focus = draw(0.01, 0.1),
+                   .script = {}};
+    // One draw a statement: arguments have no order.
+    ProbeStep first, second;
+    first.time = draw(0, 1);
+    first.press = 1e-3;
+    first.slide = draw(-0.1, 0.1);
+    first.tilt = draw(-1, 1);
+    second.time = 2;
+    second.press = draw(0, 0.04);
+    scene.probe.script = {first, second};
     return scene;
 }
 
@@ -100,6 +113,7 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
         EXPECT_NEAR(again.probe.frequency, scene.probe.frequency, 1e-3);
         ASSERT_EQ(again.probe.script.size(), 2U);
         EXPECT_NEAR(again.probe.script[0].slide, scene.probe.script[0].slide, 1e-12);
+        EXPECT_NEAR(again.probe.script[0].tilt, scene.probe.script[0].tilt, 1e-12);
     }
 }
 
@@ -111,10 +125,11 @@ TEST(Probe, GoesStraightFromStepToStep)
     probe.face = Vec3(0.1, 0.2, 0.3);
     probe.direction = Vec3(0, 1, 0);
     probe.lateral = Vec3(1, 0, 0);
-    EXPECT_EQ(probeAt(probe, 5).face, probe.face);
-    probe.script = {{1, 4e-3, 2e-3, 0, 0}, {3, 0, 2e-3, -6e-3, 0.5}};
+    const auto probeAt = [&](double time) { return probeAfter(probe, scriptedMove(probe, time)); };
+    EXPECT_EQ(probeAt(5).face, probe.face);
+    probe.script = {{{4e-3, 2e-3}, 1}, {{0, 2e-3, -6e-3, 0.5}, 3}};
     const auto expectFace = [&](double t, Vec3 shift) {
-        const Vec3 off = probeAt(probe, t).face - probe.face - shift;
+        const Vec3 off = probeAt(t).face - probe.face - shift;
         EXPECT_NEAR(glm::length(off), 0, 1e-15) << t;
     };
     const Vec3 elevation = glm::cross(probe.direction, probe.lateral);
@@ -123,10 +138,30 @@ TEST(Probe, GoesStraightFromStepToStep)
     expectFace(1, 4e-3 * probe.direction + 2e-3 * probe.lateral);
     expectFace(2, 2e-3 * probe.direction + 2e-3 * probe.lateral - 3e-3 * elevation);
     expectFace(9, 2e-3 * probe.lateral - 6e-3 * elevation);
-    const ProbePlace rocked = probeAt(probe, 9);
+    const ProbePlace rocked = probeAt(9);
     EXPECT_NEAR(glm::dot(rocked.direction, rocked.lateral), 0, 1e-15);
     EXPECT_NEAR(glm::dot(rocked.direction, probe.direction), std::cos(0.5), 1e-15);
     EXPECT_NEAR(glm::dot(rocked.direction, elevation), 0, 1e-15);
+}
+
+// Any move leaves two unit vectors across each other; alone, a tilt keeps the line along the face and a turn keeps the
+// axis.
+TEST(Probe, TurnsAsARigidBody)
+{
+    ProbeSpec probe;
+    std::mt19937_64 random(4);
+    std::uniform_real_distribution<double> angle(-1.4, 1.4);
+    for (int i = 0; i < 100; ++i) {
+        const ProbePlace p = probeAfter(probe, {.rock = angle(random), .tilt = angle(random), .turn = angle(random)});
+        EXPECT_NEAR(glm::length(p.direction), 1, 1e-14);
+        EXPECT_NEAR(glm::length(p.lateral), 1, 1e-14);
+        EXPECT_NEAR(glm::dot(p.direction, p.lateral), 0, 1e-14);
+        EXPECT_EQ(p.face, probe.face);
+    }
+    EXPECT_EQ(probeAfter(probe, {.tilt = 0.7}).lateral, probe.lateral);
+    EXPECT_EQ(probeAfter(probe, {.turn = 0.7}).direction, probe.direction);
+    EXPECT_NEAR(glm::dot(probeAfter(probe, {.tilt = 0.7}).direction, probe.direction), std::cos(0.7), 1e-15);
+    EXPECT_NEAR(glm::dot(probeAfter(probe, {.turn = 0.7}).lateral, probe.lateral), std::cos(0.7), 1e-15);
 }
 
 const std::string head = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n";

@@ -27,6 +27,29 @@ class Records(InFolder):
         np.testing.assert_array_equal(again.run(**record.samples), record.ticks)
         self.assertEqual(again.force_hash, self.hash)
 
+    def test_a_probe_s_moves_are_part_of_its_poses(self):
+        file = self.folder / "p.db"
+        scene = palpate.Scene.parse(palpate.Scene("block").changed({"volume.voxel_mm": 3, "model.setting": "fast"}).text + """
+[probe]
+kind = "linear"
+face_mm = [0, 0, 0]
+direction = [0, 1, 0]
+lateral = [1, 0, 0]
+""")
+        poses = np.zeros((600, 12))
+        poses[:, 1] = -0.03
+        poses[:, 4] = 1
+        poses[:, 6] = np.minimum(np.arange(600) * 1e-5, 3e-3)
+        with palpate.Session(scene, record=file) as session:
+            ticks = session.run(poses)
+        np.testing.assert_array_equal(ticks["probe_move"][:, 0], poses[:, 6])
+        np.testing.assert_allclose(ticks["probe_face"][:, 1], poses[:, 6], atol=1e-12)
+        self.assertLess(ticks["probe_force"][-1, 1], -0.05)
+        record = palpate.Record(file)
+        self.assertEqual(record.poses.shape, (600, 12))
+        np.testing.assert_array_equal(palpate.Session(record.model()).run(**record.samples), record.ticks)
+        self.assertIn("probe_press_m", record.to_dict())
+
     def test_replay_and_score_are_the_program_s(self):
         record = palpate.Record(self.file)
         theirs = figures("replay", self.file)
