@@ -127,7 +127,8 @@ bool sound(const State& s, const Scenery& scenery) noexcept
 
 bool sound(const Input& input) noexcept
 {
-    return upTo(input.target, furthest) && upTo(input.axis, furthest);
+    return upTo(input.target, furthest) && upTo(input.axis, furthest) &&
+           std::all_of(input.probe.begin(), input.probe.end(), [](double v) { return upTo(v, furthest); });
 }
 
 bool sound(const Displacement& d, std::uint64_t nodes) noexcept

@@ -151,13 +151,17 @@ struct State {
 
 /// What the user of a viewer asks of the simulation.
 struct Input {
-    Triple target{};          // of the tool's tip [m]
-    Triple axis{0, 1, 0};     // unit vector, from the shaft to the tip
-    std::uint32_t held = 0;   // 1: the dead-man switch
-    std::uint32_t ended = 0;  // 1: the session is to end
-    std::uint32_t fires = 0;  // how often the gun was fired: counted, so that a short press is never between two looks
-    std::uint32_t marks = 0;  // how often the place of the tool was marked
-    std::uint64_t beat = 0;   // how often this was written: it stands still when the viewer is dead or stuck
+    Triple target{};       // of the tool's tip [m]
+    Triple axis{0, 1, 0};  // unit vector, from the shaft to the tip
+    // How far the other hand has moved the scene's ultrasound probe: press, slide, sweep [m], rock, tilt, turn [rad].
+    std::array<double, 6> probe{};
+    std::uint32_t held = 0;      // 1: the dead-man switch
+    std::uint32_t ended = 0;     // 1: the session is to end
+    std::uint32_t fires = 0;     // how often the gun was fired: counted, so that a short press is never between two looks
+    std::uint32_t marks = 0;     // how often the place of the tool was marked
+    std::uint32_t pictures = 0;  // how often the ultrasound picture was stored
+    std::uint32_t padding = 0;
+    std::uint64_t beat = 0;  // how often this was written: it stands still when the viewer is dead or stuck
 };
 
 /// One displaced node of the lattice.

@@ -133,8 +133,10 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(State, missed),
                                     offsetof(State, published),
                                     offsetof(Input, axis),
+                                    offsetof(Input, probe),
                                     offsetof(Input, held),
                                     offsetof(Input, fires),
+                                    offsetof(Input, pictures),
                                     offsetof(Input, beat),
                                     offsetof(Displacement, u)})
         for (int byte = 0; byte < 8; ++byte)

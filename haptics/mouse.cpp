@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -22,7 +23,8 @@ Vec3 vec(const channel::Triple& t) noexcept
 // What another program wrote may be anything.
 bool isSound(const channel::Input& input) noexcept
 {
-    return glm::length(vec(input.target)) < 10.0 && std::abs(glm::length(vec(input.axis)) - 1.0) < 1e-3;
+    return glm::length(vec(input.target)) < 10.0 && std::abs(glm::length(vec(input.axis)) - 1.0) < 1e-3 &&
+           std::all_of(input.probe.begin(), input.probe.end(), [](double v) { return std::abs(v) <= 1.0; });
 }
 
 }  // namespace
@@ -62,6 +64,7 @@ void MouseDevice::listen() noexcept
         // What a viewer before this session has counted is none of ours.
         fire_.done = now->fires;
         mark_.done = now->marks;
+        picture_.done = now->pictures;
     }
     input_ = *now;
     heard_ = true;
@@ -88,21 +91,38 @@ void MouseDevice::turn() noexcept
     }
 }
 
+// The probe needs no dead-man switch: it gives nobody a force.
+void MouseDevice::moveProbe() noexcept
+{
+    using Member = double datasets::ProbeMove::*;
+    constexpr std::array<Member, 6> members{&datasets::ProbeMove::press, &datasets::ProbeMove::slide,
+                                            &datasets::ProbeMove::sweep, &datasets::ProbeMove::rock,
+                                            &datasets::ProbeMove::tilt,  &datasets::ProbeMove::turn};
+    for (std::size_t i = 0; i < members.size(); ++i) {
+        const double most = (i < 3 ? fastestProbe : fastestTurn) * period_;
+        const double way = (input_.probe[i] - probe_.*members[i]) * std::min(1.0, period_ / lag);
+        probe_.*members[i] += std::clamp(way, -most, most);
+    }
+}
+
 DeviceSample MouseDevice::read() noexcept
 {
     listen();
     follow();
     if (heard_) {
         turn();
+        moveProbe();
     }
     arm_.pull(goal_);
     DeviceSample sample;
     sample.position = arm_.read();
     sample.axis = axis_;
+    sample.probe = probe_;
     sample.fresh = silence_ <= longestSilence || !heard_;
     sample.buttons = input_.held != 0 ? buttonDeadMan : 0U;
     sample.buttons |= fire_.down(input_.fires, period_) ? buttonFire : 0U;
     sample.buttons |= mark_.down(input_.marks, period_) ? buttonMark : 0U;
+    sample.buttons |= picture_.down(input_.pictures, period_) ? buttonPicture : 0U;
     return sample;
 }
 

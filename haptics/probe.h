@@ -4,7 +4,7 @@
 #include <datasets/scene.h>
 #include <haptics/tick.h>
 #include <ultrasound/transducer.h>
-#include <volume/distance.h>
+#include <volume/scalar_field.h>
 
 #include <array>
 #include <optional>

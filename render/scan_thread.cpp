@@ -57,10 +57,7 @@ void ScanThread::move(const ultrasound::ProbeMove& move)
 {
     {
         const std::lock_guard lock(guard_);
-        move_.slide += move.slide;
-        move_.sweep += move.sweep;
-        move_.rock += move.rock;
-        move_.turn += move.turn;
+        move_ += move;
         ++wanted_.number;
     }
     changed_.notify_all();

@@ -224,10 +224,22 @@ Examination examinationOf(const channel::Scenery& scenery, const Medium& medium)
     return e;
 }
 
+ProbeMove& ProbeMove::operator+=(const ProbeMove& more) noexcept
+{
+    slide += more.slide;
+    sweep += more.sweep;
+    rock += more.rock;
+    turn += more.turn;
+    press += more.press;
+    tilt += more.tilt;
+    return *this;
+}
+
 Pose movedOnSkin(const Medium& medium, const Examination& examination, const ProbeMove& move)
 {
     const Pose& from = examination.pose;
-    const glm::dvec3 axial = std::cos(move.rock) * from.axial + std::sin(move.rock) * from.lateral;
+    const glm::dvec3 fanned = std::cos(move.tilt) * from.axial + std::sin(move.tilt) * from.elevation;
+    const glm::dvec3 axial = std::cos(move.rock) * fanned + std::sin(move.rock) * from.lateral;
     const glm::dvec3 lateral = std::cos(move.turn) * from.lateral + std::sin(move.turn) * from.elevation;
     Pose to = poseOf(from.face + move.slide * from.lateral + move.sweep * from.elevation, axial, lateral);
     return lay(medium, Beam(examination.transducer, examination.settings), to) ? to : from;

@@ -24,15 +24,18 @@ struct Examination {
 
 Examination examinationOf(const channel::Scenery& scenery, const Medium& medium);
 
-/// How a probe is moved on the skin.
+/// How a probe is moved by hand.
 struct ProbeMove {
     double slide = 0, sweep = 0;  // along its face, across the picture [m]
     double rock = 0, turn = 0;    // within the picture's plane, about the probe's axis [rad]
+    double press = 0;             // into the body [m]
+    double tilt = 0;              // about the line along its face: the picture fans [rad]
 
     bool operator==(const ProbeMove&) const = default;
+    ProbeMove& operator+=(const ProbeMove& more) noexcept;
 };
 
-/// The probe moved so and laid on the skin at rest again; where there is no skin it stays.
+/// The probe moved so and laid on the skin at rest again, however it was pressed; where there is no skin it stays.
 Pose movedOnSkin(const Medium& medium, const Examination& examination, const ProbeMove& move);
 
 /// Where the probe is at a tick.

@@ -175,6 +175,39 @@ TEST(Mouse, WhatIsNoPoseIsNotFollowed)
     }
 }
 
+// The other hand needs no dead-man switch. It gets where the viewer has it, at a hand's speed; nonsense moves nothing, and
+// a stored picture is one press.
+TEST(Mouse, TheOtherHandMovesTheProbe)
+{
+    Viewer viewer;
+    MouseDevice device = deviceOf(viewer);
+    run(device, 10);
+    viewer.now.probe = {5e-3, -20e-3, 0, 0.4, 0, -0.2};
+    datasets::ProbeMove before;
+    for (int i = 0; i < secondOfTicks; ++i) {
+        const auto now = run(device, 1).probe;
+        EXPECT_LE(std::abs(now.slide - before.slide), MouseDevice::fastestProbe * tickSeconds * 1.0001);
+        EXPECT_LE(std::abs(now.rock - before.rock), MouseDevice::fastestTurn * tickSeconds * 1.0001);
+        before = now;
+    }
+    EXPECT_NEAR(before.press, 5e-3, 1e-6);
+    EXPECT_NEAR(before.slide, -20e-3, 1e-6);
+    EXPECT_NEAR(before.rock, 0.4, 1e-6);
+    EXPECT_NEAR(before.turn, -0.2, 1e-6);
+    viewer.now.probe[0] = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_NEAR(run(device, 100).probe.press, 5e-3, 1e-6);
+    viewer.now.probe[0] = 5e-3;
+    viewer.now.pictures = 1;
+    int presses = 0;
+    bool down = false;
+    for (int i = 0; i < secondOfTicks; ++i) {
+        const bool now = (run(device, 1).buttons & buttonPicture) != 0;
+        presses += now && !down ? 1 : 0;
+        down = now;
+    }
+    EXPECT_EQ(presses, 1);
+}
+
 TEST(Mouse, ReadingAllocatesNothing)
 {
     Viewer viewer;

@@ -44,7 +44,7 @@ class Stubs(unittest.TestCase):
         self.assertEqual(functions, {n for n, f in vars(_palpate).items() if callable(f) and not isinstance(f, type)})
 
     def test_help_is_the_stub_s(self):
-        self.assertIn("n x 3 or n x 6 [m]", palpate.Session.run.__doc__)
+        self.assertIn("n x 3, n x 6 [m], or n x 12", palpate.Session.run.__doc__)
         self.assertTrue(palpate.Session.run.__doc__.startswith("run(poses: ArrayLike"))
         self.assertIn("Young's modulus [Pa]", palpate.Volume.stiffness.__doc__)
         self.assertIn("The array is copied", palpate.Volume.from_numpy.__doc__)

@@ -1,0 +1,45 @@
+#include <render/space_mouse.h>
+
+#include <spnav.h>
+
+#include <algorithm>
+
+namespace palpate::render {
+namespace {
+
+constexpr double fullDeflection = 350;  // of an axis, as the daemon counts
+constexpr double longestPeriod = 0.1;   // [s]: after a pause the first event has all of it
+
+}  // namespace
+
+SpaceMouse::SpaceMouse() : connected_(spnav_open() == 0)
+{
+}
+
+SpaceMouse::~SpaceMouse()
+{
+    if (connected_)
+        spnav_close();
+}
+
+// The daemon's axes: x to the right, y up, z towards the user.
+ultrasound::ProbeMove SpaceMouse::moved()
+{
+    ultrasound::ProbeMove sum;
+    spnav_event event;
+    while (connected_ && spnav_poll_event(&event) == SPNAV_EVENT_MOTION) {
+        const auto& m = event.motion;
+        const double seconds = std::min(1e-3 * m.period, longestPeriod);
+        const auto share = [](int v) { return std::clamp(v / fullDeflection, -1.0, 1.0); };
+        const double way = fastest * seconds, angle = fastestTurn * seconds;
+        sum += {.slide = -way * share(m.x),
+                .sweep = -way * share(m.z),
+                .rock = angle * share(m.rz),
+                .turn = angle * share(m.ry),
+                .press = -way * share(m.y),
+                .tilt = angle * share(m.rx)};
+    }
+    return sum;
+}
+
+}  // namespace palpate::render
