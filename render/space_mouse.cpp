@@ -12,9 +12,7 @@ constexpr double longestPeriod = 0.1;   // [s]: after a pause the first event ha
 
 }  // namespace
 
-SpaceMouse::SpaceMouse() : connected_(spnav_open() == 0)
-{
-}
+SpaceMouse::SpaceMouse() : connected_(spnav_open() == 0) {}
 
 SpaceMouse::~SpaceMouse()
 {
