@@ -28,6 +28,16 @@ string(REGEX REPLACE "/$" "" palpate_pc_prefix "${palpate_pc_prefix}")
 configure_file(packaging/palpate.pc.in palpate.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/palpate.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
+# All that `cmake --install` takes, without the tests.
+get_property(palpate_installed GLOBAL PROPERTY PALPATE_INSTALLED)
+list(TRANSFORM palpate_installed PREPEND palpate_)
+add_custom_target(palpate_installed)
+foreach(target IN LISTS palpate_installed ITEMS palpate palpate-view palpate-trainer palpate-reference palpate_python)
+  if(TARGET ${target})
+    add_dependencies(palpate_installed ${target})
+  endif()
+endforeach()
+
 # Man pages and bash completion, which the programs tell of themselves.
 if(NOT PALPATE_SANITIZE)
   find_package(Python3 COMPONENTS Interpreter)
@@ -44,6 +54,7 @@ if(Python3_FOUND)
     COMMAND ${CMAKE_COMMAND} -E touch ${palpate_shell}/made
     DEPENDS packaging/shell_files.py ${palpate_programs})
   add_custom_target(palpate_shell_files ALL DEPENDS ${palpate_shell}/made)
+  add_dependencies(palpate_installed palpate_shell_files)
   install(DIRECTORY ${palpate_shell}/man ${palpate_shell}/bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR})
 endif()
 
