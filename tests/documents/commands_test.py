@@ -19,6 +19,7 @@ TUTORIALS = ("trainer", "researcher", "experimenter")
 # with pkg-config, and the rest are the checks that this test is one of; its Python is run.
 NOT_RUN = {
     "palpate-view --replay vessel.db": "opens a window: tests/apps/replay_view_test.cpp plays records",
+    "palpate plan block --error 3% --budget 2ms --json plan.json": "measures for half a minute: tests/apps/model_command_test.cpp",
 }
 
 

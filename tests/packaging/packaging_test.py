@@ -12,9 +12,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 INSTALLED = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 and pathlib.Path(sys.argv[1]).is_dir() else None
-# Installed, and in no package, each for its reason; and in a package, but not installed by CMake.
-UNPACKAGED = {"share/doc/palpate/LICENSE": "in Debian's common-licenses", "share/doc/palpate/CHANGELOG.md": "dh_installchangelogs",
-              "share/doc/palpate/README.md": "palpate.docs", "share/doc/palpate/NOTICE": "palpate.docs"}
+# In a package, but not installed by CMake.
 NOT_BY_CMAKE = {"usr/share/doc/palpate/site": "debian/rules calls scripts/site"}
 # Beside pages that belong to other packages.
 EXCLUDED = {"palpate": ("palpate-view.1", "palpate-reference.1")}
@@ -60,6 +58,7 @@ class Installed(unittest.TestCase):
         # Without Debian's folder of its architecture, and without usr/.
         files = {p.relative_to(INSTALLED).as_posix() for p in INSTALLED.rglob("*") if not p.is_dir()}
         owners = {f: [] for f in files}
+        elsewhere = {line.removeprefix("usr/") for line in text("debian/not-installed").splitlines()}
         for listing in sorted((ROOT / "debian").glob("*.install")):
             for line in listing.read_text(encoding="utf-8").split():
                 if line in NOT_BY_CMAKE:
@@ -70,7 +69,7 @@ class Installed(unittest.TestCase):
                     if not file.endswith(EXCLUDED.get(listing.stem, ("\0",))):
                         owners[file].append(listing.stem)
         for file, packages in owners.items():
-            if file not in UNPACKAGED:
+            if file not in elsewhere:
                 self.assertEqual(len(set(packages)), 1, f"{file} is in {packages}")
 
     def matching(self, pattern, files):
