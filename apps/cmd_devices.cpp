@@ -1,4 +1,6 @@
 #include <apps/command.h>
+
+#include <base/child_process.h>
 #include <command/json.h>
 
 #include <session/falcon.h>
@@ -55,6 +57,14 @@ std::string textOf(const fs::path& file)
 {
     std::ifstream stream(file);
     return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+// The rule in this folder; where it is udev's own and there is none, the one that a package brought.
+fs::path ruleIn(const fs::path& folder)
+{
+    const fs::path file = folder / falcon::udevRuleFile;
+    const fs::path packaged = base::programFolder().parent_path() / "lib/udev/rules.d" / falcon::udevRuleFile;
+    return !fs::exists(file) && folder == DevicesOptions().rules && fs::exists(packaged) ? packaged : file;
 }
 
 void installRule(const fs::path& folder)
@@ -189,7 +199,7 @@ nlohmann::json list(const DevicesOptions& o)
     if (falcons.empty()) {
         say("no Falcon is plugged in (USB 0403:cb48): plug in its cable and its power supply");
     }
-    const fs::path rule = o.rules / falcon::udevRuleFile;
+    const fs::path rule = ruleIn(o.rules);
     const bool there = textOf(rule) == falcon::udevRule();
     say(fmt::format("udev rule         {}",
                     there ? rule.string() : "not there: 'sudo palpate devices --install-udev' writes it"));

@@ -1,5 +1,5 @@
 #include <apps/command.h>
-#include <base/build.h>
+#include <apps/version.h>
 #include <base/child_process.h>
 #include <base/nearest.h>
 #include <command/interrupted.h>
@@ -71,7 +71,7 @@ int main(int argc, char** argv)
         openTrainer("palpate-trainer");
     }
     CLI::App app("Palpate: feel inside a segmented volume", "palpate");
-    app.set_version_flag("--version", std::string(palpate::base::build()));
+    app.set_version_flag("--version", palpate::apps::versionText());
     app.require_subcommand(1);
     app.failure_message([](const CLI::App* program, const CLI::Error& e) {
         // CLI11 notices a missing command before a wrong word in its place.

@@ -28,6 +28,7 @@ function(palpate_library name)
     VERIFY_INTERFACE_HEADER_SETS ${PALPATE_VERIFY_HEADERS})
   palpate_precompile(${target})
   if(NOT arg_UNINSTALLED)
+    set_property(GLOBAL APPEND PROPERTY PALPATE_INSTALLED ${name})
     install(TARGETS ${target} EXPORT palpateTargets
       FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/palpate)
   endif()

@@ -393,13 +393,11 @@ std::unique_ptr<Transport> usbTransport()
     return std::make_unique<UsbTransport>();
 }
 
+std::string_view embeddedRule(std::string_view file) noexcept;  // made of the file by the build
+
 std::string udevRule()
 {
-    return fmt::format(
-        "# Novint Falcon: the user at the computer may open it (written by palpate devices --install-udev)\n"
-        "SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{:04x}\", ATTR{{idProduct}}==\"{:04x}\", MODE=\"0660\", "
-        "GROUP=\"plugdev\", TAG+=\"uaccess\"\n",
-        vendorId, productId);
+    return std::string(embeddedRule(udevRuleFile));
 }
 
 }  // namespace palpate::falcon

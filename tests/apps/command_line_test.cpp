@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <regex>
+
 namespace palpate::apps {
 namespace {
 
@@ -20,10 +22,22 @@ TEST(CommandLine, EveryCommandExplainsItself)
         EXPECT_NE(outcome.out.find("Usage: palpate"), std::string::npos) << outcome.out;
         EXPECT_EQ(outcome.err, "");
     }
-    EXPECT_EQ(palpate({"--version"}).status, 0);
     EXPECT_EQ(palpate({"version"}).out, palpate({"--version"}).out);
     EXPECT_EQ(palpate({"help"}).out, palpate({"--help"}).out);
     EXPECT_EQ(palpate({"help", "bench", "tick"}).out, palpate({"bench", "tick", "--help"}).out);
+}
+
+TEST(CommandLine, VersionSaysBuildKernelSetsAndLibraries)
+{
+    const Outcome said = palpate({"--version"});
+    EXPECT_EQ(said.status, 0);
+    const auto trained = figures({"train", "block", "--headless", "--unpaced", "--seconds", "0.001"});
+    EXPECT_EQ(said.out.substr(0, said.out.find('\n')), trained.at("build").get<std::string>());
+    EXPECT_TRUE(
+        std::regex_search(said.out, std::regex("\nkernels +x86-64-v2, AVX2, AVX-512 \\(this machine runs x86-64-v2")));
+    for (const std::string library : {"OpenVDB 1", "SQLite 3.", "OpenSSL 3.", "DCMTK 3.", "TBB 20", "CLI11 2."}) {
+        EXPECT_NE(said.out.find(library), std::string::npos) << library;
+    }
 }
 
 TEST(CommandLine, TheHelpListsEveryCommand)

@@ -9,7 +9,6 @@
 
 #include <map>
 #include <regex>
-#include <set>
 #include <sstream>
 
 namespace palpate::apps {
@@ -122,39 +121,6 @@ TEST(Documents, SettingsOfLevelElasticAreThePrograms)
             << " |\n";
         EXPECT_NE(page().find(row.str()), std::string::npos) << row.str();
     }
-}
-
-// Each `palpate COMMAND .. --option ..` of the pages that show commands, by the programs' own help.
-TEST(Documents, CommandsAndOptionsExist)
-{
-    static const std::regex call(R"(^    (?:for .* do )?(palpate|palpate-view) ([^#;]*).*)"), option("--[a-z-]+");
-    std::size_t seen = 0;
-    std::string line;
-    std::smatch m;
-    const std::string pages = readText(PALPATE_SOURCE_DIR "/README.md") + readText(PALPATE_SOURCE_DIR "/docs/trainer.md") +
-                              readText(PALPATE_SOURCE_DIR "/docs/experiments.md") +
-                              readText(PALPATE_SOURCE_DIR "/docs/curriculum.md");
-    for (std::istringstream in(pages); std::getline(in, line);) {
-        if (!std::regex_match(line, m, call) || !built(m[1])) {
-            continue;
-        }
-        const std::string program = m[1], rest = m[2];
-        std::vector<std::string> command{"--help"};
-        const std::string first = rest.substr(0, rest.find(' '));
-        if (std::set<std::string>{"bench", "case", "curriculum", "profile"}.contains(first)) {
-            const std::size_t second = rest.find_first_not_of(' ', first.size());
-            command = {first, rest.substr(second, rest.find(' ', second) - second), "--help"};
-        } else if (program == "palpate") {
-            command = {rest.substr(0, rest.find(' ')), "--help"};
-        }
-        const Outcome help = Program(program, command).wait();
-        EXPECT_EQ(help.status, 0) << line;
-        for (std::sregex_iterator i(rest.begin(), rest.end(), option), end; i != end; ++i) {
-            EXPECT_NE(help.out.find(i->str()), std::string::npos) << line << ": there is no " << i->str();
-        }
-        ++seen;
-    }
-    EXPECT_GT(seen, 40U);
 }
 
 TEST(Documents, EveryKeyOfAScoreIsExplained)

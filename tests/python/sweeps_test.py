@@ -135,6 +135,17 @@ class Managers(InFolder):
         shutil.copy(SOURCE / "examples" / "sweeps" / "Snakefile", self.folder)
         self.run_here("/usr/bin/snakemake", "--cores", "2", "--config", "plan=lump.toml", "folder=lump", "shards=3")
 
+    def test_dask(self):
+        shutil.copy(SOURCE / "examples" / "sweeps" / "dask_sweep.py", self.folder)
+        self.run_here("/usr/bin/python3", "dask_sweep.py", "lump.toml", "lump", "--shards", "3")
+
+    def test_dask_says_which_part_failed_and_why(self):
+        script = SOURCE / "examples" / "sweeps" / "dask_sweep.py"
+        done = subprocess.run(["/usr/bin/python3", script, "none.toml", "lump", "--shards", "2"], cwd=self.folder,
+                              env=self.environment, capture_output=True, text=True)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertRegex(done.stderr, r"part \d of 2: palpate: none.toml: ")
+
 
 if __name__ == "__main__":
     unittest.main()
