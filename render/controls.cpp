@@ -14,7 +14,7 @@
 namespace palpate::render {
 namespace {
 
-constexpr double depthStep = 1e-3;  // of a notch of the wheel [m]
+constexpr double depthStep = 1e-3;  // of a notch of the wheel, or a key [m]
 constexpr double fineShare = 0.2;   // with Shift
 
 Controls& controlsOf(GLFWwindow* window)
@@ -78,7 +78,7 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
         const char* name = glfwGetKeyName(key, scancode);
         if (action != GLFW_RELEASE)
-            controlsOf(w).key(key, name != nullptr ? name : "", action == GLFW_REPEAT, (mods & GLFW_MOD_SHIFT) != 0);
+            controlsOf(w).key(key, name != nullptr ? name : "", action == GLFW_REPEAT, mods);
     });
     // Where it is on a keyboard differs too much for a key's name.
     glfwSetCharCallback(window, [](GLFWwindow* w, unsigned int character) {
@@ -160,13 +160,27 @@ void Controls::moved(glm::dvec2 to, bool fine)
     camera(vtkCommand::MouseMoveEvent);
 }
 
+// By the keyboard: what the left button does while it is held.
+void Controls::toggleHold()
+{
+    if (hand_.held())
+        hand_.release();
+    else if (hand_.is())
+        hand_.press(follower_.state());
+}
+
+void Controls::step(glm::dvec3 direction, double steps, bool fine)
+{
+    hand_.move(steps * (fine ? fineShare : 1.0) * depthStep * direction);
+}
+
 void Controls::wheel(double notches, bool fine, bool intoPicture)
 {
     used_ = true;
     if (onUltrasound())
         picture_.ultrasound().turn(Knob::depth, notches > 0 ? -1 : 1);
     else if (hand_.is())
-        hand_.move((fine ? fineShare : 1.0) * notches * depthStep * (intoPicture ? screen().into : hand_.axis()));
+        step(intoPicture ? screen().into : hand_.axis(), notches, fine);
     else
         camera(notches > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
 }
@@ -214,7 +228,7 @@ std::string Controls::caption() const
     if (!hand_.is())
         return "";
     if (!hand_.held())
-        return "hold the left button to take the tool   (? lists the keys)";
+        return "hold the left button, or press Enter, to take the tool   (? lists the keys)";
     const double lag = glm::distance(hand_.target(), vec(follower_.state().tip));
     return fmt::format("holding   hand ahead of the tip by {:.1f} mm", 1e3 * lag);
 }

@@ -19,6 +19,7 @@ namespace palpate::render {
 /// What keys and mouse do in a window: the hand, the camera, what is shown, and a record that is played.
 ///
 ///     session with a hand of a viewer   left: hold to move the tool, wheel: along itself; right: camera
+///                                       keys: Enter takes the tool and lets it go, arrows and pages move it
 ///     any other session                 left or right: camera, wheel: zoom
 ///     record                            left: drag through the time, right: camera, wheel: zoom
 ///
@@ -44,6 +45,7 @@ public:
         int sign;  // of the stroke
         bool shift;
         int value;  // of the stroke
+        bool control = false;
     };
     static constexpr int once = 0;  // instead of a sign: a key that is held down does not repeat
     struct Stroke {
@@ -72,7 +74,9 @@ private:
     void button(int button, bool down);
     void moved(glm::dvec2 to, bool fine);
     void wheel(double notches, bool fine, bool intoPicture);
-    void key(int key, const std::string& name, bool again, bool shift);
+    void key(int key, const std::string& name, bool again, int mods);
+    void toggleHold();
+    void step(glm::dvec3 direction, double steps, bool fine);
     bool applies(const Key& key) const;
     std::vector<KeyHelp> help() const;
     Screen screen() const;

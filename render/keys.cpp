@@ -33,17 +33,33 @@ const std::vector<Controls::Key> Controls::keys{
     {hand, "hold left", "take the tool and move it in the plane of the picture", {}, nullptr},
     {hand, "  wheel", "push it along itself, or pull it back: 1 mm a notch", {}, nullptr},
     {hand, "  Ctrl wheel", "move it into the picture, or out of it: 1 mm a notch", {}, nullptr},
-    {hand, "  Shift", "five times finer", {}, nullptr},
+    {hand, "  Shift", "five times finer, mouse and keys", {}, nullptr},
+    {hand,
+     "Enter",
+     "take the tool, let it go: then keys move it as the mouse does",
+     {{GLFW_KEY_ENTER, 0, once}, {GLFW_KEY_KP_ENTER, 0, once}},
+     [](Controls& c, const Press&) { c.toggleHold(); }},
     {hand,
      "  right left",
-     "turn the tool by 2 degrees in the picture",
+     "move it by 1 mm in the picture; with Ctrl turn it by 2 degrees",
      {{GLFW_KEY_RIGHT}, {GLFW_KEY_LEFT, 0, -1}},
-     [](Controls& c, const Press& p) { c.hand_.turn(c.screen().into, p.sign * turnStep); }},
+     [](Controls& c, const Press& p) {
+         const auto screen = c.screen();
+         p.control ? c.hand_.turn(screen.into, p.sign * turnStep) : c.step(screen.right, p.sign, p.shift);
+     }},
     {hand,
      "  up down",
-     "turn the tool by 2 degrees out of the picture",
+     "move it by 1 mm in the picture; with Ctrl turn it by 2 degrees",
      {{GLFW_KEY_UP}, {GLFW_KEY_DOWN, 0, -1}},
-     [](Controls& c, const Press& p) { c.hand_.turn(c.screen().right, p.sign * turnStep); }},
+     [](Controls& c, const Press& p) {
+         const auto screen = c.screen();
+         p.control ? c.hand_.turn(screen.right, p.sign * turnStep) : c.step(screen.up, p.sign, p.shift);
+     }},
+    {hand,
+     "  Page down, up",
+     "push it 1 mm along itself, pull it back; with Ctrl into the picture",
+     {{GLFW_KEY_PAGE_DOWN}, {GLFW_KEY_PAGE_UP, 0, -1}},
+     [](Controls& c, const Press& p) { c.step(p.control ? c.screen().into : c.hand_.axis(), p.sign, p.shift); }},
     {hand,
      "  Space",
      "fire the biopsy gun; so does the right button",
@@ -121,10 +137,10 @@ const std::vector<Controls::Key> Controls::keys{
      {{GLFW_KEY_TAB}},
      [](Controls& c, const Press& p) { c.picture_.selectTissue(p.shift ? -1 : 1); }},
     {every,
-     "Page up, down",
-     "the tissue's opacity",
-     {{GLFW_KEY_PAGE_UP}, {GLFW_KEY_PAGE_DOWN, 0, -1}},
-     [](Controls& c, const Press& p) { c.picture_.changeOpacity(p.sign > 0 ? opacityStep : 1 / opacityStep); }},
+     "A",
+     "the tissue more opaque; with Shift less",
+     {{0, 'a'}},
+     [](Controls& c, const Press& p) { c.picture_.changeOpacity(p.shift ? 1 / opacityStep : opacityStep); }},
     {every,
      "U",
      "ultrasound picture, body",
@@ -260,14 +276,14 @@ bool Controls::applies(const Key& key) const
            (!key.ofUltrasound || picture_.ultrasoundShown());
 }
 
-void Controls::key(int key, const std::string& name, bool again, bool shift)
+void Controls::key(int key, const std::string& name, bool again, int mods)
 {
     used_ = true;
     for (const Key& k : keys) {
         for (const Stroke& s : k.strokes)
             if (applies(k) && (s.key != 0 ? s.key == key : name == std::string_view(&s.name, 1))) {
                 if (!again || s.sign != once)
-                    k.act(*this, {s.sign < 0 ? -1 : 1, shift, s.value});
+                    k.act(*this, {s.sign < 0 ? -1 : 1, (mods & GLFW_MOD_SHIFT) != 0, s.value, (mods & GLFW_MOD_CONTROL) != 0});
                 return;
             }
     }
