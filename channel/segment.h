@@ -107,6 +107,7 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(Scenery, entry),
                                     offsetof(Scenery, aim),
                                     offsetof(Scenery, forceCap),
+                                    offsetof(Scenery, throwLength),
                                     offsetof(Scenery, window),
                                     offsetof(Scenery, imageUnit),
                                     offsetof(Scenery, imageLow),
@@ -129,12 +130,14 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(State, aheadTissue),
                                     offsetof(State, coreTarget),
                                     offsetof(State, probe),
+                                    offsetof(State, standing),
                                     offsetof(State, hole),
                                     offsetof(State, missed),
                                     offsetof(State, published),
                                     offsetof(Input, axis),
                                     offsetof(Input, held),
                                     offsetof(Input, fires),
+                                    offsetof(Input, paused),
                                     offsetof(Input, beat),
                                     offsetof(Displacement, u)})
         for (int byte = 0; byte < 8; ++byte)

@@ -2,6 +2,7 @@
 
 #include <render/mouse_hand.h>
 #include <render/picture.h>
+#include <render/tryout.h>
 #include <render/viewer.h>
 
 #include <glm/vec2.hpp>
@@ -9,6 +10,7 @@
 #include <vtkGenericRenderWindowInteractor.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,10 +30,9 @@ namespace palpate::render {
 /// Middle shifts the camera. What keys do is in keys.cpp.
 class Controls {
 public:
-    /// Listens to `window` until it is destroyed. All must outlive that. @param playback  of a record; null = a live
-    /// session
+    /// Listens to `window` until it is destroyed. All must outlive that.
     Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture, const Follower& follower,
-             Playback* playback, std::filesystem::path images, bool steps);
+             const ViewerOptions& options);
     Controls(const Controls&) = delete;
     Controls& operator=(const Controls&) = delete;
 
@@ -81,6 +82,7 @@ private:
     std::vector<KeyHelp> help() const;
     Screen screen() const;
     void jumpBy(double seconds);
+    double shownTime() const;
     void scrub();
     bool onUltrasound() const;
     void camera(unsigned long event);
@@ -96,6 +98,7 @@ private:
     MouseHand hand_;
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
     bool steps_ = true;       // are told in words
+    std::optional<Tryout> tryout_;
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture
 };
