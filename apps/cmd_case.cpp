@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/viewers.h>
 #include <base/child_process.h>
 #include <base/outputs.h>
 #include <base/temporary_folder.h>
@@ -16,6 +17,8 @@
 
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 namespace palpate::apps {
 
@@ -119,8 +122,8 @@ void make(const Options& o)
     fmt::print("{}: made; edit its case.toml, then palpate case picture and palpate case check\n", c.folder.string());
 }
 
-// The beginning of a session of the scripted hand: the needle before the body.
-void recordBeginning(const Case& c, const fs::path& file)
+// The beginning of a session of the scripted hand: the tool before the body. Returns what is not to be seen.
+std::vector<std::string> recordBeginning(const Case& c, const fs::path& file)
 {
     const haptics::SessionModel model = session::openSession(c.scene, {});
     const haptics::SessionInfo info = session::describeSession(model, c.scene, "hand");
@@ -134,6 +137,7 @@ void recordBeginning(const Case& c, const fs::path& file)
     options.recorder = &recorder;
     session.run(*device, options);
     recorder.finish({});
+    return tissuesToFind(model);
 }
 
 void draw(const Options& o)
@@ -144,12 +148,17 @@ void draw(const Options& o)
     const base::TemporaryFolder folder("the session that is drawn");
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("drawing " + c.id);
-    recordBeginning(c, folder.path() / "session.db");
+    const auto hidden = recordBeginning(c, folder.path() / "session.db");
     const fs::path pictures = folder.path() / "pictures";
-    base::ChildProcess viewer(base::programFolder() / "palpate-view",
-                              {"--replay", (folder.path() / "session.db").string(), "--offscreen", pictures.string(),
-                               "--size", pictureSize, "--frames", "1"},
-                              "build it with -DPALPATE_VIEWER=ON");
+    std::vector<std::string> words{"--replay",    (folder.path() / "session.db").string(),
+                                   "--offscreen", pictures.string(),
+                                   "--size",      pictureSize,
+                                   "--layout",    "body",
+                                   "--frames",    "1"};
+    for (const std::string& tissue : hidden) {
+        words.insert(words.end(), {"--hide", tissue});
+    }
+    base::ChildProcess viewer(base::programFolder() / "palpate-view", words, "build it with -DPALPATE_VIEWER=ON");
     std::vector<fs::path> drawn;
     if (viewer.wait(pictureTimeout) == 0) {
         for (const auto& entry : fs::directory_iterator(pictures)) {

@@ -5,6 +5,7 @@
 
 #include <session/falcon.h>
 
+#include <haptics/falcon/force_test.h>
 #include <haptics/falcon/usb.h>
 
 #include <fmt/format.h>
@@ -37,6 +38,7 @@ struct DevicesOptions {
     bool installUdev = false;
     fs::path rules = "/etc/udev/rules.d";
     std::uint64_t exchanges = 0;
+    bool forceTest = false;
     std::string json;
 };
 
@@ -135,6 +137,25 @@ Exchanges exchange(const DevicesOptions& o)
     return done;
 }
 
+// A push of 1 N, to be felt.
+nlohmann::json pushOnce(const DevicesOptions& o)
+{
+    const auto wire = falcon::usbTransport();
+    falcon::Link link(*wire, session::linkOptions(o.falcon), session::sayForFalcon);
+    const std::atomic<bool> never{false};
+    link.connect(never);
+    const falcon::ForceTest test = falcon::testForce(link, *wire, session::sayForFalcon, never);
+    link.close();
+    if (o.json != "-") {
+        fmt::print("force test        {}\n", falcon::inWords(test));
+    }
+    return {{"held", test.held},
+            {"complete", test.complete},
+            {"peak_n", test.peak},
+            {"moved_mm", 1e3 * test.moved},
+            {"words", falcon::inWords(test)}};
+}
+
 double atShare(const std::vector<double>& sorted, double share)
 {
     const auto i = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
@@ -175,7 +196,7 @@ nlohmann::json list(const DevicesOptions& o)
     auto figures = nlohmann::json::array();
     for (const auto& f : falcons) {
         // With the options for an exchange that follows, the look would only take time.
-        const State state = f.allowed && f.driver.empty() && o.exchanges == 0 ? look() : State{};
+        const State state = f.allowed && f.driver.empty() && o.exchanges == 0 && !o.forceTest ? look() : State{};
         say(fmt::format("Novint Falcon on bus {}, address {}", f.bus, f.address));
         say(fmt::format("  may be opened   {}",
                         f.allowed ? "yes" : "no: run 'sudo palpate devices --install-udev', plug it in again"));
@@ -183,7 +204,7 @@ nlohmann::json list(const DevicesOptions& o)
                         f.driver.empty() ? "none" : f.driver + " (is detached when the Falcon is used)"));
         if (!state.problem.empty()) {
             say("  firmware        cannot be asked: " + state.problem);
-        } else if (f.allowed && f.driver.empty() && o.exchanges == 0) {
+        } else if (f.allowed && f.driver.empty() && o.exchanges == 0 && !o.forceTest) {
             say(fmt::format("  firmware        {}", !state.running ? "not loaded: give it with --falcon-firmware FILE"
                                                     : state.homed  ? "runs, homed"
                                                                    : "runs, not homed yet"));
@@ -227,6 +248,9 @@ void devices(const DevicesOptions& o)
             printExchanges(done);
         }
     }
+    if (o.forceTest) {
+        figures["force_test"] = pushOnce(o);
+    }
     if (!o.json.empty()) {
         command::writeJson(o.json, figures);
     }
@@ -242,6 +266,7 @@ void addDevices(CLI::App& app)
     c->add_option("--exchanges", o->exchanges,
                   "Make the Falcon ready and exchange so many packets without force: how fast, how surely")
         ->check(CLI::Range(1, 10000000));
+    c->add_flag("--force-test", o->forceTest, "Make the Falcon ready and push its grip with 1 N, to be felt");
     auto* install = c->add_flag("--install-udev", o->installUdev, "Write the rule that lets you open the Falcon (as root)");
     c->add_option("--udev-folder", o->rules, "Where udev's rules are")->capture_default_str();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)")

@@ -1,11 +1,13 @@
 #include <apps/command.h>
 
+#include <apps/train_attempts.h>
 #include <apps/train_figures.h>
 #include <apps/train_profile.h>
 #include <apps/viewers.h>
 #include <base/memory.h>
 #include <base/outputs.h>
 #include <base/temporary_folder.h>
+#include <base/words.h>
 #include <command/interrupted.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -60,11 +62,13 @@ struct Options {
     TrainingOptions training;
     double lesionDiameter = 10;  // [mm]
     bool sphere = false;
-    std::string layout = "trainee";
+    std::string layout = "trainee", palette = "standard";
+    bool sounds = false;
     bool view = false;
     bool noView = false;
     bool showTarget = false;  // of a palpation
     bool closeAtEnd = false;  // the window, instead of showing the result
+    bool tryout = false;
     bool unpaced = false;
     bool anyway = false;
     double seconds = 0;
@@ -183,22 +187,6 @@ void checkOutputs(const Options& o)
     }
 }
 
-// Names of the tissues that are to be found, and so not shown.
-std::vector<std::string> concealed(const Options& o, const haptics::SessionModel& model)
-{
-    std::vector<std::string> names;
-    if (model.scene.tool.kind == datasets::ToolKind::needle || o.showTarget) {
-        return names;
-    }
-    for (const auto& structure : model.tissue->structures()) {
-        const auto& labels = model.structures[0].labels;
-        if (std::ranges::find(labels, structure.value) != labels.end()) {
-            names.push_back(model.tissue->table().rows[structure.tissue].name);
-        }
-    }
-    return names;
-}
-
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
 // is now, as it is told.
 std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
@@ -304,15 +292,34 @@ ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, c
     wanted.layout = o.layout;
     wanted.pictures = o.unpaced ? "" : o.pictures;
     wanted.result = result;
-    wanted.hidden = concealed(o, model);
+    wanted.hidden = o.showTarget ? std::vector<std::string>() : tissuesToFind(model);
     wanted.test = o.training.test;
+    wanted.palette = o.palette;
+    wanted.sounds = o.sounds;
+    wanted.tryout = o.tryout ? o.seconds : 0;
     wanted.window = wantsWindow(o);
     wanted.handIsHere = session::deviceKind(o.device).needsViewer;
     return wanted;
 }
 
+// A tryout is a short session for nothing: in a body that is quickly there.
+void applyTryout(Options& o)
+{
+    constexpr double tryoutSeconds = 30;
+    if (!o.tryout) {
+        return;
+    }
+    if (!session::deviceKind(o.device).somebodyHolds) {
+        throw std::runtime_error("--tryout: somebody has to hold the tool: add --device mouse or --device falcon");
+    }
+    o.scene = o.sceneGiven ? o.scene : "layered";
+    o.seconds = o.seconds > 0 ? o.seconds : tryoutSeconds;
+    o.view = o.closeAtEnd = true;
+}
+
 void prepare(Options& o, const Training& training)
 {
+    applyTryout(o);
     for (const auto& text : o.inject) {
         const auto faults = session::parseFaults(text);
         o.faults.insert(o.faults.end(), faults.begin(), faults.end());
@@ -325,6 +332,9 @@ void prepare(Options& o, const Training& training)
 
 void train(Options o)
 {
+    if (wantsWindow(o)) {
+        base::useLanguage();
+    }
     Training training(o.training);
     prepare(o, training);
     std::optional<base::TemporaryFolder> temporary;
@@ -374,15 +384,14 @@ void train(Options o)
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };
     }
-    session::Trainer trainer(model, info, options);
     const auto begun = std::chrono::steady_clock::now();
-    session::TrainResult result = trainer.run();
+    session::TrainResult result = runToItsEnd(model, info, options);
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     const auto written = writeOutputs(o, info, model.scene.model, viewers, took, result);
     const bool counts = result.signal == 0 && !result.faulted;
     const auto kept = counts ? training.keep(info, result, record) : std::vector<std::string>{};
 
-    if (o.json != "-") {
+    if (o.json != "-" && !o.tryout) {
         summarise(result, info, model.scene.model);
         tell(fitted, written, kept);
     }
@@ -471,6 +480,12 @@ void addTrain(CLI::App& app)
     c->add_option("--layout", o->layout, "Of the window: trainee or instructor")
         ->check(CLI::IsMember({"trainee", "instructor"}))
         ->capture_default_str();
+    c->add_option("--palette", o->palette, "Of the window: standard, or colour-blind, with patterns in slices")
+        ->check(CLI::IsMember({"standard", "colour-blind"}))
+        ->capture_default_str();
+    c->add_flag("--sounds", o->sounds, "Of the window: sounds for warnings");
+    c->add_flag("--tryout", o->tryout, "30 s to learn what the hand does, told step by step: no record, no score")
+        ->excludes("--case", "--exercise", "--profile", "--test", unpaced);
     c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
     c->add_flag("--show-target", o->showTarget, "Show the target of a palpation, which the window hides");
     c->add_flag("--close-at-end", o->closeAtEnd,
@@ -478,8 +493,8 @@ void addTrain(CLI::App& app)
     c->add_option("--session", o->session, "Name under which viewers find the session");
     c->add_option("--operator", o->operatorName, "Who holds the device, or a pseudonym: for the record")
         ->check(operatorFault, "up to 200 bytes of text");
-    c->add_option("--record", o->record, "Record every tick to this file (SQLite)");
-    c->add_option("--report", o->report, "Write a report (HTML) to this file");
+    c->add_option("--record", o->record, "Record every tick to this file (SQLite)")->excludes("--tryout");
+    c->add_option("--report", o->report, "Write a report (HTML) to this file")->excludes("--tryout");
     c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder; of an --unpaced session after its end");
     c->add_flag("--anyway", o->anyway,
                 "Start also where a tick takes far too long here, or a phantom more memory than is free");

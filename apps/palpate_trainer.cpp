@@ -22,8 +22,7 @@ int main(int argc, char** argv)
     app.set_version_flag("--version", std::string(palpate::base::build()));
     app.add_option("--size", size, "WIDTHxHEIGHT in pixels")->capture_default_str();
     app.add_option("--text-scale", options.textScale, "Of all texts; in the window Ctrl with + or -")
-        ->check(CLI::Range(0.5, 3.0))
-        ->capture_default_str();
+        ->check(CLI::Range(0.5, 3.0));
     app.add_option("--case", options.caseId, "The case that is chosen at first (palpate case list)");
     app.add_option("--sessions", sessions, "Folder for records and figures of sessions")->capture_default_str();
     app.add_option("--frames", options.frames, "To measure: end after so many pictures (0: no limit)")

@@ -1,5 +1,6 @@
 #include <apps/replay_player.h>
 #include <base/build.h>
+#include <base/words.h>
 #include <command/json.h>
 #include <render/keys.h>
 #include <render/viewer.h>
@@ -62,28 +63,40 @@ void writeTimeline(const std::string& file, const std::vector<palpate::render::S
         throw std::runtime_error(file + ": cannot be written");
 }
 
-}  // namespace
+// What the command line says in words.
+struct Words {
+    std::string size = "1280x960", json, layout = "trainee", palette = "standard", ghost, slices = "tinted", timeline,
+                replay;
+    double at = -1;  // [s]; negative: from the beginning
+};
 
-int main(int argc, char** argv)
+void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
 {
-    CLI::App app(
-        "Shows a Palpate session that runs in another process. --keys lists what keys and mouse do, as does the "
-        "key ?.",
-        "palpate-view");
-    palpate::render::ViewerOptions options;
-    std::string size = "1280x960", json, layout = "trainee", slices = "tinted", timeline, replay;
     app.set_version_flag("--version", std::string(palpate::base::build()));
     app.add_flag_callback(
         "--keys", [] { throw CLI::CallForVersion(palpate::render::keysInWords(), 0); }, "List what keys and mouse do");
     app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
     app.add_option("--offscreen", options.offscreen, "Write PNG files to this folder instead of opening a window");
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");
-    app.add_option("--replay", replay, "Show a record (train --record) instead of a session that runs")
+    app.add_option("--replay", words.replay, "Show a record (train --record) instead of a session that runs")
         ->excludes("--session");
-    app.add_option("--layout", layout, "trainee or instructor")
-        ->check(CLI::IsMember({"trainee", "instructor"}))
+    app.add_option("--at", words.at, "With --replay: begin at this second of the session, and stand there")
+        ->check(CLI::Range(0.0, 86400.0));
+    app.add_option("--ghost", words.ghost,
+                   "With --replay: the tool of another record in the same body, such as an expert's");
+    app.add_option("--palette", words.palette,
+                   "Colours of tissues: standard, as in the body, or colour-blind, with patterns in slices")
+        ->check(CLI::IsMember({"standard", "colour-blind"}))
         ->capture_default_str();
-    app.add_option("--slices", slices,
+    app.add_flag("--sounds", options.sounds, "Sounds for warnings, in windows");
+}
+
+void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
+{
+    app.add_option("--layout", words.layout, "trainee, instructor or body (nothing else, and no words)")
+        ->check(CLI::IsMember({"trainee", "instructor", "body"}))
+        ->capture_default_str();
+    app.add_option("--slices", words.slices,
                    "Of a body with an image: tissue, tinted (the image in the tissues' colours) or image")
         ->check(CLI::IsMember({"tissue", "tinted", "image"}))
         ->capture_default_str();
@@ -95,35 +108,71 @@ int main(int argc, char** argv)
     app.add_flag("--no-plan", options.concealed.plan, "Without planned line and distance to the target: for a test");
     app.add_flag("!--no-steps", options.steps, "Without the steps in words, which a window shows");
     app.add_option("--result", options.result, "Figures of the session (train --json), shown when it has ended");
+    app.add_option("--tryout", options.tryout, "Of so many seconds: tell what the hand does, one thing after the other")
+        ->check(CLI::Range(0.0, 3600.0));
     app.add_flag("--hidden", options.hidden, "Draw as in a window, on a display that nobody sees (Xvfb): to measure");
-    app.add_option("--timeline", timeline, "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");
-    app.add_option("--size", size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    app.add_option("--timeline", words.timeline,
+                   "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");
+    app.add_option("--size", words.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
     app.add_option("--every", options.every, "With --offscreen: seconds of the session from one picture to the next")
         ->capture_default_str();
     app.add_option("--wait", options.wait, "Seconds without a session before giving up, and to stay when it has ended")
         ->capture_default_str();
     app.add_option("--frames", options.frames, "End after so many pictures (0: no limit)")->capture_default_str();
-    app.add_option("--json", json, "Write frame times to this file (-: standard output)");
+    app.add_option("--json", words.json, "Write frame times to this file (-: standard output)");
+}
+
+void applyLook(const Words& words, palpate::render::ViewerOptions& options)
+{
+    using palpate::render::Layout;
+    using palpate::render::Palette;
+    using palpate::render::SliceLook;
+    options.layout = words.layout == "instructor" ? Layout::instructor
+                     : words.layout == "body"     ? Layout::body
+                                                  : Layout::trainee;
+    options.palette = words.palette == "standard" ? Palette::standard : Palette::colourBlind;
+    options.slices = words.slices == "tissue"  ? SliceLook::tissue
+                     : words.slices == "image" ? SliceLook::image
+                                               : SliceLook::tinted;
+}
+
+}  // namespace
+
+int main(int argc, char** argv)
+{
+    CLI::App app(
+        "Shows a Palpate session that runs in another process. --keys lists what keys and mouse do, as does the "
+        "key ?.",
+        "palpate-view");
+    palpate::render::ViewerOptions options;
+    Words words;
+    addOptions(app, options, words);
+    addLookOptions(app, options, words);
     app.failure_message([](const CLI::App*, const CLI::Error& e) {
         return std::string("palpate-view: ") + e.what() + " (palpate-view --help lists what there is)\n";
     });
+    palpate::base::useLanguage();
     try {
         app.parse(argc, argv);
-        readSize(size, options);
-        options.instructor = layout == "instructor";
-        using palpate::render::SliceLook;
-        options.slices = slices == "tissue" ? SliceLook::tissue : slices == "image" ? SliceLook::image : SliceLook::tinted;
+        readSize(words.size, options);
+        applyLook(words, options);
         std::optional<palpate::apps::ReplayPlayer> player;
-        if (!replay.empty()) {
-            player.emplace(replay);
+        if (!words.replay.empty()) {
+            player.emplace(words.replay);
             options.session = player->session();
             options.playback = &player->playback();
+            if (words.at >= 0)
+                player->startAt(words.at);
+            if (!words.ghost.empty())
+                options.ghost = player->ghostOf(words.ghost);
+        } else if (words.at >= 0 || !words.ghost.empty()) {
+            throw std::runtime_error("--at and --ghost go with --replay RECORD");
         }
         const auto figures = palpate::render::runViewer(options);
-        if (!json.empty())
-            writeFigures(json, figures);
-        if (!timeline.empty())
-            writeTimeline(timeline, figures.shown);
+        if (!words.json.empty())
+            writeFigures(words.json, figures);
+        if (!words.timeline.empty())
+            writeTimeline(words.timeline, figures.shown);
         if (player && !player->problem().empty())
             throw std::runtime_error(player->problem());
         return 0;

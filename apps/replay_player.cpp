@@ -1,5 +1,6 @@
 #include <apps/replay_player.h>
 
+#include <base/words.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
 #include <haptics/replay.h>
@@ -103,6 +104,17 @@ struct ReplayPlayer::Impl {
         playback.fault = words;
     }
 
+    // What a debrief goes to: each event begins a moment, those of one look are one.
+    void noteMoments(const TickRecord& now)
+    {
+        constexpr double apart = 0.2;  // [s]
+        const double time = static_cast<double>(now.tick) * period;
+        if (now.eventCount > 0 && time > lastMoment + apart) {
+            playback.moments.add(time);
+            lastMoment = time;
+        }
+    }
+
     void compute()
     {
         try {
@@ -122,18 +134,20 @@ struct ReplayPlayer::Impl {
                 const bool first = comparison.differences().empty();
                 if (!comparison.add(then, now) && first) {
                     const bool force = now.total != then.total;
-                    blame(force ? "FORCES ARE NOT THOSE OF THE RECORD" : "THE RECORD SAYS SOMETHING ELSE",
+                    blame(force ? base::marked("FORCES ARE NOT THOSE OF THE RECORD")
+                                : base::marked("THE RECORD SAYS SOMETHING ELSE"),
                           fmt::format("{}: {} from tick {} on: the record was made by another build or method ({}), or was "
                                       "changed: {}",
                                       file, force ? "forces differ" : "what was recorded differs", then.tick,
                                       record.info().build, comparison.inWords()));
                 }
+                noteMoments(now);
                 showTick(now, timing, state);
                 film.add(state, simulation, *buffer);
                 playback.ready = static_cast<double>(then.tick) * period;
             });
         } catch (const std::exception& e) {
-            blame("THE RECORD ENDS HERE", e.what());
+            blame(base::marked("THE RECORD ENDS HERE"), e.what());
             // Without a single tick there is no time that could be shown.
             playback.length = film.ticks() > 0 ? playback.ready.load() : -1.0;
         }
@@ -197,11 +211,41 @@ struct ReplayPlayer::Impl {
     std::string session;
     channel::Publisher publisher;
     render::Playback playback;
+    double lastMoment = -1;  // [s]
     std::mutex problemGuard;
     std::string problem;
     std::atomic<bool> stop{false};
     std::thread computing, showing;
 };
+
+render::Ghost ReplayPlayer::ghostOf(const std::string& file) const
+{
+    const Record other(file);
+    if (other.info().volumeHash != impl_->record.info().volumeHash) {
+        throw std::runtime_error(
+            fmt::format("--ghost {}: is a session in another body than {}: its tool would be in no "
+                        "place of this one",
+                        file, impl_->file));
+    }
+    constexpr std::uint64_t every = 10;  // ticks
+    render::Ghost ghost;
+    other.each([&](const TickRecord& r) {
+        if (r.tick % every == 0) {
+            const auto tip = r.device.position + r.deflection;
+            ghost.push_back({static_cast<double>(r.tick) / other.info().rate,
+                             {tip.x, tip.y, tip.z},
+                             {r.device.axis.x, r.device.axis.y, r.device.axis.z},
+                             r.phase == Phase::inserted});
+        }
+    });
+    return ghost;
+}
+
+void ReplayPlayer::startAt(double seconds)
+{
+    impl_->playback.jump = std::clamp<double>(seconds, 0.0, impl_->playback.length);
+    impl_->playback.paused = true;
+}
 
 ReplayPlayer::ReplayPlayer(const std::string& file) : impl_(std::make_unique<Impl>(file)) {}
 

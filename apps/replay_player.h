@@ -22,6 +22,10 @@ public:
     /// The session's name, for the viewer.
     const std::string& session() const noexcept;
     render::Playback& playback() noexcept;
+    /// Where the tool of another record was. Throws std::runtime_error for one in another body.
+    render::Ghost ghostOf(const std::string& file) const;
+    /// Shows this moment, as soon as it is computed, and stands there.
+    void startAt(double seconds);
     /// Empty, or in words what is wrong: forces are not those of the record.
     std::string problem() const;
 

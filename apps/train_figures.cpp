@@ -68,6 +68,7 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
     figures["force_hash"] = session::hexadecimal(result.forceHash);
     figures["peak_memory_mb"] = session::peakMemoryMb();
     figures["lost_records"] = result.lostRecords;
+    figures["pauses"] = {{"count", result.timing.pauses}, {"seconds", result.timing.paused}};
     figures["warnings"] = result.warnings;
     return figures;
 }

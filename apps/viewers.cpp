@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <stdexcept>
@@ -58,12 +59,18 @@ void Viewers::stall(bool stopped)
 
 void Viewers::openWindow()
 {
-    std::vector<std::string> arguments{"--layout", wanted_.layout};
+    std::vector<std::string> arguments{"--layout", wanted_.layout, "--palette", wanted_.palette};
     for (const std::string& tissue : wanted_.hidden) {
         arguments.insert(arguments.end(), {"--hide", tissue});
     }
     if (wanted_.test) {
         arguments.insert(arguments.end(), {"--no-plan", "--no-steps"});
+    }
+    if (wanted_.sounds) {
+        arguments.emplace_back("--sounds");
+    }
+    if (wanted_.tryout > 0) {
+        arguments.insert(arguments.end(), {"--tryout", fmt::format("{:g}", wanted_.tryout)});
     }
     if (!wanted_.result.empty()) {
         arguments.insert(arguments.end(), {"--result", wanted_.result.string()});
@@ -77,6 +84,21 @@ void Viewers::start(std::optional<base::ChildProcess>& viewer, std::vector<std::
     arguments.insert(arguments.end(), {"--session", wanted_.session, "--wait", "30"});
     viewer.emplace(base::programFolder() / "palpate-view", arguments,
                    "build it with -DPALPATE_VIEWER=ON, or run with --no-view");
+}
+
+std::vector<std::string> tissuesToFind(const haptics::SessionModel& model)
+{
+    std::vector<std::string> names;
+    if (model.scene.tool.kind == datasets::ToolKind::needle) {
+        return names;
+    }
+    for (const auto& structure : model.tissue->structures()) {
+        const auto& labels = model.structures[0].labels;
+        if (std::ranges::find(labels, structure.value) != labels.end()) {
+            names.push_back(model.tissue->table().rows[structure.tissue].name);
+        }
+    }
+    return names;
 }
 
 void drawRecord(const std::filesystem::path& record, const std::string& pictures, double timeout)

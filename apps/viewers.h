@@ -1,6 +1,7 @@
 #pragma once
 
 #include <base/child_process.h>
+#include <haptics/session_model.h>
 
 #include <chrono>
 #include <filesystem>
@@ -13,12 +14,15 @@ namespace palpate::apps {
 
 /// Which viewers a session starts.
 struct ViewersWanted {
-    std::string session;              // its name
-    std::string layout;               // of the window
-    std::string pictures;             // folder of pictures to write; empty: none
-    std::filesystem::path result;     // figures that will be there at the end, for the window; empty: none
-    std::vector<std::string> hidden;  // tissues that the window does not show
-    bool test = false;                // no hints in the window
+    std::string session;               // its name
+    std::string layout;                // of the window
+    std::string pictures;              // folder of pictures to write; empty: none
+    std::filesystem::path result;      // figures that will be there at the end, for the window; empty: none
+    std::vector<std::string> hidden;   // tissues that the window does not show
+    bool test = false;                 // no hints in the window
+    std::string palette = "standard";  // of tissues
+    bool sounds = false;               // for warnings
+    double tryout = 0;                 // of so many seconds, see ViewerOptions; 0: none
     bool window = false;
     bool handIsHere = false;  // the window is the hand
 };
@@ -47,6 +51,9 @@ private:
     std::mutex guard_;
     std::chrono::steady_clock::time_point opened_;
 };
+
+/// Names of the tissues that a palpation is about, and so are not shown; none of a biopsy.
+std::vector<std::string> tissuesToFind(const haptics::SessionModel& model);
 
 /// Draws the pictures of a session of its record: without a clock no viewer keeps step with one. Throws std::runtime_error
 /// where they are not complete within `timeout` [s].

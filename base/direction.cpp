@@ -1,13 +1,16 @@
 #include <base/direction.h>
 
+#include <base/words.h>
+
 #include <cmath>
 
 namespace palpate::base {
 
 const char* sideInWords(int axis, bool positive) noexcept
 {
-    constexpr const char* sides[3][2] = {
-        {"the patient's right", "the patient's left"}, {"the front", "the back"}, {"the feet", "the head"}};
+    constexpr const char* sides[3][2] = {{marked("the patient's right"), marked("the patient's left")},
+                                         {marked("the front"), marked("the back")},
+                                         {marked("the feet"), marked("the head")}};
     return sides[axis][positive ? 1 : 0];
 }
 

@@ -19,7 +19,7 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 4;
+inline constexpr std::uint32_t version = 5;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
@@ -62,6 +62,11 @@ struct GreyWindow {
     double low = 0, high = 0;  // in the image's unit
 };
 
+/// Scenery::viewersHand: who holds the tool.
+inline constexpr std::uint32_t handElsewhere = 0,  // viewers only look on
+    handIsViewers = 1,                             // the mouse or the keys of a viewer
+    handIsDevices = 2;                             // a haptic device; a viewer may pause the session and end it
+
 enum class ToolKind : std::uint32_t { sphere, needle, capsule };
 enum class ProbeKind : std::uint32_t { none, linear, curved };
 
@@ -76,12 +81,13 @@ struct Scenery {
     std::array<Name, maxStructures> structure{};
     std::array<double, maxStructures> warnDistance{};
     ToolKind tool = ToolKind::needle;
-    std::uint32_t viewersHand = 0;  // 1: the hand is the mouse of a viewer
+    std::uint32_t viewersHand = handElsewhere;
     double toolRadius = 0;
     double toolLength = 0;
     Triple entry{};
     Triple aim{};
     double forceCap = 0;
+    double throwLength = 0;  // of the biopsy gun [m]
     // Of the intensity image, whose value at a display voxel is imageLow + imageStep * code.
     std::uint32_t windows = 0;  // to choose from, the best one first; 0: there is no image
     std::uint32_t padding = 0;
@@ -102,6 +108,8 @@ struct Scenery {
 enum class Phase : std::uint32_t { free, contact, inserted };
 enum class Warning : std::uint32_t { none, near, veryNear, touching };
 enum class Status : std::uint32_t { running, finished, faulted };
+/// A session that has been paused; toolElsewhere: it is to go on, and waits for the tool to come back to where it was.
+enum class Standing : std::uint32_t { no, paused, toolElsewhere };
 
 /// Where a core was taken, at rest: the middles of its ends [m].
 struct Hole {
@@ -142,7 +150,7 @@ struct State {
     double coreLength = 0;  // length in the target of the last core [m]
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
-    std::uint32_t holePadding = 0;
+    Standing standing = Standing::no;
     std::array<Hole, maxHoles> hole{};
     std::uint64_t missed = 0;     // ticks
     double tickP99 = 0;           // [s]
@@ -156,12 +164,12 @@ struct Input {
     // How far the other hand has moved the scene's ultrasound probe: press, slide, sweep [m], rock, tilt, turn [rad].
     std::array<double, 6> probe{};
     std::uint32_t held = 0;      // 1: the dead-man switch
-    std::uint32_t ended = 0;     // 1: the session is to end
+    std::uint32_t ended = 0;     // 1: the session is to end, 2: and to begin anew
     std::uint32_t fires = 0;     // how often the gun was fired: counted, so that a short press is never between two looks
     std::uint32_t marks = 0;     // how often the place of the tool was marked
     std::uint32_t pictures = 0;  // how often the ultrasound picture was stored
-    std::uint32_t padding = 0;
-    std::uint64_t beat = 0;  // how often this was written: it stands still when the viewer is dead or stuck
+    std::uint32_t paused = 0;    // 1: the session is to stand still
+    std::uint64_t beat = 0;      // how often this was written: it stands still when the viewer is dead or stuck
 };
 
 /// One displaced node of the lattice.

@@ -107,6 +107,7 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(Scenery, entry),
                                     offsetof(Scenery, aim),
                                     offsetof(Scenery, forceCap),
+                                    offsetof(Scenery, throwLength),
                                     offsetof(Scenery, window),
                                     offsetof(Scenery, imageUnit),
                                     offsetof(Scenery, imageLow),
@@ -129,6 +130,7 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(State, aheadTissue),
                                     offsetof(State, coreTarget),
                                     offsetof(State, probe),
+                                    offsetof(State, standing),
                                     offsetof(State, hole),
                                     offsetof(State, missed),
                                     offsetof(State, published),
@@ -137,6 +139,7 @@ constexpr std::uint64_t layoutHash() noexcept
                                     offsetof(Input, held),
                                     offsetof(Input, fires),
                                     offsetof(Input, pictures),
+                                    offsetof(Input, paused),
                                     offsetof(Input, beat),
                                     offsetof(Displacement, u)})
         for (int byte = 0; byte < 8; ++byte)

@@ -25,12 +25,12 @@ std::array<float, 3> floats(Vec3 v) noexcept
 
 }  // namespace
 
-channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand)
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand)
 {
     return publisherOf(session, model, viewersHand, displayGrid(*model.tissue));
 }
 
-channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand,
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
                                const volume::NodeGrid& display)
 {
     const Showing s = showingOf(model, viewersHand, display);
@@ -84,7 +84,7 @@ void showShape(const Simulation& simulation, channel::Displaced& out) noexcept
     }
 }
 
-Broadcast::Broadcast(const std::string& session, const SessionModel& model, bool viewersHand)
+Broadcast::Broadcast(const std::string& session, const SessionModel& model, std::uint32_t viewersHand)
     : publisher_(publisherOf(session, model, viewersHand))
 {
     static_assert(channel::maxStructures == maxStructures && channel::maxTissues == maxTissues);
@@ -93,12 +93,19 @@ Broadcast::Broadcast(const std::string& session, const SessionModel& model, bool
 void Broadcast::publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept
 {
     showTick(record, timing, state_);
+    state_.standing = channel::Standing::no;
     publisher_.setState(state_);
     if (record.tick % channel::frameTicks == 0) {
         showShape(simulation, publisher_.backBuffer());
         publisher_.backBuffer().tick = record.tick;
         publisher_.publishDisplaced();
     }
+}
+
+void Broadcast::stand(channel::Standing how) noexcept
+{
+    state_.standing = how;
+    publisher_.setState(state_);
 }
 
 void Broadcast::finish() noexcept

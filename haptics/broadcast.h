@@ -11,10 +11,11 @@
 namespace palpate::haptics {
 
 /// The segment of a session, with its scenery. Throws std::runtime_error when it cannot be made.
-/// @param viewersHand  the mouse of a viewer is the hand
-channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand = false);
+/// @param viewersHand  who holds the tool, see channel::handIsViewers
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model,
+                               std::uint32_t viewersHand = channel::handElsewhere);
 /// The same with the body's tissues, and the image if it has one, sampled on `display`.
-channel::Publisher publisherOf(const std::string& session, const SessionModel& model, bool viewersHand,
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
                                const volume::NodeGrid& display);
 
 /// What viewers see of a tick, on top of what they have seen of those before it. Allocates nothing.
@@ -27,7 +28,7 @@ void showShape(const Simulation& simulation, channel::Displaced& out) noexcept;
 class Broadcast {
 public:
     /// As publisherOf().
-    Broadcast(const std::string& session, const SessionModel& model, bool viewersHand = false);
+    Broadcast(const std::string& session, const SessionModel& model, std::uint32_t viewersHand = channel::handElsewhere);
 
     /// Wait-free; allocates nothing.
     void publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept;
@@ -35,6 +36,8 @@ public:
     std::optional<channel::Input> input() const noexcept { return publisher_.input(); }
     /// Whether another program has cut off the segment: nobody sees the session any more. Wait-free.
     bool torn() const noexcept { return publisher_.torn(); }
+    /// The last state again, while the session stands still. Wait-free; allocates nothing.
+    void stand(channel::Standing how) noexcept;
     /// The last state again, marked finished.
     void finish() noexcept;
 

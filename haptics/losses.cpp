@@ -1,7 +1,7 @@
 #include <haptics/losses.h>
 
 #include <base/direction.h>
-#include <base/spoken.h>
+#include <base/said.h>
 
 #include <fmt/format.h>
 
@@ -13,6 +13,9 @@
 namespace palpate::haptics {
 
 namespace {
+
+using base::said;
+using base::tr;
 
 constexpr double worthSaying = 1e-3;   // [m]; shorter ways have no direction
 constexpr double worthDepth = 5e-3;    // along the needle [m]: the notch is 20 mm long, and tissue is dragged along
@@ -26,7 +29,7 @@ double points(double most, double share)
 
 std::string timesInWords(std::uint32_t n)
 {
-    return n == 1 ? "once" : fmt::format("{} times", n);
+    return n == 1 ? tr("once") : said(tr("{} times"), n);
 }
 
 }  // namespace
@@ -39,10 +42,10 @@ std::string directionInWords(Vec3 way)
     }
     std::array<int, 3> order{0, 1, 2};
     std::ranges::sort(order, [&](int a, int b) { return std::abs(way[a]) > std::abs(way[b]); });
-    const auto named = [&](int axis) { return base::sideInWords(axis, way[axis] > 0); };
-    std::string words = fmt::format("towards {}", named(order[0]));
+    const auto named = [&](int axis) { return tr(base::sideInWords(axis, way[axis] > 0)); };
+    std::string words = said(tr("towards {}"), named(order[0]));
     if (std::abs(way[order[1]]) > 0.5 * std::abs(way[order[0]])) {
-        words += fmt::format(" and {}", named(order[1]));
+        words += said(tr(" and {}"), named(order[1]));
     }
     return words;
 }
@@ -99,11 +102,11 @@ void LossWatch::add(const TickRecord& record) noexcept
 // Where the best core lay, from the target at rest: records hold no more, and say the same as the session did.
 std::string LossWatch::miss(const Score& s, const std::string& target) const
 {
-    std::string words = s.bestTargetFraction > 0 ? fmt::format("The best core is {:.0f} % {} over {:.1f} mm",
-                                                               100 * s.bestTargetFraction, target, 1e3 * s.bestTargetLength)
-                                                 : fmt::format("No core hit the {}", target);
+    std::string words = s.bestTargetFraction > 0 ? said(tr("The best core is {:.0f} % {} over {:.1Lf} mm"),
+                                                        100 * s.bestTargetFraction, target, 1e3 * s.bestTargetLength)
+                                                 : said(tr("No core hit the {}"), target);
     if (s.bestTargetFraction <= 0 && std::isfinite(s.targetingError)) {
-        words += fmt::format(": the nearest lay {:.1f} mm beside it", 1e3 * s.targetingError);
+        words += said(tr(": the nearest lay {:.1Lf} mm beside it"), 1e3 * s.targetingError);
     }
     const Vec3 notch = core_.notchEnd - core_.notchStart;
     if (!target_ || glm::length(notch) < worthSaying) {
@@ -115,40 +118,40 @@ std::string LossWatch::miss(const Score& s, const std::string& target) const
     const Vec3 across = away - along * axis;
     std::string where;
     if (glm::length(across) >= worthSaying) {
-        where = fmt::format("{:.1f} mm off its middle {}", 1e3 * glm::length(across), directionInWords(across));
+        where = said(tr("{:.1Lf} mm off its middle {}"), 1e3 * glm::length(across), directionInWords(across));
     }
     if (std::abs(along) >= worthDepth) {
-        where += fmt::format("{}{:.1f} mm {}", where.empty() ? "" : ", ", 1e3 * std::abs(along),
-                             along > 0 ? "too deep" : "not deep enough");
+        where += said(tr("{}{:.1Lf} mm {}"), where.empty() ? "" : ", ", 1e3 * std::abs(along),
+                      along > 0 ? tr("too deep") : tr("not deep enough"));
     }
-    return words + (where.empty() ? "" : "; it lay " + where);
+    return words + (where.empty() ? "" : said(tr("; it lay {}"), where));
 }
 
 std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) const
 {
-    const std::string target = info.structures.empty() ? "target" : base::spoken(info.structures[0]);
+    const std::string target = info.structures.empty() ? tr("target") : base::spokenHere(info.structures[0]);
     if (s.passes == 0) {
-        return {{"passes", 75, "The gun was not fired: there is no core", std::nullopt}};
+        return {{"passes", 75, tr("The gun was not fired: there is no core"), std::nullopt}};
     }
     const ScoreShares share = sharesOf(s);
     const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * share.hit * share.stays;
     std::vector<Loss> all{
         {"best_target_pct", points(50, parts(s).core / 50) + points(25, share.hit), miss(s, target), at(shot)},
         {"beyond_target_mm", 25 * share.hit * (1 - share.stays),
-         fmt::format("The needle was pushed {:.1f} mm deeper than the {}", 1e3 * s.beyondTarget, target), at(beyond)},
-        {"passes", points(each, share.passes), fmt::format("{} cores were taken; one can do", s.passes), at(secondShot)},
-        {"skin_contacts", points(each, share.contacts),
-         fmt::format("The skin was touched {}", timesInWords(s.skinContacts)), at(secondContact)},
+         said(tr("The needle was pushed {:.1Lf} mm deeper than the {}"), 1e3 * s.beyondTarget, target), at(beyond)},
+        {"passes", points(each, share.passes), said(tr("{} cores were taken; one can do"), s.passes), at(secondShot)},
+        {"skin_contacts", points(each, share.contacts), said(tr("The skin was touched {}"), timesInWords(s.skinContacts)),
+         at(secondContact)},
         {"redirects", points(each, share.redirects),
-         fmt::format("The needle was drawn back and pushed on again {}", timesInWords(s.redirects)), at(redirect)},
+         said(tr("The needle was drawn back and pushed on again {}"), timesInWords(s.redirects)), at(redirect)},
         {"inserted_path_mm", points(each, share.economy),
-         fmt::format("The tip went {:.0f} mm inside the body, {:.0f} mm would have done", 1e3 * s.insertedPath,
-                     2e3 * s.deepest),
+         said(tr("The tip went {:.0f} mm inside the body, {:.0f} mm would have done"), 1e3 * s.insertedPath,
+              2e3 * s.deepest),
          std::nullopt},
-        {"peak_force_n", points(each, share.gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+        {"peak_force_n", points(each, share.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
     if (s.hasProbe) {
         all.push_back({"blind_advance_mm", points(each, share.seen),
-                       fmt::format("The needle went on {:.0f} mm without its tip in the picture", 1e3 * s.blindAdvance),
+                       said(tr("The needle went on {:.0f} mm without its tip in the picture"), 1e3 * s.blindAdvance),
                        at(blind)});
     }
     return all;
@@ -156,11 +159,11 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
 
 std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info) const
 {
-    const std::string target = info.structures.empty() ? "lump" : base::spoken(info.structures[0]);
+    const std::string target = info.structures.empty() ? tr("lump") : base::spokenHere(info.structures[0]);
     const ScoreShares share = sharesOf(s);
-    std::string where = std::isfinite(s.markError) ? fmt::format("The marks' middle lies {:.1f} mm beside that of the {}",
-                                                                 1e3 * s.markError, target)
-                                                   : fmt::format("What was marked cannot be compared with the {}", target);
+    std::string where = std::isfinite(s.markError)
+                            ? said(tr("The marks' middle lies {:.1Lf} mm beside that of the {}"), 1e3 * s.markError, target)
+                            : said(tr("What was marked cannot be compared with the {}"), target);
     if (target_) {
         const Vec3 away = marks_ / static_cast<double>(s.marks) - target_->middle;
         const std::string direction = directionInWords(away - glm::dot(away, target_->axis) * target_->axis);
@@ -169,24 +172,24 @@ std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info
     return {{"mark_error_mm", points(30, share.place) + (20 * share.size + 25 * share.gentle) * (1 - share.near), where,
              at(mark)},
             {"mark_size_error_mm", points(20, share.size),
-             fmt::format("The size was marked {:.1f} mm wrong", 1e3 * s.markSizeError), at(mark)},
-            {"peak_force_n", points(25, share.gentle), fmt::format("The force rose to {:.1f} N", s.peakForce), at(force)}};
+             said(tr("The size was marked {:.1Lf} mm wrong"), 1e3 * s.markSizeError), at(mark)},
+            {"peak_force_n", points(25, share.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
 }
 
 std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
 {
     const Score s = scorer_.score();
     if (s.skinContacts == 0) {
-        return {{"skin_contacts", 100, "The tool never touched the body", std::nullopt}};
+        return {{"skin_contacts", 100, tr("The tool never touched the body"), std::nullopt}};
     }
     std::vector<Loss> all = s.marks > 0 ? ofPalpation(s, info) : ofBiopsy(s, info);
     const std::string structure =
-        touched_ < info.structures.size() ? base::spoken(info.structures[touched_]) : "a vital structure";
+        touched_ < info.structures.size() ? base::spokenHere(info.structures[touched_]) : tr("a vital structure");
     all.push_back({"vital_contacts", points(25, parts(s).vital / 25),
                    s.vitalContacts == 0
-                       ? fmt::format("The tip was in a vital structure for {:.1f} s", s.vitalSeconds)
-                       : fmt::format("Vital structures were touched {}, first {}, for {:.1f} s and up to {:.1f} mm deep",
-                                     timesInWords(s.vitalContacts), structure, s.vitalSeconds, 1e3 * s.vitalDepth),
+                       ? said(tr("The tip was in a vital structure for {:.1Lf} s"), s.vitalSeconds)
+                       : said(tr("Vital structures were touched {}, first {}, for {:.1Lf} s and up to {:.1Lf} mm deep"),
+                              timesInWords(s.vitalContacts), structure, s.vitalSeconds, 1e3 * s.vitalDepth),
                    at(touch)});
     std::erase_if(all, [](const Loss& loss) { return loss.points < leastPoints; });
     std::ranges::stable_sort(all, std::ranges::greater{}, &Loss::points);

@@ -62,7 +62,7 @@ void addUltrasound(const SessionModel& model, channel::Scenery& s)
     s.holeRadius = model.scene.tool.notchRadius;
 }
 
-channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& labels, bool viewersHand)
+channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& labels, std::uint32_t viewersHand)
 {
     channel::Scenery s;
     s.scene = nameOf(model.scene.name);
@@ -85,7 +85,8 @@ channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& la
     s.entry = triple(model.approach.entry);
     s.aim = triple(model.approach.aim);
     s.forceCap = model.scene.forceCap;
-    s.viewersHand = viewersHand ? 1 : 0;
+    s.viewersHand = viewersHand;
+    s.throwLength = tool.throwLength;
     addUltrasound(model, s);
     return s;
 }
@@ -167,7 +168,7 @@ channel::TissueSound soundOf(const volume::TissueRow& row)
             static_cast<std::uint32_t>(a.pattern)};
 }
 
-Showing showingOf(const SessionModel& model, bool viewersHand, const volume::NodeGrid& display)
+Showing showingOf(const SessionModel& model, std::uint32_t viewersHand, const volume::NodeGrid& display)
 {
     Showing s;
     s.scenery = sceneryOf(model, display, viewersHand);

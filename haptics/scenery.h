@@ -22,7 +22,7 @@ volume::NodeGrid displayGrid(const volume::Tissue& tissue);
 /// What a tissue does to ultrasound, as viewers are told; see datasets::acousticsOf().
 channel::TissueSound soundOf(const volume::TissueRow& row);
 
-/// @param viewersHand  the mouse of a viewer is the hand
-Showing showingOf(const SessionModel& model, bool viewersHand, const volume::NodeGrid& display);
+/// @param viewersHand  who holds the tool, see channel::handIsViewers
+Showing showingOf(const SessionModel& model, std::uint32_t viewersHand, const volume::NodeGrid& display);
 
 }  // namespace palpate::haptics

@@ -1,5 +1,7 @@
 #include <haptics/servo.h>
 
+#include <glm/geometric.hpp>
+
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -92,12 +94,13 @@ void addWork(ServoTiming& timing, const TickRecord& record, Clock::duration work
     }
 }
 
-TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overloaded) noexcept
+TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overloaded, bool letGo) noexcept
 {
     const auto start = Clock::now();
     DeviceSample sample = device.read();
     sample.buttons |= overloaded ? modelTooSlow : 0U;
     sample.fresh = sample.fresh && !late;
+    sample.buttons &= letGo ? ~buttonDeadMan : ~0U;
     const auto read = Clock::now();
     TickRecord record = simulation.tick(sample);
     const auto computed = Clock::now();
@@ -108,6 +111,48 @@ TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overl
     return record;
 }
 
+// The way into a pause and out of it.
+class Pause {
+public:
+    Pause(const PauseHooks& hooks, bool paced) : hooks_(hooks), may_(paced && hooks.asked) {}
+
+    // Before a tick: whether the dead-man switch counts as let go.
+    bool begins() { return letGo_ = may_ && hooks_.asked(); }
+    // After it: whether the force is gone.
+    bool reached(const TickRecord& record) noexcept
+    {
+        faded_ = letGo_ ? faded_ + 1 : 0;
+        return faded_ >= PauseHooks::fadeTicks && glm::length(record.total) < 1e-9;
+    }
+    void stand(Device& device, Vec3 place, const std::atomic<bool>& stop, ServoTiming& timing)
+    {
+        const auto since = Clock::now();
+        auto due = since + period;
+        while (!device.finished() && !stop.load(std::memory_order_relaxed)) {
+            sleepUntil(due);
+            due = std::max(due, Clock::now() - period) + period;
+            const DeviceSample sample = device.read();
+            device.write(Vec3(0.0));
+            const bool elsewhere = !(glm::distance(sample.position, place) < PauseHooks::backAgain);
+            const bool asked = hooks_.asked();
+            if (!asked && !elsewhere) {
+                break;
+            }
+            if (hooks_.standing) {
+                hooks_.standing(!asked);
+            }
+        }
+        faded_ = 0;
+        ++timing.pauses;
+        timing.paused += seconds(Clock::now() - since);
+    }
+
+private:
+    const PauseHooks& hooks_;
+    bool may_, letGo_ = false;
+    int faded_ = 0;  // ticks
+};
+
 }  // namespace
 
 ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions& options, const TickSink& sink,
@@ -116,6 +161,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
     ServoTiming timing;
     Punctuality periods(timing);
     Overload overload(options.missedAllowed);
+    Pause pause(options.pause, options.paced);
     auto due = Clock::now() + period;
     int stale = 0;  // ticks that the force still fades, after a gap
     while (!device.finished() && !stop.load(std::memory_order_relaxed)) {
@@ -126,7 +172,8 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
             sleepUntil(due);
         }
         const auto start = Clock::now();
-        const TickRecord record = oneTick(device, simulation, stale > 0, options.paced && overload.askStepDown(timing));
+        const TickRecord record =
+            oneTick(device, simulation, stale > 0, options.paced && overload.askStepDown(timing), pause.begins());
         stale = std::max(0, stale - 1);
         const auto sent = Clock::now();
         addWork(timing, record, sent - start);
@@ -137,6 +184,10 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
             periods.add(sent > due);
         }
         sink(record, timing);
+        if (pause.reached(record)) {
+            pause.stand(device, record.device.position, stop, timing);
+            due = Clock::now() + period;
+        }
         const auto now = Clock::now();
         while (options.paced && now > due + period) {
             due += period;

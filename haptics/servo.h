@@ -11,12 +11,25 @@
 
 namespace palpate::haptics {
 
+/// A paced session that stands still when it is asked to. The force fades first, as when the dead-man switch is let go;
+/// then no tick is computed or recorded, so that measures and record know nothing of the time. It goes on where it was,
+/// once the tool is back within `backAgain` of there, with no force at first.
+struct PauseHooks {
+    std::function<bool()> asked;  // whether it is to stand still: once a period; empty: never
+    /// Once a period while it stands; `elsewhere`: it is to go on, and the tool is not back yet.
+    std::function<void(bool elsewhere)> standing;
+
+    static constexpr double backAgain = 2e-3;  // [m]
+    static constexpr int fadeTicks = 100;      // without the dead-man switch, before it stands
+};
+
 /// How a loop keeps time and when it ends.
 struct ServoOptions {
     bool paced = true;   // one tick per millisecond; false: as fast as it goes, for batches
     double seconds = 0;  // end after this much session time; 0 = when the device has finished
     /// Paced: asks for a cheaper model when more than this many of the last thousand ticks were missed; 0 = never.
     std::uint64_t missedAllowed = 100;
+    PauseHooks pause = {};  // paced: must allocate nothing, lock nothing and not block
 };
 
 /// Called after every tick, in the servo thread: must not allocate, lock or block.

@@ -45,6 +45,8 @@ struct ServoTiming {
     std::uint64_t overruns = 0;              // ticks whose own work took over a period
     std::uint64_t gaps = 0;                  // runs of missed ticks, one after the other without one in time between
     std::uint64_t longestGap = 0;            // [ticks]
+    std::uint64_t pauses = 0;                // how often the session was made to stand still
+    double paused = 0;                       // for how long in all, in no tick [s]
 };
 
 }  // namespace palpate::haptics

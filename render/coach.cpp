@@ -1,6 +1,7 @@
 #include <render/coach.h>
 
 #include <base/direction.h>
+#include <base/said.h>
 #include <render/deformation.h>
 #include <render/events.h>
 
@@ -13,14 +14,16 @@
 namespace palpate::render {
 namespace {
 
-constexpr double throwLength = 22e-3;  // of the gun [m], as in haptics/biopsy.h
-constexpr double atRim = 3e-3;         // from the target's surface: near enough to fire [m]
-constexpr double offLine = 3e-3;       // of tip from planned line that is told [m]
-constexpr double hit = 0.1;            // share of target in a core that is worth taking out
+using base::said;
+using base::tr;
+
+constexpr double atRim = 3e-3;    // from the target's surface: near enough to fire [m]
+constexpr double offLine = 3e-3;  // of tip from planned line that is told [m]
+constexpr double hit = 0.1;       // share of target in a core that is worth taking out
 
 const char* directionInWords(glm::dvec3 way)
 {
-    return base::directionInWords(way.x, way.y, way.z);
+    return tr(base::directionInWords(way.x, way.y, way.z));
 }
 
 double millimetres(double metres)
@@ -31,7 +34,7 @@ double millimetres(double metres)
 std::string target(const channel::Scenery& scenery)
 {
     const std::string name = text(scenery.structure[0]);
-    return name.empty() ? "target" : name;
+    return name.empty() ? tr("target") : base::spokenHere(name);
 }
 
 // From the planned line to the tip, across the line [m].
@@ -45,8 +48,8 @@ glm::dvec3 offPlan(const channel::Scenery& scenery, const channel::State& state)
 std::string lineFault(const channel::Scenery& scenery, const channel::State& state)
 {
     const glm::dvec3 off = offPlan(scenery, state);
-    return glm::length(off) > offLine ? fmt::format("The tip is {:.0f} mm off the line, towards {}",
-                                                    millimetres(glm::length(off)), directionInWords(off))
+    return glm::length(off) > offLine ? said(tr("The tip is {:.0f} mm off the line, towards {}"),
+                                             millimetres(glm::length(off)), directionInWords(off))
                                       : "";
 }
 
@@ -54,27 +57,27 @@ std::string lineFault(const channel::Scenery& scenery, const channel::State& sta
 std::string wayFault(const channel::Scenery& scenery, const channel::State& state, glm::dvec3 aim)
 {
     if (state.distance[0] <= 0)
-        return -state.distance[0] > atRim ? fmt::format("The tip is {:.0f} mm inside the {}: draw back to its near rim",
-                                                        millimetres(-state.distance[0]), target(scenery))
+        return -state.distance[0] > atRim ? said(tr("The tip is {:.0f} mm inside the {}: draw back to its near rim"),
+                                                 millimetres(-state.distance[0]), target(scenery))
                                           : "";
     if (std::isfinite(state.ahead[0]))
         return "";
     const glm::dvec3 way = aim - vec(state.tip), axis = vec(state.axis);
     const double along = glm::dot(way, axis);
     if (along < 0)
-        return fmt::format("The tip is beyond the {}: draw back", target(scenery));
+        return said(tr("The tip is beyond the {}: draw back"), target(scenery));
     const glm::dvec3 across = way - along * axis;
-    return fmt::format("The needle passes the {}: its middle lies {:.0f} mm towards {}", target(scenery),
-                       millimetres(glm::length(across)), directionInWords(across));
+    return said(tr("The needle passes the {}: its middle lies {:.0f} mm towards {}"), target(scenery),
+                millimetres(glm::length(across)), directionInWords(across));
 }
 
 // What else the gun would hit.
 std::string throwFault(const channel::Scenery& scenery, const channel::State& state)
 {
     for (std::size_t s = 1; s < std::min<std::size_t>(scenery.structures, channel::maxStructures); ++s)
-        if (state.ahead[s] >= 0 && state.ahead[s] < throwLength)
-            return fmt::format("Do not fire: the {:.0f} mm of the throw would reach {}", millimetres(throwLength),
-                               text(scenery.structure[s]));
+        if (state.ahead[s] >= 0 && state.ahead[s] < scenery.throwLength)
+            return said(tr("Do not fire: the {:.0f} mm of the throw would reach {}"), millimetres(scenery.throwLength),
+                        base::spokenHere(text(scenery.structure[s])));
     return "";
 }
 
@@ -84,27 +87,27 @@ Coaching approach(const channel::Scenery& scenery, const channel::State& state, 
     const bool told = view.planned && scenery.entry != scenery.aim;
     if (state.phase == channel::Phase::free) {
         c.step = 1;
-        c.now = told ? "Touch the skin at the mark, where the planned line begins" : "Touch the skin with the needle";
+        c.now =
+            told ? tr("Touch the skin at the mark, where the planned line begins") : tr("Touch the skin with the needle");
         c.wrong = told ? lineFault(scenery, state) : "";
     } else if (state.phase == channel::Phase::contact) {
         c.step = 2;
-        c.now = "Push along the needle until the skin gives way";
+        c.now = tr("Push along the needle until the skin gives way");
         c.wrong = told ? lineFault(scenery, state) : "";
     } else if (state.distance[0] > atRim) {
         c.step = 3;
         const double left = std::isfinite(state.ahead[0]) ? state.ahead[0] : state.distance[0];
-        c.now = fmt::format("Advance until the tip is at the {}'s rim{}", target(scenery),
-                            view.planned ? fmt::format(" ({:.0f} mm to go)", millimetres(left)) : "");
+        c.now = said(tr("Advance until the tip is at the {}'s rim{}"), target(scenery),
+                     view.planned ? said(tr(" ({:.0f} mm to go)"), millimetres(left)) : "");
         c.wrong = view.planned ? wayFault(scenery, state, view.aim) : "";
     } else {
         c.step = 4;
-        c.now = view.handIsHere ? "Fire the gun (Space, or the right button)" : "Fire the gun";
+        c.now = view.handIsHere ? tr("Fire the gun (Space, or the right button)") : tr("Fire the gun");
         const std::string danger = throwFault(scenery, state);
         c.wrong = !danger.empty() ? danger : view.planned ? wayFault(scenery, state, view.aim) : "";
     }
     if (state.cores > 0 && state.coreTarget < hit && c.wrong.empty())
-        c.wrong =
-            fmt::format("Core {} holds {:.0f} % {}: take another", state.cores, 100 * state.coreTarget, target(scenery));
+        c.wrong = said(tr("Core {} holds {:.0f} % {}: take another"), state.cores, 100 * state.coreTarget, target(scenery));
     return c;
 }
 
@@ -114,11 +117,12 @@ Coaching biopsy(const channel::Scenery& scenery, const channel::State& state, co
         return approach(scenery, state, view);
     if (state.phase != channel::Phase::free)
         return {5, 5,
-                fmt::format("Core {} holds {:.0f} % {}: draw the needle out", state.cores, 100 * state.coreTarget,
-                            target(scenery)),
+                said(tr("Core {} holds {:.0f} % {}: draw the needle out"), state.cores, 100 * state.coreTarget,
+                     target(scenery)),
                 "", false};
     return {5, 5,
-            view.handIsHere ? "Done: end the session (E, or click here), or take another core" : "Done: the core is out",
+            view.handIsHere ? tr("Done: end the session (E, or click here), or take another core")
+                            : tr("Done: the core is out"),
             "", view.handIsHere};
 }
 
@@ -126,13 +130,13 @@ Coaching palpation(const channel::State& state, const CoachView& view)
 {
     if (view.marks >= 2)
         return {3, 3,
-                view.handIsHere ? "End the session (E, or click here), or mark another edge (M)"
-                                : "Done: both edges are marked",
+                view.handIsHere ? tr("End the session (E, or click here), or mark another edge (M)")
+                                : tr("Done: both edges are marked"),
                 "", view.handIsHere};
     if (state.phase == channel::Phase::free)
-        return {1, 3, "Touch the skin with the fingertip", "", false};
-    std::string now = view.marks == 0 ? "Press here and there: where is it harder? Mark one edge of it"
-                                      : "Mark the opposite edge of the lump";
+        return {1, 3, tr("Touch the skin with the fingertip"), "", false};
+    std::string now = view.marks == 0 ? tr("Press here and there: where is it harder? Mark one edge of it")
+                                      : tr("Mark the opposite edge of the lump");
     return {2, 3, now + (view.handIsHere ? " (M)" : ""), "", false};
 }
 
@@ -143,7 +147,7 @@ Coaching coach(const channel::Scenery& scenery, const channel::State& state, con
     if (state.status == channel::Status::finished)
         return {};
     if (state.status == channel::Status::faulted)
-        return {1, 1, "End the session", "The forces are off", view.handIsHere};
+        return {1, 1, tr("End the session"), tr("The forces are off"), view.handIsHere};
     const bool needle = scenery.tool == channel::ToolKind::needle;
     return needle && !view.targetHidden ? biopsy(scenery, state, view) : palpation(state, view);
 }

@@ -15,10 +15,13 @@ std::array<bool, channel::maxTissues> concealedRows(const Concealment& what, con
 {
     std::array<bool, channel::maxTissues> rows{};
     std::vector<std::string> names = what.tissues;
-    for (std::string& name : names)
-        std::ranges::replace(name, '_', ' ');  // as text() does
+    const auto blanks = [](std::string name) {
+        std::ranges::replace(name, '_', ' ');
+        return name;
+    };
+    std::ranges::transform(names, names.begin(), blanks);
     for (std::size_t row = 1; row < std::min<std::size_t>(scenery.tissues, channel::maxTissues); ++row)
-        rows[row] = std::ranges::find(names, text(scenery.tissue[row].name)) != names.end();
+        rows[row] = std::ranges::find(names, blanks(text(scenery.tissue[row].name))) != names.end();
     return rows;
 }
 

@@ -1,6 +1,7 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <base/said.h>
 #include <render/controls.h>
 
 #include <vtkCommand.h>
@@ -14,7 +15,10 @@
 namespace palpate::render {
 namespace {
 
-constexpr double depthStep = 1e-3;  // of a notch of the wheel [m]
+using base::said;
+using base::tr;
+
+constexpr double depthStep = 1e-3;  // of a notch of the wheel, or a key [m]
 constexpr double fineShare = 0.2;   // with Shift
 
 Controls& controlsOf(GLFWwindow* window)
@@ -59,15 +63,17 @@ ultrasound::ProbeMove probeMove(glm::dvec2 pixels, bool turned)
 }  // namespace
 
 Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture,
-                   const Follower& follower, Playback* playback, std::filesystem::path images, bool steps)
+                   const Follower& follower, const ViewerOptions& options)
     : window_(window),
       interactor_(interactor),
       picture_(picture),
       follower_(follower),
-      playback_(playback),
-      images_(std::move(images)),
-      steps_(steps)
+      playback_(options.playback),
+      images_(options.images),
+      steps_(options.steps)
 {
+    if (options.tryout > 0)
+        tryout_.emplace(options.tryout);
     glfwSetWindowUserPointer(window, this);
     glfwSetMouseButtonCallback(
         window, [](GLFWwindow* w, int button, int action, int) { controlsOf(w).button(button, action == GLFW_PRESS); });
@@ -78,7 +84,7 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
     glfwSetKeyCallback(window, [](GLFWwindow* w, int key, int scancode, int action, int mods) {
         const char* name = glfwGetKeyName(key, scancode);
         if (action != GLFW_RELEASE)
-            controlsOf(w).key(key, name != nullptr ? name : "", action == GLFW_REPEAT, (mods & GLFW_MOD_SHIFT) != 0);
+            controlsOf(w).key(key, name != nullptr ? name : "", action == GLFW_REPEAT, mods);
     });
     // Where it is on a keyboard differs too much for a key's name.
     glfwSetCharCallback(window, [](GLFWwindow* w, unsigned int character) {
@@ -95,7 +101,9 @@ void Controls::keep()
 {
     hand_.keep(follower_);
     const auto input = follower_.session() != nullptr ? follower_.session()->input() : std::nullopt;
-    picture_.setSteps(steps_, input ? input->marks : 0, hand_.is());
+    picture_.setSteps(steps_, input ? input->marks : 0, hand_.commands());
+    if (tryout_ && follower_.known() && follower_.session() != nullptr)
+        picture_.setCoaching(tryout_->see(follower_.session()->scenery(), follower_.state(), hand_.held()));
     picture_.setCaption(caption());
     picture_.setHand(hand_.is() && hand_.held() ? std::optional(hand_.target()) : std::nullopt);
     if (playback_ != nullptr)
@@ -128,7 +136,7 @@ void Controls::button(int button, bool down)
     }
     if (button == GLFW_MOUSE_BUTTON_RIGHT && down && hand_.held())
         return hand_.fire();
-    if (button == GLFW_MOUSE_BUTTON_LEFT && down && hand_.is() && picture_.endsAt(point(cursor_)))
+    if (button == GLFW_MOUSE_BUTTON_LEFT && down && hand_.commands() && picture_.endsAt(point(cursor_)))
         return hand_.end();
     if (button == GLFW_MOUSE_BUTTON_LEFT && hand_.is())
         return down ? hand_.press(follower_.state()) : hand_.release();
@@ -160,13 +168,27 @@ void Controls::moved(glm::dvec2 to, bool fine)
     camera(vtkCommand::MouseMoveEvent);
 }
 
+// By the keyboard: what the left button does while it is held.
+void Controls::toggleHold()
+{
+    if (hand_.held())
+        hand_.release();
+    else if (hand_.is())
+        hand_.press(follower_.state());
+}
+
+void Controls::step(glm::dvec3 direction, double steps, bool fine)
+{
+    hand_.move(steps * (fine ? fineShare : 1.0) * depthStep * direction);
+}
+
 void Controls::wheel(double notches, bool fine, bool intoPicture)
 {
     used_ = true;
     if (onUltrasound())
         picture_.ultrasound().turn(Knob::depth, notches > 0 ? -1 : 1);
     else if (hand_.is())
-        hand_.move((fine ? fineShare : 1.0) * notches * depthStep * (intoPicture ? screen().into : hand_.axis()));
+        step(intoPicture ? screen().into : hand_.axis(), notches, fine);
     else
         camera(notches > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
 }
@@ -204,19 +226,23 @@ std::string Controls::caption() const
 {
     if (playback_ != nullptr) {
         const Playback& p = *playback_;
-        const std::string how = p.paused ? "PAUSED" : fmt::format("REPLAY x {:g}", p.speed.load());
+        const std::string how = p.paused ? tr("PAUSED") : said(tr("REPLAY x {:Lg}"), p.speed.load());
         const bool computing = p.ready < p.length;
         const char* fault = p.fault;
-        return fmt::format("{}   {:.3f} of {:.1f} s{}{}", how, p.time.load(), p.length.load(),
-                           computing ? fmt::format("   ({:.1f} s computed)", p.ready.load()) : "",
-                           fault != nullptr ? fmt::format("   {}", fault) : "");
+        return said(tr("{}   {:.3Lf} of {:.1Lf} s{}{}"), how, p.time.load(), p.length.load(),
+                    computing ? said(tr("   ({:.1Lf} s computed)"), p.ready.load()) : "",
+                    fault != nullptr ? std::string("   ") + tr(fault) : "");
     }
+    if (follower_.state().standing == channel::Standing::toolElsewhere)
+        return tr("PAUSED   bring the tool back to where it was");
+    if (hand_.paused())
+        return tr("PAUSED   S goes on, E ends, Backspace begins anew");
     if (!hand_.is())
         return "";
     if (!hand_.held())
-        return "hold the left button to take the tool   (? lists the keys)";
+        return tr("hold the left button, or press Enter, to take the tool   (? lists the keys)");
     const double lag = glm::distance(hand_.target(), vec(follower_.state().tip));
-    return fmt::format("holding   hand ahead of the tip by {:.1f} mm", 1e3 * lag);
+    return said(tr("holding   hand ahead of the tip by {:.1Lf} mm"), 1e3 * lag);
 }
 
 }  // namespace palpate::render

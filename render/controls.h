@@ -2,6 +2,7 @@
 
 #include <render/mouse_hand.h>
 #include <render/picture.h>
+#include <render/tryout.h>
 #include <render/viewer.h>
 
 #include <glm/vec2.hpp>
@@ -9,6 +10,7 @@
 #include <vtkGenericRenderWindowInteractor.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +21,7 @@ namespace palpate::render {
 /// What keys and mouse do in a window: the hand, the camera, what is shown, and a record that is played.
 ///
 ///     session with a hand of a viewer   left: hold to move the tool, wheel: along itself; right: camera
+///                                       keys: Enter takes the tool and lets it go, arrows and pages move it
 ///     any other session                 left or right: camera, wheel: zoom
 ///     record                            left: drag through the time, right: camera, wheel: zoom
 ///
@@ -27,10 +30,9 @@ namespace palpate::render {
 /// Middle shifts the camera. What keys do is in keys.cpp.
 class Controls {
 public:
-    /// Listens to `window` until it is destroyed. All must outlive that. @param playback  of a record; null = a live
-    /// session
+    /// Listens to `window` until it is destroyed. All must outlive that.
     Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interactor, Picture& picture, const Follower& follower,
-             Playback* playback, std::filesystem::path images, bool steps);
+             const ViewerOptions& options);
     Controls(const Controls&) = delete;
     Controls& operator=(const Controls&) = delete;
 
@@ -44,6 +46,7 @@ public:
         int sign;  // of the stroke
         bool shift;
         int value;  // of the stroke
+        bool control = false;
     };
     static constexpr int once = 0;  // instead of a sign: a key that is held down does not repeat
     struct Stroke {
@@ -72,11 +75,14 @@ private:
     void button(int button, bool down);
     void moved(glm::dvec2 to, bool fine);
     void wheel(double notches, bool fine, bool intoPicture);
-    void key(int key, const std::string& name, bool again, bool shift);
+    void key(int key, const std::string& name, bool again, int mods);
+    void toggleHold();
+    void step(glm::dvec3 direction, double steps, bool fine);
     bool applies(const Key& key) const;
     std::vector<KeyHelp> help() const;
     Screen screen() const;
     void jumpBy(double seconds);
+    double shownTime() const;
     void scrub();
     bool onUltrasound() const;
     void camera(unsigned long event);
@@ -92,6 +98,7 @@ private:
     MouseHand hand_;
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
     bool steps_ = true;       // are told in words
+    std::optional<Tryout> tryout_;
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture
 };

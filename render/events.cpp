@@ -1,5 +1,7 @@
 #include <render/events.h>
 
+#include <base/said.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,9 +10,7 @@ namespace palpate::render {
 
 std::string text(const channel::Name& name)
 {
-    std::string words(name.data(), std::find(name.begin(), name.end(), '\0'));
-    std::replace(words.begin(), words.end(), '_', ' ');
-    return words;
+    return {name.data(), std::find(name.begin(), name.end(), '\0')};
 }
 
 std::vector<Event> eventsBetween(const channel::State& before, const channel::State& now)
@@ -33,30 +33,34 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
     return events;
 }
 
+using base::said;
+using base::tr;
+
 std::string words(const Event& event, const channel::Scenery& scenery)
 {
-    const auto structure = text(scenery.structure[std::min<std::size_t>(event.structure, channel::maxStructures - 1)]);
+    const auto structure =
+        base::spokenHere(text(scenery.structure[std::min<std::size_t>(event.structure, channel::maxStructures - 1)]));
     switch (event.kind) {
         case EventKind::contact:
-            return "touches the skin";
+            return tr("touches the skin");
         case EventKind::inserted:
-            return "goes in";
+            return tr("goes in");
         case EventKind::out:
-            return "is out";
+            return tr("is out");
         case EventKind::near:
-            return "near " + structure;
+            return said(tr("near {}"), structure);
         case EventKind::veryNear:
-            return "very near " + structure;
+            return said(tr("very near {}"), structure);
         case EventKind::touching:
-            return "touching " + structure;
+            return said(tr("touching {}"), structure);
         case EventKind::fired:
-            return fmt::format("core: {:.0f} % target", 100 * event.target);
+            return said(tr("core: {:.0f} % target"), 100 * event.target);
         case EventKind::fault:
-            return "FAULT: forces off";
+            return tr("FAULT: forces off");
         case EventKind::finished:
             break;
     }
-    return "session ended";
+    return tr("session ended");
 }
 
 }  // namespace palpate::render

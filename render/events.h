@@ -24,7 +24,7 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
 /// "touching artery", "core: 83 % target".
 std::string words(const Event& event, const channel::Scenery& scenery);
 
-/// A name of a table, as words.
+/// A name as the table has it; base::spokenHere() says it to people.
 std::string text(const channel::Name& name);
 
 }  // namespace palpate::render

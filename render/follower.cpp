@@ -1,5 +1,6 @@
 #include <render/follower.h>
 
+#include <base/said.h>
 #include <render/result_file.h>
 
 #include <fmt/format.h>
@@ -14,6 +15,9 @@
 
 namespace palpate::render {
 namespace {
+
+using base::said;
+using base::tr;
 
 double seconds(Clock::duration d)
 {
@@ -120,7 +124,8 @@ void Follower::read()
     if (!now)
         return;
     if (known_ && now->tick == state_.tick) {
-        state_.published = now->published;  // a record that is paused
+        state_.published = now->published;  // a record or a session that is paused
+        state_.standing = now->standing;
         return;
     }
     if (!known_ || now->tick < rateFrom_.tick)
@@ -156,16 +161,16 @@ void Follower::notice(Picture& picture)
     constexpr double longest = 1.0;  // [s]
     const bool silent = known_ && monotonic() - publishedAt(state_) > longest;
     if (silent != std::exchange(silent_, silent))
-        picture.setNotice(silent ? "no answer from the simulation" : "", silent ? "the picture is as it was" : "");
+        picture.setNotice(silent ? tr("no answer from the simulation") : "", silent ? tr("the picture is as it was") : "");
 }
 
 void Follower::leave(Picture& picture)
 {
     const bool finished = ending_ == channel::Ending::finished;
-    picture.setNotice(finished                           ? "simulation ended"
-                      : ending_ == channel::Ending::torn ? "shared memory was cut off"
-                                                         : "simulation stopped without ending",
-                      fmt::format("closes in {:.0f} s unless session {} starts again", wait_, name_));
+    picture.setNotice(finished                           ? tr("simulation ended")
+                      : ending_ == channel::Ending::torn ? tr("shared memory was cut off")
+                                                         : tr("simulation stopped without ending"),
+                      said(tr("closes in {:.0f} s unless session {} starts again"), wait_, name_));
     readShape();
     subscriber_.reset();
     since_ = Clock::now();
@@ -178,7 +183,7 @@ void Follower::lookForResult(Picture& picture)
     if (auto card = readResult(result_)) {
         resultShown_ = true;
         picture.setResult(std::move(*card));
-        picture.setNotice("session ended", "Q closes the window");
+        picture.setNotice(tr("session ended"), tr("Q closes the window"));
     }
 }
 
@@ -199,7 +204,8 @@ void Follower::poll(Picture& picture)
     polled_ = Clock::now();
     if (!subscriber_) {
         if (ending_ == channel::Ending::none)
-            picture.setNotice("waiting for session" + (wanted_.empty() ? "" : " " + wanted_), "palpate train starts one");
+            picture.setNotice(wanted_.empty() ? tr("waiting for a session") : said(tr("waiting for session {}"), wanted_),
+                              tr("palpate train starts one"));
         tryAttach(picture);
     }
     if (!subscriber_) {

@@ -1,5 +1,7 @@
 #include <render/header.h>
 
+#include <base/said.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +10,10 @@
 
 namespace palpate::render {
 namespace {
+
+using base::said;
+using base::spokenHere;
+using base::tr;
 
 constexpr Colour cardColour{0.05, 0.06, 0.09};
 constexpr double edge = 0.8;  // of a text from its area, in fonts
@@ -44,8 +50,8 @@ struct Column {
 void drawTitle(Column& column, const channel::Scenery& scenery, const channel::State& state, const std::string& session)
 {
     const double size = 1.25 * column.font;
-    const std::string title = text(scenery.scene), time = fmt::format("{:.1f} s", state.time);
-    const std::string all = "session " + session + "   " + time;
+    const std::string title = text(scenery.scene), time = said("{:.1Lf} s", state.time);
+    const std::string all = said(tr("session {}   {}"), session, time);
     const double room = column.width - column.canvas.widthOf(title, size, true) - 2 * column.font;
     column.line(title, size, white, true);
     for (const std::string& words : {all, time})
@@ -61,13 +67,13 @@ std::string warningWords(const channel::Scenery& scenery, const channel::State& 
 {
     const std::size_t s = std::min<std::size_t>(state.warned, channel::maxStructures - 1);
     if (state.status == channel::Status::faulted)
-        return "FAULT: forces are off";
+        return tr("FAULT: forces are off");
     if (state.warning == channel::Warning::none)
         return "";
     if (state.warning == channel::Warning::touching)
-        return "STOP: touching " + text(scenery.structure[s]);
-    return fmt::format("{}: {} at {:.1f} mm", state.warning == channel::Warning::near ? "CAREFUL" : "VERY NEAR",
-                       text(scenery.structure[s]), state.distance[s] * 1e3);
+        return said(tr("STOP: touching {}"), spokenHere(text(scenery.structure[s])));
+    return said(tr("{}: {} at {:.1Lf} mm"), state.warning == channel::Warning::near ? tr("CAREFUL") : tr("VERY NEAR"),
+                spokenHere(text(scenery.structure[s])), state.distance[s] * 1e3);
 }
 
 void drawCaption(Column& column, const Header& header)
@@ -165,10 +171,10 @@ void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result
         for (const std::string& part : wrapped(canvas, words, size, bold, room))
             lines.push_back({part, size, colour, bold});
     };
-    add(fmt::format("{:.0f} of 100 points", result.total), 1.8 * font, white, true);
+    add(said(tr("{:.0f} of 100 points"), result.total), 1.8 * font, white, true);
     for (const std::string& part : result.parts)
         add(part, font, grey, false);
-    add(result.losses.empty() ? "Nothing was lost" : "Where the points went", 1.1 * font, amber, true);
+    add(result.losses.empty() ? tr("Nothing was lost") : tr("Where the points went"), 1.1 * font, amber, true);
     for (const std::string& loss : result.losses)
         add(loss, 1.05 * font, white, false);
     add(smaller, font, grey, false);

@@ -1,6 +1,7 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <base/words.h>
 #include <render/controls.h>
 
 #include <vtkCommand.h>
@@ -14,12 +15,16 @@
 namespace palpate::render {
 namespace {
 
+using base::marked;
+
 constexpr double turnStep = 2.0 / 180.0 * 3.14159265358979323846;  // of an arrow key [rad]
 constexpr double opacityStep = 1.25;
 constexpr double tick = 1e-3, frame = 1.0 / 30, leap = 1.0;  // steps through a record [s]
 
-// Windows in which a key means something: of a session, of one whose hand is the mouse, of a record.
-constexpr unsigned session = 1, hand = 2, record = 4, every = session | hand | record;
+// Windows in which a key means something: of a session, of one whose hand is this viewer, of a record, of a session whose
+// hand is a haptic device.
+constexpr unsigned session = 1, hand = 2, record = 4, device = 8, held = hand | device, watched = session | device,
+                   every = session | hand | record | device;
 
 SliceLook following(SliceLook look)
 {
@@ -30,160 +35,205 @@ SliceLook following(SliceLook look)
 
 // A new key is a row here, and in docs/viewer.md. A row without keys tells what the mouse does (controls.cpp).
 const std::vector<Controls::Key> Controls::keys{
-    {hand, "hold left", "take the tool and move it in the plane of the picture", {}, nullptr},
-    {hand, "  wheel", "push it along itself, or pull it back: 1 mm a notch", {}, nullptr},
-    {hand, "  Ctrl wheel", "move it into the picture, or out of it: 1 mm a notch", {}, nullptr},
-    {hand, "  Shift", "five times finer", {}, nullptr},
+    {hand, marked("hold left"), marked("take the tool and move it in the plane of the picture"), {}, nullptr},
+    {hand, marked("  wheel"), marked("push it along itself, or pull it back: 1 mm a notch"), {}, nullptr},
+    {hand, marked("  Ctrl wheel"), marked("move it into the picture, or out of it: 1 mm a notch"), {}, nullptr},
+    {hand, marked("  Shift"), marked("five times finer, mouse and keys"), {}, nullptr},
     {hand,
-     "  right left",
-     "turn the tool by 2 degrees in the picture",
+     marked("Enter"),
+     marked("take the tool, let it go: then keys move it as the mouse does"),
+     {{GLFW_KEY_ENTER, 0, once}, {GLFW_KEY_KP_ENTER, 0, once}},
+     [](Controls& c, const Press&) { c.toggleHold(); }},
+    {hand,
+     marked("  right left"),
+     marked("move it by 1 mm in the picture; with Ctrl turn it by 2 degrees"),
      {{GLFW_KEY_RIGHT}, {GLFW_KEY_LEFT, 0, -1}},
-     [](Controls& c, const Press& p) { c.hand_.turn(c.screen().into, p.sign * turnStep); }},
+     [](Controls& c, const Press& p) {
+         const auto screen = c.screen();
+         p.control ? c.hand_.turn(screen.into, p.sign * turnStep) : c.step(screen.right, p.sign, p.shift);
+     }},
     {hand,
-     "  up down",
-     "turn the tool by 2 degrees out of the picture",
+     marked("  up down"),
+     marked("move it by 1 mm in the picture; with Ctrl turn it by 2 degrees"),
      {{GLFW_KEY_UP}, {GLFW_KEY_DOWN, 0, -1}},
-     [](Controls& c, const Press& p) { c.hand_.turn(c.screen().right, p.sign * turnStep); }},
+     [](Controls& c, const Press& p) {
+         const auto screen = c.screen();
+         p.control ? c.hand_.turn(screen.right, p.sign * turnStep) : c.step(screen.up, p.sign, p.shift);
+     }},
     {hand,
-     "  Space",
-     "fire the biopsy gun; so does the right button",
+     marked("  Page down, up"),
+     marked("push it 1 mm along itself, pull it back; with Ctrl into the picture"),
+     {{GLFW_KEY_PAGE_DOWN}, {GLFW_KEY_PAGE_UP, 0, -1}},
+     [](Controls& c, const Press& p) { c.step(p.control ? c.screen().into : c.hand_.axis(), p.sign, p.shift); }},
+    {hand,
+     marked("  Space"),
+     marked("fire the biopsy gun; so does the right button"),
      {{GLFW_KEY_SPACE, 0, once}},
      [](Controls& c, const Press&) { c.hand_.fire(); }},
-    {hand, "M", "mark the place of the tool", {{0, 'm', once}}, [](Controls& c, const Press&) { c.hand_.mark(); }},
-    {hand, "E", "end the session", {{0, 'e', once}}, [](Controls& c, const Press&) { c.hand_.end(); }},
-    {hand, "hold right", "turn the camera", {}, nullptr},
+    {hand, "M", marked("mark the place of the tool"), {{0, 'm', once}}, [](Controls& c, const Press&) { c.hand_.mark(); }},
+    {held,
+     marked("S Pause"),
+     marked("pause: the force fades, time stands still; go on"),
+     {{0, 's', once}, {GLFW_KEY_PAUSE, 0, once}},
+     [](Controls& c, const Press&) { c.hand_.togglePause(); }},
+    {held,
+     marked("Backspace"),
+     marked("while paused: begin anew, without a record of this attempt"),
+     {{GLFW_KEY_BACKSPACE, 0, once}},
+     [](Controls& c, const Press&) { c.hand_.beginAnew(); }},
+    {held, "E", marked("end the session"), {{0, 'e', once}}, [](Controls& c, const Press&) { c.hand_.end(); }},
+    {hand, marked("hold right"), marked("turn the camera"), {}, nullptr},
     {record,
-     "Space",
-     "pause, play",
+     marked("Space"),
+     marked("pause, play"),
      {{GLFW_KEY_SPACE, 0, once}},
      [](Controls& c, const Press&) { c.playback_->paused = !c.playback_->paused; }},
     {record,
      ". ,",
-     "one tick on, back; with Shift a frame",
+     marked("one tick on, back; with Shift a frame"),
      {{0, '.'}, {0, ',', -1}},
      [](Controls& c, const Press& p) {
          c.playback_->paused = true;
          c.jumpBy(p.sign * (p.shift ? frame : tick));
      }},
     {record,
-     "right left",
-     "a second on, back",
+     marked("right left"),
+     marked("a second on, back"),
      {{GLFW_KEY_RIGHT}, {GLFW_KEY_LEFT, 0, -1}},
      [](Controls& c, const Press& p) { c.jumpBy(p.sign * leap); }},
     {record,
-     "up down",
-     "twice as fast, half as fast",
+     marked("up down"),
+     marked("twice as fast, half as fast"),
      {{GLFW_KEY_UP}, {GLFW_KEY_DOWN, 0, -1}},
      [](Controls& c, const Press& p) {
          c.playback_->speed = std::clamp(c.playback_->speed * (p.sign > 0 ? 2.0 : 0.5), 1.0 / 64, 8.0);
      }},
     {record,
-     "Home End",
-     "to the beginning, the end",
+     "N",
+     marked("to the next event; with Shift to the one before"),
+     {{0, 'n'}},
+     [](Controls& c, const Press& p) {
+         if (const auto to = c.playback_->moments.from(c.shownTime(), !p.shift)) {
+             c.playback_->paused = true;
+             c.playback_->jump = *to;
+         }
+     }},
+    {record,
+     marked("Home End"),
+     marked("to the beginning, the end"),
      {{GLFW_KEY_END}, {GLFW_KEY_HOME, 0, -1}},
      [](Controls& c, const Press& p) { c.playback_->jump = p.sign > 0 ? c.playback_->length.load() : 0.0; }},
-    {record, "hold left", "drag through the time", {}, nullptr},
-    {record, "hold right", "turn the camera", {}, nullptr},
-    {record, "wheel", "nearer, further", {}, nullptr},
-    {session, "hold left", "turn the camera", {}, nullptr},
-    {session, "wheel", "nearer, further", {}, nullptr},
-    {every, "hold middle", "shift the camera", {}, nullptr},
+    {record, marked("hold left"), marked("drag through the time"), {}, nullptr},
+    {record, marked("hold right"), marked("turn the camera"), {}, nullptr},
+    {record, marked("wheel"), marked("nearer, further"), {}, nullptr},
+    {watched, marked("hold left"), marked("turn the camera"), {}, nullptr},
+    {watched, marked("wheel"), marked("nearer, further"), {}, nullptr},
+    {every, marked("hold middle"), marked("shift the camera"), {}, nullptr},
     {every,
      "+ -",
-     "nearer, further",
+     marked("nearer, further"),
      {{0, '+'}, {0, '='}, {GLFW_KEY_KP_ADD}, {0, '-', -1}, {GLFW_KEY_KP_SUBTRACT, 0, -1}},
      [](Controls& c, const Press& p) {
          c.camera(p.sign > 0 ? vtkCommand::MouseWheelForwardEvent : vtkCommand::MouseWheelBackwardEvent);
      }},
-    {every, "R", "camera and opacities as at first", {{0, 'r'}}, [](Controls& c, const Press&) { c.picture_.resetView(); }},
+    {every,
+     "R",
+     marked("camera and opacities as at first"),
+     {{0, 'r'}},
+     [](Controls& c, const Press&) { c.picture_.resetView(); }},
     {every,
      "L",
-     "layout: trainee, instructor",
+     marked("layout: trainee, instructor"),
      {{0, 'l'}},
      [](Controls& c, const Press&) {
          c.picture_.show(c.picture_.layout() == Layout::trainee ? Layout::instructor : Layout::trainee);
      }},
     {every,
      "C",
-     "cut towards the tool, whole body",
+     marked("cut towards the tool, whole body"),
      {{0, 'c'}},
      [](Controls& c, const Press&) { c.picture_.setCut(!c.picture_.cut()); }},
     {every,
      "I",
-     "slices: image and tissues, image, tissues",
+     marked("slices: image and tissues, image, tissues"),
      {{0, 'i'}},
      [](Controls& c, const Press&) { c.picture_.show(following(c.picture_.sliceLook())); },
      true},
-    {every, "W", "the image's grey window", {{0, 'w'}}, [](Controls& c, const Press&) { c.picture_.nextWindow(); }, true},
     {every,
-     "Tab",
-     "choose a tissue; with Shift the one before",
+     "W",
+     marked("the image's grey window"),
+     {{0, 'w'}},
+     [](Controls& c, const Press&) { c.picture_.nextWindow(); },
+     true},
+    {every,
+     marked("Tab"),
+     marked("choose a tissue; with Shift the one before"),
      {{GLFW_KEY_TAB}},
      [](Controls& c, const Press& p) { c.picture_.selectTissue(p.shift ? -1 : 1); }},
     {every,
-     "Page up, down",
-     "the tissue's opacity",
-     {{GLFW_KEY_PAGE_UP}, {GLFW_KEY_PAGE_DOWN, 0, -1}},
-     [](Controls& c, const Press& p) { c.picture_.changeOpacity(p.sign > 0 ? opacityStep : 1 / opacityStep); }},
+     "A",
+     marked("the tissue more opaque; with Shift less"),
+     {{0, 'a'}},
+     [](Controls& c, const Press& p) { c.picture_.changeOpacity(p.shift ? 1 / opacityStep : opacityStep); }},
     {every,
      "U",
-     "ultrasound picture, body",
+     marked("ultrasound picture, body"),
      {{0, 'u'}},
      [](Controls& c, const Press&) { c.picture_.showUltrasound(!c.picture_.ultrasoundShown()); }},
     // ? comes as a character: where it is on a keyboard differs too much for a key's name.
-    {every, "? H F1", "these keys", {{0, 'h'}, {GLFW_KEY_F1}}, [](Controls& c, const Press&) { c.showHelp(); }},
+    {every, "? H F1", marked("these keys"), {{0, 'h'}, {GLFW_KEY_F1}}, [](Controls& c, const Press&) { c.showHelp(); }},
     {every,
-     "Q Esc",
-     "close the window",
+     marked("Q Esc"),
+     marked("close the window"),
      {{0, 'q'}, {GLFW_KEY_ESCAPE}},
      [](Controls& c, const Press&) { glfwSetWindowShouldClose(c.window_, GLFW_TRUE); }},
-    {every, "hold left", "on the picture: measure from here to there", {}, nullptr, false, true},
+    {every, marked("hold left"), marked("on the picture: measure from here to there"), {}, nullptr, false, true},
     {every,
-     "hold right",
-     "on the picture: slide and sweep the probe; with Shift rock and turn it",
+     marked("hold right"),
+     marked("on the picture: slide and sweep the probe; with Shift rock and turn it"),
      {},
      nullptr,
      false,
      true},
-    {every, "wheel", "on the picture: depth", {}, nullptr, false, true},
+    {every, marked("wheel"), marked("on the picture: depth"), {}, nullptr, false, true},
     {every,
      "D",
-     "more depth; with Shift less",
+     marked("more depth; with Shift less"),
      {{0, 'd'}},
      [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::depth, p.shift ? -1 : 1); },
      false,
      true},
     {every,
      "G",
-     "more gain; with Shift less",
+     marked("more gain; with Shift less"),
      {{0, 'g'}},
      [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::gain, p.shift ? -1 : 1); },
      false,
      true},
     {every,
      "Z",
-     "focus deeper; with Shift less",
+     marked("focus deeper; with Shift less"),
      {{0, 'z'}},
      [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::focus, p.shift ? -1 : 1); },
      false,
      true},
     {every,
      "Y",
-     "higher frequency; with Shift less",
+     marked("higher frequency; with Shift less"),
      {{0, 'y'}},
      [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::frequency, p.shift ? -1 : 1); },
      false,
      true},
     {every,
      "V",
-     "more dynamic range; with Shift less",
+     marked("more dynamic range; with Shift less"),
      {{0, 'v'}},
      [](Controls& c, const Press& p) { c.picture_.ultrasound().turn(Knob::dynamicRange, p.shift ? -1 : 1); },
      false,
      true},
     {every,
      "1 .. 8",
-     "gain of a layer (TGC), from the top; with Shift less",
+     marked("gain of a layer (TGC), from the top; with Shift less"),
      {{0, '1', 1, 0},
       {0, '2', 1, 1},
       {0, '3', 1, 2},
@@ -197,56 +247,56 @@ const std::vector<Controls::Key> Controls::keys{
      true},
     {every,
      "0",
-     "all layers alike",
+     marked("all layers alike"),
      {{0, '0'}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().levelTgc(); },
      false,
      true},
     {every,
      "F",
-     "freeze, go on",
+     marked("freeze, go on"),
      {{0, 'f', once}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().toggleFreeze(); },
      false,
      true},
     {every,
      "J K",
-     "while frozen: a picture back, on",
+     marked("while frozen: a picture back, on"),
      {{0, 'k'}, {0, 'j', -1}},
      [](Controls& c, const Press& p) { c.picture_.ultrasound().stepCine(p.sign); },
      false,
      true},
     {every,
      "X",
-     "no measures any more",
+     marked("no measures any more"),
      {{0, 'x'}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().clearCalipers(); },
      false,
      true},
     {every,
      "B",
-     "guide line: where the needle goes",
+     marked("guide line: where the needle goes"),
      {{0, 'b'}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().toggleGuide(); },
      false,
      true},
     {every,
      "O",
-     "marked side left, right",
+     marked("marked side left, right"),
      {{0, 'o'}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().mirror(); },
      false,
      true},
     {every,
      "T",
-     "linear probe, curved probe",
+     marked("linear probe, curved probe"),
      {{0, 't', once}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().changeProbe(); },
      false,
      true},
     {every,
      "P",
-     "store the picture",
+     marked("store the picture"),
      {{0, 'p', once}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().store(c.images_); },
      false,
@@ -255,19 +305,20 @@ const std::vector<Controls::Key> Controls::keys{
 
 bool Controls::applies(const Key& key) const
 {
-    const unsigned here = playback_ != nullptr ? record : hand_.is() ? hand : session;
+    const unsigned here = playback_ != nullptr ? record : hand_.is() ? hand : hand_.commands() ? device : session;
     return (key.windows & here) != 0 && (!key.ofImage || picture_.hasImage()) &&
            (!key.ofUltrasound || picture_.ultrasoundShown());
 }
 
-void Controls::key(int key, const std::string& name, bool again, bool shift)
+void Controls::key(int key, const std::string& name, bool again, int mods)
 {
     used_ = true;
     for (const Key& k : keys) {
         for (const Stroke& s : k.strokes)
             if (applies(k) && (s.key != 0 ? s.key == key : name == std::string_view(&s.name, 1))) {
                 if (!again || s.sign != once)
-                    k.act(*this, {s.sign < 0 ? -1 : 1, shift, s.value});
+                    k.act(*this,
+                          {s.sign < 0 ? -1 : 1, (mods & GLFW_MOD_SHIFT) != 0, s.value, (mods & GLFW_MOD_CONTROL) != 0});
                 return;
             }
     }
@@ -276,9 +327,14 @@ void Controls::key(int key, const std::string& name, bool again, bool shift)
 void Controls::jumpBy(double seconds)
 {
     Playback& p = *playback_;
-    // A second step may come before the player has taken the first.
-    const double asked = p.jump, now = std::isnan(asked) ? p.time.load() : asked;
-    p.jump = std::clamp<double>(now + seconds, 0, p.length);
+    p.jump = std::clamp<double>(shownTime() + seconds, 0, p.length);
+}
+
+// A second step may come before the player has taken the first.
+double Controls::shownTime() const
+{
+    const double asked = playback_->jump;
+    return std::isnan(asked) ? playback_->time.load() : asked;
 }
 
 std::vector<KeyHelp> Controls::help() const
@@ -286,7 +342,7 @@ std::vector<KeyHelp> Controls::help() const
     std::vector<KeyHelp> rows;
     for (const Key& k : keys)
         if (applies(k))
-            rows.push_back({k.shown, k.what});
+            rows.push_back({base::tr(k.shown), base::tr(k.what)});
     return rows;
 }
 
@@ -294,8 +350,9 @@ std::string keysInWords()
 {
     std::string text;
     for (const auto& [windows, title] : {std::pair{hand, "Where the mouse is the hand (palpate train --device mouse)"},
+                                         {held, "Where somebody holds the tool: with mouse, keys or a haptic device"},
                                          {record, "In a record (--replay)"},
-                                         {session, "In any other session"},
+                                         {watched, "In any other session"},
                                          {every, "In every window"}}) {
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)

@@ -23,6 +23,7 @@ void MouseHand::take(const Follower& follower)
     if (follower.session() == nullptr)
         return;
     hand_ = channel::ViewersHand::take(*follower.session());
+    holds_ = follower.session()->scenery().viewersHand == channel::handIsViewers;
     input_ = follower.session()->input().value_or(channel::Input{});
     input_.held = input_.ended = 0;
     input_.axis = follower.state().axis;
@@ -42,8 +43,22 @@ void MouseHand::keep(const Follower& follower)
 
 void MouseHand::press(const channel::State& state)
 {
+    if (paused())
+        return;
     input_.held = 1;
     input_.target = state.tip;
+}
+
+void MouseHand::togglePause() noexcept
+{
+    release();
+    input_.paused = 1 - input_.paused;
+}
+
+void MouseHand::beginAnew() noexcept
+{
+    if (paused())
+        input_.ended = 2;
 }
 
 glm::dvec3 MouseHand::target() const noexcept

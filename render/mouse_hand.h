@@ -16,7 +16,9 @@ public:
     /// heartbeat.
     void keep(const Follower& follower);
     /// This viewer is the session's hand.
-    bool is() const noexcept { return hand_.has_value(); }
+    bool is() const noexcept { return hand_.has_value() && holds_; }
+    /// This viewer may pause the session and end it: it is the hand, or a haptic device is.
+    bool commands() const noexcept { return hand_.has_value(); }
 
     /// The dead-man switch. The hand begins where the tool is.
     void press(const channel::State& state);
@@ -32,14 +34,20 @@ public:
     void turn(glm::dvec3 about, double angle) noexcept;
     /// ... fires the gun.
     void fire() noexcept { input_.fires += input_.held; }
-    void mark() noexcept { ++input_.marks; }
+    void mark() noexcept { input_.marks += paused() ? 0 : 1; }
     void end() noexcept { input_.ended = 1; }
+    /// Lets the tool go and makes the session stand still, or go on.
+    void togglePause() noexcept;
+    bool paused() const noexcept { return commands() && input_.paused != 0; }
+    /// Of a session that is paused, and only then: ends it, to begin anew.
+    void beginAnew() noexcept;
 
 private:
     void take(const Follower& follower);
 
     std::optional<channel::ViewersHand> hand_;
     channel::Input input_;
+    bool holds_ = false;
     std::uint64_t attached_ = 0;
     Clock::time_point tried_{};
 };

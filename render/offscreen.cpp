@@ -224,8 +224,10 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool
     window->SetSize(options.width, options.height);
     Outputs outputs(options, *window);
     Picture picture(*window);
+    picture.setPalette(options.palette);
+    picture.setGhost(options.ghost);
     picture.conceal(options.concealed);
-    picture.show(options.instructor ? Layout::instructor : Layout::trainee);
+    picture.show(options.layout);
     picture.show(options.slices);
     picture.showUltrasound(options.ultrasound);
     Follower follower(options.session, options.wait, options.result);

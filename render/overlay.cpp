@@ -1,5 +1,7 @@
 #include <render/overlay.h>
 
+#include <base/said.h>
+
 #include <render/deformation.h>
 #include <render/tool_picture.h>
 #include <render/volume_picture.h>
@@ -17,11 +19,16 @@
 namespace palpate::render {
 namespace {
 
+using base::said;
+using base::spokenHere;
+using base::tr;
+using base::trn;
+
 constexpr double margin = 0.8;  // in fonts
 
 std::string millimetres(double metres)
 {
-    return std::isfinite(metres) ? fmt::format("{:.1f} mm", metres * 1e3) : std::string("-");
+    return std::isfinite(metres) ? said("{:.1Lf} mm", metres * 1e3) : std::string("-");
 }
 
 // Writes lines from the top of an area downwards.
@@ -56,17 +63,17 @@ void drawBar(Pen& pen, const std::string& name, double force, double cap, const 
     pen.canvas.rectangle({from, pen.y}, {to - from, pen.font}, dark);
     pen.canvas.rectangle({from, pen.y}, {(to - from) * share, pen.font}, colour);
     pen.canvas.rectangle({to - 2, pen.y - 2}, {2, pen.font + 4}, white);
-    pen.canvas.text({pen.right, pen.y}, fmt::format("{:.2f} N", force), pen.font, white, Align::right);
+    pen.canvas.text({pen.right, pen.y}, said("{:.2Lf} N", force), pen.font, white, Align::right);
 }
 
 void drawForces(Pen& pen, const channel::Scenery& scenery, const channel::State& state)
 {
     const double total = glm::length(vec(state.total));
     const bool atCap = total > 0.95 * scenery.forceCap;
-    pen.heading(fmt::format("FORCE ON THE HAND  (limit {:.1f} N)", scenery.forceCap));
-    drawBar(pen, "basic", glm::length(vec(state.basic)), scenery.forceCap, basicColour);
-    drawBar(pen, "additional", glm::length(vec(state.additional)), scenery.forceCap, additionalColour);
-    drawBar(pen, atCap ? "total !" : "total", total, scenery.forceCap, atCap ? red : good);
+    pen.heading(said(tr("FORCE ON THE HAND  (limit {:.1Lf} N)"), scenery.forceCap));
+    drawBar(pen, tr("basic"), glm::length(vec(state.basic)), scenery.forceCap, basicColour);
+    drawBar(pen, tr("additional"), glm::length(vec(state.additional)), scenery.forceCap, additionalColour);
+    drawBar(pen, atCap ? tr("total !") : tr("total"), total, scenery.forceCap, atCap ? red : good);
 }
 
 // " in 0.8 s" when the needle's line meets structure `s` soon.
@@ -74,27 +81,27 @@ std::string contactWords(const channel::State& state, std::size_t s)
 {
     constexpr double slowest = 1e-3, soon = 9.95;  // [m/s], [s]
     const double time = state.aheadSpeed > slowest ? state.ahead[s] / state.aheadSpeed : soon;
-    return std::isfinite(time) && time >= 0 && time < soon && state.distance[s] > 0 ? fmt::format("  in {:.1f} s", time)
+    return std::isfinite(time) && time >= 0 && time < soon && state.distance[s] > 0 ? said(tr("  in {:.1Lf} s"), time)
                                                                                     : std::string();
 }
 
 void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::State& state, std::size_t s)
 {
     const double distance = state.distance[s];
-    const std::string name = text(scenery.structure[s]), when = contactWords(state, s);
+    const std::string name = spokenHere(text(scenery.structure[s])), when = contactWords(state, s);
     if (s == 0)
-        pen.pair(name + " (target)" + when, distance <= 0 ? "INSIDE" : millimetres(distance), good);
+        pen.pair(name + tr(" (target)") + when, distance <= 0 ? tr("INSIDE") : millimetres(distance), good);
     else if (distance <= 0)
-        pen.pair(name + "  TOUCHED", millimetres(distance), red);
+        pen.pair(name + tr("  TOUCHED"), millimetres(distance), red);
     else if (distance < scenery.warnDistance[s])
-        pen.pair(name + "  NEAR" + when, millimetres(distance), amber);
+        pen.pair(name + tr("  NEAR") + when, millimetres(distance), amber);
     else
         pen.pair(name + when, millimetres(distance), white);
 }
 
 void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, int lines, bool targetHidden)
 {
-    pen.heading("FROM THE TIP TO");
+    pen.heading(tr("FROM THE TIP TO"));
     const std::size_t count = std::min<std::size_t>(scenery.structures, channel::maxStructures);
     if (count == 0)
         return;
@@ -105,10 +112,11 @@ void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::Sta
               [&](std::size_t a, std::size_t b) { return state.distance[a] < state.distance[b]; });
     const auto shown = std::min(count, static_cast<std::size_t>(lines));
     if (targetHidden)
-        pen.pair(text(scenery.structure[0]), "to be found", good);
+        pen.pair(spokenHere(text(scenery.structure[0])), tr("to be found"), good);
     for (std::size_t i = targetHidden ? 1 : 0; i < shown; ++i)
         if (i + 1 == shown && shown < count)
-            pen.pair(fmt::format("and {} more", count - i), "from " + millimetres(state.distance[order[i]]), grey);
+            pen.pair(said(trn("and {} more", "and {} more", count - i), count - i),
+                     said(tr("from {}"), millimetres(state.distance[order[i]])), grey);
         else
             drawDistance(pen, scenery, state, order[i]);
 }
@@ -117,72 +125,78 @@ std::string phaseWords(const channel::State& state)
 {
     switch (state.phase) {
         case channel::Phase::contact:
-            return "touching the skin";
+            return tr("touching the skin");
         case channel::Phase::inserted:
-            return fmt::format("inserted {:.1f} mm", state.inserted * 1e3);
+            return said(tr("inserted {:.1Lf} mm"), state.inserted * 1e3);
         case channel::Phase::free:
             break;
     }
-    return "in the air";
+    return tr("in the air");
 }
 
 void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::State& state)
 {
     const bool needle = scenery.tool == channel::ToolKind::needle;
-    pen.heading(needle ? "NEEDLE" : "FINGERTIP");
+    pen.heading(needle ? tr("NEEDLE") : tr("FINGERTIP"));
     const bool known = state.tissue > 0 && state.tissue < scenery.tissues;
-    pen.pair(phaseWords(state), known ? "tip in " + text(scenery.tissue[state.tissue].name) : std::string(), white);
+    pen.pair(phaseWords(state),
+             known ? said(tr("tip in {}"), spokenHere(text(scenery.tissue[state.tissue].name))) : std::string(), white);
     if (state.aheadTissue > 0 && state.aheadTissue < scenery.tissues)
-        pen.pair("ahead: " + text(scenery.tissue[state.aheadTissue].name), millimetres(state.aheadTissueDistance), grey);
+        pen.pair(said(tr("ahead: {}"), spokenHere(text(scenery.tissue[state.aheadTissue].name))),
+                 millimetres(state.aheadTissueDistance), grey);
     if (state.cores > 0)
-        pen.pair(fmt::format("core {}: {:.0f} % target", state.cores, 100 * state.coreTarget),
-                 fmt::format("{:.1f} mm of it", state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);
+        pen.pair(said(tr("core {}: {:.0f} % target"), state.cores, 100 * state.coreTarget),
+                 said(tr("{:.1Lf} mm of it"), state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);
     else if (needle)
-        pen.pair("no core taken yet", "", grey);
+        pen.pair(tr("no core taken yet"), "", grey);
 }
 
 struct Entry {
     Colour colour;
     std::string name;
+    Pattern pattern = Pattern::none;
 };
 
 std::vector<Entry> legendEntries(const channel::Scenery& scenery, const Legend& legend, std::size_t room)
 {
     const bool needle = scenery.tool == channel::ToolKind::needle;
-    std::vector<Entry> entries{{toolColour, needle ? "needle" : "fingertip"}};
+    std::vector<Entry> entries{{toolColour, needle ? tr("needle") : tr("fingertip")}};
     if (scenery.entry != scenery.aim)
-        entries.push_back({planColour, "planned line, target"});
+        entries.push_back({planColour, tr("planned line, target")});
     if (needle) {
-        entries.push_back({trailColour, "way of the tip"});
-        entries.push_back({coreColour, "core taken"});
+        entries.push_back({trailColour, tr("way of the tip")});
+        entries.push_back({coreColour, tr("core taken")});
     }
+    if (legend.ghost)
+        entries.push_back({ghostColour, tr("the expert's")});
     for (std::size_t s = 1; s < std::min<std::size_t>(scenery.structures, channel::maxStructures); ++s)
         if (scenery.warnDistance[s] > 0) {
-            entries.push_back({{shellColour[0], shellColour[1], shellColour[2]}, "warning distance"});
+            entries.push_back({{shellColour[0], shellColour[1], shellColour[2]}, tr("warning distance")});
             break;
         }
     for (const std::uint8_t row : legend.rows) {
         if (entries.size() + 1 >= room) {
-            entries.push_back({dark, "and more"});
+            entries.push_back({dark, tr("and more")});
             break;
         }
         const auto& c = scenery.tissue[row].colour;
         const bool chosen = row == legend.chosen;
         entries.push_back({{c[0], c[1], c[2]},
-                           (chosen ? "> " : "") + text(scenery.tissue[row].name) +
-                               (chosen ? fmt::format("  x {:.2g}", static_cast<double>(legend.factor)) : std::string())});
+                           (chosen ? "> " : "") + spokenHere(text(scenery.tissue[row].name)) +
+                               (chosen ? said("  x {:.2Lg}", static_cast<double>(legend.factor)) : std::string()),
+                           patternOf(legend.palette, scenery.tissue[row].name)});
     }
     return entries;
 }
 
 void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& state, const Health& health)
 {
-    std::string simulation = fmt::format("{} ticks missed", state.missed), viewer;
+    std::string simulation = said(trn("{} tick missed", "{} ticks missed", state.missed), state.missed), viewer;
     if (health.tickRate > 0 && state.tickP99 > 0)
-        simulation = fmt::format("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed", health.tickRate, state.tickP99 * 1e6,
-                                 state.missed);
+        simulation = said(tr("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed"), health.tickRate, state.tickP99 * 1e6,
+                          state.missed);
     if (health.framesPerSecond > 0)
-        viewer = fmt::format("{:.0f} frames/s, {:.0f} ms behind", health.framesPerSecond, health.delay * 1e3);
+        viewer = said(tr("{:.0f} frames/s, {:.0f} ms behind"), health.framesPerSecond, health.delay * 1e3);
     const double font = 0.9 * plan.font, x = plan.health.x + margin * plan.font;
     const bool wide = 0.5 * font * static_cast<double>(simulation.size() + viewer.size() + 7) < plan.health.width;
     if (wide && !viewer.empty())
@@ -190,6 +204,21 @@ void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& st
     canvas.text({x, plan.health.y + 0.6 * font}, viewer.empty() ? simulation : viewer, font, grey);
     if (!viewer.empty())
         canvas.text({x, plan.health.y + 2.0 * font}, simulation, font, grey);
+}
+
+// As on the slices, in a square of the legend.
+void drawPattern(Canvas& canvas, Point2 at, double size, const Entry& entry)
+{
+    constexpr int cells = 5;
+    const double cell = size / cells;
+    const bool dark = 0.3 * entry.colour[0] + 0.6 * entry.colour[1] + 0.1 * entry.colour[2] < 0.35;
+    for (int i = 0; i < cells * cells && entry.pattern != Pattern::none; ++i) {
+        const int column = i % cells, row = i / cells;
+        // A cell is half a period.
+        if (isMarked(entry.pattern, 3 * column, 3 * row))
+            canvas.rectangle({at[0] + column * cell, at[1] + row * cell}, {cell, cell}, dark ? white : Colour{0, 0, 0},
+                             0.6);
+    }
 }
 
 }  // namespace
@@ -213,6 +242,7 @@ void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     double y = bottom;
     for (const Entry& entry : entries) {
         canvas.rectangle({x, y}, {font, font}, entry.colour);
+        drawPattern(canvas, {x, y}, font, entry);
         canvas.text({x + 1.5 * font, y - 1}, entry.name, font, white);
         y += row;
     }
@@ -244,13 +274,13 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     canvas.rectangle({static_cast<double>(plan.events.x), static_cast<double>(plan.events.y)},
                      {static_cast<double>(plan.events.width), static_cast<double>(plan.events.height)}, panelColour);
     Pen pen{canvas, plan.events.x + edge, plan.events.x + plan.events.width - edge, top - 0.2 * font, font};
-    pen.heading("EVENTS");
+    pen.heading(tr("EVENTS"));
     const double floor = plan.events.y + lineHeight * font;
     for (auto event = events.rbegin(); event != events.rend() && pen.y > floor; ++event) {
         const bool bad = event->kind == EventKind::touching || event->kind == EventKind::fault;
         const bool warning = event->kind == EventKind::near || event->kind == EventKind::veryNear;
         const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;
-        pen.pair(words(*event, scenery), fmt::format("{:.1f} s", event->time), colour);
+        pen.pair(words(*event, scenery), said("{:.1Lf} s", event->time), colour);
     }
 }
 

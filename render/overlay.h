@@ -3,6 +3,7 @@
 #include <channel/layout.h>
 #include <render/canvas.h>
 #include <render/events.h>
+#include <render/palette.h>
 #include <render/screen_plan.h>
 
 #include <cstdint>
@@ -29,6 +30,8 @@ struct Legend {
     std::span<const std::uint8_t> rows;
     int chosen = -1;   // row whose opacity is being changed; -1: none
     float factor = 1;  // of its opacity
+    Palette palette = Palette::standard;
+    bool ghost = false;  // another session's tool is shown
 };
 
 /// A key and what it does.

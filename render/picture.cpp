@@ -138,6 +138,7 @@ void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t
     palpate::render::conceal(concealed_, scenery, scenery.labels, coarse);
     palpate::render::conceal(concealed_, scenery, scenery.fine, finer);
     palpate::render::conceal(concealed_, shown);
+    paint(palette_, shown);
     session_ = std::make_unique<Session>(shown, coarse, image, finer, session, *view_);
     session_->frame = viewFrame(scenery);
     session_->entry = vec(scenery.entry);
@@ -213,6 +214,7 @@ void Picture::update(const channel::State& told, const channel::Displaced* displ
     session_->health = health;
     session_->known = true;
     session_->tool.update(session_->scenery, state, session_->deformation);
+    session_->tool.showGhost(session_->scenery, ghost_, state.time);
     note(told);
 }
 
@@ -327,7 +329,7 @@ void Picture::drawSlices(const ScreenPlan& plan, int step)
         frames = orthogonalFrames(s.frame, s.known ? vec(s.state.tip) : s.frame.centre);
     else if (s.known && s.scenery.tool == channel::ToolKind::needle)
         frames[0] = through(s.frame, vec(s.state.tip), vec(s.state.axis));
-    const Anatomy anatomy{s.scenery, s.deformation, s.grey, look_};
+    const Anatomy anatomy{s.scenery, s.deformation, s.grey, look_, palette_};
     bool due = false;
     for (std::size_t i = 0; i < slices_.size(); ++i) {
         if (plan.slices[i].empty()) {
@@ -354,6 +356,9 @@ void Picture::awaitSlices()
 void Picture::drawFlat(const ScreenPlan& plan)
 {
     Session& s = *session_;
+    step_ = {};
+    if (layout_ == Layout::body)
+        return;
     drawFigures(canvas_, plan, s.scenery, s.state, s.health, !concealed_.tissues.empty());
     drawEvents(canvas_, plan, s.scenery, s.history.events);
     if (!plan.forces.empty())
@@ -364,9 +369,9 @@ void Picture::drawFlat(const ScreenPlan& plan)
     const bool covered = !words_.empty() && plan.events.empty();  // by a notice
     if (!plan.legend.empty() && !covered && (help_.empty() || !plan.events.empty())) {
         const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
-        drawLegend(canvas_, plan, s.scenery, {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1});
+        drawLegend(canvas_, plan, s.scenery,
+                   {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1, palette_, !ghost_.empty()});
     }
-    step_ = {};
     if (!help_.empty())
         drawHelp(canvas_, plan, help_);
     if (s.known) {
@@ -385,6 +390,10 @@ Header Picture::header() const
     Header header{s.name, caption_, timeline_, {}};
     if (!stepsTold_ || !words_.empty())
         return header;
+    if (told_) {
+        header.coaching = *told_;
+        return header;
+    }
     CoachView view = coached_;
     view.aim = s.aim();
     view.planned = !concealed_.any();

@@ -4,8 +4,10 @@
 #include <render/canvas.h>
 #include <render/concealment.h>
 #include <render/deformation.h>
+#include <render/ghost.h>
 #include <render/header.h>
 #include <render/overlay.h>
+#include <render/palette.h>
 #include <render/screen_plan.h>
 #include <render/slice_picture.h>
 #include <render/tool_picture.h>
@@ -41,6 +43,10 @@ public:
     void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, const std::string& session,
               std::span<const std::uint16_t> image = {}, std::span<const std::uint8_t> fine = {});
     void close();
+    /// From the next session on: colours of tissues.
+    void setPalette(Palette palette) noexcept { palette_ = palette; }
+    /// Another session's tool beside this one's, at the same time of it; see GhostPose.
+    void setGhost(Ghost ghost) { ghost_ = std::move(ghost); }
     /// From the next session on: what is not shown.
     void conceal(Concealment what) { concealed_ = std::move(what); }
     /// Shows what has come. `displaced` is null when there is nothing newer.
@@ -53,6 +59,8 @@ public:
     void setResult(ResultCard result) { result_ = std::move(result); }
     /// Of the hand, for the steps in words: places marked, and whether it is this window. `told`: steps are shown.
     void setSteps(bool told, std::uint32_t marks, bool handIsHere);
+    /// Steps that are told instead of those of the session; nothing: those.
+    void setCoaching(std::optional<Coaching> words) { told_ = std::move(words); }
     /// Whether a click there ends the session: on the words of the last step.
     bool endsAt(Point2 pixel) const noexcept;
     /// `moving`: coarser where the renderer is software, so that the picture is finished in time.
@@ -120,9 +128,12 @@ private:
     std::unique_ptr<Session> session_;
     std::future<void> painting_;  // of the slices, while the body is drawn
     std::string words_, smaller_, caption_;
+    Palette palette_ = Palette::standard;
+    Ghost ghost_;
     Concealment concealed_;
     std::optional<ResultCard> result_;
     CoachView coached_;
+    std::optional<Coaching> told_;
     bool stepsTold_ = false, lastStep_ = false;
     Area step_;  // where the words of the step are
     std::vector<KeyHelp> help_;

@@ -1,11 +1,27 @@
 #include <render/result_file.h>
 
+#include <base/said.h>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <fstream>
 
 namespace palpate::render {
+namespace {
+
+using base::marked;
+using base::said;
+using base::tr;
+
+// The score of somebody who had something to find.
+bool palpated(const nlohmann::json& score)
+{
+    const auto found = score.find("mark_error_mm");
+    return found != score.end() && found->is_number();
+}
+
+}  // namespace
 
 std::optional<ResultCard> readResult(const std::filesystem::path& file)
 {
@@ -19,8 +35,10 @@ std::optional<ResultCard> readResult(const std::filesystem::path& file)
         ResultCard card;
         card.total = score.at("total").get<double>();
         for (const auto& [key, name, points] :
-             {std::tuple{"core", "Core", 50}, {"vital", "Vital structures", 25}, {"technique", "Technique", 25}})
-            card.parts.push_back(fmt::format("{} {:.0f} of {}", name, score.at("points").at(key).get<double>(), points));
+             {std::tuple{"core", palpated(score) ? marked("Place and size") : marked("Core"), 50},
+              {"vital", marked("Vital structures"), 25},
+              {"technique", marked("Technique"), 25}})
+            card.parts.push_back(said(tr("{} {:.0f} of {}"), tr(name), score.at("points").at(key).get<double>(), points));
         for (const auto& loss : score.value("losses", nlohmann::json::array()))
             if (card.losses.size() < most)
                 card.losses.push_back(

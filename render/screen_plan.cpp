@@ -53,7 +53,9 @@ ScreenPlan::ScreenPlan(int windowWidth, int windowHeight, Layout layout, double 
       height(windowHeight),
       font(std::max(10.0 * std::max(scale, 1.0), std::round(13.0 * std::min(windowWidth / 800.0, windowHeight / 600.0))))
 {
-    if (layout == Layout::instructor)
+    if (layout == Layout::body)
+        view = {0, 0, width, height};
+    else if (layout == Layout::instructor)
         planInstructor(*this);
     else
         planTrainee(*this);

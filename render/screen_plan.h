@@ -6,8 +6,8 @@
 namespace palpate::render {
 
 /// `trainee`: the body large, the slice through the needle, figures. `instructor`: three orthogonal slices through the tip,
-/// a small body, traces of the last seconds, events, figures.
-enum class Layout : std::uint8_t { trainee, instructor };
+/// a small body, traces of the last seconds, events, figures. `body`: the body alone, without a word.
+enum class Layout : std::uint8_t { trainee, instructor, body };
 
 /// What a slice shows of a body that came with an intensity image: the colours of its tissues, the image tinted with them,
 /// or the image alone. Without an image it is always the first.

@@ -36,6 +36,7 @@ Pixel pixelOf(const std::array<float, 3>& colour)
 struct Paint {
     std::array<float, 3> own{};
     float grey = 0;
+    Pattern pattern = Pattern::none;
 
     Pixel over(float image) const
     {
@@ -59,8 +60,18 @@ std::array<Paint, channel::maxTissues> paintsOf(const Anatomy& anatomy)
         for (std::size_t k = 0; k < 3; ++k)
             paints[t].own[k] = colour * pixel[k];
         paints[t].grey = 1 - colour;
+        paints[t].pattern = t == 0 || colour == 0 ? Pattern::none : patternOf(anatomy.palette, tissue.name);
     }
     return paints;
+}
+
+// Of a pattern: darker, or lighter where the colour is dark.
+Pixel shaded(Pixel plain)
+{
+    const bool dark = 3 * plain[0] + 6 * plain[1] + plain[2] < 10 * 90;
+    for (std::uint8_t& part : plain)
+        part = static_cast<std::uint8_t>(dark ? 255 - (255 - part) * 3 / 5 : part * 2 / 5);
+    return plain;
 }
 
 // Outside the labels there is the image alone.
@@ -167,7 +178,8 @@ void SlicePicture::paint(const Anatomy& anatomy)
             const std::size_t tissue = label & channel::rowBits;
             const bool onShell = shells && tissue != 0 && (label & channel::shellBit) != 0;
             const float image = grey ? anatomy.grey.at(rest) : 0.0F;
-            const Pixel pixel = onShell ? shell : tissue == 0 ? outside(image) : paints[tissue].over(image);
+            const Pixel plain = tissue == 0 ? outside(image) : paints[tissue].over(image);
+            const Pixel pixel = onShell ? shell : isMarked(paints[tissue].pattern, column, row) ? shaded(plain) : plain;
             for (int y = row; y < std::min(row + step, area_.height); ++y)
                 std::fill_n(pixels + static_cast<std::ptrdiff_t>(y) * area_.width + column,
                             std::min(step, area_.width - column), pixel);

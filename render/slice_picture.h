@@ -4,6 +4,7 @@
 #include <render/canvas.h>
 #include <render/deformation.h>
 #include <render/grey_image.h>
+#include <render/palette.h>
 #include <render/screen_plan.h>
 #include <render/view_frame.h>
 
@@ -22,6 +23,7 @@ struct Anatomy {
     const Deformation& deformation;
     const GreyImage& grey;
     SliceLook look = SliceLook::tissue;
+    Palette palette = Palette::standard;
 
     bool imageShown() const noexcept { return look != SliceLook::tissue && !grey.empty(); }
 };

@@ -174,6 +174,10 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
     constexpr double trail = 0.3;  // [mm]
     setLine(*trail_, {});
     showTube(renderer, *trail_, trail, 6, trailColour);
+    setLine(*ghost_, {});
+    showTube(renderer, *ghost_, 0.8 * radius, 8, ghostColour);
+    setLine(*ghostWay_, {});
+    showTube(renderer, *ghostWay_, trail, 6, ghostColour);
     setLine(*lead_, {});
     showTube(renderer, *lead_, trail, 6, handColour);
     show(renderer, *hand_, ball(1.0), handColour);
@@ -254,6 +258,25 @@ void ToolPicture::showCores(const channel::State& state, const Deformation& defo
     }
     const std::array inner{vec(state.tip), place(state.hole[(state.cores - 1) % channel::maxHoles].to)};
     setLine(*thrown_, inner);
+}
+
+void ToolPicture::showGhost(const channel::Scenery& scenery, const Ghost& ghost, double time)
+{
+    if (ghost.empty())
+        return;
+    const GhostPose& now = at(ghost, time);
+    const double length = std::max(scenery.toolLength, 10e-3);
+    const std::array shaft{now.tip - length * now.axis, now.tip};
+    setLine(*ghost_, shaft);
+    constexpr double step = 0.5e-3;  // [m]
+    std::vector<glm::dvec3> way;
+    for (const GhostPose& pose : ghost) {
+        if (pose.time > time)
+            break;
+        if (pose.inserted && (way.empty() || glm::distance(way.back(), pose.tip) > step))
+            way.push_back(pose.tip);
+    }
+    setLine(*ghostWay_, way);
 }
 
 void ToolPicture::showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip)

@@ -2,6 +2,7 @@
 
 #include <channel/layout.h>
 #include <render/deformation.h>
+#include <render/ghost.h>
 
 #include <vtkActor.h>
 #include <vtkNew.h>
@@ -24,6 +25,7 @@ inline constexpr std::array<double, 3> planColour{1.0, 1.0, 1.0};
 inline constexpr std::array<double, 3> proxyColour{1.0, 0.9, 0.2};
 inline constexpr std::array<double, 3> trailColour{1.0, 0.45, 0.85};
 inline constexpr std::array<double, 3> handColour{0.55, 1.0, 0.35};
+inline constexpr std::array<double, 3> ghostColour{0.78, 0.60, 1.0};
 inline constexpr std::array<double, 3> coreColour{1.0, 0.95, 0.45};
 
 /// The tool, a needle as it is bent; the way that its tip has come since it went in; the point on the surface that it would
@@ -33,6 +35,8 @@ class ToolPicture {
 public:
     ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer);
     void update(const channel::Scenery& scenery, const channel::State& state, const Deformation& deformation);
+    /// The tool of another session, where it was at `time` [s] of it, and the way of its tip up to there.
+    void showGhost(const channel::Scenery& scenery, const Ghost& ghost, double time);
     /// Where the hand is that holds the tool [m], with a line to the `tip`; nothing: not shown.
     void showHand(std::optional<glm::dvec3> hand, glm::dvec3 tip);
 
@@ -45,6 +49,7 @@ private:
     bool turns_ = false;         // with the axis: no sphere
     vtkNew<vtkTransform> pose_;  // of the tool; of a needle, of its point
     vtkNew<vtkActor> proxy_, aim_, hand_;
+    vtkNew<vtkPolyData> ghost_, ghostWay_;      // of another session: its shaft, the way of its tip [mm]
     vtkNew<vtkPolyData> shaft_, trail_, lead_;  // middle line of a needle, way of its tip, from the tip to the hand [mm]
     std::array<vtkNew<vtkPolyData>, channel::maxHoles> cores_;  // [mm]
     vtkNew<vtkPolyData> thrown_;                                // the inner needle while it is out [mm]

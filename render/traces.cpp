@@ -1,5 +1,7 @@
 #include <render/traces.h>
 
+#include <base/said.h>
+
 #include <render/overlay.h>
 
 #include <fmt/format.h>
@@ -55,7 +57,7 @@ Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string
     }
     canvas.text({static_cast<double>(d.inner.x), area.y + 0.3 * font}, fmt::format("-{:g} s", traceSeconds), 0.85 * font,
                 grey);
-    canvas.text({static_cast<double>(d.inner.x + d.inner.width), area.y + 0.3 * font}, "now", 0.85 * font, grey,
+    canvas.text({static_cast<double>(d.inner.x + d.inner.width), area.y + 0.3 * font}, base::tr("now"), 0.85 * font, grey,
                 Align::right);
     canvas.text({d.inner.x - 0.4 * font, d.y(top) + 0.6 * font}, unit, 0.85 * font, grey, Align::right);
     return d;
@@ -150,13 +152,13 @@ void drawForceTraces(Canvas& canvas, const Area& area, double font, const channe
         most = std::max({most, moment.basic, moment.additional, moment.total});
     // Half the limit when that is enough: most procedures need less.
     const double top = most > 0.5 * cap ? 1.1 * cap : 0.55 * cap;
-    const Diagram d = frameOf(canvas, area, font, "FORCE ON THE HAND", nowOf(history), std::ceil(top), "N");
+    const Diagram d = frameOf(canvas, area, font, base::tr("FORCE ON THE HAND"), nowOf(history), std::ceil(top), "N");
     if (cap < d.top)
         canvas.rectangle({static_cast<double>(d.inner.x), d.y(cap)}, {static_cast<double>(d.inner.width), 2}, red);
     drawAll(d, area, history,
-            {{"basic", basicColour, 1.5, [](const auto& m) { return m.basic; }},
-             {"additional", additionalColour, 1.5, [](const auto& m) { return m.additional; }},
-             {"total", good, 2.5, [](const auto& m) { return m.total; }}});
+            {{base::tr("basic"), basicColour, 1.5, [](const auto& m) { return m.basic; }},
+             {base::tr("additional"), additionalColour, 1.5, [](const auto& m) { return m.additional; }},
+             {base::tr("total"), good, 2.5, [](const auto& m) { return m.total; }}});
 }
 
 void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const channel::Scenery& scenery,
@@ -175,10 +177,11 @@ void drawDistanceTraces(Canvas& canvas, const Area& area, double font, const cha
     order.resize(std::min(count, shown));
     std::sort(order.begin(), order.end());
     constexpr double top = 40;  // [mm]
-    const Diagram d = frameOf(canvas, area, font, "DISTANCE FROM THE TIP", nowOf(history), top, "mm");
+    const Diagram d = frameOf(canvas, area, font, base::tr("DISTANCE FROM THE TIP"), nowOf(history), top, "mm");
     std::vector<Curve> curves;
     for (const std::size_t s : order)
-        curves.push_back({text(scenery.structure[s]), s == 0 ? good : colours[s % colours.size()], s == 0 ? 2.5 : 1.5,
+        curves.push_back({base::spokenHere(text(scenery.structure[s])), s == 0 ? good : colours[s % colours.size()],
+                          s == 0 ? 2.5 : 1.5,
                           [s](const History::Moment& m) { return 1e3 * static_cast<double>(m.distance[s]); }});
     drawAll(d, area, history, curves);
 }

@@ -1,5 +1,7 @@
 #include <render/ultrasound_picture.h>
 
+#include <base/said.h>
+
 #include <render/screen_image.h>
 
 #include <base/outputs.h>
@@ -112,8 +114,8 @@ void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& aroun
     actor_->SetPosition(around.x, around.y);
     actor_->SetVisibility(1);
     if (!image) {
-        canvas.text({area.x + 0.5 * area.width, area.y + 0.5 * area.height}, "ultrasound: preparing the tissue", font, grey,
-                    Align::centre);
+        canvas.text({area.x + 0.5 * area.width, area.y + 0.5 * area.height}, base::tr("ultrasound: preparing the tissue"),
+                    font, grey, Align::centre);
         return;
     }
     drawScale(canvas, *image, font);
@@ -176,15 +178,15 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
     for (const float slider : s.tgc)
         sliders += fmt::format(" {:+.0f}", slider);
     words("TGC" + sliders, grey);
-    words(fmt::format("gain {:+.0f} dB   range {:.0f} dB", s.gain, s.dynamicRange), white);
+    words(base::said(base::tr("gain {:+.0f} dB   range {:.0f} dB"), s.gain, s.dynamicRange), white);
     words(fmt::format("{} {:.1f} MHz   {:.0f} mm   focus {:.0f} mm", nameOf(image.transducer),
                       1e-6 * static_cast<double>(s.frequency), mm * static_cast<double>(s.depth),
                       mm * static_cast<double>(s.focus)),
           white);
     if (frozen_)
-        words(
-            fmt::format("FROZEN   {} of {}   {:.2f} s", cineAt_ + 1, cine_.size(), 1e-3 * static_cast<double>(image.tick)),
-            amber, true);
+        words(base::said(base::tr("FROZEN   {} of {}   {:.2Lf} s"), cineAt_ + 1, cine_.size(),
+                         1e-3 * static_cast<double>(image.tick)),
+              amber, true);
     if (!message_.empty())
         words(message_, good);
 }
@@ -357,7 +359,7 @@ void UltrasoundPicture::store(const std::filesystem::path& folder)
         file = folder / fmt::format("{}-us-{:07}{}.png", session_, image->tick, n > 0 ? fmt::format("-{}", n) : "");
     try {
         base::writeWhole(file, ultrasound::storedImage(stored, width, height));
-        message_ = "stored " + file.filename().string();
+        message_ = base::said(base::tr("stored {}"), file.filename().string());
     } catch (const std::exception& e) {
         message_ = e.what();
     }

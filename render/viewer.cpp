@@ -10,6 +10,7 @@
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
+#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -47,6 +48,24 @@ void check(const ViewerOptions& options)
 }
 
 }  // namespace
+
+void Moments::add(double time)
+{
+    const std::lock_guard lock(guard_);
+    times_.push_back(time);
+}
+
+std::optional<double> Moments::from(double time, bool onwards) const
+{
+    constexpr double here = 5e-3;  // [s]: the one that is shown is neither before nor after
+    const std::lock_guard lock(guard_);
+    if (onwards) {
+        const auto next = std::upper_bound(times_.begin(), times_.end(), time + here);
+        return next != times_.end() ? std::optional(*next) : std::nullopt;
+    }
+    const auto first = std::lower_bound(times_.begin(), times_.end(), time - here);
+    return first != times_.begin() ? std::optional(*std::prev(first)) : std::nullopt;
+}
 
 ViewerFigures runViewer(const ViewerOptions& options)
 {

@@ -1,17 +1,34 @@
 #pragma once
 
 #include <render/concealment.h>
+#include <render/ghost.h>
+#include <render/palette.h>
 #include <render/screen_plan.h>
 
 #include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace palpate::render {
+
+/// Times at which something happened, as they come to be known. For any thread.
+class Moments {
+public:
+    /// Not earlier than the ones before.
+    void add(double time);
+    /// The next after `time`, or the last before it [s]; nothing: there is none.
+    std::optional<double> from(double time, bool onwards) const;
+
+private:
+    mutable std::mutex guard_;
+    std::vector<double> times_;  // [s]
+};
 
 /// A record that is played: the viewer asks, whoever plays it tells how it goes.
 struct Playback {
@@ -21,6 +38,7 @@ struct Playback {
     std::atomic<double> time{0};                                         // shown now [s]
     std::atomic<double> ready{0};                                        // computed so far [s]
     std::atomic<double> length{0};                                       // [s]; negative when there is nothing to show
+    Moments moments;                                                     // of what was computed so far
     std::atomic<const char*> fault{nullptr};                             // what is wrong with the record, in a few words
 };
 
@@ -29,11 +47,15 @@ struct ViewerOptions {
     std::string session;                   // name; empty = the only one that runs
     std::filesystem::path offscreen;       // folder for PNG files
     std::filesystem::path movie;           // MP4 file; neither = a window
+    Ghost ghost;                           // of an expert, shown beside a record; empty: none
+    Palette palette = Palette::standard;   // of tissues
+    bool sounds = false;                   // for warnings (windows only)
     Concealment concealed;                 // what is not shown, in a test
     bool steps = true;                     // the step that one is at and what is wrong, in words (windows only)
+    double tryout = 0;                     // of so many seconds: what the hand does, in words; 0: no tryout
     std::filesystem::path result;          // figures of the session, once it has ended: shown in its window
     bool hidden = false;                   // the window is on a display of its own that nobody sees, for measurements
-    bool instructor = false;               // layout to begin with
+    Layout layout = Layout::trainee;       // to begin with
     SliceLook slices = SliceLook::tinted;  // to begin with, where there is an image
     bool ultrasound = false;               // the ultrasound picture, to begin with
     std::filesystem::path images = ".";    // folder for ultrasound pictures that are stored

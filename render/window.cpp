@@ -7,6 +7,7 @@
 #include <render/controls.h>
 #include <render/follower.h>
 #include <render/hosts.h>
+#include <render/sounds.h>
 
 #include <vtkCallbackCommand.h>
 #include <vtkCommand.h>
@@ -18,8 +19,11 @@
 #include <vtkOpenGLState.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <memory>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 namespace palpate::render {
@@ -180,8 +184,10 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     target->SetSize(width, height);
 
     Picture picture(*target);
+    picture.setPalette(options.palette);
+    picture.setGhost(options.ghost);
     picture.conceal(options.concealed);
-    picture.show(options.instructor ? Layout::instructor : Layout::trainee);
+    picture.show(options.layout);
     picture.show(options.slices);
     picture.showUltrasound(options.ultrasound);
     vtkNew<vtkGenericRenderWindowInteractor> interactor;
@@ -193,7 +199,10 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
     const Target shown{*target, *interactor};
 
     Follower follower(options.session, options.wait, options.result);
-    Controls controls(window.get(), *interactor, picture, follower, options.playback, options.images, options.steps);
+    Controls controls(window.get(), *interactor, picture, follower, options);
+    std::optional<Sounds> sounds;
+    if (options.sounds)
+        sounds.emplace([](const std::string& why) { std::fprintf(stderr, "palpate-view: %s\n", why.c_str()); });
     FrameClock clock;
     auto used = Clock::now();
     const auto nothingToShow = [&] { return options.playback != nullptr && options.playback->length < 0; };
@@ -209,6 +218,8 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>
             used = Clock::now();
         follower.poll(picture);
         controls.keep();
+        if (sounds)
+            sounds->heed(follower.state());
         const bool moving = follower.moving() || controls.holding() || Clock::now() - used < std::chrono::milliseconds(300);
         if (!clock.due(follower, moving, now)) {
             std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -68,6 +68,12 @@ std::unique_ptr<Device> openWithFaults(const TrainOptions& options, const Sessio
     return options.faults.empty() ? std::move(device) : std::make_unique<FaultyDevice>(std::move(device), options.faults);
 }
 
+// Who holds the tool, as viewers are told.
+std::uint32_t handOf(const DeviceKind& kind)
+{
+    return kind.needsViewer ? channel::handIsViewers : kind.somebodyHolds ? channel::handIsDevices : channel::handElsewhere;
+}
+
 void sleepThroughGap(const Faults& faults, std::uint64_t tick) noexcept
 {
     if (const double seconds = gapAfter(faults, tick); seconds > 0.0) {
@@ -109,7 +115,7 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
 struct Trainer::Impl {
     Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
         : options(o),
-          broadcast(o.session, model, deviceKind(o.device.name).needsViewer),
+          broadcast(o.session, model, handOf(deviceKind(o.device.name))),
           device(openWithFaults(o, model, broadcast)),
           session(model, info)
     {
@@ -127,6 +133,16 @@ struct Trainer::Impl {
         if (options.servo.paced) {
             warnings = claimRealTime();
         }
+        options.servo.pause.asked = [this] {
+            const auto input = broadcast.input();
+            if (input && input->ended != 0 && deviceKind(options.device.name).somebodyHolds) {
+                interrupted = true;
+            }
+            return input && input->paused != 0;
+        };
+        options.servo.pause.standing = [this](bool elsewhere) {
+            broadcast.stand(elsewhere ? channel::Standing::toolElsewhere : channel::Standing::paused);
+        };
         const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &interrupted};
         timing = session.run(*device, run, [this](const TickRecord& record, const ServoTiming& soFar) {
             broadcast.publish(record, soFar, session.simulation());
@@ -139,6 +155,13 @@ struct Trainer::Impl {
             sleepThroughGap(options.faults, record.tick);
         });
         broadcast.finish();
+    }
+
+    // The viewer whose user ended it is the last that wrote.
+    bool wantsAnew() const
+    {
+        const auto input = broadcast.input();
+        return input && input->ended == 2;
     }
 
     void conclude(TrainResult& result)
@@ -154,6 +177,8 @@ struct Trainer::Impl {
                               {"tick_us_p99", fmt::format("{:.2f}", 1e6 * work.p99)},
                               {"lateness_us_p50", fmt::format("{:.2f}", 1e6 * late.p50)},
                               {"lateness_us_p99", fmt::format("{:.2f}", 1e6 * late.p99)},
+                              {"pauses", fmt::format("{}", result.timing.pauses)},
+                              {"paused_s", fmt::format("{:.3f}", result.timing.paused)},
                               {"force_hash", fmt::format("{:016x}", result.forceHash)},
                               {"score_total", fmt::format("{:.1f}", result.score.total)}});
             result.lostRecords = recorder->lost();
@@ -219,6 +244,7 @@ TrainResult Trainer::run()
     result.timing = std::move(impl_->timing);
     result.warnings = warnings;
     result.signal = signalled;
+    result.restart = impl_->wantsAnew();
     impl_->conclude(result);
     // The record is closed before a disk that is full on purpose has room again.
     impl_->recorder.reset();

@@ -30,6 +30,7 @@ struct TrainResult : SessionFigures {
     haptics::ServoTiming timing;        // of the loop
     std::uint64_t lostRecords = 0;      // ticks that the recorder had no room for
     std::vector<std::string> warnings;  // a sentence each, for the user
+    bool restart = false;               // its user wants it to begin anew
     int signal = 0;                     // that ended it before its time; 0: none
     std::string problem;                // not empty: the session ran, but not everything that was asked for was done
 };

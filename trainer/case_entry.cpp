@@ -1,5 +1,7 @@
 #include <trainer/case_entry.h>
 
+#include <base/words.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
@@ -11,6 +13,8 @@ namespace palpate::trainer {
 
 namespace {
 
+using base::marked;
+using base::tr;
 using nlohmann::json;
 
 // Calls `take` for each member of the list under `key`; what is not as it should be is left out.
@@ -34,20 +38,23 @@ CaseEntry entryOf(const json& one)
 {
     CaseEntry c;
     c.id = one.at("id").get<std::string>();
-    c.title = one.at("title").get<std::string>();
+    c.title = tr(one.at("title").get<std::string>());
     c.picture = one.at("picture").get<std::string>();
     c.difficulty = one.at("difficulty").get<int>();
-    c.trains = fmt::format("{}", fmt::join(one.at("trains").get<std::vector<std::string>>(), ", "));
+    auto trains = one.at("trains").get<std::vector<std::string>>();
+    std::ranges::transform(trains, trains.begin(), [](const std::string& what) { return tr(what); });
+    c.trains = fmt::format("{}", fmt::join(trains, ", "));
     const auto measures = one.at("measures").get<std::vector<std::string>>();
     c.palpation = std::ranges::find(measures, "mark_error_mm") != measures.end();
-    c.steps.push_back(c.palpation
-                          ? "Hold the left mouse button in the picture: you hold the fingertip. The wheel presses."
-                          : "Hold the left mouse button in the picture: you hold the needle. The wheel moves it along "
-                            "itself, 1 mm a notch; Space fires.");
+    c.steps.push_back(
+        c.palpation ? tr("Hold the left mouse button in the picture, or press Enter: you hold the fingertip. The wheel, "
+                         "or Page down, presses.")
+                    : tr("Hold the left mouse button in the picture, or press Enter: you hold the needle. The wheel, "
+                         "or Page down, moves it along itself by 1 mm; Space fires."));
     for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
-        c.steps.push_back(step);
+        c.steps.push_back(tr(step));
     }
-    c.steps.push_back(c.palpation ? "M marks, E ends the session." : "E ends the session.");
+    c.steps.push_back(c.palpation ? tr("M marks, S pauses, E ends the session.") : tr("S pauses, E ends the session."));
     return c;
 }
 
@@ -55,8 +62,9 @@ CaseEntry entryOf(const json& one)
 
 const char* difficultyInWords(int difficulty) noexcept
 {
-    constexpr std::array words{"first steps", "easy", "medium", "hard", "very hard"};
-    return words[static_cast<std::size_t>(std::clamp(difficulty, 1, 5) - 1)];
+    constexpr std::array words{marked("first steps"), marked("easy"), marked("medium"), marked("hard"),
+                               marked("very hard")};
+    return tr(words[static_cast<std::size_t>(std::clamp(difficulty, 1, 5) - 1)]);
 }
 
 std::vector<CaseEntry> casesOf(const json& list)

@@ -2,6 +2,7 @@
 
 #include <base/process.h>
 #include <base/temporary_folder.h>
+#include <base/words.h>
 
 #include <nlohmann/json.hpp>
 
@@ -24,6 +25,7 @@
 namespace palpate::trainer {
 
 namespace fs = std::filesystem;
+using base::tr;
 
 namespace {
 
@@ -76,6 +78,7 @@ public:
         }
         return pid_ < 0;
     }
+    bool failed() const noexcept { return !(WIFEXITED(status_) && WEXITSTATUS(status_) == 0); }
     // The last line that the command printed as its own message.
     std::string message() const
     {
@@ -126,7 +129,7 @@ struct Errands::Impl {
         auto answer = nlohmann::json::parse(in, nullptr, false);
         if (answer.is_discarded()) {
             const std::string said = command.message();
-            state.notice = said.empty() ? asTyped("palpate", arguments) + ": no answer" : said;
+            state.notice = said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
         }
         return answer;
     }
@@ -156,10 +159,92 @@ struct Errands::Impl {
                         scratch / "devices.log");
     }
 
+    void testForce(State& state)
+    {
+        fs::remove(scratch / "force.json");
+        std::vector<std::string> words{"devices", "--force-test", "--json", scratch / "force.json"};
+        if (!state.firmware.empty()) {
+            words.insert(words.end(), {"--falcon-firmware", state.firmware});
+        }
+        push.emplace(programs / "palpate", words, scratch / "force.log");
+        state.pushing = true;
+    }
+    void tryHand(State& state)
+    {
+        tryout.emplace(programs / "palpate", tryoutArguments(state), scratch / "tryout.log");
+        state.trying = true;
+    }
+    // An expert's session in the anatomy of the case is made once, and kept beside the others.
+    void seeExpert(State& state)
+    {
+        const fs::path record = state.files.record.parent_path() / ("expert-" + chosenCase(state).id + ".db");
+        if (fs::exists(record)) {
+            state.ghost = record;
+            return startDebrief(state);
+        }
+        const fs::path part = record.string() + ".part";
+        fs::remove(part);
+        expert.emplace(programs / "palpate", expertArguments(state, part), scratch / "expert.log");
+        state.ghost = record;
+        state.ghosting = true;
+    }
+    // With ffmpeg a film, without it pictures.
+    void makeFilm(State& state)
+    {
+        const bool can = ::access("/usr/bin/ffmpeg", X_OK) == 0;
+        made = fs::path(state.files.record).replace_extension(can ? ".mp4" : ".pictures");
+        film.emplace(programs / "palpate-view",
+                     std::vector<std::string>{"--replay", state.files.record, can ? "--movie" : "--offscreen", made},
+                     scratch / "film.log");
+        state.filming = true;
+    }
+    void keepSettings(State& state)
+    {
+        base::useLanguage(state.settings.language);
+        state.notice = writeSettings(settingsFile(), state.settings);
+    }
+
+    // What has ended of all that is beside a session.
+    bool lookAtHelpers(State& state)
+    {
+        bool changed = false;
+        const auto over = [&changed](std::optional<Running>& one) {
+            const bool ended = one && one->ended();
+            changed = changed || ended;
+            return ended;
+        };
+        if (over(push)) {
+            push.reset();
+            state.pushing = false;
+            readForceTest(scratch / "force.json", state.devices);
+        }
+        if (over(tryout)) {
+            state.notice = tryout->failed() ? tryout->message() : "";
+            tryout.reset();
+            state.trying = false;
+        }
+        if (over(expert)) {
+            state.notice = expert->failed() ? expert->message() : "";
+            state.ghosting = false;
+            if (!expert->failed()) {
+                fs::rename(state.ghost.string() + ".part", state.ghost);
+                startDebrief(state);
+            }
+            expert.reset();
+        }
+        if (over(film)) {
+            state.notice = film->failed() ? film->message() : made.string();
+            state.filming = false;
+            film.reset();
+        }
+        return changed;
+    }
+
+    fs::path made;  // film or pictures
     fs::path programs;
-    const base::TemporaryFolder scratch{"what the commands print"};  // goes after those that run
+    const base::TemporaryFolder scratch{tr("what the commands print")};  // goes after those that run
     ResultSink& sink;
-    std::optional<Running> session, devices, replay;
+    std::optional<Running> session, devices, replay, push, tryout, expert, film;
 };
 
 Errands::Errands(fs::path programs, ResultSink& sink) : impl_(std::make_unique<Impl>(std::move(programs), sink)) {}
@@ -195,7 +280,19 @@ void Errands::run(Errand errand, State& state)
                     impl_->session->end();
                 }
                 return;
+            case Errand::testForce:
+                return impl_->testForce(state);
+            case Errand::tryHand:
+                return impl_->tryHand(state);
+            case Errand::seeExpert:
+                return impl_->seeExpert(state);
+            case Errand::makeFilm:
+                return impl_->makeFilm(state);
+            case Errand::keepSettings:
+                impl_->keepSettings(state);
+                return list(state);
             case Errand::startDebrief:
+                state.ghost.clear();
                 return impl_->startDebrief(state);
             case Errand::none:
             case Errand::quit:
@@ -227,6 +324,7 @@ bool Errands::look(State& state)
         sessionEnded(state, std::move(result));
         changed = true;
     }
+    changed = impl_->lookAtHelpers(state) || changed;
     if (impl_->replay && impl_->replay->ended()) {
         impl_->replay.reset();
         state.replaying = false;

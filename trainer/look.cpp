@@ -45,7 +45,7 @@ void setLook(float scale)
     io.Fonts->Clear();
     std::error_code none;
     if (std::filesystem::exists(fontFile, none)) {
-        io.Fonts->AddFontFromFileTTF(fontFile, lineHeight * scale);
+        io.Fonts->AddFontFromFileTTF(fontFile, lineHeight * scale);  // Latin-1: English, German
         io.FontGlobalScale = 1;
     } else {
         io.Fonts->AddFontDefault();

@@ -1,5 +1,7 @@
 #include <trainer/results.h>
 
+#include <base/said.h>
+
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -17,6 +19,9 @@
 namespace palpate::trainer {
 
 namespace fs = std::filesystem;
+using base::marked;
+using base::said;
+using base::tr;
 
 namespace {
 
@@ -29,25 +34,32 @@ nlohmann::json parsed(const fs::path& file)
 // Those that tell beginners from experts (docs/score.md), and the rest on request: palpate score.
 void addMeasures(const nlohmann::json& score, Result& result)
 {
-    constexpr std::array shown{std::tuple{"targeting_error_mm", "Targeting error", "mm", 1},
-                               std::tuple{"best_target_pct", "Target in the best core", "%", 0},
-                               std::tuple{"best_target_length_mm", "Length in the target", "mm", 1},
-                               std::tuple{"mark_error_mm", "Error of the marks", "mm", 1},
-                               std::tuple{"mark_size_error_mm", "Error of the size", "mm", 1},
-                               std::tuple{"vital_margin_mm", "Nearest to a vital structure", "mm", 1},
-                               std::tuple{"vital_contacts", "Touches of vital structures", "", 0},
-                               std::tuple{"passes", "Cores taken", "", 0},
-                               std::tuple{"skin_contacts", "Skin contacts", "", 0},
-                               std::tuple{"redirects", "Redirects", "", 0},
-                               std::tuple{"inserted_path_mm", "Path of the tip inside", "mm", 0},
-                               std::tuple{"peak_force_n", "Largest force", "N", 2},
-                               std::tuple{"seconds", "Time", "s", 1}};
+    constexpr std::array shown{std::tuple{"targeting_error_mm", marked("Targeting error"), "mm", 1},
+                               std::tuple{"best_target_pct", marked("Target in the best core"), "%", 0},
+                               std::tuple{"best_target_length_mm", marked("Length in the target"), "mm", 1},
+                               std::tuple{"mark_error_mm", marked("Error of the marks"), "mm", 1},
+                               std::tuple{"mark_size_error_mm", marked("Error of the size"), "mm", 1},
+                               std::tuple{"vital_margin_mm", marked("Nearest to a vital structure"), "mm", 1},
+                               std::tuple{"vital_contacts", marked("Touches of vital structures"), "", 0},
+                               std::tuple{"passes", marked("Cores taken"), "", 0},
+                               std::tuple{"skin_contacts", marked("Skin contacts"), "", 0},
+                               std::tuple{"redirects", marked("Redirects"), "", 0},
+                               std::tuple{"inserted_path_mm", marked("Path of the tip inside"), "mm", 0},
+                               std::tuple{"peak_force_n", marked("Largest force"), "N", 2},
+                               std::tuple{"seconds", marked("Time"), "s", 1}};
     for (const auto& [key, label, unit, decimals] : shown) {
         const auto value = score.find(key);
         if (value != score.end() && value->is_number()) {
-            result.measures.emplace_back(label, fmt::format("{:.{}f} {}", value->get<double>(), decimals, unit));
+            result.measures.emplace_back(tr(label), said("{:.{}Lf} {}", value->get<double>(), decimals, unit));
         }
     }
+}
+
+// The score of somebody who had something to find.
+bool palpated(const nlohmann::json& score)
+{
+    const auto found = score.find("mark_error_mm");
+    return found != score.end() && found->is_number();
 }
 
 }  // namespace
@@ -60,16 +72,22 @@ Result readResult(const fs::path& figures)
         const auto& score = json.at("score");
         result.total = score.at("total").get<double>();
         for (const auto& [key, name, most] :
-             {std::tuple{"core", "Core", 50.0}, {"vital", "Vital structures", 25.0}, {"technique", "Technique", 25.0}}) {
-            result.parts.push_back({name, score.at("points").at(key).get<double>(), most});
+             {std::tuple{"core", palpated(score) ? marked("Place and size") : marked("Core"), 50.0},
+              {"vital", marked("Vital structures"), 25.0},
+              {"technique", marked("Technique"), 25.0}}) {
+            result.parts.push_back({tr(name), score.at("points").at(key).get<double>(), most});
         }
         for (const auto& loss : score.value("losses", nlohmann::json::array())) {
-            result.losses.push_back({loss.at("points").get<double>(), loss.at("words").get<std::string>()});
+            LossOfPoints lost{loss.at("points").get<double>(), loss.at("words").get<std::string>(), std::nullopt};
+            if (const auto at = loss.find("at_s"); at != loss.end() && at->is_number()) {
+                lost.at = at->get<double>();
+            }
+            result.losses.push_back(std::move(lost));
         }
         addMeasures(score, result);
     } catch (const nlohmann::json::exception&) {
         result = {};
-        result.problem = figures.string() + ": has no score: the session did not come to its end";
+        result.problem = figures.string() + tr(": has no score: the session did not come to its end");
     }
     return result;
 }
@@ -81,29 +99,43 @@ DeviceCheck readDevices(const fs::path& figures)
     const auto json = parsed(figures);
     const auto falcons = json.is_object() ? json.value("falcons", nlohmann::json::array()) : nlohmann::json();
     if (!falcons.is_array()) {
-        check.falcon = "The look for devices failed";
-        check.remedy = "Type 'palpate devices' in a terminal to see why. The mouse works.";
+        check.falcon = tr("The look for devices failed");
+        check.remedy = tr("Type 'palpate devices' in a terminal to see why. The mouse works.");
         return check;
     }
     if (falcons.empty()) {
-        check.falcon = "No Novint Falcon is plugged in";
-        check.remedy = "To use one, plug in its cable and its power supply, and look again.";
+        check.falcon = tr("No Novint Falcon is plugged in");
+        check.remedy = tr("To use one, plug in its cable and its power supply, and look again.");
         return check;
     }
     const auto& f = falcons.front();
     if (!f.value("allowed", false)) {
-        check.falcon = "A Novint Falcon is there, but may not be opened";
-        check.remedy = "Run 'sudo palpate devices --install-udev' once, and plug it in again.";
+        check.falcon = tr("A Novint Falcon is there, but may not be opened");
+        check.remedy = tr("Run 'sudo palpate devices --install-udev' once, and plug it in again.");
     } else if (!f.value("firmware_runs", false)) {
-        check.falcon = "A Novint Falcon is there; its firmware is not loaded";
-        check.remedy = "Name the firmware file of its maker below: the session loads it.";
+        check.falcon = tr("A Novint Falcon is there; its firmware is not loaded");
+        check.remedy = tr("Name the firmware file of its maker below: the session loads it.");
         check.falconReady = true;
     } else {
-        check.falcon = f.value("homed", false) ? "A Novint Falcon is ready" : "A Novint Falcon is there, not homed yet";
-        check.remedy = f.value("homed", false) ? "" : "The session tells how to move the grip, to find its zero.";
+        check.falcon =
+            f.value("homed", false) ? tr("A Novint Falcon is ready") : tr("A Novint Falcon is there, not homed yet");
+        check.remedy = f.value("homed", false) ? "" : tr("The session tells how to move the grip, to find its zero.");
         check.falconReady = true;
     }
     return check;
+}
+
+void readForceTest(const fs::path& figures, DeviceCheck& check)
+{
+    const auto json = parsed(figures);
+    try {
+        const auto& test = json.at("force_test");
+        check.pushed = test.at("complete").get<bool>();
+        check.push = tr(test.at("words").get<std::string>());
+    } catch (const nlohmann::json::exception&) {
+        check.pushed = false;
+        check.push = tr("The force test could not be made. The mouse works without it.");
+    }
 }
 
 SessionFolder::SessionFolder(fs::path folder) : folder_(std::move(folder)) {}

@@ -13,6 +13,9 @@ Result readResult(const std::filesystem::path& figures);
 /// What `palpate devices --json` wrote.
 DeviceCheck readDevices(const std::filesystem::path& figures);
 
+/// What `palpate devices --force-test --json` wrote, into `check`.
+void readForceTest(const std::filesystem::path& figures, DeviceCheck& check);
+
 /// Takes the sessions that are done, and knows the earlier ones.
 class ResultSink {
 public:

@@ -1,70 +1,31 @@
 #include <trainer/screens.h>
 
-#include <trainer/look.h>
+#include <trainer/widgets.h>
 
-#include <fmt/format.h>
+#include <base/said.h>
+
 #include <imgui.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
+#include <string>
 
 namespace palpate::trainer {
 
 namespace {
 
-ImVec4 vec(Rgb c)
-{
-    return {c.r, c.g, c.b, 1};
-}
-
-void words(const std::string& text)
-{
-    ImGui::PushTextWrapPos(0);
-    ImGui::TextUnformatted(text.c_str());
-    ImGui::PopTextWrapPos();
-}
-
-void words(const std::string& text, Rgb colour)
-{
-    ImGui::PushStyleColor(ImGuiCol_Text, vec(colour));
-    words(text);
-    ImGui::PopStyleColor();
-}
-
-void heading(const std::string& text, float scale = 1.45F)
-{
-    ImGui::SetWindowFontScale(scale);
-    words(text);
-    ImGui::SetWindowFontScale(1);
-}
-
-void drawPicture(const Texture& texture, float wide, float high)
-{
-    if (texture.id == 0) {
-        ImGui::Dummy({wide, high});
-        return;
-    }
-    const float scale = std::min(wide / static_cast<float>(texture.width), high / static_cast<float>(texture.height));
-    ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(texture.id)),
-                 {scale * static_cast<float>(texture.width), scale * static_cast<float>(texture.height)});
-}
+using base::said;
+using base::tr;
 
 // What a case is, beside its picture.
 void drawCaseFacts(const CaseEntry& c, Rgb facts = skyBlue)
 {
     heading(c.title, 1.15F);
-    words(fmt::format("{}, difficulty {} of 5 ({});  {}", c.palpation ? "Palpation" : "Core biopsy", c.difficulty,
-                      difficultyInWords(c.difficulty),
-                      c.best ? fmt::format("best so far {:.0f} of 100", *c.best) : "not done yet"),
-          facts);
+    words(
+        said(tr("{}, difficulty {} of 5 ({});  {}"), c.palpation ? tr("Palpation") : tr("Core biopsy"), c.difficulty,
+             difficultyInWords(c.difficulty), c.best ? said(tr("best so far {:.0f} of 100"), *c.best) : tr("not done yet")),
+        facts);
     words(c.trains);
-}
-
-bool enterPressed()
-{
-    return ImGui::IsKeyPressed(ImGui::GetIO().KeyMap[ImGuiKey_Enter], false);
 }
 
 // Whose session it will be: one of the profiles, a new one, or nobody's.
@@ -73,8 +34,9 @@ Errand drawPeople(State& state)
     const float em = ImGui::GetFontSize();
     Errand errand = Errand::none;
     ImGui::SetNextItemWidth(14 * em);
-    if (ImGui::BeginCombo("Who trains", state.person.empty() ? "nobody: no progress is kept" : state.person.c_str())) {
-        if (ImGui::Selectable("nobody: no progress is kept", state.person.empty())) {
+    const std::string nobody = tr("nobody: no progress is kept");
+    if (ImGui::BeginCombo(tr("Who trains"), state.person.empty() ? nobody.c_str() : state.person.c_str())) {
+        if (ImGui::Selectable(nobody.c_str(), state.person.empty())) {
             state.person.clear();
         }
         for (const std::string& name : state.people) {
@@ -84,22 +46,24 @@ Errand drawPeople(State& state)
         }
         ImGui::EndCombo();
     }
-    ImGui::SameLine();
-    ImGui::SetNextItemWidth(12 * em);
+    besideIfRoom(std::string(tr("a new name")) + "           ");
+    ImGui::SetNextItemWidth(9 * em);
     const bool typed =
-        ImGui::InputTextWithHint("##name", "a new name", &state.newPerson, ImGuiInputTextFlags_EnterReturnsTrue);
+        ImGui::InputTextWithHint("##name", tr("a new name"), &state.newPerson, ImGuiInputTextFlags_EnterReturnsTrue);
     ImGui::SameLine();
     ImGui::BeginDisabled(state.newPerson.empty());
-    if ((ImGui::Button("Add") || typed) && !state.newPerson.empty()) {
+    if ((ImGui::Button(tr("Add")) || typed) && !state.newPerson.empty()) {
         errand = Errand::addPerson;
     }
     ImGui::EndDisabled();
-    return errand;
+    besideIfRoom(tr("Settings"));
+    const Errand settings = drawSettings(state);
+    return errand != Errand::none ? errand : settings;
 }
 
 Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
 {
-    heading("Choose a case");
+    heading(tr("Choose a case"));
     const float em = ImGui::GetFontSize(), high = 5.4F * em;
     Errand errand = drawPeople(state);
     ImGui::BeginChild("list", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
@@ -133,12 +97,47 @@ Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
     return errand;
 }
 
+// What can be done with the device before a session: look again, feel a force, try the hand.
+Errand drawDeviceTests(State& state)
+{
+    Errand errand = Errand::none;
+    if (ImGui::Button(tr("Look again"))) {
+        errand = Errand::checkDevices;
+    }
+    besideIfRoom(tr("Try the hand for 30 s"));
+    ImGui::BeginDisabled(state.trying || state.pushing);
+    if (ImGui::Button(tr("Try the hand for 30 s"))) {
+        errand = Errand::tryHand;
+    }
+    if (state.useFalcon) {
+        besideIfRoom(tr("Force test: 1 N"));
+        if (ImGui::Button(tr("Force test: 1 N"))) {
+            errand = Errand::testForce;
+        }
+    }
+    ImGui::EndDisabled();
+    if (state.trying) {
+        words(
+            tr("The trial runs in a window of its own: it tells what to do, step by step. Nothing is recorded or scored."),
+            skyBlue);
+    }
+    if (state.pushing) {
+        words(
+            tr("Hold the grip loosely and press its centre button: it pushes towards you with 1 N, about the weight of an "
+               "apple."),
+            skyBlue);
+    } else if (!state.devices.push.empty()) {
+        words(state.devices.push, state.devices.pushed ? green : orange);
+    }
+    return errand;
+}
+
 Errand drawDevices(State& state)
 {
-    heading("What will you hold?");
+    heading(tr("What will you hold?"));
     const DeviceCheck& check = state.devices;
     if (!check.done) {
-        words("Looking for devices ...", quiet);
+        words(tr("Looking for devices ..."), quiet);
     } else {
         words(check.falcon, check.falconReady ? green : orange);
         if (!check.remedy.empty()) {
@@ -146,25 +145,26 @@ Errand drawDevices(State& state)
         }
     }
     ImGui::Spacing();
-    if (ImGui::RadioButton("Mouse: no force in the hand, the picture shows it", !state.useFalcon)) {
+    if (ImGui::RadioButton(tr("Mouse or keys: no force in the hand, the picture shows it"), !state.useFalcon)) {
         state.useFalcon = false;
     }
     ImGui::BeginDisabled(!check.falconReady);
-    if (ImGui::RadioButton("Novint Falcon: you feel the tissue", state.useFalcon)) {
+    if (ImGui::RadioButton(tr("Novint Falcon: you feel the tissue"), state.useFalcon)) {
         state.useFalcon = true;
     }
     ImGui::EndDisabled();
     if (state.useFalcon) {
-        ImGui::InputTextWithHint("Firmware file", "not needed while it runs", &state.firmware);
-        words("Begin with the grip in the middle of its reach, and hold it loosely. The first force comes up slowly.");
+        ImGui::InputTextWithHint(tr("Firmware file"), tr("not needed while it runs"), &state.firmware);
+        words(tr("Begin with the grip in the middle of its reach, and hold it loosely. The first force comes up slowly."));
     } else {
         ImGui::Spacing();
-        words(
+        words(tr(
             "With the mouse: hold the left button to take the tool; moving the mouse moves it in the plane of the picture, "
-            "the wheel along itself. Let go, and the force fades. Every key is listed by ? in the session.");
+            "the wheel along itself. By keys: Enter takes it and lets it go, arrows and pages move it. Let go, and the "
+            "force fades. Every key is listed by ? in the session."));
     }
     ImGui::Spacing();
-    return ImGui::Button("Look again") ? Errand::checkDevices : Errand::none;
+    return drawDeviceTests(state);
 }
 
 void drawBriefing(State& state, const TextureOf& textureOf)
@@ -175,7 +175,7 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
     const Texture texture = textureOf(c.picture);
     const bool beside = wide > 40 * em && texture.id != 0;
-    ImGui::BeginChild("briefing", {0, -6.6F * em}, false, ImGuiWindowFlags_NavFlattened);
+    ImGui::BeginChild("briefing", {0, -(wide > 44 * em ? 6.6F : 11.0F) * em}, false, ImGuiWindowFlags_NavFlattened);
     if (texture.id != 0) {
         ImGui::BeginGroup();
         drawPicture(texture, beside ? 0.42F * wide : wide, 17 * em);
@@ -186,91 +186,26 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     }
     ImGui::BeginGroup();
     for (std::size_t i = 0; i < c.steps.size(); ++i) {
-        words(fmt::format("{}.  {}", i + 1, c.steps[i]));
+        words(said("{}.  {}", i + 1, c.steps[i]));
     }
     ImGui::EndGroup();
     ImGui::EndChild();
     int mode = state.test ? 1 : 0;
-    ImGui::RadioButton("Practise: steps and faults in words, planned line", &mode, 0);
-    ImGui::SameLine();
-    ImGui::RadioButton("Test: without hints", &mode, 1);
+    ImGui::RadioButton(tr("Practise: steps and faults in words, planned line"), &mode, 0);
+    besideIfRoom(std::string(tr("Test: without hints")) + "    ");
+    ImGui::RadioButton(tr("Test: without hints"), &mode, 1);
     state.test = mode == 1;
-    words(fmt::format("As a command: {}", asTyped("palpate", trainArguments(state, {"SESSION.db", "SESSION.json"}))),
-          quiet);
+    words(said(tr("As a command: {}"), asTyped("palpate", trainArguments(state, {"SESSION.db", "SESSION.json"}))), quiet);
 }
 
 void drawSession(const State& state)
 {
-    heading("The session runs in a window of its own");
+    heading(tr("The session runs in a window of its own"));
     words(
-        "It may take some seconds to open: the tissue is being built. When you are done, press E there, and the result "
-        "appears here.");
+        tr("It may take some seconds to open: the tissue is being built. When you are done, press E there, and the result "
+           "appears here. S pauses."));
     ImGui::Spacing();
     words(state.command, quiet);
-}
-
-void drawParts(const Result& result)
-{
-    for (const PartOfScore& part : result.parts) {
-        const float share = part.most > 0 ? static_cast<float>(part.points / part.most) : 0.0F;
-        ImGui::ProgressBar(share, {12 * ImGui::GetFontSize(), 0},
-                           fmt::format("{:.0f} of {:.0f}", part.points, part.most).c_str());
-        ImGui::SameLine();
-        ImGui::TextUnformatted(part.name.c_str());
-    }
-}
-
-void drawMeasures(const Result& result)
-{
-    if (!ImGui::BeginTable("measures", 2, ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp)) {
-        return;
-    }
-    for (const auto& [label, value] : result.measures) {
-        ImGui::TableNextRow();
-        ImGui::TableNextColumn();
-        ImGui::TextUnformatted(label.c_str());
-        ImGui::TableNextColumn();
-        ImGui::TextUnformatted(value.c_str());
-    }
-    ImGui::EndTable();
-}
-
-Errand drawResult(State& state)
-{
-    const Result& result = state.result;
-    const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
-    if (!result.problem.empty()) {
-        heading("The session has no result");
-        words(result.problem, orange);
-        return ImGui::Button("Try again") ? again(state) : Errand::none;
-    }
-    ImGui::BeginChild("result", {0, -6.2F * em}, false, ImGuiWindowFlags_NavFlattened);
-    heading(fmt::format("{:.0f} of 100 points", result.total), 1.9F);
-    words(chosenCase(state).title, quiet);
-    ImGui::Columns(wide > 44 * em ? 2 : 1, "halves", false);
-    drawParts(result);
-    ImGui::Spacing();
-    heading(result.losses.empty() ? "Nothing was lost" : "Where the points went", 1.15F);
-    constexpr std::size_t most = 3;
-    for (std::size_t i = 0; i < std::min(most, result.losses.size()); ++i) {
-        words(fmt::format("-{:.0f}   {}", result.losses[i].points, result.losses[i].words));
-    }
-    ImGui::NextColumn();
-    drawMeasures(result);
-    ImGui::Columns(1);
-    ImGui::EndChild();
-    words("Record: " + state.files.record.string(), quiet);
-    Errand errand = Errand::none;
-    if (ImGui::Button("Same case again")) {
-        errand = again(state);
-    }
-    ImGui::SameLine();
-    ImGui::BeginDisabled(state.replaying);
-    if (ImGui::Button("See it again: debrief (D)") || (!state.replaying && ImGui::IsKeyPressed('D', false))) {
-        errand = debrief(state);
-    }
-    ImGui::EndDisabled();
-    return errand;
 }
 
 // The way through the screens, and the buttons for going on and back.
@@ -280,16 +215,17 @@ Errand drawFoot(State& state, bool entered)
     const float em = ImGui::GetFontSize();
     ImGui::SetCursorPosY(ImGui::GetWindowHeight() - 3.0F * em);
     const bool first = state.screen == Screen::cases, running = state.screen == Screen::session;
-    const bool typing = io.WantTextInput;
+    // Esc that closes a popup closes it before it is seen here.
+    const bool typing = io.WantTextInput || state.popup || ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
     Errand errand = Errand::none;
     if (!running) {
-        const bool pressed = ImGui::Button(first ? "Quit (Esc)" : "Back (Esc)");
+        const bool pressed = ImGui::Button(first ? tr("Quit (Esc)") : tr("Back (Esc)"));
         if (pressed || (!typing && ImGui::IsKeyPressed(io.KeyMap[ImGuiKey_Escape], false))) {
             return goBack(state);
         }
         ImGui::SameLine();
     }
-    const std::string label = fmt::format("{}{}", mainButton(state), running ? "" : " (Enter)");
+    const std::string label = running ? std::string(mainButton(state)) : said(tr("{} (Enter)"), mainButton(state));
     const float wide = ImGui::CalcTextSize(label.c_str()).x + 2 * ImGui::GetStyle().FramePadding.x;
     ImGui::SetCursorPosX(
         std::max(ImGui::GetCursorPosX(), ImGui::GetWindowWidth() - wide - ImGui::GetStyle().WindowPadding.x));
@@ -300,7 +236,7 @@ Errand drawFoot(State& state, bool entered)
         ImGui::SetKeyboardFocusHere(-1);
     }
     // Where something has the focus, Enter presses that.
-    const bool enter = !running && !ImGui::IsAnyItemFocused() && enterPressed();
+    const bool enter = !running && !typing && !ImGui::IsAnyItemFocused() && enterPressed();
     if (pressed || enter) {
         errand = goOn(state);
     }
@@ -356,6 +292,7 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
     if (errand == Errand::none && state.screen == before) {
         errand = drawFoot(state, entered);
     }
+    state.popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
     ImGui::End();
     return errand;
 }

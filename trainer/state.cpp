@@ -1,11 +1,33 @@
 #include <trainer/state.h>
 
+#include <base/words.h>
+
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <utility>
 
 namespace palpate::trainer {
+
+using base::marked;
+using base::tr;
+
+namespace {
+
+// Of the viewer's window.
+void addLook(const State& state, std::vector<std::string>& words)
+{
+    if (state.settings.palette != "standard") {
+        words.insert(words.end(), {"--palette", state.settings.palette});
+    }
+    if (state.settings.sounds) {
+        words.emplace_back("--sounds");
+    }
+}
+
+}  // namespace
 
 const CaseEntry& chosenCase(const State& state)
 {
@@ -15,25 +37,25 @@ const CaseEntry& chosenCase(const State& state)
 
 const char* nameOf(Screen screen) noexcept
 {
-    constexpr std::array names{"Case", "Device", "Briefing", "Session", "Result"};
-    return names[static_cast<std::size_t>(screen)];
+    constexpr std::array names{marked("Case"), marked("Device"), marked("Briefing"), marked("Session"), marked("Result")};
+    return tr(names[static_cast<std::size_t>(screen)]);
 }
 
 const char* mainButton(const State& state) noexcept
 {
     switch (state.screen) {
         case Screen::cases:
-            return "Choose this case";
+            return tr("Choose this case");
         case Screen::devices:
-            return "Go on";
+            return tr("Go on");
         case Screen::briefing:
-            return "Start";
+            return tr("Start");
         case Screen::session:
-            return "End the session";
+            return tr("End the session");
         case Screen::result:
             break;
     }
-    return "Next case";
+    return tr("Next case");
 }
 
 Errand goOn(State& state)
@@ -49,7 +71,7 @@ Errand goOn(State& state)
             state.screen = Screen::briefing;
             return Errand::none;
         case Screen::briefing:
-            return state.running ? Errand::none : Errand::startSession;
+            return state.running || state.trying || state.pushing ? Errand::none : Errand::startSession;
         case Screen::session:
             return state.running ? Errand::endSession : Errand::none;
         case Screen::result:
@@ -88,8 +110,9 @@ Errand again(State& state)
     return Errand::none;
 }
 
-Errand debrief(State& state)
+Errand debrief(State& state, std::optional<double> at)
 {
+    state.from = at;
     return state.screen == Screen::result && state.result.problem.empty() && !state.replaying ? Errand::startDebrief
                                                                                               : Errand::none;
 }
@@ -129,6 +152,7 @@ std::vector<std::string> trainArguments(const State& state, const SessionFiles& 
         add({"--falcon-firmware", state.firmware});
     }
     add({"--view", "--close-at-end"});
+    addLook(state, words);
     if (state.test) {
         add({"--test"});
     }
@@ -138,7 +162,30 @@ std::vector<std::string> trainArguments(const State& state, const SessionFiles& 
 
 std::vector<std::string> debriefArguments(const State& state)
 {
-    return {"--replay", state.files.record.string(), "--layout", "trainee"};
+    std::vector<std::string> words{"--replay", state.files.record.string(), "--layout", "trainee"};
+    addLook(state, words);
+    if (state.from) {
+        words.insert(words.end(), {"--at", fmt::format("{:.2f}", *state.from)});
+    }
+    if (!state.ghost.empty()) {
+        words.insert(words.end(), {"--ghost", state.ghost.string()});
+    }
+    return words;
+}
+
+std::vector<std::string> tryoutArguments(const State& state)
+{
+    std::vector<std::string> words{"train", "--tryout", "--device", state.useFalcon ? "falcon" : "mouse"};
+    if (state.useFalcon && !state.firmware.empty()) {
+        words.insert(words.end(), {"--falcon-firmware", state.firmware});
+    }
+    addLook(state, words);
+    return words;
+}
+
+std::vector<std::string> expertArguments(const State& state, const std::filesystem::path& record)
+{
+    return {"train", "--case", chosenCase(state).id, "--trainee", "expert", "--unpaced", "--record", record.string()};
 }
 
 std::string asTyped(const std::string& program, const std::vector<std::string>& arguments)

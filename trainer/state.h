@@ -1,6 +1,7 @@
 #pragma once
 
 #include <trainer/case_entry.h>
+#include <trainer/settings.h>
 
 #include <cstddef>
 #include <filesystem>
@@ -13,7 +14,7 @@ namespace palpate::trainer {
 
 enum class Screen { cases, devices, briefing, session, result };
 
-/// "Case", "Device", "Briefing", "Session", "Result".
+/// "Case", "Device", "Briefing", "Session", "Result", in the user's language.
 const char* nameOf(Screen screen) noexcept;
 
 /// What was found of devices, in words.
@@ -22,6 +23,8 @@ struct DeviceCheck {
     bool falconReady = false;
     std::string falcon;  // what was found
     std::string remedy;  // what to do about it; empty: nothing
+    std::string push;    // what came of the force test; empty: there was none
+    bool pushed = false;
 };
 
 struct PartOfScore {
@@ -32,6 +35,7 @@ struct PartOfScore {
 struct LossOfPoints {
     double points = 0;
     std::string words;
+    std::optional<double> at;  // its moment in the session [s]; nothing: at no one moment
 };
 
 /// What a session came to, or why it did not.
@@ -64,13 +68,34 @@ struct State {
     SessionFiles files;      // of the last session
     std::string command;     // that runs, or ran last, as one would type it
     bool running = false;    // a session is going on
+    bool trying = false;     // the hand is being tried
+    bool pushing = false;    // the force test is going on
     Result result;
-    bool replaying = false;  // the debrief is open
-    std::string notice;      // something that went wrong outside a session
+    bool replaying = false;       // the debrief is open
+    std::optional<double> from;   // where it begins [s]
+    std::filesystem::path ghost;  // record of an expert that is shown beside it; empty: none
+    bool filming = false;         // a film of the session is being made
+    bool ghosting = false;        // an expert's session is being made
+    std::string notice;           // something that went wrong outside a session, or what has become of an errand
+    bool popup = false;           // something lies over the screen
+    Settings settings;
 };
 
 /// What has to be done outside the window.
-enum class Errand { none, addPerson, checkDevices, startSession, endSession, startDebrief, quit };
+enum class Errand {
+    none,
+    addPerson,
+    checkDevices,
+    testForce,
+    tryHand,
+    startSession,
+    endSession,
+    startDebrief,
+    seeExpert,
+    makeFilm,
+    keepSettings,
+    quit
+};
 
 /// The screen's main button. @returns  what has to be done for it
 Errand goOn(State& state);
@@ -78,8 +103,8 @@ Errand goOn(State& state);
 Errand goBack(State& state);
 /// Result screen: the same case again.
 Errand again(State& state);
-/// Result screen: replay of the session.
-Errand debrief(State& state);
+/// Result screen: replay of the session, from the beginning or from the moment of a loss of points.
+Errand debrief(State& state, std::optional<double> at = std::nullopt);
 
 void sessionStarted(State& state, SessionFiles files, std::string command);
 /// The best score of the case follows.
@@ -93,6 +118,10 @@ const char* mainButton(const State& state) noexcept;
 std::vector<std::string> trainArguments(const State& state, const SessionFiles& files);
 /// `palpate-view --replay ...` for the last session.
 std::vector<std::string> debriefArguments(const State& state);
+/// `palpate train --tryout`.
+std::vector<std::string> tryoutArguments(const State& state);
+/// `palpate train` by a simulated expert in the anatomy of the chosen case.
+std::vector<std::string> expertArguments(const State& state, const std::filesystem::path& record);
 /// Words as one would type them in a shell.
 std::string asTyped(const std::string& program, const std::vector<std::string>& arguments);
 

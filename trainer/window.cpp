@@ -1,5 +1,6 @@
 #include <trainer/window.h>
 
+#include <base/words.h>
 #include <trainer/case_pictures.h>
 #include <trainer/errands.h>
 #include <trainer/look.h>
@@ -15,7 +16,6 @@
 #include <chrono>
 #include <map>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -24,6 +24,8 @@
 namespace palpate::trainer {
 
 namespace {
+
+using base::tr;
 
 constexpr double idle = 0.2;  // between looks at what runs, when nobody does anything [s]
 
@@ -41,15 +43,15 @@ using Window = std::unique_ptr<GLFWwindow, WindowCloser>;
 Window openWindow(const WindowOptions& options)
 {
     if (glfwInit() == GLFW_FALSE) {
-        throw std::runtime_error("no display: set DISPLAY, or type palpate --help for the commands");
+        throw std::runtime_error(tr("no display: set DISPLAY, or type palpate --help for the commands"));
     }
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
-    Window window(glfwCreateWindow(options.width, options.height, "Palpate trainer", nullptr, nullptr));
+    Window window(glfwCreateWindow(options.width, options.height, tr("Palpate trainer"), nullptr, nullptr));
     if (!window) {
-        throw std::runtime_error("the display has no OpenGL 3.2, which the window needs");
+        throw std::runtime_error(tr("the display has no OpenGL 3.2, which the window needs"));
     }
     glfwMakeContextCurrent(window.get());
     glfwSwapInterval(0);
@@ -177,7 +179,7 @@ private:
 // Texts grow with Ctrl and + or -, and with the screen's density.
 class TextScale {
 public:
-    explicit TextScale(double asked) : asked_(asked) {}
+    explicit TextScale(double& asked) : asked_(asked) {}
 
     /// Between pictures.
     void fit(GLFWwindow* window)
@@ -196,21 +198,23 @@ public:
             ImGui_ImplOpenGL3_CreateFontsTexture();
         }
     }
-    /// In a picture.
-    void heed()
+    /// In a picture. Returns whether it has changed.
+    bool heed()
     {
         const ImGuiIO& io = ImGui::GetIO();
         constexpr double step = 1.25, least = 0.5, most = 3;
         const auto pressed = [&](int key) { return io.KeyCtrl && ImGui::IsKeyPressed(key, false); };
+        const double before = asked_;
         if (pressed(GLFW_KEY_EQUAL) || pressed(GLFW_KEY_KP_ADD)) {
             asked_ = std::min(asked_ * step, most);
         } else if (pressed(GLFW_KEY_MINUS) || pressed(GLFW_KEY_KP_SUBTRACT)) {
             asked_ = std::max(asked_ / step, least);
         }
+        return asked_ != before;
     }
 
 private:
-    double asked_;
+    double& asked_;
     float set_ = 0;
 };
 
@@ -231,8 +235,11 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     Gui gui(window.get());
     Keys keys(window.get());
     Textures textures;
-    TextScale scale(options.textScale);
     State state;
+    state.settings = readSettings(settingsFile());
+    base::useLanguage(state.settings.language);
+    state.settings.textScale = options.textScale > 0 ? options.textScale : state.settings.textScale;
+    TextScale scale(state.settings.textScale);
     Errands errands(options.programs, sink);
     errands.list(state);
     for (std::size_t i = 0; i < state.cases.size(); ++i) {
@@ -242,8 +249,9 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     const GLubyte* renderer = glGetString(GL_RENDERER);
     figures.display = renderer != nullptr ? reinterpret_cast<const char*>(renderer) : "unknown";
     std::vector<double> seconds;
-    std::optional<Screen> shown;
-    int due = 0;  // pictures until all has settled
+    constexpr int none = -1;
+    int shown = none;  // screen
+    int due = 0;       // pictures until all has settled
     while (glfwWindowShouldClose(window.get()) == GLFW_FALSE && (options.frames == 0 || figures.frames < options.frames)) {
         if (options.frames == 0 && due == 0) {
             glfwWaitEventsTimeout(idle);
@@ -255,12 +263,12 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
         errands.look(state);
         scale.fit(window.get());
         gui.begin();
-        scale.heed();
-        const bool entered = shown != state.screen;
+        const bool scaled = scale.heed();
+        const bool entered = shown != static_cast<int>(state.screen);
         if (entered) {
-            glfwSetWindowTitle(window.get(), (std::string("Palpate trainer: ") + nameOf(state.screen)).c_str());
+            glfwSetWindowTitle(window.get(), (std::string(tr("Palpate trainer: ")) + nameOf(state.screen)).c_str());
         }
-        shown = state.screen;
+        shown = static_cast<int>(state.screen);
         const ImVec2 size = ImGui::GetIO().DisplaySize;
         const Errand errand = drawScreen(
             state, [&](const std::string& picture) { return textures.of(picture); }, size.x, size.y, entered);
@@ -272,7 +280,10 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
         if (errand == Errand::quit) {
             break;
         }
-        errands.run(errand, state);
+        errands.run(errand == Errand::none && scaled ? Errand::keepSettings : errand, state);
+        if (errand == Errand::keepSettings) {
+            shown = none;  // all is drawn anew
+        }
     }
     figures.frameP50 = quantile(seconds, 0.5);
     figures.frameP90 = quantile(std::move(seconds), 0.9);

@@ -29,7 +29,9 @@ Desktop::Desktop()
 
 std::unique_ptr<Program> Desktop::start(const std::string& name, const std::vector<std::string>& arguments) const
 {
-    std::vector<std::string> words{"DISPLAY=" + display_, std::string(PALPATE_BIN_DIR) + "/" + name};
+    std::vector<std::string> words{"DISPLAY=" + display_, "LANGUAGE=en",
+                                   "XDG_CONFIG_HOME=" + std::string(folder_ / "config"),
+                                   std::string(PALPATE_BIN_DIR) + "/" + name};
     words.insert(words.end(), arguments.begin(), arguments.end());
     return std::make_unique<Program>("/usr/bin/env", words);
 }

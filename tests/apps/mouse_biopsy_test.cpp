@@ -185,6 +185,75 @@ TEST(Desktop, ASessionEndsWithTheWindowThatIsItsHand)
     EXPECT_EQ(figures({"replay", folder / "s.db"})["identical"], true);
 }
 
+// S lets the tool go and makes the ticks stand still; Backspace begins anew, with a record of the second attempt alone.
+TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
+{
+    if (!built("palpate-view") || !installed("Xvfb") || !installed("xdotool"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Folder folder;
+    const std::string session = "paused-" + std::to_string(::getpid());
+    const Desktop desktop;
+    const auto train =
+        desktop.start("palpate", {"train", "layered", "--device", "mouse", "--view", "--close-at-end", "--seconds", "600",
+                                  "--session", session, "--record", folder / "s.db", "--json", folder / "s.json"});
+    ASSERT_FALSE(desktop.window("Palpate").empty());
+    auto eyes = sessionWithHand(session);
+    ASSERT_TRUE(eyes);
+    const auto until = [&](const auto& holds) {
+        for (int i = 0; i < 200 && !holds(); ++i)
+            wait(0.05);
+        return holds();
+    };
+    wait(1);
+    desktop.xdotool({"key", "BackSpace"});
+    wait(0.5);
+    EXPECT_EQ(eyes->ending(), channel::Ending::none) << "only a session that is paused begins anew";
+    desktop.xdotool({"key", "Return", "key", "s"});
+    ASSERT_TRUE(until([&] { return eyes->state()->standing == channel::Standing::paused; }));
+    const auto at = eyes->state()->tick;
+    wait(1.0);
+    EXPECT_EQ(eyes->state()->tick, at);
+    EXPECT_EQ(glm::length(vec(eyes->state()->total)), 0.0);
+    desktop.xdotool({"key", "s"});
+    ASSERT_TRUE(until([&] { return eyes->state()->tick > at; }));
+    desktop.xdotool({"key", "s"});
+    ASSERT_TRUE(until([&] { return eyes->state()->standing == channel::Standing::paused; }));
+    desktop.xdotool({"key", "BackSpace"});
+    ASSERT_TRUE(until([&] { return eyes->ending() != channel::Ending::none; }));
+    eyes = sessionWithHand(session);
+    ASSERT_TRUE(eyes);
+    wait(2);
+    desktop.xdotool({"key", "s"});
+    ASSERT_TRUE(until([&] { return eyes->state()->standing == channel::Standing::paused; }));
+    wait(1);
+    desktop.xdotool({"key", "s"});
+    wait(1);
+    desktop.xdotool({"key", "e"});
+    const Outcome outcome = train->wait();
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const auto json = nlohmann::json::parse(readText(folder / "s.json"));
+    EXPECT_EQ(json["pauses"]["count"], 1);
+    EXPECT_GT(json["pauses"]["seconds"], 0.5);
+    const auto replayed = figures({"replay", folder / "s.db"});
+    EXPECT_EQ(replayed["identical"], true);
+    EXPECT_EQ(replayed["force_hash"], json["force_hash"]);
+}
+
+// Told step by step, and over after its seconds: nothing is left of it.
+TEST(Desktop, ATryoutEndsByItselfAndLeavesNothing)
+{
+    if (!built("palpate-view") || !installed("Xvfb") || !installed("xdotool"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Desktop desktop;
+    const auto train = desktop.start("palpate", {"train", "--tryout", "--device", "mouse", "--seconds", "3"});
+    EXPECT_FALSE(desktop.window("Palpate").empty());
+    const Outcome outcome = train->wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.out.find("points"), std::string::npos) << outcome.out;
+    expectRefusal({"train", "--tryout"}, "somebody has to hold the tool");
+    expectRefusal({"train", "--tryout", "--device", "mouse", "--record", "x.db"}, "--tryout");
+}
+
 TEST(Mouse, IsRefusedWhereNobodyCanMoveIt)
 {
     expectRefusal({"train", "layered", "--device", "mouse", "--unpaced"}, "leave out --unpaced");

@@ -3,7 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vec3.hpp>
+
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -22,6 +27,11 @@ constexpr int wide = 1000, high = 700;
 void wait(double seconds)
 {
     std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+glm::dvec3 vec(const channel::Triple& t)
+{
+    return {t[0], t[1], t[2]};
 }
 
 bool can()
@@ -147,7 +157,37 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
     EXPECT_EQ(figures({"replay", filesIn(t.folder / "s", ".db").at(0).string()})["identical"], true);
 }
 
-TEST(TrainerWindow, FromTheStartToTheDebriefAndOutByKeys)
+// The tip goes by a millimetre a key, in the picture and along the needle.
+void expectKeysMoveTheTool(const Trainer& t, const channel::Subscriber& eyes)
+{
+    const auto tip = [&] { return vec(eyes.state()->tip); };
+    const auto press = [&](const std::string& key, int times) {
+        t.desktop.xdotool({"key", "--repeat", std::to_string(times), "--delay", "40", key});
+        wait(1.0);
+    };
+    const glm::dvec3 start = tip();
+    press("Right", 6);
+    EXPECT_NEAR(glm::distance(tip(), start), 0.0, 0.2e-3) << "nobody holds the tool";
+    t.key("Return");
+    press("Right", 6);
+    const glm::dvec3 right = tip() - start;
+    EXPECT_NEAR(glm::length(right), 6e-3, 1.5e-3);
+    press("shift+Left", 30);
+    EXPECT_NEAR(glm::distance(tip(), start), 0.0, 1.5e-3) << "five of them with Shift are one without";
+    press("Up", 6);
+    EXPECT_NEAR(glm::length(tip() - start), 6e-3, 1.5e-3);
+    EXPECT_NEAR(glm::dot(glm::normalize(tip() - start), glm::normalize(right)), 0.0, 0.3);
+    press("Down", 6);
+    press("ctrl+Page_Down", 4);
+    EXPECT_NEAR(glm::length(tip() - start), 4e-3, 1.5e-3);
+    press("ctrl+Page_Up", 4);
+    const glm::dvec3 axis = vec(eyes.state()->axis);
+    press("ctrl+Right", 3);
+    EXPECT_NEAR(glm::degrees(std::acos(glm::dot(axis, vec(eyes.state()->axis)))), 6.0, 1.0);
+    press("ctrl+Left", 3);
+}
+
+TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByKeysAlone)
 {
     if (!can())
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
@@ -160,11 +200,27 @@ TEST(TrainerWindow, FromTheStartToTheDebriefAndOutByKeys)
         ASSERT_TRUE(t.isAt(next));
         wait(1);
     }
-    ASSERT_TRUE(t.session());
+    const auto eyes = t.session();
+    ASSERT_TRUE(eyes);
     ASSERT_TRUE(t.windowIsThere("^Palpate$"));
     wait(2);
+    expectKeysMoveTheTool(t, *eyes);
+    const auto go = [&](const char* key, auto until) {
+        for (int i = 0; i < 150 && !until(*eyes->state()); ++i) {
+            t.desktop.xdotool({"key", key});
+            wait(0.12);
+        }
+    };
+    go("Page_Down", [](const channel::State& s) { return s.phase == channel::Phase::inserted && s.distance[0] < 4e-3; });
+    t.key("space");
+    ASSERT_EQ(eyes->state()->cores, 1U);
+    go("Page_Up", [](const channel::State& s) { return s.phase == channel::Phase::free; });
+    t.key("Return");
     t.key("e");
-    EXPECT_EQ(t.result()["score"]["total"], 0);
+    const auto json = t.result();
+    ASSERT_EQ(json["core"].size(), 1U);
+    EXPECT_GT(json["core"][0]["target_fraction"], 0.2);
+    EXPECT_GT(json["score"]["total"], 60);
     ASSERT_TRUE(t.isAt("Result"));
     wait(1);
     t.key("d");

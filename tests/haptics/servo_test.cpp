@@ -4,15 +4,19 @@
 
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
+#include <haptics/replay.h>
 #include <haptics/servo.h>
 
 #include <gtest/gtest.h>
+#include <glm/geometric.hpp>
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <thread>
+#include <vector>
 
 namespace palpate::haptics {
 namespace {
@@ -116,6 +120,78 @@ TEST(Servo, StopsWhenAskedAndWhenTheDeviceHasFinished)
     Rig stopped;
     const auto sink = [&](const TickRecord& r, const ServoTiming&) { stopped.stop = r.tick == 41; };
     EXPECT_EQ(runServo(stopped.hand, stopped.simulation, {false, 0.0}, sink, stopped.stop).ticks, 42U);
+}
+
+// Presses the block 4 mm deep and stays; elsewhere while it is told to.
+struct Press final : Device {
+    DeviceSample read() noexcept override
+    {
+        DeviceSample sample;
+        sample.position = Vec3(elsewhere ? 20e-3 : 0.0, -10e-3 + std::min(14e-3, 2e-5 * double(reads)), 0);
+        sample.buttons = buttonDeadMan;
+        reads += going ? 1 : 0;
+        return sample;
+    }
+    void write(Vec3 force) noexcept override { last = force; }
+    bool finished() const noexcept override { return false; }
+    std::uint64_t reads = 0;
+    bool going = true, elsewhere = false;
+    Vec3 last{0.0};
+};
+
+// A pause of 200 ms is in no tick: the numbers of the ticks have no gap, and the poses that were recorded give the same
+// forces to the bit without a pause. The force falls within the stabiliser's slew, is zero while it stands, and begins at
+// zero; with the tool elsewhere it goes on standing.
+TEST(Servo, APauseIsInNoTickAndJumpsNowhere)
+{
+    Simulation simulation(tests::blockSphere());
+    Press device;
+    std::vector<TickRecord> ticks;
+    ForceHash hash;
+    bool asked = false;
+    int stood = 0, stoodElsewhere = 0;
+    double pushed = 0;
+    ServoOptions options{true, 2.0};
+    options.missedAllowed = 0;
+    options.pause.asked = [&] { return asked; };
+    options.pause.standing = [&](bool elsewhere) {
+        EXPECT_EQ(glm::length(device.last), 0.0);
+        stood += elsewhere ? 0 : 1;
+        stoodElsewhere += elsewhere ? 1 : 0;
+        asked = stood < 200;
+        device.elsewhere = stood >= 200 && stoodElsewhere < 50;
+    };
+    const std::atomic<bool> stop{false};
+    const auto sink = [&](const TickRecord& r, const ServoTiming&) {
+        ticks.push_back(r);
+        hash.add(r);
+        asked = asked || r.tick == 1200;
+        device.going = !asked;
+        pushed = r.tick == 1200 ? glm::length(r.total) : pushed;
+    };
+    const auto timing = runServo(device, simulation, options, sink, stop);
+    EXPECT_GT(pushed, 0.3);
+    EXPECT_EQ(stood, 200);
+    EXPECT_GE(stoodElsewhere, 49);
+    EXPECT_EQ(timing.pauses, 1U);
+    EXPECT_GE(timing.paused, 0.24);
+    EXPECT_LT(timing.missed, 200U);
+    ASSERT_EQ(ticks.size(), 2000U);
+    const double cap = 50.0 * tests::blockSphere().scene.forceCap * tickSeconds;  // the stabiliser's slew [N per tick]
+    bool stands = false;
+    for (std::size_t i = 1; i < ticks.size(); ++i) {
+        EXPECT_EQ(ticks[i].tick, i);
+        EXPECT_LE(glm::length(ticks[i].total - ticks[i - 1].total), cap + 1e-9);
+        stands = stands || (i > 1200 && glm::length(ticks[i].total) == 0.0);
+    }
+    EXPECT_TRUE(stands);
+    EXPECT_GT(glm::length(ticks.back().total), 0.3);
+    Simulation again(tests::blockSphere());
+    ForceHash replayed;
+    for (const TickRecord& r : ticks) {
+        replayed.add(again.tick(r.device));
+    }
+    EXPECT_EQ(replayed.value(), hash.value());
 }
 
 // The whole servo path: device, simulation, histograms, broadcast to viewers.

@@ -32,6 +32,7 @@ channel::Scenery needleScenery()
     s.structure[1] = named("vein");
     s.entry = {0, 0, 0};
     s.aim = {0, 20e-3, 0};
+    s.throwLength = 15e-3;
     return s;
 }
 
@@ -88,9 +89,22 @@ TEST(Coach, WarnsOfWhatTheThrowWouldReach)
     channel::State s = stateAt(0, 15e-3, 0, channel::Phase::inserted);
     s.distance[0] = s.ahead[0] = 1e-3;
     s.ahead[1] = 18e-3;
-    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "Do not fire: the 22 mm of the throw would reach vein");
+    EXPECT_EQ(coach(needleScenery(), s, view).wrong, "Do not fire: the 15 mm of the throw would reach vein");
     s.ahead[1] = 23e-3;
     EXPECT_EQ(coach(needleScenery(), s, view).wrong, "");
+}
+
+TEST(Coach, SaysTissuesAsPeopleDo)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.structure[0] = named("idc_high_grade");
+    scenery.structure[1] = named("chest_wall");
+    channel::State s = stateAt(0, 15e-3, 0, channel::Phase::inserted);
+    s.distance[0] = s.ahead[0] = 1e-3;
+    s.ahead[1] = 5e-3;
+    EXPECT_EQ(coach(scenery, s, view).wrong, "Do not fire: the 15 mm of the throw would reach chest wall");
+    s.distance[0] = s.ahead[0] = 10e-3;
+    EXPECT_NE(coach(scenery, s, view).now.find("high-grade carcinoma"), std::string::npos);
 }
 
 TEST(Coach, AMissBeginsAnew)

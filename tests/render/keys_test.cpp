@@ -26,7 +26,7 @@ TEST(Keys, NoKeyHasTwoMeanings)
         for (const Controls::Stroke& s : key.strokes) {
             EXPECT_NE(s.key == 0, s.name == 0) << key.shown;
             EXPECT_TRUE(s.key == 0 || s.key >= GLFW_KEY_ESCAPE || s.key == GLFW_KEY_SPACE) << key.shown;
-            for (const unsigned window : {1U, 2U, 4U}) {
+            for (const unsigned window : {1U, 2U, 4U, 8U}) {
                 if ((key.windows & window) != 0) {
                     EXPECT_TRUE(seen.emplace(window, s.key, s.name).second) << key.shown << ": " << key.what;
                 }

@@ -330,6 +330,41 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
     EXPECT_NE(said("viewer").find("stopped without ending"), std::string::npos) << said("viewer");
 }
 
+// Of the screen's left half, where the body is: pixels that are not the background.
+int bodyOnScreen(const fs::path& file)
+{
+    constexpr Pixel background{15, 18, 26};
+    const ScreenPlan plan(width, height);
+    return width * height - countOnScreen(file, background) - (width - plan.view.width) * height;
+}
+
+// From the first picture on, through the change from coarse pictures to the fine one 1.2 s after all motion: only on a
+// screen, where VTK's buffers are made anew in the midst of a picture, was the body missing from what came out.
+TEST_F(Viewer, TheBodyStaysOnTheScreenWhenMotionStops)
+{
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    Process publisher(publish("hold", "1.9"), log("publisher"));
+    Process viewer({"xvfb-run", "-a", "-s", "-noreset -screen 0 800x600x24 -fbdir " + folder_.string(), program(),
+                    "--session", session_, "--size", "800x600", "--wait", "1", "--no-steps"},
+                   log("viewer"));
+    const fs::path screen = folder_ / "Xvfb_screen0";
+    constexpr int some = width * height / 10;
+    for (int i = 0; i < 600 && bodyOnScreen(screen) < some; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    const int whole = bodyOnScreen(screen);
+    ASSERT_GE(whole, some) << said("viewer");
+    int least = whole;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(5);
+    while (std::chrono::steady_clock::now() < end) {
+        least = std::min(least, bodyOnScreen(screen));
+        std::this_thread::sleep_for(std::chrono::milliseconds(15));
+    }
+    EXPECT_GT(least, whole * 4 / 5);
+    publisher.end(SIGKILL);
+    viewer.wait();
+}
+
 TEST_F(Viewer, OpensAWindowWhereThereIsADisplay)
 {
     std::this_thread::sleep_for(std::chrono::seconds(2));

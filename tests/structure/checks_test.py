@@ -3,6 +3,7 @@
     checks_test.py ROOT
 """
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -40,6 +41,9 @@ FAULTS = [
     ("check_sizes", "apps/new.cpp", LONG, "a function has at most 80"),
     ("check_sizes", "apps/new.cpp", "namespace a::b {\n" + LONG + "}\n", "a function has at most 80"),
     ("check_sizes", "tests/volume/new.cpp", 530 * "// line\n", "a file has at most"),
+    ("check_translations", "trainer/screens.cpp", 'void f() { words("Not translated at all"); }\n', "goes past tr()"),
+    ("check_translations", "trainer/widgets.cpp", 'void f() { ImGui::Button("Close"); }\n', "goes past tr()"),
+    ("check_translations", "render/coach.cpp", 'std::string f() { return "Touch the skin"; }\n', "goes past tr()"),
     ("check_tables", "docs/press.md", TABLE + "| `y` | 0.0 (0.0 to 0.1) | 0.0 | -0.71 |\n", "4 columns under a header of 2"),
     ("check_tables", "README.md", TABLE + "| `y` |\n", "1 columns under a header of 2"),
     ("check_tables", "docs/score.md", MEANING + "| `total` | 94.6 (90.7 to 98.1) |\n", "say in words what it is"),
@@ -50,6 +54,7 @@ FAULTS = [
 INNOCENT = [
     ("check_arrows", "haptics/servo.cpp", "// #include <vtkActor.h>\n"),
     ("check_arrows", "haptics/servo.cpp", "#include <volume/geometry.h>\n#include <vector>\n"),
+    ("check_translations", "trainer/screens.cpp", 'void f() { words(tr("Translated here")); }  // not "this one" \n'),
     ("check_sizes", "apps/new.cpp", 'const char* text = R"(' + DEEP + ')";\n' + DEEP.replace("if (a > 1)", "")),
     ("check_sizes", "apps/new.cpp", "namespace a {\n" + 90 * "int x();\n" + "}\n"),
     ("check_tables", "docs/score.md", TABLE + "| `y \\\\| z` | either |\n\n```\n| a | b |\n| c |\n```\n"),
@@ -75,7 +80,35 @@ def said(script, name, text):
         return run(script, folder)
 
 
+def said_of_catalogue(change):
+    """What check_translations says about a copy of all that it reads, after `change` of the copy's folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        for part in ("apps", "base", "haptics", "render", "trainer", "training/cases", "datasets/tables", "scripts", "translations"):
+            shutil.copytree(ROOT / part, pathlib.Path(folder) / part)
+        change(pathlib.Path(folder))
+        return run("check_translations", folder)
+
+
+def edit(file, old, new):
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+
+
+CATALOGUE = [
+    (lambda root: None, 0, ""),
+    (lambda root: edit(root / "trainer/state.cpp", 'tr("Start")', 'tr("Start at once")'), 1, "'Start at once' is not translated"),
+    (lambda root: edit(root / "translations/de.po", 'msgstr "Beginnen"', 'msgstr ""'), 1, "'Start' is not translated"),
+    (lambda root: edit(root / "translations/de.po", "von 100 Punkten", "von {} Punkten"), 1, "its translation"),
+    (lambda root: edit(root / "training/cases/cyst/case.toml", "Reach the cyst,", "Go to the cyst,"), 1, "'Go to the cyst,"),
+]
+
+
 def failures():
+    for change, expected, words in CATALOGUE:
+        status, out = said_of_catalogue(change)
+        if status != expected or words not in out:
+            yield f"check_translations: expected {words!r}, it said: {out.strip()}"
     for script, name, text, expected in FAULTS:
         status, out = said(script, name, text)
         if status != 1 or f"{name}:" not in out or expected not in out:

@@ -1,0 +1,28 @@
+#include <apps/train_attempts.h>
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+namespace palpate::apps {
+
+namespace fs = std::filesystem;
+
+session::TrainResult runToItsEnd(const haptics::SessionModel& model, const haptics::SessionInfo& info,
+                                 const session::TrainOptions& options)
+{
+    for (;;) {
+        session::TrainResult result = session::Trainer(model, info, options).run();
+        if (!result.restart || result.signal != 0 || !result.problem.empty()) {
+            return result;
+        }
+        if (!options.record.empty()) {
+            for (const char* part : {"", "-wal", "-shm", "-journal"}) {
+                fs::remove(options.record.string() + part);
+            }
+        }
+        fmt::print(stderr, "palpate: begun anew\n");
+    }
+}
+
+}  // namespace palpate::apps

@@ -1,0 +1,120 @@
+#include <trainer/widgets.h>
+
+#include <base/said.h>
+
+#include <algorithm>
+
+namespace palpate::trainer {
+
+namespace {
+
+using base::said;
+using base::tr;
+
+void drawParts(const Result& result)
+{
+    for (const PartOfScore& part : result.parts) {
+        const float share = part.most > 0 ? static_cast<float>(part.points / part.most) : 0.0F;
+        ImGui::ProgressBar(share, {12 * ImGui::GetFontSize(), 0},
+                           said(tr("{:.0f} of {:.0f}"), part.points, part.most).c_str());
+        ImGui::SameLine();
+        ImGui::TextUnformatted(part.name.c_str());
+    }
+}
+
+void drawMeasures(const Result& result)
+{
+    if (!ImGui::BeginTable("measures", 2, ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp)) {
+        return;
+    }
+    for (const auto& [label, value] : result.measures) {
+        ImGui::TableNextRow();
+        ImGui::TableNextColumn();
+        ImGui::TextUnformatted(label.c_str());
+        ImGui::TableNextColumn();
+        ImGui::TextUnformatted(value.c_str());
+    }
+    ImGui::EndTable();
+}
+
+// The largest losses, each with its moment to go to: by a click, or its number.
+Errand drawLosses(State& state)
+{
+    const Result& result = state.result;
+    heading(result.losses.empty() ? tr("Nothing was lost") : tr("Where the points went"), 1.15F);
+    constexpr std::size_t most = 3;
+    Errand errand = Errand::none;
+    for (std::size_t i = 0; i < std::min(most, result.losses.size()); ++i) {
+        const LossOfPoints& loss = result.losses[i];
+        ImGui::PushID(static_cast<int>(i));
+        words(said("-{:.0f}   {}", loss.points, loss.words));
+        if (loss.at) {
+            ImGui::BeginDisabled(state.replaying);
+            const bool clicked = ImGui::Button(said(tr("See it, at {:.1Lf} s ({})"), *loss.at, i + 1).c_str());
+            if (clicked || (!state.replaying && ImGui::IsKeyPressed('1' + static_cast<int>(i), false))) {
+                errand = debrief(state, loss.at);
+            }
+            ImGui::EndDisabled();
+        }
+        ImGui::PopID();
+    }
+    return errand;
+}
+
+// What can be done with the session, by a click or a letter.
+Errand drawChoices(State& state)
+{
+    const bool free = !state.replaying && !state.ghosting;
+    Errand errand = Errand::none;
+    bool first = true;
+    const auto choice = [&](const std::string& label, char key, bool now) {
+        first ? void() : besideIfRoom(label);
+        first = false;
+        ImGui::BeginDisabled(!now);
+        const bool pressed = ImGui::Button(label.c_str()) || (now && ImGui::IsKeyPressed(key, false));
+        ImGui::EndDisabled();
+        return pressed && now;
+    };
+    if (choice(tr("Same case again (A)"), 'A', true)) {
+        return again(state);
+    }
+    if (choice(tr("See it again: debrief (D)"), 'D', free)) {
+        errand = debrief(state);
+    }
+    if (choice(state.ghosting ? tr("An expert does it ...") : tr("Beside an expert (X)"), 'X', free)) {
+        errand = Errand::seeExpert;
+    }
+    if (choice(state.filming ? tr("The film is being made ...") : tr("Film (F)"), 'F', !state.filming)) {
+        errand = Errand::makeFilm;
+    }
+    return errand;
+}
+
+}  // namespace
+
+Errand drawResult(State& state)
+{
+    const Result& result = state.result;
+    const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
+    if (!result.problem.empty()) {
+        heading(tr("The session has no result"));
+        words(result.problem, orange);
+        return ImGui::Button(tr("Try again")) ? again(state) : Errand::none;
+    }
+    ImGui::BeginChild("result", {0, -(wide > 44 * em ? 6.6F : 9.6F) * em}, false, ImGuiWindowFlags_NavFlattened);
+    heading(said(tr("{:.0f} of 100 points"), result.total), 1.9F);
+    words(chosenCase(state).title, quiet);
+    ImGui::Columns(wide > 44 * em ? 2 : 1, "halves", false);
+    drawParts(result);
+    ImGui::Spacing();
+    const Errand moment = drawLosses(state);
+    ImGui::NextColumn();
+    drawMeasures(result);
+    ImGui::Columns(1);
+    ImGui::EndChild();
+    words(said(tr("Record: {}"), state.files.record.string()), quiet);
+    const Errand chosen = drawChoices(state);
+    return moment != Errand::none ? moment : chosen;
+}
+
+}  // namespace palpate::trainer

@@ -1,0 +1,66 @@
+#include <trainer/settings.h>
+
+#include <base/words.h>
+
+#include <nlohmann/json.hpp>
+
+#include <cstdlib>
+#include <fstream>
+#include <system_error>
+
+namespace palpate::trainer {
+
+namespace fs = std::filesystem;
+
+fs::path settingsFile()
+{
+    if (const char* config = std::getenv("XDG_CONFIG_HOME"); config != nullptr && *config == '/') {
+        return fs::path(config) / "palpate" / "trainer.json";
+    }
+    const char* home = std::getenv("HOME");
+    return fs::path(home != nullptr ? home : "/tmp") / ".config" / "palpate" / "trainer.json";
+}
+
+Settings readSettings(const fs::path& file)
+{
+    Settings settings;
+    std::ifstream in(file);
+    const auto json = nlohmann::json::parse(in, nullptr, false);
+    if (!json.is_object()) {
+        return settings;
+    }
+    const auto take = [&json](const char* key, auto& value) {
+        try {
+            value = json.value(key, value);
+        } catch (const nlohmann::json::exception&) {
+            return;
+        }
+    };
+    take("language", settings.language);
+    take("palette", settings.palette);
+    take("sounds", settings.sounds);
+    take("text_scale", settings.textScale);
+    settings.textScale = settings.textScale >= 0.5 && settings.textScale <= 3 ? settings.textScale : 1;
+    settings.palette = settings.palette == "colour-blind" ? settings.palette : "standard";
+    return settings;
+}
+
+std::string writeSettings(const fs::path& file, const Settings& settings)
+{
+    const nlohmann::json json{{"language", settings.language},
+                              {"palette", settings.palette},
+                              {"sounds", settings.sounds},
+                              {"text_scale", settings.textScale}};
+    std::error_code failed;
+    fs::create_directories(file.parent_path(), failed);
+    const fs::path fresh = file.string() + ".new";
+    std::ofstream out(fresh);
+    out << json.dump(2) << '\n';
+    out.close();
+    if (out) {
+        fs::rename(fresh, file, failed);
+    }
+    return out && !failed ? "" : file.string() + base::tr(": the settings cannot be kept");
+}
+
+}  // namespace palpate::trainer
