@@ -71,6 +71,7 @@ if(PALPATE_VIEWER)
   find_package(OpenGL REQUIRED)
   pkg_check_modules(imgui REQUIRED IMPORTED_TARGET GLOBAL imgui)
   pkg_check_modules(alsa REQUIRED IMPORTED_TARGET GLOBAL alsa)
+  pkg_check_modules(spnav REQUIRED IMPORTED_TARGET GLOBAL spnav)
   find_package(VTK 9.1 REQUIRED COMPONENTS
     CommonCore CommonDataModel CommonExecutionModel CommonTransforms FiltersCore FiltersGeneral FiltersSources ImagingCore
     InteractionStyle IOImage RenderingAnnotation RenderingCore RenderingFreeType RenderingOpenGL2

@@ -5,7 +5,6 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -91,33 +90,18 @@ void MouseDevice::turn() noexcept
     }
 }
 
-// The probe needs no dead-man switch: it gives nobody a force.
-void MouseDevice::moveProbe() noexcept
-{
-    using Member = double datasets::ProbeMove::*;
-    constexpr std::array<Member, 6> members{&datasets::ProbeMove::press, &datasets::ProbeMove::slide,
-                                            &datasets::ProbeMove::sweep, &datasets::ProbeMove::rock,
-                                            &datasets::ProbeMove::tilt,  &datasets::ProbeMove::turn};
-    for (std::size_t i = 0; i < members.size(); ++i) {
-        const double most = (i < 3 ? fastestProbe : fastestTurn) * period_;
-        const double way = (input_.probe[i] - probe_.*members[i]) * std::min(1.0, period_ / lag);
-        probe_.*members[i] += std::clamp(way, -most, most);
-    }
-}
-
 DeviceSample MouseDevice::read() noexcept
 {
     listen();
     follow();
     if (heard_) {
         turn();
-        moveProbe();
     }
     arm_.pull(goal_);
     DeviceSample sample;
     sample.position = arm_.read();
     sample.axis = axis_;
-    sample.probe = probe_;
+    sample.probe = probe_.follow(input_.probe, period_);  // needs no dead-man switch: it gives nobody a force
     sample.fresh = silence_ <= longestSilence || !heard_;
     sample.buttons = input_.held != 0 ? buttonDeadMan : 0U;
     sample.buttons |= fire_.down(input_.fires, period_) ? buttonFire : 0U;

@@ -3,6 +3,7 @@
 #include <channel/layout.h>
 #include <haptics/arm.h>
 #include <haptics/device.h>
+#include <haptics/probe_follower.h>
 #include <haptics/session_model.h>
 
 #include <functional>
@@ -33,8 +34,7 @@ public:
     bool finished() const noexcept override { return ended_; }
 
     static constexpr double fastest = 0.25;        // of the goal [m/s]
-    static constexpr double fastestTurn = 1.5;     // of the axis, and of the probe [rad/s]
-    static constexpr double fastestProbe = 0.05;   // of the probe on the skin [m/s]
+    static constexpr double fastestTurn = 1.5;     // of the axis [rad/s]
     static constexpr double lag = 0.02;            // of the goal behind the mouse [s]
     static constexpr double longestSilence = 0.5;  // of a viewer that lives: a slow picture takes so long [s]
     // Critically damped, so that a jump of the mouse does not ring; as stiff as a hand's.
@@ -52,7 +52,6 @@ private:
     void listen() noexcept;
     void follow() noexcept;
     void turn() noexcept;
-    void moveProbe() noexcept;
 
     Source source_;
     double period_;
@@ -63,7 +62,7 @@ private:
     Vec3 offset_{0.0};    // from the mouse to the tool when the dead-man switch was pressed [m]
     Vec3 goal_{0.0};      // [m]
     Vec3 axis_{0.0};
-    datasets::ProbeMove probe_;
+    ProbeFollower probe_;
     Trigger fire_, mark_, picture_;
     bool ended_ = false;
 };

@@ -18,8 +18,9 @@ namespace {
 using base::said;
 using base::tr;
 
-constexpr double depthStep = 1e-3;  // of a notch of the wheel, or a key [m]
-constexpr double fineShare = 0.2;   // with Shift
+constexpr double depthStep = 1e-3;    // of a notch of the wheel, or a key [m]
+constexpr double fineShare = 0.2;     // with Shift
+constexpr double pressStep = 0.5e-3;  // of the probe into the body, by a notch of the wheel [m]
 
 Controls& controlsOf(GLFWwindow* window)
 {
@@ -56,8 +57,8 @@ ultrasound::ProbeMove probeMove(glm::dvec2 pixels, bool turned)
 {
     constexpr double metres = 0.1e-3, radians = 0.3 / 180.0 * 3.14159265358979323846;  // a pixel
     if (turned)
-        return {0, 0, radians * pixels.x, radians * pixels.y};
-    return {-metres * pixels.x, metres * pixels.y, 0, 0};
+        return {.rock = radians * pixels.x, .turn = radians * pixels.y};
+    return {.slide = -metres * pixels.x, .sweep = metres * pixels.y};
 }
 
 }  // namespace
@@ -99,6 +100,8 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
 
 void Controls::keep()
 {
+    if (const auto moved = spaceMouse_.moved(); moved != ultrasound::ProbeMove{})
+        moveProbe(moved);
     hand_.keep(follower_);
     const auto input = follower_.session() != nullptr ? follower_.session()->input() : std::nullopt;
     picture_.setSteps(steps_, input ? input->marks : 0, hand_.commands());
@@ -161,11 +164,27 @@ void Controls::moved(glm::dvec2 to, bool fine)
     if (measuring_)
         picture_.ultrasound().dragCaliper(point(to));
     if (probing_)
-        picture_.ultrasound().moveProbe(probeMove(to - from, fine));
+        moveProbe(probeMove(to - from, fine));
     if (scrubbing_)
         scrub();
     interactor_.SetEventInformation(static_cast<int>(to.x), static_cast<int>(to.y));
     camera(vtkCommand::MouseMoveEvent);
+}
+
+// Of a scene that holds the probe the session has its pose; else this viewer puts it on the skin.
+void Controls::moveProbe(const ultrasound::ProbeMove& by)
+{
+    const bool held = follower_.session() != nullptr && follower_.session()->scenery().probe != channel::ProbeKind::none;
+    if (!held)
+        picture_.ultrasound().moveProbe(by);
+    else if (hand_.commands())
+        hand_.moveProbe(by);
+}
+
+void Controls::storePicture()
+{
+    picture_.ultrasound().store(images_);
+    hand_.storePicture();
 }
 
 // By the keyboard: what the left button does while it is held.
@@ -185,7 +204,9 @@ void Controls::step(glm::dvec3 direction, double steps, bool fine)
 void Controls::wheel(double notches, bool fine, bool intoPicture)
 {
     used_ = true;
-    if (onUltrasound())
+    if (onUltrasound() && fine)
+        moveProbe({.press = notches * pressStep});
+    else if (onUltrasound())
         picture_.ultrasound().turn(Knob::depth, notches > 0 ? -1 : 1);
     else if (hand_.is())
         step(intoPicture ? screen().into : hand_.axis(), notches, fine);

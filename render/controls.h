@@ -2,6 +2,7 @@
 
 #include <render/mouse_hand.h>
 #include <render/picture.h>
+#include <render/space_mouse.h>
 #include <render/tryout.h>
 #include <render/viewer.h>
 
@@ -77,6 +78,8 @@ private:
     void wheel(double notches, bool fine, bool intoPicture);
     void key(int key, const std::string& name, bool again, int mods);
     void toggleHold();
+    void moveProbe(const ultrasound::ProbeMove& by);
+    void storePicture();
     void step(glm::dvec3 direction, double steps, bool fine);
     bool applies(const Key& key) const;
     std::vector<KeyHelp> help() const;
@@ -96,6 +99,7 @@ private:
     Playback* playback_;
     std::filesystem::path images_;  // folder for stored ultrasound pictures
     MouseHand hand_;
+    SpaceMouse spaceMouse_;
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
     bool steps_ = true;       // are told in words
     std::optional<Tryout> tryout_;

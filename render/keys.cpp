@@ -195,7 +195,7 @@ const std::vector<Controls::Key> Controls::keys{
      nullptr,
      false,
      true},
-    {every, marked("wheel"), marked("on the picture: depth"), {}, nullptr, false, true},
+    {every, marked("wheel"), marked("on the picture: depth; with Shift press the probe in"), {}, nullptr, false, true},
     {every,
      "D",
      marked("more depth; with Shift less"),
@@ -298,7 +298,7 @@ const std::vector<Controls::Key> Controls::keys{
      "P",
      marked("store the picture"),
      {{0, 'p', once}},
-     [](Controls& c, const Press&) { c.picture_.ultrasound().store(c.images_); },
+     [](Controls& c, const Press&) { c.storePicture(); },
      false,
      true},
 };

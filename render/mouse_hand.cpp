@@ -2,6 +2,8 @@
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace palpate::render {
@@ -59,6 +61,14 @@ void MouseHand::beginAnew() noexcept
 {
     if (paused())
         input_.ended = 2;
+}
+
+void MouseHand::moveProbe(const ultrasound::ProbeMove& by) noexcept
+{
+    constexpr double furthest = 0.3;  // [m], [rad]: from where the scene has it
+    const std::array<double, 6> ways{by.press, by.slide, by.sweep, by.rock, by.tilt, by.turn};
+    for (std::size_t i = 0; i < ways.size(); ++i)
+        input_.probe[i] = std::clamp(input_.probe[i] + (paused() ? 0.0 : ways[i]), -furthest, furthest);
 }
 
 glm::dvec3 MouseHand::target() const noexcept

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <render/follower.h>
+#include <ultrasound/placement.h>
 
 #include <glm/vec3.hpp>
 
@@ -34,6 +35,10 @@ public:
     void turn(glm::dvec3 about, double angle) noexcept;
     /// ... fires the gun.
     void fire() noexcept { input_.fires += input_.held; }
+    /// Moves the other hand, which holds the scene's ultrasound probe. It needs no switch, and any viewer that commands has
+    /// it.
+    void moveProbe(const ultrasound::ProbeMove& by) noexcept;
+    void storePicture() noexcept { input_.pictures += paused() ? 0 : 1; }
     void mark() noexcept { input_.marks += paused() ? 0 : 1; }
     void end() noexcept { input_.ended = 1; }
     /// Lets the tool go and makes the session stand still, or go on.

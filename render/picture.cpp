@@ -145,7 +145,7 @@ void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t
     session_->line = vec(scenery.aim) - vec(scenery.entry);
     session_->from = cameraDirection(scenery, session_->frame);
     aimCamera();
-    showUltrasound(ultrasoundShown_);
+    showUltrasound(ultrasoundShown_ || scenery.probe != channel::ProbeKind::none);
 }
 
 void Picture::close()

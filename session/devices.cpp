@@ -4,6 +4,7 @@
 #include <haptics/hand.h>
 #include <haptics/mouse.h>
 #include <haptics/palpator.h>
+#include <haptics/probe_follower.h>
 #include <haptics/replay.h>
 #include <haptics/trainee.h>
 
@@ -44,10 +45,43 @@ std::unique_ptr<Device> openMouse(const SessionModel& model, const DeviceRequest
         model, [broadcast] { return broadcast->input(); }, startDistance));
 }
 
-std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceRequest& request, const Broadcast*)
+// A haptic device in the one hand, the ultrasound probe in the other: that of a viewer's mouse.
+class WithProbe final : public Device {
+public:
+    WithProbe(std::unique_ptr<Device> device, const Broadcast& broadcast)
+        : device_(std::move(device)), broadcast_(broadcast)
+    {
+    }
+
+    haptics::DeviceSample read() noexcept override
+    {
+        if (const auto input = broadcast_.input()) {
+            asked_ = input->probe;
+        }
+        haptics::DeviceSample sample = device_->read();
+        sample.probe = probe_.follow(asked_, haptics::tickSeconds);
+        return sample;
+    }
+    void write(haptics::Vec3 force) noexcept override { device_->write(force); }
+    void observe(const haptics::TickRecord& record) noexcept override { device_->observe(record); }
+    bool finished() const noexcept override { return device_->finished(); }
+    std::string problem() const override { return device_->problem(); }
+
+private:
+    std::unique_ptr<Device> device_;
+    const Broadcast& broadcast_;
+    std::array<double, 6> asked_{};
+    haptics::ProbeFollower probe_;
+};
+
+std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceRequest& request, const Broadcast* broadcast)
 {
     assert(request.falcon);
-    return falcon::falconBefore(model, request.falcon, startDistance);
+    auto device = falcon::falconBefore(model, request.falcon, startDistance);
+    if (broadcast == nullptr || model.scene.probe.kind == datasets::ProbeKind::none) {
+        return device;
+    }
+    return std::make_unique<WithProbe>(std::move(device), *broadcast);
 }
 
 std::unique_ptr<Device> openRecord(const SessionModel&, const DeviceRequest& request, const Broadcast*)

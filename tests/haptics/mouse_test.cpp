@@ -186,8 +186,8 @@ TEST(Mouse, TheOtherHandMovesTheProbe)
     datasets::ProbeMove before;
     for (int i = 0; i < secondOfTicks; ++i) {
         const auto now = run(device, 1).probe;
-        EXPECT_LE(std::abs(now.slide - before.slide), MouseDevice::fastestProbe * tickSeconds * 1.0001);
-        EXPECT_LE(std::abs(now.rock - before.rock), MouseDevice::fastestTurn * tickSeconds * 1.0001);
+        EXPECT_LE(std::abs(now.slide - before.slide), ProbeFollower::fastest * tickSeconds * 1.0001);
+        EXPECT_LE(std::abs(now.rock - before.rock), ProbeFollower::fastestTurn * tickSeconds * 1.0001);
         before = now;
     }
     EXPECT_NEAR(before.press, 5e-3, 1e-6);
