@@ -25,7 +25,9 @@ ultrasound::ProbeMove SpaceMouse::moved()
 {
     ultrasound::ProbeMove sum;
     spnav_event event;
-    while (connected_ && spnav_poll_event(&event) == SPNAV_EVENT_MOTION) {
+    while (connected_ && spnav_poll_event(&event) != 0) {
+        if (event.type != SPNAV_EVENT_MOTION)
+            continue;
         const auto& m = event.motion;
         const double seconds = std::min(1e-3 * m.period, longestPeriod);
         const auto share = [](int v) { return std::clamp(v / fullDeflection, -1.0, 1.0); };

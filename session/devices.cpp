@@ -62,7 +62,7 @@ public:
         sample.probe = probe_.follow(asked_, haptics::tickSeconds);
         return sample;
     }
-    void write(haptics::Vec3 force) noexcept override { device_->write(force); }
+    void write(Vec3 force) noexcept override { device_->write(force); }
     void observe(const haptics::TickRecord& record) noexcept override { device_->observe(record); }
     bool finished() const noexcept override { return device_->finished(); }
     std::string problem() const override { return device_->problem(); }
