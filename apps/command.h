@@ -19,7 +19,6 @@ void addPlan(CLI::App& app);
 void addPress(CLI::App& app);
 void addBench(CLI::App& app);
 void addDevices(CLI::App& app);
-void addValidate(CLI::App& app);
 void addCase(CLI::App& app);
 void addCurriculum(CLI::App& app);
 void addProfile(CLI::App& app);

@@ -5,6 +5,7 @@
 #include <command/interrupted.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
+#include <studies/validate/command.h>
 #ifdef PALPATE_SWEEP
 #include <sweep/command.h>
 #endif
@@ -107,9 +108,9 @@ int main(int argc, char** argv)
     addPress(app);
     addBench(app);
     addDevices(app);
-    addValidate(app);
     studies::addAccuracy(app);
     studies::addStability(app);
+    studies::addValidate(app);
 #ifdef PALPATE_SWEEP
     sweep::addSweep(app);
 #endif

@@ -37,6 +37,9 @@ struct CellStiffness {
     const float* stiffening = nullptr;  // b of finite strain [-]; none: 0
 };
 
+/// I_C - 3 up to which tissue with b < 0 softens [-].
+inline constexpr float softensTo = 1.0F;
+
 /// The fields that a step of the solver moves.
 struct StepFields {
     float* u = nullptr;
@@ -109,8 +112,10 @@ struct Kernels {
     /// energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim, "Stable
     /// Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite when a
     /// cell inverts. The other modes have the energy above in axes that turn and stretch with the cell, F^T m for a mode m,
-    /// so that a turn costs nothing. Tissue that stiffens adds  mu/4 b (I_C - 3)^2  where I_C
-    /// > 3. `inverse` is 1 / spacing [1/m].
+    /// so that a turn costs nothing. Yeoh's law with two terms, mu/2 (I_C - 3) + mu/4 b (I_C - 3)^2 where I_C > 3: tissue
+    /// stiffens for b > 0. For b < 0 it softens up to I_C - 3 = softensTo, beyond which the second term goes on along its
+    /// tangent, so that with b >= -1/4 the stress of a stretch always rises. (O. H. Yeoh, "Some forms of the strain energy
+    /// function for rubber", Rubber Chem. Technol. 66, 1993.) `inverse` is 1 / spacing [1/m].
     /// @returns  the energy [J]
     double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                           float* scratch) noexcept;

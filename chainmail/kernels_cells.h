@@ -180,7 +180,10 @@ struct NeoHookean {
         const Lanes stretch = 2.0F * trace + square;
         const Lanes more = stretch > 0.0F ? stretch : Lanes{};
         const Lanes b = stiffening != nullptr ? load(stiffening + cell) * mu : Lanes{};
-        const Lanes extra = b * more;
+        // Tissue that softens (b < 0) goes on at the slope that it has at softensTo.
+        const Lanes bounded = more > softensTo ? Lanes{} + softensTo : more;
+        const Lanes shaped = b < 0.0F ? bounded : more;
+        const Lanes extra = b * shaped;
         Lanes p[3][3];
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
@@ -204,9 +207,9 @@ struct NeoHookean {
         const Lanes bend = hourglassTurned(mu, lambda, q, f, m, g);
         // h^3 W is 32 h^2 times W of the scaled stiffness.
         const float h2 = 32.0F / (inverse * inverse);
-        energy[turn] +=
-            h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume + 0.25F * extra * more) +
-            0.5F * bend;
+        energy[turn] += h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume +
+                              0.25F * extra * (more + (more - shaped))) +
+                        0.5F * bend;
         turn = (turn + 1) % (Layout::lanes / W);
     }
 };

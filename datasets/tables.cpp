@@ -23,7 +23,7 @@ constexpr double softest = 0.01;         // [kPa]; anything that is not air resi
 
 // These may be left out: they are there where somebody measured them.
 constexpr std::array<Field<TissueRow>, 3> measuredFields{{
-    {"stiffening", "", 0, 1000, 1, &TissueRow::stiffening},
+    {"stiffening", "", -0.25, 1000, 1, &TissueRow::stiffening},
     {"stiction_n_per_m", "N/m", 0, 10000, 1, &TissueRow::stictionPerMetre},
     {"friction_ns_m2", "N s/m2", 0, 10000, 1, &TissueRow::frictionDamping},
 }};

@@ -196,7 +196,7 @@ void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const S
                const std::filesystem::path& file)
 {
     for (const Material& m : materials) {
-        if (options.law == Law::neoHookean && m.stiffening > 0.0) {
+        if (options.law == Law::neoHookean && m.stiffening != 0.0) {
             throw std::runtime_error(
                 fmt::format("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0", file.string(), m.stiffening));
         }

@@ -34,20 +34,25 @@ Vec3 at(const std::vector<double>& state, std::size_t node)
     return {state[3 * node], state[3 * node + 1], state[3 * node + 2]};
 }
 
-std::string tissueEnergy(const SolveOptions& options)
+// With `softens` also for tissue of b < 0, whose second term goes on along its tangent from I = 1 on.
+std::string tissueEnergy(const SolveOptions& options, bool softens)
 {
     const bool linear = options.law == Law::linear;
     const std::string volume = linear ? "Trace(Grad_u)" : "(Det(F)-1)";
-    const std::string shape = linear ? "mu*Norm_sqr(Deviator(Sym(Grad_u)))" : "mu/2*(I+b/2*sqr(I))";
+    const std::string shape = linear    ? "mu*Norm_sqr(Deviator(Sym(Grad_u)))"
+                              : softens ? "mu/2*(I+b/2*sqr(I)+s*half_sqr_pos_part(I-1))"
+                                        : "mu/2*(I+b/2*sqr(I))";
     return shape + (options.elements == Elements::p2p1 ? "+p*" + volume + "-sqr(p)/(2*K)" : "+K/2*sqr(" + volume + ")");
 }
 
 // Cauchy stress, times Test_s.
-std::string testedStress(const SolveOptions& options)
+std::string testedStress(const SolveOptions& options, bool softens)
 {
     const bool linear = options.law == Law::linear;
     const std::string pressure = options.elements == Elements::p2p1 ? "p" : linear ? "K*Trace(Grad_u)" : "K*(Det(F)-1)";
-    const std::string shape = linear ? "2*mu*Deviator(Sym(Grad_u))" : "mu*(1+b*I)*pow(Det(F),-5/3)*Deviator(F*F')";
+    const std::string shape = linear    ? "2*mu*Deviator(Sym(Grad_u))"
+                              : softens ? "mu*(1+b*I+s*pos_part(I-1))*pow(Det(F),-5/3)*Deviator(F*F')"
+                                        : "mu*(1+b*I)*pow(Det(F),-5/3)*Deviator(F*F')";
     return "(" + shape + "+" + pressure + "*Id(3)):Test_s";
 }
 
@@ -98,9 +103,9 @@ struct FiniteElements::Impl {
     getfem::mesh mesh;
     getfem::mesh_fem uField, pField, cellField, vertexField;
     getfem::mesh_im volumeRule, faceRule;
-    std::vector<double> mu, bulk, stiffening;  // of each tetrahedron
-    std::vector<double> restR, contactR;       // of each, at rest and now
-    bool stiffens = false;
+    std::vector<double> mu, bulk, stiffening, softening;  // of each tetrahedron
+    std::vector<double> restR, contactR;                  // of each, at rest and now
+    bool stiffens = false, softens = false;
     Matrix linear;  // second derivative of the tissue's energy, with small strain
 
     struct Face {
@@ -171,7 +176,7 @@ void FiniteElements::Impl::findFaces(const TetMesh& from)
 
 void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Material> materials)
 {
-    for (auto* field : {&mu, &bulk, &stiffening, &contactR}) {
+    for (auto* field : {&mu, &bulk, &stiffening, &softening, &contactR}) {
         field->resize(cellField.nb_dof());
     }
     for (std::size_t t = 0; t < from.tets.size(); ++t) {
@@ -181,7 +186,9 @@ void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Mat
         mu[cell] = modulus / (2.0 * (1.0 + m.poisson));
         bulk[cell] = modulus / (3.0 * (1.0 - 2.0 * m.poisson));
         stiffening[cell] = m.stiffening;
-        stiffens = stiffens || m.stiffening > 0.0;
+        softening[cell] = std::max(-m.stiffening, 0.0);
+        stiffens = stiffens || m.stiffening != 0.0;
+        softens = softens || m.stiffening < 0.0;
         contactR[cell] = contactStiffness * modulus;
     }
     for (const Face& face : faces) {
@@ -217,6 +224,9 @@ void FiniteElements::Impl::addTissue(getfem::ga_workspace& space, const Fields& 
     } else {
         space.add_macro("b", "0");
     }
+    if (softens) {
+        space.add_fem_constant("s", cellField, softening);
+    }
     space.add_macro("F", "(Id(3)+Grad_u)");
     space.add_macro("I", "(pow(Det(F),-2/3)*Norm_sqr(F)-3)");
 }
@@ -241,7 +251,7 @@ const Matrix& FiniteElements::Impl::linearTissue()
         getfem::ga_workspace space;
         addTissue(space, zero);
         gmm::resize(linear, size(), size());
-        space.add_expression(tissueEnergy(options), volumeRule);
+        space.add_expression(tissueEnergy(options, softens), volumeRule);
         space.set_assembled_matrix(linear);
         space.assembly(2);
     }
@@ -290,7 +300,8 @@ double FiniteElements::energy(const std::vector<double>& state) const
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addTissue(space, fields);
-    space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule, getfem::mesh_region::all_convexes(), 0);
+    space.add_expression(tissueEnergy(impl_->options, impl_->softens), impl_->volumeRule,
+                         getfem::mesh_region::all_convexes(), 0);
     space.assembly(0);
     return space.assembled_potential();
 }
@@ -305,7 +316,8 @@ std::vector<double> FiniteElements::tissueForces(const std::vector<double>& stat
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addTissue(space, fields);
-    space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule, getfem::mesh_region::all_convexes(), 1);
+    space.add_expression(tissueEnergy(impl_->options, impl_->softens), impl_->volumeRule,
+                         getfem::mesh_region::all_convexes(), 1);
     space.set_assembled_vector(forces);
     space.assembly(1);
     return forces;
@@ -319,7 +331,7 @@ SymmetricMatrix FiniteElements::tangent(const std::vector<double>& state) const
     if (!linear) {
         getfem::ga_workspace space;
         impl_->addTissue(space, fields);
-        space.add_expression(tissueEnergy(impl_->options), impl_->volumeRule);
+        space.add_expression(tissueEnergy(impl_->options, impl_->softens), impl_->volumeRule);
         space.set_assembled_matrix(sum);
         space.assembly(2);
     }
@@ -488,7 +500,7 @@ std::vector<std::array<double, 6>> FiniteElements::meanStress(const std::vector<
     getfem::ga_workspace space;
     impl_->addTissue(space, fields, Impl::As::given);
     space.add_fem_variable("s", tensors, all, zero);
-    space.add_expression(testedStress(impl_->options), impl_->volumeRule);
+    space.add_expression(testedStress(impl_->options, impl_->softens), impl_->volumeRule);
     space.set_assembled_vector(sums);
     space.assembly(1);
 

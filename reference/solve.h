@@ -17,7 +17,7 @@ enum class Elements : std::uint8_t { p2, p2p1 };
 struct Material {
     double youngsModulus = 0;  // [Pa]
     double poisson = 0;        // [-]
-    double stiffening = 0;     // b, with finite strain: the shear modulus grows as 1 + b (I_C - 3) [-]
+    double stiffening = 0;     // b, with finite strain, as in TissueRow, from -0.25 [-]
 };
 
 /// A rigid sphere or capsule that tissue cannot enter; without friction.

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace palpate::reference {
 
@@ -112,15 +113,15 @@ Rows bars()
         rows.push_back(rowOf("bar pulled by 1 %", "force [N]", -bar.force().z, 0.01 * modulus * side * side, 1e-4));
         rows.back().source = "Hooke's law, F = E A eps";
         rows.back().setting = fmt::format("linear, {}, nu {}", nameOf(elements), poisson);
-        for (const double stiffening : {0.0, 1.0}) {
+        for (const auto& [stiffening, stretch] : {std::pair(0.0, 1.5), std::pair(1.0, 1.5), std::pair(-0.2, 2.0)}) {
             Solver stretched(mesh, std::vector<Material>{{modulus, poisson, stiffening}},
                              mirroredIn({true, true, true}, Law::neoHookean, elements));
-            stretched.prescribe(pulledTop(side, 0.5 * side));
-            const double stress = studies::neoHookeanTension(modulus, poisson, stiffening, 1.5);
-            rows.push_back(rowOf("bar pulled to 1.5", "force [N]", -stretched.force().z, stress * side * side, 1e-4));
+            stretched.prescribe(pulledTop(side, (stretch - 1.0) * side));
+            const double stress = studies::neoHookeanTension(modulus, poisson, stiffening, stretch);
+            rows.push_back(rowOf("bar pulled far", "force [N]", -stretched.force().z, stress * side * side, 1e-4));
             rows.back().source = "uniaxial stretch of its energy density (Ogden 1984)";
             rows.back().setting =
-                fmt::format("neo-Hookean, stiffening {}, {}, nu {}", stiffening, nameOf(elements), poisson);
+                fmt::format("neo-Hookean, stiffening {}, to {}, {}, nu {}", stiffening, stretch, nameOf(elements), poisson);
         }
     }
     return rows;

@@ -1,7 +1,10 @@
 #include <studies/accuracy/elastic_formulas.h>
 
+#include <chainmail/kernels.h>
+
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -54,7 +57,8 @@ double neoHookeanTension(double youngsModulus, double poisson, double stiffening
         const double j = stretch * across * across;
         const double scaled = std::pow(j, -2.0 / 3.0);
         const double i = scaled * (stretch * stretch + 2.0 * across * across) - 3.0;
-        const double shape = mu * (1.0 + stiffening * i) * scaled * (stretch * stretch - across * across) / 3.0;
+        const double until = stiffening < 0.0 ? std::min(i, double{chainmail::softensTo}) : i;
+        const double shape = mu * (1.0 + stiffening * until) * scaled * (stretch * stretch - across * across) / 3.0;
         const double pressure = bulk * (j - 1.0) * j;
         return std::array<double, 2>{2.0 * shape + pressure, pressure - shape};
     };

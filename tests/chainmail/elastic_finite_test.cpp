@@ -60,6 +60,46 @@ TEST(ElasticFinite, EnergyOfAStretchIsTheLaw)
     EXPECT_NEAR(cells.applyFinite(), stiffer * 220, 1e-5 * stiffer * 220);
 }
 
+// b < 0: the second term goes on along its tangent from I_C - 3 = 1: mu/4 b (2 I - 1).
+TEST(ElasticFinite, SofteningEndsAtItsBound)
+{
+    const double mu = 2.0;
+    const double b = -0.25;
+    for (const Vec3 stretch : {Vec3(1.3, 0.9, 0.8), Vec3(2.0, 0.8, 0.7)}) {
+        Cells cells({12, 6, 5});
+        cells.fill(mu, 30.0);
+        cells.move([&](Index3 n) { return (stretch - 1.0) * Vec3(n); });
+        const double without = cells.applyFinite();
+        const double i = glm::dot(stretch, stretch) - 3.0;
+        const double term = 0.25 * mu * b * (i > 1.0 ? 2.0 * i - 1.0 : std::max(i, 0.0) * i);
+        cells.stiffen(b);
+        EXPECT_NEAR(cells.applyFinite(), without + 220.0 * term, 1e-5 * without) << i;
+    }
+}
+
+// And the force is the derivative of that energy, on both sides of the bound.
+TEST(ElasticFinite, SofteningForceIsTheDerivativeOfEnergy)
+{
+    std::minstd_rand random(5);
+    Cells cells({7, 6, 5});
+    cells.fill(2.0, 10.0);
+    cells.stiffen(-0.25);
+    cells.moveRandom(0.3, random);
+    const Floats u = cells.u;
+    cells.moveRandom(1.0, random);
+    const Floats way = cells.u;
+    const auto at = [&](float step) {
+        for (std::size_t i = 0; i < u.size(); ++i) {
+            cells.u[i] = u[i] + step * way[i];
+        }
+        return cells.applyFinite();
+    };
+    constexpr float step = 2e-3F;
+    const double slope = (at(step) - at(-step)) / (2.0 * static_cast<double>(step));
+    at(0.0F);
+    EXPECT_NEAR(dot(cells, cells.out, way), slope, 2e-3 * std::abs(slope));
+}
+
 // Tangent modulus of a stretch e without change of volume: E (1 + 9 b e^2), what the tissue table is fitted with.
 TEST(ElasticFinite, StiffeningGivesTheTangentOfTheTissueTable)
 {

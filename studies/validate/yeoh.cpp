@@ -1,0 +1,53 @@
+#include <studies/validate/yeoh.h>
+
+#include <chainmail/kernels.h>
+
+#include <algorithm>
+#include <cstddef>
+
+namespace palpate::studies {
+
+namespace {
+
+double bounded(const Yeoh& law, double invariant) noexcept
+{
+    return law.stiffening < 0.0 ? std::min(invariant, double{chainmail::softensTo}) : invariant;
+}
+
+}  // namespace
+
+double Yeoh::energy(double invariant) const noexcept
+{
+    const double until = bounded(*this, invariant);
+    return 0.5 * shear * (invariant + stiffening * until * (invariant - 0.5 * until));
+}
+
+double Yeoh::slope(double invariant) const noexcept
+{
+    return 0.5 * shear * (1.0 + stiffening * bounded(*this, invariant));
+}
+
+double uniaxialStress(const Yeoh& law, double stretch) noexcept
+{
+    const double invariant = stretch * stretch + 2.0 / stretch - 3.0;
+    return 2.0 * law.slope(invariant) * (stretch - 1.0 / (stretch * stretch));
+}
+
+double equibiaxialStress(const Yeoh& law, double stretch) noexcept
+{
+    const double fourth = 1.0 / (stretch * stretch * stretch * stretch);
+    const double invariant = 2.0 * stretch * stretch + fourth - 3.0;
+    return 2.0 * law.slope(invariant) * (stretch - fourth / stretch);
+}
+
+double scaleOf(const std::vector<double>& shape, const std::vector<double>& values) noexcept
+{
+    double mixed = 0.0, own = 0.0;
+    for (std::size_t i = 0; i < shape.size(); ++i) {
+        mixed += shape[i] * values[i];
+        own += shape[i] * shape[i];
+    }
+    return mixed / own;
+}
+
+}  // namespace palpate::studies

@@ -1,0 +1,171 @@
+#include <studies/validate/beam.h>
+#include <studies/validate/cell_body.h>
+#include <studies/validate/measurements.h>
+#include <studies/validate/needle.h>
+#include <studies/validate/palpation.h>
+#include <studies/validate/silicone.h>
+#include <studies/validate/yeoh.h>
+
+#include <tests/folder.h>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+namespace palpate::studies {
+namespace {
+
+double uniaxialEnergy(const Yeoh& law, double stretch)
+{
+    return law.energy(stretch * stretch + 2.0 / stretch - 3.0);
+}
+
+double equibiaxialEnergy(const Yeoh& law, double stretch)
+{
+    return law.energy(2.0 * stretch * stretch + std::pow(stretch, -4) - 3.0);
+}
+
+double slopeOf(double (*energy)(const Yeoh&, double), const Yeoh& law, double stretch)
+{
+    constexpr double step = 1e-5;
+    return (energy(law, stretch + step) - energy(law, stretch - step)) / (2.0 * step);
+}
+
+// Nominal stress of a bar is dW/dstretch, of a sheet half of it: two sides work. Beyond the bound of softening too.
+TEST(Yeoh, StressIsTheDerivativeOfEnergy)
+{
+    for (const double b : {0.0, 1.5, -0.12, -0.25}) {
+        const Yeoh law{2.0, b};
+        for (const double stretch : {0.45, 0.6, 0.9, 1.2, 1.6, 2.4}) {
+            const double scale = 1.0 + std::abs(uniaxialStress(law, stretch));
+            EXPECT_NEAR(uniaxialStress(law, stretch), slopeOf(uniaxialEnergy, law, stretch), 1e-5 * scale) << b;
+            const double wide = 1.0 + std::abs(equibiaxialStress(law, stretch));
+            EXPECT_NEAR(equibiaxialStress(law, stretch), 0.5 * slopeOf(equibiaxialEnergy, law, stretch), 1e-4 * wide) << b;
+        }
+    }
+}
+
+// At rest the tangent is Young's modulus, 3 mu, under a load along one axis, and 6 mu along two.
+TEST(Yeoh, TangentAtRestIsHookes)
+{
+    constexpr double step = 1e-4;
+    const Yeoh law{2.0, -0.2};
+    EXPECT_NEAR((uniaxialStress(law, 1.0 + step) - uniaxialStress(law, 1.0 - step)) / (2.0 * step), 6.0, 1e-5);
+    EXPECT_NEAR((equibiaxialStress(law, 1.0 + step) - equibiaxialStress(law, 1.0 - step)) / (2.0 * step), 12.0, 1e-4);
+}
+
+// Of all b that a tissue may have: more stretch, more stress.
+TEST(Yeoh, StressOfAStretchAlwaysRises)
+{
+    for (double b = -0.25; b < 0.3; b += 0.01) {
+        double before = uniaxialStress({1.0, b}, 0.2);
+        for (double stretch = 0.21; stretch < 6.0; stretch += 0.01) {
+            const double now = uniaxialStress({1.0, b}, stretch);
+            ASSERT_GT(now, before) << b << " at " << stretch;
+            before = now;
+        }
+    }
+}
+
+// Without friction the deformation is uniform: load = area times the closed form, whatever the cells' size. The kernel's
+// second term is in I_C, not in its part without change of volume: at nu = 0.495, b = 0.5 and 40 % that is 3 %.
+TEST(CompressedCylinder, WithoutFrictionIsTheClosedForm)
+{
+    Cylinder shape;
+    shape.cell = 5e-3;
+    const double area = std::numbers::pi * shape.radius * shape.radius;
+    for (const double b : {0.0, -0.2, 0.5}) {
+        const auto loads = compressionLoads(shape, b, false, {0.1, 0.4});
+        EXPECT_NEAR(loads[0] / area, -uniaxialStress({1.0, b}, 0.9), 0.01 * loads[0] / area) << b;
+        EXPECT_NEAR(loads[1] / area, -uniaxialStress({1.0, b}, 0.6), 0.04 * loads[1] / area) << b;
+    }
+}
+
+// A clamped beam under a small load at its end: F L^3 / 3 E I and the shear's F L / (5/6 G A). The markers' feet are at the
+// end of the beam, and turn little.
+TEST(SiliconeBeam, SmallDropIsThatOfBeamTheory)
+{
+    Beam beam;
+    beam.youngsModulus = 1e6;
+    beam.poisson = 0.45;
+    beam.gravity = Vec3(0.0);
+    beam.tipLoad = 0.1;
+    beam.cell = 5e-3;
+    const double inertia = std::pow(30e-3, 4) / 12.0;
+    const double shear = beam.youngsModulus / (2.0 * (1.0 + beam.poisson));
+    const double drop =
+        beam.tipLoad * 1e-3 / (3.0 * beam.youngsModulus * inertia) + beam.tipLoad * 0.1 / (5.0 / 6.0 * shear * 9e-4);
+    // A clamp that also holds the beam's width makes so short a beam a little stiffer.
+    EXPECT_NEAR(-beamMarkers(beam)[1].z, drop, 0.08 * drop);
+    // Twice as stiff: half the drop.
+    const double once = beamMarkers(beam)[1].z;
+    beam.youngsModulus *= 2.0;
+    EXPECT_NEAR(beamMarkers(beam)[1].z, 0.5 * once, 0.01 * std::abs(once));
+}
+
+// The weight of the clamped beam is held at the clamp.
+TEST(CellBody, ReactionsBalanceLoads)
+{
+    CellBody body({4, 2, 2}, 5e-3);
+    volume::forEachIndex(Index3(0), Index3(3, 1, 1), [&](Index3 cell) { body.fill(cell, {1e5, 0.45, 0.0}); });
+    volume::forEachIndex(Index3(0), Index3(0, 2, 2), [&](Index3 node) {
+        for (int c = 0; c < 3; ++c) {
+            body.prescribe(node, c, 0.0);
+        }
+    });
+    body.load({4, 1, 1}, Vec3(0.01, -0.02, 0.03));
+    ASSERT_TRUE(body.solve(1e-4, 2000));
+    Vec3 sum(0.0);
+    volume::forEachIndex(Index3(0), Index3(0, 2, 2), [&](Index3 node) { sum += body.reaction(node); });
+    EXPECT_NEAR(sum.x, -0.01, 2e-5);
+    EXPECT_NEAR(sum.y, 0.02, 2e-5);
+    EXPECT_NEAR(sum.z, -0.03, 2e-5);
+}
+
+TEST(Prony, SeriesIsFoundAgain)
+{
+    const Prony wanted{0.35, 0.4, 0.6, 18.0};
+    std::vector<double> seconds, ratios;
+    for (double t = 0.1; t < 60.0; t *= 1.4) {
+        seconds.push_back(t);
+        ratios.push_back(wanted.ratio(t));
+    }
+    const Prony found = fittedProny(seconds, ratios);
+    for (const double t : {0.2, 1.0, 10.0, 50.0}) {
+        EXPECT_NEAR(found.ratio(t), wanted.ratio(t), 0.005) << t;
+    }
+}
+
+// By hand: d = 1, 1, 0: 1 - 6 * 2 / (4 * 15); ties take the mean of their ranks.
+TEST(RankCorrelation, ByHand)
+{
+    EXPECT_DOUBLE_EQ(rankCorrelation({1, 2, 3}, {10, 20, 90}), 1.0);
+    EXPECT_DOUBLE_EQ(rankCorrelation({1, 2, 3}, {3, 2, 1}), -1.0);
+    EXPECT_NEAR(rankCorrelation({1, 2, 3, 4}, {2, 1, 3, 4}), 0.8, 1e-12);
+    EXPECT_NEAR(rankCorrelation({1, 1, 2}, {5, 5, 9}), 1.0, 1e-12);
+}
+
+TEST(Measurements, MissingAndDamagedFilesSaySo)
+{
+    const tests::Folder folder;
+    EXPECT_THROW(Measurements(folder / "none.csv"), NoMeasurement);
+    EXPECT_THROW(measurementFile({folder.path()}, "none.csv"), NoMeasurement);
+    std::ofstream(folder / "short.csv") << "# what\na,b\n1,2\n3\n";
+    std::ofstream(folder / "words.csv") << "a,b\n1,soft\n\"2\",nan\n";
+    try {
+        Measurements(folder / "short.csv");
+        FAIL();
+    } catch (const std::runtime_error& e) {
+        EXPECT_NE(std::string(e.what()).find("line 4"), std::string::npos) << e.what();
+    }
+    const Measurements words(folder / "words.csv");
+    EXPECT_EQ(words.number(1, "a"), 2.0);
+    EXPECT_TRUE(std::isnan(words.number(1, "b")));
+    EXPECT_THROW(words.number(0, "b"), std::runtime_error);
+    EXPECT_THROW(words.number(0, "c"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace palpate::studies
