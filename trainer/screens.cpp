@@ -33,7 +33,7 @@ Errand drawPeople(State& state)
 {
     const float em = ImGui::GetFontSize();
     Errand errand = Errand::none;
-    ImGui::SetNextItemWidth(14 * em);
+    ImGui::SetNextItemWidth(17 * em);
     const std::string nobody = tr("nobody: no progress is kept");
     if (ImGui::BeginCombo(tr("Who trains"), state.person.empty() ? nobody.c_str() : state.person.c_str())) {
         if (ImGui::Selectable(nobody.c_str(), state.person.empty())) {
@@ -50,7 +50,7 @@ Errand drawPeople(State& state)
     ImGui::SetNextItemWidth(9 * em);
     const bool typed =
         ImGui::InputTextWithHint("##name", tr("a new name"), &state.newPerson, ImGuiInputTextFlags_EnterReturnsTrue);
-    ImGui::SameLine();
+    besideIfRoom(tr("Add"));
     ImGui::BeginDisabled(state.newPerson.empty());
     if ((ImGui::Button(tr("Add")) || typed) && !state.newPerson.empty()) {
         errand = Errand::addPerson;
@@ -135,6 +135,7 @@ Errand drawDeviceTests(State& state)
 Errand drawDevices(State& state)
 {
     heading(tr("What will you hold?"));
+    ImGui::BeginChild("device", {0, -3.4F * ImGui::GetFontSize()}, false, ImGuiWindowFlags_NavFlattened);
     const DeviceCheck& check = state.devices;
     if (!check.done) {
         words(tr("Looking for devices ..."), quiet);
@@ -164,38 +165,46 @@ Errand drawDevices(State& state)
             "force fades. Every key is listed by ? in the session."));
     }
     ImGui::Spacing();
-    return drawDeviceTests(state);
+    const Errand errand = drawDeviceTests(state);
+    ImGui::EndChild();
+    return errand;
+}
+
+void drawSteps(const CaseEntry& c)
+{
+    ImGui::BeginGroup();
+    for (std::size_t i = 0; i < c.steps.size(); ++i) {
+        words(said("{}.  {}", i + 1, c.steps[i]));
+    }
+    ImGui::EndGroup();
 }
 
 void drawBriefing(State& state, const TextureOf& textureOf)
 {
     const CaseEntry& c = chosenCase(state);
     heading(c.title);
-    words(c.trains, skyBlue);
     const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
+    ImGui::BeginChild("briefing", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
+    words(c.trains, skyBlue);
     const Texture texture = textureOf(c.picture);
     const bool beside = wide > 40 * em && texture.id != 0;
-    ImGui::BeginChild("briefing", {0, -(wide > 44 * em ? 6.6F : 11.0F) * em}, false, ImGuiWindowFlags_NavFlattened);
-    if (texture.id != 0) {
-        ImGui::BeginGroup();
-        drawPicture(texture, beside ? 0.42F * wide : wide, 17 * em);
-        ImGui::EndGroup();
-    }
     if (beside) {
+        ImGui::BeginGroup();
+        drawPicture(texture, 0.42F * wide, 17 * em);
+        ImGui::EndGroup();
         ImGui::SameLine(0.45F * wide);
     }
-    ImGui::BeginGroup();
-    for (std::size_t i = 0; i < c.steps.size(); ++i) {
-        words(said("{}.  {}", i + 1, c.steps[i]));
-    }
-    ImGui::EndGroup();
-    ImGui::EndChild();
+    drawSteps(c);
     int mode = state.test ? 1 : 0;
     ImGui::RadioButton(tr("Practise: steps and faults in words, planned line"), &mode, 0);
     besideIfRoom(std::string(tr("Test: without hints")) + "    ");
     ImGui::RadioButton(tr("Test: without hints"), &mode, 1);
     state.test = mode == 1;
     words(said(tr("As a command: {}"), asTyped("palpate", trainArguments(state, {"SESSION.db", "SESSION.json"}))), quiet);
+    if (!beside && texture.id != 0) {
+        drawPicture(texture, wide, 17 * em);
+    }
+    ImGui::EndChild();
 }
 
 void drawSession(const State& state)
