@@ -141,16 +141,18 @@ struct Press final : Device {
 
 // A pause of 200 ms is in no tick: the numbers of the ticks have no gap, and the poses that were recorded give the same
 // forces to the bit without a pause. The force falls within the stabiliser's slew, is zero while it stands, and begins at
-// zero; with the tool elsewhere it goes on standing.
+// zero; with the tool elsewhere it goes on standing. At level spring, which every machine computes in time: a late tick
+// fades the force as well.
 TEST(Servo, APauseIsInNoTickAndJumpsNowhere)
 {
-    Simulation simulation(tests::blockSphere());
+    const SessionModel model = tests::modelOf(tests::blockScene + "[model]\nlevel = \"spring\"\n");
+    Simulation simulation(model);
     Press device;
     std::vector<TickRecord> ticks;
     ForceHash hash;
     bool asked = false;
     int stood = 0, stoodElsewhere = 0;
-    double pushed = 0;
+    double pushed = 0, afterwards = 0;  // largest force before the pause and at the end [N]
     ServoOptions options{true, 2.0};
     options.missedAllowed = 0;
     options.pause.asked = [&] { return asked; };
@@ -167,17 +169,19 @@ TEST(Servo, APauseIsInNoTickAndJumpsNowhere)
         hash.add(r);
         asked = asked || r.tick == 1200;
         device.going = !asked;
-        pushed = r.tick == 1200 ? glm::length(r.total) : pushed;
+        pushed = std::max(pushed, r.tick <= 1200 ? glm::length(r.total) : 0.0);
+        afterwards = std::max(afterwards, r.tick >= 1800 ? glm::length(r.total) : 0.0);
     };
     const auto timing = runServo(device, simulation, options, sink, stop);
     EXPECT_GT(pushed, 0.3);
+    EXPECT_GT(afterwards, 0.3);
     EXPECT_EQ(stood, 200);
     EXPECT_GE(stoodElsewhere, 49);
     EXPECT_EQ(timing.pauses, 1U);
     EXPECT_GE(timing.paused, 0.24);
-    EXPECT_LT(timing.missed, 200U);
+    EXPECT_LT(timing.longestGap, 200U);
     ASSERT_EQ(ticks.size(), 2000U);
-    const double cap = 50.0 * tests::blockSphere().scene.forceCap * tickSeconds;  // the stabiliser's slew [N per tick]
+    const double cap = 50.0 * model.scene.forceCap * tickSeconds;  // the stabiliser's slew [N per tick]
     bool stands = false;
     for (std::size_t i = 1; i < ticks.size(); ++i) {
         EXPECT_EQ(ticks[i].tick, i);
@@ -185,8 +189,7 @@ TEST(Servo, APauseIsInNoTickAndJumpsNowhere)
         stands = stands || (i > 1200 && glm::length(ticks[i].total) == 0.0);
     }
     EXPECT_TRUE(stands);
-    EXPECT_GT(glm::length(ticks.back().total), 0.3);
-    Simulation again(tests::blockSphere());
+    Simulation again(model);
     ForceHash replayed;
     for (const TickRecord& r : ticks) {
         replayed.add(again.tick(r.device));
