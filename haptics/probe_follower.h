@@ -15,8 +15,9 @@ public:
     static constexpr double fastestTurn = 1.5;  // [rad/s]
     static constexpr double lag = 0.02;         // [s]
 
-    /// One tick of `period` [s] on.
-    /// @param asked  press, slide, sweep [m], rock, tilt, turn [rad]; one that is not a number leaves it where it is
+    /// One tick on.
+    /// @param asked   press, slide, sweep [m], rock, tilt, turn [rad]; one that is not a number leaves it where it is
+    /// @param period  of the tick [s]
     const datasets::ProbeMove& follow(const std::array<double, 6>& asked, double period) noexcept
     {
         using Move = datasets::ProbeMove;

@@ -14,8 +14,10 @@ namespace palpate::haptics {
 /// needle whether there is a probe or not.
 class ProbeHand {
 public:
-    /// @param probe  of the scene; of kind `none` it does nothing    @param seed  of the session    @param period  of a
-    /// tick [s]
+    /// @param probe   of the scene; of kind `none` it does nothing
+    /// @param skill   how well it holds the plane on the needle
+    /// @param seed    of the session
+    /// @param period  of a tick [s]
     ProbeHand(const datasets::ProbeSpec& probe, const Skill& skill, std::uint64_t seed, double period);
 
     bool holds() const noexcept { return holds_; }
