@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/export_ct.h>
 #include <apps/export_ultrasound.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
@@ -27,12 +28,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "displacement", "inverse", "ultrasound"};
+const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "displacement", "inverse", "ultrasound", "ct"};
+
+const std::vector<std::string> windowChoices{"soft tissue", "lung", "bone"};
 
 struct Options {
     fs::path volume, output, map, json, like;
     int width = 800, height = 600;
-    std::string record, at, what;
+    std::string record, at, what, window = "soft tissue";
     bool nifti2 = false;
 };
 
@@ -48,7 +51,7 @@ bool isPng(const fs::path& file)
 
 bool ofRecordOnly(const std::string& what)
 {
-    return what == "displacement" || what == "inverse" || what == "ultrasound";
+    return what == "displacement" || what == "inverse" || what == "ultrasound" || what == "ct";
 }
 
 void checkOptions(Options& o)
@@ -59,9 +62,9 @@ void checkOptions(Options& o)
     if (o.volume.empty() == o.record.empty()) {
         throw std::runtime_error("palpate export: give a volume (V.vdb), or a record (--record FILE --at TIME)");
     }
-    if ((o.what == "ultrasound") != isPng(o.output)) {
+    if ((o.what == "ultrasound" || o.what == "ct") != isPng(o.output)) {
         throw std::runtime_error(
-            fmt::format("{}: an ultrasound picture is a .png, and nothing else is", o.output.string()));
+            fmt::format("{}: an ultrasound picture or a CT scan is a .png, and nothing else is", o.output.string()));
     }
     if (!o.like.empty() && (o.what != "ultrasound" || !o.at.empty())) {
         throw std::runtime_error("--like: goes with --record FILE -o FILE.png, and says the time itself: leave out --at");
@@ -201,6 +204,9 @@ void runExport(Options o)
     } else if (o.what == "ultrasound") {
         more = exportUltrasound({o.output, o.record, o.like.empty() ? timeFrom(o.at) : 0.0, o.like, o.width, o.height},
                                 [&](double share) { progress.show("computing the session again", share); });
+    } else if (o.what == "ct") {
+        more = exportCt({o.output, o.record, timeFrom(o.at), o.window, o.height},
+                        [&](double share) { progress.show("computing the session again", share); });
     } else {
         more = exportState(o, how, progress, figures);
     }
@@ -231,8 +237,8 @@ void addExport(CLI::App& app)
     command
         ->add_option(
             "--what", o->what,
-            "labels (default), image, stiffness [kPa]; of a record labels, displacement or its inverse [mm, LPS], or "
-            "the ultrasound picture (.png)")
+            "labels (default), image, stiffness [kPa]; of a record labels, displacement or its inverse [mm, LPS], the "
+            "ultrasound picture (default of .png), or a CT scan (.png) of a scene with CT")
         ->check(CLI::IsMember(whatChoices));
     command->add_flag("--nifti2", o->nifti2, "NIfTI-2: positions as doubles");
     command->add_option("--write-map", o->map, "Write names and tissues too, as a label map for import --map")
@@ -242,7 +248,8 @@ void addExport(CLI::App& app)
     command->add_option("--width", o->width, "Of an ultrasound picture [pixels]")
         ->check(CLI::Range(100, 8192))
         ->capture_default_str();
-    command->add_option("--height", o->height, "Of an ultrasound picture [pixels]")
+    command->add_option("--window", o->window, "Of a CT scan")->check(CLI::IsMember(windowChoices))->capture_default_str();
+    command->add_option("--height", o->height, "Of an ultrasound picture or a slice of a CT scan [pixels]")
         ->check(CLI::Range(100, 8192))
         ->capture_default_str();
     command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");

@@ -12,6 +12,7 @@ constexpr double furthest = 100;   // of a place [m]
 constexpr double strongest = 1e4;  // force [N]
 constexpr double largestValue = 1e12;
 constexpr std::array<std::int32_t, 3> noNodes{};  // of a body that does not deform, or without fine labels
+constexpr std::uint32_t mostSlices = 99;          // of a CT scan
 constexpr std::uint32_t mostPattern = 3;          // of TissueSound
 
 bool upTo(double value, double most) noexcept
@@ -62,6 +63,12 @@ bool soundOfUltrasound(const Scenery& s) noexcept
            std::all_of(s.sound.begin(), s.sound.end(), [](const TissueSound& t) { return sound(t); });
 }
 
+bool soundOfCt(const Scenery& s) noexcept
+{
+    return s.ctSlices <= mostSlices && within(s.ctWidth, 0, 1) && within(s.ctDoseIndex, 0, 1e4) &&
+           within(s.ctDoseLength, 0, 1e6);
+}
+
 // Its axes are unit vectors at right angles.
 bool sound(const ProbePose& p) noexcept
 {
@@ -106,7 +113,7 @@ bool sound(const Scenery& s) noexcept
             return false;
     return s.toolRadius >= 0 && s.toolRadius <= 1 && s.toolLength >= 0 && s.toolLength <= 10 && upTo(s.entry, furthest) &&
            upTo(s.aim, furthest) && upTo(s.forceCap, strongest) && upTo(s.imageLow, largestValue) &&
-           upTo(s.imageStep, largestValue) && soundOfUltrasound(s);
+           upTo(s.imageStep, largestValue) && soundOfUltrasound(s) && soundOfCt(s);
 }
 
 bool sound(const State& s, const Scenery& scenery) noexcept

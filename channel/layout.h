@@ -19,7 +19,7 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 5;
+inline constexpr std::uint32_t version = 6;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
@@ -103,6 +103,12 @@ struct Scenery {
     double probeDepth = 0, probeFrequency = 0,
            probeFocus = 0;  // that the scene asks for [m], [Hz], [m]; 0: the probe's own
     double holeRadius = 0;  // of State::hole [m]
+    // Of a CT scan, which the scene has on demand; 0 slices: it has none.
+    std::uint32_t ctSlices = 0;
+    std::uint32_t ctPadding = 0;
+    double ctWidth = 0;       // of a slice [m]
+    double ctDoseIndex = 0;   // CTDIvol of a scan [mGy]
+    double ctDoseLength = 0;  // of a scan [mGy cm]
 };
 
 enum class Phase : std::uint32_t { free, contact, inserted };
@@ -151,6 +157,8 @@ struct State {
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
     Standing standing = Standing::no;
+    std::uint32_t pictures = 0;     // that the hand asked for so far: stored ultrasound pictures, or CT scans
+    std::uint32_t pictureHeld = 0;  // 1: its button is down
     std::array<Hole, maxHoles> hole{};
     std::uint64_t missed = 0;     // ticks
     double tickP99 = 0;           // [s]

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <datasets/ct.h>
 #include <datasets/phantom.h>
 #include <datasets/probe.h>
 #include <volume/geometry.h>
@@ -153,6 +154,7 @@ struct Scene {
     std::string device = "premium";   // the haptic device that the stabiliser reckons with, see haptics/arm.h
     std::vector<TraineeStep> script;  // empty = the standard biopsy along entry and aim
     ProbeSpec probe;
+    CtSpec ct;
 };
 
 /// Reads a scene. Errors: "FILE:LINE: [dffb] range_mm = -4 mm: must be 0 to 100 mm". Unknown keys are errors, with the

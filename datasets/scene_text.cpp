@@ -386,6 +386,10 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     }
     readScript(top, scene.script);
     readProbe(top, scene.probe);
+    readCt(top, scene.ct);
+    if (scene.ct.given() && scene.probe.kind != ProbeKind::none) {
+        top.refuse("ct", "a scene is guided by ultrasound ([probe]) or by CT ([ct]), not by both");
+    }
     top.finish();
     if (scene.target.empty() && !scene.aim) {
         top.missing("[target]", "structure = \"..\", what to sample, or aim_mm = [x, y, z]");
@@ -407,7 +411,8 @@ Scene loadScene(const std::filesystem::path& file)
 
 std::vector<std::string> builtInScenes()
 {
-    return {"breast", "us-core-biopsy", "near-vessel", "behind-rib", "find-lump", "layered", "block", "plate", "pair"};
+    return {"breast",    "us-core-biopsy", "ct-core-biopsy", "near-vessel", "behind-rib",
+            "find-lump", "layered",        "block",          "plate",       "pair"};
 }
 
 std::optional<Scene> builtInScene(const std::string& name)
@@ -449,7 +454,7 @@ std::string sceneText(const Scene& scene)
     for (const TraineeStep& step : scene.script) {
         out += stepText(step);
     }
-    return out + probeText(scene.probe);
+    return out + probeText(scene.probe) + ctText(scene.ct);
 }
 
 }  // namespace palpate::datasets

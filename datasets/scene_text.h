@@ -22,6 +22,10 @@ std::string tissueChangesText(std::span<const TissueChange> changes);
 void readProbe(Section& top, ProbeSpec& probe);
 std::string probeText(const ProbeSpec& probe);
 
+/// The table [ct] of a scene, and back.
+void readCt(Section& top, CtSpec& ct);
+std::string ctText(const CtSpec& ct);
+
 /// A scene as TOML text with every field, for scenes that no one wrote. parseScene() reads it back.
 std::string sceneText(const Scene& scene);
 

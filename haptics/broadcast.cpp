@@ -60,6 +60,9 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
     state.aheadTissue = r.ahead.tissue;
     state.aheadSpeed = r.ahead.speed;
     state.probe = {triple(r.probeFace), triple(r.probeAxis), triple(r.probeLateral), glm::length(r.probeForce)};
+    const std::uint32_t held = (r.device.buttons & buttonPicture) != 0 ? 1 : 0;
+    state.pictures += held != 0 && state.pictureHeld == 0 ? 1 : 0;
+    state.pictureHeld = held;
     if (r.fired) {
         state.hole[state.cores % channel::maxHoles] = {floats(r.core.restStart), floats(r.core.restEnd)};
         ++state.cores;

@@ -18,7 +18,13 @@ double ofProbe(const Score& s, double value)
     return s.hasProbe ? value : std::numeric_limits<double>::infinity();
 }
 
-constexpr std::array<Measure, 32> all{{
+// Nothing where it has no CT.
+double ofCt(const Score& s, double value)
+{
+    return s.scanDose > 0 ? value : std::numeric_limits<double>::infinity();
+}
+
+constexpr std::array<Measure, 34> all{{
     {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
     {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
@@ -75,6 +81,10 @@ constexpr std::array<Measure, 32> all{{
      [](const Score& s) { return ofProbe(s, static_cast<double>(s.picturesBefore)); }},
     {"pictures_after", "after", "Pictures after a shot", "", 0, Listed::ifProbe,
      [](const Score& s) { return ofProbe(s, static_cast<double>(s.picturesAfter)); }},
+    {"ct_scans", "scans", "CT scans", "", 0, Listed::ifCt,
+     [](const Score& s) { return ofCt(s, static_cast<double>(s.scans)); }},
+    {"ct_dose_mgy_cm", "mGy cm", "Dose of the CT scans", "mGy cm", 1, Listed::ifCt,
+     [](const Score& s) { return ofCt(s, s.scans * s.scanDose); }},
 }};
 
 }  // namespace
@@ -99,7 +109,7 @@ LabelledValues describeMeasures(const Score& score)
     LabelledValues lines;
     for (const Measure& m : all) {
         if (m.listed == Listed::never || (m.listed == Listed::ifMarked && score.marks == 0) ||
-            (m.listed == Listed::ifProbe && !score.hasProbe)) {
+            (m.listed == Listed::ifProbe && !score.hasProbe) || (m.listed == Listed::ifCt && !(score.scanDose > 0))) {
             continue;
         }
         const double value = m.value(score);

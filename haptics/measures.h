@@ -13,7 +13,7 @@ namespace palpate::haptics {
 
 /// One number of a score as figures, tables and lists give it, in the unit that its key names.
 struct Measure {
-    enum class Listed : std::uint8_t { always, ifFired, ifMarked, ifProbe, never };
+    enum class Listed : std::uint8_t { always, ifFired, ifMarked, ifProbe, ifCt, never };
 
     const char* key;    // in --json
     const char* title;  // in a table

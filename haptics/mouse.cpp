@@ -12,8 +12,6 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double pressed = 0.05;  // [s]
-
 Vec3 vec(const channel::Triple& t) noexcept
 {
     return {t[0], t[1], t[2]};
@@ -31,21 +29,6 @@ bool isSound(const channel::Input& input) noexcept
 MouseDevice::MouseDevice(const DeviceParameters& device, Source source, Vec3 start, Vec3 axis, double period)
     : source_(std::move(source)), period_(period), arm_(device, grip, start, period), goal_(start), axis_(axis)
 {
-}
-
-bool MouseDevice::Trigger::down(std::uint32_t asked, double period) noexcept
-{
-    // A viewer that could not read what the one before it had counted begins anew: that is no press.
-    if (static_cast<std::int32_t>(asked - done) < 0) {
-        done = asked;
-    }
-    if (left <= 0.0 && asked != done) {
-        done = asked;
-        left = 2.0 * pressed;
-    }
-    const bool isDown = left > pressed;
-    left = std::max(0.0, left - period);
-    return isDown;
 }
 
 void MouseDevice::listen() noexcept

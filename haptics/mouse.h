@@ -5,6 +5,7 @@
 #include <haptics/device.h>
 #include <haptics/probe_follower.h>
 #include <haptics/session_model.h>
+#include <haptics/trigger.h>
 
 #include <functional>
 #include <optional>
@@ -41,14 +42,6 @@ public:
     static constexpr Grip grip{0.1, 16.0, 400.0};
 
 private:
-    // A button that is down for a while, and then up for as long.
-    struct Trigger {
-        std::uint32_t done = 0;
-        double left = 0;  // [s]
-
-        bool down(std::uint32_t asked, double period) noexcept;
-    };
-
     void listen() noexcept;
     void follow() noexcept;
     void turn() noexcept;

@@ -99,6 +99,9 @@ SessionInfo infoOf(const SessionModel& model)
     info.volumeHash = modelHash(model);
     info.model = datasets::modelLevels[static_cast<std::size_t>(model.scene.model.level)];
     info.extra.emplace_back(targetShapeKey, toText(shapeOfTarget(model)));
+    if (model.scene.ct.given()) {
+        info.extra.emplace_back(scanDoseKey, fmt::format("{:.12g}", model.scene.ct.doseLength()));
+    }
     info.probe = model.scene.probe.kind != datasets::ProbeKind::none;
     for (const auto& s : model.structures) {
         info.structures.push_back(s.name);
@@ -134,12 +137,16 @@ std::string contradictionIn(const SessionInfo& info, const SessionModel& model)
         return differ("the list of warning distances [m]", fmt::format("{}", fmt::join(info.warnDistances, ", ")),
                       fmt::format("{}", fmt::join(own.warnDistances, ", ")));
     }
-    const auto target = [](const SessionInfo& i) {
-        const auto found = std::ranges::find(i.extra, targetShapeKey, &std::pair<std::string, std::string>::first);
+    const auto extra = [](const SessionInfo& i, const char* key) {
+        const auto found = std::ranges::find(i.extra, key, &std::pair<std::string, std::string>::first);
         return found == i.extra.end() ? std::string() : found->second;
     };
-    if (const std::string said = target(info); !said.empty() && said != target(own)) {
-        return differ("the target's shape", said, target(own));
+    if (const std::string said = extra(info, targetShapeKey), is = extra(own, targetShapeKey);
+        !said.empty() && said != is) {
+        return differ("the target's shape", said, is);
+    }
+    if (const std::string said = extra(info, scanDoseKey), is = extra(own, scanDoseKey); said != is) {
+        return differ("the dose of a CT scan [mGy cm]", said, is);
     }
     return {};
 }

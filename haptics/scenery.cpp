@@ -88,6 +88,11 @@ channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& la
     s.viewersHand = viewersHand;
     s.throwLength = tool.throwLength;
     addUltrasound(model, s);
+    const datasets::CtSpec& ct = model.scene.ct;
+    s.ctSlices = static_cast<std::uint32_t>(ct.slices);
+    s.ctWidth = ct.width;
+    s.ctDoseIndex = ct.doseIndex;
+    s.ctDoseLength = ct.doseLength();
     return s;
 }
 

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <locale>
 #include <numbers>
@@ -69,6 +70,16 @@ std::optional<TargetShape> targetShapeOf(const SessionInfo& info)
         }
     }
     return std::nullopt;
+}
+
+double scanDoseOf(const SessionInfo& info)
+{
+    const auto found = std::ranges::find(info.extra, scanDoseKey, &std::pair<std::string, std::string>::first);
+    double dose = 0;
+    if (found != info.extra.end()) {
+        std::from_chars(found->second.data(), found->second.data() + found->second.size(), dose);
+    }
+    return std::isfinite(dose) ? std::max(dose, 0.0) : 0.0;
 }
 
 // Weights: the list of measures is of Johnson 2012 and tissue.md's summary of published simulators; the points and the
@@ -175,6 +186,7 @@ Scorer::Scorer(const SessionInfo& info)
       target_(targetShapeOf(info))
 {
     score_.hasProbe = info.probe;
+    score_.scanDose = scanDoseOf(info);
 }
 
 void Scorer::add(const TickRecord& record) noexcept
@@ -199,6 +211,9 @@ void Scorer::add(const TickRecord& record) noexcept
     }
     if (score_.hasProbe) {
         addPicture(record);
+    }
+    if (score_.scanDose > 0) {
+        addScan(record);
     }
     tip_ = tip;
     lastTick_ = record.tick;
@@ -351,6 +366,13 @@ void Scorer::addPicture(const TickRecord& record) noexcept
     } else if (record.inserted < reached_ - redirectLength) {
         reached_ = record.inserted;  // drawn back: what follows is another way in
     }
+}
+
+void Scorer::addScan(const TickRecord& record) noexcept
+{
+    const bool down = (record.device.buttons & buttonPicture) != 0;
+    score_.scans += down && !pictureDown_ ? 1 : 0;
+    pictureDown_ = down;
 }
 
 void Scorer::judgeProbe(Score& s) const noexcept

@@ -54,7 +54,10 @@ struct Score {
     double blindAdvance = 0;  // way that the needle went on inside without its tip in the picture [m]
     std::uint32_t picturesBefore = 0,
                   picturesAfter = 0;  // stored with the needle inside before the first shot; after a shot
-    double total = 0;                 // 0-100; the formula is in score.cpp and docs/score.md
+    // CT, where the scene has it.
+    double scanDose = 0;  // of one scan [mGy cm]; 0: the scene has no CT
+    std::uint32_t scans = 0;
+    double total = 0;  // 0-100; the formula is in score.cpp and docs/score.md
 };
 
 /// Where the points of a total come from.
@@ -122,6 +125,11 @@ std::string toText(const TargetShape& shape);
 /// What the record of a session says; nothing where it does not.
 std::optional<TargetShape> targetShapeOf(const SessionInfo& info);
 
+/// Key of SessionInfo::extra: dose-length product of one CT scan [mGy cm], of a scene with [ct].
+inline constexpr const char* scanDoseKey = "ct_scan_mgy_cm";
+/// What the record of a session says of it; 0 where it says nothing.
+double scanDoseOf(const SessionInfo& info);
+
 /// Feeds on ticks, in a live session and from a record alike.
 class Scorer {
 public:
@@ -141,6 +149,7 @@ private:
     void judgeMarks(Score& score) const noexcept;
     void addPicture(const TickRecord& record) noexcept;
     void judgeProbe(Score& score) const noexcept;
+    void addScan(const TickRecord& record) noexcept;
 
     double rate_ = 1000;  // [Hz]
     std::size_t structures_ = 0;

@@ -94,13 +94,12 @@ void addWork(ServoTiming& timing, const TickRecord& record, Clock::duration work
     }
 }
 
-TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overloaded, bool letGo) noexcept
+TickRecord oneTick(Device& device, Simulation& simulation, bool late, bool overloaded, bool fading) noexcept
 {
     const auto start = Clock::now();
     DeviceSample sample = device.read();
     sample.buttons |= overloaded ? modelTooSlow : 0U;
-    sample.fresh = sample.fresh && !late;
-    sample.buttons &= letGo ? ~buttonDeadMan : ~0U;
+    sample.fresh = sample.fresh && !late && !fading;
     const auto read = Clock::now();
     TickRecord record = simulation.tick(sample);
     const auto computed = Clock::now();
@@ -116,12 +115,12 @@ class Pause {
 public:
     Pause(const PauseHooks& hooks, bool paced) : hooks_(hooks), may_(paced && hooks.asked) {}
 
-    // Before a tick: whether the dead-man switch counts as let go.
-    bool begins() { return letGo_ = may_ && hooks_.asked(); }
+    // Before a tick: whether its pose counts as old, so that the force fades.
+    bool begins() { return fading_ = may_ && hooks_.asked(); }
     // After it: whether the force is gone.
     bool reached(const TickRecord& record) noexcept
     {
-        faded_ = letGo_ ? faded_ + 1 : 0;
+        faded_ = fading_ ? faded_ + 1 : 0;
         return faded_ >= PauseHooks::fadeTicks && glm::length(record.total) < 1e-9;
     }
     void stand(Device& device, Vec3 place, const std::atomic<bool>& stop, ServoTiming& timing)
@@ -149,7 +148,7 @@ public:
 
 private:
     const PauseHooks& hooks_;
-    bool may_, letGo_ = false;
+    bool may_, fading_ = false;
     int faded_ = 0;  // ticks
 };
 

@@ -11,7 +11,7 @@
 
 namespace palpate::haptics {
 
-/// A paced session that stands still when it is asked to. The force fades first, as when the dead-man switch is let go;
+/// A paced session that stands still when it is asked to. The force fades first, as when the device falls silent;
 /// then no tick is computed or recorded, so that measures and record know nothing of the time. It goes on where it was,
 /// once the tool is back within `backAgain` of there, with no force at first.
 struct PauseHooks {
@@ -20,7 +20,7 @@ struct PauseHooks {
     std::function<void(bool elsewhere)> standing;
 
     static constexpr double backAgain = 2e-3;  // [m]
-    static constexpr int fadeTicks = 100;      // without the dead-man switch, before it stands
+    static constexpr int fadeTicks = 100;      // of fading, before it stands
 };
 
 /// How a loop keeps time and when it ends.

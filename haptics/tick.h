@@ -22,7 +22,7 @@ inline constexpr std::size_t maxEventsPerTick = 16;
 inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
 inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
 inline constexpr std::uint32_t buttonMark = 1U << 2;     // "here": the trainee marks the place of the tool
-inline constexpr std::uint32_t buttonPicture = 1U << 8;  // stores the ultrasound picture
+inline constexpr std::uint32_t buttonPicture = 1U << 8;  // stores the ultrasound picture, or takes a CT scan
 inline constexpr std::uint32_t modelTooSlow = 1U << 30;  // the loop cannot keep up: use a cheaper model from now on
 inline constexpr std::uint32_t poseInvalid = 1U
                                              << 31;  // the pose was none (not finite, out of bounds); records keep the last

@@ -152,6 +152,7 @@ void Trainee::begin(Act act) noexcept
             break;
         case Act::look:
             probe_.look();
+            storing_ = model_.scene.ct.given() ? triggerTime : 0.0;  // a look is a scan
             go(arm_.position(), axis_);
             break;
         case Act::check:
@@ -284,10 +285,10 @@ void Trainee::advanceAct() noexcept
     }
 }
 
-// One before and one after the shot belong to the task.
+// One before and one after the shot belong to the task; where CT guides, a picture is a scan.
 void Trainee::storePicture() noexcept
 {
-    storing_ = probe_.stores() ? triggerTime : 0.0;
+    storing_ = model_.scene.ct.given() || probe_.stores() ? triggerTime : 0.0;
 }
 
 DeviceSample Trainee::read() noexcept

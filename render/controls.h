@@ -64,6 +64,7 @@ public:
         void (*act)(Controls&, const Press&);
         bool ofImage = false;       // only where the body has a CT or MR
         bool ofUltrasound = false;  // only while the ultrasound picture is shown
+        bool ofCt = false;          // only while the CT scan is shown
     };
     /// The one list of them.
     static const std::vector<Key> keys;

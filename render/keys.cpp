@@ -153,6 +153,22 @@ const std::vector<Controls::Key> Controls::keys{
      marked("cut towards the tool, whole body"),
      {{0, 'c'}},
      [](Controls& c, const Press&) { c.picture_.setCut(!c.picture_.cut()); }},
+    {held,
+     "P",
+     marked("take a CT scan"),
+     {{0, 'p', once}},
+     [](Controls& c, const Press&) { c.hand_.storePicture(); },
+     false,
+     false,
+     true},
+    {every,
+     "W",
+     marked("CT window: soft tissue, lung, bone"),
+     {{0, 'w'}},
+     [](Controls& c, const Press&) { c.picture_.nextCtWindow(); },
+     false,
+     false,
+     true},
     {every,
      "I",
      marked("slices: image and tissues, image, tissues"),
@@ -307,7 +323,7 @@ bool Controls::applies(const Key& key) const
 {
     const unsigned here = playback_ != nullptr ? record : hand_.is() ? hand : hand_.commands() ? device : session;
     return (key.windows & here) != 0 && (!key.ofImage || picture_.hasImage()) &&
-           (!key.ofUltrasound || picture_.ultrasoundShown());
+           (!key.ofUltrasound || picture_.ultrasoundShown()) && (!key.ofCt || picture_.ctShown());
 }
 
 void Controls::key(int key, const std::string& name, bool again, int mods)
@@ -356,12 +372,16 @@ std::string keysInWords()
                                          {every, "In every window"}}) {
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)
-            if (k.windows == windows && !k.ofUltrasound)
+            if (k.windows == windows && !k.ofUltrasound && !k.ofCt)
                 text += fmt::format("  {:<15}{}{}\n", k.shown, k.what, k.ofImage ? " (of a body with a CT or MR)" : "");
     }
     text += "\nWhile the ultrasound picture is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofUltrasound)
+            text += fmt::format("  {:<15}{}\n", k.shown, k.what);
+    text += "\nWhile the CT scan of a scene with CT is shown:\n";
+    for (const Controls::Key& k : Controls::keys)
+        if (k.ofCt)
             text += fmt::format("  {:<15}{}\n", k.shown, k.what);
     return text;
 }

@@ -111,6 +111,7 @@ Picture::Picture(vtkRenderWindow& window)
     : window_(window),
       slices_{SlicePicture(*flat_), SlicePicture(*flat_), SlicePicture(*flat_)},
       ultrasound_(*flat_),
+      ct_(*flat_),
       canvas_(*flat_)
 {
     window_.SetNumberOfLayers(2);
@@ -144,6 +145,8 @@ void Picture::open(const channel::Scenery& scenery, std::span<const std::uint8_t
     session_->entry = vec(scenery.entry);
     session_->line = vec(scenery.aim) - vec(scenery.entry);
     session_->from = cameraDirection(scenery, session_->frame);
+    if (scenery.ctSlices > 0)
+        ct_.open(shown, coarse, image);
     aimCamera();
     showUltrasound(ultrasoundShown_ || scenery.probe != channel::ProbeKind::none);
 }
@@ -152,6 +155,7 @@ void Picture::close()
 {
     awaitSlices();
     ultrasound_.close();
+    ct_.close();
     session_.reset();
     view_->RemoveAllViewProps();
     for (SlicePicture& slice : slices_)
@@ -210,6 +214,7 @@ void Picture::update(const channel::State& told, const channel::Displaced* displ
     if (displaced != nullptr)
         session_->shape = *displaced;
     ultrasound_.see(state, displaced);
+    ct_.see(state, session_->shape);
     session_->state = state;
     session_->health = health;
     session_->known = true;
@@ -235,7 +240,7 @@ void Picture::setNotice(const std::string& words, const std::string& smaller)
 
 ScreenPlan Picture::screenPlan() const
 {
-    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_, ultrasoundShown_};
+    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_, ultrasoundShown_ || ctShown()};
 }
 
 void Picture::showUltrasound(bool shown)
@@ -243,6 +248,7 @@ void Picture::showUltrasound(bool shown)
     const bool turned = std::exchange(ultrasoundShown_, shown) != shown;
     if (!shown)
         ultrasound_.hide();
+    ct_.hide();
     if (!session_)
         return;
     if (shown && !ultrasound_.opened()) {
@@ -266,9 +272,11 @@ void Picture::render(Quality quality)
         session_->tool.showHand(hand_, vec(session_->state.tip));
         session_->volume.prepare(quality, software_.value_or(true), static_cast<double>(view.width) * view.height);
         drawSlices(plan, quality == Quality::moving && software_.value_or(true) ? 2 : 1);
-        if (!plan.ultrasound.empty())
-            ultrasound_.draw(canvas_, plan.ultrasound, layout_ == Layout::trainee ? plan.title : plan.ultrasound, plan.font,
-                             quality == Quality::still);
+        const Area& around = layout_ == Layout::trainee ? plan.title : plan.ultrasound;
+        if (!plan.ultrasound.empty() && ctShown())
+            ct_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still);
+        else if (!plan.ultrasound.empty())
+            ultrasound_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still);
         drawFlat(plan);
     }
     if (result_ && session_)

@@ -3,6 +3,7 @@
 #include <channel/channel.h>
 #include <render/canvas.h>
 #include <render/concealment.h>
+#include <render/ct_picture.h>
 #include <render/deformation.h>
 #include <render/ghost.h>
 #include <render/header.h>
@@ -90,6 +91,9 @@ public:
     bool ultrasoundShown() const noexcept { return ultrasoundShown_; }
     UltrasoundPicture& ultrasound() noexcept { return ultrasound_; }
     const UltrasoundPicture& ultrasound() const noexcept { return ultrasound_; }
+    /// Whether the scene has CT, whose last scan is shown where the ultrasound picture is not.
+    bool ctShown() const noexcept { return ct_.opened() && !ultrasoundShown_; }
+    void nextCtWindow() noexcept { ct_.nextWindow(); }
     /// Camera and opacities as they were when the session was opened.
     void resetView();
     /// Lists the keys across the picture; empty = hidden.
@@ -124,6 +128,7 @@ private:
     // Before the canvas: flat things are drawn in the order in which they were added.
     std::array<SlicePicture, 3> slices_;
     UltrasoundPicture ultrasound_;
+    CtPicture ct_;
     Canvas canvas_;
     std::unique_ptr<Session> session_;
     std::future<void> painting_;  // of the slices, while the body is drawn

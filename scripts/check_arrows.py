@@ -17,7 +17,8 @@ ARROWS = {
     "datasets": {"base", "volume"},
     "channel": {"base"},
     "ultrasound": {"base", "channel"},
-    "render": {"base", "channel", "ultrasound"},
+    "ct": {"base", "channel"},
+    "render": {"base", "channel", "ultrasound", "ct"},
     "haptics": {"base", "volume", "occupancy", "chainmail", "datasets", "channel", "ultrasound"},
     "haptics/falcon": {"base", "volume", "datasets", "haptics"},
     "session": {"base", "volume", "datasets", "haptics", "haptics/falcon", "channel"},
@@ -34,7 +35,7 @@ ARROWS = {
     "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
-        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "render", "reference",
+        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "ct", "render", "reference",
     },
 }
 # Third-party headers that stay in one folder.

@@ -7,6 +7,7 @@
 #include <haptics/probe_follower.h>
 #include <haptics/replay.h>
 #include <haptics/trainee.h>
+#include <haptics/trigger.h>
 
 #include <fmt/format.h>
 
@@ -45,10 +46,10 @@ std::unique_ptr<Device> openMouse(const SessionModel& model, const DeviceRequest
         model, [broadcast] { return broadcast->input(); }, startDistance));
 }
 
-// A haptic device in the one hand, the ultrasound probe in the other: that of a viewer's mouse.
-class WithProbe final : public Device {
+// A haptic device in the one hand, what guides it in the other, at a viewer: ultrasound probe, stored pictures, CT scans.
+class WithViewer final : public Device {
 public:
-    WithProbe(std::unique_ptr<Device> device, const Broadcast& broadcast)
+    WithViewer(std::unique_ptr<Device> device, const Broadcast& broadcast)
         : device_(std::move(device)), broadcast_(broadcast)
     {
     }
@@ -57,9 +58,13 @@ public:
     {
         if (const auto input = broadcast_.input()) {
             asked_ = input->probe;
+            pictures_.done = heard_ ? pictures_.done : input->pictures;  // what one before has counted is none of ours
+            presses_ = input->pictures;
+            heard_ = true;
         }
         haptics::DeviceSample sample = device_->read();
         sample.probe = probe_.follow(asked_, haptics::tickSeconds);
+        sample.buttons |= pictures_.down(presses_, haptics::tickSeconds) ? haptics::buttonPicture : 0U;
         return sample;
     }
     void write(Vec3 force) noexcept override { device_->write(force); }
@@ -72,16 +77,20 @@ private:
     const Broadcast& broadcast_;
     std::array<double, 6> asked_{};
     haptics::ProbeFollower probe_;
+    haptics::Trigger pictures_;
+    std::uint32_t presses_ = 0;
+    bool heard_ = false;
 };
 
 std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceRequest& request, const Broadcast* broadcast)
 {
     assert(request.falcon);
     auto device = falcon::falconBefore(model, request.falcon, startDistance);
-    if (broadcast == nullptr || model.scene.probe.kind == datasets::ProbeKind::none) {
+    const bool guided = model.scene.probe.kind != datasets::ProbeKind::none || model.scene.ct.given();
+    if (broadcast == nullptr || !guided) {
         return device;
     }
-    return std::make_unique<WithProbe>(std::move(device), *broadcast);
+    return std::make_unique<WithViewer>(std::move(device), *broadcast);
 }
 
 std::unique_ptr<Device> openRecord(const SessionModel&, const DeviceRequest& request, const Broadcast*)

@@ -1,6 +1,7 @@
 #include <ultrasound/stored_image.h>
 
-#include <zlib.h>
+#include <base/png.h>
+
 #include <nlohmann/json.hpp>
 
 #include <array>
@@ -14,41 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::string_view signature{"\x89PNG\r\n\x1a\n", 8};
-constexpr std::string_view keyword{"palpate\0", 8};
-
-void word(std::string& out, std::uint32_t v)
-{
-    for (int shift = 24; shift >= 0; shift -= 8)
-        out += static_cast<char>(v >> static_cast<unsigned>(shift) & 0xffU);
-}
-
-void chunk(std::string& out, std::string_view type, std::string_view data)
-{
-    word(out, static_cast<std::uint32_t>(data.size()));
-    const std::string body = std::string(type) + std::string(data);
-    out += body;
-    word(out,
-         static_cast<std::uint32_t>(crc32(0, reinterpret_cast<const Bytef*>(body.data()), static_cast<uInt>(body.size()))));
-}
-
-std::string deflated(const Pixels& pixels)
-{
-    std::string raw;
-    for (int row = 0; row < pixels.height; ++row) {
-        raw += '\0';  // no filter
-        const auto* begin =
-            reinterpret_cast<const char*>(pixels.grey.data()) + static_cast<std::ptrdiff_t>(row) * pixels.width;
-        raw.append(begin, static_cast<std::size_t>(pixels.width));
-    }
-    uLongf size = compressBound(static_cast<uLong>(raw.size()));
-    std::string out(size, '\0');
-    if (compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(raw.data()),
-                 static_cast<uLong>(raw.size())) != Z_OK)
-        throw std::runtime_error("a picture cannot be compressed: out of memory");
-    out.resize(size);
-    return out;
-}
+constexpr std::string_view keyword = "palpate";
 
 json triple(glm::dvec3 v)
 {
@@ -112,24 +79,6 @@ StoredHow understood(const json& j)
     return how;
 }
 
-// The text of the chunk tEXt "palpate"; empty when there is none.
-std::string textIn(const std::string& png)
-{
-    std::size_t at = signature.size();
-    while (at + 12 <= png.size()) {
-        std::size_t length = 0;
-        for (std::size_t i = 0; i < 4; ++i)
-            length = length << 8U | static_cast<unsigned char>(png[at + i]);
-        if (length > png.size() - at - 12)
-            break;
-        const std::string_view data(png.data() + at + 8, length);
-        if (png.compare(at + 4, 4, "tEXt") == 0 && data.starts_with(keyword))
-            return std::string(data.substr(keyword.size()));
-        at += 12 + length;
-    }
-    return {};
-}
-
 }  // namespace
 
 std::string storedImage(const BeamImage& image, int width, int height)
@@ -137,17 +86,7 @@ std::string storedImage(const BeamImage& image, int width, int height)
     Pixels pixels;
     ScanConverter().convert(image, width, height, pixels);
     drawMarks(image, pixels);
-    std::string head;
-    word(head, static_cast<std::uint32_t>(width));
-    word(head, static_cast<std::uint32_t>(height));
-    constexpr std::array<char, 5> eightBitGrey{8, 0, 0, 0, 0};
-    head.append(eightBitGrey.data(), eightBitGrey.size());
-    std::string out(signature);
-    chunk(out, "IHDR", head);
-    chunk(out, "tEXt", std::string(keyword) + describe(image, width, height).dump());
-    chunk(out, "IDAT", deflated(pixels));
-    chunk(out, "IEND", {});
-    return out;
+    return base::greyPng(width, height, pixels.grey, keyword, describe(image, width, height).dump());
 }
 
 StoredHow readStored(const std::filesystem::path& file)
@@ -156,7 +95,7 @@ StoredHow readStored(const std::filesystem::path& file)
     const std::string png((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
     if (!in)
         throw std::runtime_error(file.string() + ": cannot be read");
-    const std::string text = png.starts_with(signature) ? textIn(png) : std::string();
+    const std::string text = base::textInPng(png, keyword);
     if (text.empty())
         throw std::runtime_error(file.string() + ": is no ultrasound image that palpate has stored");
     try {

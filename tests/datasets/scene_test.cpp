@@ -117,6 +117,38 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
     }
 }
 
+TEST(Scene, CtOfAnySceneComesBackAndADoseFollows)
+{
+    Scene scene = parseScene(
+        "[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n"
+        "[ct]\nslices = 5\nslice_mm = 2.5\nctdi_mgy = 8\n",
+        origin);
+    EXPECT_EQ(scene.ct.slices, 5);
+    EXPECT_NEAR(scene.ct.doseLength(), 8 * 5 * 0.25, 1e-12);
+    const Scene again = parseScene(sceneText(scene), origin);
+    EXPECT_EQ(again.ct.slices, 5);
+    EXPECT_NEAR(again.ct.width, 2.5e-3, 1e-12);
+    EXPECT_NEAR(again.ct.doseIndex, 8, 1e-12);
+    scene.ct.slices = 0;
+    EXPECT_FALSE(parseScene(sceneText(scene), origin).ct.given());
+}
+
+TEST(Scene, CtIsRefusedWhereItCannotBe)
+{
+    const auto refused = [](const std::string& more) {
+        try {
+            parseScene("[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n" + more, origin);
+        } catch (const std::runtime_error& e) {
+            return std::string(e.what());
+        }
+        return std::string();
+    };
+    EXPECT_NE(refused("[ct]\nslices = 2\n").find("must be odd"), std::string::npos);
+    EXPECT_NE(refused("[ct]\nslice_mm = 0\n").find("must be 0.5 to 20 mm"), std::string::npos);
+    EXPECT_NE(refused("[ct]\ndose = 1\n").find("dose"), std::string::npos);
+    EXPECT_NE(refused("[ct]\n[probe]\nkind = \"linear\"\nover_target = true\n").find("not by both"), std::string::npos);
+}
+
 // Linear between the steps, from where it begins; after the last it stays. Rocking turns both axes within the plane.
 TEST(Probe, GoesStraightFromStepToStep)
 {

@@ -1,0 +1,33 @@
+#include <apps/export_ct.h>
+
+#include <base/outputs.h>
+#include <channel/deformation.h>
+#include <ct/scanner.h>
+#include <haptics/recorder.h>
+#include <haptics/score.h>
+#include <session/deformed_state.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+std::string exportCt(const CtExport& o, const std::function<void(double)>& progress)
+{
+    if (const haptics::Record record(o.record); !(haptics::scanDoseOf(record.info()) > 0)) {
+        throw std::runtime_error(o.record + ": its scene has no CT: a section [ct] says what a scan is");
+    }
+    const session::ShownState shown = session::shownState(o.record, o.at, std::nullopt, progress);
+    const haptics::Showing& s = shown.showing;
+    channel::Deformation body(s.scenery, s.labels);
+    body.apply(*shown.shape);
+    const ct::Scan scan = ct::Scanner(s.scenery, s.image).scan(shown.state, body);
+    const auto& window = *std::ranges::find(ct::windows, o.window, &ct::Window::name);
+    base::writeWhole(o.output, ct::scanPng(scan, shown.state.tick, s.scenery.ctDoseLength, window, o.side));
+    return fmt::format(" at tick {}: {} slices of {:.1f} mm, {:.1f} mGy cm", shown.state.tick, scan.hu.size(),
+                       1e3 * s.scenery.ctWidth, s.scenery.ctDoseLength);
+}
+
+}  // namespace palpate::apps

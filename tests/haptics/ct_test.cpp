@@ -1,0 +1,74 @@
+#include "models.h"
+#include "synthetic_session.h"
+
+#include <haptics/broadcast.h>
+#include <haptics/replay.h>
+#include <haptics/score.h>
+#include <haptics/simulation.h>
+#include <haptics/trainee.h>
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace palpate::haptics {
+namespace {
+
+// A press counts once, however long it lasts; each scan has the dose that its scene says.
+TEST(Ct, EachPressIsAScanAndItsDose)
+{
+    SessionInfo info = synthetic::info();
+    info.extra.emplace_back(scanDoseKey, "7.5");
+    Scorer scorer(info);
+    channel::State state;
+    TickRecord r;
+    for (const bool down : {false, true, true, true, false, true, false, false, true}) {
+        r.device.buttons = down ? buttonPicture : 0U;
+        scorer.add(r);
+        showTick(r, {}, state);
+        ++r.tick;
+    }
+    const Score s = scorer.score();
+    EXPECT_EQ(s.scans, 3U);
+    EXPECT_EQ(state.pictures, 3U) << "viewers count the same";
+    EXPECT_DOUBLE_EQ(s.scanDose, 7.5);
+    Scorer without(synthetic::info());
+    r.device.buttons = buttonPicture;
+    without.add(r);
+    EXPECT_EQ(without.score().scans, 0U);
+}
+
+TEST(Ct, ADoseThatIsNoneCountsNothing)
+{
+    for (const char* text : {"", "much", "nan", "-3", "inf"}) {
+        SessionInfo info;
+        info.extra.emplace_back(scanDoseKey, text);
+        EXPECT_EQ(scanDoseOf(info), 0.0) << text;
+    }
+}
+
+// A scripted trainee scans at each look, before the shot and after it: at least four times.
+TEST(Ct, ATraineeScansAtEachLook)
+{
+    const auto model = tests::modelOf(tests::layeredScene + "[model]\nlevel = \"spring\"\n[ct]\nctdi_mgy = 4\n");
+    EXPECT_NEAR(scanDoseOf(infoOf(model)), 4 * 3 * 0.5, 1e-9);
+    const auto scansOf = [&](const SessionModel& of) {
+        Trainee trainee(of, skillCalled("expert"), 3, 0.02);
+        Simulation simulation(of);
+        Scorer scorer(infoOf(of));
+        std::uint32_t shots = 0;
+        for (int i = 0; i < 60000 && !trainee.finished(); ++i) {
+            const TickRecord record = simulation.tick(trainee.read());
+            trainee.observe(record);
+            scorer.add(record);
+            shots += record.fired ? 1 : 0;
+        }
+        EXPECT_GE(shots, 1U);
+        return scorer.score().scans;
+    };
+    EXPECT_GE(scansOf(model), 4U);
+    EXPECT_EQ(scansOf(tests::modelOf(tests::layeredScene + "[model]\nlevel = \"spring\"\n")), 0U);
+}
+
+}  // namespace
+}  // namespace palpate::haptics
