@@ -146,7 +146,7 @@ void CtPicture::draw(Canvas& canvas, const Area& area, const Area& around, doubl
     canvas.text({large.x + 0.4 * font, large.y + 2.2 * font}, "5 cm", 0.8 * font, grey);
     const ct::Window& window = ct::windows[window_];
     canvas.text({x, area.y - lineHeight * font},
-                base::said(tr("CT scan {} at {:.1f} s; dose so far {:.1f} mGy cm; {} ({:.0f} to {:.0f} HU)"), taken_,
+                base::said(tr("CT scan {} at {:.1Lf} s; dose so far {:.1Lf} mGy cm; {} ({:.0f} to {:.0f} HU)"), taken_,
                            1e-3 * static_cast<double>(tick_), taken_ * scenery_.ctDoseLength, tr(windowNames[window_]),
                            window.low, window.high),
                 font, grey);
