@@ -88,9 +88,9 @@ TEST(Coach, WarnsOfWhatTheThrowWouldReach)
 {
     channel::State s = stateAt(0, 15e-3, 0, channel::Phase::inserted);
     s.distance[0] = s.ahead[0] = 1e-3;
-    s.ahead[1] = 18e-3;
+    s.ahead[1] = 13e-3;
     EXPECT_EQ(coach(needleScenery(), s, view).wrong, "Do not fire: the 15 mm of the throw would reach vein");
-    s.ahead[1] = 23e-3;
+    s.ahead[1] = 16e-3;
     EXPECT_EQ(coach(needleScenery(), s, view).wrong, "");
 }
 
