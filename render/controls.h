@@ -55,6 +55,7 @@ public:
         char name = 0;
         int sign = 1;   // of two keys that do opposite things
         int value = 0;  // of several that do the same to different things
+        bool alt = false;
     };
     struct Key {
         unsigned windows;  // kinds, added up

@@ -18,6 +18,7 @@ namespace {
 using base::marked;
 
 constexpr double turnStep = 2.0 / 180.0 * 3.14159265358979323846;  // of an arrow key [rad]
+constexpr double probeStep = 1e-3, pressStep = 0.5e-3;             // of the probe [m]
 constexpr double opacityStep = 1.25;
 constexpr double tick = 1e-3, frame = 1.0 / 30, leap = 1.0;  // steps through a record [s]
 
@@ -213,6 +214,33 @@ const std::vector<Controls::Key> Controls::keys{
      true},
     {every, marked("wheel"), marked("on the picture: depth; with Shift press the probe in"), {}, nullptr, false, true},
     {every,
+     marked("Alt right left"),
+     marked("slide the probe by 1 mm; with Shift rock it by 2 degrees"),
+     {{GLFW_KEY_RIGHT, 0, 1, 0, true}, {GLFW_KEY_LEFT, 0, -1, 0, true}},
+     [](Controls& c, const Press& p) {
+         p.shift ? c.moveProbe({.rock = p.sign * turnStep}) : c.moveProbe({.slide = p.sign * probeStep});
+     },
+     false,
+     true},
+    {every,
+     marked("Alt up down"),
+     marked("sweep it by 1 mm; with Shift turn it by 2 degrees"),
+     {{GLFW_KEY_UP, 0, 1, 0, true}, {GLFW_KEY_DOWN, 0, -1, 0, true}},
+     [](Controls& c, const Press& p) {
+         p.shift ? c.moveProbe({.turn = p.sign * turnStep}) : c.moveProbe({.sweep = p.sign * probeStep});
+     },
+     false,
+     true},
+    {every,
+     marked("Alt Page down, up"),
+     marked("press it in by 0.5 mm, take it back; with Shift tilt it by 2 degrees"),
+     {{GLFW_KEY_PAGE_DOWN, 0, 1, 0, true}, {GLFW_KEY_PAGE_UP, 0, -1, 0, true}},
+     [](Controls& c, const Press& p) {
+         p.shift ? c.moveProbe({.tilt = p.sign * turnStep}) : c.moveProbe({.press = p.sign * pressStep});
+     },
+     false,
+     true},
+    {every,
      "D",
      marked("more depth; with Shift less"),
      {{0, 'd'}},
@@ -331,7 +359,8 @@ void Controls::key(int key, const std::string& name, bool again, int mods)
     used_ = true;
     for (const Key& k : keys) {
         for (const Stroke& s : k.strokes)
-            if (applies(k) && (s.key != 0 ? s.key == key : name == std::string_view(&s.name, 1))) {
+            if (applies(k) && s.alt == ((mods & GLFW_MOD_ALT) != 0) &&
+                (s.key != 0 ? s.key == key : name == std::string_view(&s.name, 1))) {
                 if (!again || s.sign != once)
                     k.act(*this,
                           {s.sign < 0 ? -1 : 1, (mods & GLFW_MOD_SHIFT) != 0, s.value, (mods & GLFW_MOD_CONTROL) != 0});
@@ -373,16 +402,16 @@ std::string keysInWords()
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)
             if (k.windows == windows && !k.ofUltrasound && !k.ofCt)
-                text += fmt::format("  {:<15}{}{}\n", k.shown, k.what, k.ofImage ? " (of a body with a CT or MR)" : "");
+                text += fmt::format("  {:<17}{}{}\n", k.shown, k.what, k.ofImage ? " (of a body with a CT or MR)" : "");
     }
     text += "\nWhile the ultrasound picture is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofUltrasound)
-            text += fmt::format("  {:<15}{}\n", k.shown, k.what);
+            text += fmt::format("  {:<17}{}\n", k.shown, k.what);
     text += "\nWhile the CT scan of a scene with CT is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofCt)
-            text += fmt::format("  {:<15}{}\n", k.shown, k.what);
+            text += fmt::format("  {:<17}{}\n", k.shown, k.what);
     return text;
 }
 
