@@ -30,12 +30,12 @@ namespace fs = std::filesystem;
 
 const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "displacement", "inverse", "ultrasound", "ct"};
 
-const std::vector<std::string> windowChoices{"soft tissue", "lung", "bone"};
+const std::vector<std::string> windowChoices{"soft-tissue", "lung", "bone"};
 
 struct Options {
     fs::path volume, output, map, json, like;
     int width = 800, height = 600;
-    std::string record, at, what, window = "soft tissue";
+    std::string record, at, what, window = "soft-tissue";
     bool nifti2 = false;
 };
 

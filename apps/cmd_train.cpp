@@ -148,11 +148,13 @@ std::string devicesInWords()
 }
 
 // The tasks are built-in scenes; that of the scene itself goes with any.
-const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-biopsy", "near-vessel", "behind-rib", "find-lump"};
+const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-biopsy",
+                                     "near-vessel", "behind-rib",     "find-lump"};
 
 void applyTask(Options& o)
 {
-    const bool ownScene = o.task == "us-core-biopsy" || o.task == "ct-core-biopsy" || o.task == "near-vessel" || o.task == "behind-rib";
+    const bool ownScene =
+        o.task == "us-core-biopsy" || o.task == "ct-core-biopsy" || o.task == "near-vessel" || o.task == "behind-rib";
     if (ownScene && o.sceneGiven) {
         throw std::runtime_error(fmt::format("--task {}: has a scene of its own: leave out {}", o.task, o.scene));
     }
@@ -448,7 +450,8 @@ void addTrain(CLI::App& app)
             ->capture_default_str();
     addTrainingOptions(*c, o->training);
     c->add_option("--task", o->task,
-                  "core-biopsy: of the scene's target; us-core-biopsy, ct-core-biopsy, near-vessel, behind-rib: biopsies with scenes of "
+                  "core-biopsy: of the scene's target; us-core-biopsy, ct-core-biopsy, near-vessel, behind-rib: biopsies "
+                  "with scenes of "
                   "their own; find-lump: "
                   "palpation, where is it and how large")
         ->check(CLI::IsMember(tasks));

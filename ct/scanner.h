@@ -46,7 +46,7 @@ struct Window {
 
     std::uint8_t grey(double hu) const noexcept;
 };
-inline constexpr std::array<Window, 3> windows{{{"soft tissue", -160, 240}, {"lung", -1350, 150}, {"bone", -450, 1050}}};
+inline constexpr std::array<Window, 3> windows{{{"soft-tissue", -160, 240}, {"lung", -1350, 150}, {"bone", -450, 1050}}};
 
 /// Scans the deformed body of a session whose scene has CT.
 class Scanner {

@@ -163,9 +163,9 @@ const std::vector<Controls::Key> Controls::keys{
      false,
      true},
     {every,
-     "W",
+     "V",
      marked("CT window: soft tissue, lung, bone"),
-     {{0, 'w'}},
+     {{0, 'v'}},
      [](Controls& c, const Press&) { c.picture_.nextCtWindow(); },
      false,
      false,
@@ -402,16 +402,16 @@ std::string keysInWords()
         text += fmt::format("{}{}:\n", text.empty() ? "" : "\n", title);
         for (const Controls::Key& k : Controls::keys)
             if (k.windows == windows && !k.ofUltrasound && !k.ofCt)
-                text += fmt::format("  {:<17}{}{}\n", k.shown, k.what, k.ofImage ? " (of a body with a CT or MR)" : "");
+                text += fmt::format("  {:<18}{}{}\n", k.shown, k.what, k.ofImage ? " (of a body with a CT or MR)" : "");
     }
     text += "\nWhile the ultrasound picture is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofUltrasound)
-            text += fmt::format("  {:<17}{}\n", k.shown, k.what);
+            text += fmt::format("  {:<18}{}\n", k.shown, k.what);
     text += "\nWhile the CT scan of a scene with CT is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofCt)
-            text += fmt::format("  {:<17}{}\n", k.shown, k.what);
+            text += fmt::format("  {:<18}{}\n", k.shown, k.what);
     return text;
 }
 

@@ -52,18 +52,6 @@ std::vector<std::uint8_t> tissuesIn(const channel::Scenery& scenery, std::span<c
     return rows;
 }
 
-// Where the camera looks from: turned about the planned line out of the slice's plane, so that the picture has depth and
-// the line still lies in the plane of the picture, in which the mouse moves the tool.
-glm::dvec3 cameraDirection(const channel::Scenery& scenery, const ViewFrame& frame)
-{
-    const glm::dvec3 line = vec(scenery.aim) - vec(scenery.entry);
-    if (glm::length(line) < 1e-4)
-        return glm::normalize(frame.towards + 0.35 * frame.up + 0.30 * frame.right);
-    const glm::dvec3 across = glm::normalize(glm::cross(glm::normalize(line), frame.towards));
-    const bool flipped = glm::dot(across, frame.right + frame.up) < 0;
-    return glm::normalize(frame.towards + (flipped ? -0.30 : 0.30) * across);
-}
-
 }  // namespace
 
 struct Picture::Session {

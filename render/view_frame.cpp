@@ -93,4 +93,14 @@ std::string side(glm::dvec3 d)
     return letters;
 }
 
+glm::dvec3 cameraDirection(const channel::Scenery& scenery, const ViewFrame& frame)
+{
+    const glm::dvec3 line = vec(scenery.aim) - vec(scenery.entry);
+    if (glm::length(line) < 1e-4)
+        return glm::normalize(frame.towards + 0.35 * frame.up + 0.30 * frame.right);
+    const glm::dvec3 across = glm::normalize(glm::cross(glm::normalize(line), frame.towards));
+    const bool flipped = glm::dot(across, frame.right + frame.up) < 0;
+    return glm::normalize(frame.towards + (flipped ? -0.30 : 0.30) * across);
+}
+
 }  // namespace palpate::render

@@ -29,4 +29,8 @@ ViewFrame through(const ViewFrame& frame, glm::dvec3 tip, glm::dvec3 axis);
 /// "L", or "LA" when oblique: the side of the patient that `direction` points to (LPS).
 std::string side(glm::dvec3 direction);
 
+/// Where the camera looks from, a unit vector: turned about the planned line out of the slice's plane, so that the picture
+/// has depth and the line still lies in the plane of the picture, in which the mouse moves the tool.
+glm::dvec3 cameraDirection(const channel::Scenery& scenery, const ViewFrame& frame);
+
 }  // namespace palpate::render

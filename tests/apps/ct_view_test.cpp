@@ -29,11 +29,11 @@ TEST(Ct, ATraineeScansAndTheRecordGivesTheScansAgain)
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         return readText(folder / name);
     };
-    const std::string first = make("a.png", "2s", "soft tissue");
+    const std::string first = make("a.png", "2s", "soft-tissue");
     EXPECT_NE(base::textInPng(first, "palpate-ct").find("\"tick\":2000"), std::string::npos);
-    EXPECT_EQ(make("b.png", "2s", "soft tissue"), first);
+    EXPECT_EQ(make("b.png", "2s", "soft-tissue"), first);
     EXPECT_NE(make("c.png", "2s", "lung"), first);
-    EXPECT_NE(make("d.png", "0.1s", "soft tissue"), first);
+    EXPECT_NE(make("d.png", "0.1s", "soft-tissue"), first);
     EXPECT_EQ(palpate({"replay", record}).status, 0);
     expectRefusal({"export", "--record", record, "--at", "2s", "--what", "ct", "-o", folder / "e.nrrd"}, "is a .png");
     figures(

@@ -19,18 +19,20 @@ namespace {
 // same (those are ASCII).
 TEST(Keys, NoKeyHasTwoMeanings)
 {
-    std::set<std::tuple<unsigned, int, char>> seen;
+    std::set<std::tuple<unsigned, int, int, char, bool>> seen;
     for (const Controls::Key& key : Controls::keys) {
         EXPECT_EQ(key.strokes.empty(), key.act == nullptr) << key.shown;
         EXPECT_NE(std::string(key.what), "") << key.shown;
         for (const Controls::Stroke& s : key.strokes) {
             EXPECT_NE(s.key == 0, s.name == 0) << key.shown;
             EXPECT_TRUE(s.key == 0 || s.key >= GLFW_KEY_ESCAPE || s.key == GLFW_KEY_SPACE) << key.shown;
-            for (const unsigned window : {1U, 2U, 4U, 8U}) {
-                if ((key.windows & window) != 0) {
-                    EXPECT_TRUE(seen.emplace(window, s.key, s.name).second) << key.shown << ": " << key.what;
-                }
-            }
+            // What is shown: the body, the ultrasound picture, the CT scan.
+            for (const unsigned window : {1U, 2U, 4U, 8U})
+                for (const int shown : {0, 1, 2})
+                    if ((key.windows & window) != 0 && (!key.ofUltrasound || shown == 1) && (!key.ofCt || shown == 2)) {
+                        EXPECT_TRUE(seen.emplace(window, shown, s.key, s.name, s.alt).second)
+                            << key.shown << ": " << key.what;
+                    }
         }
     }
     EXPECT_GT(seen.size(), 40U);
