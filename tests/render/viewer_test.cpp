@@ -330,12 +330,13 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
     EXPECT_NE(said("viewer").find("stopped without ending"), std::string::npos) << said("viewer");
 }
 
-// Of the screen's left half, where the body is: pixels that are not the background.
+// Of the screen's left half, where the body is: pixels that are not the background; 0 before there is a picture.
 int bodyOnScreen(const fs::path& file)
 {
     constexpr Pixel background{15, 18, 26};
     const ScreenPlan plan(width, height);
-    return width * height - countOnScreen(file, background) - (width - plan.view.width) * height;
+    const int empty = countOnScreen(file, background);
+    return empty == 0 ? 0 : width * height - empty - (width - plan.view.width) * height;
 }
 
 // From the first picture on, through the change from coarse pictures to the fine one 1.2 s after all motion: only on a
