@@ -19,7 +19,7 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 5;
+inline constexpr std::uint32_t version = 6;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
@@ -103,6 +103,7 @@ struct Scenery {
     double probeDepth = 0, probeFrequency = 0,
            probeFocus = 0;  // that the scene asks for [m], [Hz], [m]; 0: the probe's own
     double holeRadius = 0;  // of State::hole [m]
+    Name who{};             // trains: a name or a pseudonym; empty: not known
 };
 
 enum class Phase : std::uint32_t { free, contact, inserted };
