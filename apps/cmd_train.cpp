@@ -287,7 +287,8 @@ std::optional<base::TemporaryFolder> forResult(const Options& o)
     return shown ? std::optional<base::TemporaryFolder>(std::in_place, "the result that the window shows") : std::nullopt;
 }
 
-ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, const fs::path& result)
+ViewersWanted viewersFor(const Options& o, const Training& training, const haptics::SessionModel& model,
+                         const fs::path& result)
 {
     ViewersWanted wanted;
     wanted.session = sessionName(o);
@@ -298,6 +299,7 @@ ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, c
     wanted.test = o.training.test;
     wanted.palette = o.palette;
     wanted.sounds = o.sounds;
+    wanted.leftHanded = training.leftHanded();
     wanted.tryout = o.tryout ? o.seconds : 0;
     wanted.window = wantsWindow(o);
     wanted.handIsHere = session::deviceKind(o.device).needsViewer;
@@ -381,7 +383,7 @@ void train(Options o)
     // Before the record is made, so that a viewer that cannot be started leaves none.
     const std::optional<base::TemporaryFolder> resultFolder = forResult(o);
     const fs::path toShow = resultFolder ? resultFolder->path() / "result.json" : fs::path();
-    Viewers viewers(viewersFor(o, model, toShow));
+    Viewers viewers(viewersFor(o, training, model, toShow));
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };
