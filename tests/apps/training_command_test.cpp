@@ -81,7 +81,8 @@ TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
     Program running("palpate", {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast"});
     const std::string name = "train-" + std::to_string(running.pid());
     const auto listed = [&]() -> nlohmann::json {
-        for (const auto& one : figures({"sessions"})["sessions"]) {
+        const auto all = figures({"sessions"});
+        for (const auto& one : all["sessions"]) {
             if (one["session"] == name) {
                 return one;
             }
