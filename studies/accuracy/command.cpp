@@ -8,6 +8,7 @@
 #include <session/open.h>
 #include <studies/accuracy/deep.h>
 #include <studies/accuracy/figures.h>
+#include <studies/accuracy/installed_rivals.h>
 #include <studies/accuracy/log.h>
 #include <studies/accuracy/references.h>
 #include <studies/accuracy/rival.h>
@@ -98,12 +99,15 @@ Solved solved(const std::string& what, const Options& o, command::Progress& prog
     return out;
 }
 
-// What is run of all methods, in their order. Throws for a name that there is none of.
+// What is run of all methods, in their order. Throws for a name that neither they nor an installed rival has.
 std::vector<Baseline> chosen(std::vector<Baseline> all, const Options& o)
 {
     std::set<std::string> names, taken;
     for (const Baseline& b : all) {
         names.insert(b.method);
+    }
+    for (const Rival& rival : installedRivals()) {
+        names.insert(rival.name);
     }
     for (const std::string& name : o.methods) {
         if (!names.contains(name)) {
@@ -139,6 +143,24 @@ std::vector<Rival> rivalsOf(const Options& o)
     return rivals;
 }
 
+bool asked(const Rival& rival, const Options& o)
+{
+    return std::ranges::any_of(o.rivals, [&](const std::string& text) { return rivalOf(text, {}).name == rival.name; });
+}
+
+// Those that were asked for, and those that are installed: without --quick all, but for the names of the former.
+std::vector<Rival> allRivals(const Options& o)
+{
+    std::vector<Rival> rivals = rivalsOf(o);
+    for (Rival& rival : installedRivals()) {
+        const bool wanted = std::ranges::find(o.methods, rival.name) != o.methods.end();
+        if (!asked(rival, o) && (wanted || (o.methods.empty() && !o.quick))) {
+            rivals.push_back(std::move(rival));
+        }
+    }
+    return rivals;
+}
+
 std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, const Options& o)
 {
     std::vector<Baseline> methods = accuracyMethods(s.subject);
@@ -153,7 +175,8 @@ std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, con
         cases.push_back({std::move(method), nullptr, 0});
     }
     for (const Rival& rival : rivals) {
-        for (const double spacing : rival.spacings) {
+        const bool first = o.quick && !asked(rival, o);
+        for (const double spacing : std::span(rival.spacings).first(first ? 1 : rival.spacings.size())) {
             cases.push_back({{rival.name, settingOf(rival, spacing), nullptr}, &rival, spacing});
         }
     }
@@ -250,7 +273,7 @@ std::vector<Solved> solveAll(const Options& o, const std::vector<std::string>& s
 
 json runAll(const Options& o, const std::vector<std::string>& subjects)
 {
-    const std::vector<Rival> rivals = rivalsOf(o);
+    const std::vector<Rival> rivals = allRivals(o);
     command::Progress progress;
     const std::vector<Solved> all = solveAll(o, subjects, progress);
     std::filesystem::path file;
@@ -281,12 +304,15 @@ json runAll(const Options& o, const std::vector<std::string>& subjects)
     return figures;
 }
 
-// A rival that failed is in the table with its reason and spoils nothing else; but it was asked for.
-void checkRivals(const json& figures)
+// A rival that failed is in the table with its reason and spoils nothing else; but --rival asked for it.
+void checkRivals(const json& figures, const Options& o)
 {
-    std::set<std::string> failures;  // laws of one run share theirs
+    std::set<std::string> names, failures;  // laws of one run share their failures
+    for (const Rival& rival : rivalsOf(o)) {
+        names.insert(rival.name);
+    }
     for (const json& e : figures["chart"]) {
-        if (e.contains("rival") && e.contains("failure")) {
+        if (e.contains("failure") && names.contains(e["method"].get<std::string>())) {
             failures.insert(fmt::format("rival {}, {}, {}: {}", e["method"].get<std::string>(),
                                         e["scene"].get<std::string>(), e["setting"].get<std::string>(),
                                         e["failure"].get<std::string>()));
@@ -345,7 +371,7 @@ void accuracyCommand(Options o)
     if (!o.json.empty()) {
         command::writeJson(o.json, figures);
     }
-    checkRivals(figures);
+    checkRivals(figures, o);
 }
 
 }  // namespace
@@ -359,7 +385,8 @@ void addAccuracy(CLI::App& app)
                          "Folder for charts (PNG, HTML), CSV and JSON; a run that was stopped goes on there");
     accuracy->add_option("--scenes", o->scenes, "Scenes: built-in names or files (default: all built-in)")->delimiter(',');
     accuracy->add_option("--volume", o->volumes, "Volumes (.vdb)")->delimiter(',');
-    accuracy->add_option("--methods", o->methods, "Methods by name, e.g. elastic,xpbd (default: all)")->delimiter(',');
+    accuracy->add_option("--methods", o->methods, "Methods by name, e.g. elastic,xpbd,bullet (default: all)")
+        ->delimiter(',');
     accuracy->add_option("--references", o->references,
                          "Folder of solved references, and for new ones (default: ~/.cache/palpate/references)");
     accuracy->add_option("--law", o->laws, "Laws of the references")->delimiter(',')->capture_default_str();

@@ -155,6 +155,21 @@ TEST(AccuracyCommand, ARivalStandsInTheSameTableAndChart)
     EXPECT_EQ(figures(command)["cases_run"], 0);
 }
 
+// Somebody else's engine with somebody else's law: as near as linear tetrahedra of this size come (20 to 30 % of the
+// force).
+TEST(AccuracyCommand, BulletStandsBesideThem)
+{
+    const Place place;
+    const json all = figures({"accuracy", "--scenes", place.scene, "--references", place.references, "--methods",
+                              "nothing,bullet", "--quick", "--law", "neo-hookean"});
+    const json& bullet = entryOf(all, "neo-hookean", "bullet");
+    ASSERT_TRUE(bullet.contains("near_pct")) << bullet;
+    EXPECT_EQ(bullet["setting"], "6 mm, explicit, Poisson 0.45");
+    EXPECT_LT(bullet["near_pct"], 0.6 * entryOf(all, "neo-hookean", "nothing")["near_pct"].get<double>());
+    EXPECT_LT(bullet["force_pct"], 50.0);
+    EXPECT_GT(bullet["us_per_update"], 0.0);
+}
+
 TEST(AccuracyCommand, ARivalThatFailsIsLeftOutAndSpoilsNothing)
 {
     const Place place;
@@ -198,7 +213,7 @@ TEST(AccuracyCommand, RefusesWhatThereIsNot)
 {
     const Place place;
     expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--methods", "magic"},
-                  "there are chainmail");
+                  "chainmail, chainmail_fifo");
     expectRefusal({"accuracy", "--law", "hooke"}, "there are linear, neo-hookean");
     expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--rival", "xpbd=true"},
                   "xpbd is a method of this command");
