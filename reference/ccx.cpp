@@ -218,30 +218,20 @@ std::filesystem::path resultsOf(const std::filesystem::path& file, int& status)
     return results;
 }
 
-// Hexahedra of a shell whose outside is the sphere, over the faces of a cube; their nodes follow the tissue's.
+// Hexahedra of a shell whose outside is the part of a sphere that looks `ahead`, a unit vector, over the faces of a cube;
+// their nodes follow the tissue's.
 class ShellMesh {
 public:
-    ShellMesh(Vec3 centre, double radius, std::size_t firstNode) : first_(firstNode)
+    ShellMesh(Vec3 centre, double radius, Vec3 ahead, std::size_t firstNode)
+        : centre_(centre), radius_(radius), first_(firstNode)
     {
-        constexpr int across = 14;  // per face: 1.1 mm on a sphere of 10 mm
-        constexpr double inside = 0.8;
+        constexpr double behind = -0.2;  // cosine: 100 degrees around
         for (int face = 0; face < 6; ++face) {
-            const int axis = face / 2;
-            const double side = face % 2 == 0 ? -1.0 : 1.0;
-            const auto node = [&](int i, int j, double share) {
-                // Equal angles, so that the hexahedra are about equal.
-                const auto along = [](int k) { return std::tan((2.0 * k / across - 1.0) * std::atan(1.0)); };
-                Vec3 p(0.0);
-                p[axis] = side;
-                p[(axis + 1) % 3] = side * along(i);  // so that the outside is counterclockwise on both faces
-                p[(axis + 2) % 3] = along(j);
-                return nodeAt(centre + share * radius * glm::normalize(p));
-            };
             for (int i = 0; i < across; ++i) {
                 for (int j = 0; j < across; ++j) {
-                    hexahedra.push_back({node(i, j, inside), node(i + 1, j, inside), node(i + 1, j + 1, inside),
-                                         node(i, j + 1, inside), node(i, j, 1.0), node(i + 1, j, 1.0),
-                                         node(i + 1, j + 1, 1.0), node(i, j + 1, 1.0)});
+                    if (glm::dot(direction(face, i + 0.5, j + 0.5), ahead) > behind) {
+                        addHexahedron(face, i, j);
+                    }
                 }
             }
         }
@@ -251,6 +241,31 @@ public:
     std::vector<std::array<std::size_t, 8>> hexahedra;  // in the order of C3D8, the outer face is S2
 
 private:
+    static constexpr int across = 14;  // per face of the cube: 1.1 mm on a sphere of 10 mm
+
+    // In equal angles, so that the hexahedra are about equal.
+    static Vec3 direction(int face, double i, double j)
+    {
+        const int axis = face / 2;
+        const double side = face % 2 == 0 ? -1.0 : 1.0;
+        const auto along = [](double k) { return std::tan((2.0 * k / across - 1.0) * std::atan(1.0)); };
+        Vec3 p(0.0);
+        p[axis] = side;
+        p[(axis + 1) % 3] = side * along(i);  // so that the outside is counterclockwise on both faces
+        p[(axis + 2) % 3] = along(j);
+        return glm::normalize(p);
+    }
+
+    void addHexahedron(int face, int i, int j)
+    {
+        constexpr double inside = 0.8;
+        const auto node = [&](int a, int b, double share) {
+            return nodeAt(centre_ + share * radius_ * direction(face, i + a, j + b));
+        };
+        hexahedra.push_back({node(0, 0, inside), node(1, 0, inside), node(1, 1, inside), node(0, 1, inside),
+                             node(0, 0, 1.0), node(1, 0, 1.0), node(1, 1, 1.0), node(0, 1, 1.0)});
+    }
+
     std::size_t nodeAt(Vec3 p)
     {
         constexpr double same = 1e-7;  // [m]
@@ -262,6 +277,8 @@ private:
         return at->second;
     }
 
+    Vec3 centre_;    // [m]
+    double radius_;  // [m]
     std::size_t first_;
     std::map<std::array<long long, 3>, std::size_t> found_;
 };
@@ -310,7 +327,7 @@ void writeMeetable(std::ostream& out, const TetMesh& mesh, const CcxPress& press
 // friction.
 void writeSteps(std::ostream& out, const CcxPress& press)
 {
-    constexpr std::array<const char*, stepsPerCentre> increments{"0.25,1.,1e-5,0.5", "1.,1."};
+    constexpr std::array<const char*, stepsPerCentre> increments{"0.5,1.,1e-5,0.5", "1.,1."};
     for (std::size_t step = 0; step < stepsPerCentre * press.centres.size(); ++step) {
         const Vec3 way = perMetre * (press.centres[step / stepsPerCentre] - press.start);
         fmt::print(out, "*STEP, NLGEOM, INC=1000\n*STATIC\n{}\n*BOUNDARY\n", increments[step % stepsPerCentre]);
@@ -413,7 +430,8 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
     constexpr double pressurePer = 50.0;  // mm of overclosure, in the softest modulus
     checkStiffening(materials, Law::neoHookean, file);
     const QuadraticMesh quadratic(mesh);
-    const ShellMesh shell(press.start, press.radius, quadratic.nodes.size());
+    const ShellMesh shell(press.start, press.radius, glm::normalize(press.centres.front() - press.start),
+                          quadratic.nodes.size());
     std::ofstream out(file);
     writeElements(out, mesh, quadratic);
     writeMaterials(out, mesh, materials, Law::neoHookean);

@@ -33,9 +33,9 @@ struct CcxPress {
 };
 
 /// Writes that as input of CalculiX: C3D10 and `*HYPERELASTIC, NEO HOOKE` as exportCcx() has them, for each centre a
-/// `*STEP, NLGEOM` in which the sphere goes there and one in which it rests; the sphere is a shell of hexahedra that is
-/// moved as a whole, contact surface to surface with a linear pressure of 50 times the softest modulus per mm. Throws
-/// std::runtime_error as exportCcx().
+/// `*STEP, NLGEOM` in which the sphere goes there and one in which it rests; the part of the sphere that looks
+/// where it goes first is a shell of hexahedra that is moved as a whole, contact surface to surface with a linear pressure
+/// of 50 times the softest modulus per mm. Throws std::runtime_error as exportCcx().
 void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, const CcxPress& press,
                     const std::filesystem::path& file);
 

@@ -120,7 +120,7 @@ public:
     EndsWithUs& operator=(const EndsWithUs&) = delete;
 };
 
-// What the command said last, for a message: where its log is, and the line.
+// What the command said last, for a message.
 std::string lastWords(const fs::path& log)
 {
     constexpr std::size_t longest = 200;
@@ -131,7 +131,7 @@ std::string lastWords(const fs::path& log)
     }
     std::ranges::replace_if(
         last, [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
-    return last.empty() ? "" : fmt::format(" ({} ends with: {})", log.string(), last.substr(0, longest));
+    return last.empty() ? "" : fmt::format(" ({} ends with: {})", log.filename().string(), last.substr(0, longest));
 }
 
 void runCommand(const Rival& rival, const fs::path& folder, double mostSeconds)

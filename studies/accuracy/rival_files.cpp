@@ -85,7 +85,7 @@ template <typename Take>
 std::size_t readTable(const std::filesystem::path& file, std::string_view head, std::size_t most, Take&& take)
 {
     const auto fail = [&](const std::string& what) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), what));
+        throw std::runtime_error(fmt::format("{}: {}", file.filename().string(), what));
     };
     std::ifstream in(file);
     if (!in || std::filesystem::is_directory(file)) {
@@ -124,7 +124,8 @@ std::size_t readTable(const std::filesystem::path& file, std::string_view head, 
 void checkRows(const std::filesystem::path& file, std::size_t rows, std::size_t wanted, const std::string& ofWhat)
 {
     if (rows != wanted) {
-        throw std::runtime_error(fmt::format("{}: {} rows: must be {}, {}", file.string(), rows, wanted, ofWhat));
+        throw std::runtime_error(
+            fmt::format("{}: {} rows: must be {}, {}", file.filename().string(), rows, wanted, ofWhat));
     }
 }
 
@@ -186,12 +187,12 @@ RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t loo
     const auto times = folder / "times.csv";
     readTable(times, "processor_s", mostTimes, [&](std::span<const double> v) {
         if (v[0] <= 0.0) {
-            throw std::runtime_error(fmt::format("{}: {:g} s: must be over 0", times.string(), v[0]));
+            throw std::runtime_error(fmt::format("{}: {:g} s: must be over 0", times.filename().string(), v[0]));
         }
         out.seconds.push_back(v[0]);
     });
     if (out.seconds.empty()) {
-        throw std::runtime_error(times.string() + ": no rows: must be one per update in contact");
+        throw std::runtime_error(times.filename().string() + ": no rows: must be one per update in contact");
     }
     return out;
 }

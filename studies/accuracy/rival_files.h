@@ -34,8 +34,8 @@ struct RivalAnswer {
 /// Reads `displacements.csv`, `forces.csv` and `times.csv` of a rival.
 /// @param looks   how many there are
 /// @param points  of the mesh
-/// Throws std::runtime_error ("FILE: what is wrong", on one line) for a file that is missing, has another head line, too
-/// few or too many rows, or numbers that are not finite or not there.
+/// Throws std::runtime_error ("FILE: what is wrong", on one line, the file without its folder) for a file that is missing,
+/// has another head line, too few or too many rows, or numbers that are not finite or not there.
 RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t looks, std::size_t points);
 
 }  // namespace palpate::studies
