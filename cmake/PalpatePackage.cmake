@@ -32,7 +32,8 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/palpate.pc DESTINATION ${CMAKE_INSTALL
 get_property(palpate_installed GLOBAL PROPERTY PALPATE_INSTALLED)
 list(TRANSFORM palpate_installed PREPEND palpate_)
 add_custom_target(palpate_installed)
-foreach(target IN LISTS palpate_installed ITEMS palpate palpate-view palpate-trainer palpate-reference palpate_python)
+foreach(target IN LISTS palpate_installed ITEMS palpate palpate-view palpate-trainer palpate-reference
+    palpate-rival-bullet palpate-rival-calculix palpate_python)
   if(TARGET ${target})
     add_dependencies(palpate_installed ${target})
   endif()

@@ -54,6 +54,8 @@ OWNERS = {
     "CGAL/": {"reference"},
     "getfem/": {"reference"},
     "gmm/": {"reference"},
+    "Bullet": {"apps"},
+    "btBullet": {"apps"},
     "dmumps_c": {"reference"},
 }
 MOST_LINES = 520
