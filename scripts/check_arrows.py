@@ -31,10 +31,11 @@ ARROWS = {
         "base", "volume", "volume/prepare", "datasets", "channel", "haptics", "session", "ultrasound", "planner", "report", "sweep",
     },
     "trainer": {"base"},
-    "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
+    "reference/tetgen": {"reference"},
+    "reference": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
-        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "render", "reference",
+        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "render", "reference", "reference/tetgen",
     },
 }
 # Third-party headers that stay in one folder.
@@ -54,6 +55,7 @@ OWNERS = {
     "getfem/": {"reference"},
     "gmm/": {"reference"},
     "dmumps_c": {"reference"},
+    "tetgen.h": {"reference"},
 }
 MOST_LINES = 520
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^">]+)[">]')
