@@ -148,17 +148,16 @@ json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& t
     return regions;
 }
 
-// TetGen fills the surfaces of CGAL's mesh, in a process of its own.
+// TetGen fills the surfaces of CGAL's mesh, in a process of its own, and takes its points, which are as dense as they must
+// be.
 reference::BodyMesh bodyOf(const Options& o, const reference::PressProblem& problem)
 {
     const auto options = reference::meshOptions(problem, 1e-3 * o.size);
     if (o.mesher == "cgal") {
         return reference::meshBody(problem.tissue, options);
     }
-    reference::TetGenOptions tetgen;
-    tetgen.grading = options;
     return reference::meshBody(problem.tissue, options, [&](const reference::TetMesh& mesh) {
-        return reference::fillSurfaces(reference::surfacesOf(mesh), tetgen);
+        return reference::fillSurfaces(reference::surfacesOf(mesh, reference::AllPoints::yes), {});
     });
 }
 

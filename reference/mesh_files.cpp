@@ -148,20 +148,32 @@ std::string setName(const std::string& name)
     return out;
 }
 
-void addOutside(const TetMesh& mesh, std::string& text)
+void addNodeSet(const std::string& name, const std::set<std::uint32_t>& nodes, std::string& text)
 {
-    std::set<std::uint32_t> nodes;
-    for (const auto& f : surfacesOf(mesh, AllPoints::yes).facets) {
-        if (f.front == Surfaces::outside) {
-            nodes.insert(f.points.begin(), f.points.end());
-        }
-    }
-    text += "*NSET, NSET=OUTSIDE\n";
+    text += "*NSET, NSET=" + name + "\n";
     std::size_t at = 0;
     for (const std::uint32_t n : nodes) {
         fmt::format_to(Text(text), "{},{}", n + 1, ++at % perLine == 0 ? "\n" : "");
     }
     text += at % perLine == 0 ? "" : "\n";
+}
+
+void addNodeSets(const TetMesh& mesh, const volume::TissueTable& table, std::string& text)
+{
+    std::set<std::uint32_t> outside;
+    for (const auto& f : surfacesOf(mesh, AllPoints::yes).facets) {
+        if (f.front == Surfaces::outside) {
+            outside.insert(f.points.begin(), f.points.end());
+        }
+    }
+    addNodeSet("OUTSIDE", outside, text);
+    std::map<std::uint8_t, std::set<std::uint32_t>> nodes;
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        nodes[mesh.tissue[t]].insert(mesh.tets[t].begin(), mesh.tets[t].end());
+    }
+    for (const auto& [row, set] : nodes) {
+        addNodeSet("N" + setName(table.rows[row].name).substr(1), set, text);
+    }
 }
 
 // Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
@@ -190,7 +202,7 @@ std::string inpText(const TetMesh& mesh, const volume::TissueTable& table)
         fmt::format_to(out, "*MATERIAL, NAME={0}\n*ELASTIC\n{1:.12g},{2:.12g}\n*SOLID SECTION, ELSET={0}, MATERIAL={0}\n",
                        name, perPascal * tissue.youngsModulus, tissue.poissonRatio);
     }
-    addOutside(mesh, text);
+    addNodeSets(mesh, table, text);
     return text;
 }
 

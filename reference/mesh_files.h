@@ -16,9 +16,9 @@ void checkMeshFile(const std::filesystem::path& file);
 /// A mesh as the text of a file, by the ending of its name. Lengths are in metres in .vtu, .vtk and .msh, in mm in .inp,
 /// whose stresses are in kPa.
 ///
-///     .vtu, .vtk  VTK's unstructured grid; `tissue` of each cell is its row of the tissue table, `tissue_names` their
-///     names .msh        gmsh 2.2: a physical volume per tissue, a physical surface per pair of tissues that touch .inp
-///     CalculiX and Abaqus: C3D4, an ELSET, material and section per tissue, NSET OUTSIDE
+///     .vtu, .vtk  VTK's unstructured grid; `tissue` of a cell is its row of the table, `tissue_names` the rows' names
+///     .msh        gmsh 2.2: a physical volume per tissue, a physical surface per pair of tissues that touch
+///     .inp        CalculiX and Abaqus: C3D4; per tissue ELSET T_NAME, NSET N_NAME, material, section; NSET OUTSIDE
 ///
 /// Throws std::runtime_error as checkMeshFile().
 std::string meshText(const TetMesh& mesh, const volume::TissueTable& table, const std::filesystem::path& file);

@@ -96,7 +96,6 @@ void write(const std::filesystem::path& file, const TetGenJob& job)
     out.put(job.points);
     out.put(job.facets);
     out.put(job.regions);
-    out.put(job.sizing);
     out.finish();
 }
 
@@ -119,7 +118,6 @@ TetGenJob readJob(const std::filesystem::path& file)
     in.take(job.points);
     in.take(job.facets);
     in.take(job.regions);
-    in.take(job.sizing);
     return job;
 }
 

@@ -16,17 +16,10 @@ struct TetGenJob {
         double largest = 0;             // volume of a tetrahedron [mm^3]; 0: no bound
     };
 
-    /// Edges at most so long: `size` within `radius` of a line, `growth` more per length beyond [mm]; 0: no such bound.
-    struct Sizing {
-        std::array<double, 3> from{}, to{};
-        double radius = 0, size = 0, growth = 0, largest = 0;
-    };
-
     std::string switches;                              // of TetGen, as on its command line
     std::vector<std::array<double, 3>> points;         // [mm]
     std::vector<std::array<std::uint32_t, 3>> facets;  // points of each
     std::vector<Region> regions;
-    Sizing sizing;
 };
 
 /// What comes back.

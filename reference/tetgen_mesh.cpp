@@ -35,10 +35,6 @@ TetGenJob jobOf(const Surfaces& surfaces, const TetGenOptions& options)
         job.regions.push_back(
             {inMillimetres(seed.point), 1.0 + static_cast<double>(job.regions.size()), regularVolume * edge * edge * edge});
     }
-    if (const auto& g = options.grading) {
-        job.sizing = {inMillimetres(g->from), inMillimetres(g->to), perMetre * g->radius, perMetre * g->size, g->growth,
-                      perMetre * g->largest};
-    }
     return job;
 }
 

@@ -1,11 +1,9 @@
 #pragma once
 
-#include <reference/mesher.h>
 #include <reference/surfaces.h>
 #include <reference/tet_mesh.h>
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,11 +14,11 @@ struct TetGenOptions {
     std::filesystem::path program;  // palpate-mesh, which runs it as a process of its own; "": beside this program
     std::string switches = "pq1.4/12AaYMO9";  // of TetGen; the facets stay as they are (Y)
     double largest = 0;                       // edge of a tetrahedron away from the surfaces [m]; 0: no bound
-    std::optional<MeshOptions> grading;       // edges by edgeLength() instead
     double seconds = 3600;                    // after which it is ended [s]
 };
 
-/// Tetrahedra that fill `surfaces`, by TetGen in a process of its own. Their facets are faces of the mesh, each tetrahedron
+/// Tetrahedra that fill `surfaces`, by TetGen in a process of its own. Their facets are faces of the mesh, their other
+/// points are points of it, each tetrahedron
 /// is of one tissue, and the volume of every tissue is the enclosed one. Faces are left out. Throws std::runtime_error, one
 /// line, when TetGen fails, breaks down or takes too long, or its mesh is not what was asked for.
 TetMesh fillSurfaces(const Surfaces& surfaces, const TetGenOptions& options);

@@ -14,7 +14,7 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double resolution = 4.0;                 // see MeshOptions
+constexpr double resolution = 6.0;                 // see MeshOptions
 constexpr double mostLess = 0.8, mostMore = 1.25;  // of a volume that is asked for anew
 constexpr double mendedAngle = 10.0;               // dihedral angles under it are mended where they can be [degrees]
 

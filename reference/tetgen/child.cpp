@@ -19,41 +19,6 @@ namespace palpate::reference {
 
 namespace {
 
-// TetGen's callback takes nothing of ours: one job per process.
-TetGenJob::Sizing sizing;
-
-constexpr double edgeToVolume = 0.11785113;  // of a regular tetrahedron: edge^3 / (6 sqrt 2)
-
-bool isTooLarge(REAL* a, REAL* b, REAL* c, REAL* d, REAL*, REAL)
-{
-    double along = 0.0, square = 0.0;
-    std::array<double, 3> middle{}, line{};
-    for (std::size_t i = 0; i < 3; ++i) {
-        middle[i] = 0.25 * (a[i] + b[i] + c[i] + d[i]);
-        line[i] = sizing.to[i] - sizing.from[i];
-        along += (middle[i] - sizing.from[i]) * line[i];
-        square += line[i] * line[i];
-    }
-    const double t = square > 0.0 ? std::clamp(along / square, 0.0, 1.0) : 0.0;
-    double distance = 0.0;
-    for (std::size_t i = 0; i < 3; ++i) {
-        distance = std::hypot(distance, middle[i] - sizing.from[i] - t * line[i]);
-    }
-    const double beyond = std::max(0.0, distance - sizing.radius);
-    const double edge = std::min(sizing.largest, sizing.size + sizing.growth * beyond);
-    const std::array<REAL*, 4> p{a, b, c, d};
-    std::array<std::array<double, 3>, 3> e{};
-    for (std::size_t k = 0; k < 3; ++k) {
-        for (std::size_t i = 0; i < 3; ++i) {
-            e[k][i] = p[k + 1][i] - a[i];
-        }
-    }
-    const double sixfold = e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
-                           e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-                           e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]);
-    return std::abs(sixfold) / 6.0 > edgeToVolume * edge * edge * edge;
-}
-
 void fill(tetgenio& in, const TetGenJob& job)
 {
     in.firstnumber = 0;
@@ -83,10 +48,6 @@ void fill(tetgenio& in, const TetGenJob& job)
         std::copy(job.regions[r].point.begin(), job.regions[r].point.end(), at);
         at[3] = job.regions[r].number;
         at[4] = job.regions[r].largest > 0.0 ? job.regions[r].largest : -1.0;
-    }
-    if (job.sizing.size > 0.0) {
-        sizing = job.sizing;
-        in.tetunsuitable = isTooLarge;
     }
 }
 

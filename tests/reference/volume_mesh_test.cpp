@@ -141,30 +141,21 @@ TEST(TetGen, LeavesHollowsEmpty)
     EXPECT_NEAR(volumesOf(mesh, std::array<std::uint8_t, 1>{1})[0], 26e-6, 1e-14);
 }
 
-// Small tetrahedra where the grading says so; beside facets, which stay as they are, they are as large as these.
-TEST(TetGen, FollowsTheGrading)
+// Points of the surfaces that no facet has are points of the mesh: what grades it.
+TEST(TetGen, TakesPointsInside)
 {
-    TetGenOptions options = tetgen();
-    MeshOptions grading;
-    grading.radius = 2e-3;
-    grading.size = 0.8e-3;
-    grading.growth = 0.5;
-    grading.from = grading.to = Vec3(15e-3);
-    options.grading = grading;
-    const TetMesh mesh = fillSurfaces(surfacesOf(cubeInCube(2)), options);
-    double near = 0.0, far = 0.0;
-    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        Vec3 middle(0.0);
-        for (const auto p : mesh.tets[t]) {
-            middle += 0.25 * mesh.points[p];
-        }
-        const double edge = std::cbrt(std::numbers::sqrt2 * sixVolumes(mesh, t));
-        double& largest = glm::distance(middle, grading.from) < 2e-3 ? near : far;
-        largest = std::max(largest, edge);
+    const TetMesh from = cubeInCube(2);
+    const Surfaces s = surfacesOf(from, AllPoints::yes);
+    ASSERT_EQ(s.points.size(), 343U);
+    ASSERT_LT(surfacesOf(from).points.size(), 300U);
+    const TetMesh mesh = fillSurfaces(s, tetgen());
+    std::set<std::array<double, 3>> places;
+    for (const Vec3 p : mesh.points) {
+        places.insert({p.x, p.y, p.z});
     }
-    EXPECT_GT(near, 0.3e-3);
-    EXPECT_LE(near, 0.801e-3);
-    EXPECT_GT(far, 3e-3);
+    for (const Vec3 p : from.points) {
+        ASSERT_TRUE(places.contains({p.x, p.y, p.z}));
+    }
 }
 
 // Two cubes that stick in each other are no complex: one line says so, and `-d` names the facets.
@@ -262,36 +253,6 @@ volume::Tissue phantom(const std::string& name, double voxel, std::map<std::stri
     return datasets::makePhantom(spec, datasets::defaultTissues());
 }
 
-struct Case {
-    const char* name;
-    volume::Tissue tissue;
-    double size;
-};
-
-std::vector<Case> phantoms()
-{
-    std::vector<Case> cases;
-    cases.push_back(
-        {"block",
-         phantom("block", 2e-3,
-                 {{"width_mm", 50}, {"thickness_mm", 30}, {"tumour_diameter_mm", 16}, {"tumour_centre_mm", 15}}),
-         6e-3});
-    cases.push_back({"layered", phantom("layered", 2e-3, {{"width_mm", 40}, {"skin_mm", 2}}), 6e-3});
-    cases.push_back({"pair",
-                     phantom("block", 2e-3,
-                             {{"width_mm", 60},
-                              {"thickness_mm", 30},
-                              {"tumours", 2},
-                              {"tumour_diameter_mm", 16},
-                              {"tumour_centre_mm", 14},
-                              {"gap_mm", 4}}),
-                     5e-3});
-    cases.push_back(
-        {"breast", phantom("breast", 3e-3, {{"radius_mm", 45}, {"skin_mm", 3}, {"vessels", 0}, {"tumour_diameter_mm", 20}}),
-         6e-3});
-    return cases;
-}
-
 void expectGood(const MeshQuality& q)
 {
     EXPECT_EQ(q.flipped, 0U);
@@ -306,22 +267,54 @@ void expectGood(const MeshQuality& q)
     EXPECT_TRUE(thick);
 }
 
-TEST(VolumeMesh, OfPhantomsKeepsVolumesAndHasNoBadElement)
+VolumeMesh meshed(const volume::Tissue& tissue, double size, SurfaceKind surface)
 {
-    for (const Case& c : phantoms()) {
-        SCOPED_TRACE(c.name);
-        VolumeMeshOptions options;
-        options.size = c.size;
-        options.largest = 3.0 * c.size;
-        options.tetgen = tetgen();
-        const VolumeMesh made = meshVolume(c.tissue, options);
-        expectGood(made.quality);
-        EXPECT_GT(made.quality.longest, 1.5 * c.size);  // graded
-        // One region per tissue: every tissue of the voxels, bone too.
-        const std::set<std::uint8_t> rows(made.mesh.tissue.begin(), made.mesh.tissue.end());
-        EXPECT_EQ(rows.size(), made.quality.tissues.size());
-        EXPECT_TRUE(rows.contains(c.tissue.table().find("bone").value()) || std::string(c.name) == "breast");
-    }
+    VolumeMeshOptions options;
+    options.size = size;
+    options.largest = 3.0 * size;
+    options.surface = surface;
+    options.tetgen = tetgen();
+    VolumeMesh made = meshVolume(tissue, options);
+    expectGood(made.quality);
+    // One region per tissue: every tissue of the voxels, bone too.
+    const std::set<std::uint8_t> rows(made.mesh.tissue.begin(), made.mesh.tissue.end());
+    EXPECT_EQ(rows.size(), made.quality.tissues.size());
+    return made;
+}
+
+volume::Tissue smallBlock()
+{
+    return phantom("block", 2e-3,
+                   {{"width_mm", 40}, {"thickness_mm", 24}, {"tumour_diameter_mm", 14}, {"tumour_centre_mm", 12}});
+}
+
+TEST(VolumeMesh, OfABlockIsGoodAndGraded)
+{
+    const VolumeMesh made = meshed(smallBlock(), 6e-3, SurfaceKind::cgal);
+    EXPECT_GT(made.quality.longest, 9e-3);
+}
+
+TEST(VolumeMesh, OfLayersIsGood)
+{
+    meshed(phantom("layered", 2e-3, {{"width_mm", 30}, {"skin_mm", 4}}), 7e-3, SurfaceKind::cgal);
+}
+
+TEST(VolumeMesh, OfAPairIsGood)
+{
+    meshed(phantom("block", 2e-3,
+                   {{"width_mm", 50},
+                    {"thickness_mm", 24},
+                    {"tumours", 2},
+                    {"tumour_diameter_mm", 14},
+                    {"tumour_centre_mm", 12},
+                    {"gap_mm", 4}}),
+           7e-3, SurfaceKind::cgal);
+}
+
+TEST(VolumeMesh, OfABreastIsGood)
+{
+    meshed(phantom("breast", 4e-3, {{"radius_mm", 40}, {"skin_mm", 4}, {"vessels", 0}, {"tumour_diameter_mm", 20}}), 8e-3,
+           SurfaceKind::cgal);
 }
 
 TEST(VolumeMesh, WithoutTissueIsRefused)
