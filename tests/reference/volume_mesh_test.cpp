@@ -294,29 +294,6 @@ TEST(VolumeMesh, OfABlockIsGoodAndGraded)
     EXPECT_GT(made.quality.longest, 9e-3);
 }
 
-TEST(VolumeMesh, OfLayersIsGood)
-{
-    meshed(phantom("layered", 2e-3, {{"width_mm", 30}, {"skin_mm", 4}}), 7e-3, SurfaceKind::cgal);
-}
-
-TEST(VolumeMesh, OfAPairIsGood)
-{
-    meshed(phantom("block", 2e-3,
-                   {{"width_mm", 50},
-                    {"thickness_mm", 24},
-                    {"tumours", 2},
-                    {"tumour_diameter_mm", 14},
-                    {"tumour_centre_mm", 12},
-                    {"gap_mm", 4}}),
-           7e-3, SurfaceKind::cgal);
-}
-
-TEST(VolumeMesh, OfABreastIsGood)
-{
-    meshed(phantom("breast", 4e-3, {{"radius_mm", 40}, {"skin_mm", 4}, {"vessels", 0}, {"tumour_diameter_mm", 20}}), 8e-3,
-           SurfaceKind::cgal);
-}
-
 TEST(VolumeMesh, WithoutTissueIsRefused)
 {
     volume::TissueTable table = datasets::defaultTissues();
