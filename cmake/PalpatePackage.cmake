@@ -32,7 +32,7 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/palpate.pc DESTINATION ${CMAKE_INSTALL
 get_property(palpate_installed GLOBAL PROPERTY PALPATE_INSTALLED)
 list(TRANSFORM palpate_installed PREPEND palpate_)
 add_custom_target(palpate_installed)
-foreach(target IN LISTS palpate_installed ITEMS palpate palpate-view palpate-trainer palpate-reference
+foreach(target IN LISTS palpate_installed ITEMS palpate palpate-view palpate-trainer palpate-reference palpate-mesh
     palpate-rival-bullet palpate-rival-calculix palpate_python)
   if(TARGET ${target})
     add_dependencies(palpate_installed ${target})
@@ -44,7 +44,7 @@ if(NOT PALPATE_SANITIZE)
   find_package(Python3 COMPONENTS Interpreter)
 endif()
 if(Python3_FOUND)
-  foreach(program palpate palpate-view palpate-trainer palpate-reference)
+  foreach(program palpate palpate-view palpate-trainer palpate-reference palpate-mesh)
     if(TARGET ${program})
       list(APPEND palpate_programs $<TARGET_FILE:${program}>)
     endif()
