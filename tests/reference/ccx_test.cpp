@@ -90,7 +90,8 @@ TEST(Ccx, AgreesOnABlockPressedDeep)
 }
 
 // A sphere pressed into a block and sideways, by their contact and by ours, on one mesh of quadratic tetrahedra: 3 % apart,
-// as theirs is a sphere of facets that tissue may enter a little. Without the rest after the step it is over 8 %.
+// as theirs is a sphere of facets that tissue may enter a little. On a larger block it was 8 % without the rest after a
+// step.
 TEST(Ccx, AgreesOnASphereThatPressesAndDrags)
 {
     if (!hasCcx()) {
