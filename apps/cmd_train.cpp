@@ -153,8 +153,7 @@ const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-b
 
 void applyTask(Options& o)
 {
-    const bool ownScene =
-        o.task == "us-core-biopsy" || o.task == "ct-core-biopsy" || o.task == "near-vessel" || o.task == "behind-rib";
+    const bool ownScene = !o.task.empty() && o.task != "core-biopsy" && o.task != "find-lump";
     if (ownScene && o.sceneGiven) {
         throw std::runtime_error(fmt::format("--task {}: has a scene of its own: leave out {}", o.task, o.scene));
     }
@@ -453,9 +452,7 @@ void addTrain(CLI::App& app)
     addTrainingOptions(*c, o->training);
     c->add_option("--task", o->task,
                   "core-biopsy: of the scene's target; us-core-biopsy, ct-core-biopsy, near-vessel, behind-rib: biopsies "
-                  "with scenes of "
-                  "their own; find-lump: "
-                  "palpation, where is it and how large")
+                  "with scenes of their own; find-lump: palpation, where is it and how large")
         ->check(CLI::IsMember(tasks));
     c->add_flag("--palpate", o->changes.palpate, "Find the scene's target with a fingertip");
     c->add_option("--lesion-from", o->lesionFrom,
