@@ -213,7 +213,9 @@ void drawSpreads(const ComparedMeasure& measure, float wide, float high)
         for (const double v : s.values) {
             draw.AddCircleFilled({across(v), middle}, 0.16F * ImGui::GetFontSize(), ink(groupColour(g), 0.8F));
         }
-        draw.AddLine({across(s.median), middle - half}, {across(s.median), middle + half}, ink({1, 1, 1}), 2);
+        if (std::isfinite(s.median)) {
+            draw.AddLine({across(s.median), middle - half}, {across(s.median), middle + half}, ink({1, 1, 1}), 2);
+        }
     }
     ImGui::Dummy({wide, high});
 }
