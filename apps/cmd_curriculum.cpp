@@ -1,5 +1,8 @@
 #include <apps/command.h>
+#include <base/temporary_folder.h>
 #include <command/json.h>
+#include <command/progress.h>
+#include <training/course_check.h>
 #include <training/progress.h>
 #include <training/simulate.h>
 #include <training/store.h>
@@ -24,7 +27,7 @@ using training::CusumChart;
 struct Options {
     std::string id, profile;
     fs::path json, profiles;
-    int people = 200, most = 500;
+    int people = 200, most = 500, kills = 50;
     std::uint64_t seed = 1;
 };
 
@@ -181,6 +184,58 @@ void simulate(const Options& o)
     }
 }
 
+// Gates, alarm rates against theory, and the file of profiles under kill -9.
+void verify(const Options& o)
+{
+    constexpr double allowed = 0.2;  // of a rate
+    const Curriculum c = training::findCurriculum(o.id);
+    command::Progress line;  // without a thread: the check forks
+    line.show("killing processes that store");
+    const base::TemporaryFolder folder("a file of profiles");
+    const auto kills = training::checkKills(c, folder.path(), o.kills, o.seed);
+    line.show("simulating courses");
+    const auto courses = training::checkCourses(c, o.people, o.seed, o.most);
+    line.clear();
+    std::vector<std::string> faults = courses.gateFaults;
+    faults.insert(faults.end(), kills.faults.begin(), kills.faults.end());
+    std::string text = fmt::format(
+        "{} people of each skill, {} sessions, {} of {} people finished\ngates: {} did not open when they should\n{:<10} "
+        "{:<16} {:>8} {:>10} {:>7}\n",
+        o.people, courses.sessions, courses.finished, 3 * o.people, courses.gateFaults.size(), "skill", "signal", "counted",
+        "expected", "ratio");
+    auto signals = nlohmann::json::array();
+    for (const training::SignalCount& s : courses.signals) {
+        const char* const what = s.chart == CusumChart::alarm ? "alarm" : "has learnt it";
+        const auto counted = static_cast<double>(s.counted);
+        const bool possible = s.expected > 0;  // before the gate opens
+        const double ratio = possible ? counted / s.expected : 1;
+        text += fmt::format("{:<10} {:<16} {:>8} {:>10.1f} {:>7}\n", s.skill, what, s.counted, s.expected,
+                            possible ? fmt::format("{:.3f}", ratio) : "-");
+        signals.push_back({{"skill", s.skill}, {"signal", what}, {"counted", s.counted}, {"expected", s.expected}});
+        if (std::abs(ratio - 1) > allowed || (!possible && s.counted > 0)) {
+            faults.push_back(fmt::format("{}: signals \"{}\" are off by more than {:.0f} %", s.skill, what, 100 * allowed));
+        }
+    }
+    text += fmt::format("kill -9: {} times while {} sessions were stored, {} faults\n", kills.kills, kills.sessions,
+                        kills.faults.size());
+    if (o.json != "-") {
+        fmt::print("{}", text);
+    }
+    if (!o.json.empty()) {
+        command::writeJson(o.json, {{"people", o.people},
+                                    {"sessions", courses.sessions},
+                                    {"finished", courses.finished},
+                                    {"gate_faults", courses.gateFaults},
+                                    {"signals", signals},
+                                    {"kills", kills.kills},
+                                    {"stored", kills.sessions},
+                                    {"kill_faults", kills.faults}});
+    }
+    if (!faults.empty()) {
+        throw std::runtime_error(fmt::format("{}: {} faults, the first: {}", c.id, faults.size(), faults.front()));
+    }
+}
+
 }  // namespace
 
 void addCurriculum(CLI::App& app)
@@ -215,6 +270,20 @@ void addCurriculum(CLI::App& app)
     tried->add_option("--seed", o->seed, "of all chances")->capture_default_str();
     json(tried);
     tried->final_callback([o] { simulate(*o); });
+
+    CLI::App* const verified = c->add_subcommand(
+        "verify", "Sends simulated people through a curriculum: do its gates open, its charts signal as they should?");
+    verified->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
+    verified->add_option("--people", o->people, "of each skill")->check(CLI::Range(1, 100000))->capture_default_str();
+    verified->add_option("--sessions", o->most, "of each of them, at most")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    verified->add_option("--kills", o->kills, "how often a process that stores sessions is killed")
+        ->check(CLI::Range(0, 10000))
+        ->capture_default_str();
+    verified->add_option("--seed", o->seed, "of all chances")->capture_default_str();
+    json(verified);
+    verified->final_callback([o] { verify(*o); });
 }
 
 }  // namespace palpate::apps

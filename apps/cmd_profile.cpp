@@ -47,6 +47,13 @@ void make(const Options& o)
     fmt::print("{}: made, {} hand, in {}\n", person.name, handInWords(person.hand), store.file().string());
 }
 
+void changeHand(const Options& o)
+{
+    ProfileStore store = open(o);
+    store.setHand(store.find(o.name), o.hand == "left" ? Hand::left : Hand::right);
+    fmt::print("{}: {} hand\n", o.name, o.hand);
+}
+
 void list(const Options& o)
 {
     const ProfileStore store = open(o);
@@ -163,6 +170,10 @@ void addProfile(CLI::App& app)
         ->check(CLI::IsMember({"right", "left"}))
         ->capture_default_str();
     made->final_callback([o] { make(*o); });
+
+    CLI::App* const changed = sub("hand", "Say which hand holds the needle", true);
+    changed->add_option("HAND", o->hand, "right or left")->check(CLI::IsMember({"right", "left"}))->required();
+    changed->final_callback([o] { changeHand(*o); });
 
     CLI::App* const all = sub("list", "The profiles that there are", false);
     all->add_option("--json", o->json, "write them here (- for standard output)");

@@ -1,7 +1,7 @@
 #include <apps/command.h>
+#include <apps/progress_figures.h>
 #include <base/outputs.h>
 #include <command/json.h>
-#include <haptics/measures.h>
 #include <training/progress_page.h>
 
 #include <fmt/format.h>
@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -19,15 +18,12 @@ namespace palpate::apps {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using training::CurriculumProgress;
 using training::ExerciseProgress;
 using training::PersonProgress;
 
-constexpr std::size_t recent = 5;  // sessions of which a median is given
-
 struct Options {
-    std::vector<std::string> names, groups;
+    std::vector<std::string> names, groups, curricula;
     std::string caseId, exercise;
     fs::path profiles, html, csv, xapi, json;
     bool all = false;
@@ -36,6 +32,14 @@ struct Options {
 /// Curricula that sessions name, read once: what is returned points to them.
 class Curricula {
 public:
+    /// One that was asked for has to be there. Returns its name.
+    std::string add(const std::string& asked)
+    {
+        training::Curriculum made = training::findCurriculum(asked);
+        const std::string id = made.id;
+        all_.insert_or_assign(id, std::move(made));
+        return id;
+    }
     const training::Curriculum* called(const std::string& id)
     {
         const auto known = all_.find(id);
@@ -55,10 +59,12 @@ private:
     std::map<std::string, std::optional<training::Curriculum>> all_;
 };
 
-PersonProgress progressOf(const training::ProfileStore& store, const training::Person& person, Curricula& curricula)
+/// @param asked  curricula that are shown also where the person has not begun them
+PersonProgress progressOf(const training::ProfileStore& store, const training::Person& person,
+                          const std::vector<std::string>& asked, Curricula& curricula)
 {
     PersonProgress out{person, store.sessions(person), {}};
-    std::vector<std::string> named;
+    std::vector<std::string> named = asked;
     for (const auto& s : out.sessions) {
         if (!s.curriculum.empty() && std::ranges::find(named, s.curriculum) == named.end()) {
             named.push_back(s.curriculum);
@@ -67,102 +73,6 @@ PersonProgress progressOf(const training::ProfileStore& store, const training::P
     for (const std::string& id : named) {
         if (const auto* const c = curricula.called(id)) {
             out.curricula.push_back(training::progressOf(*c, out.sessions, training::utcNow()));
-        }
-    }
-    return out;
-}
-
-double medianOf(std::vector<double> values)
-{
-    return values.empty() ? NAN : report::quantile(std::move(values), 0.5);
-}
-
-// Rows as docs/curriculum.md has them: a person, an exercise, a measure.
-void addRows(const PersonProgress& p, const CurriculumProgress& c, const ExerciseProgress& e, json& rows)
-{
-    if (e.sessions.empty()) {
-        return;
-    }
-    std::vector<std::string> keys{"total"};
-    for (const training::Level& level : e.exercise->gate.levels) {
-        if (std::ranges::find(keys, level.measure) == keys.end()) {
-            keys.push_back(level.measure);
-        }
-    }
-    const auto& last = e.chart.back();
-    for (const std::string& key : keys) {
-        std::vector<double> values;
-        json curve = json::array();
-        for (const auto& s : e.sessions) {
-            const auto at = s.values.find(key);
-            curve.push_back(at == s.values.end() ? json() : json(at->second));
-            if (at != s.values.end()) {
-                values.push_back(at->second);
-            }
-        }
-        values.erase(values.begin(), values.end() - static_cast<std::ptrdiff_t>(std::min(values.size(), recent)));
-        rows.push_back({{"name", p.person.name},
-                        {"curriculum", c.curriculum->id},
-                        {"exercise", e.exercise->id},
-                        {"measure", key},
-                        {"trials", e.sessions.size()},
-                        {"median_last", medianOf(values)},
-                        {"curve", curve},
-                        {"cusum",
-                         {{"alarm", last.alarm},
-                          {"learning", last.learning},
-                          {"alarms", std::ranges::count_if(e.chart, &training::CusumPoint::alarmed)},
-                          {"learnt", std::ranges::any_of(e.chart, &training::CusumPoint::proficient)}}},
-                        {"proficient", e.gate.open},
-                        {"days_since", e.daysSince ? json(*e.daysSince) : json()},
-                        {"refresh", e.refresh}});
-    }
-}
-
-json figures(const std::vector<PersonProgress>& people, const std::vector<report::ScoredGroup>& groups)
-{
-    json rows = json::array(), next = json::array(), sessions = json::array(), compared = json::array();
-    for (const PersonProgress& p : people) {
-        for (const CurriculumProgress& c : p.curricula) {
-            for (const ExerciseProgress& e : c.exercises) {
-                addRows(p, c, e, rows);
-            }
-            const auto* const n = c.next();
-            next.push_back({{"name", p.person.name},
-                            {"curriculum", c.curriculum->id},
-                            {"exercise", n ? json(n->exercise->id) : json()},
-                            {"reason", n ? training::reasonFor(*n) : "all exercises are reached"},
-                            {"cusum_plan",
-                             {{"p0", c.curriculum->cusum.p0},
-                              {"p1", c.curriculum->cusum.p1},
-                              {"alpha", c.curriculum->cusum.alpha},
-                              {"beta", c.curriculum->cusum.beta}}}});
-        }
-        for (const auto& s : p.sessions) {
-            sessions.push_back({{"name", p.person.name},
-                                {"session", s.id},
-                                {"started", s.started},
-                                {"case", s.caseId},
-                                {"curriculum", s.curriculum},
-                                {"exercise", s.exercise},
-                                {"mode", s.test ? "test" : "practice"},
-                                {"record", s.record},
-                                {"rating", s.rating},
-                                {"note", s.note},
-                                {"measures", s.values}});
-        }
-    }
-    for (const report::ScoredGroup& g : groups) {
-        json medians;
-        for (const haptics::Measure& m : haptics::measures()) {
-            medians[m.key] = report::quantile(report::valuesOf(g, m), 0.5);
-        }
-        compared.push_back({{"name", g.name}, {"n", g.sessions.size()}, {"median", medians}});
-    }
-    json out = {{"people", rows}, {"next", next}, {"sessions", sessions}, {"groups", compared}};
-    if (groups.size() >= 2) {
-        for (const haptics::Measure& m : haptics::measures()) {
-            out["effect_size"][m.key] = report::cliffsDelta(report::valuesOf(groups[0], m), report::valuesOf(groups[1], m));
         }
     }
     return out;
@@ -218,13 +128,17 @@ void run(const Options& o)
     }
     const training::ProfileStore store(o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles);
     Curricula curricula;
+    std::vector<std::string> asked;
+    for (const std::string& id : o.curricula) {
+        asked.push_back(curricula.add(id));
+    }
     std::vector<PersonProgress> people;
     for (const std::string& name : o.names) {
-        people.push_back(progressOf(store, store.find(name), curricula));
+        people.push_back(progressOf(store, store.find(name), asked, curricula));
     }
     if (o.all) {
         for (const training::Person& person : store.people()) {
-            people.push_back(progressOf(store, person, curricula));
+            people.push_back(progressOf(store, person, asked, curricula));
         }
     }
     std::vector<report::ScoredGroup> groups;
@@ -244,7 +158,7 @@ void run(const Options& o)
         training::writeXapi(o.xapi, people);
     }
     if (!o.json.empty()) {
-        command::writeJson(o.json, figures(people, groups));
+        command::writeJson(o.json, progressFigures(people, groups));
     }
     if (o.json != "-") {
         for (const PersonProgress& p : people) {
@@ -263,6 +177,8 @@ void addProgress(CLI::App& app)
     c->add_option("NAME", o->names, "profiles");
     c->add_flag("--all", o->all, "of everybody")->excludes("NAME");
     c->add_option("--group", o->groups, "a group to compare: NAME=PROFILE,PROFILE; give the option once per group")
+        ->allow_extra_args(false);
+    c->add_option("--curriculum", o->curricula, "a curriculum, also where it was not begun; may be given again")
         ->allow_extra_args(false);
     c->add_option("--case", o->caseId, "groups: only sessions of this case");
     c->add_option("--exercise", o->exercise, "groups: only sessions of this CURRICULUM/EXERCISE");

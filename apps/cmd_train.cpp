@@ -153,8 +153,7 @@ const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-b
 
 void applyTask(Options& o)
 {
-    const bool ownScene =
-        o.task == "us-core-biopsy" || o.task == "ct-core-biopsy" || o.task == "near-vessel" || o.task == "behind-rib";
+    const bool ownScene = !o.task.empty() && o.task != "core-biopsy" && o.task != "find-lump";
     if (ownScene && o.sceneGiven) {
         throw std::runtime_error(fmt::format("--task {}: has a scene of its own: leave out {}", o.task, o.scene));
     }
@@ -287,7 +286,8 @@ std::optional<base::TemporaryFolder> forResult(const Options& o)
     return shown ? std::optional<base::TemporaryFolder>(std::in_place, "the result that the window shows") : std::nullopt;
 }
 
-ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, const fs::path& result)
+ViewersWanted viewersFor(const Options& o, const Training& training, const haptics::SessionModel& model,
+                         const fs::path& result)
 {
     ViewersWanted wanted;
     wanted.session = sessionName(o);
@@ -298,6 +298,7 @@ ViewersWanted viewersFor(const Options& o, const haptics::SessionModel& model, c
     wanted.test = o.training.test;
     wanted.palette = o.palette;
     wanted.sounds = o.sounds;
+    wanted.leftHanded = training.leftHanded();
     wanted.tryout = o.tryout ? o.seconds : 0;
     wanted.window = wantsWindow(o);
     wanted.handIsHere = session::deviceKind(o.device).needsViewer;
@@ -381,7 +382,7 @@ void train(Options o)
     // Before the record is made, so that a viewer that cannot be started leaves none.
     const std::optional<base::TemporaryFolder> resultFolder = forResult(o);
     const fs::path toShow = resultFolder ? resultFolder->path() / "result.json" : fs::path();
-    Viewers viewers(viewersFor(o, model, toShow));
+    Viewers viewers(viewersFor(o, training, model, toShow));
     options.stallViewers = [&viewers](bool stopped) { viewers.stall(stopped); };
     if (viewers.window) {
         options.lookAfter = [&viewers] { return viewers.lookAfter(); };
@@ -451,9 +452,7 @@ void addTrain(CLI::App& app)
     addTrainingOptions(*c, o->training);
     c->add_option("--task", o->task,
                   "core-biopsy: of the scene's target; us-core-biopsy, ct-core-biopsy, near-vessel, behind-rib: biopsies "
-                  "with scenes of "
-                  "their own; find-lump: "
-                  "palpation, where is it and how large")
+                  "with scenes of their own; find-lump: palpation, where is it and how large")
         ->check(CLI::IsMember(tasks));
     c->add_flag("--palpate", o->changes.palpate, "Find the scene's target with a fingertip");
     c->add_option("--lesion-from", o->lesionFrom,

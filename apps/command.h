@@ -23,5 +23,6 @@ void addCase(CLI::App& app);
 void addCurriculum(CLI::App& app);
 void addProfile(CLI::App& app);
 void addProgress(CLI::App& app);
+void addSessions(CLI::App& app);
 
 }  // namespace palpate::apps

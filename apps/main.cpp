@@ -97,6 +97,7 @@ int main(int argc, char** argv)
     addCurriculum(app);
     addProfile(app);
     addProgress(app);
+    addSessions(app);
     addImport(app);
     addInfo(app);
     addExport(app);

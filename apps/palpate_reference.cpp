@@ -6,7 +6,9 @@
 #include <command/json.h>
 #include <reference/ccx.h>
 #include <reference/press_path.h>
+#include <reference/refill.h>
 #include <reference/symmetry.h>
+#include <reference/tetgen_mesh.h>
 #include <reference/verification.h>
 #include <reference/vtu.h>
 #include <session/open.h>
@@ -38,6 +40,7 @@ struct Options {
     std::string tool = "sphere_10mm";
     std::string law = "linear";
     std::string elements = "P2/P1";
+    std::string mesher = "cgal";
     double speed = 20;          // [mm/s]
     double size = 2.5;          // [mm]
     double press = 0;           // [mm]; 0 = as far as the trial goes
@@ -145,6 +148,19 @@ json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& t
     return regions;
 }
 
+// TetGen fills the surfaces of CGAL's mesh, in a process of its own, and takes its points, which are as dense as they must
+// be.
+reference::BodyMesh bodyOf(const Options& o, const reference::PressProblem& problem)
+{
+    const auto options = reference::meshOptions(problem, 1e-3 * o.size);
+    if (o.mesher == "cgal") {
+        return reference::meshBody(problem.tissue, options);
+    }
+    return reference::meshBody(problem.tissue, options, [&](const reference::TetMesh& mesh) {
+        return reference::fillSurfaces(reference::surfacesOf(mesh, reference::AllPoints::yes), {});
+    });
+}
+
 // The last state as a problem that CalculiX can solve: what touches the tool goes where it is, the rest follows.
 void exportLast(const std::string& file, const reference::PressProblem& problem, const reference::BodyMesh& body,
                 const reference::Solver& solver, studies::TrialPose pose)
@@ -178,7 +194,7 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const s
          .progress = o.progress,
          .mirrored = planesOf(o)},
         posesOf(o, path)};
-    const reference::BodyMesh body = reference::meshBody(part, reference::meshOptions(problem, 1e-3 * o.size));
+    const reference::BodyMesh body = bodyOf(o, problem);
     const double meshed = cpuSeconds();
     say("{}: {} tetrahedra, {} mixtures, smallest angle {:.1f} degrees, {:.1f} s\n", model.scene.name,
         body.mesh.tets.size(), body.mixtures.size(), body.sharpest, meshed);
@@ -252,6 +268,9 @@ void run(const Options& o)
     if (o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty()) {
         throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
     }
+    if (!o.save.empty() && o.mesher != "cgal") {
+        throw std::runtime_error("--save: what `palpate accuracy` reads is of CGAL's mesh: leave --mesher out");
+    }
     if (!o.save.empty() && (!o.looks.empty() || !o.mirrored.empty())) {
         throw std::runtime_error(
             "--save: what `palpate accuracy` reads has all looks of the trial, in the whole body: "
@@ -291,6 +310,7 @@ void run(const Options& o)
                         {"tool", info.tool},
                         {"law", info.law},
                         {"elements", info.elements},
+                        {"mesher", o.mesher},
                         {"key", info.key},
                         {"tets", info.tets},
                         {"unknowns", info.unknowns},
@@ -313,6 +333,10 @@ void addOptions(CLI::App& app, Options& o)
     app.add_option("--elements", o.elements,
                    "P2, or P2/P1 (Taylor-Hood): right with fewer tetrahedra where tissue hardly changes its volume")
         ->check(CLI::IsMember({"P2", "P2/P1"}))
+        ->capture_default_str();
+    app.add_option("--mesher", o.mesher,
+                   "Who makes the tetrahedra between surfaces that both share: cgal, or tetgen (by palpate-mesh)")
+        ->check(CLI::IsMember({"cgal", "tetgen"}))
         ->capture_default_str();
     app.add_option("--speed", o.speed, "Speed whose looks are solved [mm/s]")
         ->check(CLI::Range(1.0, 1000.0))

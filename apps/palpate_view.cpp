@@ -66,7 +66,7 @@ void writeTimeline(const std::string& file, const std::vector<palpate::render::S
 // What the command line says in words.
 struct Words {
     std::string size = "1280x960", json, layout = "trainee", palette = "standard", ghost, slices = "tinted", timeline,
-                replay;
+                replay, hand = "right";
     double at = -1;  // [s]; negative: from the beginning
 };
 
@@ -89,6 +89,9 @@ void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& w
         ->check(CLI::IsMember({"standard", "colour-blind"}))
         ->capture_default_str();
     app.add_flag("--sounds", options.sounds, "Sounds for warnings, in windows");
+    app.add_option("--hand", words.hand, "That holds the mouse; left: its buttons change places")
+        ->check(CLI::IsMember({"right", "left"}))
+        ->capture_default_str();
 }
 
 void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
@@ -130,6 +133,7 @@ void applyLook(const Words& words, palpate::render::ViewerOptions& options)
     options.layout = words.layout == "instructor" ? Layout::instructor
                      : words.layout == "body"     ? Layout::body
                                                   : Layout::trainee;
+    options.leftHanded = words.hand == "left";
     options.palette = words.palette == "standard" ? Palette::standard : Palette::colourBlind;
     options.slices = words.slices == "tissue"  ? SliceLook::tissue
                      : words.slices == "image" ? SliceLook::image

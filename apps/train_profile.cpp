@@ -51,6 +51,11 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
     }
 }
 
+bool Training::leftHanded() const noexcept
+{
+    return options_.hand.empty() ? person_ && person_->hand == training::Hand::left : options_.hand == "left";
+}
+
 std::string Training::scene() const
 {
     return case_ ? case_->scene : "";
@@ -89,6 +94,9 @@ void Training::describe(haptics::SessionInfo& info) const
 {
     if (person_ && info.operatorName.empty()) {
         info.operatorName = person_->name;
+    }
+    if (person_ || !options_.hand.empty()) {
+        info.extra.emplace_back(training::handKey, leftHanded() ? "left" : "right");
     }
     if (case_) {
         info.extra.emplace_back(training::caseKey, case_->id);
@@ -152,6 +160,8 @@ void addTrainingOptions(CLI::App& command, TrainingOptions& o)
                        "CURRICULUM/EXERCISE: its case, with as much guidance as this trial has (palpate curriculum list)");
     command.add_option("--profile", o.profile, "Whose progress it counts for (palpate profile new)");
     command.add_option("--profiles", o.profiles, "File of the profiles");
+    command.add_option("--hand", o.hand, "That holds the mouse (as the profile says it); left: its buttons change places")
+        ->check(CLI::IsMember({"right", "left"}));
     command.add_flag("--test", o.test, "A test: no guidance, and it counts for gates that ask for tests");
 }
 

@@ -21,6 +21,7 @@ struct TrainingOptions {
     std::string profile;
     std::filesystem::path profiles;  // empty: the standard file
     bool test = false;
+    std::string hand;  // "right" or "left"; empty: as the profile says
 };
 
 /// A session that is trained for something: a case, an exercise, a person's progress.
@@ -40,6 +41,8 @@ public:
     /// Keeps the session in the profile. @returns  what there is to say, a line each: the largest losses of points first
     std::vector<std::string> keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
                                   const std::filesystem::path& record);
+    /// Whether who trains holds needle and mouse in the left hand.
+    bool leftHanded() const noexcept;
     const std::string& profile() const noexcept { return options_.profile; }
 
 private:

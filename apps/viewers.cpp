@@ -69,6 +69,9 @@ void Viewers::openWindow()
     if (wanted_.sounds) {
         arguments.emplace_back("--sounds");
     }
+    if (wanted_.leftHanded) {
+        arguments.insert(arguments.end(), {"--hand", "left"});
+    }
     if (wanted_.tryout > 0) {
         arguments.insert(arguments.end(), {"--tryout", fmt::format("{:g}", wanted_.tryout)});
     }

@@ -22,6 +22,7 @@ struct ViewersWanted {
     bool test = false;                 // no hints in the window
     std::string palette = "standard";  // of tissues
     bool sounds = false;               // for warnings
+    bool leftHanded = false;           // the mouse is in the left hand
     double tryout = 0;                 // of so many seconds, see ViewerOptions; 0: none
     bool window = false;
     bool handIsHere = false;  // the window is the hand

@@ -1,7 +1,5 @@
 #include <base/child_process.h>
 
-#include <base/process.h>
-
 #include <signal.h>
 #include <sys/wait.h>
 
@@ -9,6 +7,7 @@
 #include <cstring>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 namespace palpate::base {
 
@@ -17,29 +16,45 @@ std::filesystem::path programFolder()
     return std::filesystem::read_symlink("/proc/self/exe").parent_path();
 }
 
+namespace {
+
+Program programOf(const std::string& name, const std::vector<std::string>& arguments)
+{
+    Program program{{name}, {-1, -1, -1}, true};
+    program.words.insert(program.words.end(), arguments.begin(), arguments.end());
+    return program;
+}
+
+}  // namespace
+
 ChildProcess::ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy)
+    : ChildProcess(programOf(program, arguments), remedy)
+{
+}
+
+ChildProcess::ChildProcess(Program program, const std::string& remedy)
 {
     // A group of its own: Ctrl-C ends this program, and the other then ends with it.
-    Program started{{program}, {-1, -1, -1}, true};
-    started.words.insert(started.words.end(), arguments.begin(), arguments.end());
-    const auto [pid, error] = start(started);
+    program.ownGroup = true;
+    const auto [pid, error] = start(program);
     if (error != 0) {
-        throw std::runtime_error(program + ": cannot be started (" + std::strerror(error) + "); " + remedy);
+        throw std::runtime_error(program.words[0] + ": cannot be started (" + std::strerror(error) + "); " + remedy);
     }
     pid_ = pid;
 }
 
 ChildProcess::~ChildProcess()
 {
+    const pid_t group = pid_;
     if (pid_ > 0) {
-        kill(pid_, SIGTERM);
-        kill(pid_, SIGCONT);  // what is stopped takes no other signal
+        kill(-group, SIGTERM);
+        kill(-group, SIGCONT);  // what is stopped takes no other signal
         wait(2.0);
     }
-    if (pid_ > 0) {
+    if (group > 0) {
         // It holds nothing that could be lost: what a viewer shows is the session's, and files get their name when they are
-        // whole.
-        kill(pid_, SIGKILL);
+        // whole. Nor does what it has started, and may have left behind.
+        kill(-group, SIGKILL);
         wait(2.0);
     }
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <base/process.h>
+
 #include <sys/types.h>
 
 #include <filesystem>
@@ -14,13 +16,18 @@ public:
     /// Starts `program`, a path or a name to be looked for in PATH; its messages go to standard error. Throws
     /// std::runtime_error, which ends in `remedy`, when it cannot be started.
     ChildProcess(const std::string& program, const std::vector<std::string>& arguments, const std::string& remedy);
+    /// The same with streams of its own; the program always gets a group of its own.
+    /// @pre  at least one word
+    ChildProcess(Program program, const std::string& remedy);
     ChildProcess(const ChildProcess&) = delete;
     ChildProcess& operator=(const ChildProcess&) = delete;
-    /// Asks it to end (SIGTERM) if it still runs, and after two seconds no longer asks (SIGKILL).
+    /// Asks it and what it has started to end (SIGTERM) if it still runs, and after two seconds no longer asks (SIGKILL).
     ~ChildProcess();
 
     /// Waits up to `seconds` for it to end by itself. Returns its exit status; -1 when it was killed or still runs.
     int wait(double seconds);
+    /// Its number, which is its group's too; -1 once it has ended.
+    pid_t pid() const noexcept { return pid_; }
     /// Whether a signal has killed it.
     bool killed();
     /// Stops it (SIGSTOP), or lets it go on (SIGCONT), if it still runs.

@@ -109,6 +109,7 @@ struct Scenery {
     double ctWidth = 0;       // of a slice [m]
     double ctDoseIndex = 0;   // CTDIvol of a scan [mGy]
     double ctDoseLength = 0;  // of a scan [mGy cm]
+    Name who{};               // trains: a name or a pseudonym; empty: not known
 };
 
 enum class Phase : std::uint32_t { free, contact, inserted };

@@ -61,7 +61,8 @@ endif()
 if(PALPATE_REFERENCE)
   find_package(CGAL 5.5 CONFIG REQUIRED)
   find_package(GetFEM REQUIRED)
-  find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOXML)
+  find_package(TetGen REQUIRED)
+  find_package(VTK 9.1 REQUIRED COMPONENTS CommonCore CommonDataModel IOXML IOLegacy)
 endif()
 
 # After the reference's: render/ links VTK_LIBRARIES, which are those found last.

@@ -25,15 +25,17 @@ std::array<float, 3> floats(Vec3 v) noexcept
 
 }  // namespace
 
-channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand)
+channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
+                               const std::string& who)
 {
-    return publisherOf(session, model, viewersHand, displayGrid(*model.tissue));
+    return publisherOf(session, model, viewersHand, displayGrid(*model.tissue), who);
 }
 
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
-                               const volume::NodeGrid& display)
+                               const volume::NodeGrid& display, const std::string& who)
 {
-    const Showing s = showingOf(model, viewersHand, display);
+    Showing s = showingOf(model, viewersHand, display);
+    s.scenery.who = nameOf(who);
     return {session, s.scenery, s.labels, s.image, s.fine};
 }
 
@@ -87,8 +89,9 @@ void showShape(const Simulation& simulation, channel::Displaced& out) noexcept
     }
 }
 
-Broadcast::Broadcast(const std::string& session, const SessionModel& model, std::uint32_t viewersHand)
-    : publisher_(publisherOf(session, model, viewersHand))
+Broadcast::Broadcast(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
+                     const std::string& who)
+    : publisher_(publisherOf(session, model, viewersHand, who))
 {
     static_assert(channel::maxStructures == maxStructures && channel::maxTissues == maxTissues);
 }

@@ -12,11 +12,12 @@ namespace palpate::haptics {
 
 /// The segment of a session, with its scenery. Throws std::runtime_error when it cannot be made.
 /// @param viewersHand  who holds the tool, see channel::handIsViewers
+/// @param who          a name or a pseudonym, of which viewers see the first 31 bytes; empty: not known
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model,
-                               std::uint32_t viewersHand = channel::handElsewhere);
+                               std::uint32_t viewersHand = channel::handElsewhere, const std::string& who = {});
 /// The same with the body's tissues, and the image if it has one, sampled on `display`.
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
-                               const volume::NodeGrid& display);
+                               const volume::NodeGrid& display, const std::string& who = {});
 
 /// What viewers see of a tick, on top of what they have seen of those before it. Allocates nothing.
 void showTick(const TickRecord& record, const ServoTiming& timing, channel::State& state) noexcept;
@@ -28,7 +29,8 @@ void showShape(const Simulation& simulation, channel::Displaced& out) noexcept;
 class Broadcast {
 public:
     /// As publisherOf().
-    Broadcast(const std::string& session, const SessionModel& model, std::uint32_t viewersHand = channel::handElsewhere);
+    Broadcast(const std::string& session, const SessionModel& model, std::uint32_t viewersHand = channel::handElsewhere,
+              const std::string& who = {});
 
     /// Wait-free; allocates nothing.
     void publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept;

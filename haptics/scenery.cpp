@@ -13,6 +13,18 @@
 
 namespace palpate::haptics {
 
+channel::Name nameOf(const std::string& text) noexcept
+{
+    channel::Name name{};
+    std::size_t bytes = std::min(text.size(), name.size() - 1);
+    const auto within = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U; };
+    while (bytes > 0 && bytes < text.size() && within(bytes)) {
+        --bytes;
+    }
+    std::copy_n(text.begin(), bytes, name.begin());
+    return name;
+}
+
 namespace {
 
 constexpr std::size_t displayNodes = 160U * 160U * 160U;
@@ -29,13 +41,6 @@ channel::Triple triple(Vec3 v) noexcept
 channel::Grid gridOf(const volume::NodeGrid& g) noexcept
 {
     return {{g.size.x, g.size.y, g.size.z}, 0, triple(g.origin), g.spacing};
-}
-
-channel::Name nameOf(const std::string& text) noexcept
-{
-    channel::Name name{};
-    std::copy_n(text.begin(), std::min(text.size(), name.size() - 1), name.begin());
-    return name;
 }
 
 channel::ToolKind shown(datasets::ToolKind kind)

@@ -4,6 +4,7 @@
 #include <haptics/session_model.h>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace palpate::haptics {
@@ -15,6 +16,9 @@ struct Showing {
     std::vector<std::uint16_t> image;  // per node of scenery.labels, or empty
     std::vector<std::uint8_t> fine;    // per node of scenery.fine: tissue row; or empty
 };
+
+/// The first 31 bytes of a text, of UTF-8 whole characters.
+channel::Name nameOf(const std::string& text) noexcept;
 
 /// The grid that a viewer's labels are on where nobody asks for another.
 volume::NodeGrid displayGrid(const volume::Tissue& tissue);

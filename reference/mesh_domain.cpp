@@ -77,6 +77,9 @@ struct EdgeField {
 
     FT operator()(const Point_3& p, int dimension, const Index& index) const
     {
+        if (dimension == 3 && options->inside > 0.0) {
+            return share * inMillimetres * options->inside;
+        }
         const double length = edgeLength(*options, toVec(p));
         return share * inMillimetres * (dimension == 2 ? std::min(length, onPatch(bounds->edge, index)) : length);
     }

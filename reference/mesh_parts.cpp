@@ -19,34 +19,6 @@ constexpr double lookUntil = 2.5;  // and where that ends [voxels]
 constexpr double flat = 1e-5;      // six volumes of a tetrahedron by the cube of an edge: less is none
 constexpr std::uint32_t none = ~0U;
 
-// Corners of the face across from each corner, counterclockwise seen from outside.
-constexpr std::array<std::array<std::size_t, 3>, 4> faceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
-
-struct SortedFace {
-    std::array<std::uint32_t, 3> key{};  // points in order
-    std::uint32_t tet = 0;
-    std::uint8_t side = 0;
-};
-
-std::vector<SortedFace> sortedFaces(const TetMesh& mesh)
-{
-    std::vector<SortedFace> faces;
-    faces.reserve(4 * mesh.tets.size());
-    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
-        for (std::uint8_t side = 0; side < 4; ++side) {
-            SortedFace f{{}, static_cast<std::uint32_t>(t), side};
-            for (std::size_t i = 0; i < 3; ++i) {
-                f.key[i] = mesh.tets[t][faceCorners[side][i]];
-            }
-            std::ranges::sort(f.key);
-            faces.push_back(f);
-        }
-    }
-    std::ranges::sort(
-        faces, [](const SortedFace& a, const SortedFace& b) { return std::tie(a.key, a.tet) < std::tie(b.key, b.tet); });
-    return faces;
-}
-
 std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i)
 {
     while (parent[i] != i) {
@@ -54,22 +26,6 @@ std::uint32_t rootOf(std::vector<std::uint32_t>& parent, std::uint32_t i)
         i = parent[i];
     }
     return i;
-}
-
-void dropUnusedPoints(TetMesh& mesh)
-{
-    std::vector<std::uint32_t> to(mesh.points.size(), none);
-    std::vector<Vec3> points;
-    for (auto& tet : mesh.tets) {
-        for (auto& p : tet) {
-            if (to[p] == none) {
-                to[p] = static_cast<std::uint32_t>(points.size());
-                points.push_back(mesh.points[p]);
-            }
-            p = to[p];
-        }
-    }
-    mesh.points = std::move(points);
 }
 
 // Whether the first that is not soft before a face holds the body.
@@ -101,6 +57,25 @@ bool liesOnHeldSide(const SmoothLabels& labels, Vec3 p)
 }
 
 }  // namespace
+
+std::vector<SortedFace> sortedFaces(const TetMesh& mesh)
+{
+    std::vector<SortedFace> faces;
+    faces.reserve(4 * mesh.tets.size());
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        for (std::uint8_t side = 0; side < 4; ++side) {
+            SortedFace f{{}, static_cast<std::uint32_t>(t), side};
+            for (std::size_t i = 0; i < 3; ++i) {
+                f.key[i] = mesh.tets[t][faceCorners[side][i]];
+            }
+            std::ranges::sort(f.key);
+            faces.push_back(f);
+        }
+    }
+    std::ranges::sort(
+        faces, [](const SortedFace& a, const SortedFace& b) { return std::tie(a.key, a.tet) < std::tie(b.key, b.tet); });
+    return faces;
+}
 
 double sixVolumes(const TetMesh& mesh, std::size_t tet) noexcept
 {
@@ -139,6 +114,22 @@ double smallestDihedral(const TetMesh& mesh) noexcept
         }
     }
     return std::acos(std::clamp(largestCosine, -1.0, 1.0)) * 180.0 / std::numbers::pi;
+}
+
+void dropUnusedPoints(TetMesh& mesh)
+{
+    std::vector<std::uint32_t> to(mesh.points.size(), none);
+    std::vector<Vec3> points;
+    for (auto& tet : mesh.tets) {
+        for (auto& p : tet) {
+            if (to[p] == none) {
+                to[p] = static_cast<std::uint32_t>(points.size());
+                points.push_back(mesh.points[p]);
+            }
+            p = to[p];
+        }
+    }
+    mesh.points = std::move(points);
 }
 
 double keepLargestPiece(TetMesh& mesh)

@@ -3,10 +3,24 @@
 #include <reference/smooth_labels.h>
 #include <reference/tet_mesh.h>
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 namespace palpate::reference {
+
+/// Corners of the face across from each corner, counterclockwise seen from outside.
+inline constexpr std::array<std::array<std::size_t, 3>, 4> faceCorners{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+
+/// A face of a tetrahedron.
+struct SortedFace {
+    std::array<std::uint32_t, 3> key{};  // points in order
+    std::uint32_t tet = 0;
+    std::uint8_t side = 0;  // corner across from it
+};
+/// All faces, by key and then by tetrahedron: those that are shared follow each other (4 tets x 1).
+std::vector<SortedFace> sortedFaces(const TetMesh& mesh);
 
 /// Six times the volume of a tetrahedron, positive when its points turn the right way [m^3].
 double sixVolumes(const TetMesh& mesh, std::size_t tet) noexcept;
@@ -15,6 +29,8 @@ std::vector<double> volumesOf(const TetMesh& mesh, std::span<const std::uint8_t>
 /// Of all tetrahedra [degrees].
 double smallestDihedral(const TetMesh& mesh) noexcept;
 
+/// Leaves the points that tetrahedra have, in the order of their first use.
+void dropUnusedPoints(TetMesh& mesh);
 /// Leaves the largest piece that hangs together by faces, and the points that it has. Returns the volume left out [m^3].
 double keepLargestPiece(TetMesh& mesh);
 /// Puts the points that lie on a flat side, but for rounding, exactly there, and takes tetrahedra away that have no volume

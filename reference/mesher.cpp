@@ -3,6 +3,7 @@
 #include <reference/mesh_domain.h>
 #include <reference/mesh_parts.h>
 #include <reference/mixtures.h>
+#include <reference/refill.h>
 
 #include <algorithm>
 #include <array>
@@ -66,6 +67,9 @@ public:
     {
         std::optional<TetMesh> out;
         for (const double resolution : resolutions) {
+            if (resolution > options_.resolution) {
+                continue;
+            }
             labels_.within = reachOf(thickness_, resolution, options_);
             bounds_.distance.clear();
             std::ranges::transform(thickness_, std::back_inserter(bounds_.distance),
@@ -127,15 +131,26 @@ double edgeLength(const MeshOptions& options, Vec3 p) noexcept
     return std::min(options.largest, options.size + options.growth * beyond);
 }
 
+TetMesh meshLabels(SmoothLabels& labels, const MeshOptions& options)
+{
+    TetMesh mesh = BodyMesher(labels, options).mesh();
+    snapToSides(labels, mesh);
+    return mesh;
+}
+
 BodyMesh meshBody(const volume::Tissue& tissue, const MeshOptions& options)
+{
+    return meshBody(tissue, options, [](const TetMesh& mesh) { return mesh; });
+}
+
+BodyMesh meshBody(const volume::Tissue& tissue, const MeshOptions& options, const Refill& refill)
 {
     SmoothLabels labels = smoothLabels(tissue);
     BodyMesh body;
     body.rows = labels.rows;
     body.voxels = labels.volume;
     const std::vector<double> bias = labels.bias;
-    body.mesh = BodyMesher(labels, options).mesh();
-    snapToSides(labels, body.mesh);
+    body.mesh = refill(meshLabels(labels, options));
     body.dropped = keepLargestPiece(body.mesh);
     body.sharpest = smallestDihedral(body.mesh);
     labels.bias = bias;  // chords are no matter to a mixture

@@ -15,7 +15,9 @@ struct MeshOptions {
     double size = 1.5e-3;      // [m]
     double growth = 0.25;      // how much longer edges are per metre further away [m/m]
     double largest = 10e-3;    // [m]
+    double inside = 0;         // edges away from surfaces [m]; 0: as above
     double layer = 2.0;        // edges in a region are at most so many times as long as it is thick
+    double resolution = 12.0;  // edges may be so many times as long as a tissue is thick before it is left out, or less
     std::size_t most = 50000;  // tetrahedra: more, and thin tissues far from the contact are mixed with what they lie in
     int volumePasses = 2;      // meshes made anew to keep the regions' volumes
 };
@@ -40,6 +42,10 @@ struct BodyMesh {
 /// is what a mesher of given facets, as TetGen, leaves to the one who extracts them, who has to be careful at every line
 /// where three tissues meet.
 BodyMesh meshBody(const volume::Tissue& tissue, const MeshOptions& options);
+
+/// Tetrahedra of all regions of `labels`, whose biases and reaches are changed so that volumes are kept; what lies on a
+/// flat side is exactly there. Faces are left out.
+TetMesh meshLabels(SmoothLabels& labels, const MeshOptions& options);
 
 /// Edge length wanted at `p` [m], without regard to layers.
 double edgeLength(const MeshOptions& options, Vec3 p) noexcept;

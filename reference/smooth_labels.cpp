@@ -66,7 +66,7 @@ SoftVoxels cropped(const SoftVoxels& all, Index3 first, Index3 last)
     return part;
 }
 
-SoftVoxels readVoxels(const volume::Tissue& tissue)
+SoftVoxels readVoxels(const volume::Tissue& tissue, Keep keep)
 {
     const auto [first, last] = voxelRange(tissue);
     SoftVoxels all;
@@ -78,7 +78,7 @@ SoftVoxels readVoxels(const volume::Tissue& tissue)
     Index3 low = all.size, high(-1);
     volume::forEachIndex(Index3(0), all.size - 1, [&](Index3 n) {
         const std::uint8_t row = reader.tissue(tissue.affine().toPatient(Vec3(n + all.low)));
-        if (isHeld(rows[row])) {
+        if (keep == Keep::soft && isHeld(rows[row])) {
             all.held = true;
         } else if (rows[row].role != volume::Role::air) {
             all.row[all.offset(n)] = row;
@@ -87,7 +87,9 @@ SoftVoxels readVoxels(const volume::Tissue& tissue)
         }
     });
     if (glm::any(glm::greaterThan(low, high))) {
-        throw std::runtime_error("volume: there is no soft tissue in it to mesh: all of it is air, bone or fixed");
+        throw std::runtime_error(keep == Keep::all
+                                     ? "volume: there is no tissue in it to mesh: all of it is air"
+                                     : "volume: there is no soft tissue in it to mesh: all of it is air, bone or fixed");
     }
     return cropped(all, low, high);
 }
@@ -377,12 +379,12 @@ bool isHeld(const volume::TissueRow& row) noexcept
     return row.fixed || row.role == volume::Role::bone;
 }
 
-SmoothLabels smoothLabels(const volume::Tissue& tissue)
+SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep)
 {
-    SoftVoxels voxels = readVoxels(tissue);
+    SoftVoxels voxels = readVoxels(tissue, keep);
     SmoothLabels labels;
     labels.affine = tissue.affine();
-    labels.heldSide = voxels.held ? -1 : layOnItsBack(labels.affine, voxels);
+    labels.heldSide = voxels.held || keep == Keep::all ? -1 : layOnItsBack(labels.affine, voxels);
     labels.flat = flatSides(voxels);
     if (labels.heldSide >= 0) {
         labels.flat[static_cast<std::size_t>(labels.heldSide)] = true;

@@ -45,10 +45,14 @@ struct SmoothLabels {
     }
 };
 
+/// Which tissues are regions: those that deform, or all but air.
+enum class Keep : std::uint8_t { soft, all };
+
 /// Soft is what is neither air, nor bone, nor fixed. A body of which nothing is fixed lies on its back, as in
 /// chainmail::elasticBody(): its rear 5 %, in whole layers of voxels and at least one, are left out, and it is held there.
-/// Throws std::runtime_error where there is no soft tissue.
-SmoothLabels smoothLabels(const volume::Tissue& tissue);
+/// With Keep::all everything but air is a region, and nothing is left out.
+/// Throws std::runtime_error where there is no such tissue.
+SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep = Keep::soft);
 
 /// Chooses the biases so that the regions have these volumes [m^3] (rows x 1).
 void fitVolumes(SmoothLabels& labels, std::span<const double> wanted);

@@ -102,7 +102,7 @@ Coaching approach(const channel::Scenery& scenery, const channel::State& state, 
         c.wrong = view.planned ? wayFault(scenery, state, view.aim) : "";
     } else {
         c.step = 4;
-        c.now = view.handIsHere ? tr("Fire the gun (Space, or the right button)") : tr("Fire the gun");
+        c.now = view.handIsHere ? tr("Fire the gun (Space, or the other mouse button)") : tr("Fire the gun");
         const std::string danger = throwFault(scenery, state);
         c.wrong = !danger.empty() ? danger : view.planned ? wayFault(scenery, state, view.aim) : "";
     }

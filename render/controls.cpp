@@ -52,6 +52,13 @@ Point2 point(glm::dvec2 p)
     return {p.x, p.y};
 }
 
+// The index finger of a left hand lies on the right button.
+int forHand(int button, bool leftHanded)
+{
+    const bool swaps = leftHanded && (button == GLFW_MOUSE_BUTTON_LEFT || button == GLFW_MOUSE_BUTTON_RIGHT);
+    return swaps ? GLFW_MOUSE_BUTTON_LEFT + GLFW_MOUSE_BUTTON_RIGHT - button : button;
+}
+
 // The probe slides and sweeps with the cursor; `turned`: rocks and turns.
 ultrasound::ProbeMove probeMove(glm::dvec2 pixels, bool turned)
 {
@@ -71,13 +78,15 @@ Controls::Controls(GLFWwindow* window, vtkGenericRenderWindowInteractor& interac
       follower_(follower),
       playback_(options.playback),
       images_(options.images),
-      steps_(options.steps)
+      steps_(options.steps),
+      leftHanded_(options.leftHanded)
 {
     if (options.tryout > 0)
         tryout_.emplace(options.tryout);
     glfwSetWindowUserPointer(window, this);
-    glfwSetMouseButtonCallback(
-        window, [](GLFWwindow* w, int button, int action, int) { controlsOf(w).button(button, action == GLFW_PRESS); });
+    glfwSetMouseButtonCallback(window, [](GLFWwindow* w, int button, int action, int) {
+        controlsOf(w).button(forHand(button, controlsOf(w).leftHanded_), action == GLFW_PRESS);
+    });
     glfwSetCursorPosCallback(window,
                              [](GLFWwindow* w, double x, double y) { controlsOf(w).moved(pixelAt(w, x, y), shiftIn(w)); });
     glfwSetScrollCallback(window,
@@ -187,7 +196,7 @@ void Controls::storePicture()
     hand_.storePicture();
 }
 
-// By the keyboard: what the left button does while it is held.
+// By the keyboard: what the button of the index finger does while it is held.
 void Controls::toggleHold()
 {
     if (hand_.held())
@@ -261,7 +270,8 @@ std::string Controls::caption() const
     if (!hand_.is())
         return "";
     if (!hand_.held())
-        return tr("hold the left button, or press Enter, to take the tool   (? lists the keys)");
+        return leftHanded_ ? tr("hold the right button, or press Enter, to take the tool   (? lists the keys)")
+                           : tr("hold the left button, or press Enter, to take the tool   (? lists the keys)");
     const double lag = glm::distance(hand_.target(), vec(follower_.state().tip));
     return said(tr("holding   hand ahead of the tip by {:.1Lf} mm"), 1e3 * lag);
 }

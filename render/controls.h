@@ -75,6 +75,7 @@ private:
     struct Screen {
         glm::dvec3 right, up, into;
     };
+    /// @param button  GLFW's, for a mouse in the right hand
     void button(int button, bool down);
     void moved(glm::dvec2 to, bool fine);
     void wheel(double notches, bool fine, bool intoPicture);
@@ -104,6 +105,7 @@ private:
     SpaceMouse spaceMouse_;
     glm::dvec2 cursor_{0.0};  // [pixels], from the lower left
     bool steps_ = true;       // are told in words
+    bool leftHanded_ = false;
     std::optional<Tryout> tryout_;
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture

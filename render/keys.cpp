@@ -68,7 +68,7 @@ const std::vector<Controls::Key> Controls::keys{
      [](Controls& c, const Press& p) { c.step(p.control ? c.screen().into : c.hand_.axis(), p.sign, p.shift); }},
     {hand,
      marked("  Space"),
-     marked("fire the biopsy gun; so does the right button"),
+     marked("fire the biopsy gun; so does the other mouse button"),
      {{GLFW_KEY_SPACE, 0, once}},
      [](Controls& c, const Press&) { c.hand_.fire(); }},
     {hand, "M", marked("mark the place of the tool"), {{0, 'm', once}}, [](Controls& c, const Press&) { c.hand_.mark(); }},
@@ -385,9 +385,13 @@ double Controls::shownTime() const
 std::vector<KeyHelp> Controls::help() const
 {
     std::vector<KeyHelp> rows;
+    const auto shown = [this](std::string_view what) {
+        constexpr const char *left = marked("hold left"), *right = marked("hold right");
+        return leftHanded_ && what == left ? right : leftHanded_ && what == right ? left : what.data();
+    };
     for (const Key& k : keys)
         if (applies(k))
-            rows.push_back({base::tr(k.shown), base::tr(k.what)});
+            rows.push_back({base::tr(shown(k.shown)), base::tr(k.what)});
     return rows;
 }
 

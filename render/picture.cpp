@@ -228,7 +228,8 @@ void Picture::setNotice(const std::string& words, const std::string& smaller)
 
 ScreenPlan Picture::screenPlan() const
 {
-    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_, ultrasoundShown_ || ctShown()};
+    return {window_.GetSize()[0], window_.GetSize()[1], layout_, scale_,
+            ultrasoundShown_ || (ctShown() && layout_ != Layout::body)};
 }
 
 void Picture::showUltrasound(bool shown)

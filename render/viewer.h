@@ -50,6 +50,7 @@ struct ViewerOptions {
     Ghost ghost;                           // of an expert, shown beside a record; empty: none
     Palette palette = Palette::standard;   // of tissues
     bool sounds = false;                   // for warnings (windows only)
+    bool leftHanded = false;               // the mouse is in the left hand: its buttons change places
     Concealment concealed;                 // what is not shown, in a test
     bool steps = true;                     // the step that one is at and what is wrong, in words (windows only)
     double tryout = 0;                     // of so many seconds: what the hand does, in words; 0: no tryout

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Texts of cases as gettext's entries: case_texts.py CASE.toml.. ; and the names of tissues as people say them."""
+"""Texts of cases and curricula as gettext's entries: case_texts.py FILE.toml.. ; the names of tissues as people say them; names of measures."""
 
 import pathlib
 import re
@@ -20,11 +20,19 @@ def spoken_names():
     return [known.get(name, name.replace("_", " ")) for name in names]
 
 
+def measures():
+    """Labels and units of haptics::measures()."""
+    root = pathlib.Path(__file__).parent.parent
+    found = re.findall(r'^    \{"\w+", "[^"]*", "([^"]*)", "([^"]*)",', (root / "haptics/measures.cpp").read_text(), re.M)
+    return [label for label, _ in found] + [unit for _, unit in found if " " in unit]
+
+
 def main():
-    texts = spoken_names()
+    texts = spoken_names() + measures()
     for file in sys.argv[1:]:
-        case = tomllib.loads(pathlib.Path(file).read_text())
-        texts += [case["title"], *case["trains"], *case["briefing"]]
+        made = tomllib.loads(pathlib.Path(file).read_text())
+        texts += [made["title"], *made.get("trains", []), *made.get("briefing", [])]
+        texts += [exercise["title"] for exercise in made.get("exercise", [])]
     for text in dict.fromkeys(texts):
         print(f"msgid {quoted(text)}\nmsgstr \"\"\n")
 

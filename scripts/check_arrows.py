@@ -32,10 +32,11 @@ ARROWS = {
         "base", "volume", "volume/prepare", "datasets", "channel", "haptics", "session", "ultrasound", "planner", "report", "sweep",
     },
     "trainer": {"base"},
-    "reference": {"volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
+    "reference/tetgen": {"reference"},
+    "reference": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",
-        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "ct", "render", "reference",
+        "studies", "planner", "sweep", "training", "trainer", "ultrasound", "ct", "render", "reference", "reference/tetgen",
     },
 }
 # Third-party headers that stay in one folder.
@@ -54,7 +55,10 @@ OWNERS = {
     "CGAL/": {"reference"},
     "getfem/": {"reference"},
     "gmm/": {"reference"},
+    "Bullet": {"apps"},
+    "btBullet": {"apps"},
     "dmumps_c": {"reference"},
+    "tetgen.h": {"reference"},
 }
 MOST_LINES = 520
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^">]+)[">]')

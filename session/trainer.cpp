@@ -115,7 +115,7 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
 struct Trainer::Impl {
     Impl(const SessionModel& model, const SessionInfo& info, const TrainOptions& o)
         : options(o),
-          broadcast(o.session, model, handOf(deviceKind(o.device.name))),
+          broadcast(o.session, model, handOf(deviceKind(o.device.name)), info.operatorName),
           device(openWithFaults(o, model, broadcast)),
           session(model, info)
     {

@@ -1,6 +1,7 @@
 #include <trainer/case_entry.h>
 
 #include <base/words.h>
+#include <trainer/lists.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -17,23 +18,6 @@ using base::marked;
 using base::tr;
 using nlohmann::json;
 
-// Calls `take` for each member of the list under `key`; what is not as it should be is left out.
-template <typename Take>
-void each(const json& list, const char* key, const Take& take)
-{
-    const auto found = list.is_object() ? list.find(key) : list.end();
-    if (!list.is_object() || found == list.end() || !found->is_array()) {
-        return;
-    }
-    for (const json& one : *found) {
-        try {
-            take(one);
-        } catch (const json::exception&) {
-            continue;
-        }
-    }
-}
-
 CaseEntry entryOf(const json& one)
 {
     CaseEntry c;
@@ -46,11 +30,12 @@ CaseEntry entryOf(const json& one)
     c.trains = fmt::format("{}", fmt::join(trains, ", "));
     const auto measures = one.at("measures").get<std::vector<std::string>>();
     c.palpation = std::ranges::find(measures, "mark_error_mm") != measures.end();
-    c.steps.push_back(
-        c.palpation ? tr("Hold the left mouse button in the picture, or press Enter: you hold the fingertip. The wheel, "
-                         "or Page down, presses.")
-                    : tr("Hold the left mouse button in the picture, or press Enter: you hold the needle. The wheel, "
-                         "or Page down, moves it along itself by 1 mm; Space fires."));
+    c.steps.push_back(c.palpation ? tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
+                                       "hold the fingertip. The wheel, "
+                                       "or Page down, presses.")
+                                  : tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
+                                       "hold the needle. The wheel, "
+                                       "or Page down, moves it along itself by 1 mm; Space fires."));
     for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
         c.steps.push_back(tr(step));
     }
@@ -75,10 +60,12 @@ std::vector<CaseEntry> casesOf(const json& list)
     return cases;
 }
 
-std::vector<std::string> peopleOf(const json& list)
+std::vector<PersonEntry> peopleOf(const json& list)
 {
-    std::vector<std::string> people;
-    each(list, "profiles", [&](const json& one) { people.push_back(one.at("name").get<std::string>()); });
+    std::vector<PersonEntry> people;
+    each(list, "profiles", [&](const json& one) {
+        people.push_back({one.at("name").get<std::string>(), one.at("hand") == "left"});
+    });
     return people;
 }
 

@@ -27,7 +27,13 @@ const char* difficultyInWords(int difficulty) noexcept;
 /// are not whole are left out.
 std::vector<CaseEntry> casesOf(const nlohmann::json& list);
 
-/// The names that `palpate profile list --json` gives.
-std::vector<std::string> peopleOf(const nlohmann::json& list);
+/// Somebody who trains.
+struct PersonEntry {
+    std::string name;
+    bool leftHanded = false;
+};
+
+/// Those that `palpate profile list --json` gives.
+std::vector<PersonEntry> peopleOf(const nlohmann::json& list);
 
 }  // namespace palpate::trainer

@@ -3,22 +3,19 @@
 #include <base/process.h>
 #include <base/temporary_folder.h>
 #include <base/words.h>
+#include <trainer/lists.h>
+#include <trainer/running.h>
 
-#include <nlohmann/json.hpp>
-
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstring>
+#include <cctype>
 #include <fstream>
+#include <functional>
+#include <list>
 #include <optional>
-#include <stdexcept>
 #include <string>
-#include <thread>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -29,74 +26,7 @@ using base::tr;
 
 namespace {
 
-// A command that runs; what it prints is kept in a file.
-class Running {
-public:
-    Running(const fs::path& program, const std::vector<std::string>& arguments, fs::path log) : log_(std::move(log))
-    {
-        const int out = ::open(log_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-        base::Program started{{program.string()}, {-1, out, out}, true};
-        started.words.insert(started.words.end(), arguments.begin(), arguments.end());
-        const auto [pid, error] = base::start(started);
-        if (out >= 0) {
-            ::close(out);
-        }
-        if (error != 0) {
-            throw std::runtime_error(program.string() + ": cannot be started (" + std::strerror(error) + ")");
-        }
-        pid_ = pid;
-    }
-    ~Running()
-    {
-        end();
-        if (!finish()) {
-            ::kill(pid_, SIGKILL);
-            ::waitpid(pid_, nullptr, 0);
-        }
-    }
-    Running(const Running&) = delete;
-    Running& operator=(const Running&) = delete;
-
-    // Waits five seconds at most for its end.
-    bool finish() noexcept
-    {
-        for (int i = 0; i < 200 && !ended(); ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(25));
-        }
-        return ended();
-    }
-    void end() const noexcept
-    {
-        if (pid_ > 0) {
-            ::kill(pid_, SIGTERM);
-        }
-    }
-    bool ended() noexcept
-    {
-        if (pid_ > 0 && ::waitpid(pid_, &status_, WNOHANG) == pid_) {
-            pid_ = -1;
-        }
-        return pid_ < 0;
-    }
-    bool failed() const noexcept { return !(WIFEXITED(status_) && WEXITSTATUS(status_) == 0); }
-    // The last line that the command printed as its own message.
-    std::string message() const
-    {
-        std::ifstream in(log_);
-        std::string last;
-        for (std::string line; std::getline(in, line);) {
-            if (line.starts_with("palpate")) {
-                last = line;
-            }
-        }
-        return last;
-    }
-
-private:
-    fs::path log_;
-    pid_t pid_ = -1;
-    int status_ = 0;
-};
+constexpr double answerTime = 30;  // of a short command, on a machine that has much to do [s]
 
 }  // namespace
 
@@ -124,7 +54,7 @@ struct Errands::Impl {
         fs::remove(file);
         arguments.insert(arguments.end(), {"--json", file.string()});
         Running command(programs / "palpate", arguments, scratch / "answer.log");
-        command.finish();
+        command.finish(answerTime);
         std::ifstream in(file);
         auto answer = nlohmann::json::parse(in, nullptr, false);
         if (answer.is_discarded()) {
@@ -135,21 +65,154 @@ struct Errands::Impl {
     }
     void listPeople(State& state)
     {
-        state.people = peopleOf(answerOf(state, {"profile", "list"}));
-        if (std::ranges::find(state.people, state.person) == state.people.end()) {
+        const auto answer = answerOf(state, {"profile", "list"});
+        if (answer.is_discarded()) {
+            return;  // who was there stays
+        }
+        state.people = peopleOf(answer);
+        if (chosenPerson(state) == nullptr) {
             state.person.clear();
+        }
+    }
+    // A short command that writes no JSON. Returns whether it did what it was asked; else the state says why not.
+    bool did(State& state, const std::vector<std::string>& arguments)
+    {
+        Running command(programs / "palpate", arguments, scratch / "short.log");
+        const bool done = command.finish(answerTime) && !command.failed();
+        const std::string said = command.message();
+        state.notice = done ? "" : said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
+        return done;
+    }
+    std::vector<std::string> progressWords(const std::string& whose) const
+    {
+        std::vector<std::string> words{"progress", whose};
+        for (const std::string& id : curricula) {
+            words.insert(words.end(), {"--curriculum", id});
+        }
+        return words;
+    }
+    // The curve of who trains, and the best scores: of that person, or of the folder's sessions.
+    void choosePerson(State& state)
+    {
+        progressLoaded(state, state.person.empty() ? Progress() : progressIn(answerOf(state, progressWords(state.person))));
+        if (state.settings.person != state.person) {
+            state.settings.person = state.person;
+            state.notice = writeSettings(settingsFile(), state.settings);
+        }
+        for (CaseEntry& c : state.cases) {
+            c.best = state.person.empty() ? sink.best(c) : state.progress.best(c.id);
+        }
+    }
+    void changeHand(State& state)
+    {
+        if (const PersonEntry* const person = chosenPerson(state)) {
+            did(state, {"profile", "hand", person->name, person->leftHanded ? "left" : "right"});
+        }
+        listPeople(state);
+    }
+    fs::path output(const std::string& name)
+    {
+        std::string plain = name;
+        std::ranges::replace_if(
+            plain, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; }, '-');
+        fs::create_directories(sink.folder());
+        return sink.folder() / plain;
+    }
+    // With what the desktop opens pages with; where it has nothing, the notice says where the page is.
+    static void open(const fs::path& page)
+    {
+        if (::access("/usr/bin/xdg-open", X_OK) == 0) {
+            base::start({{"/usr/bin/xdg-open", page.string()}, {-1, -1, -1}, true});
+        }
+    }
+    void writeProgress(State& state)
+    {
+        const fs::path base = output("progress-" + state.person);
+        std::vector<std::string> words = progressWords(state.person);
+        words.insert(words.end(), {"--html", base.string() + ".html", "--csv", base.string() + ".csv", "--xapi",
+                                   base.string() + ".xapi.json"});
+        if (did(state, words)) {
+            state.notice = base.string() + tr(": page (.html), table (.csv), xAPI statements (.xapi.json)");
+            open(base.string() + ".html");
+        }
+    }
+    void loadEverybody(State& state)
+    {
+        Instructor& i = state.instructor;
+        listPeople(state);
+        i.groupOf.resize(state.people.size(), 0);
+        i.everybody = state.people.empty() ? Progress() : progressIn(answerOf(state, {"progress", "--all"}));
+        // The newest first.
+        std::ranges::stable_sort(i.everybody.sessions, std::greater(), &KeptSession::started);
+        chooseKept(state, std::min(i.chosen, std::max<std::size_t>(i.everybody.sessions.size(), 1) - 1));
+    }
+    void watch(const State& state, const std::vector<std::string>& words)
+    {
+        std::vector<std::string> all = words;
+        all.insert(all.end(), {"--layout", "instructor", "--palette", state.settings.palette});
+        eyes.emplace_back(programs / "palpate-view", all, scratch / ("watch-" + std::to_string(++watched) + ".log"));
+    }
+    void keepNote(State& state)
+    {
+        const Instructor& i = state.instructor;
+        if (i.chosen < i.everybody.sessions.size()) {
+            const KeptSession& s = i.everybody.sessions[i.chosen];
+            const bool done = did(state, {"profile", "note", s.name, std::to_string(s.number), "--text=" + i.note,
+                                          "--rating", std::to_string(i.rating)});
+            done ? loadEverybody(state) : void();
+        }
+    }
+    void compareGroups(State& state)
+    {
+        std::vector<std::string> words = comparisonArguments(state);
+        if (words.empty()) {
+            state.notice = tr("Put somebody into each of the two groups.");
+            return;
+        }
+        const fs::path page = output("groups").replace_extension(".html");
+        if (state.instructor.asPage) {
+            words.insert(words.end(), {"--html", page.string()});
+        }
+        state.notice.clear();
+        state.instructor.comparison = comparisonIn(answerOf(state, words));
+        if (state.instructor.asPage && state.notice.empty()) {
+            state.notice = page.string();
+            open(page);
+        }
+    }
+    // Looks at the sessions that run as long as somebody looks at them.
+    void lookAtLive(State& state)
+    {
+        const bool wanted = state.screen == Screen::instructor && state.instructor.page == InstructorPage::live;
+        if (!wanted) {
+            live.reset();
+            state.instructor.live.clear();
+            return;
+        }
+        const fs::path file = scratch / "live.json";
+        if (!live || live->ended()) {
+            fs::remove(file);
+            live.emplace(programs / "palpate", std::vector<std::string>{"sessions", "--every", "0.5", "--json", file},
+                         scratch / "live.log");
+        }
+        std::error_code none;
+        if (const auto written = fs::last_write_time(file, none); !none && written != liveRead) {
+            liveRead = written;
+            std::ifstream in(file);
+            state.instructor.live = liveIn(nlohmann::json::parse(in, nullptr, false));
         }
     }
     void addPerson(State& state)
     {
         const std::string name = state.newPerson;
         Running command(programs / "palpate", {"profile", "new", name}, scratch / "person.log");
-        command.finish();
+        command.finish(answerTime);
         state.notice = command.message();
         listPeople(state);
-        if (std::ranges::find(state.people, name) != state.people.end()) {
+        if (std::ranges::find(state.people, name, &PersonEntry::name) != state.people.end()) {
             state.person = name;
             state.newPerson.clear();
+            choosePerson(state);
         }
     }
     void checkDevices()
@@ -232,6 +295,14 @@ struct Errands::Impl {
             }
             expert.reset();
         }
+        eyes.remove_if([&](Running& one) {
+            const bool ended = one.ended();
+            if (ended && one.failed()) {
+                state.notice = one.message();
+            }
+            changed = changed || ended;
+            return ended;
+        });
         if (over(film)) {
             state.notice = film->failed() ? film->message() : made.string();
             state.filming = false;
@@ -244,7 +315,11 @@ struct Errands::Impl {
     fs::path programs;
     const base::TemporaryFolder scratch{tr("what the commands print")};  // goes after those that run
     ResultSink& sink;
-    std::optional<Running> session, devices, replay, push, tryout, expert, film;
+    std::vector<std::string> curricula;  // that there are
+    std::optional<Running> session, devices, replay, push, tryout, expert, film, live;
+    fs::file_time_type liveRead;
+    std::list<Running> eyes;  // viewers of the instructor
+    int watched = 0;          // how many there were
 };
 
 Errands::Errands(fs::path programs, ResultSink& sink) : impl_(std::make_unique<Impl>(std::move(programs), sink)) {}
@@ -255,10 +330,12 @@ void Errands::list(State& state)
 {
     try {
         state.cases = casesOf(impl_->answerOf(state, {"case", "list"}));
-        for (CaseEntry& c : state.cases) {
-            c.best = impl_->sink.best(c);
-        }
+        state.person = state.settings.person;
         impl_->listPeople(state);
+        impl_->curricula.clear();
+        each(impl_->answerOf(state, {"curriculum", "list"}), "curricula",
+             [this](const auto& one) { impl_->curricula.push_back(one.at("id").template get<std::string>()); });
+        impl_->choosePerson(state);
     } catch (const std::exception& e) {
         state.notice = e.what();
     }
@@ -270,6 +347,22 @@ void Errands::run(Errand errand, State& state)
         switch (errand) {
             case Errand::addPerson:
                 return impl_->addPerson(state);
+            case Errand::choosePerson:
+                return impl_->choosePerson(state);
+            case Errand::changeHand:
+                return impl_->changeHand(state);
+            case Errand::writeProgress:
+                return impl_->writeProgress(state);
+            case Errand::loadEverybody:
+                return impl_->loadEverybody(state);
+            case Errand::watchSession:
+                return impl_->watch(state, {"--session", state.instructor.watched});
+            case Errand::seeKept:
+                return impl_->watch(state, {"--replay", state.instructor.watched});
+            case Errand::keepNote:
+                return impl_->keepNote(state);
+            case Errand::compareGroups:
+                return impl_->compareGroups(state);
             case Errand::checkDevices:
                 state.devices = {};
                 return impl_->checkDevices();
@@ -325,6 +418,7 @@ bool Errands::look(State& state)
         changed = true;
     }
     changed = impl_->lookAtHelpers(state) || changed;
+    impl_->lookAtLive(state);
     if (impl_->replay && impl_->replay->ended()) {
         impl_->replay.reset();
         state.replaying = false;

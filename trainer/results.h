@@ -27,6 +27,8 @@ public:
     virtual void keep(const CaseEntry& of, const SessionFiles& files, const Result& result) = 0;
     /// Points of the best session of a case.
     virtual std::optional<double> best(const CaseEntry& of) const = 0;
+    /// Where pages and tables go.
+    virtual std::filesystem::path folder() const = 0;
 };
 
 /// Keeps record (.db) and figures (.json) of each session in one folder, named by case and date.
@@ -37,6 +39,7 @@ public:
     /// Both files are there already.
     void keep(const CaseEntry&, const SessionFiles&, const Result&) override {}
     std::optional<double> best(const CaseEntry& of) const override;
+    std::filesystem::path folder() const override { return folder_; }
 
 private:
     std::filesystem::path folder_;

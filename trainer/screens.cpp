@@ -38,13 +38,19 @@ Errand drawPeople(State& state)
     if (ImGui::BeginCombo(tr("Who trains"), state.person.empty() ? nobody.c_str() : state.person.c_str())) {
         if (ImGui::Selectable(nobody.c_str(), state.person.empty())) {
             state.person.clear();
+            errand = Errand::choosePerson;
         }
-        for (const std::string& name : state.people) {
-            if (ImGui::Selectable(name.c_str(), state.person == name)) {
-                state.person = name;
+        for (const PersonEntry& one : state.people) {
+            if (ImGui::Selectable(one.name.c_str(), state.person == one.name)) {
+                state.person = one.name;
+                errand = Errand::choosePerson;
             }
         }
         ImGui::EndCombo();
+    }
+    if (PersonEntry* const person = chosenPerson(state)) {
+        besideIfRoom(std::string(tr("Left-handed")) + "    ");
+        errand = ImGui::Checkbox(tr("Left-handed"), &person->leftHanded) ? Errand::changeHand : errand;
     }
     besideIfRoom(std::string(tr("a new name")) + "           ");
     ImGui::SetNextItemWidth(9 * em);
@@ -56,6 +62,16 @@ Errand drawPeople(State& state)
         errand = Errand::addPerson;
     }
     ImGui::EndDisabled();
+    ImGui::BeginDisabled(state.person.empty());
+    besideIfRoom(tr("Progress"));
+    if (ImGui::Button(tr("Progress"))) {
+        errand = showProgress(state);
+    }
+    ImGui::EndDisabled();
+    besideIfRoom(tr("Instructor"));
+    if (ImGui::Button(tr("Instructor"))) {
+        errand = showInstructor(state);
+    }
     besideIfRoom(tr("Settings"));
     const Errand settings = drawSettings(state);
     return errand != Errand::none ? errand : settings;
@@ -159,10 +175,11 @@ Errand drawDevices(State& state)
         words(tr("Begin with the grip in the middle of its reach, and hold it loosely. The first force comes up slowly."));
     } else {
         ImGui::Spacing();
-        words(tr(
-            "With the mouse: hold the left button to take the tool; moving the mouse moves it in the plane of the picture, "
-            "the wheel along itself. By keys: Enter takes it and lets it go, arrows and pages move it. Let go, and the "
-            "force fades. Every key is listed by ? in the session."));
+        words(
+            tr("With the mouse: hold the button of your index finger to take the tool; moving the mouse moves it in the "
+               "plane of the picture, "
+               "the wheel along itself. By keys: Enter takes it and lets it go, arrows and pages move it. Let go, and the "
+               "force fades. Every key is listed by ? in the session."));
     }
     ImGui::Spacing();
     const Errand errand = drawDeviceTests(state);
@@ -241,7 +258,7 @@ Errand drawFoot(State& state, bool entered)
     ImGui::PushStyleColor(ImGuiCol_Button, vec({0.0F, 0.42F, 0.31F}));
     const bool pressed = ImGui::Button(label.c_str());
     ImGui::PopStyleColor();
-    if (entered && !first) {
+    if (entered && !first && state.screen != Screen::progress) {
         ImGui::SetKeyboardFocusHere(-1);
     }
     // Where something has the focus, Enter presses that.
@@ -254,6 +271,11 @@ Errand drawFoot(State& state, bool entered)
 
 void drawWay(const State& state)
 {
+    if (state.screen > Screen::result) {
+        ImGui::TextColored(vec(orange), "%s", nameOf(state.screen));
+        ImGui::Separator();
+        return;
+    }
     for (std::size_t i = 0; i <= static_cast<std::size_t>(Screen::result); ++i) {
         if (i > 0) {
             ImGui::SameLine();
@@ -296,6 +318,12 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
             break;
         case Screen::result:
             errand = drawResult(state);
+            break;
+        case Screen::progress:
+            errand = drawProgress(state, entered);
+            break;
+        case Screen::instructor:
+            errand = drawInstructor(state);
             break;
     }
     if (errand == Errand::none && state.screen == before) {

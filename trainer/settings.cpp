@@ -40,6 +40,7 @@ Settings readSettings(const fs::path& file)
     take("palette", settings.palette);
     take("sounds", settings.sounds);
     take("text_scale", settings.textScale);
+    take("person", settings.person);
     settings.textScale = settings.textScale >= 0.5 && settings.textScale <= 3 ? settings.textScale : 1;
     settings.palette = settings.palette == "colour-blind" ? settings.palette : "standard";
     return settings;
@@ -50,7 +51,8 @@ std::string writeSettings(const fs::path& file, const Settings& settings)
     const nlohmann::json json{{"language", settings.language},
                               {"palette", settings.palette},
                               {"sounds", settings.sounds},
-                              {"text_scale", settings.textScale}};
+                              {"text_scale", settings.textScale},
+                              {"person", settings.person}};
     std::error_code failed;
     fs::create_directories(file.parent_path(), failed);
     const fs::path fresh = file.string() + ".new";

@@ -11,6 +11,7 @@ struct Settings {
     std::string palette = "standard";  // of tissues, see palpate-view --palette
     bool sounds = false;               // for warnings
     double textScale = 1;              // 0.5 to 3
+    std::string person;                // who trained last; empty: nobody
 };
 
 /// $XDG_CONFIG_HOME/palpate/trainer.json, or ~/.config/palpate/trainer.json.

@@ -1,6 +1,6 @@
 #include <trainer/state.h>
 
-#include <base/words.h>
+#include <base/said.h>
 
 #include <fmt/format.h>
 
@@ -12,6 +12,7 @@
 namespace palpate::trainer {
 
 using base::marked;
+using base::said;
 using base::tr;
 
 namespace {
@@ -37,7 +38,8 @@ const CaseEntry& chosenCase(const State& state)
 
 const char* nameOf(Screen screen) noexcept
 {
-    constexpr std::array names{marked("Case"), marked("Device"), marked("Briefing"), marked("Session"), marked("Result")};
+    constexpr std::array names{marked("Case"),   marked("Device"),   marked("Briefing"),  marked("Session"),
+                               marked("Result"), marked("Progress"), marked("Instructor")};
     return tr(names[static_cast<std::size_t>(screen)]);
 }
 
@@ -52,10 +54,14 @@ const char* mainButton(const State& state) noexcept
             return tr("Start");
         case Screen::session:
             return tr("End the session");
+        case Screen::progress:
+            return tr("Train this exercise");
+        case Screen::instructor:
+            return tr("Choose a case");
         case Screen::result:
             break;
     }
-    return tr("Next case");
+    return state.exercise.empty() ? tr("Next case") : tr("What is next");
 }
 
 Errand goOn(State& state)
@@ -65,8 +71,14 @@ Errand goOn(State& state)
             if (state.cases.empty()) {
                 return Errand::none;
             }
+            state.exercise.clear();
             state.screen = Screen::devices;
             return Errand::checkDevices;
+        case Screen::progress:
+            return trainExercise(state, state.exerciseShown);
+        case Screen::instructor:
+            state.screen = Screen::cases;
+            return Errand::none;
         case Screen::devices:
             state.screen = Screen::briefing;
             return Errand::none;
@@ -76,6 +88,9 @@ Errand goOn(State& state)
             return state.running ? Errand::endSession : Errand::none;
         case Screen::result:
             break;
+    }
+    if (!state.exercise.empty()) {
+        return showProgress(state);
     }
     // The next one in the list; from the last one back to the list's beginning.
     state.chosen = (state.chosen + 1) % std::max<std::size_t>(state.cases.size(), 1);
@@ -90,6 +105,8 @@ Errand goBack(State& state)
             return Errand::quit;
         case Screen::devices:
         case Screen::result:
+        case Screen::progress:
+        case Screen::instructor:
             state.screen = Screen::cases;
             return Errand::none;
         case Screen::briefing:
@@ -115,6 +132,70 @@ Errand debrief(State& state, std::optional<double> at)
     state.from = at;
     return state.screen == Screen::result && state.result.problem.empty() && !state.replaying ? Errand::startDebrief
                                                                                               : Errand::none;
+}
+
+PersonEntry* chosenPerson(State& state) noexcept
+{
+    const auto at = std::ranges::find(state.people, state.person, &PersonEntry::name);
+    return at == state.people.end() ? nullptr : &*at;
+}
+
+Errand showProgress(State& state)
+{
+    if (chosenPerson(state) == nullptr || state.running) {
+        return Errand::none;
+    }
+    state.screen = Screen::progress;
+    state.exerciseShown = state.curveShown = 0;
+    return Errand::choosePerson;
+}
+
+void progressLoaded(State& state, Progress progress)
+{
+    const bool first = state.exerciseShown == 0;
+    state.progress = std::move(progress);
+    const std::size_t count = state.progress.exercises.size();
+    state.exerciseShown =
+        first ? state.progress.next().value_or(0) : std::min(state.exerciseShown, std::max<std::size_t>(count, 1) - 1);
+    state.curveShown = 0;
+}
+
+Errand trainExercise(State& state, std::size_t exercise)
+{
+    if (exercise >= state.progress.exercises.size() || state.running) {
+        return Errand::none;
+    }
+    const ExerciseEntry& e = state.progress.exercises[exercise];
+    const auto at = std::ranges::find(state.cases, e.caseId, &CaseEntry::id);
+    if (e.standing == ExerciseEntry::Standing::locked || at == state.cases.end()) {
+        state.notice = reasonFor(e);
+        return Errand::none;
+    }
+    state.chosen = static_cast<std::size_t>(at - state.cases.begin());
+    state.exercise = e.curriculum + "/" + e.id;
+    state.test = e.test;
+    state.notice.clear();
+    state.screen = Screen::devices;
+    return Errand::checkDevices;
+}
+
+Errand showInstructor(State& state)
+{
+    if (state.running) {
+        return Errand::none;
+    }
+    state.screen = Screen::instructor;
+    return Errand::loadEverybody;
+}
+
+void chooseKept(State& state, std::size_t session)
+{
+    Instructor& i = state.instructor;
+    if (session < i.everybody.sessions.size()) {
+        i.chosen = session;
+        i.note = i.everybody.sessions[session].note;
+        i.rating = i.everybody.sessions[session].rating;
+    }
 }
 
 void sessionStarted(State& state, SessionFiles files, std::string command)
@@ -143,7 +224,11 @@ std::vector<std::string> trainArguments(const State& state, const SessionFiles& 
     std::vector<std::string> words{"train"};
     const auto add = [&words](std::initializer_list<std::string> more) { words.insert(words.end(), more); };
     const CaseEntry& chosen = chosenCase(state);
-    add({"--case", chosen.id});
+    if (state.exercise.empty()) {
+        add({"--case", chosen.id});
+    } else {
+        add({"--exercise", state.exercise});
+    }
     if (!state.person.empty()) {
         add({"--profile", state.person});
     }
@@ -157,6 +242,30 @@ std::vector<std::string> trainArguments(const State& state, const SessionFiles& 
         add({"--test"});
     }
     add({"--record", files.record.string(), "--json", files.figures.string()});
+    return words;
+}
+
+std::vector<std::string> comparisonArguments(const State& state)
+{
+    std::vector<std::string> words{"progress"};
+    const Instructor& of = state.instructor;
+    for (int group = 1; group <= 2; ++group) {
+        std::string text = said(tr("group {}"), group) + "=";
+        bool some = false;
+        for (std::size_t i = 0; i < std::min(of.groupOf.size(), state.people.size()); ++i) {
+            if (of.groupOf[i] == group) {
+                text += (some ? "," : "") + state.people[i].name;
+                some = true;
+            }
+        }
+        if (!some) {
+            return {};
+        }
+        words.insert(words.end(), {"--group", text});
+    }
+    if (!of.caseId.empty()) {
+        words.insert(words.end(), {"--case", of.caseId});
+    }
     return words;
 }
 
@@ -176,6 +285,10 @@ std::vector<std::string> debriefArguments(const State& state)
 std::vector<std::string> tryoutArguments(const State& state)
 {
     std::vector<std::string> words{"train", "--tryout", "--device", state.useFalcon ? "falcon" : "mouse"};
+    const auto person = std::ranges::find(state.people, state.person, &PersonEntry::name);
+    if (person != state.people.end() && person->leftHanded) {
+        words.insert(words.end(), {"--hand", "left"});
+    }
     if (state.useFalcon && !state.firmware.empty()) {
         words.insert(words.end(), {"--falcon-firmware", state.firmware});
     }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <trainer/case_entry.h>
+#include <trainer/instructor.h>
+#include <trainer/progress.h>
 #include <trainer/settings.h>
 
 #include <cstddef>
@@ -12,9 +14,9 @@
 
 namespace palpate::trainer {
 
-enum class Screen { cases, devices, briefing, session, result };
+enum class Screen { cases, devices, briefing, session, result, progress, instructor };
 
-/// "Case", "Device", "Briefing", "Session", "Result", in the user's language.
+/// "Case", "Device", "Briefing", "Session", "Result", "Progress", "Instructor", in the user's language.
 const char* nameOf(Screen screen) noexcept;
 
 /// What was found of devices, in words.
@@ -52,15 +54,37 @@ struct SessionFiles {
     std::filesystem::path record, figures;
 };
 
+/// What an instructor looks at.
+enum class InstructorPage { live, sessions, groups };
+
+struct Instructor {
+    InstructorPage page = InstructorPage::live;
+    std::vector<LiveSession> live;
+    std::string watched;       // a session that a viewer is to be opened on
+    Progress everybody;        // sessions of all profiles
+    std::size_t chosen = 0;    // of everybody.sessions
+    std::string note;          // of the chosen one, as it is typed
+    int rating = 0;            // 1 to 5; 0: none
+    std::vector<int> groupOf;  // by profile, as in State::people: 0 in none, 1 or 2
+    std::string caseId;        // only sessions of this case are compared; empty: all
+    bool asPage = false;       // the comparison is wanted as a page, too
+    Comparison comparison;
+};
+
 /// Everything that the window shows. The functions below are all that changes its screen; drawing changes nothing but the
 /// choices.
 struct State {
     Screen screen = Screen::cases;
     std::vector<CaseEntry> cases;
     std::size_t chosen = 0;
-    std::vector<std::string> people;  // profiles
+    std::vector<PersonEntry> people;  // profiles
     std::string person;               // whose session it is; empty: nobody's
     std::string newPerson;            // a name that is being typed
+    Progress progress;                // of that person
+    std::size_t exerciseShown = 0;    // of progress.exercises
+    std::size_t curveShown = 0;       // of its curves
+    std::string exercise;             // that the session is of, "CURRICULUM/EXERCISE"; empty: none
+    Instructor instructor;
     DeviceCheck devices;
     bool useFalcon = false;  // else the mouse
     std::string firmware;    // of the Falcon, a file
@@ -85,6 +109,14 @@ struct State {
 enum class Errand {
     none,
     addPerson,
+    choosePerson,
+    changeHand,
+    writeProgress,
+    loadEverybody,
+    watchSession,
+    seeKept,
+    keepNote,
+    compareGroups,
     checkDevices,
     testForce,
     tryHand,
@@ -106,6 +138,18 @@ Errand again(State& state);
 /// Result screen: replay of the session, from the beginning or from the moment of a loss of points.
 Errand debrief(State& state, std::optional<double> at = std::nullopt);
 
+/// Where somebody stands. Nothing where nobody is chosen.
+Errand showProgress(State& state);
+/// Progress screen: an exercise, with its case, begins. Nothing for one whose gate is shut.
+Errand trainExercise(State& state, std::size_t exercise);
+Errand showInstructor(State& state);
+/// Instructor's screen: a session that was kept, its note and rating.
+void chooseKept(State& state, std::size_t session);
+/// What `palpate progress` has learnt of the person.
+void progressLoaded(State& state, Progress progress);
+/// Null where nobody is chosen.
+PersonEntry* chosenPerson(State& state) noexcept;
+
 void sessionStarted(State& state, SessionFiles files, std::string command);
 /// The best score of the case follows.
 void sessionEnded(State& state, Result result);
@@ -116,6 +160,8 @@ const char* mainButton(const State& state) noexcept;
 
 /// `palpate train ...` for the chosen case.
 std::vector<std::string> trainArguments(const State& state, const SessionFiles& files);
+/// `palpate progress --group ...` for the groups that the instructor has made; empty where one of them has nobody.
+std::vector<std::string> comparisonArguments(const State& state);
 /// `palpate-view --replay ...` for the last session.
 std::vector<std::string> debriefArguments(const State& state);
 /// `palpate train --tryout`.

@@ -25,6 +25,10 @@ bool enterPressed();
 /// Puts the next widget beside the one before, or below it where a row has no room for `label`.
 void besideIfRoom(const std::string& label);
 
+/// Where somebody stands: exercises, learning curves, CUSUM.
+Errand drawProgress(State& state, bool entered);
+/// Sessions that run, those that were kept, groups.
+Errand drawInstructor(State& state);
 /// Result and debrief.
 Errand drawResult(State& state);
 /// Language, palette, sounds, size of texts, behind a button.

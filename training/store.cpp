@@ -265,6 +265,16 @@ Person ProfileStore::find(const std::string& name) const
                     meant.empty() ? "; palpate profile new makes one" : "; did you mean " + meant + "?"));
 }
 
+void ProfileStore::setHand(const Person& person, Hand hand)
+{
+    guarded(impl_->file, [&] {
+        Statement update(*impl_->database, "UPDATE person SET hand = ? WHERE id = ?");
+        update.bind(1, std::string_view(hand == Hand::left ? "left" : "right"));
+        update.bind(2, person.id);
+        update.run();
+    });
+}
+
 std::int64_t ProfileStore::store(const Person& person, const StoredSession& s)
 {
     return guarded(impl_->file, [&] {

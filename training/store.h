@@ -50,6 +50,7 @@ Values valuesOf(const haptics::Score& score);
 inline constexpr const char* caseKey = "case";
 inline constexpr const char* exerciseKey = "exercise";  // "CURRICULUM/EXERCISE"
 inline constexpr const char* modeKey = "mode";          // "practice" or "test"
+inline constexpr const char* handKey = "hand";          // "left" or "right"
 inline constexpr const char* guidanceKey = "guidance";  // 0 to 1
 
 /// People and their sessions in one SQLite file of mode 0600. Every change is one transaction, which is on the disk when
@@ -74,6 +75,8 @@ public:
     std::vector<Person> people() const;
     /// Refuses a name that is not there, with the nearest that is.
     Person find(const std::string& name) const;
+
+    void setHand(const Person& person, Hand hand);
 
     /// @returns  the session's id
     std::int64_t store(const Person& person, const StoredSession& session);

@@ -2,13 +2,16 @@
 
 #include <base/build.h>
 #include <base/outputs.h>
+#include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <session/open.h>
 #include <studies/accuracy/deep.h>
 #include <studies/accuracy/figures.h>
+#include <studies/accuracy/installed_rivals.h>
 #include <studies/accuracy/log.h>
 #include <studies/accuracy/references.h>
+#include <studies/accuracy/rival.h>
 #include <studies/accuracy/verify.h>
 #include <studies/kernel/trial_errors.h>
 
@@ -36,6 +39,9 @@ struct Options {
     std::vector<std::string> laws{"linear", "neo-hookean"};
     std::string folder, references, json;
     double mostSeconds = 60;  // per case
+    std::vector<std::string> rivals;
+    std::vector<double> rivalSpacings{4};  // [mm]
+    double rivalSeconds = 600;             // per scene and mesh
     bool quick = false, verify = false, depth = false;
     std::vector<std::string> settings = DeepCommand{}.settings;  // of --depth
     double speed = DeepCommand{}.speed;                          // the same [mm/s]
@@ -46,6 +52,19 @@ struct Solved {
     std::string scene;
     AccuracySubject subject;
     std::vector<SolvedReference> references;
+};
+
+// A method at one of its settings, or a rival on one of its meshes.
+struct Case {
+    Baseline method;
+    const Rival* rival = nullptr;
+    double spacing = 0;  // of the rival's mesh [m]
+
+    // In the log: a rival's answer is one to its command and the files in it, too.
+    std::string key(const ReferenceInfo& info) const
+    {
+        return rival == nullptr ? info.key : fmt::format("{}|{}", info.key, fingerprint(*rival));
+    }
 };
 
 // A file's name without folder and ending: it is part of the pictures' names.
@@ -80,12 +99,15 @@ Solved solved(const std::string& what, const Options& o, command::Progress& prog
     return out;
 }
 
-// What is run of all methods, in their order. Throws for a name that there is none of.
+// What is run of all methods, in their order. Throws for a name that neither they nor an installed rival has.
 std::vector<Baseline> chosen(std::vector<Baseline> all, const Options& o)
 {
     std::set<std::string> names, taken;
     for (const Baseline& b : all) {
         names.insert(b.method);
+    }
+    for (const Rival& rival : installedRivals()) {
+        names.insert(rival.name);
     }
     for (const std::string& name : o.methods) {
         if (!names.contains(name)) {
@@ -103,18 +125,94 @@ std::vector<Baseline> chosen(std::vector<Baseline> all, const Options& o)
     return all;
 }
 
+std::vector<Rival> rivalsOf(const Options& o)
+{
+    std::vector<double> spacings;
+    for (const double mm : o.rivalSpacings) {
+        spacings.push_back(1e-3 * mm);
+    }
+    std::vector<Rival> rivals;
+    for (const std::string& text : o.rivals) {
+        Rival rival = rivalOf(text, spacings);
+        if (std::ranges::find(rivals, rival.name, &Rival::name) != rivals.end()) {
+            throw std::runtime_error(
+                fmt::format("--rival {}: there is another one called {}: write NAME=COMMAND", text, rival.name));
+        }
+        rivals.push_back(std::move(rival));
+    }
+    return rivals;
+}
+
+bool asked(const Rival& rival, const Options& o)
+{
+    return std::ranges::any_of(o.rivals, [&](const std::string& text) { return rivalOf(text, {}).name == rival.name; });
+}
+
+// Those that were asked for, and those that are installed: without --quick all, but for the names of the former.
+std::vector<Rival> allRivals(const Options& o)
+{
+    std::vector<Rival> rivals = rivalsOf(o);
+    for (Rival& rival : installedRivals()) {
+        const bool wanted = std::ranges::find(o.methods, rival.name) != o.methods.end();
+        if (!asked(rival, o) && (wanted || (o.methods.empty() && !o.quick))) {
+            rivals.push_back(std::move(rival));
+        }
+    }
+    return rivals;
+}
+
+std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, const Options& o)
+{
+    std::vector<Baseline> methods = accuracyMethods(s.subject);
+    for (const Rival& rival : rivals) {
+        if (std::ranges::find(methods, rival.name, &Baseline::method) != methods.end()) {
+            throw std::runtime_error(
+                fmt::format("--rival: {} is a method of this command: write another NAME=COMMAND", rival.name));
+        }
+    }
+    std::vector<Case> cases;
+    for (Baseline& method : chosen(std::move(methods), o)) {
+        cases.push_back({std::move(method), nullptr, 0});
+    }
+    for (const Rival& rival : rivals) {
+        const bool first = o.quick && !asked(rival, o);
+        for (const double spacing : std::span(rival.spacings).first(first ? 1 : rival.spacings.size())) {
+            cases.push_back({{rival.name, settingOf(rival, spacing), nullptr}, &rival, spacing});
+        }
+    }
+    return cases;
+}
+
 std::string caseName(const std::string& scene, const Baseline& method)
 {
     return fmt::format("{}: {}{}{}", scene, method.method, method.setting.empty() ? "" : ", ", method.setting);
 }
 
-// Runs a method against those references that the log does not have, and logs it. Returns how many.
-std::size_t runMissing(const Solved& s, const Baseline& method, const Options& o, AccuracyLog& log)
+AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* const> references, const Options& o)
+{
+    if (what.rival == nullptr) {
+        return runAccuracy(what.method, s.subject, references, o.mostSeconds);
+    }
+    const auto answered = [&](const std::filesystem::path& folder) {
+        return runRival(*what.rival, what.spacing, s.scene, s.subject, references, folder, o.rivalSeconds);
+    };
+    if (o.folder.empty()) {
+        const base::TemporaryFolder folder("the files of a rival");
+        return answered(folder.path());
+    }
+    return answered(std::filesystem::path(o.folder) / "rivals" / what.rival->name /
+                    fmt::format("{}-{:g}mm", s.scene, 1e3 * what.spacing));
+}
+
+// Runs a case against those references that the log does not have, and logs it. Returns how many. A rival that has failed
+// may have been mended.
+std::size_t runMissing(const Solved& s, const Case& what, const Options& o, AccuracyLog& log)
 {
     std::vector<const SolvedReference*> missing;
     std::vector<const Reference*> references;
     for (const SolvedReference& r : s.references) {
-        if (log.find(r.second.key, method.method, method.setting) == nullptr) {
+        const json* const done = log.find(what.key(r.second), what.method.method, what.method.setting);
+        if (done == nullptr || (what.rival != nullptr && done->contains("failure"))) {
             missing.push_back(&r);
             references.push_back(&r.first);
         }
@@ -122,15 +220,20 @@ std::size_t runMissing(const Solved& s, const Baseline& method, const Options& o
     if (missing.empty()) {
         return 0;
     }
-    const AccuracyRun run = runAccuracy(method, s.subject, references, o.mostSeconds);
+    const AccuracyRun result = run(s, what, references, o);
     for (std::size_t i = 0; i < missing.size(); ++i) {
         const ReferenceInfo& info = missing[i]->second;
-        log.add(info.key, accuracyEntry(s.scene, info.law, method, run, run.results.empty() ? nullptr : &run.results[i]));
+        json entry =
+            accuracyEntry(s.scene, info.law, what.method, result, result.results.empty() ? nullptr : &result.results[i]);
+        if (what.rival != nullptr) {
+            entry["rival"] = what.rival->command;
+        }
+        log.add(what.key(info), entry);
     }
     return missing.size();
 }
 
-void addScene(const Solved& s, const std::vector<Baseline>& methods, const AccuracyLog& log, json& figures)
+void addScene(const Solved& s, const std::vector<Case>& cases, const AccuracyLog& log, json& figures)
 {
     const SolvedReference* laws[2]{};
     for (const SolvedReference& r : s.references) {
@@ -138,8 +241,8 @@ void addScene(const Solved& s, const std::vector<Baseline>& methods, const Accur
         json entry = referenceEntry(r.second);
         entry["scene"] = s.scene;
         figures["references"].push_back(entry);
-        for (const Baseline& method : methods) {
-            if (const json* done = log.find(r.second.key, method.method, method.setting)) {
+        for (const Case& c : cases) {
+            if (const json* done = log.find(c.key(r.second), c.method.method, c.method.setting)) {
                 figures["chart"].push_back(*done);
                 figures["chart"].back()["scene"] = s.scene;
             }
@@ -151,9 +254,8 @@ void addScene(const Solved& s, const std::vector<Baseline>& methods, const Accur
     }
 }
 
-json runAll(const Options& o, const std::vector<std::string>& subjects)
+std::vector<Solved> solveAll(const Options& o, const std::vector<std::string>& subjects, command::Progress& progress)
 {
-    command::Progress progress;
     std::vector<Solved> all;
     for (const std::string& what : subjects) {
         if (std::ranges::find(all, shortName(what), &Solved::scene) != all.end()) {
@@ -166,6 +268,14 @@ json runAll(const Options& o, const std::vector<std::string>& subjects)
     if (all.empty()) {
         throw std::runtime_error("no scene has a reference: see the lines above");
     }
+    return all;
+}
+
+json runAll(const Options& o, const std::vector<std::string>& subjects)
+{
+    const std::vector<Rival> rivals = allRivals(o);
+    command::Progress progress;
+    const std::vector<Solved> all = solveAll(o, subjects, progress);
     std::filesystem::path file;
     if (!o.folder.empty()) {
         std::filesystem::create_directories(o.folder);
@@ -179,19 +289,38 @@ json runAll(const Options& o, const std::vector<std::string>& subjects)
                  {"verification", json::array()}};
     std::size_t ran = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
-        const auto methods = chosen(accuracyMethods(all[i].subject), o);
-        for (std::size_t m = 0; m < methods.size(); ++m) {
-            progress.show(fmt::format("scene {} of {}, method {} of {}: {}", i + 1, all.size(), m + 1, methods.size(),
-                                      caseName(all[i].scene, methods[m])));
-            ran += runMissing(all[i], methods[m], o, log);
+        const std::vector<Case> cases = casesOf(all[i], rivals, o);
+        for (std::size_t m = 0; m < cases.size(); ++m) {
+            progress.show(fmt::format("scene {} of {}, method {} of {}: {}", i + 1, all.size(), m + 1, cases.size(),
+                                      caseName(all[i].scene, cases[m].method)));
+            ran += runMissing(all[i], cases[m], o, log);
         }
-        addScene(all[i], methods, log, figures);
+        addScene(all[i], cases, log, figures);
     }
     progress.clear();
     figures["cases_run"] = ran;
     figures["cases_resumed"] = figures["chart"].size() - ran;
     markFronts(figures);
     return figures;
+}
+
+// A rival that failed is in the table with its reason and spoils nothing else; but --rival asked for it.
+void checkRivals(const json& figures, const Options& o)
+{
+    std::set<std::string> names, failures;  // laws of one run share their failures
+    for (const Rival& rival : rivalsOf(o)) {
+        names.insert(rival.name);
+    }
+    for (const json& e : figures["chart"]) {
+        if (e.contains("failure") && names.contains(e["method"].get<std::string>())) {
+            failures.insert(fmt::format("rival {}, {}, {}: {}", e["method"].get<std::string>(),
+                                        e["scene"].get<std::string>(), e["setting"].get<std::string>(),
+                                        e["failure"].get<std::string>()));
+        }
+    }
+    if (!failures.empty()) {
+        throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
+    }
 }
 
 void checkLaws(const Options& o)
@@ -242,6 +371,7 @@ void accuracyCommand(Options o)
     if (!o.json.empty()) {
         command::writeJson(o.json, figures);
     }
+    checkRivals(figures, o);
 }
 
 }  // namespace
@@ -255,7 +385,8 @@ void addAccuracy(CLI::App& app)
                          "Folder for charts (PNG, HTML), CSV and JSON; a run that was stopped goes on there");
     accuracy->add_option("--scenes", o->scenes, "Scenes: built-in names or files (default: all built-in)")->delimiter(',');
     accuracy->add_option("--volume", o->volumes, "Volumes (.vdb)")->delimiter(',');
-    accuracy->add_option("--methods", o->methods, "Methods by name, e.g. elastic,xpbd (default: all)")->delimiter(',');
+    accuracy->add_option("--methods", o->methods, "Methods by name, e.g. elastic,xpbd,bullet (default: all)")
+        ->delimiter(',');
     accuracy->add_option("--references", o->references,
                          "Folder of solved references, and for new ones (default: ~/.cache/palpate/references)");
     accuracy->add_option("--law", o->laws, "Laws of the references")->delimiter(',')->capture_default_str();
@@ -263,11 +394,25 @@ void addAccuracy(CLI::App& app)
         ->add_option("--limit", o->mostSeconds, "Most seconds for a method's ticks in one scene; beyond, it is left out")
         ->check(CLI::Range(1.0, 1e6))
         ->capture_default_str();
+    auto* rival = accuracy->add_option(
+        "--rival", o->rivals,
+        "COMMAND or NAME=COMMAND, which solves the same push by files; again for another (docs/accuracy.md)");
+    rival->allow_extra_args(false);
+    accuracy->add_option("--rival-mesh-mm", o->rivalSpacings, "Spacings of the meshes that --rival gets")
+        ->delimiter(',')
+        ->check(CLI::Range(1.0, 50.0))
+        ->capture_default_str()
+        ->needs(rival);
+    accuracy->add_option("--rival-limit", o->rivalSeconds, "Most seconds for a rival in one scene on one mesh")
+        ->check(CLI::Range(1.0, 1e6))
+        ->capture_default_str();
     accuracy->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     accuracy->add_flag("--quick", o->quick, "Few methods, scenes block and plate: a minute");
-    accuracy->add_flag("--verify", o->verify, "No charts: our kernel and the reference against closed forms");
+    accuracy->add_flag("--verify", o->verify, "No charts: our kernel and the reference against closed forms")
+        ->excludes(rival);
     auto* depth = accuracy->add_flag(
         "--depth", o->depth, "The force alone: first touch, two radii deep and back, against stored finite elements");
+    depth->excludes(rival);
     accuracy->add_option("--settings", o->settings, "With --depth: settings of level elastic")
         ->delimiter(',')
         ->capture_default_str()

@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace palpate::studies {
 
@@ -115,6 +116,21 @@ void printBeaten(const std::vector<json*>& group)
     }
 }
 
+// Who asks for a rival looks for it, on the front or not.
+void printRivals(const std::vector<json*>& group)
+{
+    bool first = true;
+    for (const json* e : group) {
+        if (!e->contains("rival") || e->contains("failure")) {
+            continue;
+        }
+        if (std::exchange(first, false)) {
+            fmt::print("  rivals that others wrote:\n");
+        }
+        printRow(*e);
+    }
+}
+
 std::string csvCell(const json& entry, const std::string& key)
 {
     const std::size_t part = key.starts_with("press_") ? 6 : key.starts_with("drag_") ? 5 : 0;
@@ -206,6 +222,7 @@ void printAccuracy(const json& figures)
                 fmt::print("  the linear law itself is {} % off\n", cell(f, "near_pct", 2));
             }
         }
+        printRivals(group);
         printBeaten(group);
         for (const json* e : group) {
             if (e->contains("failure")) {

@@ -30,12 +30,13 @@ AccuracyLog::AccuracyLog(std::filesystem::path file, std::string build) : file_(
 
 const json* AccuracyLog::find(const std::string& reference, const std::string& method, const std::string& setting) const
 {
-    const auto found = std::ranges::find_if(lines_, [&](const json& line) {
+    // From the end: what was run again counts as it was the last time.
+    const auto found = std::find_if(lines_.rbegin(), lines_.rend(), [&](const json& line) {
         const json& entry = line["entry"];
         return line["reference"] == reference && entry.value("method", json()) == method &&
                entry.value("setting", json()) == setting;
     });
-    return found != lines_.end() ? &(*found)["entry"] : nullptr;
+    return found != lines_.rend() ? &(*found)["entry"] : nullptr;
 }
 
 void AccuracyLog::add(const std::string& reference, const json& entry)

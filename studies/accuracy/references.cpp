@@ -131,21 +131,28 @@ SolvedReference solvedReference(const std::string& what, const AccuracySubject& 
     return made;
 }
 
-fs::path referenceProgram()
+fs::path ourProgram(const std::string& name)
 {
-    const fs::path beside = base::programFolder() / "palpate-reference";
-    if (access(beside.c_str(), X_OK) == 0) {
-        return beside;
+    const fs::path own = base::programFolder();
+    for (const fs::path& folder : {own, own.parent_path() / "libexec" / "palpate"}) {
+        if (access((folder / name).c_str(), X_OK) == 0) {
+            return folder / name;
+        }
     }
     const char* const path = std::getenv("PATH");
     std::istringstream folders(path != nullptr ? path : "");
     for (std::string folder; std::getline(folders, folder, ':');) {
-        const fs::path file = fs::path(folder) / "palpate-reference";
+        const fs::path file = fs::path(folder) / name;
         if (!folder.empty() && access(file.c_str(), X_OK) == 0) {
             return file;
         }
     }
     return {};
+}
+
+fs::path referenceProgram()
+{
+    return ourProgram("palpate-reference");
 }
 
 int runReferenceProgram(const std::vector<std::string>& arguments)

@@ -28,7 +28,10 @@ using SolvedReference = std::pair<Reference, ReferenceInfo>;
 SolvedReference solvedReference(const std::string& what, const AccuracySubject& subject, const std::string& law,
                                 const ReferenceFolders& folders, const std::function<void(const std::string&)>& tell);
 
-/// palpate-reference beside this program or in PATH; "" when it was not built.
+/// Another program of ours: beside this one, in libexec/palpate of the installation, or in PATH; "" where it is in none.
+/// @param name  of the file
+std::filesystem::path ourProgram(const std::string& name);
+/// palpate-reference, likewise; "" when it was not built.
 std::filesystem::path referenceProgram();
 /// Runs it with its output on standard error, and waits. Returns its exit status; -1 when it was killed.
 int runReferenceProgram(const std::vector<std::string>& arguments);

@@ -120,6 +120,81 @@ TEST(AccuracyCommand, ChartsErrorAgainstTimeAndGoesOnWhereItStopped)
     EXPECT_EQ(figures(place.command(out))["cases_run"], 0);
 }
 
+// Linear tetrahedra in Python: of the program as it is documented.
+TEST(AccuracyCommand, ARivalStandsInTheSameTableAndChart)
+{
+    const Place place;
+    const std::string out = place.folder / "out";
+    const std::vector<std::string> command{"accuracy",
+                                           "--scenes",
+                                           place.scene,
+                                           "--references",
+                                           place.references,
+                                           "--methods",
+                                           "nothing",
+                                           "-o",
+                                           out,
+                                           "--rival-mesh-mm",
+                                           "6",
+                                           "--rival",
+                                           "/usr/bin/python3 " PALPATE_SOURCE_DIR "/examples/rivals/linear_tets.py"};
+    const json first = figures(command);
+    ASSERT_EQ(first["chart"].size(), 4U);
+    const json &linear = entryOf(first, "linear", "linear_tets"), &finite = entryOf(first, "neo-hookean", "linear_tets");
+    EXPECT_EQ(linear["setting"], "6 mm");
+    EXPECT_LT(linear["near_pct"], 0.6 * entryOf(first, "linear", "nothing")["near_pct"].get<double>());
+    EXPECT_LT(linear["force_pct"], 40.0);
+    EXPECT_NE(linear["near_pct"], finite["near_pct"]);
+    EXPECT_GT(linear["us_per_update"], 0.0);
+    EXPECT_TRUE(linear["on_front"].get<bool>());
+    EXPECT_NE(linear["rival"].get<std::string>().find("linear_tets.py"), std::string::npos);
+    const std::filesystem::path folder(out);
+    EXPECT_NE(readText(folder / "accuracy.csv").find("\"linear_tets\",\"6 mm\""), std::string::npos);
+    EXPECT_NE(readText(folder / "accuracy.html").find("linear_tets"), std::string::npos);
+    EXPECT_TRUE(std::filesystem::exists(folder / "rivals" / "linear_tets" / "small-6mm" / "push.json"));
+    EXPECT_EQ(figures(command)["cases_run"], 0);
+}
+
+// Somebody else's engine with somebody else's law: as near as linear tetrahedra of this size come (20 to 30 % of the
+// force).
+TEST(AccuracyCommand, BulletStandsBesideThem)
+{
+    const Place place;
+    const json all = figures({"accuracy", "--scenes", place.scene, "--references", place.references, "--methods",
+                              "nothing,bullet", "--quick", "--law", "neo-hookean"});
+    const json& bullet = entryOf(all, "neo-hookean", "bullet");
+    ASSERT_TRUE(bullet.contains("near_pct")) << bullet;
+    EXPECT_EQ(bullet["setting"], "6 mm, explicit, Poisson 0.45");
+    EXPECT_LT(bullet["near_pct"], 0.6 * entryOf(all, "neo-hookean", "nothing")["near_pct"].get<double>());
+    EXPECT_LT(bullet["force_pct"], 50.0);
+    EXPECT_GT(bullet["us_per_update"], 0.0);
+}
+
+TEST(AccuracyCommand, ARivalThatFailsIsLeftOutAndSpoilsNothing)
+{
+    const Place place;
+    const std::filesystem::path out = place.folder / "out";
+    auto command = place.command(out.string());
+    command.insert(command.end(),
+                   {"--law", "linear", "--rival", "broken=sh -c 'echo no licence; exit 7'", "--rival", "silent=true"});
+    const Outcome outcome = palpate(command);
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_EQ(std::ranges::count(outcome.err, '\n'), 1) << outcome.err;
+    EXPECT_NE(outcome.err.find("rival broken, small, 4 mm: exit status 7"), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("ends with: no licence"), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("rival silent, small, 4 mm: "), std::string::npos) << outcome.err;
+    const json figures = json::parse(readText(out / "accuracy.json"));
+    EXPECT_EQ(figures["chart"].size(), 5U);
+    EXPECT_GT(entryOf(figures, "linear", "elastic")["near_pct"], 0.0);
+    EXPECT_TRUE(entryOf(figures, "linear", "broken").contains("failure"));
+    EXPECT_EQ(readText(out / "accuracy.html").find("broken"), std::string::npos);
+    // What has been mended is run again, and nothing else.
+    EXPECT_EQ(palpate(command).status, 1);
+    const json again = json::parse(readText(out / "accuracy.json"));
+    EXPECT_EQ(again["cases_run"], 2);
+    EXPECT_EQ(entryOf(again, "linear", "elastic"), entryOf(figures, "linear", "elastic"));
+}
+
 // A copy of the program has no palpate-reference beside it.
 TEST(AccuracyCommand, WithoutAReferenceItSaysWhatToDo)
 {
@@ -138,8 +213,12 @@ TEST(AccuracyCommand, RefusesWhatThereIsNot)
 {
     const Place place;
     expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--methods", "magic"},
-                  "there are chainmail");
+                  "chainmail, chainmail_fifo");
     expectRefusal({"accuracy", "--law", "hooke"}, "there are linear, neo-hookean");
+    expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--rival", "xpbd=true"},
+                  "xpbd is a method of this command");
+    expectRefusal({"accuracy", "--rival", "a=true", "--rival", "a=false"}, "there is another one called a");
+    expectRefusal({"accuracy", "--rival", "a="}, "there is no command in it");
     expectRefusal({"accuracy", "--scenes", "nowhere"}, "no such scene");
     expectRefusal({"accuracy", "--scenes", place.scene + "," + place.scene, "--references", place.references},
                   "another scene called small");

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <signal.h>
+#include <unistd.h>
+
 #include <cstdlib>
 
 namespace palpate::apps {
@@ -69,6 +72,62 @@ TEST_F(TrainingCommands, ARecordFromAnotherMachineCountsAsWhatItWas)
     ASSERT_EQ(palpate({"profile", "erase", "anna", "--yes"}).status, 0);
     EXPECT_TRUE(fs::exists(folder_ / "r.db")) << "a record that somebody put elsewhere stays";
     expectRefusal({"progress", "anna"}, "there is no such profile");
+}
+
+// An instructor sees who trains, and how it goes, while it goes; nothing of a session that was killed.
+TEST_F(TrainingCommands, SessionsThatRunAreListedWithWhoTrains)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    Program running("palpate", {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast"});
+    const std::string name = "train-" + std::to_string(running.pid());
+    const auto listed = [&]() -> nlohmann::json {
+        const auto all = figures({"sessions"});
+        for (const auto& one : all["sessions"]) {
+            if (one["session"] == name) {
+                return one;
+            }
+        }
+        return nullptr;
+    };
+    nlohmann::json one;
+    for (int i = 0; i < 300 && (one.is_null() || one["state"] == "outside"); ++i) {
+        one = listed();
+        ::usleep(100000);
+    }
+    ASSERT_FALSE(one.is_null());
+    EXPECT_EQ(one["who"], "anna");
+    EXPECT_EQ(one["scene"], "layered");
+    EXPECT_EQ(one["process"], running.pid());
+    EXPECT_NE(one["state"], "outside");
+    EXPECT_GT(one["seconds"], 0);
+    EXPECT_EQ(one["target"], "tumour");
+    ::kill(running.pid(), SIGKILL);
+    running.wait();
+    EXPECT_TRUE(listed().is_null());
+}
+
+TEST_F(TrainingCommands, ProgressShowsWhatWasNotBegunToo)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    EXPECT_TRUE(figures({"progress", "anna"})["exercises"].empty());
+    const auto progress = figures({"progress", "anna", "--curriculum", "breast-core-biopsy"});
+    ASSERT_EQ(progress["exercises"].size(), 8U);
+    EXPECT_EQ(progress["exercises"][0]["state"], "next");
+    EXPECT_EQ(progress["exercises"][7]["state"], "locked");
+    EXPECT_TRUE(progress["exercises"][7]["test"]);
+    expectRefusal({"progress", "anna", "--curriculum", "palpaton"}, "did you mean palpation?");
+    ASSERT_EQ(palpate({"profile", "hand", "anna", "left"}).status, 0);
+    EXPECT_EQ(figures({"profile", "list"})["profiles"][0]["hand"], "left");
+    expectRefusal({"profile", "hand", "bert", "left"}, "there is no such profile");
+}
+
+// The full check is the command without these options.
+TEST_F(TrainingCommands, ACurriculumIsVerifiedBySimulatedPeople)
+{
+    const auto check = figures({"curriculum", "verify", "breast-core-biopsy", "--people", "60", "--kills", "2"});
+    EXPECT_EQ(check["finished"], 180);
+    EXPECT_TRUE(check["gate_faults"].empty() && check["kill_faults"].empty());
+    EXPECT_EQ(check["signals"].size(), 6U);
 }
 
 TEST_F(TrainingCommands, ACaseIsMadeOfAVolumeAndTrained)

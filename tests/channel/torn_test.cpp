@@ -129,12 +129,17 @@ TEST(Bounds, AStateThatIsNoneIsNotShown)
 TEST(Bounds, AnUltrasoundThatIsNoneIsNoScenery)
 {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-    const std::vector<void (*)(Scenery&)> faults{
-        [](Scenery& s) { s.fine.spacing = 0; },          [](Scenery& s) { s.fine.size[1] = -4; },
-        [](Scenery& s) { s.fine.size[2] = 1 << 20; },    [](Scenery& s) { s.sound[63].soundSpeed = nan; },
-        [](Scenery& s) { s.sound[1].attenuation = -1; }, [](Scenery& s) { s.sound[1].echo = 1e30F; },
-        [](Scenery& s) { s.sound[0].pattern = 4; },      [](Scenery& s) { s.probe = static_cast<ProbeKind>(3); },
-        [](Scenery& s) { s.probeFrequency = -5e6; },     [](Scenery& s) { s.holeRadius = std::nan(""); }};
+    const std::vector<void (*)(Scenery&)> faults{[](Scenery& s) { s.fine.spacing = 0; },
+                                                 [](Scenery& s) { s.fine.size[1] = -4; },
+                                                 [](Scenery& s) { s.fine.size[2] = 1 << 20; },
+                                                 [](Scenery& s) { s.sound[63].soundSpeed = nan; },
+                                                 [](Scenery& s) { s.sound[1].attenuation = -1; },
+                                                 [](Scenery& s) { s.sound[1].echo = 1e30F; },
+                                                 [](Scenery& s) { s.sound[0].pattern = 4; },
+                                                 [](Scenery& s) { s.probe = static_cast<ProbeKind>(3); },
+                                                 [](Scenery& s) { s.probeFrequency = -5e6; },
+                                                 [](Scenery& s) { s.holeRadius = std::nan(""); },
+                                                 [](Scenery& s) { s.who.fill('a'); }};
     const std::vector<std::uint8_t> fine(finelyLabelled().size());
     for (const auto& fault : faults) {
         Scenery scenery = fineScenery();

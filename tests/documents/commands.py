@@ -9,10 +9,10 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "packaging"))
 import shell_files  # noqa: E402
 
-PROGRAMS = ("palpate", "palpate-view", "palpate-trainer", "palpate-reference")
+PROGRAMS = ("palpate", "palpate-view", "palpate-trainer", "palpate-reference", "palpate-mesh")
 SHELL = {"sh", "bash", "shell", "console"}  # without a word: diagrams and lists
 # `inline` that begins with a program is a command too; `palpate sweep` alone names it.
-INLINE = re.compile(r"`((?:palpate|palpate-view|palpate-trainer|palpate-reference|scripts/[a-z-]+) [^`]+)`")
+INLINE = re.compile(r"`((?:palpate|palpate-view|palpate-trainer|palpate-reference|palpate-mesh|scripts/[a-z-]+) [^`]+)`")
 
 
 def documents():

@@ -246,6 +246,20 @@ TEST(Broadcast, ViewerSeesTheStateAndTheDisplacedNodes)
     EXPECT_EQ(viewer->state()->status, channel::Status::finished);
 }
 
+// 31 bytes are there for it; a letter of two bytes is there whole or not at all.
+TEST(Broadcast, SaysWhoTrains)
+{
+    const std::string session = "test-who-" + std::to_string(getpid()), start(29, 'a');
+    for (const auto& [who, seen] : {std::pair{std::string("Ada"), std::string("Ada")},
+                                    {start + "a\u00fc", start + "a"},
+                                    {start + "\u00fca", start + "\u00fc"}}) {
+        const Broadcast broadcast(session, tests::blockSphere(), channel::handElsewhere, who);
+        const auto viewer = channel::Subscriber::attach(session);
+        ASSERT_TRUE(viewer);
+        EXPECT_EQ(std::string(viewer->scenery().who.data()), seen);
+    }
+}
+
 TEST(Histogram, QuantilesAreWithinOnePercentOfTheExactOnes)
 {
     Histogram h;

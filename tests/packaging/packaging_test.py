@@ -15,7 +15,7 @@ INSTALLED = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 and pathlib.Path(
 # In a package, but not installed by CMake.
 NOT_BY_CMAKE = {"usr/share/doc/palpate/site": "debian/rules calls scripts/site"}
 # Beside pages that belong to other packages.
-EXCLUDED = {"palpate": ("palpate-view.1", "palpate-reference.1")}
+EXCLUDED = {"palpate": ("palpate-view.1", "palpate-reference.1", "palpate-mesh.1")}
 
 
 def text(name):

@@ -11,7 +11,7 @@ import unittest
 
 BIN = pathlib.Path(os.environ["PALPATE_BIN"])
 SHELL = pathlib.Path(os.environ["PALPATE_SHELL"])
-PROGRAMS = [name for name in ("palpate", "palpate-view", "palpate-trainer", "palpate-reference") if (BIN / name).exists()]
+PROGRAMS = [name for name in ("palpate", "palpate-view", "palpate-trainer", "palpate-reference", "palpate-mesh") if (BIN / name).exists()]
 ENVIRONMENT = {"PATH": "/usr/bin:/bin", "HOME": "/nonexistent", "LC_ALL": "C.UTF-8"}
 
 

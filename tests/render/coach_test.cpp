@@ -62,7 +62,7 @@ TEST(Coach, LeadsThroughABiopsyStepByStep)
     EXPECT_NE(coach(scenery, s, view).now.find("tumour's rim (10 mm to go)"), std::string::npos);
     EXPECT_EQ(coach(scenery, s, view).wrong, "");
     s.distance[0] = s.ahead[0] = 1e-3;
-    EXPECT_EQ(coach(scenery, s, view).now, "Fire the gun (Space, or the right button)");
+    EXPECT_EQ(coach(scenery, s, view).now, "Fire the gun (Space, or the other mouse button)");
     s.cores = 1;
     s.coreTarget = 0.6;
     EXPECT_NE(coach(scenery, s, view).now.find("60 % tumour: draw the needle out"), std::string::npos);

@@ -21,12 +21,13 @@ TEST(Settings, AreThereAgain)
 {
     const tests::Folder folder;
     const auto file = folder.path() / "a" / "trainer.json";
-    EXPECT_EQ(writeSettings(file, {"de", "colour-blind", true, 1.5}), "");
+    EXPECT_EQ(writeSettings(file, {"de", "colour-blind", true, 1.5, "Ada"}), "");
     const Settings s = readSettings(file);
     EXPECT_EQ(s.language, "de");
     EXPECT_EQ(s.palette, "colour-blind");
     EXPECT_TRUE(s.sounds);
     EXPECT_EQ(s.textScale, 1.5);
+    EXPECT_EQ(s.person, "Ada");
     EXPECT_NE(writeSettings("/proc/none/trainer.json", s), "") << "cannot be written, and says so";
 }
 

@@ -73,9 +73,14 @@ TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
 {
     std::mt19937 random(7);
     State state = firstState();
+    state.people = {{"Ada", false}};
+    state.person = "Ada";
+    state.progress.exercises.resize(2);
+    state.progress.exercises[0].standing = ExerciseEntry::Standing::next;
+    state.progress.exercises[0].caseId = "second";
     for (int i = 0; i < 20000; ++i) {
         Errand errand = Errand::none;
-        switch (random() % 5) {
+        switch (random() % 8) {
             case 0:
             case 1:
                 errand = goOn(state);
@@ -85,6 +90,15 @@ TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
                 break;
             case 3:
                 errand = again(state);
+                break;
+            case 4:
+                errand = showProgress(state);
+                break;
+            case 5:
+                errand = showInstructor(state);
+                break;
+            case 6:
+                errand = trainExercise(state, random() % 3);
                 break;
             default:
                 errand = debrief(state);
@@ -99,6 +113,60 @@ TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
         ASSERT_EQ(state.running, state.screen == Screen::session);
         ASSERT_LT(state.chosen, state.cases.size());
     }
+}
+
+// The way that a curriculum leads: progress, the exercise that is next, its session, progress again.
+TEST(State, AnExerciseIsTrainedFromTheProgressScreenAndLeadsBackToIt)
+{
+    State state = firstState();
+    EXPECT_EQ(showProgress(state), Errand::none) << "nobody is chosen";
+    state.people = {{"Ada", true}};
+    state.person = "Ada";
+    EXPECT_EQ(showProgress(state), Errand::choosePerson);
+    EXPECT_EQ(state.screen, Screen::progress);
+    Progress progress;
+    progress.exercises.resize(3);
+    ExerciseEntry& next = progress.exercises[1];
+    next.curriculum = "c";
+    next.id = "e";
+    next.caseId = "third";
+    next.standing = ExerciseEntry::Standing::next;
+    next.next = next.test = true;
+    progress.exercises[2].caseId = "first";
+    progressLoaded(state, progress);
+    EXPECT_EQ(state.exerciseShown, 1U) << "the next one";
+    EXPECT_EQ(trainExercise(state, 2), Errand::none) << "its gate is shut";
+    EXPECT_NE(state.notice, "");
+    EXPECT_EQ(goOn(state), Errand::checkDevices);
+    EXPECT_EQ(state.chosen, 2U);
+    EXPECT_TRUE(state.test);
+    goOn(state);
+    EXPECT_EQ(goOn(state), Errand::startSession);
+    const auto words = trainArguments(state, {"r.db", "r.json"});
+    EXPECT_NE(std::ranges::find(words, "c/e"), words.end());
+    EXPECT_EQ(std::ranges::find(words, "--case"), words.end());
+    const auto tryout = tryoutArguments(state);
+    EXPECT_NE(std::ranges::find(tryout, "left"), tryout.end());
+    sessionStarted(state, {}, "");
+    sessionEnded(state, scored(50));
+    EXPECT_EQ(goOn(state), Errand::choosePerson);
+    EXPECT_EQ(state.screen, Screen::progress);
+    goBack(state);
+    EXPECT_EQ(state.screen, Screen::cases);
+    goOn(state);
+    EXPECT_EQ(state.exercise, "") << "a case of the list is no exercise";
+}
+
+TEST(State, GroupsAreCompared)
+{
+    State state = firstState();
+    state.people = {{"Ada", false}, {"Bert", false}, {"Carla", false}};
+    state.instructor.groupOf = {1, 1, 0};
+    EXPECT_TRUE(comparisonArguments(state).empty()) << "nobody in the second group";
+    state.instructor.groupOf[2] = 2;
+    state.instructor.caseId = "first";
+    EXPECT_EQ(comparisonArguments(state), (std::vector<std::string>{"progress", "--group", "group 1=Ada,Bert", "--group",
+                                                                    "group 2=Carla", "--case", "first"}));
 }
 
 TEST(State, TheCommandIsWhatAShellUnderstands)
@@ -143,8 +211,10 @@ TEST(Cases, AreReadAsTheCommandListsThem)
     for (const char* other : {"null", "[]", "{}", R"({"cases": 3})", R"({"cases": [1, "a", null]})"}) {
         EXPECT_TRUE(casesOf(nlohmann::json::parse(other)).empty()) << other;
     }
-    EXPECT_EQ(peopleOf(nlohmann::json::parse(R"({"profiles": [{"name": "B"}, {}, {"name": "A"}]})")),
-              (std::vector<std::string>{"B", "A"}));
+    const auto people = peopleOf(
+        nlohmann::json::parse(R"({"profiles": [{"name": "B", "hand": "left"}, {}, {"name": "A", "hand": "right"}]})"));
+    ASSERT_EQ(people.size(), 2U);
+    EXPECT_TRUE(people[0].name == "B" && people[0].leftHanded && people[1].name == "A" && !people[1].leftHanded);
     EXPECT_TRUE(casePicture("no such picture").rgb.empty());
 }
 

@@ -1,0 +1,195 @@
+// palpate-mesh: a volume as conforming tetrahedra. A program of its own: what it links is under the GPL and the AGPL, see
+// reference/NOTICE.
+#include <base/build.h>
+#include <base/outputs.h>
+#include <command/interrupted.h>
+#include <command/json.h>
+#include <command/progress.h>
+#include <datasets/scene.h>
+#include <reference/mesh_files.h>
+#include <reference/tetgen/child.h>
+#include <reference/volume_mesh.h>
+#include <session/open.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <exception>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace palpate::apps {
+
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+struct Options {
+    std::string volume, json;
+    fs::path output;
+    double size = 3;     // [mm]
+    double largest = 0;  // [mm]; 0 = two and a half times the size
+    std::string surface = "cgal";
+};
+
+// A volume (.vdb), a scene (.toml), or a built-in scene by its name.
+volume::Tissue openVolume(const std::string& what)
+{
+    const fs::path file(what);
+    if (file.extension() == ".toml") {
+        return datasets::sceneVolume(datasets::loadScene(file));
+    }
+    if (const auto scene = datasets::builtInScene(what); scene && !fs::exists(file)) {
+        return datasets::sceneVolume(*scene);
+    }
+    if (file.extension().empty() && !fs::exists(file)) {
+        throw std::runtime_error(fmt::format("{}: is neither a volume (.vdb) nor a built-in phantom: these are {}", what,
+                                             fmt::join(datasets::builtInScenes(), ", ")));
+    }
+    return session::loadVolume(file);
+}
+
+json figuresOf(const reference::MeshQuality& q, const volume::TissueTable& table)
+{
+    json tissues = json::array();
+    for (const auto& t : q.tissues) {
+        tissues.push_back({{"tissue", table.rows[t.row].name},
+                           {"row", t.row},
+                           {"voxels_ml", 1e6 * t.voxels},
+                           {"mesh_ml", 1e6 * t.mesh},
+                           {"volume_error_pct", t.percent()},
+                           {"thickness_mm", 1e3 * t.thickness},
+                           {"thinner_than_mesh", t.thin},
+                           {"tetrahedra", t.tets},
+                           {"least_dihedral_deg", t.leastDihedral}});
+    }
+    return {{"points", q.points},
+            {"tetrahedra", q.tets},
+            {"faces_outside", q.outside},
+            {"faces_between_tissues", q.between},
+            {"faces_shared_by_more_than_two", q.overShared},
+            {"flipped", q.flipped},
+            {"least_dihedral_deg", q.leastDihedral},
+            {"largest_dihedral_deg", q.largestDihedral},
+            {"median_least_dihedral_deg", q.medianDihedral},
+            {"tetrahedra_under_10_deg", q.under10},
+            {"least_radius_ratio", q.worstRadii},
+            {"shortest_edge_mm", 1e3 * q.shortest},
+            {"longest_edge_mm", 1e3 * q.longest},
+            {"worst", {{"element", q.worst}, {"at_mm", {1e3 * q.worstAt.x, 1e3 * q.worstAt.y, 1e3 * q.worstAt.z}}}},
+            {"tissues", tissues}};
+}
+
+void printQuality(const Options& o, const reference::MeshQuality& q, const volume::TissueTable& table, double seconds)
+{
+    fmt::print("{}: {} points, {} tetrahedra, edges {:.2f} to {:.2f} mm, {:.1f} s of processor time\n\n", o.output.string(),
+               q.points, q.tets, 1e3 * q.shortest, 1e3 * q.longest, seconds);
+    fmt::print("{:<20} {:>11} {:>11} {:>8} {:>10} {:>8} {:>10}\n", "tissue", "voxels, ml", "mesh, ml", "error, %",
+               "tetrahedra", "least, °", "thick, mm");
+    for (const auto& t : q.tissues) {
+        fmt::print("{:<20} {:>11.3f} {:>11.3f} {:>8.2f} {:>10} {:>8.1f} {:>10.2f}{}\n", table.rows[t.row].name,
+                   1e6 * t.voxels, 1e6 * t.mesh, t.percent(), t.tets, t.leastDihedral, 1e3 * t.thickness,
+                   t.thin ? "  thinner than the mesh" : "");
+    }
+    fmt::print("\ndihedral angles: {:.1f} to {:.1f} degrees, median of the least {:.1f}; {} of {} tetrahedra under 10\n",
+               q.leastDihedral, q.largestDihedral, q.medianDihedral, q.under10, q.tets);
+    fmt::print("worst tetrahedron: number {}, at {:.1f} {:.1f} {:.1f} mm\n", q.worst + 1, 1e3 * q.worstAt.x,
+               1e3 * q.worstAt.y, 1e3 * q.worstAt.z);
+    fmt::print("faces: {} outside, {} between tissues, {} of more than two tetrahedra; {} tetrahedra flipped\n", q.outside,
+               q.between, q.overShared, q.flipped);
+}
+
+void run(const Options& o)
+{
+    if (o.volume.empty()) {
+        throw std::runtime_error(fmt::format("no volume: name one (.vdb), or a built-in phantom: {}",
+                                             fmt::join(datasets::builtInScenes(), ", ")));
+    }
+    if (o.output.empty()) {
+        throw std::runtime_error("nothing to write: name a file with -o, which ends in " + reference::meshFileEndings());
+    }
+    reference::checkMeshFile(o.output);
+    base::checkOutput(o.output);
+    base::checkOutput(o.json);
+    const volume::Tissue tissue = openVolume(o.volume);
+    command::Progress progress(command::Progress::Clock::ticking);
+    reference::VolumeMeshOptions options;
+    options.size = 1e-3 * o.size;
+    options.largest = 1e-3 * std::max(o.size, o.largest > 0.0 ? o.largest : 2.5 * o.size);
+    options.surface = o.surface == "nets" ? reference::SurfaceKind::nets : reference::SurfaceKind::cgal;
+    options.progress = [&](const std::string& what) { progress.show(what); };
+    const reference::VolumeMesh made = reference::meshVolume(tissue, options);
+    progress.show("writing");
+    base::writeWhole(o.output, reference::meshText(made.mesh, tissue.table(), o.output));
+    progress.clear();
+    const double seconds = static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+    if (o.json != "-") {
+        printQuality(o, made.quality, tissue.table(), seconds);
+    }
+    if (!o.json.empty()) {
+        json figures = figuresOf(made.quality, tissue.table());
+        figures.update({{"volume", o.volume},
+                        {"output", o.output.string()},
+                        {"size_mm", o.size},
+                        {"largest_mm", 1e3 * options.largest},
+                        {"surface", o.surface}});
+        command::writeJson(o.json, figures);
+    }
+}
+
+void addOptions(CLI::App& app, Options& o)
+{
+    app.add_option("volume", o.volume, "Volume (.vdb), scene (.toml), or a built-in phantom by its name");
+    app.add_option("-o,--output", o.output, "Mesh to write: " + reference::meshFileEndings())->type_name("FILE");
+    app.add_option("--size", o.size, "Edges on the surfaces of tissues [mm]; shorter where a tissue is thin")
+        ->check(CLI::Range(0.2, 50.0))
+        ->type_name("MM")
+        ->capture_default_str();
+    app.add_option("--largest", o.largest, "Edges away from surfaces [mm] (default: two and a half times --size)")
+        ->check(CLI::Range(0.2, 200.0))
+        ->type_name("MM");
+    app.add_option("--surface", o.surface, "Who finds the surfaces: cgal, or nets (surface nets on voxels of --size)")
+        ->check(CLI::IsMember({"cgal", "nets"}))
+        ->capture_default_str();
+    app.add_option("--json", o.json, "Write figures to this file (- = standard output)")->type_name("FILE");
+}
+
+}  // namespace
+
+}  // namespace palpate::apps
+
+int main(int argc, char** argv)
+{
+    // The program starts itself so, with nothing but TetGen to do.
+    if (argc == 4 && std::string_view(argv[1]) == "--tetgen-job") {
+        return palpate::reference::runTetGenJob(argv[2], argv[3]);
+    }
+    palpate::command::endOnSignals();
+    CLI::App app("A volume as conforming tetrahedra, one region per tissue", "palpate-mesh");
+    app.set_version_flag("--version", std::string(palpate::base::build()));
+    app.failure_message([](const CLI::App*, const CLI::Error& e) {
+        return std::string("palpate-mesh: ") + e.what() + " (palpate-mesh --help lists what there is)\n";
+    });
+    palpate::apps::Options options;
+    palpate::apps::addOptions(app, options);
+    try {
+        app.parse(argc, argv);
+        palpate::apps::run(options);
+        return 0;
+    } catch (const CLI::ParseError& e) {
+        const int status = app.exit(e);
+        return status == 0 ? 0 : 2;
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "palpate-mesh: %s\n", e.what());
+        return 1;
+    }
+}

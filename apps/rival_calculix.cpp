@@ -1,0 +1,103 @@
+// palpate-rival-calculix: CalculiX with neo-Hookean quadratic tetrahedra on a push of `palpate accuracy`. Of
+// palpate-reference's code, and under its licence: see reference/NOTICE.
+#include <apps/rival_push.h>
+#include <reference/ccx.h>
+
+#include <fmt/format.h>
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+namespace palpate::apps {
+
+namespace {
+
+// Of all children that have ended [s].
+double childrensTime()
+{
+    rusage used{};
+    getrusage(RUSAGE_CHILDREN, &used);
+    const auto seconds = [](timeval t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+    return seconds(used.ru_utime) + seconds(used.ru_stime);
+}
+
+void addFaces(const RivalPush& push, reference::TetMesh& mesh)
+{
+    using Corners = std::array<std::uint32_t, 3>;
+    const auto sorted = [](Corners c) {
+        std::ranges::sort(c);
+        return c;
+    };
+    std::map<Corners, std::uint32_t> owner;
+    for (std::uint32_t t = 0; t < push.tets.size(); ++t) {
+        for (std::size_t without = 0; without < 4; ++without) {
+            const auto& tet = push.tets[t];
+            owner[sorted({tet[(without + 1) % 4], tet[(without + 2) % 4], tet[(without + 3) % 4]})] = t;
+        }
+    }
+    std::vector<char> held(push.points.size(), 0);
+    for (const std::uint32_t p : push.held) {
+        held.at(p) = 1;
+    }
+    for (const Corners& c : push.triangles) {
+        const bool stays = std::ranges::all_of(c, [&](std::uint32_t p) { return held[p] != 0; });
+        mesh.faces.push_back({c, owner.at(sorted(c)), stays});
+    }
+}
+
+reference::TetMesh meshOf(const RivalPush& push)
+{
+    constexpr std::size_t mostMaterials = std::numeric_limits<std::uint8_t>::max();
+    if (push.materials.size() > mostMaterials) {
+        throw std::runtime_error(fmt::format("{} materials: {} are the most; take another --rival-mesh-mm",
+                                             push.materials.size(), mostMaterials));
+    }
+    reference::TetMesh mesh;
+    mesh.points = push.points;
+    mesh.tets = push.tets;
+    for (const std::uint32_t m : push.material) {
+        mesh.tissue.push_back(static_cast<std::uint8_t>(m));
+    }
+    addFaces(push, mesh);
+    return mesh;
+}
+
+RivalResults solve(const RivalPush& push, const std::filesystem::path& folder)
+{
+    if (!reference::hasCcx()) {
+        throw std::runtime_error("ccx is not in PATH: install Debian's calculix-ccx");
+    }
+    std::vector<reference::Material> materials;
+    for (const RivalMaterial& m : push.materials) {
+        materials.push_back({m.youngsModulus, m.poisson, 0.0});
+    }
+    reference::CcxPress press{push.held, push.radius, push.centre.at(0), {}};
+    for (const std::size_t look : push.looks) {
+        press.centres.push_back(push.centre.at(look));
+    }
+    const auto file = folder / "press.inp";
+    reference::exportCcxPress(meshOf(push), materials, press, file);
+    const double before = childrensTime();
+    RivalResults results;
+    for (const reference::CcxSolution& step : reference::runCcxPress(file, push.looks.size())) {
+        results.u.emplace_back(step.u.begin(), step.u.begin() + static_cast<std::ptrdiff_t>(push.points.size()));
+        results.force.push_back(step.force);
+    }
+    // CalculiX does not say what a step took: the mean of all.
+    results.seconds.push_back((childrensTime() - before) / static_cast<double>(push.looks.size()));
+    return results;
+}
+
+}  // namespace
+
+}  // namespace palpate::apps
+
+int main(int argc, char** argv)
+{
+    return palpate::apps::rivalMain(argc, argv, "palpate-rival-calculix", "CalculiX on a push of `palpate accuracy`",
+                                    palpate::apps::solve);
+}

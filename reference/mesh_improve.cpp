@@ -1,0 +1,173 @@
+#include <reference/mesh_improve.h>
+
+#include <reference/mesh_parts.h>
+#include <reference/mesh_quality.h>
+#include <reference/surfaces.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace palpate::reference {
+
+namespace {
+
+constexpr int passes = 6;
+constexpr double firstStep = 0.25;  // of the mean edge at a point,
+constexpr double lastStep = 0.01;   // and where the search ends
+constexpr double smooth = 0.9;      // cosine between a facet's normal and the mean, from which on a surface is smooth
+constexpr double gain = 1e-3;       // least that a move has to bring [degrees]
+
+// 6 along the axes, 8 along the diagonals.
+std::vector<Vec3> directions()
+{
+    std::vector<Vec3> out;
+    for (int i = 0; i < 27; ++i) {
+        const Vec3 d(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+        const double square = glm::dot(d, d);
+        if (square == 1.0 || square == 3.0) {
+            out.push_back(glm::normalize(d));
+        }
+    }
+    return out;
+}
+
+class Improver {
+public:
+    Improver(TetMesh& mesh, Moving moving) : mesh_(mesh), star_(mesh.points.size()), normal_(mesh.points.size(), Vec3(0.0))
+    {
+        fixed_.assign(mesh.points.size(), 0);
+        for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
+            for (const std::uint32_t p : mesh.tets[t]) {
+                star_[p].push_back(t);
+            }
+        }
+        readSurfaces(moving);
+    }
+
+    // Worst angle of a tetrahedron, from 0 or 180 degrees; negative where it is flipped.
+    double worst(std::uint32_t tet) const
+    {
+        if (sixVolumes(mesh_, tet) <= 0.0) {
+            return -1.0;
+        }
+        const auto [low, high] = dihedralsOf(mesh_, tet);
+        return std::min(low, 180.0 - high);
+    }
+
+    void move(std::uint32_t p)
+    {
+        if (fixed_[p] != 0) {
+            return;
+        }
+        static const std::vector<Vec3> to = directions();
+        double best = worstAround(p);
+        const double edge = meanEdge(p);
+        for (double step = firstStep; step > lastStep;) {
+            const Vec3 from = mesh_.points[p];
+            Vec3 found = from;
+            for (const Vec3 d : to) {
+                const Vec3 along = onSurface(p, d);
+                mesh_.points[p] = from + step * edge * along;
+                const double now = worstAround(p, best + gain);
+                if (now > best + gain) {
+                    best = now;
+                    found = mesh_.points[p];
+                }
+            }
+            mesh_.points[p] = found;
+            step *= found == from ? 0.5 : 1.0;
+        }
+    }
+
+private:
+    // A point is free on a surface whose facets there all look nearly the same way, but for front and back.
+    void readSurfaces(Moving moving)
+    {
+        const Surfaces surfaces = surfacesOf(mesh_, AllPoints::yes);
+        const auto normalOf = [&](const Surfaces::Facet& f) {
+            const Vec3 a = mesh_.points[f.points[0]];
+            return glm::normalize(glm::cross(mesh_.points[f.points[1]] - a, mesh_.points[f.points[2]] - a));
+        };
+        for (const auto& f : surfaces.facets) {
+            const Vec3 n = normalOf(f);
+            for (const std::uint32_t p : f.points) {
+                normal_[p] += glm::dot(normal_[p], n) < 0.0 ? -n : n;
+            }
+        }
+        for (const auto& f : surfaces.facets) {
+            const Vec3 n = normalOf(f);
+            for (const std::uint32_t p : f.points) {
+                const double length = glm::length(normal_[p]);
+                const bool bends = length == 0.0 || std::abs(glm::dot(normal_[p], n)) < smooth * length;
+                fixed_[p] = fixed_[p] != 0 || moving == Moving::inner || bends ? 1 : 0;
+            }
+        }
+        for (Vec3& n : normal_) {
+            const double length = glm::length(n);
+            n = length > 0.0 ? n / length : n;
+        }
+    }
+
+    Vec3 onSurface(std::uint32_t p, Vec3 d) const
+    {
+        const Vec3 n = normal_[p];
+        return d - glm::dot(d, n) * n;
+    }
+
+    double meanEdge(std::uint32_t p) const
+    {
+        double sum = 0.0;
+        for (const std::uint32_t t : star_[p]) {
+            for (const std::uint32_t q : mesh_.tets[t]) {
+                sum += glm::distance(mesh_.points[p], mesh_.points[q]);
+            }
+        }
+        return sum / (3.0 * static_cast<double>(star_[p].size()));
+    }
+
+    // Of all tetrahedra at a point; stops where it is no more than `enough`.
+    double worstAround(std::uint32_t p, double enough = -std::numeric_limits<double>::infinity()) const
+    {
+        double least = 180.0;
+        for (const std::uint32_t t : star_[p]) {
+            least = std::min(least, worst(t));
+            if (least <= enough) {
+                break;
+            }
+        }
+        return least;
+    }
+
+    TetMesh& mesh_;
+    std::vector<std::vector<std::uint32_t>> star_;  // tetrahedra at each point
+    std::vector<Vec3> normal_;                      // of the surface at each point; nothing inside
+    std::vector<char> fixed_;
+};
+
+}  // namespace
+
+void improveAngles(TetMesh& mesh, double target, Moving moving)
+{
+    Improver improver(mesh, moving);
+    for (int pass = 0; pass < passes; ++pass) {
+        std::vector<std::pair<double, std::uint32_t>> bad;
+        for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
+            if (const double worst = improver.worst(t); worst < target) {
+                bad.emplace_back(worst, t);
+            }
+        }
+        std::ranges::sort(bad);
+        for (const auto& [angle, tet] : bad) {
+            for (const std::uint32_t p : mesh.tets[tet]) {
+                improver.move(p);
+            }
+        }
+    }
+}
+
+}  // namespace palpate::reference

@@ -1,0 +1,136 @@
+#include <reference/tetgen_job.h>
+
+#include <fstream>
+#include <stdexcept>
+#include <type_traits>
+
+namespace palpate::reference {
+
+namespace {
+
+class Writer {
+public:
+    explicit Writer(const std::filesystem::path& file) : file_(file), out_(file, std::ios::binary) {}
+
+    template <typename T>
+    void put(const T& value)
+    {
+        static_assert(std::is_trivially_copyable_v<T>);
+        out_.write(reinterpret_cast<const char*>(&value), sizeof value);
+    }
+    template <typename T>
+    void put(const std::vector<T>& values)
+    {
+        put(values.size());
+        out_.write(reinterpret_cast<const char*>(values.data()), static_cast<std::streamsize>(values.size() * sizeof(T)));
+    }
+    void put(const std::string& text) { put(std::vector<char>(text.begin(), text.end())); }
+    void finish()
+    {
+        out_.close();
+        if (!out_) {
+            throw std::runtime_error(file_.string() + ": cannot be written: is the disk full?");
+        }
+    }
+
+private:
+    std::filesystem::path file_;
+    std::ofstream out_;
+};
+
+class Reader {
+public:
+    explicit Reader(const std::filesystem::path& file)
+        : file_(file), in_(file, std::ios::binary), bytes_(in_ ? std::filesystem::file_size(file) : 0)
+    {
+        check();
+    }
+
+    template <typename T>
+    void take(T& value)
+    {
+        static_assert(std::is_trivially_copyable_v<T>);
+        in_.read(reinterpret_cast<char*>(&value), sizeof value);
+        check();
+    }
+    template <typename T>
+    void take(std::vector<T>& values)
+    {
+        std::size_t count = 0;
+        take(count);
+        if (count > bytes_ / sizeof(T)) {
+            in_.setstate(std::ios::failbit);
+            check();
+        }
+        values.resize(count);
+        in_.read(reinterpret_cast<char*>(values.data()), static_cast<std::streamsize>(count * sizeof(T)));
+        check();
+    }
+
+    void take(std::string& text)
+    {
+        std::vector<char> bytes;
+        take(bytes);
+        text.assign(bytes.begin(), bytes.end());
+    }
+
+private:
+    void check() const
+    {
+        if (!in_) {
+            throw std::runtime_error(file_.string() + ": is no whole job of TetGen's");
+        }
+    }
+
+    std::filesystem::path file_;
+    std::ifstream in_;
+    std::uintmax_t bytes_;
+};
+
+}  // namespace
+
+void write(const std::filesystem::path& file, const TetGenJob& job)
+{
+    Writer out(file);
+    out.put(job.switches);
+    out.put(job.points);
+    out.put(job.facets);
+    out.put(job.regions);
+    out.finish();
+}
+
+void write(const std::filesystem::path& file, const TetGenResult& result)
+{
+    Writer out(file);
+    out.put(result.error);
+    out.put(result.points);
+    out.put(result.tets);
+    out.put(result.region);
+    out.put(result.faces);
+    out.finish();
+}
+
+TetGenJob readJob(const std::filesystem::path& file)
+{
+    TetGenJob job;
+    Reader in(file);
+    in.take(job.switches);
+    in.take(job.points);
+    in.take(job.facets);
+    in.take(job.regions);
+    return job;
+}
+
+TetGenResult readResult(const std::filesystem::path& file)
+{
+    TetGenResult result;
+    Reader in(file);
+    in.take(result.error);
+    in.take(result.points);
+    in.take(result.tets);
+    in.take(result.region);
+    in.take(result.faces);
+    return result;
+}
+
+}  // namespace palpate::reference

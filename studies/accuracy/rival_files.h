@@ -1,0 +1,41 @@
+#pragma once
+
+#include <studies/accuracy/accuracy.h>
+#include <studies/kernel/baselines/tets.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace palpate::studies {
+
+/// Triangles on the outside of tetrahedra, counterclockwise seen from outside, in the order of their tetrahedra.
+/// @param mesh  whose tetrahedra have det(b - a, c - a, d - a) > 0
+std::vector<std::array<std::uint32_t, 3>> outsideOf(const LatticeTets& mesh);
+
+/// Writes `push.json` for a rival: mesh, materials, what is held, tool, its path tick by tick, looks. SI, patient frame
+/// LPS. docs/accuracy.md has the keys.
+/// @param folder  where it goes; must be there
+/// @param scene   its name
+/// Throws std::runtime_error when the file cannot be written.
+void writeRivalPush(const std::filesystem::path& folder, const std::string& scene, const AccuracySubject& subject,
+                    const LatticeTets& mesh);
+
+/// What a rival found.
+struct RivalAnswer {
+    std::vector<std::vector<Vec3>> u;  // of the mesh's points at each look [m] (looks x points)
+    std::vector<Vec3> force;           // on the tool at each look [N] (looks x 1)
+    std::vector<double> seconds;       // processor time of updates in contact [s] (any number x 1)
+};
+
+/// Reads `displacements.csv`, `forces.csv` and `times.csv` of a rival.
+/// @param looks   how many there are
+/// @param points  of the mesh
+/// Throws std::runtime_error ("FILE: what is wrong", on one line, the file without its folder) for a file that is missing,
+/// has another head line, too few or too many rows, or numbers that are not finite or not there.
+RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t looks, std::size_t points);
+
+}  // namespace palpate::studies

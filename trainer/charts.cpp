@@ -1,0 +1,223 @@
+#include <trainer/charts.h>
+
+#include <base/said.h>
+#include <trainer/widgets.h>
+
+#include <imgui.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace palpate::trainer {
+
+namespace {
+
+using base::said;
+using base::tr;
+
+ImU32 ink(Rgb c, float opacity = 1)
+{
+    return ImGui::GetColorU32({c.r, c.g, c.b, opacity});
+}
+
+struct Range {
+    double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+
+    void take(double v) noexcept
+    {
+        if (std::isfinite(v)) {
+            low = std::min(low, v);
+            high = std::max(high, v);
+        }
+    }
+    void take(const std::optional<double>& v) noexcept
+    {
+        if (v) {
+            take(*v);
+        }
+    }
+};
+
+// What the curves and their levels need, with some room; from 0 on where that is near.
+Range rangeOf(const std::vector<ChartLine>& lines)
+{
+    Range r;
+    for (const ChartLine& line : lines) {
+        for (const double v : line.curve->values) {
+            r.take(v);
+        }
+        r.take(line.curve->atLeast);
+        r.take(line.curve->atMost);
+    }
+    if (r.low > r.high) {
+        return {0, 1};
+    }
+    if (r.low > 0 && r.low < 0.6 * r.high) {
+        r.low = 0;
+    }
+    const double room = std::max(0.08 * (r.high - r.low), 1e-6 + 0.02 * std::abs(r.high));
+    return {r.low == 0 ? 0 : r.low - room, r.high + room};
+}
+
+// From values to pixels.
+struct Plane {
+    ImVec2 from, to;  // upper left and lower right
+    Range y;
+    std::size_t sessions = 1;
+
+    float across(std::size_t session) const
+    {
+        const float share = (static_cast<float>(session) + 0.5F) / static_cast<float>(std::max<std::size_t>(sessions, 1));
+        return from.x + share * (to.x - from.x);
+    }
+    float down(double v) const { return to.y - static_cast<float>((v - y.low) / (y.high - y.low)) * (to.y - from.y); }
+};
+
+std::string tickText(double v, double step)
+{
+    return said("{:.{}Lf}", v == 0 ? 0.0 : v, step < 0.1 ? 2 : step < 1 ? 1 : 0);
+}
+
+void drawAxes(ImDrawList& draw, const Plane& p)
+{
+    const float em = ImGui::GetFontSize();
+    draw.AddRectFilled(p.from, p.to, ink({0.09F, 0.10F, 0.13F}));
+    const auto rows = ticksOf(p.y.low, p.y.high, static_cast<int>((p.to.y - p.from.y) / (1.8F * em)));
+    for (const double v : rows) {
+        const float at = p.down(v);
+        const std::string text = tickText(v, rows.size() > 1 ? rows[1] - rows[0] : 1);
+        draw.AddLine({p.from.x, at}, {p.to.x, at}, ink(quiet, 0.25F));
+        draw.AddText({p.from.x - ImGui::CalcTextSize(text.c_str()).x - 0.4F * em, at - 0.5F * em}, ink(quiet),
+                     text.c_str());
+    }
+    const auto most = std::max(2, static_cast<int>((p.to.x - p.from.x) / (3 * em)));
+    for (const double v : ticksOf(1, static_cast<double>(std::max<std::size_t>(p.sessions, 1)), most)) {
+        if (v < 1 || v != std::floor(v)) {
+            continue;
+        }
+        const std::string text = said("{:.0f}", v);
+        const float at = p.across(static_cast<std::size_t>(v) - 1);
+        draw.AddText({at - 0.5F * ImGui::CalcTextSize(text.c_str()).x, p.to.y + 0.15F * em}, ink(quiet), text.c_str());
+    }
+}
+
+// Its name stands above it, or below where that is asked for or needed.
+void drawLevel(ImDrawList& draw, const Plane& p, double level, Rgb colour, const std::string& name, bool below)
+{
+    const float em = ImGui::GetFontSize(), at = p.down(level);
+    for (float x = p.from.x; x < p.to.x; x += 0.8F * em) {
+        draw.AddLine({x, at}, {std::min(x + 0.45F * em, p.to.x), at}, ink(colour), 1.5F);
+    }
+    const bool roomAbove = at - 1.15F * em > p.from.y, roomBelow = at + 1.2F * em < p.to.y;
+    const float up = (below && roomBelow) || !roomAbove ? 0.1F * em : -1.1F * em;
+    draw.AddText({p.to.x - ImGui::CalcTextSize(name.c_str()).x - 0.3F * em, at + up}, ink(colour), name.c_str());
+}
+
+void drawCurve(ImDrawList& draw, const Plane& p, const ChartLine& line, std::size_t number)
+{
+    const auto& values = line.curve->values;
+    const float mark = 0.22F * ImGui::GetFontSize();
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        if (!std::isfinite(values[i])) {
+            continue;
+        }
+        const ImVec2 at{p.across(i), p.down(values[i])};
+        if (i > 0 && std::isfinite(values[i - 1])) {
+            draw.AddLine({p.across(i - 1), p.down(values[i - 1])}, at, ink(line.colour), 2);
+        }
+        number == 0 ? draw.AddCircleFilled(at, mark, ink(line.colour))
+                    : draw.AddRectFilled({at.x - mark, at.y - mark}, {at.x + mark, at.y + mark}, ink(line.colour));
+    }
+}
+
+}  // namespace
+
+std::vector<double> ticksOf(double low, double high, int most)
+{
+    if (!(high > low) || most < 1) {
+        return {low};
+    }
+    const double rough = (high - low) / most, power = std::pow(10.0, std::floor(std::log10(rough)));
+    double step = 10 * power;
+    for (const double times : {1.0, 2.0, 5.0}) {
+        if (times * power >= rough) {
+            step = times * power;
+            break;
+        }
+    }
+    std::vector<double> ticks;
+    for (double n = std::ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; ++n) {
+        ticks.push_back(n * step);
+    }
+    return ticks;
+}
+
+void drawCurves(const std::vector<ChartLine>& lines, float wide, float high)
+{
+    const float em = ImGui::GetFontSize();
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    ImDrawList& draw = *ImGui::GetWindowDrawList();
+    Plane p{{at.x + 3.2F * em, at.y + 0.3F * em}, {at.x + wide - 0.3F * em, at.y + high - 2.6F * em}, rangeOf(lines), 1};
+    for (const ChartLine& line : lines) {
+        p.sessions = std::max(p.sessions, line.curve->values.size());
+    }
+    drawAxes(draw, p);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        const ChartLine& line = lines[i];
+        if (line.curve->atLeast) {
+            drawLevel(draw, p, *line.curve->atLeast, lines.size() > 1 ? line.colour : green,
+                      said(tr("at least {:Lg}"), *line.curve->atLeast), true);
+        }
+        if (line.curve->atMost) {
+            drawLevel(draw, p, *line.curve->atMost, lines.size() > 1 ? line.colour : green,
+                      lines.size() > 1 ? line.curve->label : said(tr("at most {:Lg}"), *line.curve->atMost), i > 0);
+        }
+        drawCurve(draw, p, line, i);
+    }
+    const char* const below = tr("session");
+    draw.AddText({0.5F * (p.from.x + p.to.x - ImGui::CalcTextSize(below).x), p.to.y + 1.2F * em}, ink(quiet), below);
+    ImGui::Dummy({wide, high});
+}
+
+Rgb groupColour(std::size_t group) noexcept
+{
+    constexpr std::array colours{skyBlue, orange, green};
+    return colours[group % colours.size()];
+}
+
+void drawSpreads(const ComparedMeasure& measure, float wide, float high)
+{
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    ImDrawList& draw = *ImGui::GetWindowDrawList();
+    Range r;
+    for (const Spread& s : measure.groups) {
+        for (const double v : s.values) {
+            r.take(v);
+        }
+    }
+    const float margin = 0.4F * ImGui::GetFontSize(), row = high / static_cast<float>(measure.groups.size());
+    const auto across = [&](double v) {
+        const double share = r.high > r.low ? (v - r.low) / (r.high - r.low) : 0.5;
+        return at.x + margin + static_cast<float>(std::clamp(share, 0.0, 1.0)) * (wide - 2 * margin);
+    };
+    for (std::size_t g = 0; g < measure.groups.size(); ++g) {
+        const Spread& s = measure.groups[g];
+        const float middle = at.y + (static_cast<float>(g) + 0.5F) * row, half = 0.32F * row;
+        if (s.values.empty()) {
+            continue;
+        }
+        draw.AddRectFilled({across(s.lower), middle - half}, {across(s.upper), middle + half}, ink(groupColour(g), 0.3F));
+        for (const double v : s.values) {
+            draw.AddCircleFilled({across(v), middle}, 0.16F * ImGui::GetFontSize(), ink(groupColour(g), 0.8F));
+        }
+        if (std::isfinite(s.median)) {
+            draw.AddLine({across(s.median), middle - half}, {across(s.median), middle + half}, ink({1, 1, 1}), 2);
+        }
+    }
+    ImGui::Dummy({wide, high});
+}
+
+}  // namespace palpate::trainer

@@ -1,0 +1,132 @@
+#include <trainer/instructor.h>
+
+#include <base/said.h>
+#include <trainer/lists.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace palpate::trainer {
+
+namespace {
+
+using base::marked;
+using base::said;
+using base::tr;
+using nlohmann::json;
+
+std::string translated(const std::string& word)
+{
+    constexpr std::array known{marked("outside"), marked("touching"), marked("inserted"),
+                               marked("paused"),  marked("finished"), marked("faulted")};
+    return std::ranges::find(known, word) == known.end() ? word : tr(word);
+}
+
+std::string warningOf(const json& one)
+{
+    const auto warning = one.at("warning").get<std::string>();
+    if (warning == "none") {
+        return {};
+    }
+    const std::string what = tr(one.at("warned").get<std::string>());
+    return warning == "touching" ? said(tr("touches {}"), what) : said(tr("near: {}"), what);
+}
+
+LiveSession liveOf(const json& one)
+{
+    constexpr double silent = 2;  // [s]
+    LiveSession s;
+    s.session = one.at("session").get<std::string>();
+    s.who = one.at("who").get<std::string>();
+    s.scene = one.at("scene").get<std::string>();
+    s.doing = translated(one.at("state").get<std::string>());
+    s.warning = warningOf(one);
+    s.touching = one.at("warning") == "touching";
+    s.seconds = one.at("seconds").get<double>();
+    s.inserted = one.at("inserted_mm").get<double>();
+    s.force = one.at("force_n").get<double>();
+    s.target = numberAt(one, "target_mm");
+    s.vital = numberAt(one, "vital_mm");
+    s.cores = one.at("cores").get<int>();
+    s.lastCore = numberAt(one, "last_core_target_pct");
+    s.stuck = one.at("age_s").get<double>() > silent && one.at("state") != "paused";
+    return s;
+}
+
+double orInfinite(const json& values, const std::string& key)
+{
+    return numberAt(values, key.c_str()).value_or(std::numeric_limits<double>::infinity());
+}
+
+Spread spreadOf(const json& group, const std::string& key)
+{
+    Spread s{orInfinite(group.at("median"), key),
+             orInfinite(group.at("lower_quartile"), key),
+             orInfinite(group.at("upper_quartile"), key),
+             {}};
+    for (const json& value : group.at("values").at(key)) {
+        if (value.is_number()) {
+            s.values.push_back(value.get<double>());
+        }
+    }
+    return s;
+}
+
+// Whether there is anything to see: two values that differ.
+bool differs(const ComparedMeasure& m)
+{
+    std::optional<double> first;
+    for (const Spread& s : m.groups) {
+        for (const double v : s.values) {
+            if (first && *first != v) {
+                return true;
+            }
+            first = v;
+        }
+    }
+    return false;
+}
+
+}  // namespace
+
+std::vector<LiveSession> liveIn(const json& figures)
+{
+    std::vector<LiveSession> all;
+    each(figures, "sessions", [&](const json& one) { all.push_back(liveOf(one)); });
+    return all;
+}
+
+Comparison comparisonIn(const json& figures)
+{
+    Comparison out;
+    std::vector<json> groups;
+    each(figures, "groups", [&](const json& one) {
+        const int n = one.at("n").get<int>();
+        out.names.push_back(one.at("name").get<std::string>());
+        out.sessions.push_back(n);
+        groups.push_back(one);
+    });
+    each(figures, "measures", [&](const json& one) {
+        const auto key = one.at("key").get<std::string>();
+        ComparedMeasure m{tr(one.at("label").get<std::string>()),
+                          tr(one.at("unit").get<std::string>()),
+                          one.at("decimals").get<int>(),
+                          {},
+                          std::nullopt};
+        for (const json& group : groups) {
+            m.groups.push_back(spreadOf(group, key));
+        }
+        if (const auto effects = figures.find("effect_size"); effects != figures.end()) {
+            m.effect = numberAt(*effects, key.c_str());
+        }
+        if (differs(m)) {
+            out.measures.push_back(std::move(m));
+        }
+    });
+    return out;
+}
+
+}  // namespace palpate::trainer

@@ -1,0 +1,275 @@
+#include <trainer/charts.h>
+#include <trainer/widgets.h>
+
+#include <base/said.h>
+
+#include <imgui_stdlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+namespace palpate::trainer {
+
+namespace {
+
+using base::said;
+using base::tr;
+
+std::string orNone(const std::optional<double>& millimetres)
+{
+    return millimetres ? said("{:.1Lf} mm", *millimetres) : "-";
+}
+
+Errand drawLive(State& state)
+{
+    Instructor& i = state.instructor;
+    if (i.live.empty()) {
+        words(tr("No session of yours runs on this machine. As soon as one does it stands here, with its figures."), quiet);
+    }
+    Errand errand = Errand::none;
+    for (const LiveSession& s : i.live) {
+        ImGui::PushID(s.session.c_str());
+        ImGui::Separator();
+        heading(said("{}: {}", s.who.empty() ? s.session : s.who, s.scene), 1.15F);
+        besideIfRoom(tr("Watch"));
+        if (ImGui::Button(tr("Watch"))) {
+            i.watched = s.session;
+            errand = Errand::watchSession;
+        }
+        words(said(tr("{}; {:.0f} s, inside {:.1Lf} mm, target {}, vital structure {}, force {:.1Lf} N"), s.doing,
+                   s.seconds, s.inserted, orNone(s.target), orNone(s.vital), s.force));
+        if (s.cores > 0) {
+            words(said(tr("Cores: {}, target in the last one {:.0f} %"), s.cores, s.lastCore.value_or(0)));
+        }
+        if (!s.warning.empty()) {
+            words(said(tr("Warning: {}"), s.warning), s.touching ? vermilion : orange);
+        }
+        if (s.stuck) {
+            words(tr("Nothing was heard of it for two seconds."), orange);
+        }
+        ImGui::PopID();
+    }
+    return errand;
+}
+
+std::string titleOf(const State& state, const KeptSession& s)
+{
+    const auto at = std::ranges::find(state.cases, s.caseId, &CaseEntry::id);
+    return at != state.cases.end() ? at->title : s.caseId.empty() ? s.scene : s.caseId;
+}
+
+void drawKeptList(State& state)
+{
+    Instructor& i = state.instructor;
+    for (std::size_t n = 0; n < i.everybody.sessions.size(); ++n) {
+        const KeptSession& s = i.everybody.sessions[n];
+        ImGui::PushID(static_cast<int>(n));
+        const ImVec2 at = ImGui::GetCursorPos();
+        const float high = 2 * ImGui::GetTextLineHeightWithSpacing();
+        if (ImGui::Selectable("##kept", i.chosen == n, 0, {0, high})) {
+            chooseKept(state, n);
+        } else if (ImGui::IsItemFocused() && ImGui::GetIO().NavVisible && i.chosen != n) {
+            chooseKept(state, n);
+        }
+        const ImVec2 next = ImGui::GetCursorPos();
+        ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
+        ImGui::BeginGroup();
+        ImGui::TextUnformatted(said("{}: {}", s.name, titleOf(state, s)).c_str());
+        std::string line = s.started.substr(0, 10) + " " + s.started.substr(11, 5) + " UTC";
+        line += s.total ? said(tr(", {:.0f} points"), *s.total) : "";
+        line += s.rating > 0 ? said(tr(", rated {} of 5"), s.rating) : "";
+        ImGui::TextColored(vec(i.chosen == n ? Rgb{1, 1, 1} : quiet), "%s", line.c_str());
+        ImGui::EndGroup();
+        ImGui::SetCursorPos(next);
+        ImGui::PopID();
+    }
+}
+
+// The chosen session: what it came to, and the instructor's word on it.
+Errand drawKept(State& state)
+{
+    Instructor& i = state.instructor;
+    const KeptSession& s = i.everybody.sessions[i.chosen];
+    Errand errand = Errand::none;
+    heading(said("{}: {}", s.name, titleOf(state, s)), 1.15F);
+    words(said(tr("Session {}, {}"), s.number, s.test ? tr("test") : tr("practice")), quiet);
+    if (s.total) {
+        words(said(tr("{:.0f} of 100 points"), *s.total));
+    }
+    if (!s.record.empty() && ImGui::Button(tr("See it again"))) {
+        i.watched = s.record;
+        errand = Errand::seeKept;
+    }
+    ImGui::Spacing();
+    words(tr("Global rating, 1 to 5"));
+    for (int rating = 0; rating <= 5; ++rating) {
+        ImGui::PushID(rating);
+        ImGui::RadioButton(rating == 0 ? tr("none") : std::to_string(rating).c_str(), &i.rating, rating);
+        ImGui::PopID();
+        besideIfRoom("5     ");
+    }
+    ImGui::NewLine();
+    words(tr("Note"));
+    ImGui::InputTextMultiline("##note", &i.note, {ImGui::GetContentRegionAvail().x, 6 * ImGui::GetFontSize()});
+    const bool changed = i.note != s.note || i.rating != s.rating;
+    ImGui::BeginDisabled(!changed);
+    if (ImGui::Button(tr("Keep note and rating"))) {
+        errand = Errand::keepNote;
+    }
+    ImGui::EndDisabled();
+    if (changed) {
+        words(tr("Not kept yet."), orange);
+    }
+    return errand;
+}
+
+Errand drawSessions(State& state)
+{
+    if (state.instructor.everybody.sessions.empty()) {
+        words(tr("No session was kept yet: choose who trains before a session begins."), quiet);
+        return Errand::none;
+    }
+    const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
+    const bool beside = wide > 40 * em;
+    ImGui::BeginChild("sessions", {beside ? 0.45F * wide : 0, beside ? 0 : 7 * em}, false, ImGuiWindowFlags_NavFlattened);
+    drawKeptList(state);
+    ImGui::EndChild();
+    beside ? ImGui::SameLine() : void();
+    ImGui::BeginChild("kept", {0, 0}, false, ImGuiWindowFlags_NavFlattened);
+    const Errand errand = drawKept(state);
+    ImGui::EndChild();
+    return errand;
+}
+
+void drawMembers(State& state)
+{
+    Instructor& i = state.instructor;
+    i.groupOf.resize(state.people.size(), 0);
+    for (std::size_t n = 0; n < state.people.size(); ++n) {
+        ImGui::PushID(static_cast<int>(n));
+        ImGui::RadioButton(tr("in none"), &i.groupOf[n], 0);
+        for (int group = 1; group <= 2; ++group) {
+            ImGui::SameLine();
+            ImGui::PushStyleColor(ImGuiCol_CheckMark, vec(groupColour(static_cast<std::size_t>(group - 1))));
+            ImGui::RadioButton(said(tr("group {}"), group).c_str(), &i.groupOf[n], group);
+            ImGui::PopStyleColor();
+        }
+        ImGui::SameLine();
+        ImGui::TextUnformatted(state.people[n].name.c_str());
+        ImGui::PopID();
+    }
+}
+
+Errand drawChoiceOfGroups(State& state)
+{
+    Instructor& i = state.instructor;
+    drawMembers(state);
+    const auto at = std::ranges::find(state.cases, i.caseId, &CaseEntry::id);
+    ImGui::SetNextItemWidth(17 * ImGui::GetFontSize());
+    if (ImGui::BeginCombo(tr("Sessions"), at == state.cases.end() ? tr("of all cases") : at->title.c_str())) {
+        if (ImGui::Selectable(tr("of all cases"), i.caseId.empty())) {
+            i.caseId.clear();
+        }
+        for (const CaseEntry& c : state.cases) {
+            if (ImGui::Selectable((c.title + "##" + c.id).c_str(), c.id == i.caseId)) {
+                i.caseId = c.id;
+            }
+        }
+        ImGui::EndCombo();
+    }
+    besideIfRoom(tr("Compare"));
+    const bool compare = ImGui::Button(tr("Compare"));
+    besideIfRoom(tr("Compare, as a page too"));
+    i.asPage = ImGui::Button(tr("Compare, as a page too"));
+    return compare || i.asPage ? Errand::compareGroups : Errand::none;
+}
+
+std::string spreadInWords(const Spread& s, int decimals)
+{
+    const auto number = [decimals](double v) { return std::isfinite(v) ? said("{:.{}Lf}", v, decimals) : "-"; };
+    return said(tr("{} ({} to {})"), number(s.median), number(s.lower), number(s.upper));
+}
+
+void drawComparison(const Comparison& c)
+{
+    const float em = ImGui::GetFontSize();
+    if (!ImGui::BeginTable("compared", 5, ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp)) {
+        return;
+    }
+    ImGui::TableSetupColumn(tr("Measure"));
+    for (std::size_t g = 0; g < 2; ++g) {
+        ImGui::TableSetupColumn(said("{} (n = {})", c.names[g], c.sessions[g]).c_str());
+    }
+    ImGui::TableSetupColumn(tr("Cliff's delta"));
+    ImGui::TableSetupColumn(tr("each session"), ImGuiTableColumnFlags_WidthFixed, 12 * em);
+    ImGui::TableHeadersRow();
+    for (const ComparedMeasure& m : c.measures) {
+        ImGui::TableNextRow();
+        ImGui::TableNextColumn();
+        words(m.unit.empty() ? m.label : m.label + " [" + m.unit + "]");
+        for (std::size_t g = 0; g < 2; ++g) {
+            ImGui::TableNextColumn();
+            words(spreadInWords(m.groups[g], m.decimals), groupColour(g));
+        }
+        ImGui::TableNextColumn();
+        words(m.effect ? said("{:+.2Lf}", *m.effect) : "-");
+        ImGui::TableNextColumn();
+        drawSpreads(m, 12 * em, 1.8F * em);
+    }
+    ImGui::EndTable();
+    words(
+        tr("Medians with quartiles; dots are sessions. Cliff's delta: how much more often a value of the first group lies "
+           "above one of the second than below it, -1 to 1."),
+        quiet);
+}
+
+Errand drawGroups(State& state)
+{
+    if (state.people.size() < 2) {
+        words(tr("There are fewer than two profiles: choose who trains before a session begins."), quiet);
+        return Errand::none;
+    }
+    const Errand errand = drawChoiceOfGroups(state);
+    if (state.instructor.comparison.names.size() == 2) {
+        drawComparison(state.instructor.comparison);
+    }
+    return errand;
+}
+
+}  // namespace
+
+Errand drawInstructor(State& state)
+{
+    heading(tr("What are they doing?"));
+    int page = static_cast<int>(state.instructor.page);
+    const std::pair<const char*, InstructorPage> pages[]{{tr("Sessions that run"), InstructorPage::live},
+                                                         {tr("Sessions that were kept"), InstructorPage::sessions},
+                                                         {tr("Compare groups"), InstructorPage::groups}};
+    bool first = true;
+    for (const auto& [label, which] : pages) {
+        first ? void() : besideIfRoom(std::string(label) + "    ");
+        first = false;
+        ImGui::RadioButton(label, &page, static_cast<int>(which));
+    }
+    const bool turned = page != static_cast<int>(state.instructor.page);
+    state.instructor.page = static_cast<InstructorPage>(page);
+    ImGui::BeginChild("page", {0, -3.4F * ImGui::GetFontSize()}, false, ImGuiWindowFlags_NavFlattened);
+    Errand errand = Errand::none;
+    switch (state.instructor.page) {
+        case InstructorPage::live:
+            errand = drawLive(state);
+            break;
+        case InstructorPage::sessions:
+            errand = drawSessions(state);
+            break;
+        case InstructorPage::groups:
+            errand = drawGroups(state);
+            break;
+    }
+    ImGui::EndChild();
+    return errand == Errand::none && turned ? Errand::loadEverybody : errand;
+}
+
+}  // namespace palpate::trainer

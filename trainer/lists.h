@@ -1,0 +1,37 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include <optional>
+
+/// Lists in what commands write. Not part of the interface.
+namespace palpate::trainer {
+
+/// Calls `take` for each member of the list under `key`; what is not as it should be is left out.
+template <typename Take>
+void each(const nlohmann::json& list, const char* key, const Take& take)
+{
+    if (!list.is_object()) {
+        return;
+    }
+    const auto found = list.find(key);
+    if (found == list.end() || !found->is_array()) {
+        return;
+    }
+    for (const nlohmann::json& one : *found) {
+        try {
+            take(one);
+        } catch (const nlohmann::json::exception&) {
+            continue;
+        }
+    }
+}
+
+/// Nothing for null and for what is not there.
+inline std::optional<double> numberAt(const nlohmann::json& object, const char* key)
+{
+    const auto found = object.find(key);
+    return found != object.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
+}
+
+}  // namespace palpate::trainer

@@ -1,0 +1,172 @@
+#include <trainer/progress.h>
+
+#include <base/said.h>
+#include <trainer/lists.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace palpate::trainer {
+
+namespace {
+
+using base::marked;
+using base::said;
+using base::tr;
+using nlohmann::json;
+using Standing = ExerciseEntry::Standing;
+
+struct Labelled {
+    std::string label, unit;
+};
+using Labels = std::map<std::string, Labelled>;
+
+std::vector<double> numbersOf(const json& list)
+{
+    std::vector<double> out;
+    for (const json& one : list) {
+        out.push_back(one.is_number() ? one.get<double>() : std::numeric_limits<double>::quiet_NaN());
+    }
+    return out;
+}
+
+Standing standingOf(const std::string& word)
+{
+    constexpr std::array words{"locked", "open", "next", "reached", "refresh"};
+    const auto at = std::ranges::find(words, word);
+    return at == words.end() ? Standing::locked : static_cast<Standing>(at - words.begin());
+}
+
+// In the order of the levels; then the total, unless a level is of it.
+std::vector<Curve> curvesOf(const json& one, const Labels& labels)
+{
+    std::vector<std::string> keys;
+    for (const json& level : one.at("levels")) {
+        const auto key = level.at("measure").get<std::string>();
+        if (std::ranges::find(keys, key) == keys.end()) {
+            keys.push_back(key);
+        }
+    }
+    if (std::ranges::find(keys, "total") == keys.end()) {
+        keys.emplace_back("total");
+    }
+    std::vector<Curve> curves;
+    for (const std::string& key : keys) {
+        const auto named = labels.find(key);
+        Curve curve{named == labels.end() ? key : named->second.label, named == labels.end() ? "" : named->second.unit,
+                    numbersOf(one.at("curves").at(key)), std::nullopt, std::nullopt};
+        for (const json& level : one.at("levels")) {
+            if (level.at("measure") == key) {
+                curve.atLeast = numberAt(level, "at_least");
+                curve.atMost = numberAt(level, "at_most");
+            }
+        }
+        curves.push_back(std::move(curve));
+    }
+    return curves;
+}
+
+ExerciseEntry exerciseOf(const json& one, const Labels& labels)
+{
+    ExerciseEntry e;
+    e.curriculum = one.at("curriculum").get<std::string>();
+    e.curriculumTitle = tr(one.at("curriculum_title").get<std::string>());
+    e.id = one.at("exercise").get<std::string>();
+    e.title = tr(one.at("title").get<std::string>());
+    e.caseId = one.at("case").get<std::string>();
+    e.standing = standingOf(one.at("state").get<std::string>());
+    e.next = one.at("next").get<bool>();
+    e.test = one.at("test").get<bool>();
+    e.sessions = one.at("sessions").get<int>();
+    e.recentMet = one.at("recent_met").get<int>();
+    e.recentTried = one.at("recent_tried").get<int>();
+    e.pass = one.at("pass").get<int>();
+    e.of = one.at("of").get<int>();
+    e.daysSince = numberAt(one, "days_since");
+    e.curves = curvesOf(one, labels);
+    const json& cusum = one.at("cusum");
+    e.p0 = cusum.at("p0").get<double>();
+    e.p1 = cusum.at("p1").get<double>();
+    e.alarm = {tr("alarm: fails too often"), "", numbersOf(cusum.at("alarm")), std::nullopt,
+               cusum.at("alarm_limit").get<double>()};
+    e.learning = {tr("learning: fails seldom"), "", numbersOf(cusum.at("learning")), std::nullopt,
+                  cusum.at("learning_limit").get<double>()};
+    return e;
+}
+
+KeptSession sessionOf(const json& one)
+{
+    KeptSession s;
+    s.name = one.at("name").get<std::string>();
+    s.number = one.at("session").get<std::int64_t>();
+    s.started = one.at("started").get<std::string>();
+    s.caseId = one.at("case").get<std::string>();
+    s.scene = one.at("scene").get<std::string>();
+    s.test = one.at("mode") == "test";
+    s.record = one.at("record").get<std::string>();
+    s.note = one.at("note").get<std::string>();
+    s.rating = one.at("rating").get<int>();
+    s.total = numberAt(one.at("measures"), "total");
+    return s;
+}
+
+}  // namespace
+
+std::optional<std::size_t> Progress::next() const noexcept
+{
+    const auto at = std::ranges::find(exercises, true, &ExerciseEntry::next);
+    return at == exercises.end() ? std::nullopt : std::optional(static_cast<std::size_t>(at - exercises.begin()));
+}
+
+std::optional<double> Progress::best(const std::string& caseId) const noexcept
+{
+    std::optional<double> best;
+    for (const KeptSession& s : sessions) {
+        if (s.caseId == caseId && s.total) {
+            best = std::max(best.value_or(0), *s.total);
+        }
+    }
+    return best;
+}
+
+Progress progressIn(const json& figures)
+{
+    Labels labels;
+    each(figures, "measures", [&](const json& one) {
+        labels[one.at("key").get<std::string>()] = {tr(one.at("label").get<std::string>()),
+                                                    tr(one.at("unit").get<std::string>())};
+    });
+    Progress progress;
+    each(figures, "exercises", [&](const json& one) { progress.exercises.push_back(exerciseOf(one, labels)); });
+    each(figures, "sessions", [&](const json& one) { progress.sessions.push_back(sessionOf(one)); });
+    return progress;
+}
+
+const char* inWords(Standing standing) noexcept
+{
+    constexpr std::array words{marked("locked"), marked("open"), marked("next"), marked("reached"),
+                               marked("to be refreshed")};
+    return tr(words[static_cast<std::size_t>(standing)]);
+}
+
+std::string reasonFor(const ExerciseEntry& e)
+{
+    if (e.standing == Standing::refresh) {
+        return said(tr("It was reached, and not practised for {:.0f} days."), std::floor(e.daysSince.value_or(0)));
+    }
+    if (e.standing == Standing::reached) {
+        return tr("Its level was reached. It can be practised again at any time.");
+    }
+    if (e.standing == Standing::locked) {
+        return tr("Its gate is shut: the exercises before it come first.");
+    }
+    const std::string asked = e.test ? said(tr("{} of {} tests at its level open the gate."), e.pass, e.of)
+                                     : said(tr("{} of {} sessions at its level open the gate."), e.pass, e.of);
+    return e.recentTried == 0 ? asked
+                              : asked + " " + said(tr("So far it is {} of the last {}."), e.recentMet, e.recentTried);
+}
+
+}  // namespace palpate::trainer
