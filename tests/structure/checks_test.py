@@ -83,7 +83,7 @@ def said(script, name, text):
 def said_of_catalogue(change):
     """What check_translations says about a copy of all that it reads, after `change` of the copy's folder."""
     with tempfile.TemporaryDirectory() as folder:
-        for part in ("apps", "base", "haptics", "render", "trainer", "training/cases", "datasets/tables", "scripts", "translations"):
+        for part in ("apps", "base", "haptics", "render", "trainer", "training/cases", "training/curricula", "datasets/tables", "scripts", "translations"):
             shutil.copytree(ROOT / part, pathlib.Path(folder) / part)
         change(pathlib.Path(folder))
         return run("check_translations", folder)
