@@ -212,8 +212,11 @@ void verify(const Options& o)
         text += fmt::format("{:<10} {:<16} {:>8} {:>10.1f} {:>7}\n", s.skill, what, s.counted, s.expected,
                             possible ? fmt::format("{:.3f}", ratio) : "-");
         signals.push_back({{"skill", s.skill}, {"signal", what}, {"counted", s.counted}, {"expected", s.expected}});
-        if (std::abs(ratio - 1) > allowed || (!possible && s.counted > 0)) {
-            faults.push_back(fmt::format("{}: signals \"{}\" are off by more than {:.0f} %", s.skill, what, 100 * allowed));
+        // Of a few signals chance alone takes more: three standard deviations of a count.
+        const double most = std::max(allowed * s.expected, 3 * std::sqrt(s.expected));
+        if (std::abs(counted - s.expected) > most || (!possible && s.counted > 0)) {
+            faults.push_back(fmt::format("{}: signals \"{}\" are off by more than {:.0f} % and chance", s.skill, what,
+                                         100 * allowed));
         }
     }
     text += fmt::format("kill -9: {} times while {} sessions were stored, {} faults\n", kills.kills, kills.sessions,

@@ -54,6 +54,7 @@ std::string sceneWith(const std::string& section, const std::string& line)
                                              {"[[insert]]", "centre_mm = [0, 0, 0]"},
                                              {"[target]", "structure = \"tumour\""},
                                              {"[safety]", ""},
+                                             {"[ct]", ""},
                                              {"[[script]]", "kind = \"fire\""}};
     std::string out;
     for (const auto& [heading, text] : lines) {
