@@ -215,8 +215,8 @@ void verify(const Options& o)
         // Of a few signals chance alone takes more: three standard deviations of a count.
         const double most = std::max(allowed * s.expected, 3 * std::sqrt(s.expected));
         if (std::abs(counted - s.expected) > most || (!possible && s.counted > 0)) {
-            faults.push_back(fmt::format("{}: signals \"{}\" are off by more than {:.0f} % and chance", s.skill, what,
-                                         100 * allowed));
+            faults.push_back(
+                fmt::format("{}: signals \"{}\" are off by more than {:.0f} % and chance", s.skill, what, 100 * allowed));
         }
     }
     text += fmt::format("kill -9: {} times while {} sessions were stored, {} faults\n", kills.kills, kills.sessions,
