@@ -1,6 +1,6 @@
 // palpate-mesh: a volume as conforming tetrahedra. A program of its own: what it links is under the GPL and the AGPL, see
 // reference/NOTICE.
-#include <base/build.h>
+#include <apps/parsed_program.h>
 #include <base/outputs.h>
 #include <command/interrupted.h>
 #include <command/json.h>
@@ -17,9 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cstdio>
 #include <ctime>
-#include <exception>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -174,22 +172,8 @@ int main(int argc, char** argv)
         return palpate::reference::runTetGenJob(argv[2], argv[3]);
     }
     palpate::command::endOnSignals();
-    CLI::App app("A volume as conforming tetrahedra, one region per tissue", "palpate-mesh");
-    app.set_version_flag("--version", std::string(palpate::base::build()));
-    app.failure_message([](const CLI::App*, const CLI::Error& e) {
-        return std::string("palpate-mesh: ") + e.what() + " (palpate-mesh --help lists what there is)\n";
-    });
     palpate::apps::Options options;
-    palpate::apps::addOptions(app, options);
-    try {
-        app.parse(argc, argv);
-        palpate::apps::run(options);
-        return 0;
-    } catch (const CLI::ParseError& e) {
-        const int status = app.exit(e);
-        return status == 0 ? 0 : 2;
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "palpate-mesh: %s\n", e.what());
-        return 1;
-    }
+    return palpate::apps::runParsed(
+        argc, argv, "palpate-mesh", "A volume as conforming tetrahedra, one region per tissue",
+        [&](CLI::App& app) { palpate::apps::addOptions(app, options); }, [&] { palpate::apps::run(options); });
 }

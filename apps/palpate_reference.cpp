@@ -1,7 +1,7 @@
 // palpate-reference: the finite-element reference of one scene. A program of its own: what it links is under the GPL, see
 // reference/NOTICE.
 #include <apps/command.h>
-#include <base/build.h>
+#include <apps/parsed_program.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <reference/ccx.h>
@@ -23,7 +23,6 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
-#include <exception>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -372,22 +371,8 @@ void addOptions(CLI::App& app, Options& o)
 
 int main(int argc, char** argv)
 {
-    CLI::App app("The finite-element reference of a scene: mesh, solution, and files of both", "palpate-reference");
-    app.set_version_flag("--version", std::string(palpate::base::build()));
-    app.failure_message([](const CLI::App*, const CLI::Error& e) {
-        return std::string("palpate-reference: ") + e.what() + " (palpate-reference --help lists what there is)\n";
-    });
     palpate::apps::Options options;
-    palpate::apps::addOptions(app, options);
-    try {
-        app.parse(argc, argv);
-        palpate::apps::run(options);
-        return 0;
-    } catch (const CLI::ParseError& e) {
-        const int status = app.exit(e);
-        return status == 0 ? 0 : 2;
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "palpate-reference: %s\n", e.what());
-        return 1;
-    }
+    return palpate::apps::runParsed(
+        argc, argv, "palpate-reference", "The finite-element reference of a scene: mesh, solution, and files of both",
+        [&](CLI::App& app) { palpate::apps::addOptions(app, options); }, [&] { palpate::apps::run(options); });
 }

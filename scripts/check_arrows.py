@@ -32,7 +32,7 @@ ARROWS = {
         "base", "volume", "volume/prepare", "datasets", "channel", "haptics", "session", "ultrasound", "planner", "report", "sweep",
     },
     "trainer": {"base"},
-    "reference/tetgen": {"reference"},
+    "reference/tetgen": {"base", "reference"},
     "reference": {"base", "volume", "occupancy", "chainmail", "datasets", "haptics", "studies"},
     "apps": {
         "base", "volume", "volume/prepare", "datasets", "haptics", "haptics/falcon", "channel", "session", "report", "command",

@@ -1,13 +1,9 @@
 #include <reference/tetgen/child.h>
 
+#include <base/quiet_child.h>
 #include <reference/tetgen_job.h>
 
-#include <fcntl.h>
-#include <signal.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <tetgen.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -76,18 +72,6 @@ TetGenResult resultOf(const tetgenio& out, bool diagnosed)
     return result;
 }
 
-// It does not outlive its parent, and leaves neither text nor a core behind: what is wrong goes to the result.
-void becomeQuiet()
-{
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    const rlimit none{0, 0};
-    ::setrlimit(RLIMIT_CORE, &none);
-    if (const int nowhere = ::open("/dev/null", O_WRONLY); nowhere >= 0) {
-        ::dup2(nowhere, STDOUT_FILENO);
-        ::dup2(nowhere, STDERR_FILENO);
-    }
-}
-
 // What TetGen's numbers mean, as its command line says them.
 const char* meaningOf(int error)
 {
@@ -111,7 +95,7 @@ const char* meaningOf(int error)
 
 int runTetGenJob(const std::filesystem::path& job, const std::filesystem::path& result)
 {
-    becomeQuiet();
+    base::becomeQuietChild();
     std::string error;
     try {
         TetGenJob read = readJob(job);

@@ -1,10 +1,10 @@
 #include <volume/import/barrier.h>
+
+#include <base/quiet_child.h>
 #include <volume/import/source.h>
 
 #include <fcntl.h>
 #include <signal.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -195,13 +195,7 @@ bool receive(const Receiver& from, ImportedImage& image)
 // A failed assertion leaves neither text nor a core behind; ours is the one line that is thrown.
 void becomeQuiet()
 {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    const rlimit none{0, 0};
-    ::setrlimit(RLIMIT_CORE, &none);
-    if (const int nowhere = ::open("/dev/null", O_WRONLY); nowhere >= 0) {
-        ::dup2(nowhere, STDOUT_FILENO);
-        ::dup2(nowhere, STDERR_FILENO);
-    }
+    base::becomeQuietChild();
     ::signal(SIGPIPE, SIG_DFL);
 }
 

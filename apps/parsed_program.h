@@ -1,0 +1,41 @@
+#pragma once
+
+#include <base/build.h>
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+namespace palpate::apps {
+
+/// A program with one command: parses its arguments and runs it. What is wrong is one line on standard error.
+/// @param name   of the program
+/// @param about  what --help says of it
+/// @param add    adds its options to the app that it gets
+/// @param run    does the work, and throws what is wrong
+/// Returns the exit status: 0, 1 for what was thrown, 2 for arguments.
+template <typename Add, typename Run>
+int runParsed(int argc, char** argv, const std::string& name, const std::string& about, const Add& add, const Run& run)
+{
+    CLI::App app(about, name);
+    app.set_version_flag("--version", std::string(base::build()));
+    app.failure_message([&](const CLI::App*, const CLI::Error& e) {
+        return name + ": " + e.what() + " (" + name + " --help lists what there is)\n";
+    });
+    add(app);
+    try {
+        app.parse(argc, argv);
+        run();
+        return 0;
+    } catch (const CLI::ParseError& e) {
+        const int status = app.exit(e);
+        return status == 0 ? 0 : 2;
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), e.what());
+        return 1;
+    }
+}
+
+}  // namespace palpate::apps
