@@ -96,7 +96,8 @@ std::optional<channel::Subscriber> sessionWithHand(const std::string& name)
 {
     for (int i = 0; i < 400; ++i) {
         auto session = channel::Subscriber::attach(name);
-        if (session && session->state() && session->input())
+        // A session that begins anew leaves its first attempt's memory for a moment.
+        if (session && session->state() && session->input() && session->ending() == channel::Ending::none)
             return session;
         wait(0.05);
     }
@@ -204,31 +205,37 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
             wait(0.05);
         return holds();
     };
+    // A window that is not there yet misses a key.
+    const auto pressUntil = [&](const char* key, const auto& holds) {
+        for (int i = 0; i < 5 && !holds(); ++i) {
+            desktop.xdotool({"key", key});
+            until(holds);
+        }
+        return holds();
+    };
+    const auto paused = [&] { return eyes->state()->standing == channel::Standing::paused; };
     wait(1);
     desktop.xdotool({"key", "BackSpace"});
     wait(0.5);
     EXPECT_EQ(eyes->ending(), channel::Ending::none) << "only a session that is paused begins anew";
-    desktop.xdotool({"key", "Return", "key", "s"});
-    ASSERT_TRUE(until([&] { return eyes->state()->standing == channel::Standing::paused; }));
+    desktop.xdotool({"key", "Return"});
+    ASSERT_TRUE(pressUntil("s", paused));
     const auto at = eyes->state()->tick;
     wait(1.0);
     EXPECT_EQ(eyes->state()->tick, at);
     EXPECT_EQ(glm::length(vec(eyes->state()->total)), 0.0);
-    desktop.xdotool({"key", "s"});
-    ASSERT_TRUE(until([&] { return eyes->state()->tick > at; }));
-    desktop.xdotool({"key", "s"});
-    ASSERT_TRUE(until([&] { return eyes->state()->standing == channel::Standing::paused; }));
-    desktop.xdotool({"key", "BackSpace"});
-    ASSERT_TRUE(until([&] { return eyes->ending() != channel::Ending::none; }));
+    ASSERT_TRUE(pressUntil("s", [&] { return eyes->state()->tick > at; }));
+    ASSERT_TRUE(pressUntil("s", paused));
+    ASSERT_TRUE(pressUntil("BackSpace", [&] { return eyes->ending() != channel::Ending::none; }));
     eyes = sessionWithHand(session);
     ASSERT_TRUE(eyes);
+    EXPECT_FALSE(paused());
     wait(2);
-    desktop.xdotool({"key", "s"});
-    ASSERT_TRUE(until([&] { return eyes->state()->standing == channel::Standing::paused; }));
+    ASSERT_TRUE(pressUntil("s", paused));
+    const auto again = eyes->state()->tick;
     wait(1);
-    desktop.xdotool({"key", "s"});
-    wait(1);
-    desktop.xdotool({"key", "e"});
+    ASSERT_TRUE(pressUntil("s", [&] { return eyes->state()->tick > again; }));
+    ASSERT_TRUE(pressUntil("e", [&] { return eyes->ending() != channel::Ending::none; }));
     const Outcome outcome = train->wait();
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const auto json = nlohmann::json::parse(readText(folder / "s.json"));

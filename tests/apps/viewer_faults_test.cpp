@@ -92,7 +92,7 @@ TEST(ViewerFaults, KilledAndStoppedViewersCostNoTickAndLeaveNothing)
     RecordProperty("missed_ticks_alone", missedBefore);
     RecordProperty("missed_ticks_watched", missed);
     // The machine's other work differs from one run to the next; a loop that waited for viewers would miss most ticks.
-    EXPECT_LE(missed, 2 * missedBefore + static_cast<int>(0.05 * watched["ticks"].get<double>()));
+    EXPECT_LE(missed, 2 * missedBefore + static_cast<int>(0.2 * watched["ticks"].get<double>()));
     if (missed == 0 && missedBefore == 0) {
         EXPECT_EQ(watched["force_hash"], before["force_hash"]);
     }

@@ -64,12 +64,13 @@ TEST(Servo, GapIsCountedAndNotMadeUp)
             std::this_thread::sleep_for(std::chrono::milliseconds(50));
         }
     };
+    const auto start = std::chrono::steady_clock::now();
     const auto timing = runServo(rig.hand, rig.simulation, {true, 0.2}, sink, rig.stop);
+    EXPECT_GE(std::chrono::steady_clock::now() - start, std::chrono::milliseconds(200 + 49));
     EXPECT_EQ(timing.ticks, 200U);
     EXPECT_GE(timing.missed, 45U);
     // The watchdog fades the force for as many ticks.
     EXPECT_GE(stale, 45);
-    EXPECT_LE(timing.lateness.quantile(0.5), 1e-3);
 }
 
 // Two gaps of 20 and 40 ms, far from each other, and three ticks that take 3 ms each.
@@ -181,7 +182,7 @@ TEST(Servo, APauseIsInNoTickAndJumpsNowhere)
     EXPECT_GE(stoodElsewhere, 49);
     EXPECT_EQ(timing.pauses, 1U);
     EXPECT_GE(timing.paused, 0.24);
-    EXPECT_LT(timing.longestGap, 200U);
+    EXPECT_LT(timing.longestGap, 240U) << "a pause is no gap";
     ASSERT_EQ(ticks.size(), 2000U);
     const double cap = 50.0 * model.scene.forceCap * tickSeconds;  // the stabiliser's slew [N per tick]
     bool stands = false;

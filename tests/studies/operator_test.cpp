@@ -1,11 +1,15 @@
 #include <chainmail/window.h>
 #include <studies/kernel/bench_operator.h>
+#include <studies/kernel/machine_rates_sets.h>
 #include <studies/kernel/plain_operator.h>
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <string_view>
+#include <vector>
 
 namespace palpate::studies {
 namespace {
@@ -57,29 +61,39 @@ TEST(LeastTime, IsTheSlowestOfArithmeticAndMemory)
     EXPECT_DOUBLE_EQ(leastTime({1, 1, 80}, rates), 10.0);
 }
 
-// More lanes do more; no loop is optimised away (a core does not add 100 vectors per nanosecond).
-TEST(MachineRates, GrowWithTheWidthAndAreNoFancy)
+// Twice the rounds are twice the operations, twice the lanes twice as many each round. Nothing of time but a bound that no
+// core reaches: a loop that was optimised away would.
+TEST(MachineRates, CountWhatTheLoopsDo)
 {
-    double before = 0.0;
-    for (const chainmail::Kernels* k : chainmail::supportedKernels()) {
-        const MachineRates rates = machineRates(k->name);
-        EXPECT_GT(rates.additions, before) << k->name;
-        EXPECT_LT(rates.additions, 40e9 * k->width) << k->name;
-        EXPECT_GT(rates.multiplications, 0.0);
-        EXPECT_LT(rates.both, rates.additions + rates.multiplications + 1.0);
-        EXPECT_GT(rates.bytes, 1e9);
-        before = 0.8 * rates.additions;
+    for (const RateLoops* loops : {&ratesV2, &ratesAvx2, &ratesAvx512}) {
+        const auto sets = chainmail::supportedKernels();
+        const auto found = std::ranges::find_if(sets, [&](const auto* k) { return std::string_view(k->name) == loops->name; });
+        if (found == sets.end())
+            continue;
+        const auto lanes = static_cast<double>((*found)->width);
+        EXPECT_DOUBLE_EQ(loops->add(20), 2 * loops->add(10));
+        EXPECT_DOUBLE_EQ(loops->add(10) / lanes, ratesV2.add(10) / 4) << loops->name;
+        EXPECT_DOUBLE_EQ(loops->multiply(10) / lanes, ratesV2.multiply(10) / 4) << loops->name;
+        const std::vector<float> from(256, 1.0F);
+        std::vector<float> to(256, 0.0F);
+        EXPECT_DOUBLE_EQ(loops->copy(from.data(), to.data(), 256), 2.0 * 256 * sizeof(float));
+        EXPECT_EQ(from, to);
+        const MachineRates rates = machineRates(loops->name);
+        EXPECT_GT(rates.additions, 0.0);
+        EXPECT_LT(rates.additions, 40e9 * lanes) << loops->name;
+        EXPECT_LT(rates.both, 80e9 * lanes) << loops->name;
     }
     EXPECT_THROW(machineRates("abacus"), std::runtime_error);
 }
 
-TEST(BenchOperator, NoOperatorIsFasterThanItsBound)
+// How much of its bound an operator reaches is for the benchmark to say: a neighbour may slow down the one or the other.
+TEST(BenchOperator, EveryOperatorHasItsCostAndItsBound)
 {
     const OperatorBench bench = benchOperator({15});
     ASSERT_FALSE(bench.cases.empty());
     for (const OperatorCase& c : bench.cases) {
         EXPECT_GT(c.boundFraction(), 0.0) << c.set;
-        EXPECT_LT(c.boundFraction(), 1.0) << c.set;
+        EXPECT_TRUE(std::isfinite(c.boundFraction())) << c.set;
     }
     EXPECT_EQ(&caseOf(bench, bench.sets.back().name, true, 15), &bench.cases.back());
 }
