@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <thread>
 
 namespace palpate::apps {
@@ -55,7 +56,10 @@ public:
     void move(dvec3 by)
     {
         left_ += by;
-        const dvec3 way = glm::inverse(glm::dmat3(pixelRight_, pixelDown_, notch_)) * left_;
+        const glm::dmat3 ways(pixelRight_, pixelDown_, notch_);
+        if (!(std::abs(glm::determinant(ways)) > 0.0))
+            throw std::runtime_error("the tip does not follow the mouse");
+        const dvec3 way = glm::inverse(ways) * left_;
         const long right = std::lround(way.x), down = std::lround(way.y), notches = std::lround(way.z);
         left_ -= double(right) * pixelRight_ + double(down) * pixelDown_ + double(notches) * notch_;
         std::vector<std::string> words;
@@ -79,12 +83,27 @@ public:
     }
 
 private:
+    // Where the tip is when it has come to rest.
+    dvec3 restingTip() const
+    {
+        dvec3 before = vec(sees().tip);
+        for (int still = 0, i = 0; still < 4 && i < 100; ++i) {
+            wait(0.15);
+            const dvec3 now = vec(sees().tip);
+            still = glm::distance(now, before) < 1e-6 ? still + 1 : 0;
+            before = now;
+        }
+        return before;
+    }
+
+    // How the tip goes by `words`. A window that is busy is slow to answer.
     dvec3 tried(const std::vector<std::string>& words) const
     {
-        const dvec3 before = vec(sees().tip);
+        const dvec3 before = restingTip();
         desktop_.xdotool(words);
-        wait(0.8);
-        return vec(sees().tip) - before;
+        for (int i = 0; i < 100 && glm::distance(vec(sees().tip), before) < 1e-5; ++i)
+            wait(0.1);
+        return restingTip() - before;
     }
 
     const Desktop& desktop_;
