@@ -73,6 +73,10 @@ void drawKeptList(State& state)
         } else if (ImGui::IsItemFocused() && ImGui::GetIO().NavVisible && i.chosen != n) {
             chooseKept(state, n);
         }
+        if (!ImGui::IsItemVisible()) {
+            ImGui::PopID();
+            continue;  // of hundreds a dozen are seen
+        }
         const ImVec2 next = ImGui::GetCursorPos();
         ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
         ImGui::BeginGroup();

@@ -5,6 +5,7 @@
 #include <base/said.h>
 
 #include <imgui.h>
+#include <imgui_internal.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
@@ -181,6 +182,11 @@ Errand drawDevices(State& state)
                "the wheel along itself. By keys: Enter takes it and lets it go, arrows and pages move it. Let go, and the "
                "force fades. Every key is listed by ? in the session."));
     }
+    if (check.falconReady && state.gripReady) {
+        words(tr("The buttons of its grip work this window: forward presses what is marked, right and left mark the next "
+                 "and the one before, centre goes back."),
+              skyBlue);
+    }
     ImGui::Spacing();
     const Errand errand = drawDeviceTests(state);
     ImGui::EndChild();
@@ -297,6 +303,7 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
     ImGui::Begin("Palpate", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
+    ImGui::PushItemFlag(ImGuiItemFlags_Inputable, true);  // Tab goes to all, not to text alone
     drawWay(state);
     if (!state.notice.empty()) {
         words(state.notice, orange);
@@ -330,6 +337,7 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
         errand = drawFoot(state, entered);
     }
     state.popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
+    ImGui::PopItemFlag();
     ImGui::End();
     return errand;
 }

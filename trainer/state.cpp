@@ -134,6 +134,13 @@ Errand debrief(State& state, std::optional<double> at)
                                                                                               : Errand::none;
 }
 
+bool listensToGrip(const State& state) noexcept
+{
+    const bool taken =
+        state.running || state.trying || state.pushing || (state.screen == Screen::devices && !state.devices.done);
+    return state.listening && !taken && state.screen != Screen::session;
+}
+
 PersonEntry* chosenPerson(State& state) noexcept
 {
     const auto at = std::ranges::find(state.people, state.person, &PersonEntry::name);
