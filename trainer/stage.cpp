@@ -54,7 +54,8 @@ Window openWindow(int width, int height)
     return window;
 }
 
-// ImGui looks at keys once per picture. A key that goes down and up between two pictures stays down for one.
+// ImGui looks at keys once per picture. A key that goes down and up between two pictures stays down for one, and so does
+// what was held with it.
 class Keys {
 public:
     explicit Keys(GLFWwindow* window) : window_(window)
@@ -79,7 +80,7 @@ public:
         for (const Stroke& k : up) {
             ImGui_ImplGlfw_KeyCallback(window_, k.key, k.code, GLFW_RELEASE, k.mods);
         }
-        pressed_.clear();
+        pressed_ = false;
         return !up.empty();
     }
 
@@ -90,18 +91,18 @@ private:
     };
     void heed(int key, int code, int action, int mods)
     {
-        if (action == GLFW_RELEASE && std::ranges::find(pressed_, key) != pressed_.end()) {
+        if (action == GLFW_RELEASE && pressed_) {
             released_.push_back({key, code, mods});
             return;
         }
         if (action == GLFW_PRESS) {
-            pressed_.push_back(key);
+            pressed_ = true;
         }
         ImGui_ImplGlfw_KeyCallback(window_, key, code, action, mods);
     }
 
     GLFWwindow* window_;
-    std::vector<int> pressed_;  // since the last picture
+    bool pressed_ = false;  // a key, since the last picture
     std::vector<Stroke> released_;
 };
 
