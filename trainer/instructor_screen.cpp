@@ -22,6 +22,13 @@ std::string orNone(const std::optional<double>& millimetres)
     return millimetres ? said("{:.1Lf} mm", *millimetres) : "-";
 }
 
+// The scene of a case is called as the case is.
+std::string titleOf(const State& state, const LiveSession& s)
+{
+    const auto at = std::ranges::find(state.cases, s.scene, &CaseEntry::id);
+    return at != state.cases.end() ? at->title : s.scene;
+}
+
 Errand drawLive(State& state)
 {
     Instructor& i = state.instructor;
@@ -32,7 +39,7 @@ Errand drawLive(State& state)
     for (const LiveSession& s : i.live) {
         ImGui::PushID(s.session.c_str());
         ImGui::Separator();
-        heading(said("{}: {}", s.who.empty() ? s.session : s.who, s.scene), 1.15F);
+        heading(said("{}: {}", s.who.empty() ? s.session : s.who, titleOf(state, s)), 1.15F);
         besideIfRoom(tr("Watch"));
         if (ImGui::Button(tr("Watch"))) {
             i.watched = s.session;
