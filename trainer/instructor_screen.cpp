@@ -39,6 +39,7 @@ Errand drawLive(State& state)
     for (const LiveSession& s : i.live) {
         ImGui::PushID(s.session.c_str());
         ImGui::Separator();
+        ImGui::AlignTextToFramePadding();
         heading(said("{}: {}", s.who.empty() ? s.session : s.who, titleOf(state, s)), 1.15F);
         besideIfRoom(tr("Watch"));
         if (ImGui::Button(tr("Watch"))) {
