@@ -130,7 +130,7 @@ void drawName(ImDrawList& draw, const Plane& p, const Level& level)
     const float up = (level.below && roomBelow) || !roomAbove ? 0.1F * em : -1.1F * em;
     const ImVec2 size = ImGui::CalcTextSize(level.name.c_str());
     const ImVec2 from{p.to.x - size.x - 0.3F * em, at + up};
-    draw.AddRectFilled({from.x - 0.2F * em, from.y}, {p.to.x, from.y + size.y}, ink(ground, 0.85F));
+    draw.AddRectFilled({from.x - 0.2F * em, from.y}, {p.to.x, from.y + size.y}, ink(ground, 0.6F));
     draw.AddText(from, ink(level.colour), level.name.c_str());
 }
 

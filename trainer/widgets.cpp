@@ -73,7 +73,7 @@ std::string shortened(const std::string& text, float wide)
 
 bool roomForTwo()
 {
-    return ImGui::GetWindowContentRegionMax().x - ImGui::GetWindowContentRegionMin().x > 50 * ImGui::GetFontSize();
+    return ImGui::GetIO().DisplaySize.x > 52 * ImGui::GetFontSize();
 }
 
 Errand drawSettings(State& state)
