@@ -122,6 +122,14 @@ struct Window {
     {
         return desktop.xdotool({"search", "--onlyvisible", "--name", "^Palpate trainer: " + screen + "$"}) != "";
     }
+    bool hasResult() const
+    {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder / "sessions", none))
+            if (entry.path().extension() == ".json" && apps::readText(entry.path()).find("\"score\"") != std::string::npos)
+                return true;
+        return false;
+    }
     int runs(const std::string& words) const { return children(trainer->pid(), words); }
 };
 
@@ -160,8 +168,16 @@ TEST(Grip, ItsButtonsWorkTheScreensAndASessionGetsTheFalcon)
     EXPECT_TRUE(waitFor([&] { return window.runs("--device falcon") == 1; })) << "the second button was marked";
     EXPECT_EQ(window.runs("devices --buttons"), 0);
     EXPECT_TRUE(waitFor([&] { return bench.kernel.claimed.load(); })) << "the session has it";
+    // Whoever trains moves the grip, as the session asks for, and ends it by the left button, held.
     bench.device.hand.buttons = buttonLeft;
-    EXPECT_TRUE(waitFor(at("Result"))) << "the left button, held, ends the session";
+    const Vec3 middle = bench.device.hand.goal;
+    double side = 5e-3;
+    EXPECT_TRUE(waitFor([&] {
+        side = -side;
+        bench.device.hand.goal = middle + Vec3(side, side, 2 * side);
+        return window.isAt("Result");
+    }));
+    EXPECT_TRUE(window.hasResult()) << "a session that could not have the Falcon has none";
     EXPECT_TRUE(waitFor(listening));
     bench.device.hand.buttons = 0;
     EXPECT_TRUE(bench.heard(20));
