@@ -184,7 +184,8 @@ Errand drawDevices(State& state)
                "force fades. Every key is listed by ? in the session."));
     }
     if (check.falconReady && state.gripReady) {
-        words(tr("The buttons of its grip work this window: forward presses what is marked, right and left mark the next "
+        words(tr("The buttons of the Falcon's grip work this window: forward presses what is marked, right and left mark "
+                 "the next "
                  "and the one before, centre goes back."),
               skyBlue);
     }
