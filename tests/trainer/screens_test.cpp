@@ -18,7 +18,7 @@ namespace {
 
 constexpr float width = 1280, height = 720;
 
-class Screens : public testing::TestWithParam<std::tuple<const char*, float>> {
+class Screens : public testing::TestWithParam<std::tuple<std::string, int>> {
 protected:
     Screens()
     {
@@ -26,7 +26,7 @@ protected:
         ImGui::GetIO().IniFilename = nullptr;
         ImGui::GetIO().DisplaySize = {width, height};
         base::useLanguage(std::get<0>(GetParam()));
-        setLook(std::get<1>(GetParam()));
+        setLook(0.01F * static_cast<float>(std::get<1>(GetParam())));
         unsigned char* pixels = nullptr;
         int wide = 0, high = 0;
         ImGui::GetIO().Fonts->GetTexDataAsRGBA32(&pixels, &wide, &high);
@@ -110,8 +110,11 @@ TEST_P(Screens, WhatRollsIsNoSlit)
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Languages, Screens,
-                         testing::Combine(testing::Values("en", "de"), testing::Values(1.0F, 1.5F, 2.0F)));
+// Language, and size of texts in per cent.
+INSTANTIATE_TEST_SUITE_P(At, Screens, testing::Combine(testing::Values("en", "de"), testing::Values(100, 150, 200)),
+                         [](const auto& test) {
+                             return std::get<0>(test.param) + std::to_string(std::get<1>(test.param));
+                         });
 
 }  // namespace
 }  // namespace palpate::trainer
