@@ -123,6 +123,7 @@ std::vector<std::pair<std::string, State>> exampleScreens(const State& listed)
     base.settings = listed.settings;
     base.devices = {true, true, tr("A Novint Falcon is ready"), "", "", false};
     base.result = result();
+    base.files.record = "/home/resident/.local/share/palpate/sessions/near-vessel-20261122-091405.db";
     fillInstructor(random, base);
     base.person = base.people.front().name;
     for (std::size_t n = 0; n < std::min<std::size_t>(base.cases.size(), 16); ++n) {

@@ -247,7 +247,7 @@ Errand drawFoot(State& state, bool entered)
 {
     const ImGuiIO& io = ImGui::GetIO();
     const float em = ImGui::GetFontSize();
-    ImGui::SetCursorPosY(ImGui::GetWindowHeight() - 3.0F * em);
+    ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY(), ImGui::GetWindowHeight() - 3.0F * em));
     const bool first = state.screen == Screen::cases, running = state.screen == Screen::session;
     // Esc that closes a popup closes it before it is seen here.
     const bool typing = io.WantTextInput || state.popup || ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);

@@ -89,9 +89,10 @@ TEST_P(Screens, NothingIsCutOff)
         draw(state);
         ASSERT_FALSE(windows().empty());
         for (const ImGuiWindow* w : windows()) {
-            EXPECT_LE(w->ContentSize.x, w->InnerRect.GetWidth() + 1) << w->Name;
+            EXPECT_LE(w->WindowPadding.x + w->ContentSize.x, w->InnerRect.GetWidth() + 1) << w->Name;
             const bool rolls = (w->Flags & ImGuiWindowFlags_NoScrollbar) == 0;
-            EXPECT_TRUE(rolls || w->ContentSize.y <= w->InnerRect.GetHeight() + 1) << w->Name << ": " << w->ContentSize.y;
+            EXPECT_TRUE(rolls || w->WindowPadding.y + w->ContentSize.y <= w->InnerRect.GetHeight() + 1)
+                << w->Name << ": " << w->ContentSize.y;
         }
     }
 }
