@@ -311,6 +311,7 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
     if (!state.notice.empty()) {
         words(state.notice, orange);
     }
+    entered = entered && !state.popup;  // which keeps the focus
     Errand errand = Errand::none;
     const Screen before = state.screen;
     switch (state.screen) {

@@ -288,7 +288,7 @@ bool Stage::await(double seconds)
     return glfwGetTime() - begun >= nearly * seconds;
 }
 
-void Stage::press(Press what, bool popup)
+void Stage::press(Press what)
 {
     switch (what) {
         case Press::activate:
@@ -296,9 +296,9 @@ void Stage::press(Press what, bool popup)
         case Press::back:
             return impl_->keys.tap(GLFW_KEY_ESCAPE);
         case Press::next:
-            return impl_->keys.tap(popup ? GLFW_KEY_DOWN : GLFW_KEY_TAB);
+            return impl_->keys.tap(GLFW_KEY_TAB);
         case Press::previous:
-            return popup ? impl_->keys.tap(GLFW_KEY_UP) : impl_->keys.tap(GLFW_KEY_TAB, GLFW_KEY_LEFT_SHIFT);
+            return impl_->keys.tap(GLFW_KEY_TAB, GLFW_KEY_LEFT_SHIFT);
     }
 }
 

@@ -35,8 +35,7 @@ public:
     /// Takes in what has happened; waits for something to happen, so long at most [s]. Returns whether it waited that long.
     bool await(double seconds);
     /// The next picture sees the key that does the same.
-    /// @param popup  something lies over the screen: the focus moves as in a list
-    void press(Press what, bool popup);
+    void press(Press what);
     /// Draws the screen that `state` is at, and sees to what was pressed.
     Drawn draw(State& state);
     /// The next picture shows the screen as if it were new.

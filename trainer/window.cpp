@@ -68,7 +68,7 @@ public:
         }
         down_ = !down_ && !waiting_.empty();
         if (down_) {
-            stage_.press(waiting_.front(), state.popup);
+            stage_.press(waiting_.front());
             waiting_.pop_front();
         }
         return down_ || !waiting_.empty();

@@ -267,6 +267,24 @@ TEST(TrainerWindow, TabGoesToEverythingThatCanBePressed)
     EXPECT_FALSE(desktop.window("^Palpate trainer: Instructor$").empty()) << "beside the settings, before the list";
 }
 
+// A setting that is changed is kept at once, and all is drawn anew: behind the settings, which keep the focus.
+TEST(TrainerWindow, KeysStayInTheSettingsWhenOneIsChanged)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Desktop desktop;
+    const Folder folder;
+    const auto program = desktop.start("palpate-trainer", {"--case", "first-touch", "--sessions", folder / "s"});
+    ASSERT_FALSE(desktop.window("^Palpate trainer: Case$").empty());
+    wait(1);
+    // Settings; English, Deutsch, colours as in the body; the next ones, and what is behind them.
+    for (const char* key : {"shift+Tab", "Return", "Tab", "Tab", "Return", "Tab", "Return"}) {
+        desktop.xdotool({"key", key});
+        wait(1.5);
+    }
+    EXPECT_FALSE(desktop.window("^Palpate trainer: Case$").empty()) << "Enter chose a case behind the settings";
+}
+
 TEST(TrainerWindow, EachScreenIsDrawnToMeasureIt)
 {
     if (!can())
