@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/falcon_buttons.h>
 
 #include <base/child_process.h>
 #include <command/json.h>
@@ -38,7 +39,7 @@ struct DevicesOptions {
     bool installUdev = false;
     fs::path rules = "/etc/udev/rules.d";
     std::uint64_t exchanges = 0;
-    bool forceTest = false;
+    bool forceTest = false, buttons = false;
     std::string json;
 };
 
@@ -240,6 +241,10 @@ void devices(const DevicesOptions& o)
         installRule(o.rules);
         return;
     }
+    if (o.buttons) {
+        printButtons(o.falcon);
+        return;
+    }
     auto figures = list(o);
     if (o.exchanges > 0) {
         const Exchanges done = exchange(o);
@@ -266,11 +271,16 @@ void addDevices(CLI::App& app)
     c->add_option("--exchanges", o->exchanges,
                   "Make the Falcon ready and exchange so many packets without force: how fast, how surely")
         ->check(CLI::Range(1, 10000000));
-    c->add_flag("--force-test", o->forceTest, "Make the Falcon ready and push its grip with 1 N, to be felt");
+    auto* const buttons = c->add_flag("--buttons", o->buttons,
+                                      "Print a line for each button that is pressed at the Falcon's grip, without force, "
+                                      "until it is ended (Ctrl-C); where there is no Falcon, wait for one");
+    c->add_flag("--force-test", o->forceTest, "Make the Falcon ready and push its grip with 1 N, to be felt")
+        ->excludes(buttons);
     auto* install = c->add_flag("--install-udev", o->installUdev, "Write the rule that lets you open the Falcon (as root)");
     c->add_option("--udev-folder", o->rules, "Where udev's rules are")->capture_default_str();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)")
-        ->excludes(install);
+        ->excludes(install)
+        ->excludes(buttons);
     c->final_callback([o] { devices(*o); });
 }
 

@@ -1,5 +1,6 @@
 #include <session/trainer.h>
 
+#include <base/end_in_order.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
 
@@ -24,43 +25,7 @@ namespace palpate::session {
 namespace {
 
 using namespace haptics;
-
-std::atomic<bool> interrupted{false};
-std::atomic<int> signalled{0};
-
-void onSignal(int signal)
-{
-    signalled = signal;
-    interrupted = true;
-}
-
-// Ctrl-C, a polite kill and a terminal that is closed end the session in order; they end the program again once the session
-// is over.
-class EndInOrder {
-public:
-    EndInOrder()
-    {
-        interrupted = false;
-        signalled = 0;
-        struct sigaction action {};
-        action.sa_handler = onSignal;
-        for (std::size_t i = 0; i < signals.size(); ++i) {
-            sigaction(signals[i], &action, &before_[i]);
-        }
-    }
-    ~EndInOrder()
-    {
-        for (std::size_t i = 0; i < signals.size(); ++i) {
-            sigaction(signals[i], &before_[i], nullptr);
-        }
-    }
-    EndInOrder(const EndInOrder&) = delete;
-    EndInOrder& operator=(const EndInOrder&) = delete;
-
-private:
-    static constexpr std::array signals{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
-    std::array<struct sigaction, signals.size()> before_{};
-};
+using base::EndInOrder;
 
 std::unique_ptr<Device> openWithFaults(const TrainOptions& options, const SessionModel& model, const Broadcast& broadcast)
 {
@@ -102,7 +67,7 @@ void waitFor(const TrainOptions& options, const std::atomic<bool>& done)
             showProgress(*state);
         }
         if (options.lookAfter && !options.lookAfter()) {
-            interrupted = true;
+            EndInOrder::asked() = true;
         }
     }
     if (terminal) {
@@ -136,18 +101,18 @@ struct Trainer::Impl {
         options.servo.pause.asked = [this] {
             const auto input = broadcast.input();
             if (input && input->ended != 0 && deviceKind(options.device.name).somebodyHolds) {
-                interrupted = true;
+                EndInOrder::asked() = true;
             }
             return input && input->paused != 0;
         };
         options.servo.pause.standing = [this](bool elsewhere) {
             broadcast.stand(elsewhere ? channel::Standing::toolElsewhere : channel::Standing::paused);
         };
-        const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &interrupted};
+        const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &EndInOrder::asked()};
         timing = session.run(*device, run, [this](const TickRecord& record, const ServoTiming& soFar) {
             broadcast.publish(record, soFar, session.simulation());
             if (broadcast.torn()) {
-                interrupted = true;
+                EndInOrder::asked() = true;
             }
             if (around) {
                 around->tell(record.tick);
@@ -230,7 +195,7 @@ TrainResult Trainer::run()
         try {
             waitFor(impl_->options, done);
         } catch (...) {
-            interrupted = true;
+            EndInOrder::asked() = true;
             servo.join();
             throw;
         }
@@ -243,7 +208,7 @@ TrainResult Trainer::run()
     static_cast<SessionFigures&>(result) = impl_->session.figures();
     result.timing = std::move(impl_->timing);
     result.warnings = warnings;
-    result.signal = signalled;
+    result.signal = EndInOrder::signal();
     result.restart = impl_->wantsAnew();
     impl_->conclude(result);
     // The record is closed before a disk that is full on purpose has room again.

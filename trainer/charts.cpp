@@ -15,6 +15,8 @@ namespace palpate::trainer {
 
 namespace {
 
+constexpr Rgb ground{0.09F, 0.10F, 0.13F};
+
 using base::said;
 using base::tr;
 
@@ -84,7 +86,7 @@ std::string tickText(double v, double step)
 void drawAxes(ImDrawList& draw, const Plane& p)
 {
     const float em = ImGui::GetFontSize();
-    draw.AddRectFilled(p.from, p.to, ink({0.09F, 0.10F, 0.13F}));
+    draw.AddRectFilled(p.from, p.to, ink(ground));
     const auto rows = ticksOf(p.y.low, p.y.high, static_cast<int>((p.to.y - p.from.y) / (1.8F * em)));
     for (const double v : rows) {
         const float at = p.down(v);
@@ -104,16 +106,32 @@ void drawAxes(ImDrawList& draw, const Plane& p)
     }
 }
 
-// Its name stands above it, or below where that is asked for or needed.
-void drawLevel(ImDrawList& draw, const Plane& p, double level, Rgb colour, const std::string& name, bool below)
+// A line across that is to be reached, or not to be passed.
+struct Level {
+    double value = 0;
+    Rgb colour;
+    std::string name;
+    bool below = false;  // its name stands below it, where there is room
+};
+
+void drawLevel(ImDrawList& draw, const Plane& p, const Level& level)
 {
-    const float em = ImGui::GetFontSize(), at = p.down(level);
+    const float em = ImGui::GetFontSize(), at = p.down(level.value);
     for (float x = p.from.x; x < p.to.x; x += 0.8F * em) {
-        draw.AddLine({x, at}, {std::min(x + 0.45F * em, p.to.x), at}, ink(colour), 1.5F);
+        draw.AddLine({x, at}, {std::min(x + 0.45F * em, p.to.x), at}, ink(level.colour), 1.5F);
     }
+}
+
+// Over the curves, which would cross it out.
+void drawName(ImDrawList& draw, const Plane& p, const Level& level)
+{
+    const float em = ImGui::GetFontSize(), at = p.down(level.value);
     const bool roomAbove = at - 1.15F * em > p.from.y, roomBelow = at + 1.2F * em < p.to.y;
-    const float up = (below && roomBelow) || !roomAbove ? 0.1F * em : -1.1F * em;
-    draw.AddText({p.to.x - ImGui::CalcTextSize(name.c_str()).x - 0.3F * em, at + up}, ink(colour), name.c_str());
+    const float up = (level.below && roomBelow) || !roomAbove ? 0.1F * em : -1.1F * em;
+    const ImVec2 size = ImGui::CalcTextSize(level.name.c_str());
+    const ImVec2 from{p.to.x - size.x - 0.3F * em, at + up};
+    draw.AddRectFilled({from.x - 0.2F * em, from.y}, {p.to.x, from.y + size.y}, ink(ground, 0.6F));
+    draw.AddText(from, ink(level.colour), level.name.c_str());
 }
 
 void drawCurve(ImDrawList& draw, const Plane& p, const ChartLine& line, std::size_t number)
@@ -165,21 +183,29 @@ void drawCurves(const std::vector<ChartLine>& lines, float wide, float high)
         p.sessions = std::max(p.sessions, line.curve->values.size());
     }
     drawAxes(draw, p);
+    std::vector<Level> levels;
     for (std::size_t i = 0; i < lines.size(); ++i) {
-        const ChartLine& line = lines[i];
-        if (line.curve->atLeast) {
-            drawLevel(draw, p, *line.curve->atLeast, lines.size() > 1 ? line.colour : green,
-                      said(tr("at least {:Lg}"), *line.curve->atLeast), true);
+        const Curve& c = *lines[i].curve;
+        const bool several = lines.size() > 1;
+        const Rgb colour = several ? lines[i].colour : green;
+        if (c.atLeast) {
+            levels.push_back({*c.atLeast, colour, said(tr("at least {:Lg}"), *c.atLeast), true});
         }
-        if (line.curve->atMost) {
-            drawLevel(draw, p, *line.curve->atMost, lines.size() > 1 ? line.colour : green,
-                      lines.size() > 1 ? line.curve->label : said(tr("at most {:Lg}"), *line.curve->atMost), i > 0);
+        if (c.atMost) {
+            levels.push_back({*c.atMost, colour, several ? c.label : said(tr("at most {:Lg}"), *c.atMost), i > 0});
         }
-        drawCurve(draw, p, line, i);
     }
+    std::ranges::for_each(levels, [&](const Level& l) { drawLevel(draw, p, l); });
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        drawCurve(draw, p, lines[i], i);
+    }
+    std::ranges::for_each(levels, [&](const Level& l) { drawName(draw, p, l); });
     const char* const below = tr("session");
     draw.AddText({0.5F * (p.from.x + p.to.x - ImGui::CalcTextSize(below).x), p.to.y + 1.2F * em}, ink(quiet), below);
-    ImGui::Dummy({wide, high});
+    // What can have the focus is scrolled to by keys.
+    ImGui::PushID(lines.front().curve);
+    ImGui::InvisibleButton("chart", {wide, high});
+    ImGui::PopID();
 }
 
 Rgb groupColour(std::size_t group) noexcept

@@ -18,6 +18,7 @@ struct ChartLine {
 std::vector<double> ticksOf(double low, double high, int most);
 
 /// Draws curves by session, from 1 on, with their levels as lines across. Curves are told apart by their marks too.
+/// @pre  at least one
 /// @param wide, high  of all of it [pixels]
 void drawCurves(const std::vector<ChartLine>& lines, float wide, float high);
 

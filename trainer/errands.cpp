@@ -35,6 +35,7 @@ struct Errands::Impl {
 
     void startSession(State& state)
     {
+        grip.letGo();
         const SessionFiles files = sink.filesFor(chosenCase(state));
         const auto arguments = trainArguments(state, files);
         session.emplace(programs / "palpate", arguments, scratch / "session.log");
@@ -215,8 +216,10 @@ struct Errands::Impl {
             choosePerson(state);
         }
     }
-    void checkDevices()
+    void checkDevices(State& state)
     {
+        state.devices = {};
+        grip.letGo();
         fs::remove(scratch / "devices.json");
         devices.emplace(programs / "palpate", std::vector<std::string>{"devices", "--json", scratch / "devices.json"},
                         scratch / "devices.log");
@@ -224,6 +227,7 @@ struct Errands::Impl {
 
     void testForce(State& state)
     {
+        grip.letGo();
         fs::remove(scratch / "force.json");
         std::vector<std::string> words{"devices", "--force-test", "--json", scratch / "force.json"};
         if (!state.firmware.empty()) {
@@ -234,6 +238,7 @@ struct Errands::Impl {
     }
     void tryHand(State& state)
     {
+        grip.letGo();
         tryout.emplace(programs / "palpate", tryoutArguments(state), scratch / "tryout.log");
         state.trying = true;
     }
@@ -265,6 +270,18 @@ struct Errands::Impl {
     {
         base::useLanguage(state.settings.language);
         state.notice = writeSettings(settingsFile(), state.settings);
+    }
+
+    // Hears a device's buttons as long as they work the window. The file of a firmware is taken once it is typed.
+    void lookAtGrip(State& state)
+    {
+        if (listensToGrip(state) && !devices) {
+            firmware = state.screen == Screen::devices ? firmware : state.firmware;
+            grip.listen(firmware);
+        } else {
+            grip.letGo();
+        }
+        state.gripReady = grip.ready();
     }
 
     // What has ended of all that is beside a session.
@@ -320,6 +337,8 @@ struct Errands::Impl {
     fs::file_time_type liveRead;
     std::list<Running> eyes;  // viewers of the instructor
     int watched = 0;          // how many there were
+    Grip grip{programs, scratch / "grip.log"};
+    std::string firmware;  // that the grip was last listened to with
 };
 
 Errands::Errands(fs::path programs, ResultSink& sink) : impl_(std::make_unique<Impl>(std::move(programs), sink)) {}
@@ -364,8 +383,7 @@ void Errands::run(Errand errand, State& state)
             case Errand::compareGroups:
                 return impl_->compareGroups(state);
             case Errand::checkDevices:
-                state.devices = {};
-                return impl_->checkDevices();
+                return impl_->checkDevices(state);
             case Errand::startSession:
                 return impl_->startSession(state);
             case Errand::endSession:
@@ -396,6 +414,11 @@ void Errands::run(Errand errand, State& state)
     }
 }
 
+std::vector<Press> Errands::pressed()
+{
+    return impl_->grip.heard();
+}
+
 bool Errands::look(State& state)
 {
     bool changed = false;
@@ -419,6 +442,7 @@ bool Errands::look(State& state)
     }
     changed = impl_->lookAtHelpers(state) || changed;
     impl_->lookAtLive(state);
+    impl_->lookAtGrip(state);
     if (impl_->replay && impl_->replay->ended()) {
         impl_->replay.reset();
         state.replaying = false;

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <trainer/grip.h>
 #include <trainer/results.h>
 #include <trainer/state.h>
 
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace palpate::trainer {
 
@@ -26,6 +28,8 @@ public:
     void run(Errand errand, State& state);
     /// Looks what has ended, and tells the state. To be called often. Returns whether something changed.
     bool look(State& state);
+    /// What was pressed at a device's grip since this was last called.
+    std::vector<Press> pressed();
 
 private:
     struct Impl;

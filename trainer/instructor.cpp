@@ -96,6 +96,8 @@ std::vector<LiveSession> liveIn(const json& figures)
 {
     std::vector<LiveSession> all;
     each(figures, "sessions", [&](const json& one) { all.push_back(liveOf(one)); });
+    // A session that somebody sees again (palpate-view --replay) has a segment too; nobody trains in it.
+    std::erase_if(all, [](const LiveSession& s) { return s.session.starts_with("replay-"); });
     return all;
 }
 

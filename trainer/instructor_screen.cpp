@@ -22,6 +22,13 @@ std::string orNone(const std::optional<double>& millimetres)
     return millimetres ? said("{:.1Lf} mm", *millimetres) : "-";
 }
 
+// The scene of a case is called as the case is.
+std::string titleOf(const State& state, const LiveSession& s)
+{
+    const auto at = std::ranges::find(state.cases, s.scene, &CaseEntry::id);
+    return at != state.cases.end() ? at->title : s.scene;
+}
+
 Errand drawLive(State& state)
 {
     Instructor& i = state.instructor;
@@ -32,7 +39,8 @@ Errand drawLive(State& state)
     for (const LiveSession& s : i.live) {
         ImGui::PushID(s.session.c_str());
         ImGui::Separator();
-        heading(said("{}: {}", s.who.empty() ? s.session : s.who, s.scene), 1.15F);
+        ImGui::AlignTextToFramePadding();
+        heading(said("{}: {}", s.who.empty() ? s.session : s.who, titleOf(state, s)), 1.15F);
         besideIfRoom(tr("Watch"));
         if (ImGui::Button(tr("Watch"))) {
             i.watched = s.session;
@@ -60,6 +68,35 @@ std::string titleOf(const State& state, const KeptSession& s)
     return at != state.cases.end() ? at->title : s.caseId.empty() ? s.scene : s.caseId;
 }
 
+// When it was, what it came to.
+std::string factsOf(const KeptSession& s)
+{
+    std::string line = s.started.substr(0, 10) + " " + s.started.substr(11, 5) + " UTC";
+    line += s.total ? said(tr(", {:.0f} points"), *s.total) : "";
+    line += s.rating > 0 ? said(tr(", rated {} of 5"), s.rating) : "";
+    return line;
+}
+
+// One of them, and the others behind a button, where there is no room for a list.
+void drawKeptChoice(State& state)
+{
+    Instructor& i = state.instructor;
+    const auto& all = i.everybody.sessions;
+    const auto nameOf = [&](const KeptSession& s) { return said("{}: {}", s.name, titleOf(state, s)); };
+    ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
+    if (!ImGui::BeginCombo("##kept", (nameOf(all[i.chosen]) + ", " + factsOf(all[i.chosen])).c_str())) {
+        return;
+    }
+    for (std::size_t n = 0; n < all.size(); ++n) {
+        ImGui::PushID(static_cast<int>(n));
+        if (ImGui::Selectable((nameOf(all[n]) + ", " + factsOf(all[n])).c_str(), n == i.chosen)) {
+            chooseKept(state, n);
+        }
+        ImGui::PopID();
+    }
+    ImGui::EndCombo();
+}
+
 void drawKeptList(State& state)
 {
     Instructor& i = state.instructor;
@@ -73,14 +110,16 @@ void drawKeptList(State& state)
         } else if (ImGui::IsItemFocused() && ImGui::GetIO().NavVisible && i.chosen != n) {
             chooseKept(state, n);
         }
+        if (!ImGui::IsItemVisible()) {
+            ImGui::PopID();
+            continue;  // of hundreds a dozen are seen
+        }
         const ImVec2 next = ImGui::GetCursorPos();
         ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
         ImGui::BeginGroup();
-        ImGui::TextUnformatted(said("{}: {}", s.name, titleOf(state, s)).c_str());
-        std::string line = s.started.substr(0, 10) + " " + s.started.substr(11, 5) + " UTC";
-        line += s.total ? said(tr(", {:.0f} points"), *s.total) : "";
-        line += s.rating > 0 ? said(tr(", rated {} of 5"), s.rating) : "";
-        ImGui::TextColored(vec(i.chosen == n ? Rgb{1, 1, 1} : quiet), "%s", line.c_str());
+        const float wide = ImGui::GetContentRegionAvail().x;
+        ImGui::TextUnformatted(shortened(said("{}: {}", s.name, titleOf(state, s)), wide).c_str());
+        ImGui::TextColored(vec(i.chosen == n ? Rgb{1, 1, 1} : quiet), "%s", shortened(factsOf(s), wide).c_str());
         ImGui::EndGroup();
         ImGui::SetCursorPos(next);
         ImGui::PopID();
@@ -93,7 +132,7 @@ Errand drawKept(State& state)
     Instructor& i = state.instructor;
     const KeptSession& s = i.everybody.sessions[i.chosen];
     Errand errand = Errand::none;
-    heading(said("{}: {}", s.name, titleOf(state, s)), 1.15F);
+    roomForTwo() ? heading(said("{}: {}", s.name, titleOf(state, s)), 1.15F) : void();
     words(said(tr("Session {}, {}"), s.number, s.test ? tr("test") : tr("practice")), quiet);
     if (s.total) {
         words(said(tr("{:.0f} of 100 points"), *s.total));
@@ -131,12 +170,14 @@ Errand drawSessions(State& state)
         words(tr("No session was kept yet: choose who trains before a session begins."), quiet);
         return Errand::none;
     }
-    const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
-    const bool beside = wide > 40 * em;
-    ImGui::BeginChild("sessions", {beside ? 0.45F * wide : 0, beside ? 0 : 7 * em}, false, ImGuiWindowFlags_NavFlattened);
-    drawKeptList(state);
-    ImGui::EndChild();
-    beside ? ImGui::SameLine() : void();
+    if (roomForTwo()) {
+        ImGui::BeginChild("sessions", {0.45F * ImGui::GetContentRegionAvail().x, 0}, false, ImGuiWindowFlags_NavFlattened);
+        drawKeptList(state);
+        ImGui::EndChild();
+        ImGui::SameLine();
+    } else {
+        drawKeptChoice(state);
+    }
     ImGui::BeginChild("kept", {0, 0}, false, ImGuiWindowFlags_NavFlattened);
     const Errand errand = drawKept(state);
     ImGui::EndChild();
@@ -242,7 +283,7 @@ Errand drawGroups(State& state)
 
 Errand drawInstructor(State& state)
 {
-    heading(tr("What are they doing?"));
+    roomForTwo() ? heading(tr("What are they doing?")) : void();
     int page = static_cast<int>(state.instructor.page);
     const std::pair<const char*, InstructorPage> pages[]{{tr("Sessions that run"), InstructorPage::live},
                                                          {tr("Sessions that were kept"), InstructorPage::sessions},

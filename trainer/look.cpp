@@ -24,6 +24,8 @@ void setColours(ImGuiStyle& style)
     set(ImGuiCol_ButtonHovered, 0.22F, 0.36F, 0.53F);
     set(ImGuiCol_ButtonActive, 0.16F, 0.45F, 0.68F);
     set(ImGuiCol_Header, 0.17F, 0.30F, 0.45F);
+    set(ImGuiCol_HeaderHovered, 0.19F, 0.25F, 0.34F);
+    set(ImGuiCol_HeaderActive, 0.20F, 0.35F, 0.52F);
     set(ImGuiCol_NavHighlight, 0.90F, 0.62F, 0.00F);
     set(ImGuiCol_PlotHistogram, 0.34F, 0.71F, 0.91F);
     set(ImGuiCol_FrameBg, 0.19F, 0.21F, 0.26F);

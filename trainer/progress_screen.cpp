@@ -28,6 +28,12 @@ Rgb colourOf(Standing standing)
     }
 }
 
+std::string standingOf(const ExerciseEntry& e)
+{
+    return said(base::trn("{}, {} session", "{}, {} sessions", static_cast<unsigned long>(e.sessions)), inWords(e.standing),
+                e.sessions);
+}
+
 // The exercises of all curricula, with where one stands in each.
 Errand drawExercises(State& state, bool entered)
 {
@@ -60,16 +66,44 @@ Errand drawExercises(State& state, bool entered)
         const ImVec2 next = ImGui::GetCursorPos();
         ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
         ImGui::BeginGroup();
-        ImGui::TextUnformatted(said("{}. {}", ++number, e.title).c_str());
+        const float wide = ImGui::GetContentRegionAvail().x;
+        ImGui::TextUnformatted(shortened(said("{}. {}", ++number, e.title), wide).c_str());
         ImGui::TextColored(vec(state.exerciseShown == i ? Rgb{1, 1, 1} : colourOf(e.standing)), "%s",
-                           said(base::trn("{}, {} session", "{}, {} sessions", static_cast<unsigned long>(e.sessions)),
-                                inWords(e.standing), e.sessions)
-                               .c_str());
+                           shortened(standingOf(e), wide).c_str());
         ImGui::EndGroup();
         ImGui::SetCursorPos(next);
         ImGui::PopID();
     }
     return errand;
+}
+
+// The same where there is no room for a list: one of them, and the others behind a button.
+void chooseExercise(State& state)
+{
+    const auto& all = state.progress.exercises;
+    const auto titleOf = [&](std::size_t i) {
+        const std::string& of = all[i].curriculum;
+        const auto before = std::count_if(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i),
+                                          [&of](const ExerciseEntry& e) { return e.curriculum == of; });
+        return said("{}. {}", before + 1, all[i].title);
+    };
+    const std::size_t shown = std::min(state.exerciseShown, all.size() - 1);
+    ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
+    if (!ImGui::BeginCombo("##exercises", titleOf(shown).c_str(), ImGuiComboFlags_HeightLargest)) {
+        return;
+    }
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        if (i == 0 || all[i - 1].curriculum != all[i].curriculum) {
+            ImGui::TextColored(vec(skyBlue), "%s", all[i].curriculumTitle.c_str());
+        }
+        ImGui::PushID(static_cast<int>(i));
+        if (ImGui::Selectable((titleOf(i) + ": " + standingOf(all[i])).c_str(), i == shown)) {
+            state.exerciseShown = i;
+            state.curveShown = 0;
+        }
+        ImGui::PopID();
+    }
+    ImGui::EndCombo();
 }
 
 // One measure after the other, each with its level; the charts that tell whether somebody has learnt it.
@@ -97,10 +131,10 @@ void drawExercise(State& state)
         return;
     }
     const ExerciseEntry& e = state.progress.exercises[state.exerciseShown];
-    heading(e.title, 1.15F);
+    roomForTwo() ? heading(e.title, 1.15F) : void();
     words(e.next ? said(tr("Next. {}"), reasonFor(e)) : reasonFor(e), colourOf(e.standing));
     const auto at = std::ranges::find(state.cases, e.caseId, &CaseEntry::id);
-    if (at != state.cases.end()) {
+    if (at != state.cases.end() && roomForTwo()) {
         words(said(tr("Case: {}"), at->title), quiet);
     }
     if (e.sessions == 0 || e.curves.empty()) {
@@ -108,7 +142,7 @@ void drawExercise(State& state)
         return;
     }
     const float wide = ImGui::GetContentRegionAvail().x, em = ImGui::GetFontSize();
-    drawCurvesOf(state, e, wide, std::max(18 * em, ImGui::GetContentRegionAvail().y - 5.2F * em));
+    drawCurvesOf(state, e, wide, std::max(roomForTwo() ? 18 * em : 14 * em, ImGui::GetContentRegionAvail().y - 5.2F * em));
 }
 
 }  // namespace
@@ -128,12 +162,15 @@ Errand drawProgress(State& state, bool entered)
         words(tr("There is no curriculum."));
         return errand;
     }
-    const bool beside = wide > 44 * em;
-    ImGui::BeginChild("exercises", {beside ? 0.34F * wide : 0, beside ? -3.4F * em : 7 * em}, false,
-                      ImGuiWindowFlags_NavFlattened);
-    const Errand begun = drawExercises(state, entered);
-    ImGui::EndChild();
-    beside ? ImGui::SameLine() : void();
+    Errand begun = Errand::none;
+    if (roomForTwo()) {
+        ImGui::BeginChild("exercises", {0.34F * wide, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
+        begun = drawExercises(state, entered);
+        ImGui::EndChild();
+        ImGui::SameLine();
+    } else {
+        chooseExercise(state);
+    }
     ImGui::BeginChild("exercise", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
     drawExercise(state);
     ImGui::EndChild();

@@ -95,25 +95,29 @@ Errand drawChoices(State& state)
 Errand drawResult(State& state)
 {
     const Result& result = state.result;
-    const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
+    const float em = ImGui::GetFontSize();
     if (!result.problem.empty()) {
         heading(tr("The session has no result"));
         words(result.problem, orange);
         return ImGui::Button(tr("Try again")) ? again(state) : Errand::none;
     }
-    ImGui::BeginChild("result", {0, -(wide > 44 * em ? 6.6F : 9.6F) * em}, false, ImGuiWindowFlags_NavFlattened);
-    heading(said(tr("{:.0f} of 100 points"), result.total), 1.9F);
+    // Where texts are large, all of it rolls, and what can be done comes before the figures.
+    const bool two = roomForTwo();
+    ImGui::BeginChild("result", {0, -(two ? 6.6F : 3.4F) * em}, false, ImGuiWindowFlags_NavFlattened);
+    heading(said(tr("{:.0f} of 100 points"), result.total), two ? 1.9F : 1.45F);
     words(chosenCase(state).title, quiet);
-    ImGui::Columns(wide > 44 * em ? 2 : 1, "halves", false);
+    ImGui::Columns(two ? 2 : 1, "halves", false);
     drawParts(result);
     ImGui::Spacing();
     const Errand moment = drawLosses(state);
+    Errand chosen = two ? Errand::none : drawChoices(state);
     ImGui::NextColumn();
     drawMeasures(result);
     ImGui::Columns(1);
-    ImGui::EndChild();
+    two ? ImGui::EndChild() : void();
     words(said(tr("Record: {}"), state.files.record.string()), quiet);
-    const Errand chosen = drawChoices(state);
+    chosen = two ? drawChoices(state) : chosen;
+    two ? void() : ImGui::EndChild();
     return moment != Errand::none ? moment : chosen;
 }
 

@@ -5,6 +5,7 @@
 #include <base/said.h>
 
 #include <imgui.h>
+#include <imgui_internal.h>
 #include <imgui_stdlib.h>
 
 #include <algorithm>
@@ -33,7 +34,7 @@ Errand drawPeople(State& state)
 {
     const float em = ImGui::GetFontSize();
     Errand errand = Errand::none;
-    ImGui::SetNextItemWidth(17 * em);
+    ImGui::SetNextItemWidth((roomForTwo() ? 17 : 11) * em);
     const std::string nobody = tr("nobody: no progress is kept");
     if (ImGui::BeginCombo(tr("Who trains"), state.person.empty() ? nobody.c_str() : state.person.c_str())) {
         if (ImGui::Selectable(nobody.c_str(), state.person.empty())) {
@@ -52,8 +53,8 @@ Errand drawPeople(State& state)
         besideIfRoom(std::string(tr("Left-handed")) + "    ");
         errand = ImGui::Checkbox(tr("Left-handed"), &person->leftHanded) ? Errand::changeHand : errand;
     }
-    besideIfRoom(std::string(tr("a new name")) + "           ");
-    ImGui::SetNextItemWidth(9 * em);
+    besideIfRoom(std::string(tr("a new name")) + (roomForTwo() ? "           " : ""));
+    ImGui::SetNextItemWidth((roomForTwo() ? 9 : 8) * em);
     const bool typed =
         ImGui::InputTextWithHint("##name", tr("a new name"), &state.newPerson, ImGuiInputTextFlags_EnterReturnsTrue);
     besideIfRoom(tr("Add"));
@@ -79,8 +80,9 @@ Errand drawPeople(State& state)
 
 Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
 {
-    heading(tr("Choose a case"));
-    const float em = ImGui::GetFontSize(), high = 5.4F * em;
+    // Large letters need the room for the list, and break its lines.
+    roomForTwo() ? heading(tr("Choose a case")) : void();
+    const float em = ImGui::GetFontSize(), high = (roomForTwo() ? 5.4F : 6.6F) * em;
     Errand errand = drawPeople(state);
     ImGui::BeginChild("list", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
     for (std::size_t i = 0; i < state.cases.size(); ++i) {
@@ -101,7 +103,7 @@ Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
         }
         const ImVec2 next = ImGui::GetCursorPos();
         ImGui::SetCursorPos({at.x + 0.4F * em, at.y + 0.3F * em});
-        drawPicture(textureOf(c.picture), 7 * em, high - 0.6F * em);
+        drawPicture(textureOf(c.picture), 6.6F * em, high - 0.6F * em);
         ImGui::SetCursorPos({at.x + 7.2F * em, at.y + 0.3F * em});
         ImGui::BeginGroup();
         drawCaseFacts(c, state.chosen == i ? Rgb{1, 1, 1} : skyBlue);
@@ -181,6 +183,12 @@ Errand drawDevices(State& state)
                "the wheel along itself. By keys: Enter takes it and lets it go, arrows and pages move it. Let go, and the "
                "force fades. Every key is listed by ? in the session."));
     }
+    if (check.falconReady && state.gripReady) {
+        words(tr("The buttons of the Falcon's grip work this window: forward presses what is marked, right and left mark "
+                 "the next "
+                 "and the one before, centre goes back."),
+              skyBlue);
+    }
     ImGui::Spacing();
     const Errand errand = drawDeviceTests(state);
     ImGui::EndChild();
@@ -239,7 +247,7 @@ Errand drawFoot(State& state, bool entered)
 {
     const ImGuiIO& io = ImGui::GetIO();
     const float em = ImGui::GetFontSize();
-    ImGui::SetCursorPosY(ImGui::GetWindowHeight() - 3.0F * em);
+    ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY(), ImGui::GetWindowHeight() - 3.0F * em));
     const bool first = state.screen == Screen::cases, running = state.screen == Screen::session;
     // Esc that closes a popup closes it before it is seen here.
     const bool typing = io.WantTextInput || state.popup || ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
@@ -258,7 +266,8 @@ Errand drawFoot(State& state, bool entered)
     ImGui::PushStyleColor(ImGuiCol_Button, vec({0.0F, 0.42F, 0.31F}));
     const bool pressed = ImGui::Button(label.c_str());
     ImGui::PopStyleColor();
-    if (entered && !first && state.screen != Screen::progress) {
+    // A list beside what is chosen of it has the focus itself.
+    if (entered && !first && (state.screen != Screen::progress || !roomForTwo())) {
         ImGui::SetKeyboardFocusHere(-1);
     }
     // Where something has the focus, Enter presses that.
@@ -297,10 +306,12 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
     ImGui::Begin("Palpate", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
+    ImGui::PushItemFlag(ImGuiItemFlags_Inputable, true);  // Tab goes to all, not to text alone
     drawWay(state);
     if (!state.notice.empty()) {
         words(state.notice, orange);
     }
+    entered = entered && !state.popup;  // which keeps the focus
     Errand errand = Errand::none;
     const Screen before = state.screen;
     switch (state.screen) {
@@ -330,6 +341,7 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
         errand = drawFoot(state, entered);
     }
     state.popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
+    ImGui::PopItemFlag();
     ImGui::End();
     return errand;
 }

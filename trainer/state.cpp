@@ -28,6 +28,13 @@ void addLook(const State& state, std::vector<std::string>& words)
     }
 }
 
+// What was said on one screen is not said on the next.
+void turnTo(State& state, Screen screen)
+{
+    state.screen = screen;
+    state.notice.clear();
+}
+
 }  // namespace
 
 const CaseEntry& chosenCase(const State& state)
@@ -72,15 +79,15 @@ Errand goOn(State& state)
                 return Errand::none;
             }
             state.exercise.clear();
-            state.screen = Screen::devices;
+            turnTo(state, Screen::devices);
             return Errand::checkDevices;
         case Screen::progress:
             return trainExercise(state, state.exerciseShown);
         case Screen::instructor:
-            state.screen = Screen::cases;
+            turnTo(state, Screen::cases);
             return Errand::none;
         case Screen::devices:
-            state.screen = Screen::briefing;
+            turnTo(state, Screen::briefing);
             return Errand::none;
         case Screen::briefing:
             return state.running || state.trying || state.pushing ? Errand::none : Errand::startSession;
@@ -94,7 +101,7 @@ Errand goOn(State& state)
     }
     // The next one in the list; from the last one back to the list's beginning.
     state.chosen = (state.chosen + 1) % std::max<std::size_t>(state.cases.size(), 1);
-    state.screen = Screen::cases;
+    turnTo(state, Screen::cases);
     return Errand::none;
 }
 
@@ -107,10 +114,10 @@ Errand goBack(State& state)
         case Screen::result:
         case Screen::progress:
         case Screen::instructor:
-            state.screen = Screen::cases;
+            turnTo(state, Screen::cases);
             return Errand::none;
         case Screen::briefing:
-            state.screen = Screen::devices;
+            turnTo(state, Screen::devices);
             return Errand::none;
         case Screen::session:
             break;
@@ -123,7 +130,7 @@ Errand again(State& state)
     if (state.screen != Screen::result) {
         return Errand::none;
     }
-    state.screen = Screen::briefing;
+    turnTo(state, Screen::briefing);
     return Errand::none;
 }
 
@@ -132,6 +139,13 @@ Errand debrief(State& state, std::optional<double> at)
     state.from = at;
     return state.screen == Screen::result && state.result.problem.empty() && !state.replaying ? Errand::startDebrief
                                                                                               : Errand::none;
+}
+
+bool listensToGrip(const State& state) noexcept
+{
+    const bool taken =
+        state.running || state.trying || state.pushing || (state.screen == Screen::devices && !state.devices.done);
+    return state.listening && !taken && state.screen != Screen::session;
 }
 
 PersonEntry* chosenPerson(State& state) noexcept
@@ -145,7 +159,7 @@ Errand showProgress(State& state)
     if (chosenPerson(state) == nullptr || state.running) {
         return Errand::none;
     }
-    state.screen = Screen::progress;
+    turnTo(state, Screen::progress);
     state.exerciseShown = state.curveShown = 0;
     return Errand::choosePerson;
 }
@@ -174,8 +188,7 @@ Errand trainExercise(State& state, std::size_t exercise)
     state.chosen = static_cast<std::size_t>(at - state.cases.begin());
     state.exercise = e.curriculum + "/" + e.id;
     state.test = e.test;
-    state.notice.clear();
-    state.screen = Screen::devices;
+    turnTo(state, Screen::devices);
     return Errand::checkDevices;
 }
 
@@ -184,7 +197,7 @@ Errand showInstructor(State& state)
     if (state.running) {
         return Errand::none;
     }
-    state.screen = Screen::instructor;
+    turnTo(state, Screen::instructor);
     return Errand::loadEverybody;
 }
 

@@ -86,6 +86,8 @@ struct State {
     std::string exercise;             // that the session is of, "CURRICULUM/EXERCISE"; empty: none
     Instructor instructor;
     DeviceCheck devices;
+    bool listening = false;  // keys go to this window, and so do the buttons of a device
+    bool gripReady = false;  // there is a device whose buttons work this window
     bool useFalcon = false;  // else the mouse
     std::string firmware;    // of the Falcon, a file
     bool test = false;       // without hints
@@ -137,6 +139,9 @@ Errand goBack(State& state);
 Errand again(State& state);
 /// Result screen: replay of the session, from the beginning or from the moment of a loss of points.
 Errand debrief(State& state, std::optional<double> at = std::nullopt);
+
+/// Whether buttons of a device work the window now: nobody else has the device, and keys go to the window.
+bool listensToGrip(const State& state) noexcept;
 
 /// Where somebody stands. Nothing where nobody is chosen.
 Errand showProgress(State& state);

@@ -58,6 +58,24 @@ void besideIfRoom(const std::string& label)
     }
 }
 
+std::string shortened(const std::string& text, float wide)
+{
+    std::string out = text;
+    for (std::size_t end = text.size(); end > 0 && ImGui::CalcTextSize(out.c_str()).x > wide;) {
+        // To where a character begins, in UTF-8.
+        do {
+            --end;
+        } while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U);
+        out = text.substr(0, end) + "...";
+    }
+    return out;
+}
+
+bool roomForTwo()
+{
+    return ImGui::GetIO().DisplaySize.x > 52 * ImGui::GetFontSize();
+}
+
 Errand drawSettings(State& state)
 {
     const std::string title = std::string(tr("Settings")) + "###settings";

@@ -25,6 +25,11 @@ bool enterPressed();
 /// Puts the next widget beside the one before, or below it where a row has no room for `label`.
 void besideIfRoom(const std::string& label);
 
+/// The text, with its end left out where it is wider than so many pixels.
+std::string shortened(const std::string& text, float wide);
+/// Whether a list and what is chosen of it have room side by side in the window.
+bool roomForTwo();
+
 /// Where somebody stands: exercises, learning curves, CUSUM.
 Errand drawProgress(State& state, bool entered);
 /// Sessions that run, those that were kept, groups.

@@ -40,6 +40,7 @@ TEST(DevicesCommand, OptionsOfTheFalconNeedTheFalcon)
 {
     expectRefusal({"train", "block", "--no-view", "--on-unplug", "wait"}, "goes with --device falcon");
     expectRefusal({"train", "block", "--device", "falcon", "--unpaced"}, "somebody holds it");
+    expectRefusal({"devices", "--buttons", "--force-test"}, "--buttons");
     expectRefusal({"train", "block", "--device", "falcon", "--trainee", "expert"}, "needs --device hand");
 }
 

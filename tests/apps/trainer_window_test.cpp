@@ -249,5 +249,61 @@ TEST(TrainerWindow, PalpateAloneOpensItOnADesktopAndItsHelpElsewhere)
     EXPECT_NE(bare.err.find("palpate --help"), std::string::npos);
 }
 
+// From the list of cases back over the buttons above it, whatever is beside or below what.
+TEST(TrainerWindow, TabGoesToEverythingThatCanBePressed)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Desktop desktop;
+    const Folder folder;
+    const auto program = desktop.start("palpate-trainer", {"--case", "first-touch", "--sessions", folder / "s"});
+    ASSERT_FALSE(desktop.window("^Palpate trainer: Case$").empty());
+    wait(1);
+    for (int i = 0; i < 2; ++i) {
+        desktop.xdotool({"key", "shift+Tab"});
+        wait(1);
+    }
+    desktop.xdotool({"key", "Return"});
+    EXPECT_FALSE(desktop.window("^Palpate trainer: Instructor$").empty()) << "beside the settings, before the list";
+}
+
+// A setting that is changed is kept at once, and all is drawn anew: behind the settings, which keep the focus.
+TEST(TrainerWindow, KeysStayInTheSettingsWhenOneIsChanged)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Desktop desktop;
+    const Folder folder;
+    const auto program = desktop.start("palpate-trainer", {"--case", "first-touch", "--sessions", folder / "s"});
+    ASSERT_FALSE(desktop.window("^Palpate trainer: Case$").empty());
+    wait(1);
+    // Settings; English, Deutsch, colours as in the body; the next ones, and what is behind them.
+    for (const char* key : {"shift+Tab", "Return", "Tab", "Tab", "Return", "Tab", "Return"}) {
+        desktop.xdotool({"key", key});
+        wait(1.5);
+    }
+    EXPECT_FALSE(desktop.window("^Palpate trainer: Case$").empty()) << "Enter chose a case behind the settings";
+}
+
+TEST(TrainerWindow, EachScreenIsDrawnToMeasureIt)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Desktop desktop;
+    const Folder folder;
+    const auto program = desktop.start("palpate-trainer",
+                                       {"--frames", "3", "--screens", "--json", folder / "f", "--sessions", folder / "s"});
+    ASSERT_EQ(program->wait().status, 0);
+    const auto json = nlohmann::json::parse(readText(folder / "f"));
+    EXPECT_EQ(json.at("frames"), 3 * json.at("screens").size());
+    for (const char* screen : {"case", "device", "briefing", "session", "result", "progress", "instructor, live",
+                               "instructor, kept", "instructor, groups"}) {
+        const auto& of = json.at("screens").at(screen);
+        EXPECT_EQ(of.at("frames"), 3) << screen;
+        EXPECT_GT(of.at("frame_ms_p50"), 0) << screen;
+        EXPECT_LE(of.at("frame_ms_p50"), of.at("frame_ms_max")) << screen;
+    }
+}
+
 }  // namespace
 }  // namespace palpate::apps

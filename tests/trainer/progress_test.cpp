@@ -73,8 +73,11 @@ TEST(Instructor, SessionsThatRunAreReadAsTheCommandWritesThem)
        "warned": "vein", "force_n": 1.5, "cores": 1, "last_core_target_pct": 45},
       {"session": "train-2", "who": "", "scene": "breast", "process": 2, "state": "paused", "seconds": 1, "age_s": 30,
        "inserted_mm": 0, "target": "tumour", "target_mm": 3, "vital": null, "vital_mm": null, "warning": "none",
+       "warned": null, "force_n": 0, "cores": 0, "last_core_target_pct": null},
+      {"session": "replay-3", "who": "Ada", "scene": "breast", "process": 3, "state": "outside", "seconds": 1, "age_s": 0,
+       "inserted_mm": 0, "target": "tumour", "target_mm": 3, "vital": null, "vital_mm": null, "warning": "none",
        "warned": null, "force_n": 0, "cores": 0, "last_core_target_pct": null}]})"));
-    ASSERT_EQ(all.size(), 2U);
+    ASSERT_EQ(all.size(), 2U) << "what is seen again does not run";
     EXPECT_TRUE(all[0].touching && !all[0].stuck);
     EXPECT_NE(all[0].warning.find("vein"), std::string::npos);
     EXPECT_TRUE(all[0].target == 3.0 && !all[0].vital && all[0].lastCore == 45.0);

@@ -68,6 +68,18 @@ TEST(State, TheBestScoreNeverFallsAndAFailedSessionIsNone)
     EXPECT_EQ(debrief(state), Errand::none) << "there is nothing to see again";
 }
 
+TEST(State, WhatIsSaidOnAScreenIsNotSaidOnTheNext)
+{
+    State state = firstState();
+    showInstructor(state);
+    state.notice = "Put somebody into each of the two groups.";
+    goBack(state);
+    EXPECT_EQ(state.notice, "");
+    state.notice = "palpate: no such profile";
+    goOn(state);
+    EXPECT_EQ(state.notice, "");
+}
+
 // Whatever is pressed in whatever order: a session runs on its own screen and on no other, and one case is chosen.
 TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
 {

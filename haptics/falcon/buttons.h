@@ -1,0 +1,41 @@
+#pragma once
+
+#include <haptics/falcon/link.h>
+
+#include <cstdint>
+#include <functional>
+#include <string_view>
+
+namespace palpate::falcon {
+
+/// Tells presses of the grip's buttons from what the packets say of them. A packet has no checksum, so a button is down or
+/// up once all readings have said so for `settled`. What is down from the first reading on is no press.
+class Presses {
+public:
+    static constexpr double settled = 20e-3;  // [s]
+
+    /// @param buttons  of a reading: buttonRight | ...
+    /// @param now      when it came [s]
+    /// @returns        those that have gone down
+    std::uint8_t take(std::uint8_t buttons, double now) noexcept;
+
+private:
+    std::uint8_t down_ = 0xFF;
+    std::uint8_t seen_ = 0;
+    double since_ = 0;  // [s]
+    bool begun_ = false;
+};
+
+/// "right", "forward", "centre" or "left".
+/// @param button  one of buttonRight, ...
+std::string_view nameOf(std::uint8_t button) noexcept;
+
+/// Tells each press of a button, without a force, until the Falcon is lost or `ended` says so.
+/// @param link     connected; it need not be homed
+/// @param wire     the link's, for its clock
+/// @param pressed  is told one button at a time
+/// @param ended    is asked about a hundred times a second
+void watchButtons(Link& link, Transport& wire, const std::function<void(std::uint8_t)>& pressed,
+                  const std::function<bool()>& ended);
+
+}  // namespace palpate::falcon
