@@ -67,7 +67,8 @@ TEST(MachineRates, CountWhatTheLoopsDo)
 {
     for (const RateLoops* loops : {&ratesV2, &ratesAvx2, &ratesAvx512}) {
         const auto sets = chainmail::supportedKernels();
-        const auto found = std::ranges::find_if(sets, [&](const auto* k) { return std::string_view(k->name) == loops->name; });
+        const auto found =
+            std::ranges::find_if(sets, [&](const auto* k) { return std::string_view(k->name) == loops->name; });
         if (found == sets.end())
             continue;
         const auto lanes = static_cast<double>((*found)->width);
