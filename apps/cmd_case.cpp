@@ -172,7 +172,7 @@ void draw(const Options& o)
     progress.clear();
     fmt::print("{}\n", to.string());
     if (c.picture.empty() && o.picture.empty()) {
-        fmt::print("name it in {}: picture = \"{}\"\n", (c.folder / training::caseFile).string(), to.filename().string());
+        training::namePicture(c, to.filename().string());
     }
 }
 

@@ -57,4 +57,10 @@ struct NewCase {
 /// all. Throws std::runtime_error. @returns the case
 Case makeCase(const NewCase& wanted);
 
+/// Names a picture in a case's case.toml, which stays as it is but for that line at its beginning.
+/// @param made     a case without a picture
+/// @param picture  name of a PNG file in the case's folder
+/// Throws std::runtime_error.
+void namePicture(const Case& made, const std::string& picture);
+
 }  // namespace palpate::training

@@ -10,7 +10,10 @@
 
 #include <unistd.h>
 
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
+#include <string>
 
 namespace palpate::training {
 
@@ -70,6 +73,16 @@ Case makeCase(const NewCase& wanted)
         throw;
     }
     return loadCase(folder);
+}
+
+void namePicture(const Case& made, const std::string& picture)
+{
+    const fs::path file = made.folder / caseFile;
+    std::ifstream in(file);
+    const std::string text{std::istreambuf_iterator<char>(in), {}};
+    // Before any table, a key is the case's own.
+    base::writeWhole(file, fmt::format("picture = {}\n{}", datasets::tomlString(picture), text));
+    loadCase(made.folder);
 }
 
 }  // namespace palpate::training

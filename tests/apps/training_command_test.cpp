@@ -140,6 +140,15 @@ TEST_F(TrainingCommands, ACaseIsMadeOfAVolumeAndTrained)
     EXPECT_EQ(checked.status, 1);
     EXPECT_NE(checked.out.find("picture: there is none"), std::string::npos) << checked.out;
     EXPECT_EQ(checked.out.find("trains"), std::string::npos) << checked.out;
+    // What check asks for, in the words of its message.
+    if (fs::exists(PALPATE_BIN_DIR "/palpate-view")) {
+        const Outcome drawn = palpate({"case", "picture", folder_ / "mine"});
+        EXPECT_EQ(drawn.status, 0) << drawn.err;
+        const Outcome again = palpate({"case", "check", folder_ / "mine"});
+        EXPECT_EQ(again.status, 0) << again.out << again.err;
+        EXPECT_EQ(palpate({"case", "picture", folder_ / "mine"}).status, 0);
+        EXPECT_EQ(palpate({"case", "check", folder_ / "mine"}).status, 0);
+    }
     // The volume went along: the folder can be given away.
     fs::remove(volume);
     const auto trained = figures({"train", "--case", folder_ / "mine", "--headless", "--unpaced", "--seconds", "0.5"});

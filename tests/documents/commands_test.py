@@ -1,26 +1,32 @@
-"""Every command on every page names what there is; those of the tutorials run as they stand; every picture is in the gallery.
+"""Every command on every page names what there is and runs, or it is marked why not; every picture is in the gallery.
 
     PALPATE_BIN=build/dev/bin commands_test.py
 """
 
+import importlib.machinery
+import importlib.util
 import os
 import pathlib
 import re
 import subprocess
 import tempfile
+import tomllib
 import unittest
 
 from commands import ROOT, Checker, commands_of, documents
 
 BIN = pathlib.Path(os.environ["PALPATE_BIN"])
 PYTHON = os.environ.get("PYTHONPATH")
-TUTORIALS = ("trainer", "researcher", "experimenter")
-# What the tutorials' test does not run, and why. tutorial-developer.md: scripts/check-package builds the examples with CMake and
-# with pkg-config, and the rest are the checks that this test is one of; its Python is run.
-NOT_RUN = {
-    "palpate-view --replay vessel.db": "opens a window: tests/apps/replay_view_test.cpp plays records",
-    "palpate plan block --error 3% --budget 2ms --json plan.json": "measures for half a minute: tests/apps/model_command_test.cpp",
-}
+
+
+def module(path):
+    loader = importlib.machinery.SourceFileLoader("check_pages", str(path))
+    found = importlib.util.module_from_spec(importlib.util.spec_from_loader("check_pages", loader))
+    loader.exec_module(found)
+    return found
+
+
+runner = module(ROOT / "scripts/check-pages")
 
 
 class Commands(unittest.TestCase):
@@ -49,26 +55,47 @@ class Commands(unittest.TestCase):
             self.assertEqual([checker.fault(words) for _, words in commands_of(right + "\n") if checker.fault(words)], [])
 
 
-class Tutorials(unittest.TestCase):
-    def test_every_step_runs_in_order(self):
-        for name in TUTORIALS:
-            with self.subTest(name), tempfile.TemporaryDirectory() as folder:
-                page = (ROOT / "docs" / f"tutorial-{name}.md").read_text(encoding="utf-8")
-                self.follow(page, pathlib.Path(folder))
+class Pages(unittest.TestCase):
+    """What scripts/check-pages runs, and that it fails where a command does. It runs each page in a test of ctest's."""
 
-    def follow(self, page, folder):
-        for file, text in re.findall(r"this is `([\w.]+)`:\n\n```\w+\n(.*?)```", page, re.S):
-            (folder / file).write_text(text, encoding="utf-8")
-        environment = {"PATH": f"{BIN}:/usr/bin:/bin", "HOME": str(folder), "LC_ALL": "C.UTF-8", "PYTHONPATH": PYTHON or ""}
-        ran = 0
-        for line in steps(page):
-            if line in NOT_RUN or (line.startswith("#python\n") and not PYTHON):
-                continue
-            command = ["/usr/bin/python3", "-B", "-c", line] if line.startswith("#python\n") else ["bash", "-c", line]
-            done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-            self.assertEqual(done.returncode, 0, f"{line}\n{done.stdout[-1000:]}{done.stderr}")
-            ran += 1
-        self.assertGreater(ran, 4)
+    def test_every_mark_names_a_command_of_its_page_and_says_why(self):
+        marks = tomllib.loads(runner.MARKS.read_text(encoding="utf-8"))
+        texts = {page.name: page.read_text(encoding="utf-8") for page in documents()}
+        for page, own in marks.items():
+            keys = {key for _, key, _ in runner.steps(texts[page])}
+            self.assertEqual(set(own) - {"before"} - keys, set(), page)
+            for command, mark in own.items():
+                if command != "before":
+                    self.assertRegex(mark, r"^(as|full|full as|build|window|device|root|network|data|cluster): \S", f"{page}: {command}")
+
+    def test_most_commands_run(self):
+        marks = tomllib.loads(runner.MARKS.read_text(encoding="utf-8"))
+        kinds = []
+        for page in documents():
+            own = marks.get(page.name, {})
+            kinds += [own.get(key, "as").partition(":")[0] for _, key, _ in runner.steps(page.read_text(encoding="utf-8"))]
+        run, never = kinds.count("as"), [kind for kind in kinds if kind not in ("as", "full", "full as")]
+        self.assertGreater(run, 2 * len(kinds) / 5)
+        self.assertLess(len(never), len(kinds) / 3)
+
+    def outcome(self, page):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "page.md"
+            file.write_text(page, encoding="utf-8")
+            return subprocess.run([ROOT / "scripts/check-pages", "--build", BIN.parent, file], capture_output=True, text=True)
+
+    def test_a_command_that_fails_fails_its_page_by_file_and_line(self):
+        done = self.outcome("One:\n\n    palpate version\n    palpate info nosuch.vdb\n    palpate version | grep palpate\n")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("page.md:4: status 1: palpate info nosuch.vdb", done.stderr)
+        self.assertIn("3 commands of 1 pages ran, 1 failed", done.stdout)
+
+    def test_commands_have_the_files_of_those_before_and_loops_are_one(self):
+        done = self.outcome("This is `n.txt`:\n\n```csv\n1\n2\n```\n\n    for n in $(cat n.txt); do\n    palpate phantom block --voxel $((2 + n)) "
+                            "-o $n.vdb   # each\n    done\n\nthen\n\n    palpate info \\\n        2.vdb\n\n    a table    1\n\n    palpate info 1.vdb | grep -q skin && false\n")
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("3 commands of 1 pages ran, 1 failed", done.stdout)
+        self.assertIn("page.md:19: status 1", done.stderr)
 
     @unittest.skipUnless(PYTHON, "built without Python")
     def test_the_developers_python_runs(self):
@@ -76,12 +103,6 @@ class Tutorials(unittest.TestCase):
         code = re.search(r"^```python\n(.*?)^```", page, re.S | re.M)[1]
         done = subprocess.run(["/usr/bin/python3", "-B", "-c", code], capture_output=True, text=True)
         self.assertRegex(done.stdout, r"^0\.\d+ N\n$", done.stderr)
-
-
-def steps(page):
-    """Commands of indented lines and Python blocks, in their order; the latter begin with a line of their own."""
-    for line, python in re.findall(r"^    (\S.*)$|^```python\n((?:.*\n)*?)```", page, re.M):
-        yield line or "#python\n" + python
 
 
 class Gallery(unittest.TestCase):
