@@ -28,6 +28,8 @@ using nlohmann::json;
 
 constexpr int warmUp = 40;  // ticks before those that count
 constexpr int counted = 160;
+constexpr double probeAside = 15e-3;  // of the ball, and how deep it presses [m]
+constexpr double probePress = 4e-3;
 
 // Streams through more memory than caches hold, on another core if there is one.
 class Neighbour {
@@ -54,7 +56,7 @@ private:
     std::thread thread_;
 };
 
-haptics::SessionModel smallBlock(const std::string& setting)
+haptics::SessionModel smallBlock(const std::string& setting, bool probe)
 {
     datasets::Scene scene = *datasets::builtInScene("block");
     scene.source.phantom.numbers["width_mm"] = 60;
@@ -62,6 +64,10 @@ haptics::SessionModel smallBlock(const std::string& setting)
     scene.source.phantom.voxel = 2e-3;
     scene.model.level = datasets::ModelLevel::elastic;
     scene.model.elastic = datasets::elasticSetting(setting);
+    if (probe) {
+        scene.probe.kind = datasets::ProbeKind::linear;
+        scene.probe.face = {0, 0, probeAside};
+    }
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
     return haptics::buildModel(std::move(scene), std::move(tissue));
 }
@@ -103,9 +109,9 @@ FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>&
     return {"default", words};
 }
 
-TickTime measureSetting(const std::string& setting)
+TickTime measureSetting(const std::string& setting, bool probe)
 {
-    const haptics::SessionModel model = smallBlock(setting);
+    const haptics::SessionModel model = smallBlock(setting, probe);
     haptics::Simulation simulation(model);
     const Neighbour viewer;
     haptics::Histogram times;
@@ -114,6 +120,7 @@ TickTime measureSetting(const std::string& setting)
     for (int tick = 0; tick < warmUp + counted; ++tick) {
         const double swing = 0.02 * tick;
         sample.position = {4e-3 * std::sin(swing), 0.4 * radius * (1.0 - std::cos(swing)) - radius, 0};
+        sample.probe.press = 0.5 * probePress * (1.0 - std::cos(swing));
         const double start = base::processorTime();
         simulation.tick(sample);
         if (tick >= warmUp) {
@@ -124,27 +131,35 @@ TickTime measureSetting(const std::string& setting)
     return {p.p50, p.p99};
 }
 
-FittingSetting fittingHere(const std::filesystem::path& cache)
+FittingSetting fittingHere(const std::filesystem::path& cache, bool probe)
 {
     json known;
     if (std::ifstream in(cache); in) {
         known = json::parse(in, nullptr, false);
     }
-    const std::string here = key();
-    const auto text = [&known](const char* name) {
-        const auto found = known.is_object() ? known.find(name) : known.end();
-        return known.is_object() && found != known.end() && found->is_string() ? found->get<std::string>() : "";
+    if (!known.is_object() || known.value("machine", json()) != key()) {
+        known = json{{"machine", key()}};
+    }
+    const char* const what = probe ? "tool and probe" : "tool";
+    const json kept = known.value(what, json::object());
+    const auto text = [&kept](const char* name) {
+        const auto found = kept.is_object() ? kept.find(name) : kept.end();
+        return kept.is_object() && found != kept.end() && found->is_string() ? found->get<std::string>() : "";
     };
     const auto names = datasets::elasticSettings();
-    if (text("machine") == here && std::find(names.begin(), names.end(), text("setting")) != names.end()) {
+    if (std::find(names.begin(), names.end(), text("setting")) != names.end()) {
         return {text("setting"), text("reason")};
     }
-    FittingSetting found = fittingSetting(measureSetting);
+    FittingSetting found = fittingSetting([probe](const std::string& setting) { return measureSetting(setting, probe); });
+    if (probe) {
+        found.reason = "with a probe beside the tool " + found.reason;
+    }
     if (!cache.empty()) {
         std::error_code none;
         std::filesystem::create_directories(cache.parent_path(), none);
+        known[what] = {{"setting", found.setting}, {"reason", found.reason}};
         try {
-            base::writeWhole(cache, json{{"machine", here}, {"setting", found.setting}, {"reason", found.reason}}.dump());
+            base::writeWhole(cache, known.dump());
         } catch (const std::exception&) {
             // The next session measures again.
         }

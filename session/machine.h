@@ -28,11 +28,15 @@ FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>&
 
 /// A ball pressed into a small block, as fast as it goes, while another thread keeps the memory busy as a viewer does: 0.1
 /// s. Times are of the processor, so that other programs do not count: the servo thread goes before them.
-TickTime measureSetting(const std::string& setting);
+/// @param setting  of level `elastic`
+/// @param probe  an ultrasound probe is pressed beside the ball
+TickTime measureSetting(const std::string& setting, bool probe = false);
 
 /// fittingSetting() of this machine and build, from `cache` where it is known; else it is measured, and written there. A
 /// cache that cannot be read or written costs the measurement and nothing else.
-FittingSetting fittingHere(const std::filesystem::path& cache);
+/// @param cache  the file
+/// @param probe  of a scene with an ultrasound probe: the body has two tools to bear
+FittingSetting fittingHere(const std::filesystem::path& cache, bool probe = false);
 
 /// $XDG_CACHE_HOME/palpate/machine.json or ~/.cache/palpate/machine.json; empty where there is no home.
 std::filesystem::path machineCache();

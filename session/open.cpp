@@ -118,7 +118,7 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
 {
     const bool elastic = changes.model.value_or(std::string(levelOf(scene))) == "elastic";
     if (changes.fit && elastic && !changes.setting && !scene.model.settingNamed) {
-        changes.setting = changes.fit();
+        changes.setting = changes.fit(scene.probe.kind != datasets::ProbeKind::none);
     }
     if (!anyOf(changes)) {
         return scene;

@@ -218,8 +218,7 @@ std::vector<std::string> faultsOf(const Case& made)
     try {
         const haptics::SessionModel model = session::openSession(made.scene, {});
         const bool find = model.scene.task == datasets::SessionTask::find;
-        // The picture of a palpation would show what is to be found.
-        if (!find && made.picture.empty()) {
+        if (made.picture.empty()) {
             add("picture: there is none; palpate case picture makes one");
         }
         for (const std::string& key : made.measures) {

@@ -71,6 +71,19 @@ TEST(FittingSetting, IsKeptAndACacheThatIsDamagedIsMeasuredAnew)
     }
 }
 
+// A body that bears a probe too asks for more, and each has its own entry.
+TEST(FittingSetting, OfASceneWithAProbeIsMeasuredWithOne)
+{
+    const tests::Folder folder;
+    const std::filesystem::path cache = folder / "machine.json";
+    const FittingSetting alone = fittingHere(cache), both = fittingHere(cache, true);
+    EXPECT_EQ(alone.reason.find("probe"), std::string::npos);
+    EXPECT_NE(both.reason.find("probe"), std::string::npos) << both.reason;
+    EXPECT_EQ(fittingHere(cache).reason, alone.reason);
+    EXPECT_EQ(fittingHere(cache, true).reason, both.reason) << "it was measured again";
+    EXPECT_GT(measureSetting("fast", true).p50, 0.0);
+}
+
 TEST(FittingSetting, NeedsNoCache)
 {
     EXPECT_FALSE(fittingHere({}).setting.empty());
