@@ -48,4 +48,20 @@ private:
     channel::State state_;
 };
 
+/// Whether viewers ask for a pause. A viewer that was stopped in the middle of its writing has said nothing new: what it
+/// asked for before holds.
+class PauseAsked {
+public:
+    /// @param input  what was read now; none: it was not whole
+    /// @returns  whether a pause is asked for
+    bool after(const std::optional<channel::Input>& input) noexcept
+    {
+        asked_ = input ? input->paused != 0 : asked_;
+        return asked_;
+    }
+
+private:
+    bool asked_ = false;
+};
+
 }  // namespace palpate::haptics

@@ -272,5 +272,20 @@ TEST(Histogram, QuantilesAreWithinOnePercentOfTheExactOnes)
     EXPECT_DOUBLE_EQ(h.percentiles().max, 1e-3);
 }
 
+// A viewer that the servo's thread stops in the middle of its writing ends no pause, and begins none.
+TEST(Servo, APauseIsAskedForUntilAWholeInputSaysOtherwise)
+{
+    PauseAsked asked;
+    channel::Input input;
+    EXPECT_FALSE(asked.after(std::nullopt));
+    EXPECT_FALSE(asked.after(input));
+    input.paused = 1;
+    EXPECT_TRUE(asked.after(input));
+    EXPECT_TRUE(asked.after(std::nullopt));
+    input.paused = 0;
+    EXPECT_FALSE(asked.after(input));
+    EXPECT_FALSE(asked.after(std::nullopt));
+}
+
 }  // namespace
 }  // namespace palpate::haptics

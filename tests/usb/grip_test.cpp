@@ -182,6 +182,10 @@ TEST(Grip, ItsButtonsWorkTheScreensAndASessionGetsTheFalcon)
     bench.device.hand.buttons = 0;
     EXPECT_TRUE(bench.heard(20));
     ASSERT_TRUE(bench.press(buttonCentre, at("Case")));
+    // Whoever has the Falcon lets it go before the kernel is gone.
+    window.trainer->send(SIGTERM);
+    window.trainer->wait();
+    EXPECT_TRUE(waitFor([&] { return !bench.kernel.claimed; }));
 }
 
 }  // namespace
