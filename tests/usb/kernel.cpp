@@ -7,9 +7,18 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <mutex>
 #include <string>
 
 namespace palpate::falcon {
+
+namespace {
+
+// Questions come in a thread of umockdev's, also while a kernel ends: a program that was killed is still being let go.
+std::mutex asking;
+const Kernel* alive = nullptr;
+
+}  // namespace
 
 Kernel::Kernel(Emulator& device) : device_(device), bed_(umockdev_testbed_new()), handler_(umockdev_ioctl_base_new())
 {
@@ -27,12 +36,20 @@ Kernel::Kernel(Emulator& device) : device_(device), bed_(umockdev_testbed_new())
     g_free(root);
     std::filesystem::create_directories(file.parent_path());
     g_file_set_contents(file.c_str(), reinterpret_cast<const gchar*>(descriptors.data()), descriptors.size(), nullptr);
+    {
+        const std::lock_guard lock(asking);
+        alive = this;
+    }
     g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(onIoctl), this);
     umockdev_testbed_attach_ioctl(bed_, usbNode, handler_, nullptr);
 }
 
 Kernel::~Kernel()
 {
+    {
+        const std::lock_guard lock(asking);
+        alive = nullptr;
+    }
     umockdev_testbed_detach_ioctl(bed_, usbNode, nullptr);
     g_object_unref(handler_);
     g_object_unref(bed_);
@@ -149,7 +166,12 @@ void Kernel::discard(UMockdevIoctlClient* client, UMockdevIoctlData* argument)
 
 gboolean Kernel::onIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self)
 {
-    static_cast<Kernel*>(self)->answer(client);
+    const std::lock_guard lock(asking);
+    if (alive == self) {
+        static_cast<Kernel*>(self)->answer(client);
+    } else {
+        umockdev_ioctl_client_complete(client, -1, ENODEV);
+    }
     return TRUE;
 }
 
