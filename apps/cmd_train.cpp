@@ -103,6 +103,13 @@ std::string deviceInWords(const Options& o)
     return o.trainee.empty() ? o.device : fmt::format("{} (seed {})", o.trainee, o.changes.seed.value_or(1));
 }
 
+// Pictures of a record are those of its events, on a machine that is busy too, and no viewer is beside the servo loop.
+bool drawsLater(const Options& o)
+{
+    const bool live = wantsWindow(o) || recordFile(o).empty() || session::has(o.faults, session::FaultKind::stallViewer);
+    return !o.pictures.empty() && (o.unpaced || !live);
+}
+
 // What would strike nothing would show nothing.
 void checkFaults(const Options& o)
 {
@@ -137,16 +144,6 @@ void checkDevice(const Options& o)
     }
 }
 
-// "hand (a scripted trainee), mouse (of the viewer's window), ... or a record (.db) whose poses are played"
-std::string devicesInWords()
-{
-    std::string words;
-    for (const session::DeviceKind& kind : session::deviceKinds()) {
-        words += fmt::format("{}{}{}", words.empty() ? "" : ", ", kind.name.empty() ? "or " : "", kind.what);
-    }
-    return words;
-}
-
 // The tasks are built-in scenes; that of the scene itself goes with any.
 const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-biopsy",
                                      "near-vessel", "behind-rib",     "find-lump"};
@@ -177,6 +174,9 @@ void checkOutputs(const Options& o)
     base::checkOutput(o.json);
     base::checkOutput(o.report);
     base::checkOutputFolder(o.pictures);
+    if (drawsLater(o)) {
+        checkViewer();
+    }
     const auto record = recordFile(o);
     base::checkOutput(record);
     if (!record.empty() && fs::exists(record)) {
@@ -214,7 +214,7 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
     if (viewers.camera && viewers.camera->wait(picturesTimeout) != 0) {
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
     }
-    if (o.unpaced && !o.pictures.empty()) {
+    if (drawsLater(o)) {
         attempt([&] { drawRecord(recordFile(o), o.pictures, laterTimeout + 10 * sessionTook); });
     }
     if (!o.json.empty()) {
@@ -292,7 +292,7 @@ ViewersWanted viewersFor(const Options& o, const Training& training, const hapti
     ViewersWanted wanted;
     wanted.session = sessionName(o);
     wanted.layout = o.layout;
-    wanted.pictures = o.unpaced ? "" : o.pictures;
+    wanted.pictures = drawsLater(o) ? "" : o.pictures;
     wanted.result = result;
     wanted.hidden = o.showTarget ? std::vector<std::string>() : tissuesToFind(model);
     wanted.test = o.training.test;
@@ -461,7 +461,7 @@ void addTrain(CLI::App& app)
         ->check(CLI::Range(2.0, 50.0))
         ->capture_default_str();
     c->add_flag("--lesion-sphere", o->sphere, "A ball instead of lobes and spikes");
-    c->add_option("--device", o->device, devicesInWords())->capture_default_str();
+    c->add_option("--device", o->device, session::devicesInWords())->capture_default_str();
     command::addFalconOptions(*c, o->falcon);
     c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
         ->check(CLI::IsMember(haptics::skillNames()));
@@ -497,7 +497,8 @@ void addTrain(CLI::App& app)
         ->check(operatorFault, "up to 200 bytes of text");
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)")->excludes("--tryout");
     c->add_option("--report", o->report, "Write a report (HTML) to this file")->excludes("--tryout");
-    c->add_option("--pictures", o->pictures, "Write pictures (PNG) to this folder; of an --unpaced session after its end");
+    c->add_option("--pictures", o->pictures,
+                  "Write pictures (PNG) to this folder; without a window of the record, after its end");
     c->add_flag("--anyway", o->anyway,
                 "Start also where a tick takes far too long here, or a phantom more memory than is free");
     c->add_option("--inject", o->inject,

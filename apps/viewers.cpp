@@ -5,10 +5,17 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <stdexcept>
 #include <utility>
 
 namespace palpate::apps {
+
+namespace {
+
+constexpr const char* howToDraw = "build it with -DPALPATE_VIEWER=ON, or leave out --pictures";
+
+}  // namespace
 
 Viewers::Viewers(ViewersWanted wanted) : wanted_(std::move(wanted))
 {
@@ -104,11 +111,18 @@ std::vector<std::string> tissuesToFind(const haptics::SessionModel& model)
     return names;
 }
 
+void checkViewer()
+{
+    const auto viewer = base::programFolder() / "palpate-view";
+    if (!std::filesystem::exists(viewer)) {
+        throw std::runtime_error(viewer.string() + ": cannot be started: there is none; " + howToDraw);
+    }
+}
+
 void drawRecord(const std::filesystem::path& record, const std::string& pictures, double timeout)
 {
     base::ChildProcess viewer(base::programFolder() / "palpate-view",
-                              {"--replay", record.string(), "--offscreen", pictures},
-                              "build it with -DPALPATE_VIEWER=ON, or leave out --pictures");
+                              {"--replay", record.string(), "--offscreen", pictures}, howToDraw);
     if (viewer.wait(timeout) != 0) {
         throw std::runtime_error(pictures + ": the pictures are not complete: the viewer failed or took too long");
     }

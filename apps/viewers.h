@@ -56,8 +56,11 @@ private:
 /// Names of the tissues that a palpation is about, and so are not shown; none of a biopsy.
 std::vector<std::string> tissuesToFind(const haptics::SessionModel& model);
 
-/// Draws the pictures of a session of its record: without a clock no viewer keeps step with one. Throws std::runtime_error
-/// where they are not complete within `timeout` [s].
+/// Throws std::runtime_error where there is no viewer that could draw.
+void checkViewer();
+
+/// Draws the pictures of a session of its record: without a clock, or on a busy machine, no viewer keeps step with one.
+/// Throws std::runtime_error where they are not complete within `timeout` [s].
 void drawRecord(const std::filesystem::path& record, const std::string& pictures, double timeout);
 
 }  // namespace palpate::apps

@@ -122,6 +122,15 @@ void checkTool(const DeviceRequest& request, const datasets::Scene& scene)
 
 }  // namespace
 
+std::string devicesInWords()
+{
+    std::string words;
+    for (const DeviceKind& kind : deviceKinds()) {
+        words += fmt::format("{}{}{}", words.empty() ? "" : ", ", kind.name.empty() ? "or " : "", kind.what);
+    }
+    return words;
+}
+
 std::span<const DeviceKind> deviceKinds() noexcept
 {
     return kinds;

@@ -35,6 +35,9 @@ struct DeviceKind {
 
 std::span<const DeviceKind> deviceKinds() noexcept;
 
+/// "hand (a scripted trainee), mouse (of the viewer's window), ... or a record (.db) whose poses are played"
+std::string devicesInWords();
+
 /// The kind called `name`; that of records for any other name.
 const DeviceKind& deviceKind(std::string_view name) noexcept;
 
