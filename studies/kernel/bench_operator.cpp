@@ -96,8 +96,8 @@ void timeSet(const Kernels& k, const MachineRates& rates, Cube& cube, std::vecto
 
 }  // namespace
 
-// Instructions of the compiled loops over cells, additions and multiplications (tests/structure/operator_cost_test.py counts them
-// again); a division is left out. Eight floats go in and out.
+// Instructions of the compiled loops over cells, additions and multiplications (tests/structure/operator_cost_test.py
+// counts them again); a division is left out. Eight floats go in and out.
 OperatorCost operatorCost(bool finiteStrain) noexcept
 {
     constexpr double bytes = 8 * sizeof(float);
