@@ -1,4 +1,4 @@
-#include <base/build.h>
+#include <apps/parsed_program.h>
 #include <base/child_process.h>
 #include <command/json.h>
 #include <trainer/window.h>
@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -47,53 +46,58 @@ void writeFigures(const std::string& file, const WindowFigures& figures)
     palpate::command::writeJson(file, all);
 }
 
+struct Words {
+    palpate::trainer::WindowOptions options;
+    std::string size = "1280x720", json;
+    bool screens = false;
+    std::filesystem::path sessions = palpate::trainer::sessionsFolder();
+};
+
+void addOptions(CLI::App& app, Words& w)
+{
+    app.add_option("--size", w.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    app.add_option("--text-scale", w.options.textScale, "Of all texts; in the window Ctrl with + or -")
+        ->check(CLI::Range(0.5, 3.0));
+    app.add_option("--case", w.options.caseId, "The case that is chosen at first (palpate case list)");
+    app.add_option("--sessions", w.sessions, "Folder for records and figures of sessions")->capture_default_str();
+    auto* const frames =
+        app.add_option("--frames", w.options.frames, "To measure: end after so many pictures (0: no limit)")
+            ->capture_default_str();
+    app.add_flag("--screens", w.screens,
+                 "To measure: draw each screen so many times (--frames), with made-up sessions on it")
+        ->needs(frames);
+    app.add_option("--json", w.json, "Write frame times to this file (-: standard output)");
+}
+
+void run(Words& w)
+{
+    int end = 0;
+    int& width = w.options.width;
+    int& height = w.options.height;
+    const int read = std::sscanf(w.size.c_str(), "%dx%d%n", &width, &height, &end);
+    if (read != 2 || static_cast<std::size_t>(end) != w.size.size() || width < 320 || height < 240 || width > 8192 ||
+        height > 8192) {
+        throw std::runtime_error("--size " + w.size + ": must be WIDTHxHEIGHT, 320x240 to 8192x8192 pixels");
+    }
+    w.options.programs = palpate::base::programFolder();
+    palpate::trainer::SessionFolder sink(w.sessions);
+    const WindowFigures figures =
+        w.screens ? palpate::trainer::measureScreens(w.options, sink) : palpate::trainer::runWindow(w.options, sink);
+    if (w.screens && w.json != "-") {
+        print(figures);
+    }
+    if (!w.json.empty()) {
+        writeFigures(w.json, figures);
+    }
+}
+
 }  // namespace
 
 int main(int argc, char** argv)
 {
-    CLI::App app("Choose a case, do it, see how it went: one window for training. palpate without arguments opens it.",
-                 "palpate-trainer");
-    palpate::trainer::WindowOptions options;
-    std::string size = "1280x720", file;
-    bool screens = false;
-    std::filesystem::path sessions = palpate::trainer::sessionsFolder();
-    app.set_version_flag("--version", std::string(palpate::base::build()));
-    app.add_option("--size", size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    app.add_option("--text-scale", options.textScale, "Of all texts; in the window Ctrl with + or -")
-        ->check(CLI::Range(0.5, 3.0));
-    app.add_option("--case", options.caseId, "The case that is chosen at first (palpate case list)");
-    app.add_option("--sessions", sessions, "Folder for records and figures of sessions")->capture_default_str();
-    auto* const frames = app.add_option("--frames", options.frames, "To measure: end after so many pictures (0: no limit)")
-                             ->capture_default_str();
-    app.add_flag("--screens", screens, "To measure: draw each screen so many times (--frames), with made-up sessions on it")
-        ->needs(frames);
-    app.add_option("--json", file, "Write frame times to this file (-: standard output)");
-    app.failure_message([](const CLI::App*, const CLI::Error& e) {
-        return std::string("palpate-trainer: ") + e.what() + " (palpate-trainer --help lists what there is)\n";
-    });
-    try {
-        app.parse(argc, argv);
-        int end = 0;
-        const int read = std::sscanf(size.c_str(), "%dx%d%n", &options.width, &options.height, &end);
-        if (read != 2 || static_cast<std::size_t>(end) != size.size() || options.width < 320 || options.height < 240 ||
-            options.width > 8192 || options.height > 8192) {
-            throw std::runtime_error("--size " + size + ": must be WIDTHxHEIGHT, 320x240 to 8192x8192 pixels");
-        }
-        options.programs = palpate::base::programFolder();
-        palpate::trainer::SessionFolder sink(sessions);
-        const WindowFigures figures =
-            screens ? palpate::trainer::measureScreens(options, sink) : palpate::trainer::runWindow(options, sink);
-        if (screens && file != "-") {
-            print(figures);
-        }
-        if (!file.empty()) {
-            writeFigures(file, figures);
-        }
-        return 0;
-    } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "palpate-trainer: %s\n", e.what());
-        return 1;
-    }
+    Words words;
+    return palpate::apps::runParsed(
+        argc, argv, "palpate-trainer",
+        "Choose a case, do it, see how it went: one window for training. palpate without arguments opens it.",
+        [&](CLI::App& app) { addOptions(app, words); }, [&] { run(words); });
 }

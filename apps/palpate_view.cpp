@@ -1,5 +1,5 @@
+#include <apps/parsed_program.h>
 #include <apps/replay_player.h>
-#include <base/build.h>
 #include <base/words.h>
 #include <command/json.h>
 #include <render/keys.h>
@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include <cstdio>
-#include <exception>
 #include <fstream>
 #include <iomanip>
 #include <optional>
@@ -72,7 +71,6 @@ struct Words {
 
 void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
 {
-    app.set_version_flag("--version", std::string(palpate::base::build()));
     app.add_flag_callback(
         "--keys", [] { throw CLI::CallForVersion(palpate::render::keysInWords(), 0); }, "List what keys and mouse do");
     app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
@@ -140,50 +138,45 @@ void applyLook(const Words& words, palpate::render::ViewerOptions& options)
                                                : SliceLook::tinted;
 }
 
+void run(Words& words, palpate::render::ViewerOptions& options)
+{
+    readSize(words.size, options);
+    applyLook(words, options);
+    std::optional<palpate::apps::ReplayPlayer> player;
+    if (!words.replay.empty()) {
+        player.emplace(words.replay);
+        options.session = player->session();
+        options.playback = &player->playback();
+        if (words.at >= 0)
+            player->startAt(words.at);
+        if (!words.ghost.empty())
+            options.ghost = player->ghostOf(words.ghost);
+    } else if (words.at >= 0 || !words.ghost.empty()) {
+        throw std::runtime_error("--at and --ghost go with --replay RECORD");
+    }
+    const auto figures = palpate::render::runViewer(options);
+    if (!words.json.empty())
+        writeFigures(words.json, figures);
+    if (!words.timeline.empty())
+        writeTimeline(words.timeline, figures.shown);
+    if (player && !player->problem().empty())
+        throw std::runtime_error(player->problem());
+}
+
 }  // namespace
 
 int main(int argc, char** argv)
 {
-    CLI::App app(
-        "Shows a Palpate session that runs in another process. --keys lists what keys and mouse do, as does the "
-        "key ?.",
-        "palpate-view");
     palpate::render::ViewerOptions options;
     Words words;
-    addOptions(app, options, words);
-    addLookOptions(app, options, words);
-    app.failure_message([](const CLI::App*, const CLI::Error& e) {
-        return std::string("palpate-view: ") + e.what() + " (palpate-view --help lists what there is)\n";
-    });
     palpate::base::useLanguage();
-    try {
-        app.parse(argc, argv);
-        readSize(words.size, options);
-        applyLook(words, options);
-        std::optional<palpate::apps::ReplayPlayer> player;
-        if (!words.replay.empty()) {
-            player.emplace(words.replay);
-            options.session = player->session();
-            options.playback = &player->playback();
-            if (words.at >= 0)
-                player->startAt(words.at);
-            if (!words.ghost.empty())
-                options.ghost = player->ghostOf(words.ghost);
-        } else if (words.at >= 0 || !words.ghost.empty()) {
-            throw std::runtime_error("--at and --ghost go with --replay RECORD");
-        }
-        const auto figures = palpate::render::runViewer(options);
-        if (!words.json.empty())
-            writeFigures(words.json, figures);
-        if (!words.timeline.empty())
-            writeTimeline(words.timeline, figures.shown);
-        if (player && !player->problem().empty())
-            throw std::runtime_error(player->problem());
-        return 0;
-    } catch (const CLI::ParseError& e) {
-        return app.exit(e) == 0 ? 0 : 2;
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "palpate-view: %s\n", e.what());
-        return 1;
-    }
+    return palpate::apps::runParsed(
+        argc, argv, "palpate-view",
+        "Shows a Palpate session that runs in another process. --keys lists what keys and mouse do, as does the "
+        "key ?.",
+        [&](CLI::App& app) {
+            addOptions(app, options, words);
+            addLookOptions(app, options, words);
+        },
+        [&] { run(words, options); });
 }

@@ -34,8 +34,16 @@ public:
 
     /// Wait-free; allocates nothing.
     void publish(const TickRecord& record, const ServoTiming& timing, const Simulation& simulation) noexcept;
-    /// What the viewer that is the hand asks for; see channel::Publisher.
-    std::optional<channel::Input> input() const noexcept { return publisher_.input(); }
+    /// What the viewer that is the hand asks for; see channel::Publisher. A viewer that was stopped in the middle of its
+    /// writing has said nothing new: what it asked for before holds. Called by one thread at a time.
+    /// @returns  the last that was whole; none: there was none yet
+    std::optional<channel::Input> input() const noexcept
+    {
+        if (const auto now = publisher_.input()) {
+            heard_ = now;
+        }
+        return heard_;
+    }
     /// Whether another program has cut off the segment: nobody sees the session any more. Wait-free.
     bool torn() const noexcept { return publisher_.torn(); }
     /// The last state again, while the session stands still. Wait-free; allocates nothing.
@@ -46,22 +54,7 @@ public:
 private:
     channel::Publisher publisher_;
     channel::State state_;
-};
-
-/// Whether viewers ask for a pause. A viewer that was stopped in the middle of its writing has said nothing new: what it
-/// asked for before holds.
-class PauseAsked {
-public:
-    /// @param input  what was read now; none: it was not whole
-    /// @returns  whether a pause is asked for
-    bool after(const std::optional<channel::Input>& input) noexcept
-    {
-        asked_ = input ? input->paused != 0 : asked_;
-        return asked_;
-    }
-
-private:
-    bool asked_ = false;
+    mutable std::optional<channel::Input> heard_;
 };
 
 }  // namespace palpate::haptics

@@ -137,8 +137,9 @@ FittingSetting fittingHere(const std::filesystem::path& cache, bool probe)
     if (std::ifstream in(cache); in) {
         known = json::parse(in, nullptr, false);
     }
-    if (!known.is_object() || known.value("machine", json()) != key()) {
-        known = json{{"machine", key()}};
+    const std::string here = key();
+    if (!known.is_object() || known.value("machine", json()) != here) {
+        known = json{{"machine", here}};
     }
     const char* const what = probe ? "tool and probe" : "tool";
     const json kept = known.value(what, json::object());

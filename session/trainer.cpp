@@ -103,7 +103,7 @@ struct Trainer::Impl {
             if (input && input->ended != 0 && deviceKind(options.device.name).somebodyHolds) {
                 EndInOrder::asked() = true;
             }
-            return pauseAsked.after(input);
+            return input && input->paused != 0;
         };
         options.servo.pause.standing = [this](bool elsewhere) {
             broadcast.stand(elsewhere ? channel::Standing::toolElsewhere : channel::Standing::paused);
@@ -173,7 +173,6 @@ struct Trainer::Impl {
     ServoTiming timing;
     std::optional<Recorder> recorder;
     std::optional<FaultsAround> around;
-    PauseAsked pauseAsked;
 };
 
 Trainer::Trainer(const SessionModel& model, const SessionInfo& info, const TrainOptions& options)

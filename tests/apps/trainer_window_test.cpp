@@ -61,12 +61,17 @@ int parentOf(std::uint64_t pid)
 
 // The trainer's window, and who uses it.
 struct Trainer {
+    explicit Trainer(const std::string& chosen = "layered")
+        : program(desktop.start("palpate-trainer", {"--size", std::to_string(wide) + "x" + std::to_string(high), "--case",
+                                                    chosen, "--sessions", folder / "s"})),
+          open(!desktop.window("Palpate trainer").empty())
+    {
+    }
+
     const Folder folder;
     const Desktop desktop;
-    std::unique_ptr<Program> program = desktop.start(
-        "palpate-trainer",
-        {"--size", std::to_string(wide) + "x" + std::to_string(high), "--case", "layered", "--sessions", folder / "s"});
-    bool open = !desktop.window("Palpate trainer").empty();
+    std::unique_ptr<Program> program;
+    bool open;
 
     void click(int x, int y, const std::string& button = "1") const
     {
@@ -254,17 +259,13 @@ TEST(TrainerWindow, TabGoesToEverythingThatCanBePressed)
 {
     if (!can())
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
-    const Desktop desktop;
-    const Folder folder;
-    const auto program = desktop.start("palpate-trainer", {"--case", "first-touch", "--sessions", folder / "s"});
-    ASSERT_FALSE(desktop.window("^Palpate trainer: Case$").empty());
+    const Trainer t("first-touch");
+    ASSERT_TRUE(t.isAt("Case"));
     wait(1);
-    for (int i = 0; i < 2; ++i) {
-        desktop.xdotool({"key", "shift+Tab"});
-        wait(1);
+    for (const char* key : {"shift+Tab", "shift+Tab", "Return"}) {
+        t.key(key);
     }
-    desktop.xdotool({"key", "Return"});
-    EXPECT_FALSE(desktop.window("^Palpate trainer: Instructor$").empty()) << "beside the settings, before the list";
+    EXPECT_TRUE(t.isAt("Instructor")) << "beside the settings, before the list";
 }
 
 // A setting that is changed is kept at once, and all is drawn anew: behind the settings, which keep the focus.
@@ -272,17 +273,15 @@ TEST(TrainerWindow, KeysStayInTheSettingsWhenOneIsChanged)
 {
     if (!can())
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
-    const Desktop desktop;
-    const Folder folder;
-    const auto program = desktop.start("palpate-trainer", {"--case", "first-touch", "--sessions", folder / "s"});
-    ASSERT_FALSE(desktop.window("^Palpate trainer: Case$").empty());
+    const Trainer t("first-touch");
+    ASSERT_TRUE(t.isAt("Case"));
     wait(1);
     // Settings; English, Deutsch, colours as in the body; the next ones, and what is behind them.
     for (const char* key : {"shift+Tab", "Return", "Tab", "Tab", "Return", "Tab", "Return"}) {
-        desktop.xdotool({"key", key});
-        wait(1.5);
+        t.key(key);
+        wait(0.5);
     }
-    EXPECT_FALSE(desktop.window("^Palpate trainer: Case$").empty()) << "Enter chose a case behind the settings";
+    EXPECT_TRUE(t.isAt("Case")) << "Enter chose a case behind the settings";
 }
 
 TEST(TrainerWindow, EachScreenIsDrawnToMeasureIt)

@@ -1,7 +1,9 @@
 #include "models.h"
 
 #include <tests/allocations.h>
+#include <tests/channel/example.h>
 
+#include <channel/segment.h>
 #include <haptics/broadcast.h>
 #include <haptics/hand.h>
 #include <haptics/replay.h>
@@ -275,16 +277,33 @@ TEST(Histogram, QuantilesAreWithinOnePercentOfTheExactOnes)
 // A viewer that the servo's thread stops in the middle of its writing ends no pause, and begins none.
 TEST(Servo, APauseIsAskedForUntilAWholeInputSaysOtherwise)
 {
-    PauseAsked asked;
+    const std::string name = "inside-" + std::to_string(::getpid());
+    const auto model = tests::blockSphere();
+    const Broadcast broadcast(name, model, channel::handIsViewers);
+    const auto asked = [&] {
+        const auto input = broadcast.input();
+        return input && input->paused != 0;
+    };
+    EXPECT_FALSE(asked());
+    const auto viewer = channel::Subscriber::attach(name);
+    ASSERT_TRUE(viewer);
+    auto hand = channel::ViewersHand::take(*viewer);
+    ASSERT_TRUE(hand);
+    channel::RawSegment raw(channel::segmentName(name));
+    auto& block = raw.at<channel::InputBlock>(raw.at<channel::Header>(0).inputOffset);
     channel::Input input;
-    EXPECT_FALSE(asked.after(std::nullopt));
-    EXPECT_FALSE(asked.after(input));
+    hand->set(input);
+    EXPECT_FALSE(asked());
     input.paused = 1;
-    EXPECT_TRUE(asked.after(input));
-    EXPECT_TRUE(asked.after(std::nullopt));
+    hand->set(input);
+    EXPECT_TRUE(asked());
+    block.sequence += 1;
+    EXPECT_TRUE(asked()) << "in the middle of writing";
     input.paused = 0;
-    EXPECT_FALSE(asked.after(input));
-    EXPECT_FALSE(asked.after(std::nullopt));
+    hand->set(input);
+    EXPECT_FALSE(asked());
+    block.sequence += 1;
+    EXPECT_FALSE(asked());
 }
 
 }  // namespace
