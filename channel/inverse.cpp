@@ -232,17 +232,29 @@ void Inverse::checkCell(glm::ivec3 cell)
 
 void Inverse::findFolds(std::span<const std::uint32_t> moved)
 {
-    const float most = edgeWithout / perMetre_;
+    const int row = size_.x, layer = row * size_.y;
+    const auto squareOf = [](Lanes d) {
+        d *= d;
+        return d[0] + d[1] + d[2];
+    };
+    const float most = edgeWithout * edgeWithout / (perMetre_ * perMetre_);
+    int begin = -row;  // of the row that the last node was in
+    glm::ivec3 here(0);
     for (const std::uint32_t i : moved) {
         const auto n = static_cast<int>(i);
-        const glm::ivec3 here(n % size_.x, n / size_.x % size_.y, n / size_.x / size_.y);
-        bool steep = false;
-        for (int side = 0; side < 6 && !steep; ++side) {
-            glm::ivec3 next = here;
-            next[side / 2] += side % 2 == 0 ? 1 : -1;
-            const bool there = glm::all(glm::greaterThanEqual(next, glm::ivec3(0))) && glm::all(glm::lessThan(next, size_));
-            steep = there && glm::length(glm::vec3(u_[at(next)]) - glm::vec3(u_[i])) > most;
+        if (n < begin || n >= begin + row) {
+            begin = n - n % row;
+            here = {0, begin / row % size_.y, begin / layer};
         }
+        here.x = n - begin;
+        const Lanes u = lanes(u_[i]);
+        const auto changeTo = [&](bool there, int step) {
+            return there ? squareOf(lanes(u_[static_cast<std::size_t>(n + step)]) - u) : 0.0F;
+        };
+        const float x = std::max(changeTo(here.x + 1 < size_.x, 1), changeTo(here.x > 0, -1));
+        const float y = std::max(changeTo(here.y + 1 < size_.y, row), changeTo(here.y > 0, -row));
+        const float z = std::max(changeTo(here.z + 1 < size_.z, layer), changeTo(here.z > 0, -layer));
+        const bool steep = std::max({x, y, z}) > most;
         for (int k = 0; k < 8 && steep; ++k)
             checkCell(here - corner(k));
     }

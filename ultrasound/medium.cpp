@@ -16,7 +16,6 @@ namespace {
 constexpr double fineEnough = 0.35e-3;          // [m]: labels that need not be refined
 constexpr std::size_t affordable = 24'000'000;  // voxels: 3 bytes each
 constexpr int border = 3;                       // voxels at the sides that are not looked at
-constexpr float codes = 4096;
 
 // Blood and air after a core: dark, between the bright cut walls.
 constexpr channel::TissueSound blood{1578, 1050, 0.21F, 1.16F, -20, 0, 0};
@@ -157,14 +156,14 @@ std::uint8_t Medium::label(glm::vec3 v) const noexcept
     return labels_[offset(n)];
 }
 
-// Differences along each axis, linear along the two others.
-glm::vec3 Medium::slope(glm::vec3 v) const noexcept
+// Linear along each axis.
+Medium::Impedance Medium::impedanceAt(glm::vec3 v) const noexcept
 {
     if (!(v.x >= border && v.y >= border && v.z >= border))
-        return glm::vec3(0);
+        return {pureImpedance(unknown), glm::vec3(0)};
     const glm::ivec3 n(v);
     if (n.x >= size_.x - border || n.y >= size_.y - border || n.z >= size_.z - border)
-        return glm::vec3(0);
+        return {pureImpedance(unknown), glm::vec3(0)};
     const glm::vec3 t = v - glm::vec3(n);
     const std::int16_t* q = &lnZ_[offset(n)];
     const auto y = static_cast<std::size_t>(size_.x), z = y * static_cast<std::size_t>(size_.y);
@@ -173,9 +172,11 @@ glm::vec3 Medium::slope(glm::vec3 v) const noexcept
     const float x00 = f(1) - f(0), x10 = f(y + 1) - f(y), x01 = f(z + 1) - f(z), x11 = f(z + y + 1) - f(z + y);
     const float y00 = f(y) - f(0), y10 = f(y + 1) - f(1), y01 = f(z + y) - f(z), y11 = f(z + y + 1) - f(z + 1);
     const float z00 = f(z) - f(0), z10 = f(z + 1) - f(1), z01 = f(z + y) - f(y), z11 = f(z + y + 1) - f(y + 1);
-    return glm::vec3(mix(t.z, mix(t.y, x00, x10), mix(t.y, x01, x11)), mix(t.z, mix(t.x, y00, y10), mix(t.x, y01, y11)),
-                     mix(t.y, mix(t.x, z00, z10), mix(t.x, z01, z11))) /
-           codes;
+    const float near = mix(t.y, f(0) + t.x * x00, f(y) + t.x * x10), far = mix(t.y, f(z) + t.x * x01, f(z + y) + t.x * x11);
+    return {mix(t.z, near, far) / codes,
+            glm::vec3(mix(t.z, mix(t.y, x00, x10), mix(t.y, x01, x11)), mix(t.z, mix(t.x, y00, y10), mix(t.x, y01, y11)),
+                      mix(t.y, mix(t.x, z00, z10), mix(t.x, z01, z11))) /
+                codes};
 }
 
 void Medium::dig(const channel::Hole& hole, double radius, glm::ivec3& low, glm::ivec3& high)

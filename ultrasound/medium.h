@@ -32,8 +32,14 @@ public:
 
     /// Label of the voxel around `v` [voxels from the origin]: tissue row, pureBit, holeBit; `unknown` beyond.
     std::uint8_t label(glm::vec3 v) const noexcept;
-    /// Gradient of ln Z, smoothed over a voxel [1/voxel].
-    glm::vec3 slope(glm::vec3 v) const noexcept;
+    /// ln Z [MRayl], smoothed over a voxel, and its gradient [1/voxel].
+    struct Impedance {
+        float ln = 0;
+        glm::vec3 slope{0};
+    };
+    Impedance impedanceAt(glm::vec3 v) const noexcept;
+    /// ln Z where a label is pure [MRayl].
+    float pureImpedance(std::uint8_t label) const noexcept { return static_cast<float>(code_[label & compared]) / codes; }
     /// What a label's tissue does to sound; a hole is filled with blood.
     const channel::TissueSound& sound(std::uint8_t label) const noexcept { return sound_[label & compared]; }
     /// The tissue's impedance [MRayl]; that of gel in air, which the labels tell.
@@ -44,6 +50,8 @@ public:
     bool punch(std::span<const channel::Hole> holes, double radius);
 
 private:
+    static constexpr float codes = 4096;  // of ln Z in steps
+
     struct Saved {
         std::size_t at = 0;
         std::uint8_t label = 0;

@@ -21,7 +21,9 @@ constexpr float tipEcho = 0.05F;       // of the bevel, seen from everywhere
 constexpr float tipLength = 2e-3F;     // [m]
 constexpr float gasContrast = -0.4F;   // of half ln Z: gas, not tissue, lies behind
 constexpr float degree = 57.29578F;
-constexpr int stride = 8;  // steps between exact rest points; the displacement is smooth
+// Between exact rest points, as the displacement is smooth:
+constexpr int stride = 8;      // steps along a line
+constexpr int lineStride = 4;  // lines
 
 }  // namespace
 
@@ -60,7 +62,9 @@ void RayCaster::cast(const View& view, const Needle* needle, const RayOptions& o
     shade.lines = settings.lines;
     shade.steps = static_cast<int>(settings.depth / step_) + 1;
     shade.left.resize(shade.at(shade.planes, 0, 0));
-    for (int e = 0; e < settings.planes; ++e)
+    for (int e = 0; e < settings.planes; ++e) {
+        rest_.solve(view, settings.lines, lineStride, (shade.steps - 1) / stride + 2,
+                    [&](int line, int row) { return pointAt(view.beam(), line, e, row); });
         for (int i = 0; i < settings.lines; ++i) {
             Ray ray;
             ray.line = i;
@@ -72,7 +76,15 @@ void RayCaster::cast(const View& view, const Needle* needle, const RayOptions& o
             }
             castLine(view, options, ray, shade, echoes);
         }
+    }
     fillShadows(view, shade);
+}
+
+// Where the row of rest points `row` has its point of a line in a plane.
+glm::vec3 RayCaster::pointAt(const Beam& beam, int line, int plane, int row) const
+{
+    const float z = static_cast<float>(row * stride) * step_;
+    return beam.point(beam.lineAt(static_cast<float>(line)), beam.plane(plane) * beam.elevationSigma(z), z);
 }
 
 void RayCaster::deposit(EchoLines& echoes, int line, float depth, float re, float im) const
@@ -91,17 +103,16 @@ void RayCaster::deposit(EchoLines& echoes, int line, float depth, float re, floa
 
 void RayCaster::castLine(const View& view, const RayOptions& options, Ray& ray, Shade& shade, EchoLines& echoes)
 {
-    const Beam& beam = view.beam();
     const Medium& medium = view.medium();
-    const float l = beam.lineAt(static_cast<float>(ray.line)), off = beam.plane(ray.plane);
-    glm::vec3 shift(0);
-    const auto restAt = [&](float z) { return view.restVoxel(beam.point(l, off * beam.elevationSigma(z), z), shift); };
+    const auto restAt = [&](int row) {
+        return rest_.voxel(view, pointAt(view.beam(), ray.line, ray.plane, row), ray.line, row);
+    };
     glm::vec3 v(0), next = restAt(0);
     for (int s = 0; s < shade.steps; ++s) {
         const float z = static_cast<float>(s) * step_;
         if (s % stride == 0) {
             v = next;
-            next = restAt(z + stride * step_);
+            next = restAt(s / stride + 1);
             ray.step = (1.0F / stride) * (next - v);
         } else {
             v += ray.step;
@@ -117,26 +128,37 @@ void RayCaster::castLine(const View& view, const RayOptions& options, Ray& ray, 
             echoNeedle(ray, echoes);
         if (ray.tipAt >= 0 && z >= ray.tipAt)
             deposit(echoes, ray.line, std::exchange(ray.tipAt, -1.0F), ray.weight * ray.amplitude * tipEcho, 0);
-        if (options.interfaces && (label & pureBit) == 0) {
-            const glm::vec3 slope = medium.slope(v);
-            const float change = 0.5F * glm::dot(slope, ray.step), size = std::abs(change);
-            if (change * ray.crossing.change < 0)
-                release(ray, echoes);
-            Crossing& c = ray.crossing;
-            if (!(c.weight > 0))
-                c.before = label;
-            // What the second tissue takes comes after its border.
-            if (!(c.weight > 0) || ((label ^ c.before) & compared) == 0)
-                c.amplitude = ray.amplitude * ray.behind;
-            c.change += change;
-            c.weight += size;
-            c.depth += size * z;
-            c.normal += slope;
-        } else if (ray.crossing.weight > 0) {
-            release(ray, echoes);
-        }
+        if (options.interfaces && ((label & pureBit) == 0 || ray.crossing.weight > 0))
+            cross(medium, v, label, z, ray, echoes);
+        ray.last = label;
         shade.left[shade.at(ray.plane, s, ray.line)] = ray.amplitude * ray.behind;
     }
+}
+
+// Of ln Z the differences from point to point: over a border their sum is the whole change, wherever the points lie.
+void RayCaster::cross(const Medium& medium, glm::vec3 v, std::uint8_t label, float depth, Ray& ray, EchoLines& echoes) const
+{
+    const bool pure = (label & pureBit) != 0;
+    const Medium::Impedance here =
+        pure ? Medium::Impedance{medium.pureImpedance(label), glm::vec3(0)} : medium.impedanceAt(v);
+    const float before = (ray.last & pureBit) == 0 ? ray.lnZ : medium.pureImpedance(ray.last);
+    const bool known = ray.last != unknown && label != unknown;
+    const float change = known ? 0.5F * (here.ln - before) : 0.0F, size = std::abs(change);
+    ray.lnZ = here.ln;
+    if (change * ray.crossing.change < 0)
+        release(ray, echoes);
+    Crossing& c = ray.crossing;
+    if (!(c.weight > 0))
+        c.before = label;
+    // What the second tissue takes comes after its border.
+    if (!(c.weight > 0) || ((label ^ c.before) & compared) == 0)
+        c.amplitude = ray.amplitude * ray.behind;
+    c.change += change;
+    c.weight += size;
+    c.depth += size * (depth - 0.5F * step_);
+    c.normal += here.slope;
+    if (pure && c.weight > 0)
+        release(ray, echoes);
 }
 
 // In quadrature by its sign: no phase can be had from voxels.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ultrasound/rest_shifts.h>
 #include <ultrasound/view.h>
 
 #include <array>
@@ -45,16 +46,20 @@ private:
         float behind = 1;     // and of that by the needle
         glm::vec3 step{0};    // at rest [voxels]
         Crossing crossing;
+        std::uint8_t last = unknown;          // label of the point before
+        float lnZ = 0;                        // there, if it was not pure
         float needleAt = 0, needleEcho = -1;  // of the shaft
         float tipAt = -1;                     // depth of the tip's echo; below 0: not on this ray
         bool inside = false, stopped = false;
     };
 
     void prepare(const View& view);
+    glm::vec3 pointAt(const Beam& beam, int line, int plane, int row) const;
     void castLine(const View& view, const RayOptions& options, Ray& ray, Shade& shade, EchoLines& echoes);
     void meetNeedle(const View& view, const Needle& needle, Ray& ray) const;
     float dimmed(const Beam& beam, float depth, float slope) const;
     void echoNeedle(Ray& ray, EchoLines& echoes) const;
+    void cross(const Medium& medium, glm::vec3 v, std::uint8_t label, float depth, Ray& ray, EchoLines& echoes) const;
     void release(Ray& ray, EchoLines& echoes) const;
     void stopAtAir(Ray& ray, float depth, EchoLines& echoes) const;
     void deposit(EchoLines& echoes, int line, float depth, float re, float im) const;
@@ -63,6 +68,7 @@ private:
     std::array<float, 256> left_{};  // share of the amplitude after one step in a tissue
     std::vector<float> planeWeight_;
     std::vector<float> before_, now_, raw_;  // of fillShadows()
+    RestShifts rest_;                        // of the plane that is cast
     float step_ = 0, sample_ = 0;
     float needleRadius_ = 0;
 };

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace palpate::ultrasound {
 
@@ -132,30 +133,48 @@ void Scatterers::find(const View& view, const Medium& medium)
     chosen_.clear();
     ++pass_;
     const float half = beam.halfWidth() + edge_, apart = 0.5F * edge_, depth = beam.settings().depth + edge_;
-    const float perBlockVoxel = 1 / voxelsPerBlock_;
     for (float z = beam.top() - edge_; z < depth; z += apart) {
         const float wide = reach * beam.elevationSigma(z) + 0.4F * edge_;
         const int steps = static_cast<int>(std::ceil(wide / apart));
-        for (int j = -steps; j <= steps; ++j) {
-            glm::vec3 shift(0);
-            const float y = static_cast<float>(j) * wide / static_cast<float>(steps);
-            for (float l = -half; l < half; l += apart) {
-                if (beam.curved()) {
-                    const glm::vec2 at = beam.place(l, z);
-                    const float border = edge_ / beam.transducer().radius;
-                    if (at.y < -edge_ || at.y > depth || std::abs(at.x) > 0.5F * beam.transducer().sector + border)
-                        continue;
-                }
-                const glm::ivec3 n(glm::floor(perBlockVoxel * view.restVoxel({l, y, z}, shift)));
-                if (n.x < 0 || n.y < 0 || n.z < 0 || n.x >= size_.x || n.y >= size_.y || n.z >= size_.z)
-                    continue;
-                const auto id = static_cast<std::uint32_t>(n.x + size_.x * (n.y + size_.y * n.z));
-                if (stamp_[id] == pass_)
-                    continue;
-                stamp_[id] = pass_;
-                chosen_.push_back(id);
-            }
-        }
+        float from = -half, to = half;
+        while (from < to && !nearPicture(beam, from, z))
+            from += apart;
+        while (to > from && !nearPicture(beam, to, z))
+            to -= apart;
+        const int looks = static_cast<int>(std::ceil((to - from) / apart));
+        for (int j = -steps; looks > 0 && j <= steps; ++j)
+            findAlong(view, {from, static_cast<float>(j) * wide / static_cast<float>(steps), z}, looks);
+    }
+}
+
+bool Scatterers::nearPicture(const Beam& beam, float l, float z) const
+{
+    if (!beam.curved())
+        return true;
+    const glm::vec2 at = beam.place(l, z);
+    return at.y >= -edge_ && at.y <= beam.settings().depth + edge_ &&
+           std::abs(at.x) <= 0.5F * beam.transducer().sector + edge_ / beam.transducer().radius;
+}
+
+// Chooses the blocks that lie along a row of `looks` points from `first`.
+void Scatterers::findAlong(const View& view, glm::vec3 first, int looks)
+{
+    constexpr int stride = 4;  // looks between exact rest points: two blocks
+    const float perBlockVoxel = 1 / voxelsPerBlock_, apart = 0.5F * edge_;
+    const auto pointAt = [&](int look) { return first + glm::vec3(static_cast<float>(look) * apart, 0, 0); };
+    rest_.solve(view, looks, stride, 1, [&](int look, int) { return pointAt(look); });
+    for (int i = 0; i < looks; ++i) {
+        const glm::vec3 p = pointAt(i);
+        if (!nearPicture(view.beam(), p.x, p.z))
+            continue;
+        const glm::ivec3 n(glm::floor(perBlockVoxel * rest_.voxel(view, p, i, 0)));
+        if (n.x < 0 || n.y < 0 || n.z < 0 || n.x >= size_.x || n.y >= size_.y || n.z >= size_.z)
+            continue;
+        const auto id = static_cast<std::uint32_t>(n.x + size_.x * (n.y + size_.y * n.z));
+        if (stamp_[id] == pass_)
+            continue;
+        stamp_[id] = pass_;
+        chosen_.push_back(id);
     }
 }
 
@@ -231,42 +250,60 @@ BlockScale Scatterers::scaleAt(const View& view, float depth) const
     return s;
 }
 
-void Scatterers::add(const View& view, const Shade& shade, const Block& block, const BlockEchoes& at,
-                     EchoLines& echoes) const
+void Scatterers::Sum::clear(int lineCount, int sampleCount)
+{
+    lines = lineCount;
+    samples = sampleCount;
+    complex.assign(2 * static_cast<std::size_t>(lines) * static_cast<std::size_t>(samples), 0);
+}
+
+void Scatterers::Sum::add(int sample, int line, float part, Lanes echo) noexcept
+{
+    const auto to = [](float* p, Lanes more) {
+        Lanes q;
+        std::memcpy(&q, p, sizeof q);
+        q += more;
+        std::memcpy(p, &q, sizeof q);
+    };
+    const std::size_t row = 2 * static_cast<std::size_t>(lines);
+    float* first = &complex[static_cast<std::size_t>(sample) * row + 2 * static_cast<std::size_t>(line)];
+    to(first, (1 - part) * echo);
+    to(first + row, part * echo);
+}
+
+void Scatterers::Sum::addTo(EchoLines& echoes) const
+{
+    for (std::size_t i = 0; i < echoes.re.size(); ++i) {
+        echoes.re[i] += complex[2 * i];
+        echoes.im[i] += complex[2 * i + 1];
+    }
+}
+
+void Scatterers::add(const View& view, const Shade& shade, const Block& block, const BlockEchoes& at)
 {
     const float toStep = view.beam().sample() / view.beam().transducer().rayStep;
     const int centre = shade.planes / 2;
-    const auto lines = static_cast<float>(echoes.lines - 1), samples = static_cast<float>(echoes.samples - 1);
+    const auto lines = static_cast<float>(sum_.lines - 1), samples = static_cast<float>(sum_.samples - 1);
     for (std::size_t j = 0; j < perBlock; ++j) {
         const float l = at.l[j], z = at.z[j];
-        if (block.strength[j] == 0 || !(l >= 0 && z >= 0 && l < lines && z < samples))
+        const bool beside = at.cosine[j] == 0 && at.sine[j] == 0;  // too far from the picture's plane
+        if (block.strength[j] == 0 || beside || !(l >= 0 && z >= 0 && l < lines && z < samples))
             continue;
         const int i = static_cast<int>(l), k = static_cast<int>(z);
         const int plane = std::clamp(static_cast<int>(at.y[j]) + centre, 0, shade.planes - 1);
         const int step = std::min(static_cast<int>((z + 0.5F) * toStep), shade.steps - 1);
         const float left = shade.left[shade.at(plane, step, static_cast<int>(l + 0.5F))];
         const float a = left * level_[block.strength[j]] * norm_[static_cast<std::size_t>(k)];
-        const float c = a * at.cosine[j], s = a * at.sine[j];
         const float wl = l - static_cast<float>(i), wz = z - static_cast<float>(k);
-        const float w00 = (1 - wl) * (1 - wz), w10 = wl * (1 - wz), w01 = (1 - wl) * wz, w11 = wl * wz;
-        float* re = &echoes.re[echoes.at(k, i)];
-        float* im = &echoes.im[echoes.at(k, i)];
-        float* below = re + echoes.lines;
-        float* imBelow = im + echoes.lines;
-        re[0] += w00 * c;
-        re[1] += w10 * c;
-        below[0] += w01 * c;
-        below[1] += w11 * c;
-        im[0] += w00 * s;
-        im[1] += w10 * s;
-        imBelow[0] += w01 * s;
-        imBelow[1] += w11 * s;
+        const float c = a * at.cosine[j], s = a * at.sine[j];
+        sum_.add(k, i, wz, Sum::Lanes{(1 - wl) * c, (1 - wl) * s, wl * c, wl * s});
     }
 }
 
 void Scatterers::splat(const View& view, const Shade& shade, EchoLines& echoes)
 {
     const Kernels& k = kernels();
+    sum_.clear(echoes.lines, echoes.samples);
     BlockEchoes at;
     for (const std::uint32_t id : chosen_) {
         if (known_[id] == Known::nothing)
@@ -282,8 +319,9 @@ void Scatterers::splat(const View& view, const Shade& shade, EchoLines& echoes)
         if (std::abs(off) > scale.cut + edge_)
             continue;
         k.echoes(scale, at);
-        add(view, shade, block_[id], at, echoes);
+        add(view, shade, block_[id], at);
     }
+    sum_.addTo(echoes);
 }
 
 void Scatterers::splatPoint(const View& view, const Shade& shade, glm::vec3 p, float level, EchoLines& echoes)
@@ -295,7 +333,9 @@ void Scatterers::splatPoint(const View& view, const Shade& shade, glm::vec3 p, f
     Block block{};
     block.strength[0] = static_cast<std::uint8_t>(std::clamp(static_cast<int>(std::lround(2 * level)) + 128, 1, 255));
     kernels().echoes(scaleAt(view, p.z), at);
-    add(view, shade, block, at, echoes);
+    sum_.clear(echoes.lines, echoes.samples);
+    add(view, shade, block, at);
+    sum_.addTo(echoes);
 }
 
 }  // namespace palpate::ultrasound

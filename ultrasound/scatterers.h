@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ultrasound/kernels.h>
+#include <ultrasound/rest_shifts.h>
 #include <ultrasound/view.h>
 
 #include <array>
@@ -45,13 +46,27 @@ private:
     struct Block {
         std::array<std::uint8_t, perBlock> strength;  // 2 (dB over fat) + 128, 0: nothing
     };
+    // Echoes at baseband while they are added: real and imaginary part side by side, so that two lines are one register.
+    struct Sum {
+        using Lanes = float __attribute__((vector_size(16)));
+
+        void clear(int lineCount, int sampleCount);
+        // `echo` of `line` and the next one, shared out between `sample` and the next one, which gets `part`.
+        void add(int sample, int line, float part, Lanes echo) noexcept;
+        void addTo(EchoLines& echoes) const;
+
+        int lines = 0, samples = 0;
+        std::vector<float> complex;  // (samples x lines x 2)
+    };
     enum class Known : std::uint8_t { no, some, nothing };
 
     void prepare(const View& view, const Medium& medium);
+    bool nearPicture(const Beam& beam, float l, float z) const;
+    void findAlong(const View& view, glm::vec3 first, int looks);
     void fill(std::uint32_t id, glm::vec3 corner, const Medium& medium);
     void place(const View& view, glm::vec3 corner, const Pattern& pattern, BlockEchoes& out, float& depth,
                float& off) const;
-    void add(const View& view, const Shade& shade, const Block& block, const BlockEchoes& at, EchoLines& echoes) const;
+    void add(const View& view, const Shade& shade, const Block& block, const BlockEchoes& at);
     BlockScale scaleAt(const View& view, float depth) const;
     glm::vec3 cornerOf(std::uint32_t id) const noexcept;
 
@@ -65,6 +80,8 @@ private:
     std::vector<Known> known_;
     std::vector<Block> block_;
     std::vector<std::uint32_t> chosen_;
+    RestShifts rest_;  // of a row of looks
+    Sum sum_;
     std::uint32_t pass_ = 0;
 };
 

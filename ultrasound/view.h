@@ -68,15 +68,24 @@ public:
     const Pose& pose() const noexcept { return pose_; }
     bool still() const noexcept { return still_; }
 
-    /// The voxel at rest of what is at `p` in the probe's frame [m]. `shift`: where the search starts and ended.
+    /// From `p` in the probe's frame [m] to its place at rest [lattice spacings]. `shift`: where the search starts and
+    /// ended.
+    void follow(glm::vec3 p, glm::vec3& shift) const noexcept
+    {
+        constexpr float enough = 0.005F;  // [lattice spacings]: a hundredth of a millimetre
+        if (!still_)
+            body_.follow(latticeAt_ + perSpacing_ * inPatient(p), shift, enough);
+    }
+    /// The voxel of what is at `p` in the probe's frame [m] and at rest `shift` [lattice spacings] away.
+    glm::vec3 voxel(glm::vec3 p, glm::vec3 shift) const noexcept
+    {
+        return voxelAt_ + perVoxel_ * inPatient(p) + voxelsPerSpacing_ * shift;
+    }
+    /// The voxel at rest of what is at `p` in the probe's frame [m]. `shift`: as in follow().
     glm::vec3 restVoxel(glm::vec3 p, glm::vec3& shift) const noexcept
     {
-        const glm::vec3 d = p.x * axes_[0] + p.y * axes_[1] + p.z * axes_[2], v = voxelAt_ + perVoxel_ * d;
-        if (still_)
-            return v;
-        constexpr float enough = 0.005F;  // [lattice spacings]: a hundredth of a millimetre
-        body_.follow(latticeAt_ + perSpacing_ * d, shift, enough);
-        return v + voxelsPerSpacing_ * shift;
+        follow(p, shift);
+        return voxel(p, shift);
     }
     /// A direction of the patient's frame in the probe's.
     glm::vec3 inward(glm::vec3 d) const noexcept
@@ -87,6 +96,8 @@ public:
     glm::vec3 local(glm::dvec3 p) const noexcept { return inward(glm::vec3(p - pose_.face)); }
 
 private:
+    glm::vec3 inPatient(glm::vec3 d) const noexcept { return d.x * axes_[0] + d.y * axes_[1] + d.z * axes_[2]; }
+
     const Beam& beam_;
     const Pose& pose_;
     const channel::Deformation& body_;
