@@ -13,7 +13,7 @@ DisplacedLattice::DisplacedLattice(const Lattice& lattice)
 
 void DisplacedLattice::place(Node n) noexcept
 {
-    map_.place(n, lattice_.grid.position(lattice_.grid.node(n)) + Vec3(u_[n]));
+    map_.displace(n, u_[n]);
     const bool displaced = u_[n] != Vec3f(0.0F);
     std::uint32_t& slot = slot_[n];
     if (displaced && slot == 0) {

@@ -55,6 +55,25 @@ Vec3 Elastic::displacement(Vec3 rest) const noexcept
     return site.level < stack_.size() ? gather(stack_.windows(), site, Field::u) : Vec3(0.0);
 }
 
+// As displacement(): the middle of a cell lies at (2 m + 1) / 2^(level + 1) of a cell of a coarser level, m a whole number.
+Vec3 Elastic::displacementOf(Index3 cell) const noexcept
+{
+    const auto windows = stack_.windows();
+    for (std::size_t l = 0; l < windows.size(); ++l) {
+        const int scale = 1 << l;
+        const Index3 low = cell / scale;
+        if (!windows[l].contains(low) || !windows[l].contains(low + 1)) {
+            continue;
+        }
+        ContactSite site;
+        site.share = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
+        site.node = static_cast<std::uint32_t>(windows[l].at(low));
+        site.level = static_cast<std::uint16_t>(l);
+        return gather(windows, site, Field::u);
+    }
+    return Vec3(0.0);
+}
+
 void Elastic::settle() noexcept
 {
     products_.reset();
@@ -140,7 +159,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
         touch(s, shapes_, ties_);
         if (const double friction = frictionOf(s); friction > 0.0) {
             s.limit = friction * std::max(s.depth, 0.0);
-            touch(s, shapes_, ties_);
+            press(s);
         }
     }
 }
@@ -272,7 +291,7 @@ void Elastic::letSlip() noexcept
         const Vec3 along = s.along();
         const double length = glm::length(along);
         s.slip = length > s.limit ? s.limit / length * along : along;
-        touch(s, shapes_, ties_);
+        press(s);
     }
 }
 

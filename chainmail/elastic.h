@@ -88,6 +88,8 @@ public:
     double behind(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].behind; }
     /// Displacement of the material that is at `rest` [m].
     Vec3 displacement(Vec3 rest) const noexcept;
+    /// The same at the middle of a cell of the finest level.
+    Vec3 displacementOf(Index3 cell) const noexcept;
     bool atRest() const noexcept { return atRest_; }
     const WindowStack& stack() const noexcept { return stack_; }
     const ElasticBody& body() const noexcept { return stack_.body(); }

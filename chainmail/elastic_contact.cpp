@@ -142,11 +142,7 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
         if (!windows[l].contains(cell) || !windows[l].contains(cell + 1)) {
             continue;
         }
-        const Vec3 t = at - Vec3(cell);
-        const std::array<Vec3, 2> w{1.0 - t, t};
-        for (std::size_t c = 0; c < 8; ++c) {
-            site.share[c] = static_cast<float>(w[c & 1].x * w[(c >> 1) & 1].y * w[c >> 2].z);
-        }
+        site.share = trilinear(at - Vec3(cell));
         site.node = static_cast<std::uint32_t>(windows[l].at(cell));
         site.level = static_cast<std::uint16_t>(l);
         return;
@@ -161,16 +157,17 @@ double AreaRatio::operator()(const ContactSite& site) noexcept
         level_ = site.level;
         const Window& w = windows_[site.level];
         const double quarter = 0.25 / body_.levels[site.level].nodes.spacing;
-        f_ = {Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+        std::array<Vec3, 3> f{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
         for (int c = 0; c < 8; ++c) {
             const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
-            f_[0] += (c & 1) != 0 ? u : -u;
-            f_[1] += (c & 2) != 0 ? u : -u;
-            f_[2] += (c & 4) != 0 ? u : -u;
+            f[0] += (c & 1) != 0 ? u : -u;
+            f[1] += (c & 2) != 0 ? u : -u;
+            f[2] += (c & 4) != 0 ? u : -u;
         }
+        cofactor_ = {glm::cross(f[1], f[2]), glm::cross(f[2], f[0]), glm::cross(f[0], f[1])};
     }
     const Vec3 n(body_.points[site.point].normal);
-    const Vec3 area = n.x * glm::cross(f_[1], f_[2]) + n.y * glm::cross(f_[2], f_[0]) + n.z * glm::cross(f_[0], f_[1]);
+    const Vec3 area = n.x * cofactor_[0] + n.y * cofactor_[1] + n.z * cofactor_[2];
     return std::clamp(glm::length(area), leastRatio, mostRatio);
 }
 
@@ -223,6 +220,11 @@ void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, 
     const auto at = shapes[site.owner].sample(site.rest + site.u);
     site.depth = -at.distance;
     site.normal = at.gradient;
+    press(site);
+}
+
+void press(ContactSite& site) noexcept
+{
     const double push = site.stiffness * std::max(site.depth, 0.0);
     site.force = push * site.normal;
     site.energy = 0.5 * push * site.depth;

@@ -39,29 +39,34 @@ struct ElasticLoad {
 /// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
 /// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area as the
 /// tissue lies now: under a pressure p a tool sinks in by p h / 20 E, however far the surface under it is stretched.
-struct ContactSite {
+///
+/// A call goes over all sites some ten times: what is asked for together lies in one cache line.
+struct alignas(64) ContactSite {
+    Vec3 p{0.0};           // of the search direction [m]
+    Vec3 normal{0.0};      // out of the tool there; of a tie, its axis
+    double depth = 0;      // of a surface point inside the tool [m]
+    double stiffness = 0;  // of a surface point by its area in this call; of a tie along its axis [N/m]
+
+    Vec3 u{0.0};       // its displacement [m]
+    Vec3 force{0.0};   // on the tissue [N]
+    double limit = 0;  // of the slip along the surface that friction holds [m]
+    bool isTie = false;
+
+    Vec3 rest{0.0};
+    Vec3 slip{0.0};          // how far the tool went on since it took hold of the point, while they touch [m]
+    double energy = 0;       // [J]
     std::uint32_t node = 0;  // lowest node of the cell that it lies in
     std::uint16_t level = 0;
     std::uint16_t owner = 0;  // index of tool or tie
-    bool isTie = false;
-    std::uint32_t point = 0;       // index of the surface point
-    std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
-    Vec3 rest{0.0};
-    Vec3 anchor{0.0};      // the point in a cell that it moves with [m]
-    double atRest = 0;     // stiffness of a surface point, by its area at rest [N/m]
-    double stiffness = 0;  // the same, by its area in this call; of a tie along its axis [N/m]
-    double across = 0;     // of a tie, across its axis [N/m]
 
-    Vec3 u{0.0};         // its displacement [m]
-    Vec3 p{0.0};         // and that of the search direction
-    Vec3 z{0.0};         // of the part of it that is new
-    double depth = 0;    // of a surface point inside the tool [m]
-    Vec3 normal{0.0};    // out of the tool there; of a tie, its axis
-    Vec3 force{0.0};     // on the tissue [N]
-    Vec3 slip{0.0};      // how far the tool went on since it took hold of the point, while they touch [m]
-    double limit = 0;    // of the slip along the surface that friction holds [m]
-    double energy = 0;   // [J]
-    double stretch = 0;  // areaRatio() at the end of the last call; 0: not known
+    std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
+    Vec3 z{0.0};                   // of the search direction the part that is new [m]
+    double across = 0;             // stiffness of a tie across its axis [N/m]
+
+    Vec3 anchor{0.0};         // the point in a cell that it moves with [m]
+    double atRest = 0;        // stiffness of a surface point, by its area at rest [N/m]
+    double stretch = 0;       // areaRatio() at the end of the last call; 0: not known
+    std::uint32_t point = 0;  // index of the surface point
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
@@ -81,6 +86,8 @@ struct ContactSite {
 /// to the slip `limit`; beyond, its force stays. The limit is Coulomb's, but kept while a call solves: so friction has an
 /// energy, and the contact stays a convex problem.
 void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept;
+/// The same where only the slip or its limit is another. @pre the site is no tie
+void press(ContactSite& site) noexcept;
 
 /// The energy of the contacts along the direction p, and its derivatives by the way.
 struct Along {
@@ -110,7 +117,7 @@ private:
     std::span<const Window> windows_;
     std::uint32_t node_ = 0;
     std::uint32_t level_ = ~0U;
-    std::array<Vec3, 3> f_{};  // columns of F
+    std::array<Vec3, 3> cofactor_{};  // columns of cof(F)
 };
 
 /// Share of the contact's stiffness that a patch of radius a has on cells of side h.
@@ -125,6 +132,17 @@ double resolvedShare(double radiusInCells) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;
+
+/// Shares of a cell's nodes in what is at `t` of its edges: trilinear, x fastest.
+inline std::array<float, 8> trilinear(Vec3 t) noexcept
+{
+    const std::array<Vec3, 2> w{1.0 - t, t};
+    std::array<float, 8> share{};
+    for (std::size_t c = 0; c < 8; ++c) {
+        share[c] = static_cast<float>(w[c & 1].x * w[(c >> 1) & 1].y * w[c >> 2].z);
+    }
+    return share;
+}
 
 /// Finest window with the cell around `rest` [m], and where in it. `level` = number of windows when none has it.
 void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept;

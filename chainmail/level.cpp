@@ -21,6 +21,35 @@ constexpr std::size_t windowsShown = 3;  // the finest, and two by turns
 constexpr float leastVolume = 0.05F;     // of a cell that still counts as not inverted, share of its volume at rest
 constexpr std::array<float, 4> shares{1.0F, 0.5F, 0.25F, 0.0F};
 
+// Means over the eight nodes of each of `count` cells in a row, from that of the lowest node `at` on.
+void cellMeans(const Window& window, std::size_t at, std::size_t count, Vec3f* out) noexcept
+{
+    const Layout& l = window.layout;
+    for (int c = 0; c < 3; ++c) {
+        const float* f = window.field(Field::u) + static_cast<std::size_t>(c) * l.count + at;
+        for (std::size_t i = 0; i < count; ++i) {
+            const float low = f[i] + f[i + 1] + f[i + l.row] + f[i + l.row + 1];
+            const float high = f[i + l.plane] + f[i + l.plane + 1] + f[i + l.plane + l.row] + f[i + l.plane + l.row + 1];
+            out[i][c] = 0.125F * (low + high);
+        }
+    }
+}
+
+// Of the links that begin in a row of `count` floats with neighbours `row` and `plane` floats on: the longest shift.
+float longestLink(const float* from, std::size_t count, std::size_t row, std::size_t plane) noexcept
+{
+    float longest = 0.0F;
+    for (std::size_t i = 0; i < count; ++i) {
+        const float x = std::abs(from[i + 3] - from[i]);
+        const float y = std::abs(from[i + row] - from[i]);
+        const float z = std::abs(from[i + plane] - from[i]);
+        const float most = x > y ? x : y;
+        const float further = most > z ? most : z;
+        longest = further > longest ? further : longest;
+    }
+    return longest;
+}
+
 float largest(Vec3f v) noexcept
 {
     return glm::max(glm::max(std::abs(v.x), std::abs(v.y)), std::abs(v.z));
@@ -76,6 +105,7 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
     strained_.assign(shape.u().size(), 0);
     before_.resize(cells);
     now_.resize(cells);
+    longRows_.resize(static_cast<std::size_t>(size.y + 2) * static_cast<std::size_t>(size.z + 2));
 }
 
 ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
@@ -160,20 +190,6 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     return reaction;
 }
 
-Vec3f ElasticLevel::cellMean(const Window& window, Index3 cell) const noexcept
-{
-    const Layout& l = window.layout;
-    const std::size_t at = window.at(cell);
-    Vec3f mean(0.0F);
-    for (int c = 0; c < 3; ++c) {
-        const float* f = window.field(Field::u) + static_cast<std::size_t>(c) * l.count + at;
-        const float low = f[0] + f[1] + f[l.row] + f[l.row + 1];
-        const float high = f[l.plane] + f[l.plane + 1] + f[l.plane + l.row] + f[l.plane + l.row + 1];
-        mean[c] = 0.125F * (low + high);
-    }
-    return mean;
-}
-
 // The finest window: around the tool in every call, elsewhere a few layers of nodes at a time.
 void ElasticLevel::writeFinest(Vec3 around, int layers) noexcept
 {
@@ -195,28 +211,39 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
     const Window& window = elastic_.stack().windows().front();
     const auto& grid = shape_.lattice().grid;
     const auto u = shape_.raw();
-    std::size_t i = 0;
-    volume::forEachIndex(low, high, [&](Index3 at) {
-        const auto n = static_cast<Node>(grid.offset(at));
-        before_[i] = u[n];
-        now_[i++] = shape_.lattice().isNode(n) ? cellMean(window, at) : Vec3f(0.0F);
+    const auto inRow = static_cast<std::size_t>(std::max(high.x - low.x + 1, 0));
+    const auto forEachRow = [&](auto&& visit) {
+        std::size_t first = 0;
+        volume::forEachIndex(low, {low.x, high.y, high.z}, [&](Index3 at) {
+            visit(at, grid.offset(at), first);
+            first += inRow;
+        });
+    };
+    forEachRow([&](Index3 at, std::size_t n, std::size_t first) {
+        cellMeans(window, window.at(at), inRow, &now_[first]);
+        for (std::size_t i = 0; i < inRow; ++i) {
+            before_[first + i] = u[n + i];
+            if (!shape_.lattice().isNode(static_cast<Node>(n + i))) {
+                now_[first + i] = Vec3f(0.0F);
+            }
+        }
     });
     for (const float share : shares) {
-        i = 0;
-        volume::forEachIndex(low, high, [&](Index3 at) {
-            const Vec3f old = before_[i];
-            u[grid.offset(at)] = old + share * (now_[i] - old);
-            ++i;
+        forEachRow([&](Index3, std::size_t n, std::size_t first) {
+            for (std::size_t i = 0; i < inRow; ++i) {
+                const Vec3f old = before_[first + i];
+                u[n + i] = old + share * (now_[first + i] - old);
+            }
         });
         if (keepsOrientation(glm::max(low - 1, Index3(1)), glm::min(high + 1, grid.size - 2))) {
             break;
         }
     }
-    i = 0;
-    volume::forEachIndex(low, high, [&](Index3 at) {
-        const auto n = static_cast<Node>(grid.offset(at));
-        if (u[n] != before_[i++]) {
-            shape_.place(n);
+    forEachRow([&](Index3, std::size_t n, std::size_t first) {
+        for (std::size_t i = 0; i < inRow; ++i) {
+            if (u[n + i] != before_[first + i]) {
+                shape_.place(static_cast<Node>(n + i));
+            }
         }
     });
 }
@@ -226,39 +253,54 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
 bool ElasticLevel::keepsOrientation(Index3 low, Index3 high) noexcept
 {
     const auto& lattice = shape_.lattice();
-    if (!hasLongLink(low, high)) {
+    if (!findLongLinks(low, high)) {
         return true;
     }
-    bool all = true;
-    volume::forEachIndex(low, high, [&](Index3 at) { markStrained(static_cast<Node>(lattice.grid.offset(at))); });
-    volume::forEachIndex(low, high, [&](Index3 at) {
+    const auto inRow = static_cast<Node>(high.x - low.x + 1);
+    const auto rows = static_cast<std::size_t>(high.y - low.y + 2);
+    const auto isLong = [&](int y, int z) {
+        return longRows_[static_cast<std::size_t>(z - low.z + 1) * rows + static_cast<std::size_t>(y - low.y + 1)] != 0;
+    };
+    // A node's links begin in its row, and in those before it along y and z.
+    volume::forEachIndex(low, {low.x, high.y, high.z}, [&](Index3 at) {
         const auto n = static_cast<Node>(lattice.grid.offset(at));
-        all = all && (strained_[n] == 0 || upright(n));
+        if (isLong(at.y, at.z) || isLong(at.y - 1, at.z) || isLong(at.y, at.z - 1)) {
+            for (Node i = n; i < n + inRow; ++i) {
+                markStrained(i);
+            }
+        } else {
+            std::fill_n(strained_.begin() + n, inRow, std::uint8_t{0});
+        }
+    });
+    bool all = true;
+    volume::forEachIndex(low, {low.x, high.y, high.z}, [&](Index3 at) {
+        const auto n = static_cast<Node>(lattice.grid.offset(at));
+        for (Node i = n; all && i < n + inRow; ++i) {
+            all = strained_[i] == 0 || upright(i);
+        }
     });
     return all;
 }
 
-// Of links that begin in a box, to tissue or not. Whole rows at once: few boxes have one.
-bool ElasticLevel::hasLongLink(Index3 low, Index3 high) const noexcept
+// Whether a long link, to tissue or not, begins in a box. Whole rows at once: few boxes have one. Where one does, longRows_
+// has the box's rows and those before it along y and z, from the node before the box on.
+bool ElasticLevel::findLongLinks(Index3 low, Index3 high) noexcept
 {
     const auto& grid = shape_.lattice().grid;
     const float* u = &shape_.u().front().x;
     const std::size_t row = 3 * static_cast<std::size_t>(grid.size.x);
     const std::size_t plane = row * static_cast<std::size_t>(grid.size.y);
     const std::size_t count = 3 * static_cast<std::size_t>(high.x - low.x + 1);
-    float longest = 0.0F;
+    const float third = static_cast<float>(grid.spacing) / 3.0F;
+    bool any = false;
     volume::forEachIndex(Index3(low.x, low.y, low.z), Index3(low.x, high.y, high.z), [&](Index3 at) {
-        const float* from = u + 3 * grid.offset(at);
-        for (std::size_t i = 0; i < count; ++i) {
-            const float x = std::abs(from[i + 3] - from[i]);
-            const float y = std::abs(from[i + row] - from[i]);
-            const float z = std::abs(from[i + plane] - from[i]);
-            const float most = x > y ? x : y;
-            const float further = most > z ? most : z;
-            longest = further > longest ? further : longest;
-        }
+        any = any || longestLink(u + 3 * grid.offset(at), count, row, plane) > third;
     });
-    return longest > static_cast<float>(grid.spacing) / 3.0F;
+    std::size_t i = 0;
+    volume::forEachIndex(low - 1, Index3(low.x - 1, any ? high.y : low.y - 2, high.z), [&](Index3 at) {
+        longRows_[i++] = longestLink(u + 3 * grid.offset(at), count + 3, row, plane) > third ? 1 : 0;
+    });
+    return any;
 }
 
 void ElasticLevel::markStrained(Node n) noexcept
@@ -307,10 +349,10 @@ bool ElasticLevel::upright(Node n) const noexcept
 }
 
 // Node by node, where one alone may not turn a cell over.
-void ElasticLevel::write(Node n) noexcept
+void ElasticLevel::write(Node n, Index3 at) noexcept
 {
     const auto& lattice = shape_.lattice();
-    Vec3f u(elastic_.atRest() ? Vec3(0.0) : elastic_.displacement(lattice.grid.position(lattice.grid.node(n))));
+    Vec3f u(elastic_.atRest() ? Vec3(0.0) : elastic_.displacementOf(at));
     if (glm::dot(u, u) < leastShown * leastShown) {
         u = Vec3f(0.0F);
     }
@@ -351,7 +393,7 @@ void ElasticLevel::writeByTurns(std::size_t level) noexcept
         }
         const auto n = static_cast<Node>(grid.offset(at));
         if (shape_.lattice().isNode(n)) {
-            write(n);
+            write(n, at);
         }
         if (++at.x > high.x) {
             at.x = low.x;
@@ -379,7 +421,8 @@ void ElasticLevel::revisitMoved() noexcept
     for (int i = 0; i < turns && !shape_.moved().empty(); ++i) {
         revisited_ = revisited_ < shape_.moved().size() ? revisited_ : 0;
         const std::size_t before = shape_.moved().size();
-        write(shape_.moved()[revisited_]);
+        const Node n = shape_.moved()[revisited_];
+        write(n, shape_.lattice().grid.node(n));
         // A node that is at rest now left its place to another.
         revisited_ += shape_.moved().size() == before ? 1 : 0;
     }

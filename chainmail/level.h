@@ -98,14 +98,13 @@ private:
 
     ElasticLoad load(const Grip& grip) noexcept;
     ElasticLoad tie(const Grip& grip) noexcept;
-    Vec3f cellMean(const Window& window, Index3 cell) const noexcept;
     void writeFinest(Vec3 around, int layers) noexcept;
     void writeBox(Index3 low, Index3 high) noexcept;
-    void write(Node n) noexcept;
+    void write(Node n, Index3 at) noexcept;
     void writeByTurns(std::size_t level) noexcept;
     void revisitMoved() noexcept;
     bool keepsOrientation(Index3 low, Index3 high) noexcept;
-    bool hasLongLink(Index3 low, Index3 high) const noexcept;
+    bool findLongLinks(Index3 low, Index3 high) noexcept;
     void markStrained(Node n) noexcept;
     void markWithNeighbours(Node n) noexcept;
     bool upright(Node n) const noexcept;
@@ -121,6 +120,7 @@ private:
     std::vector<Vec3f> before_;                      // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;
     std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
+    std::vector<std::uint8_t> longRows_;  // not 0 for rows of a box in which a link begins that is shifted so, to tissue or not
     std::vector<Index3> turns_;           // by level: where its turn is
     std::size_t revisited_ = 0;
     ElasticResult last_;

@@ -174,18 +174,10 @@ WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, bool
     return sum;
 }
 
-void WindowStack::addForce(std::size_t level, std::size_t node, Vec3 force) noexcept
+void WindowStack::addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept
 {
-    Window& w = windows_[level];
-    if (w.dof[node] != 0.0F) {
-        w.add(Field::r, node, force);
-        return;
-    }
-    if (w.border[node] == 0.0F) {
-        return;
-    }
-    w.visitParents(node, windows_[level + 1],
-                   [&](std::size_t parent, double share) { addForce(level + 1, parent, share * force); });
+    windows_[level].visitParents(node, windows_[level + 1],
+                                 [&](std::size_t parent, double share) { addForce(level + 1, parent, share * force); });
 }
 
 std::array<double, 2> WindowStack::dots(Field x, Field a, Field b) const noexcept

@@ -59,7 +59,15 @@ public:
     void joinBorders(Field x) noexcept;
 
     /// Adds a force at a node: to the residual of a degree of freedom; at a border node, to those it follows.
-    void addForce(std::size_t level, std::size_t node, Vec3 force) noexcept;
+    void addForce(std::size_t level, std::size_t node, Vec3 force) noexcept
+    {
+        Window& w = windows_[level];
+        if (w.dof[node] != 0.0F) {
+            w.add(Field::r, node, force);
+        } else if (w.border[node] != 0.0F) {
+            addToParents(level, node, force);
+        }
+    }
 
     /// { x . a, x . b }, over the degrees of freedom where a and b are zero elsewhere.
     std::array<double, 2> dots(Field x, Field a, Field b) const noexcept;
@@ -79,6 +87,7 @@ private:
     Vec3 wantedPlace(std::size_t level, const Focus& focus) const noexcept;
     Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
     void place() noexcept;
+    void addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept;
     void transfer(Field field) noexcept;
     static StepFields stepFields(Window& window, Field direction) noexcept;
 

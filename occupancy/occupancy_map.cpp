@@ -14,11 +14,14 @@ constexpr int margin = 4;
 }  // namespace
 
 OccupancyMap::OccupancyMap(const volume::NodeGrid& grid, std::span<const std::uint8_t> solid)
-    : cells_{grid.size + Index3(2 * margin), grid.origin - margin * grid.spacing, grid.spacing},
+    : grid_(grid),
+      cells_{grid.size + Index3(2 * margin), grid.origin - margin * grid.spacing, grid.spacing},
+      nearHome_(0.49F * static_cast<float>(grid.spacing)),
       head_(cells_.count(), none),
       next_(grid.count(), none),
       previous_(grid.count(), none),
-      cell_(grid.count(), none)
+      cell_(grid.count(), none),
+      isHome_(grid.count(), 1)
 {
     assert(solid.size() == grid.count());
     for (std::size_t e = 0; e < solid.size(); ++e) {
@@ -36,10 +39,12 @@ Index3 OccupancyMap::cellAt(Vec3 p) const noexcept
     return Index3(glm::clamp(g, Vec3(0.0), Vec3(cells_.size - Index3(1))));
 }
 
-void OccupancyMap::place(Element e, Vec3 position) noexcept
+void OccupancyMap::place(Element e, Vec3f u) noexcept
 {
-    const auto cell = static_cast<std::uint32_t>(cells_.offset(cellAt(position)));
+    const Index3 node = grid_.node(e);
+    const auto cell = static_cast<std::uint32_t>(cells_.offset(cellAt(grid_.position(node) + Vec3(u))));
     if (cell != cell_[e]) {
+        isHome_[e] = cell == cells_.offset(node + Index3(margin)) ? 1 : 0;
         unlink(e);
         link(e, cell);
         ++rewrites_;

@@ -2,6 +2,8 @@
 
 #include <volume/geometry.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,8 +29,14 @@ public:
     /// Elements are the nodes of `grid` with solid[node] != 0 (count x 1), each at its node.
     OccupancyMap(const volume::NodeGrid& grid, std::span<const std::uint8_t> solid);
 
-    /// Element `e` is at `position` [m] now. O(1), allocates nothing.
-    void place(Element e, Vec3 position) noexcept;
+    /// Element `e` is `u` [m] away from its node now. O(1), allocates nothing.
+    void displace(Element e, Vec3f u) noexcept
+    {
+        // Up to half a spacing away it is in its node's cell; most are.
+        if (isHome_[e] == 0 || std::max({std::abs(u.x), std::abs(u.y), std::abs(u.z)}) > nearHome_) {
+            place(e, u);
+        }
+    }
 
     /// Calls visit(element) for every element in the cells that the box [low, high] touches [m].
     template <typename Visit>
@@ -49,15 +57,19 @@ public:
     std::uint64_t rewrites() const noexcept { return rewrites_; }
 
 private:
+    void place(Element e, Vec3f u) noexcept;
     Index3 cellAt(Vec3 p) const noexcept;
     void unlink(Element e) noexcept;
     void link(Element e, std::uint32_t cell) noexcept;
 
+    volume::NodeGrid grid_;            // of the elements
     volume::NodeGrid cells_;           // node = middle of a cell; a margin wider than the lattice
+    float nearHome_;                   // a little under half a spacing [m]
     std::vector<Element> head_;        // first element of each cell   (cells x 1)
     std::vector<Element> next_;        // the one behind it            (elements x 1)
     std::vector<Element> previous_;    // the one before it            (elements x 1)
     std::vector<std::uint32_t> cell_;  // the cell of each element     (elements x 1)
+    std::vector<std::uint8_t> isHome_; // not 0 where that is its node's (elements x 1)
     std::uint64_t rewrites_ = 0;
 };
 

@@ -93,6 +93,9 @@ private:
     Nearest nearest(Vec3 p) const noexcept
     {
         const Vec3 r = p - start_;
+        if (length_ <= 0.0) {
+            return {r, radius_};
+        }
         const double s = glm::dot(r, ahead_);
         const double q = glm::length(r - s * ahead_);
         const double x = std::clamp(s + q * sine_ / cosine_, 0.0, length_);

@@ -54,7 +54,7 @@ public:
             const auto e = static_cast<Element>(grid_.offset(n));
             const double bell = std::exp(-0.5 * glm::dot(rest, rest) / (dentRadius * dentRadius));
             u_[e] = Vec3f(Vec3(0, 0, -dent * bell));
-            map_.place(e, rest + Vec3(u_[e]));
+            map_.displace(e, u_[e]);
         });
     }
 
