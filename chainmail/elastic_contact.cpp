@@ -180,9 +180,12 @@ double resolvedShare(double radiusInCells) noexcept
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept
 {
     const Window& w = windows[site.level];
+    const std::size_t n = w.layout.count, row = w.layout.row, plane = w.layout.plane;
+    const std::array<std::size_t, 8> at{0, 1, row, row + 1, plane, plane + 1, plane + row, plane + row + 1};
+    const float* x = w.field(field) + site.node;
     Vec3 sum(0.0);
-    for (int c = 0; c < 8; ++c) {
-        sum += static_cast<double>(site.share[static_cast<std::size_t>(c)]) * w.value(field, w.layout.corner(site.node, c));
+    for (std::size_t c = 0; c < 8; ++c) {
+        sum += static_cast<double>(site.share[c]) * Vec3(x[at[c]], x[n + at[c]], x[2 * n + at[c]]);
     }
     return sum;
 }
@@ -232,9 +235,10 @@ void press(ContactSite& site) noexcept
         return;
     }
     const Vec3 along = site.along();
-    const double held = std::min(glm::length(along), site.limit);
-    site.force += held > 0.0 ? site.stiffness * held / glm::length(along) * along : Vec3(0.0);
-    site.energy += frictionEnergy(site.stiffness, glm::length(along), site.limit);
+    const double length = glm::length(along);
+    const double held = std::min(length, site.limit);
+    site.force += held > 0.0 ? site.stiffness * held / length * along : Vec3(0.0);
+    site.energy += frictionEnergy(site.stiffness, length, site.limit);
 }
 
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept

@@ -282,8 +282,8 @@ bool ElasticLevel::keepsOrientation(Index3 low, Index3 high) noexcept
     return all;
 }
 
-// Whether a long link, to tissue or not, begins in a box. Whole rows at once: few boxes have one. Where one does, longRows_
-// has the box's rows and those before it along y and z, from the node before the box on.
+// Whether a long link, to tissue or not, begins in a box. Whole rows at once: few have one. In longRows_ are those of the
+// box's rows and of those before it along y and z, from the node before the box on.
 bool ElasticLevel::findLongLinks(Index3 low, Index3 high) noexcept
 {
     const auto& grid = shape_.lattice().grid;
@@ -292,13 +292,16 @@ bool ElasticLevel::findLongLinks(Index3 low, Index3 high) noexcept
     const std::size_t plane = row * static_cast<std::size_t>(grid.size.y);
     const std::size_t count = 3 * static_cast<std::size_t>(high.x - low.x + 1);
     const float third = static_cast<float>(grid.spacing) / 3.0F;
-    bool any = false;
-    volume::forEachIndex(Index3(low.x, low.y, low.z), Index3(low.x, high.y, high.z), [&](Index3 at) {
-        any = any || longestLink(u + 3 * grid.offset(at), count, row, plane) > third;
-    });
+    bool around = false;
     std::size_t i = 0;
-    volume::forEachIndex(low - 1, Index3(low.x - 1, any ? high.y : low.y - 2, high.z), [&](Index3 at) {
-        longRows_[i++] = longestLink(u + 3 * grid.offset(at), count + 3, row, plane) > third ? 1 : 0;
+    volume::forEachIndex(low - 1, Index3(low.x - 1, high.y, high.z), [&](Index3 at) {
+        const bool isLong = longestLink(u + 3 * grid.offset(at), count + 3, row, plane) > third;
+        longRows_[i++] = isLong ? 1 : 0;
+        around = around || isLong;
+    });
+    bool any = false;
+    volume::forEachIndex(low, Index3(low.x, around ? high.y : low.y - 1, high.z), [&](Index3 at) {
+        any = any || longestLink(u + 3 * grid.offset(at), count, row, plane) > third;
     });
     return any;
 }
@@ -338,10 +341,11 @@ bool ElasticLevel::upright(Node n) const noexcept
         edge[static_cast<std::size_t>(side)] = shift;
     }
     const float least = leastVolume * spacing * spacing * spacing;
-    for (std::size_t octant = 0; octant < 8; ++octant) {
-        const std::size_t x = octant & 1, y = (octant >> 1) & 1, z = octant >> 2;
-        const float sign = (x + y + z) % 2 != 0 ? 1.0F : -1.0F;
-        if (sign * glm::dot(edge[x], glm::cross(edge[2 + y], edge[4 + z])) < least) {
+    for (std::size_t side = 0; side < 4; ++side) {
+        const std::size_t y = side & 1, z = side >> 1;
+        const Vec3f across = glm::cross(edge[2 + y], edge[4 + z]);
+        const float sign = (y + z) % 2 != 0 ? 1.0F : -1.0F;
+        if (sign * glm::dot(edge[0], across) < least || -sign * glm::dot(edge[1], across) < least) {
             return false;
         }
     }
