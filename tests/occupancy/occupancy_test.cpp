@@ -37,7 +37,7 @@ struct Solid {
         for (Element e = 0; e < grid.count(); ++e) {
             if (solid[e] != 0) {
                 u[e] = Vec3f(field(grid.position(grid.node(e))));
-                map->place(e, body().position(e));
+                map->displace(e, u[e]);
             }
         }
     }
