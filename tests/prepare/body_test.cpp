@@ -354,7 +354,7 @@ std::set<std::string> allTissues(const Patient& p)
     return all;
 }
 
-class Bones : public ::testing::Test {
+class BonesOfAPatient : public ::testing::Test {
 protected:
     Patient torso, abdomen;
 
@@ -371,7 +371,7 @@ protected:
 
 // Bones whose labels are held back come back from the image. TotalSegmentator's two models agree to 0.958 on the bones
 // of the upper abdomen.
-TEST_F(Bones, WithoutLabelsAreFound)
+TEST_F(BonesOfAPatient, WithoutLabelsAreFound)
 {
     EXPECT_GE(boneDice(torso, "bone, torso, bones held back", bones), 0.90);
     EXPECT_GE(boneDice(abdomen, "bone, upper abdomen, bones held back", bones), 0.90);
@@ -380,7 +380,7 @@ TEST_F(Bones, WithoutLabelsAreFound)
 }
 
 // Noise of a low dose, and contrast medium in vessels and organs that have no label.
-TEST_F(Bones, AreFoundInOtherImagesOfThem)
+TEST_F(BonesOfAPatient, AreFoundInOtherImagesOfThem)
 {
     for (Patient p : {torso, abdomen}) {
         std::mt19937 random(1);
