@@ -127,10 +127,10 @@ TEST_F(ImportOptions, AxesAreSaidWhereTheFileDoesNot)
     refused(one, with({"--axes", "RAS"}), "leave --axes out");
 }
 
-TEST_F(ImportOptions, WhatIsOnlyOfDicomIsRefusedForOtherFiles)
+TEST_F(ImportOptions, WhatIsOnlyOfDicomDoesNotPassInSilence)
 {
     refused(one, with({"--series", "1.2.3"}), "leave --series out");
-    refused(one, with({"--dicom-labels"}), "leave --dicom-labels out");
+    EXPECT_TRUE(warns(taken(one, with({"--dicom-labels"})), "--dicom-labels decides nothing"));
     expectRefusal(import(one, with({"--threshold", "1.5"})), "--threshold: Value 1.5 not in range");
     EXPECT_TRUE(warns(taken(one, with({"--overlap", "first"})), "--overlap decides nothing"));
     if (!fs::exists(data + "/highdicom_seg")) {

@@ -117,10 +117,11 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
+    ImportedLabels labels = labelsOf(checkedSource(path, options, options.sheared), options);
     if (options.dicomLabels) {
-        refuse(path, "--dicom-labels: it is no DICOM: leave --dicom-labels out");
+        labels.warnings.emplace_back("--dicom-labels decides nothing: it is no DICOM");
     }
-    return labelsOf(checkedSource(path, options, options.sheared), options);
+    return labels;
 }
 
 }  // namespace
