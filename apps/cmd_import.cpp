@@ -201,11 +201,16 @@ void addMapping(CLI::App& command, Options& o)
 void addSteps(CLI::App& command, Options& o)
 {
     const char* group = "Changes, done in this order; lengths in mm, or with a unit";
-    command
-        .add_option("--crop", o.steps.crop, "Keep a box around all tissue, around a structure, or x0,x1,y0,y1,z0,z1 in LPS")
-        ->type_name("tissue|NAME|BOX")
+    CLI::Option* const crop =
+        command
+            .add_option("--crop", o.steps.crop,
+                        "Keep a box around all tissue, around a structure, or x0,x1,y0,y1,z0,z1 in LPS")
+            ->type_name("tissue|NAME|BOX")
+            ->group(group);
+    command.add_option("--crop-margin", o.cropMargin, "Around the structure (default 10)")
+        ->type_name("MM")
+        ->needs(crop)
         ->group(group);
-    command.add_option("--crop-margin", o.cropMargin, "Around the structure (default 10)")->type_name("MM")->group(group);
     command.add_option("--voxel", o.voxel, "Resample to cubes; straightens sheared grids")->type_name("MM")->group(group);
     command
         .add_option_function<std::vector<std::string>>(

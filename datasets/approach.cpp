@@ -366,6 +366,11 @@ std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optio
     for (const auto& [why, ways] : refused) {
         reasons += fmt::format("; {} go {}", ways, why);
     }
+    if (!lines.empty()) {
+        const auto wider = [](const Line& a, const Line& b) { return a.way.clearance < b.way.clearance; };
+        const double widest = std::max_element(lines.begin(), lines.end(), wider)->way.clearance;
+        reasons += fmt::format("; the widest keeps {:.1f} mm", 1e3 * std::max(0.0, widest));
+    }
     throw std::runtime_error(
         fmt::format("{}: no straight way to '{}' from the skin that keeps {:g} mm from vital structures and bone ({} ways "
                     "reach it{}): set entry_mm and aim_mm in [target]",

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <regex>
 #include <set>
 #include <stdexcept>
 
@@ -128,6 +129,21 @@ std::vector<std::pair<double, double>> pointsOf(Section& top)
     return points;
 }
 
+// Roman numerals, also with a letter behind: lobules of a cerebellum, segments of a liver, nerves of a head.
+bool isNumeral(std::string_view name)
+{
+    static const std::regex numeral(R"((left|right)?[ _]*[IVX]+[AB]?([ _][a-z])?)");
+    return std::regex_match(name.begin(), name.end(), numeral);
+}
+
+// Whether a word is the initials of those before it.
+bool isInitials(const std::vector<std::string>& words, const std::string& word)
+{
+    return word.size() > 1 && word.size() <= words.size() &&
+           std::equal(word.begin(), word.end(), words.end() - static_cast<std::ptrdiff_t>(word.size()),
+                      [](char initial, const std::string& before) { return initial == before.front(); });
+}
+
 }  // namespace
 
 const std::vector<LabelMap>& labelMaps()
@@ -197,7 +213,7 @@ StructureNames::StructureNames()
     }
     for (const LabelMap& map : labelMaps()) {
         for (const volume::LabelName& label : map.labels) {
-            if (map.general) {
+            if (map.general && !isNumeral(label.name)) {
                 labels_.emplace_back(wordsOf(label.name), label.tissue);
             }
         }
@@ -216,10 +232,15 @@ StructureNames::Words StructureNames::wordsOf(std::string_view name) const
             words.emplace_back();
         }
     }
-    Words out;
+    words.erase(std::remove(words.begin(), words.end(), ""), words.end());
+    Words whole, out;
     for (std::string& word : words) {
+        if (isInitials(whole, word)) {
+            continue;
+        }
+        whole.push_back(word);
         const bool says = std::find(ignored_.begin(), ignored_.end(), word) == ignored_.end();
-        if (!word.empty() && says) {
+        if (says) {
             if (word.size() > 3 && word.ends_with('s') && !word.ends_with("ss") && !word.ends_with("us") &&
                 !word.ends_with("is") && !word.ends_with("as")) {
                 word.pop_back();

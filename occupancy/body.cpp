@@ -90,11 +90,10 @@ struct Search {
     }
 
     // Half a step keeps the iteration a contraction for gradients of u up to 3.
-    void step() noexcept
-    {
-        const Vec3 miss = p - corners.displacement(rest) - rest;
-        rest += 0.5 * miss;
-    }
+    void step() noexcept { rest += 0.5 * miss(); }
+
+    // From where `rest` is seen to the point.
+    Vec3 miss() noexcept { return p - corners.displacement(rest) - rest; }
 
     Vec3 p;
     Vec3 rest;
@@ -126,6 +125,20 @@ Vec3 restPoint(const Body& body, Vec3 p) noexcept
 {
     Search search(body, p);
     solve({&search, 1});
+    return search.rest;
+}
+
+Vec3 exactRestPoint(const Body& body, Vec3 p) noexcept
+{
+    constexpr int steps = 60;
+    Search search(body, p);
+    const double enough = 1e-3 * body.grid.spacing;
+    for (int i = 0; i < steps && search.moved; ++i) {
+        if (glm::length(search.miss()) < enough) {
+            break;
+        }
+        search.step();
+    }
     return search.rest;
 }
 

@@ -135,7 +135,7 @@ volume::LabelImage DeformedState::labels() const
         volume::forEachIndex(Index3(0, 0, z), Index3(image.size.x - 1, image.size.y - 1, z), [&](Index3 n) {
             const Vec3 p = image.affine.toPatient(Vec3(n));
             if (inside(box, p)) {
-                const Vec3 rest = occupancy::restPoint(body, p);
+                const Vec3 rest = occupancy::exactRestPoint(body, p);
                 image.values[image.offset(n)] = holds(body, rest, p) ? reader.label(rest) : std::uint16_t{0};
             }
         });
@@ -161,7 +161,7 @@ std::vector<Vec3f> DeformedState::inverse() const
     tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
         const Vec3 p = grid.position(grid.node(i));
         if (inside(box, p)) {
-            out[i] = Vec3f(1e3 * (occupancy::restPoint(body, p) - p));
+            out[i] = Vec3f(1e3 * (occupancy::exactRestPoint(body, p) - p));
         }
     });
     return out;

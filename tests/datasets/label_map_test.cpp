@@ -101,13 +101,18 @@ TEST(StructureNames, KnowWhatSegmentersWrite)
                                                          {"Renal cyst", "cyst"},
                                                          {"tibia_left", "bone"},
                                                          {"Sigmoid colon", "bowel"},
-                                                         {"esophagus", "esophagus"}};
+                                                         {"esophagus", "esophagus"},
+                                                         {"Right Adrenal Gland (RAG)", "adrenal"},
+                                                         {"Inferior Vena Cava (IVC)", "vein"},
+                                                         {"thyroid lobe left", "thyroid"},
+                                                         {"temporal_lobe", "brain"}};
     for (const auto& [name, tissue] : known) {
         EXPECT_EQ(names.tissueOf(name).value_or("unknown"), tissue) << name;
     }
     // What only speaks of a tissue is not taken for it.
-    for (const char* name : {"liver metastasis margin", "rib fracture", "left ventricle", "ventricle", "vessel", "breast",
-                             "edema", "PZ", "cancer margin", "123", "", "Segment_4"}) {
+    for (const char* name :
+         {"liver metastasis margin", "rib fracture", "left ventricle", "ventricle", "vessel", "breast", "edema", "PZ",
+          "cancer margin", "123", "", "Segment_4", "unknown", "temporal", "frontal", "V", "left VI l", "VIIIb", "face"}) {
         EXPECT_FALSE(names.tissueOf(name)) << name;
     }
     EXPECT_EQ(names.suggestion("liver metastasis margin").value_or(""), "liver");

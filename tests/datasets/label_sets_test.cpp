@@ -216,7 +216,12 @@ std::vector<LabelSet> otherNamedSets()
          "",
          {{9, "vein"}, {10, "vein"}, {12, "adrenal"}},
          ""},
-        {"WORD", {}, {{11, "intestine"}, {13, "rectum"}, {15, "Head_of_femur_L"}}, "", {}, "15 'Head_of_femur_L'"},
+        {"WORD",
+         {},
+         {{11, "intestine"}, {13, "rectum"}, {15, "Head_of_femur_L"}},
+         "",
+         {{11, "bowel"}, {13, "bowel"}, {15, "bone"}},
+         ""},
         {"SPIDER",
          {},
          {{1, "vertebra L5"}, {100, "spinal canal"}, {201, "intervertebral disc"}},
@@ -243,6 +248,82 @@ std::vector<LabelSet> otherNamedSets()
          {},
          "no tissue is known for 2 of its labels"},
         {"values as names", {5}, {{5, "label 5"}}, "", {}, "its values would fit"},
+    };
+}
+
+std::vector<LabelSet> moreSets()
+{
+    const std::string unknown = "no tissue is known for";
+    return {
+        {"FLARE 2022 as it comes",
+         {},
+         named({"Liver", "Right kidney (RK)", "Inferior Vena Cava (IVC)", "Right Adrenal Gland (RAG)", "Left kidney (LK)"}),
+         "",
+         {{2, "kidney"}, {3, "vein"}, {4, "adrenal"}, {5, "kidney"}},
+         ""},
+        {"CHAOS MR", {63, 126, 189, 252}, {}, "", {}, unknown},
+        {"MM-WHS", {205, 420, 500, 550, 600, 820, 850}, {}, "", {}, unknown},
+        {"ACDC, dataset.json of nnU-Net",
+         {},
+         named({"RV", "MLV", "LVC"}),
+         "",
+         {},
+         "no tissue is known for 3 of its labels"},
+        {"ACDC, values", {1, 2, 3}, {}, "", {}, "or one of"},
+        {"PROMISE12", {1}, {}, "", {}, "or one of"},
+        {"Duke breast MRI", {}, named({"breast", "dense tissue", "blood vessels"}), "", {}, "1 'breast'"},
+        {"SynthSeg", {2, 3, 4, 17, 24, 53, 1002, 2035}, {}, "", {}, "--map freesurfer ("},
+        {"SynthSeg by its map",
+         {2, 3, 4, 17, 24, 1002},
+         {},
+         "freesurfer",
+         {{2, "white_matter"}, {4, "csf"}, {1002, "grey_matter"}},
+         ""},
+        {"HaN-Seg",
+         {},
+         named({"A_Carotid_L", "Bone_Mandible", "SpinalCord", "OpticNrv_R", "Glnd_Thyroid", "Eye_AL", "Parotid_L"}),
+         "",
+         {{1, "artery"}, {2, "bone"}, {3, "spinal_cord"}, {4, "nerve"}, {5, "thyroid"}, {6, "eye"}, {7, "soft_tissue"}},
+         ""},
+        {"HaN-Seg, all of it", {}, named({"A_Carotid_L", "BuccalMucosa", "Cavity_Oral"}), "", {}, "2 'BuccalMucosa'"},
+        {"SegTHOR", {}, named({"esophagus", "heart", "trachea", "aorta"}), "", {{1, "esophagus"}, {4, "artery"}}, ""},
+        {"CT-ORG",
+         {},
+         named({"liver", "bladder", "lungs", "kidneys", "bone", "brain"}),
+         "",
+         {{1, "liver"}, {3, "lung"}, {5, "bone"}},
+         ""},
+        {"AbdomenAtlas",
+         {},
+         named({"gall_bladder", "postcava", "celiac_truck", "hepatic_vessel", "femur_left"}),
+         "",
+         {{1, "gallbladder"}, {2, "vein"}, {3, "artery"}, {4, "vein"}, {5, "bone"}},
+         ""},
+        {"PANORAMA",
+         {},
+         named({"PDAC lesion", "veins", "arteries", "pancreas parenchyma", "pancreatic duct"}),
+         "",
+         {},
+         "5 'pancreatic duct'"},
+        {"HECKTOR", {}, named({"GTVp", "GTVn"}), "", {{1, "tumour"}, {2, "lymph_node"}}, ""},
+        {"liver segments in Roman numerals",
+         {},
+         named({"I", "IVa", "V", "VI", "VIII"}),
+         "",
+         {},
+         "no tissue is known for 5 of its labels"},
+        {"bones of a skull",
+         {},
+         named({"frontal", "parietal", "occipital", "temporal"}),
+         "",
+         {},
+         "no tissue is known for 4 of its labels"},
+        {"what nobody knows",
+         {},
+         named({"unknown", "other", "necrosis"}),
+         "",
+         {},
+         "no tissue is known for 3 of its labels"},
     };
 }
 
@@ -295,13 +376,14 @@ void check(const LabelSet& set)
 TEST(LabelSets, EachLabelHasTheTissueThatItMustHaveOrTheSetIsRefused)
 {
     std::size_t sets = 0;
-    for (const auto& list : {bareSets(), mappedSets(), totalSegmentatorSets(), decathlonSets(), otherNamedSets()}) {
+    for (const auto& list :
+         {bareSets(), mappedSets(), totalSegmentatorSets(), decathlonSets(), otherNamedSets(), moreSets()}) {
         for (const LabelSet& set : list) {
             check(set);
             ++sets;
         }
     }
-    EXPECT_GE(sets, 40U);
+    EXPECT_GE(sets, 70U);
 }
 
 // One note for many labels; --verbose gives one for each.

@@ -144,6 +144,66 @@ TEST(RestPoint, InvertsAnAffineDisplacement)
     }
 }
 
+// Of random places in the tissue: how far their answers are off, and from where they are seen [elements].
+struct LookUp {
+    double servo = 0, exact = 0, residual = 0;
+};
+
+LookUp lookUp(const std::function<Vec3(Vec3)>& field)
+{
+    const Vec3 middle(23.5, 23.5, 18.5);
+    Solid s(48, [&](Vec3 p) {
+        const Vec3 out = glm::abs(p - middle) - Vec3(20, 20, 15);
+        return std::max({out.x, out.y, out.z});
+    });
+    s.displace(field);
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> across(5, 42), up(5, 33);
+    LookUp most;
+    for (int i = 0; i < 20000; ++i) {
+        const double a = across(random), b = across(random), c = up(random);
+        const Vec3 x(a, b, c), p = x + displacementAt(s.body(), x), exact = exactRestPoint(s.body(), p);
+        most.servo = std::max(most.servo, glm::distance(restPoint(s.body(), p), x));
+        most.exact = std::max(most.exact, glm::distance(exact, x));
+        most.residual = std::max(most.residual, glm::distance(exact + displacementAt(s.body(), exact), p));
+    }
+    return most;
+}
+
+// The skin pressed in by `depth` over a width of `wide` [elements].
+std::function<Vec3(Vec3)> dimple(double depth, double wide)
+{
+    return [=](Vec3 p) {
+        const double r = std::hypot(p.x - 23.3, p.y - 23.7) / wide;
+        return Vec3(0, 0, -depth * std::exp(-r * r) * std::exp((p.z - 33) / (1.5 * wide)));
+    };
+}
+
+// Six steps find a place to a quarter of an element, half a voxel of slices, in dimples as deep as wide; exports go on
+// until the place is exact, in dimples twice as steep too.
+TEST(RestPoint, OfADimpleIsWhatWasThere)
+{
+    for (const auto& [depth, wide] : {std::pair(2.0, 6.0), std::pair(4.0, 6.0), std::pair(6.0, 6.0)}) {
+        const LookUp most = lookUp(dimple(depth, wide));
+        EXPECT_LT(most.servo, 0.25) << depth << " " << wide;
+        EXPECT_LT(most.exact, 0.005) << depth << " " << wide;
+    }
+    EXPECT_LT(lookUp(dimple(4, 3)).exact, 0.005);
+    EXPECT_LT(lookUp(dimple(6, 3)).residual, 0.05);
+}
+
+// A needle that takes the elements at its shaft with it, by more than they are apart.
+TEST(RestPoint, AroundADraggedNeedleIsSeenWhereItIs)
+{
+    for (const double drag : {1.0, 2.0, 4.0}) {
+        const LookUp most = lookUp([&](Vec3 p) {
+            const double r = std::hypot(p.x - 23.3, p.y - 23.7);
+            return r < 3 && p.z > 12 ? Vec3(0, 0, -drag * (1 - r / 3)) : Vec3(0);
+        });
+        EXPECT_LT(most.residual, 0.05) << drag;
+    }
+}
+
 // The elements of a row share a division: whatever the order, the positions are those of the grid, to the bit.
 TEST(RestPositions, AreThoseOfTheGridInAnyOrder)
 {

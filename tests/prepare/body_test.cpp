@@ -14,6 +14,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <random>
 #include <set>
 
 namespace palpate::prepare {
@@ -335,27 +336,72 @@ TEST(BodyOfAPatient, SkinIsTheLayerAroundTotalSegmentatorsMasks)
               0.6);
 }
 
-// Bones whose labels are held back come back from the image.
-TEST(BodyOfAPatient, BonesWithoutLabelsAreFound)
+const std::set<std::string> bones{"bone", "rib"};
+
+// Dice of the bones that come back with the labels of some tissues held back.
+double boneDice(const Patient& p, const char* what, const std::set<std::string>& heldBack)
 {
-    if (!hasData()) {
-        GTEST_SKIP() << "no test volumes in " << data;
-    }
-    const std::set<std::string> bones{"bone", "rib"};
-    const auto bone = [&](const Patient& p, const char* what, const std::set<std::string>& heldBack) {
-        const auto ours = recovered(p, heldBack);
-        return diceOf(
-            what, ours.size(), [&](std::size_t i) { return bones.count(p.tissue[i]) > 0; },
-            [&](std::size_t i) { return bones.count(ours[i]) > 0; });
-    };
-    const Patient torso =
-        patient("/totalsegmentator_ct/example_seg_fast_force_split.nii.gz", "/totalsegmentator_ct/example_ct.nii.gz");
-    const Patient part = patient("/totalsegmentator_ct/example_seg.nii.gz", "/totalsegmentator_ct/example_ct_sm.nii.gz");
-    EXPECT_GE(bone(torso, "bone, torso, bones held back", bones), 0.89);
-    EXPECT_GE(bone(part, "bone, upper abdomen, bones held back", bones), 0.86);
-    std::set<std::string> all(part.tissue.begin(), part.tissue.end());
+    const auto ours = recovered(p, heldBack);
+    return diceOf(
+        what, ours.size(), [&](std::size_t i) { return bones.count(p.tissue[i]) > 0; },
+        [&](std::size_t i) { return bones.count(ours[i]) > 0; });
+}
+
+std::set<std::string> allTissues(const Patient& p)
+{
+    std::set<std::string> all(p.tissue.begin(), p.tissue.end());
     all.erase("air");
-    EXPECT_GE(bone(part, "bone, upper abdomen, every label held back", all), 0.84);
+    return all;
+}
+
+class BonesOfAPatient : public ::testing::Test {
+protected:
+    Patient torso, abdomen;
+
+    void SetUp() override
+    {
+        if (!hasData()) {
+            GTEST_SKIP() << "no test volumes in " << data;
+        }
+        torso =
+            patient("/totalsegmentator_ct/example_seg_fast_force_split.nii.gz", "/totalsegmentator_ct/example_ct.nii.gz");
+        abdomen = patient("/totalsegmentator_ct/example_seg.nii.gz", "/totalsegmentator_ct/example_ct_sm.nii.gz");
+    }
+};
+
+// Bones whose labels are held back come back from the image. TotalSegmentator's two models agree to 0.958 on the bones
+// of the upper abdomen.
+TEST_F(BonesOfAPatient, WithoutLabelsAreFound)
+{
+    EXPECT_GE(boneDice(torso, "bone, torso, bones held back", bones), 0.90);
+    EXPECT_GE(boneDice(abdomen, "bone, upper abdomen, bones held back", bones), 0.90);
+    EXPECT_GE(boneDice(torso, "bone, torso, every label held back", allTissues(torso)), 0.90);
+    EXPECT_GE(boneDice(abdomen, "bone, upper abdomen, every label held back", allTissues(abdomen)), 0.88);
+}
+
+// Noise of a low dose, and contrast medium in vessels and organs that have no label.
+TEST_F(BonesOfAPatient, AreFoundInOtherImagesOfThem)
+{
+    for (Patient p : {torso, abdomen}) {
+        std::mt19937 random(1);
+        std::normal_distribution<float> noise(0, 30);
+        for (float& v : p.hu) {
+            v += noise(random);
+        }
+        EXPECT_GE(boneDice(p, "bone, with noise of 30 HU", bones), 0.88);
+    }
+    const std::map<std::string, float> bolus{
+        {"aorta", 200.0F},        {"iliac_artery_left", 200.0F}, {"iliac_artery_right", 200.0F},
+        {"kidney_right", 140.0F}, {"kidney_left", 140.0F},       {"spleen", 80.0F},
+        {"liver", 60.0F},         {"inferior_vena_cava", 110.0F}};
+    for (Patient p : {torso, abdomen}) {
+        const auto named = namesByValue(p.names);
+        for (std::size_t i = 0; i < p.hu.size(); ++i) {
+            const auto more = p.labels.values[i] != 0 ? bolus.find(named.at(p.labels.values[i])) : bolus.end();
+            p.hu[i] += more != bolus.end() ? more->second : 0.0F;
+        }
+        EXPECT_GE(boneDice(p, "bone, contrast medium, every label held back", allTissues(p)), 0.86);
+    }
 }
 
 }  // namespace

@@ -73,6 +73,9 @@ ImportedLabels labelsOf(Source source, const ImportOptions& options)
         LabelSink sink(source.header, source.size, LabelRules(source.scaled, options));
         decode(source, options.progress, [&](std::span<const double> values) { sink.add(values); });
         sink.finish(source.label, out);
+        if (!options.overlap.empty()) {
+            out.warnings.emplace_back("--overlap decides nothing: a voxel of it has one label");
+        }
         for (SegmentName& s : source.segments) {
             out.names.push_back(std::move(s.label));
         }
@@ -114,7 +117,11 @@ ImportedLabels readLabels(const std::filesystem::path& path, const ImportOptions
         return labelsApart(path, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(path, {path}, o); });
     }
-    return labelsOf(checkedSource(path, options, options.sheared), options);
+    ImportedLabels labels = labelsOf(checkedSource(path, options, options.sheared), options);
+    if (options.dicomLabels) {
+        labels.warnings.emplace_back("--dicom-labels decides nothing: it is no DICOM");
+    }
+    return labels;
 }
 
 }  // namespace

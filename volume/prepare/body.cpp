@@ -2,6 +2,7 @@
 
 #include <volume/clean.h>
 #include <volume/import.h>
+#include <volume/prepare/bone.h>
 #include <volume/prepare/masks.h>
 
 #include <fmt/format.h>
@@ -31,8 +32,6 @@ constexpr const char* imageOption = "--body-from-image";
 constexpr float airBelow = -500;       // outside the body; inside it lung or gas
 constexpr float gasBelow = -930;       // gas, where half of a region is so; else lung
 constexpr float fatTo = -30;           // and above it muscle and other soft tissue
-constexpr float boneFrom = 150;        // bone, or blood with contrast medium
-constexpr float marrowFrom = 90;       // inside a bone's shell, smoothed
 constexpr float muscleTo = 85;         // smoothed; what is brighter is cartilage, or an organ with contrast medium
 constexpr double vesselTo = 500;       // no blood is brighter
 constexpr double evenness = 0.15;      // standard deviation inside a vessel, share of its mean
@@ -46,13 +45,10 @@ constexpr double leastLung = 20e-6;
 constexpr double lungVessels = 4e-3;  // radius of vessels that count as lung
 constexpr double vesselRim = 2e-3;    // of what is not taken for a vessel's inside
 constexpr double leastVessel = 1e-6;
-constexpr double shellGap = 3e-3;     // in a bone's shell
-constexpr double marrowGap = 15e-3;   // half the width of marrow between two walls, in a slice
-constexpr double marrowArea = 15e-4;  // of a hole in a bone's slice
-constexpr double rimDepth = 10e-3;    // fat so near to the surface is fat under the skin
-constexpr double fatBridge = 6e-3;    // half the thickness of what connects it with further fat under the skin
-constexpr double wallDepth = 12e-3;   // of the muscles under that fat
-constexpr double boneReach = 20e-3;   // of the muscles around a bone
+constexpr double rimDepth = 10e-3;   // fat so near to the surface is fat under the skin
+constexpr double fatBridge = 6e-3;   // half the thickness of what connects it with further fat under the skin
+constexpr double wallDepth = 12e-3;  // of the muscles under that fat
+constexpr double boneReach = 20e-3;  // of the muscles around a bone
 constexpr double thinnestMuscle = 2e-3;
 constexpr double disc = 7e-3;                               // half the gap between vertebrae
 constexpr double skinThickness = 2e-3, skinDeepest = 6e-3;  // of what is skin in any case; of what is, where it is no fat
@@ -140,18 +136,15 @@ void checkAxes(const LabelImage& image, const char* option)
     }
 }
 
-// The grid with its axial slices so far apart that distances stay inside them.
-VoxelGrid slices(VoxelGrid grid)
-{
-    grid.affine.linear[axialAxis(grid.affine)] *= 1e4;
-    return grid;
-}
-
 /// What is where in the CT. One step after the other, each on voxels that none before it has taken.
 class Finder {
 public:
     Finder(const LabelImage& image, const Labeller& labels, std::vector<float> hu)
-        : grid_{image.size, image.affine}, labels_(labels), hu_(std::move(hu)), found_(hu_.size(), none)
+        : grid_{image.size, image.affine},
+          labels_(labels),
+          hu_(std::move(hu)),
+          found_(hu_.size(), none),
+          boneFrom_(boneThreshold(grid_))
     {
         for (float& v : hu_) {
             v = std::isnan(v) ? -1000.0F : v;
@@ -166,7 +159,7 @@ public:
         findLung();
         tell("looking for bone and vessels");
         findVessels();
-        findBone();
+        findBones();
         tell("looking for fat and muscle");
         findSoft();
         findSkin();
@@ -244,7 +237,7 @@ private:
         }
         const Mask whole = closed(grid_, lungs, lungVessels);
         for (std::size_t i = 0; i < whole.size(); ++i) {
-            found_[i] = whole[i] != 0 && isFree(i) && hu_[i] < boneFrom ? lung : found_[i];
+            found_[i] = whole[i] != 0 && isFree(i) && hu_[i] < boneFrom_ ? lung : found_[i];
         }
     }
 
@@ -257,7 +250,7 @@ private:
         };
         const Vec3 spacing = grid_.affine.spacing();
         const double rim = std::max(vesselRim, std::min({spacing.x, spacing.y, spacing.z}));
-        const Mask dense = where([&](std::size_t i) { return isFree(i) && hu_[i] >= boneFrom; });
+        const Mask dense = where([&](std::size_t i) { return isFree(i) && hu_[i] >= boneFrom_; });
         const MaskPieces cores = piecesOf(grid_, eroded(grid_, dense, rim), hu_);
         const std::vector<std::uint32_t> nearest = spread(cores.of, dense, rim);
         std::vector<Judged> judged(cores.pieces.size());
@@ -311,17 +304,14 @@ private:
         return out;
     }
 
-    // What else attenuates more than soft tissue is bone, and the marrow that its shell encloses.
-    void findBone()
+    // What else attenuates more than soft tissue, and the marrow in it.
+    void findBones()
     {
-        smooth_ = boxMeans(grid_, hu_, smoothing);
-        Mask bones = where([&](std::size_t i) { return isFree(i) && hu_[i] >= boneFrom; });
-        bones = closed(grid_, bones, shellGap);
-        fillHolesBySlices(grid_, bones, marrowArea);
-        const Mask shut = closed(slices(grid_), bones, marrowGap);
+        const Mask may = where([&](std::size_t i) { return isFree(i); });
+        const Mask known = where([&](std::size_t i) { return labels_.role(i) == Role::bone; });
+        const Mask bones = findBone(grid_, hu_, may, known);
         for (std::size_t i = 0; i < bones.size(); ++i) {
-            const bool inside = bones[i] != 0 || (shut[i] != 0 && smooth_[i] > marrowFrom);
-            found_[i] = inside && isFree(i) ? bone : found_[i];
+            found_[i] = bones[i] != 0 ? bone : found_[i];
         }
     }
 
@@ -355,9 +345,10 @@ private:
         }
         under = dilated(grid_, under, wallDepth);
         const Mask bones = where([&](std::size_t i) { return found_[i] == bone || labels_.role(i) == Role::bone; });
+        const std::vector<float> smooth = boxMeans(grid_, hu_, smoothing);
         const Mask nearBone = dilated(grid_, bones, boneReach), between = closed(grid_, bones, disc);
         const auto isWall = [&](std::size_t i) {
-            return found_[i] == soft && (under[i] != 0 || nearBone[i] != 0) && between[i] == 0 && smooth_[i] < muscleTo;
+            return found_[i] == soft && (under[i] != 0 || nearBone[i] != 0) && between[i] == 0 && smooth[i] < muscleTo;
         };
         const Mask thickWall =
             where([&](std::size_t i) { return isWall(i) || bones[i] != 0 || found_[i] == skin || labels_.isMuscle(i); });
@@ -385,8 +376,8 @@ private:
     VoxelGrid grid_;
     const Labeller& labels_;
     std::vector<float> hu_;
-    std::vector<float> smooth_;  // the same with less noise
     std::vector<Found> found_;
+    float boneFrom_;  // bone, or blood with contrast medium [HU]
     double leftOut_ = 0;
 };
 

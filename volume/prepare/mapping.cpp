@@ -106,6 +106,7 @@ public:
                                                      s.text, listOf(labels, counts)));
             }
         }
+        checkSettings(counts);
         if (!options.map.empty()) {
             checkNames(options.map, file, counts);
         }
@@ -146,6 +147,25 @@ public:
     }
 
 private:
+    // Two settings of one label, perhaps by its name and by its value, have to agree.
+    void checkSettings(const LabelCounts& counts) const
+    {
+        for (const auto& [value, voxels] : counts) {
+            const LabelName* own = find(labels_.names, value);
+            const Setting* first = nullptr;
+            for (const Setting& s : settings_) {
+                if (!s.names(originalOf(value), own != nullptr ? own->name : "")) {
+                    continue;
+                }
+                if (first != nullptr && first->tissue != s.tissue) {
+                    throw std::runtime_error(fmt::format("--set {} and --set {}: both name label {}: leave one out",
+                                                         first->text, s.text, originalOf(value)));
+                }
+                first = &s;
+            }
+        }
+    }
+
     std::int64_t originalOf(std::uint16_t value) const
     {
         const auto found = std::find_if(labels_.renumbered.begin(), labels_.renumbered.end(),

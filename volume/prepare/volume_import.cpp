@@ -173,6 +173,14 @@ void checkRequest(const ImportRequest& o)
     if (!o.imageUnit.empty() && o.image.empty()) {
         throw std::runtime_error("--image-unit: needs the image: add --image FILE");
     }
+    if (o.imageVolume > 0 && o.image.empty()) {
+        throw std::runtime_error("--image-volume: needs the image: add --image FILE");
+    }
+    std::error_code none;
+    if (!o.reading.series.empty() && fs::exists(o.input, none) && !fs::is_directory(o.input, none) &&
+        !fs::is_directory(o.image, none)) {
+        throw std::runtime_error("--series: neither the labels nor the image are a folder of DICOM: leave --series out");
+    }
 }
 
 NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
