@@ -80,7 +80,7 @@ chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settin
     options.window = settings.window;
     options.cycles = static_cast<int>(std::lround(settings.cycles * std::max(1.0, period / tickSeconds)));
     options.finiteStrain = settings.strain == datasets::Strain::finite;
-    options.viscosity = settings.viscosity / period;
+    options.period = period;
     return options;
 }
 

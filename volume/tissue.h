@@ -63,6 +63,7 @@ struct CellMaterial {
     float poissonRatio = 0;  // mean over the tissue [-]
     float fixed = 0;         // share of the tissue that is held in space [-]
     float stiffening = 0;    // mean over the tissue [-]
+    std::array<float, relaxationTerms> relaxing{};  // weights of Relaxation, mean over what is not held [-]
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.
