@@ -18,6 +18,7 @@ constexpr double reach = 0.6;          // spacings from a tool within which surf
 constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
 constexpr double leastEnergy = 1e-9;   // of tissue that springs back: with less it is at rest, within some micrometres [J]
 constexpr int callsPerTurn = 2;        // from one term of the history to the next
+constexpr int callsOfGiven = 20;       // in which windows that take over find their displacement
 constexpr double mostBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
 constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
 constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew ...
@@ -75,6 +76,7 @@ void Elastic::settle() noexcept
         }
         since_ = {};
         historyEnergy_ = 0.0;
+        givenFor_ = 0;
     }
     energy_ = 0.0;
     toolAt_.clear();
@@ -214,6 +216,11 @@ void Elastic::remember(int periods) noexcept
     if (!stack_.body().relaxes) {
         return;
     }
+    if (givenFor_ > 0) {
+        --givenFor_;
+        takeGiven();
+        return;
+    }
     for (int& since : since_) {
         since += periods;
     }
@@ -237,6 +244,35 @@ void Elastic::remember(int periods) noexcept
         (*products_)[0] -= share * work[0];
         (*products_)[1] -= share * work[1];
     }
+}
+
+Elastic::HistoryShares Elastic::historyShares() noexcept
+{
+    HistoryShares shares{};
+    for (std::size_t i = 0; i < shares.size() && stack_.body().relaxes && !atRest_; ++i) {
+        stack_.evaluateTerm(i, Field::f, options_.finiteStrain);
+        const double share = stack_.dot(Field::u, WindowStack::history(i)) / stack_.dot(Field::u, Field::f);
+        shares[i] = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+    }
+    return shares;
+}
+
+void Elastic::beginWith(const HistoryShares& shares) noexcept
+{
+    given_ = shares;
+    givenFor_ = callsOfGiven;
+}
+
+// The history that another body's windows had, at this displacement.
+void Elastic::takeGiven() noexcept
+{
+    for (std::size_t i = 0; i < given_.size(); ++i) {
+        const Field history = WindowStack::history(i);
+        stack_.evaluateTerm(i, history, options_.finiteStrain);
+        stack_.combine(history, given_[i] - 1.0, history, history);
+    }
+    stack_.combine(WindowStack::history(0), 1.0, WindowStack::history(1), Field::h);
+    refreshForces();
 }
 
 // The tissue's forces anew, where they cannot be carried along.

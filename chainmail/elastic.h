@@ -95,6 +95,13 @@ public:
     /// Displacement of the material that is at `rest` [m].
     Vec3 displacement(Vec3 rest) const noexcept;
     bool atRest() const noexcept { return atRest_; }
+
+    /// Of a body that relaxes: how far each term of its history has got, as a share of where it goes to if nothing moves,
+    /// mean over the body. Uses up working memory, as relax() does.
+    using HistoryShares = std::array<double, volume::relaxationTerms>;
+    HistoryShares historyShares() noexcept;
+    /// Begins with such a history, until its own displacement has been found: for windows that take over from others.
+    void beginWith(const HistoryShares& shares) noexcept;
     const WindowStack& stack() const noexcept { return stack_; }
     const ElasticBody& body() const noexcept { return stack_.body(); }
     /// Nodes of all windows.
@@ -145,6 +152,7 @@ private:
     void refreshForces() noexcept;
     bool springsBack() const noexcept;
     void remember(int periods) noexcept;
+    void takeGiven() noexcept;
     double refreshResidual(bool isCopied) noexcept;
     void prepareContacts() noexcept;
     void look() noexcept;
@@ -188,6 +196,8 @@ private:
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is
     int untilTurn_ = 0;                                 // calls
+    HistoryShares given_{};                             // see beginWith()
+    int givenFor_ = 0;                                  // calls
     double historyEnergy_ = 0;                          // history . u [J]
     double energy_ = 0;       // of the tissue, history's included [J]
     double startEnergy_ = 0;  // the same when the call began [J]

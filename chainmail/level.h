@@ -91,6 +91,8 @@ public:
                  const ElasticOptions& options, Vec3 start);
     Reaction deform(const Grip& grip) noexcept;
     const Elastic& elastic() const noexcept { return elastic_; }
+    /// Goes on from another level with the same body, whose windows are others: tissue has relaxed as far as there.
+    void takeOver(ElasticLevel& from) noexcept { elastic_.beginWith(from.elastic_.historyShares()); }
     static constexpr std::size_t mostOthers = 7;
 
 private:

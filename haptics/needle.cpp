@@ -202,9 +202,9 @@ struct Needle {
             state.shaftForce = state.sliding * hold.sliding + hold.damping * state.speed;
             state.shaftLost = {};
         }
-        const double force = state.shaftLost.lost() - state.shaftForce;
+        const double force = state.shaftForce - state.shaftLost.lost();
         state.shaftLost.hold(state.shaftForce, hold.relaxation, dt);
-        return force;
+        return -force;
     }
 };
 
@@ -214,7 +214,7 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
 {
     NeedleState& needle = tip.needle;
     tip.phase = Phase::inserted;
-    needle = NeedleState{.entry = tip.proxy, .cuts = needle.cuts};
+    needle = NeedleState{.entry = tip.proxy, .tipLost = std::exchange(tip.lost, {}), .cuts = needle.cuts};
     needle.depth = glm::dot(tool.position - tip.proxy, tool.axis);
     const Vec3 other = std::abs(tool.axis.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
     const Vec3 right = glm::normalize(glm::cross(tool.axis, other));

@@ -18,8 +18,8 @@ struct NeedleState {
     double shaftForce = 0;      // of the shaft on the tissue around it, along the needle [N]
     double shaftStiffness = 0;  // of that tissue [N/m]
     double sideStiffness = 0;   // and sideways [N/m]
-    RelaxingForce tipLost;      // of the force at the tip
-    RelaxingForce shaftLost;    // and of `shaftForce`
+    RelaxingForce tipLost = {};    // of the force at the tip
+    RelaxingForce shaftLost = {};  // and of `shaftForce`
     int sliding = 0;            // the way the shaft slides along the needle; 0: it sticks
     double curvature = 0;       // of a bevelled needle's path [1/m]
     Vec3 bendsTo{0.0};          // unit vector across the needle

@@ -74,7 +74,7 @@ TEST(ValidateCommand, FolderHasAPageAndPictures)
     const Outcome o = palpate({"validate", "beam", "relaxation", "--quick", "-o", folder / "v"});
     EXPECT_EQ(o.out.find("nan"), std::string::npos) << o.out;
     for (const char* name :
-         {"validation.html", "validation.csv", "validation.json", "beam.png", "relaxation-kelvin-voigt.png"}) {
+         {"validation.html", "validation.csv", "validation.json", "beam.png", "relaxation-held.png", "relaxation-hysteresis.png"}) {
         EXPECT_TRUE(std::filesystem::exists((folder / "v") / name)) << name << o.err;
     }
 }
