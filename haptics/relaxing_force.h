@@ -25,7 +25,7 @@ public:
     void renew(double most) noexcept
     {
         const double now = lost();
-        if (now > most) {
+        if (now > 0.0 && now > most) {
             scale(std::max(most, 0.0) / now);
         }
     }

@@ -312,8 +312,9 @@ TEST(Scene, EveryBrokenKeyIsNamedWithFileAndLine)
             continue;
         }
         const std::string key = lines[at].substr(0, equals), value = lines[at].substr(equals + 3);
-        const bool number = value[0] != '"' && value[0] != '[';
-        std::vector<std::string> changes{key + " = true", key + " = { a = 1 }", key + " = 1979-05-27",
+        const bool flag = value == "true" || value == "false";
+        const bool number = !flag && value[0] != '"' && value[0] != '[';
+        std::vector<std::string> changes{flag ? key + " = 2" : key + " = true", key + " = { a = 1 }", key + " = 1979-05-27",
                                          number ? key + " = \"text\"" : key + " = 3"};
         if (number) {
             changes.insert(changes.end(), {key + " = nan", key + " = -inf", key + " = 1e9", key + " = -1e9"});
