@@ -14,15 +14,14 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t mostTools = 16;
-constexpr double reach = 0.6;          // spacings from a tool within which surface points are looked at
-constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
-constexpr double leastEnergy = 1e-9;   // of tissue that springs back: with less it is at rest, within some micrometres [J]
-constexpr int callsPerTurn = 2;        // from one term of the history to the next
-constexpr int callsOfGiven = 20;       // in which windows that take over find their displacement
-constexpr double mostBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
-constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew ...
-constexpr int freePeriod = 8;          // ... and where tissue springs back: its energy falls to next to nothing
+constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
+constexpr double leastEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr int callsPerTurn = 2;       // from one term of the history to the next
+constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
+constexpr double mostBalance = 1.5;   // of forces that are far from balanced: these are taken as they are
+constexpr int moreAfterMove = 2;      // cycles, so that windows that moved are not felt
+constexpr int refreshPeriod = 256;    // calls after which forces that are carried along are computed anew
 
 }  // namespace
 
@@ -391,7 +390,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
         return result;
     }
     const bool hasLain = !std::exchange(atRest_, false);
-    if (result.moved || ++sinceRefresh_ >= (isTouched ? refreshPeriod : freePeriod)) {
+    if (result.moved || ++sinceRefresh_ >= refreshPeriod) {
         refreshForces();
         sinceRefresh_ = 0;
     }
@@ -410,11 +409,12 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
         forgetIncrement();
     }
     hasIncrement_ = options_.goOn;
-    const int most = effort.cycles + (result.moved ? moreAfterMove : 0);
-    for (int i = 0; i < most + (effort.far > 0.0 ? 1 : 0); ++i) {
+    // No hand feels tissue that springs back.
+    const int most = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
+    for (int i = 0; i < most + (isTouched && effort.far > 0.0 ? 1 : 0); ++i) {
         const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
         result.residual = refreshResidual(hasGone);
-        if (tolerance > 0.0 && result.residual <= tolerance * (isTouched ? contactForce() : historyForce())) {
+        if (tolerance > 0.0 && result.residual <= tolerance * loadForce()) {
             break;
         }
         ++result.cycles;
@@ -479,10 +479,11 @@ double Elastic::contactForce() const noexcept
     return sum;
 }
 
-// The same measure of what tissue has that nothing touches.
-double Elastic::historyForce() const noexcept
+// What the residual is measured by. Tissue that springs back under a tool that lifts off has more force than the contact.
+double Elastic::loadForce() const noexcept
 {
-    return std::sqrt(stack_.dot(Field::h, Field::h));
+    const double contacts = contactForce();
+    return stack_.body().relaxes ? std::max(contacts, std::sqrt(stack_.dot(Field::h, Field::h))) : contacts;
 }
 
 Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept

@@ -175,7 +175,7 @@ private:
     void forgetStep() noexcept;
     bool oneCycle(double limit, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
-    double historyForce() const noexcept;
+    double loadForce() const noexcept;
     void balance() noexcept;
     void measure(ElasticResult& result) noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
@@ -199,8 +199,8 @@ private:
     HistoryShares given_{};                             // see beginWith()
     int givenFor_ = 0;                                  // calls
     double historyEnergy_ = 0;                          // history . u [J]
-    double energy_ = 0;       // of the tissue, history's included [J]
-    double startEnergy_ = 0;  // the same when the call began [J]
+    double energy_ = 0;                                 // of the tissue, history's included [J]
+    double startEnergy_ = 0;                            // the same when the call began [J]
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
     double stiffness_ = 0;                           // along the last step, of tissue and contacts

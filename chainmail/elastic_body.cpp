@@ -25,7 +25,7 @@ struct Moduli {
     double mu = 0;
     double bulk = 0;
     double stiffening = 0;
-    double held = 0;                                          // share of the tissue
+    double held = 0;                                         // share of the tissue
     std::array<double, volume::relaxationTerms> relaxing{};  // weights
 };
 
@@ -137,8 +137,8 @@ private:
 
     bool relaxes() const { return !fine_.relaxing[0].empty(); }
 
-    // A coarse cell has the shear modulus of its eight cells right after a step, and that of a long time after it; the terms
-    // share what is gone as they do on average.
+    // A coarse cell has the shear modulus of its eight cells right after a step, and that of a long time after it; the
+    // terms share what is gone as they do on average.
     Moduli upscaled(Index3 low) const
     {
         BlockMean mu, bulk, relaxed;

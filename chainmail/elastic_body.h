@@ -17,8 +17,8 @@ struct CellLevel {
     std::vector<float> stiffening;    // with finite strain, see TissueRow                        [-]    (count x 1)
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
     std::array<std::vector<float>, volume::relaxationTerms> relaxing;  // weights of each cell [-]; none: does not relax
-    std::vector<float> diagonal;      // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
-    double radius = 1;  // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
+    std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
+    double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
 };
 
 /// A piece of the body's surface at rest.

@@ -117,7 +117,7 @@ private:
     Elastic elastic_;
     int period_;  // calls from one solution to the next while a tip holds the tissue
     int turn_ = 0;
-    int since_ = 0;  // calls since the last solution
+    int since_ = 0;                                  // calls since the last solution
     bool isShapeOnly_ = false;                       // the last call's force on the hand was not from here
     std::array<ElasticTool, mostOthers + 1> tools_;  // the others, then the hand's: so each keeps its place
     std::array<Tie, 1 + mostShaftTies> ties_;        // the tip's, then the shaft's

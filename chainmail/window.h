@@ -27,16 +27,16 @@ using Floats = std::vector<float, CacheAligned<float>>;
 
 /// What a window keeps for every node: three components each, Layout::fieldSize() floats.
 enum class Field : std::uint8_t {
-    u,  // displacement [m]
-    a,  // A u, by the elastic energy alone [N]
-    d,  // the last tick's increment of u
-    e,  // and of a
-    p,  // search direction
-    q,  // A p
-    r,  // residual: force of the contacts less a, where the node is a degree of freedom [N]
-    f,  // right side of the cycle
-    z,  // its answer
-    t,  // working memory
+    u,   // displacement [m]
+    a,   // A u, by the elastic energy alone [N]
+    d,   // the last tick's increment of u
+    e,   // and of a
+    p,   // search direction
+    q,   // A p
+    r,   // residual: force of the contacts less a, where the node is a degree of freedom [N]
+    f,   // right side of the cycle
+    z,   // its answer
+    t,   // working memory
     h,   // history: what relaxation has taken of the tissue's force, all terms together [N]
     h0,  // the same of each term; these three only where the body relaxes
     h1,
@@ -68,10 +68,10 @@ struct Window {
         Floats mu, lambda;
     };
     std::array<Term, volume::relaxationTerms> terms;  // of the Prony series: uncovered moduli times its weight
-    Floats diagonal;                      // reciprocal of the operator's diagonal, zero where the node is not free
-    Floats border;                        // nodes that follow the next coarser window
-    Floats open;                          // free, or border
-    Floats dof;                           // degrees of freedom: free and not covered
+    Floats diagonal;  // reciprocal of the operator's diagonal, zero where the node is not free
+    Floats border;    // nodes that follow the next coarser window
+    Floats open;      // free, or border
+    Floats dof;       // degrees of freedom: free and not covered
     std::array<Floats, fieldCount> fields;
     float weight = 0.2F;  // of the smoother
 

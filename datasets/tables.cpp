@@ -107,7 +107,8 @@ std::pair<std::string_view, std::string> misfit(const TissueRow& row)
     }
     if (row.relaxingFast + row.relaxingSlow > mostRelaxing) {
         return {"relaxing_slow", fmt::format("must not be over {:g} together with relaxing_fast: a solid keeps some of its "
-                                             "stress", mostRelaxing)};
+                                             "stress",
+                                             mostRelaxing)};
     }
     if (row.cuttingForce > row.punctureForce) {
         return {"cutting_n", "must not be over puncture_n: the force drops after the puncture"};

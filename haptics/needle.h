@@ -11,18 +11,18 @@ struct TipState;
 
 /// A needle that is inside, and what needles have left behind.
 struct NeedleState {
-    Vec3 entry{0.0};            // where it went in, at rest [m]
-    double inserted = 0;        // length of the shaft inside, at rest [m]
-    double depth = 0;           // of the tool's tip from `entry` along the needle, in the tick before [m]
-    double speed = 0;           // of the shaft along the needle, low-passed [m/s]
-    double shaftForce = 0;      // of the shaft on the tissue around it, along the needle [N]
-    double shaftStiffness = 0;  // of that tissue [N/m]
-    double sideStiffness = 0;   // and sideways [N/m]
+    Vec3 entry{0.0};               // where it went in, at rest [m]
+    double inserted = 0;           // length of the shaft inside, at rest [m]
+    double depth = 0;              // of the tool's tip from `entry` along the needle, in the tick before [m]
+    double speed = 0;              // of the shaft along the needle, low-passed [m/s]
+    double shaftForce = 0;         // of the shaft on the tissue around it, along the needle [N]
+    double shaftStiffness = 0;     // of that tissue [N/m]
+    double sideStiffness = 0;      // and sideways [N/m]
     RelaxingForce tipLost = {};    // of the force at the tip
     RelaxingForce shaftLost = {};  // and of `shaftForce`
-    int sliding = 0;            // the way the shaft slides along the needle; 0: it sticks
-    double curvature = 0;       // of a bevelled needle's path [1/m]
-    Vec3 bendsTo{0.0};          // unit vector across the needle
+    int sliding = 0;               // the way the shaft slides along the needle; 0: it sticks
+    double curvature = 0;          // of a bevelled needle's path [1/m]
+    Vec3 bendsTo{0.0};             // unit vector across the needle
     Cuts cuts;
 
     /// How far the tissue is carried along with the shaft [m].

@@ -168,8 +168,11 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
     }
     const double rigid = held.share > 0.0 ? held.mean() : std::numeric_limits<double>::infinity();
     const double modulus = free.share > 0.0 ? std::min(free.mean() * tissue / free.share, rigid) : rigid;
-    CellMaterial material{static_cast<float>(tissue * modulus), static_cast<float>(poisson / tissue),
-                          static_cast<float>(held.share / tissue), static_cast<float>(stiffening / tissue), {}};
+    CellMaterial material{static_cast<float>(tissue * modulus),
+                          static_cast<float>(poisson / tissue),
+                          static_cast<float>(held.share / tissue),
+                          static_cast<float>(stiffening / tissue),
+                          {}};
     for (std::size_t i = 0; i < relaxing.size() && free.share > 0.0; ++i) {
         material.relaxing[i] = static_cast<float>(relaxing[i] / free.share);
     }

@@ -329,10 +329,11 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
     }
     e.scatter = spread;
     e.parameters = {{"relaxing_fast", fit.weights[0]}, {"relaxing_slow", fit.weights[1]}};
-    e.note = fmt::format("series {:.2f} + {:.2f} exp(-t / {:g} s) + {:.2f} exp(-t / {:g} s); friction in the guide and "
-                         "tissue relax together in the curves",
-                         1.0 - fit.weights[0] - fit.weights[1], fit.weights[0], volume::relaxationTimes[0],
-                         fit.weights[1], volume::relaxationTimes[1]);
+    e.note = fmt::format(
+        "series {:.2f} + {:.2f} exp(-t / {:g} s) + {:.2f} exp(-t / {:g} s); friction in the guide and "
+        "tissue relax together in the curves",
+        1.0 - fit.weights[0] - fit.weights[1], fit.weights[0], volume::relaxationTimes[0], fit.weights[1],
+        volume::relaxationTimes[1]);
     e.picture = {"Held needle", "time after the stop [s]", "held force over that at the start [-]", {mean, line}};
     e.judge();
     return e;

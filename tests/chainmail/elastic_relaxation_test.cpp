@@ -163,18 +163,18 @@ TEST(Relaxation, NoPathFromRestGivesWork)
 }
 
 // Two layers at nu = 0 under an even load are two standard linear solids in series, each of which creeps by itself:
-// strain = s / E (1 + w / (1 - w) (1 - exp(-(1 - w) t / T))). Cells of two tissues side by side keep histories of their own.
+// strain = s / E (1 + w / (1 - w) (1 - exp(-(1 - w) t / T))). Cells of two tissues side by side keep histories of their
+// own.
 TEST(Relaxation, LayersInSeriesCreepEachByItsOwnWeights)
 {
     const int cells = 8;
     const Weights upper{0.5F, 0.0F}, lower{0.0F, 0.7F};
-    const tests::ElasticBlock block{{cells, cells + 1, cells},
-                                    spacing,
-                                    [=](Index3 c) {
-                                        return relaxing(modulus, 0.0, c.y < cells / 2 ? upper : lower, c.y == cells);
-                                    },
-                                    1,
-                                    Vec3(0.0)};
+    const tests::ElasticBlock block{
+        {cells, cells + 1, cells},
+        spacing,
+        [=](Index3 c) { return relaxing(modulus, 0.0, c.y < cells / 2 ? upper : lower, c.y == cells); },
+        1,
+        Vec3(0.0)};
     const ElasticBody body = tests::bodyOf(block, 0.4999, true);
     const Vec3 middle(0.5 * cells * spacing, 0.0, 0.5 * cells * spacing);
     Elastic elastic(body, ofStrain(false, 21), tests::focusUnder(middle));
@@ -301,14 +301,21 @@ TEST(Relaxation, WindowsThatMoveTakeTheHistoryAlong)
 // The history is a force. When windows move, its work along any displacement that is linear in space is what it was.
 TEST(Relaxation, WindowsThatMoveKeepTheWorkOfTheHistory)
 {
-    const tests::ElasticBlock block{
-        {60, 30, 60}, spacing, [](Index3) { return relaxing(modulus, 0.45, {0.5F, 0.3F}); }, 1, Vec3(0.0)};
+    const tests::ElasticBlock block{{60, 30, 60},
+                                    spacing,
+                                    [](Index3) {
+                                        return relaxing(modulus, 0.45, {0.5F, 0.3F});
+                                    },
+                                    1,
+                                    Vec3(0.0)};
     const ElasticBody body = tests::bodyOf(block, 0.4999, true);
     const Vec3 middle(60e-3, 30e-3, 60e-3);
     WindowStack stack(body, 11, tests::focusAt(middle));
     std::minstd_rand random(5);
     std::uniform_real_distribution<double> value(-1.0, 1.0);
-    const auto inside = [&](Vec3 rest) { return glm::all(glm::lessThan(glm::abs(rest - middle), Vec3(40e-3, 20e-3, 40e-3))); };
+    const auto inside = [&](Vec3 rest) {
+        return glm::all(glm::lessThan(glm::abs(rest - middle), Vec3(40e-3, 20e-3, 40e-3)));
+    };
     tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3 rest) {
         const Vec3 v(value(random), value(random), value(random));
         tests::setAt(w, node, Field::h1, inside(rest) ? static_cast<double>(w.dof[node]) * v : Vec3(0.0));

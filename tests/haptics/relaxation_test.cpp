@@ -107,8 +107,8 @@ TEST(RelaxingTissue, AStepDownTakesTheHistoryAlong)
 // Level `spring` is rigid tissue: it has nothing to relax.
 TEST(RelaxingTissue, LevelSpringHoldsItsForce)
 {
-    auto model = tests::modelOf(
-        tests::sphereOnBlock("structure = \"base\"\naim_mm = [0, 55, 0]\n[model]\nrelaxation = true\nlevel = \"spring\"\n"));
+    auto model = tests::modelOf(tests::sphereOnBlock(
+        "structure = \"base\"\naim_mm = [0, 55, 0]\n[model]\nrelaxation = true\nlevel = \"spring\"\n"));
     const auto samples = pressed(1.0);
     const auto force = forces(model, samples);
     EXPECT_EQ(force.back(), force[rampUp + 60]);

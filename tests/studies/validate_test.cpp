@@ -152,9 +152,9 @@ TEST(NeedleStroke, HeldForceFollowsTheTissuesSeries)
         EXPECT_NEAR(stroke.held[i] / stroke.held[0], relaxation.remaining(at[i]), 0.02) << at[i];
         EXPECT_NEAR(stiff.held[i] / stiff.held[0], 1.0, 0.02) << at[i];
     }
-    // Tissue that is cut is new: the way in is the table's.
+    // Tissue that is cut is new: the way in has the table's forces, a little earlier since new tissue gives way less.
     for (std::size_t i = 3; i < stroke.in.size(); ++i) {
-        EXPECT_NEAR(stroke.in[i], stiff.in[i], 0.03 * stiff.in[i]) << i;
+        EXPECT_NEAR(stroke.in[i], stiff.in[i], 0.07 * stiff.in[i]) << i;
     }
 }
 
