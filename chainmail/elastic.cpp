@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace palpate::chainmail {
@@ -21,7 +22,8 @@ constexpr int callsPerTurn = 2;       // from one term of the history to the nex
 constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
 constexpr double mostBalance = 1.5;   // of forces that are far from balanced: these are taken as they are
 constexpr int moreAfterMove = 2;      // cycles, so that windows that moved are not felt
-constexpr int refreshPeriod = 256;    // calls after which forces that are carried along are computed anew
+constexpr double noLimit = -std::numeric_limits<double>::infinity();
+constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
 
@@ -418,7 +420,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
             break;
         }
         ++result.cycles;
-        hasGone = oneCycle(isOpen ? start : 0.0, result);
+        hasGone = oneCycle(isOpen ? start : noLimit, result);
         if (!hasGone && isOpen && !confirm(start)) {
             again(result);
         } else if (!hasGone) {

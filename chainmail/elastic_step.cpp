@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace palpate::chainmail {
 
@@ -16,7 +17,8 @@ constexpr double rounding = 1e-6;       // relative: sums of single-precision pr
 constexpr double mostFurther = 4.0;     // steps that force and energy may be carried on along a parabola
 constexpr double parabolic = 0.1;       // of what a step gains: by how much the energy may be off the parabola
 constexpr double leastStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
-constexpr double mostNearness = 10.0;   // of that expectation, bounds
+constexpr double noLimit = -std::numeric_limits<double>::infinity();
+constexpr double mostNearness = 10.0;  // of that expectation, bounds
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
 // half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
@@ -248,7 +250,7 @@ bool Elastic::oneCycle(double limit, ElasticResult& result) noexcept
 void Elastic::again(ElasticResult& result) noexcept
 {
     look();
-    if (!takeStep({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, 0.0, result)) {
+    if (!takeStep({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, noLimit, result)) {
         forgetIncrement();
     }
 }

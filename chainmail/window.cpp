@@ -183,13 +183,19 @@ void keepWhereFree(const Window& w, float* force) noexcept
 void handDown(Window& coarse, Field field, Window& fine) noexcept
 {
     const Index3 o = offsetIn(fine, coarse);
-    volume::forEachIndex(Index3(1), (fine.size() - 1) / 2 - 1, [&](Index3 n) {
-        const std::size_t to = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
+    const Index3 last = (fine.size() - 1) / 2;
+    volume::forEachIndex(Index3(0), last, [&](Index3 n) {
+        const bool inside = n == glm::clamp(n, Index3(1), last - 1);
+        if (!inside && anyTissue(coarse.layout, coarse.uncoveredMu, o + n - 1, o + n)) {
+            return;
+        }
+        const Index3 at = glm::clamp(2 * n, Index3(1), fine.size() - 2);
+        const std::size_t to = fine.layout.at(at.x, at.y, at.z);
         const std::size_t from = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
         if (fine.diagonal[to] > 0.0F) {
             fine.add(field, to, coarse.value(field, from));
-            coarse.add(field, from, -coarse.value(field, from));
         }
+        coarse.add(field, from, -coarse.value(field, from));
     });
 }
 

@@ -138,7 +138,9 @@ void restrictAdd(const Kernels& k, const Window& fine, const float* from, const 
 /// Drops a force where a window has no degree of freedom of its own.
 void keepWhereFree(const Window& w, float* force) noexcept;
 
-/// A force at nodes of the coarse window that the fine one covers goes to the fine one's nodes at the same places.
+/// A force at nodes of the coarse window that the fine one covers goes to the fine one's nodes at the same places. So does
+/// that at nodes on its border which have no tissue of the coarse window's own around them, to the next node inside: there
+/// next to nothing would hold against it.
 void handDown(Window& coarse, Field field, Window& fine) noexcept;
 
 /// coarse = fine where the coarse window has a node that the fine one covers.
