@@ -7,19 +7,23 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace palpate::chainmail {
 
 namespace {
 
 constexpr std::size_t mostTools = 16;
-constexpr double reach = 0.6;          // spacings from a tool within which surface points are looked at
-constexpr double drift = 0.25;         // spacings that a tool may move until they are looked for again
-constexpr double leastEnergy = 1e-12;  // of viscous tissue that springs back: with less it is at rest [J]
-constexpr double mostBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;       // cycles, so that windows that moved are not felt
-constexpr int refreshPeriod = 256;     // calls after which forces that are carried along are computed anew ...
-constexpr int freePeriod = 8;          // ... and where tissue springs back: its energy falls to next to nothing
+constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
+constexpr double leastEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr int callsPerTurn = 2;       // from one term of the history to the next
+constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
+constexpr double mostBalance = 1.5;   // of forces that are far from balanced: these are taken as they are
+constexpr int moreAfterMove = 2;      // cycles, so that windows that moved are not felt
+constexpr double noLimit = -std::numeric_limits<double>::infinity();
+constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
 
@@ -29,7 +33,6 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
       multigrid_(stack_, 8 * options.maxSites),
       sites_(options.maxSites)
 {
-    memory_ = options.viscosity / (1.0 + options.viscosity);
     held_.reserve(mostTools);
     tools_.reserve(mostTools);
     shapes_.reserve(mostTools);
@@ -84,8 +87,16 @@ void Elastic::settle() noexcept
     if (atRest_) {
         return;
     }
-    for (const Field f : {Field::u, Field::a, Field::d, Field::e, Field::r, Field::v}) {
+    for (const Field f : {Field::u, Field::a, Field::d, Field::e, Field::r}) {
         stack_.clear(f);
+    }
+    if (stack_.body().relaxes) {
+        for (const Field f : {Field::h, Field::h0, Field::h1}) {
+            stack_.clear(f);
+        }
+        since_ = {};
+        historyEnergy_ = 0.0;
+        givenFor_ = 0;
     }
     energy_ = 0.0;
     toolAt_.clear();
@@ -195,13 +206,101 @@ bool Elastic::touched() const noexcept
                        [&](const ContactSite& s) { return s.active() || shapes_[s.owner].distance(s.rest) < 0.0; });
 }
 
+// Force and energy at u: of the tissue right after a step, less its history. At small strain `along` is u.
+WindowStack::Evaluated Elastic::tissueForce(Field y, Field along) noexcept
+{
+    WindowStack::Evaluated now = stack_.evaluate(Field::u, y, along, options_.finiteStrain);
+    if (!options_.finiteStrain) {
+        now.energy = -0.5 * now.product;
+    }
+    if (stack_.body().relaxes) {
+        const auto [work, energy] = stack_.dots(Field::h, along, Field::u);
+        stack_.combine(y, -1.0, Field::h, y);
+        now.product -= work;
+        now.energy += energy;
+        historyEnergy_ = energy;
+    }
+    return now;
+}
+
+// A body that no tool touches, and that still has a history.
+bool Elastic::springsBack() const noexcept
+{
+    return stack_.body().relaxes && !atRest_ &&
+           std::max(std::abs(energy_), std::abs(stack_.dot(Field::h, Field::u))) >= leastEnergy;
+}
+
+// What the time since the last call does to the history, where the tissue has lain. By turns: one evaluation of a term.
+void Elastic::remember(int periods) noexcept
+{
+    if (!stack_.body().relaxes) {
+        return;
+    }
+    if (givenFor_ > 0) {
+        --givenFor_;
+        takeGiven();
+        return;
+    }
+    for (int& since : since_) {
+        since += periods;
+    }
+    untilTurn_ = untilTurn_ > 0 ? untilTurn_ - 1 : callsPerTurn - 1;
+    if (untilTurn_ > 0) {
+        return;
+    }
+    const std::size_t term = std::exchange(term_, (term_ + 1) % volume::relaxationTerms);
+    const double seconds = std::exchange(since_[term], 0) * options_.period;
+    const double share = -std::expm1(-seconds / volume::relaxationTimes[term]);
+    const Field history = WindowStack::history(term);
+    stack_.evaluateTerm(term, Field::f, options_.finiteStrain);
+    stack_.combine(Field::f, -1.0, history, Field::f);
+    const auto work = stack_.dots(Field::f, Field::u, Field::d);
+    stack_.combine(history, share, Field::f, history);
+    stack_.combine(Field::h, share, Field::f, Field::h);
+    stack_.combine(Field::a, -share, Field::f, Field::a);
+    energy_ += share * work[0];
+    historyEnergy_ += share * work[0];
+    if (products_) {
+        (*products_)[0] -= share * work[0];
+        (*products_)[1] -= share * work[1];
+    }
+}
+
+Elastic::HistoryShares Elastic::historyShares() noexcept
+{
+    HistoryShares shares{};
+    for (std::size_t i = 0; i < shares.size() && stack_.body().relaxes && !atRest_; ++i) {
+        stack_.evaluateTerm(i, Field::f, options_.finiteStrain);
+        const double share = stack_.dot(Field::u, WindowStack::history(i)) / stack_.dot(Field::u, Field::f);
+        shares[i] = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+    }
+    return shares;
+}
+
+void Elastic::beginWith(const HistoryShares& shares) noexcept
+{
+    given_ = shares;
+    givenFor_ = callsOfGiven;
+}
+
+// The history that another body's windows had, at this displacement.
+void Elastic::takeGiven() noexcept
+{
+    for (std::size_t i = 0; i < given_.size(); ++i) {
+        const Field history = WindowStack::history(i);
+        stack_.evaluateTerm(i, history, options_.finiteStrain);
+        stack_.combine(history, given_[i] - 1.0, history, history);
+    }
+    stack_.combine(WindowStack::history(0), 1.0, WindowStack::history(1), Field::h);
+    refreshForces();
+}
+
 // The tissue's forces anew, where they cannot be carried along.
 void Elastic::refreshForces() noexcept
 {
     products_.reset();
     stack_.joinBorders(Field::u);
-    const auto now = stack_.evaluate(Field::u, Field::a, Field::u, options_.finiteStrain);
-    energy_ = options_.finiteStrain ? now.energy : -0.5 * now.product;
+    energy_ = tissueForce(Field::a, Field::u).energy;
     if (hasIncrement_) {
         stack_.joinBorders(Field::d);
         stack_.apply(Field::d, Field::e);
@@ -211,9 +310,7 @@ void Elastic::refreshForces() noexcept
 // r = forces of the tissue and of the contacts. Returns its norm.
 double Elastic::refreshResidual(bool isCopied) noexcept
 {
-    if (memory_ > 0.0) {
-        stack_.combine(Field::a, -memory_, Field::v, Field::r);
-    } else if (!isCopied) {
+    if (!isCopied) {
         stack_.copy(Field::a, Field::r);
     }
     for (const ContactSite& s : sites()) {
@@ -223,7 +320,7 @@ double Elastic::refreshResidual(bool isCopied) noexcept
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             stack_.addForce(s.level, l.corner(s.node, c),
-                            (1.0 - memory_) * static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
+                            static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
         }
     }
     return std::sqrt(stack_.dot(Field::r, Field::r));
@@ -241,7 +338,7 @@ void Elastic::prepareContacts() noexcept
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             const double share = static_cast<double>(s.share[static_cast<std::size_t>(c)]);
-            multigrid_.addContact(s.level, l.corner(s.node, c), (1.0 - memory_) * share * tangent);
+            multigrid_.addContact(s.level, l.corner(s.node, c), share * tangent);
         }
     }
     multigrid_.prepare();
@@ -253,7 +350,7 @@ double Elastic::contactEnergy() const noexcept
     for (const ContactSite& s : sites()) {
         sum += s.energy;
     }
-    return (1.0 - memory_) * sum;
+    return sum;
 }
 
 void Elastic::moveSites(double length) noexcept
@@ -309,41 +406,40 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
     const bool isTouched = touched();
-    if (!isTouched && (memory_ == 0.0 || energy_ < leastEnergy)) {
+    if (!isTouched && !springsBack()) {
         settle();
         return result;
     }
-    atRest_ = false;
-    if (result.moved || ++sinceRefresh_ >= (isTouched ? refreshPeriod : freePeriod)) {
+    const bool hasLain = !std::exchange(atRest_, false);
+    if (result.moved || ++sinceRefresh_ >= refreshPeriod) {
         refreshForces();
         sinceRefresh_ = 0;
     }
-    result.start = energy_ + contactEnergy() / (1.0 - memory_);
-    if (memory_ > 0.0) {
-        stack_.copy(Field::a, Field::v);
+    if (hasLain) {
+        remember(load.periods);
     }
+    result.start = energy_ + contactEnergy();
     const double start = energy_ + contactEnergy();
     startEnergy_ = energy_;
     bool isOpen = false;  // the tissue's force was not evaluated where it is
     bool hasGone = false;
-    if (hasIncrement_ && memory_ == 0.0) {
+    if (hasIncrement_) {
         hasGone = goOn(result);
         isOpen = hasGone && options_.finiteStrain;
-    } else if (hasIncrement_) {
-        again(result);
     } else {
         forgetIncrement();
     }
     hasIncrement_ = options_.goOn;
-    const int most = effort.cycles + (result.moved ? moreAfterMove : 0);
-    for (int i = 0; i < most + (effort.far > 0.0 ? 1 : 0); ++i) {
+    // No hand feels tissue that springs back.
+    const int most = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
+    for (int i = 0; i < most + (isTouched && effort.far > 0.0 ? 1 : 0); ++i) {
         const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
         result.residual = refreshResidual(hasGone);
-        if (tolerance > 0.0 && result.residual <= tolerance * contactForce()) {
+        if (tolerance > 0.0 && result.residual <= tolerance * loadForce()) {
             break;
         }
         ++result.cycles;
-        hasGone = oneCycle(isOpen ? start : 0.0, result);
+        hasGone = oneCycle(isOpen ? start : noLimit, result);
         if (!hasGone && isOpen && !confirm(start)) {
             again(result);
         } else if (!hasGone) {
@@ -364,18 +460,17 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 // Virtual work along the displacement itself: the tissue's own, over that of the contacts.
 void Elastic::balance() noexcept
 {
-    const double held = memory_ > 0.0 ? memory_ * stack_.dot(Field::v, Field::u) : 0.0;
-    const double tissue = held - (products_ ? (*products_)[0] : stack_.dot(Field::a, Field::u));
+    const double tissue = -(products_ ? (*products_)[0] : stack_.dot(Field::a, Field::u));
     double contacts = 0.0;
     for (const ContactSite& s : sites()) {
-        contacts += (1.0 - memory_) * glm::dot(s.force, s.u);
+        contacts += glm::dot(s.force, s.u);
     }
     balance_ = contacts > 0.0 ? std::clamp(tissue / contacts, 1.0 / mostBalance, mostBalance) : 1.0;
 }
 
 void Elastic::measure(ElasticResult& result) noexcept
 {
-    result.energy = energy_ + contactEnergy() / (1.0 - memory_);
+    result.energy = energy_ + contactEnergy();
     for (HeldTool& held : held_) {
         held.forgetContacts();
         result.behind = std::max(result.behind, held.behind);
@@ -403,6 +498,13 @@ double Elastic::contactForce() const noexcept
         sum += glm::length(s.force);
     }
     return sum;
+}
+
+// What the residual is measured by. Tissue that springs back under a tool that lifts off has more force than the contact.
+double Elastic::loadForce() const noexcept
+{
+    const double contacts = contactForce();
+    return stack_.body().relaxes ? std::max(contacts, std::sqrt(stack_.dot(Field::h, Field::h))) : contacts;
 }
 
 Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept

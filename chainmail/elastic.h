@@ -15,7 +15,7 @@ struct ElasticOptions {
     int window = 15;            // nodes of a window along the way in, odd; see WindowStack
     int cycles = 2;             // per call of relax(); one more where that leaves much out of balance
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
-    double viscosity = 0;       // Kelvin-Voigt: time that a strain lags behind its stress, in calls of relax()
+    double period = 1e-3;       // of a tick [s]: what relaxes does so by the ticks that its loads name
     std::size_t maxSites = 4096;
     double tolerance = 0.01;           // no more once the forces out of balance are this share of the contacts' [-]
     int heldPeriod = 3;                // of an ElasticLevel: see there
@@ -44,9 +44,15 @@ struct ElasticResult {
 /// the energy with the contacts as they are along it, so that none raises the energy: one that would is shortened, and
 /// dropped at last.
 ///
-/// Viscosity (Kelvin-Voigt, one time for all tissue) is integrated by implicit Euler: the tissue's force is
-/// a + c (a - v), v the force after the call before and c the viscous time in calls. Divided by 1 + c this is the same
-/// problem with contacts softer by 1 / (1 + c), and a force of -v c / (1 + c) on every node.
+/// A body that relaxes (ElasticBody::relaxes) is a generalised Maxwell solid. Of its force right after a step, a(u), each
+/// term i of the Prony series has taken a history h_i, and the tissue's force is a(u) - h_0 - h_1, with
+///
+///     dh_i/dt = (a_i(u) - h_i) / t_i
+///
+/// a_i being the force of the same tissue with its moduli times the term's weights, cell by cell: exact where tissues meet.
+/// In a call the history is a dead load, so that a call keeps one energy. The terms go on by turns, exactly for a u that
+/// rests. Source: R. L. Taylor, K. S. Pister, G. L. Goudreau, "Thermomechanical analysis of viscoelastic solids", Int. J.
+/// Numer. Methods Eng. 2, 1970 (recursion); history by node and not by cell, since all tissue has the same times.
 ///
 /// A tool presses only as deep as the cells bear, see HeldTool.
 ///
@@ -91,6 +97,13 @@ public:
     /// The same at the middle of a cell of the finest level.
     Vec3 displacementOf(Index3 cell) const noexcept;
     bool atRest() const noexcept { return atRest_; }
+
+    /// Of a body that relaxes: how far each term of its history has got, as a share of where it goes to if nothing moves,
+    /// mean over the body. Uses up working memory, as relax() does.
+    using HistoryShares = std::array<double, volume::relaxationTerms>;
+    HistoryShares historyShares() noexcept;
+    /// Begins with such a history, until its own displacement has been found: for windows that take over from others.
+    void beginWith(const HistoryShares& shares) noexcept;
     const WindowStack& stack() const noexcept { return stack_; }
     const ElasticBody& body() const noexcept { return stack_.body(); }
     /// Nodes of all windows.
@@ -113,8 +126,7 @@ private:
         Field field = Field::p;
         double beta = 0;
         Parabola tissue;
-        Along contacts;      // where the step starts
-        double viscous = 0;  // slope of what viscosity holds
+        Along contacts;  // where the step starts
     };
 
     // What the next direction is made conjugate to: a step of this call with its image, d and e or p and q.
@@ -138,7 +150,11 @@ private:
     void meet(const ElasticLoad& load, bool moved) noexcept;
     void spreadPressure() noexcept;
     bool touched() const noexcept;
+    WindowStack::Evaluated tissueForce(Field y, Field along) noexcept;
     void refreshForces() noexcept;
+    bool springsBack() const noexcept;
+    void remember(int periods) noexcept;
+    void takeGiven() noexcept;
     double refreshResidual(bool isCopied) noexcept;
     void prepareContacts() noexcept;
     void look() noexcept;
@@ -161,6 +177,7 @@ private:
     void forgetStep() noexcept;
     bool oneCycle(double limit, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
+    double loadForce() const noexcept;
     void balance() noexcept;
     void measure(ElasticResult& result) noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
@@ -178,9 +195,14 @@ private:
     std::vector<Vec3> toolAt_;        // in the last call [m]
     std::vector<Vec3f> slip_;         // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
-    double memory_ = 0;       // share of the last call's stress that viscosity holds against this one's
-    double energy_ = 0;       // of the tissue [J]
-    double startEnergy_ = 0;  // the same when the call began [J]
+    std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
+    std::size_t term_ = 0;                              // whose turn it is
+    int untilTurn_ = 0;                                 // calls
+    HistoryShares given_{};                             // see beginWith()
+    int givenFor_ = 0;                                  // calls
+    double historyEnergy_ = 0;                          // history . u [J]
+    double energy_ = 0;                                 // of the tissue, history's included [J]
+    double startEnergy_ = 0;                            // the same when the call began [J]
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
     double stiffness_ = 0;                           // along the last step, of tissue and contacts

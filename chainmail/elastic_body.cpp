@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <random>
 
 namespace palpate::chainmail {
@@ -24,7 +25,8 @@ struct Moduli {
     double mu = 0;
     double bulk = 0;
     double stiffening = 0;
-    double held = 0;  // share of the tissue
+    double held = 0;                                         // share of the tissue
+    std::array<double, volume::relaxationTerms> relaxing{};  // weights
 };
 
 int coarseNodes(int fine)
@@ -95,6 +97,9 @@ public:
         coarse.lambda.assign(count, 0.0F);
         coarse.stiffening.assign(count, 0.0F);
         coarse.fixed.assign(count, 0);
+        for (std::size_t i = 0; i < fine_.relaxing.size(); ++i) {
+            coarse.relaxing[i].assign(relaxes() ? count : 0, 0.0F);
+        }
         held.assign(count, 0.0F);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 2, [&](Index3 c) {
             const Moduli m = upscaled(2 * c);
@@ -103,6 +108,9 @@ public:
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
             coarse.stiffening[at] = static_cast<float>(m.stiffening);
             held[at] = static_cast<float>(m.held);
+            for (std::size_t i = 0; i < m.relaxing.size() && relaxes(); ++i) {
+                coarse.relaxing[i][at] = static_cast<float>(m.relaxing[i]);
+            }
         });
         volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
                              [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = mostlyFixed(2 * n) ? 1 : 0; });
@@ -127,9 +135,13 @@ private:
         return fixed > 0.3 * tissue;
     }
 
+    bool relaxes() const { return !fine_.relaxing[0].empty(); }
+
+    // A coarse cell has the shear modulus of its eight cells right after a step, and that of a long time after it; the
+    // terms share what is gone as they do on average.
     Moduli upscaled(Index3 low) const
     {
-        BlockMean mu, bulk;
+        BlockMean mu, bulk, relaxed;
         Moduli mean;
         int filled = 0;
         volume::forEachIndex(low, low + 1, [&](Index3 c) {
@@ -141,11 +153,23 @@ private:
                 bulk.add(static_cast<double>(fine_.lambda[at]) + 2.0 / 3.0 * m, held);
                 mean.stiffening += static_cast<double>(fine_.stiffening[at]);
                 mean.held += held;
+                double left = 1.0;
+                for (std::size_t i = 0; i < mean.relaxing.size() && relaxes(); ++i) {
+                    const double weight = static_cast<double>(fine_.relaxing[i][at]);
+                    mean.relaxing[i] += m * weight;
+                    left -= weight;
+                }
+                relaxed.add(m * left, held);
                 ++filled;
             }
         });
         const int cells = std::max(filled, 1);
-        return {mu.modulus(), bulk.modulus(), mean.stiffening / cells, mean.held / cells};
+        const double sum = std::accumulate(mean.relaxing.begin(), mean.relaxing.end(), 0.0);
+        const double gone = sum > 0.0 ? 1.0 - relaxed.modulus() / mu.modulus() : 0.0;
+        for (double& weight : mean.relaxing) {
+            weight *= sum > 0.0 ? gone / sum : 0.0;
+        }
+        return {mu.modulus(), bulk.modulus(), mean.stiffening / cells, mean.held / cells, mean.relaxing};
     }
 
     const CellLevel& fine_;
@@ -169,8 +193,17 @@ void fixMostlyHeld(const volume::NodeGrid& cells, const std::vector<volume::Cell
     });
 }
 
+volume::Relaxation relaxationOf(const volume::CellMaterial& material, bool relaxes)
+{
+    volume::Relaxation relaxation;
+    for (std::size_t i = 0; i < material.relaxing.size() && relaxes; ++i) {
+        relaxation.weights[i] = static_cast<double>(material.relaxing[i]);
+    }
+    return relaxation;
+}
+
 CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials, double poissonCap,
-                 Index3 size)
+                 Index3 size, bool relaxes)
 {
     CellLevel level;
     level.nodes = {size, cells.origin - 0.5 * cells.spacing, cells.spacing};
@@ -178,14 +211,20 @@ CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMa
     level.lambda.assign(level.nodes.count(), 0.0F);
     level.stiffening.assign(level.nodes.count(), 0.0F);
     level.fixed.assign(level.nodes.count(), 0);
+    for (auto& weights : level.relaxing) {
+        weights.assign(relaxes ? level.nodes.count() : 0, 0.0F);
+    }
     volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
         const auto& m = materials[cells.offset(c)];
         if (m.youngsModulus <= leastTissue) {
             return;
         }
         const double nu = std::min(static_cast<double>(m.poissonRatio), poissonCap);
-        const double e = static_cast<double>(m.youngsModulus);
+        const double e = static_cast<double>(m.youngsModulus) * relaxationOf(m, relaxes).instantaneous();
         const std::size_t at = level.nodes.offset(c);
+        for (std::size_t i = 0; i < level.relaxing.size() && relaxes; ++i) {
+            level.relaxing[i][at] = m.relaxing[i];
+        }
         level.mu[at] = static_cast<float>(e / (2.0 * (1.0 + nu)));
         level.lambda[at] = static_cast<float>(e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
         level.stiffening[at] = m.stiffening;
@@ -351,12 +390,13 @@ void indexRows(ElasticBody& body)
 }  // namespace
 
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
-                        const volume::DistanceField& surface, double poissonCap, double toolRadius)
+                        const volume::DistanceField& surface, double poissonCap, double toolRadius, bool relaxes)
 {
     ElasticBody body;
+    body.relaxes = relaxes;
     int levels = 1;
     const Index3 size = paddedNodes(cells.size, levels);
-    body.levels.push_back(finest(cells, materials, poissonCap, size));
+    body.levels.push_back(finest(cells, materials, poissonCap, size, relaxes));
     auto& fixed = body.levels.front().fixed;
     body.held = std::any_of(fixed.begin(), fixed.end(), [](std::uint8_t f) { return f != 0; });
     if (!body.held) {

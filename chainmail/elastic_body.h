@@ -3,6 +3,7 @@
 #include <volume/scalar_field.h>
 #include <volume/tissue.h>
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -15,8 +16,9 @@ struct CellLevel {
     std::vector<float> lambda;        // Lame's first parameter                                    [Pa] (count x 1)
     std::vector<float> stiffening;    // with finite strain, see TissueRow                        [-]    (count x 1)
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
-    std::vector<float> diagonal;      // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
-    double radius = 1;  // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
+    std::array<std::vector<float>, volume::relaxationTerms> relaxing;  // weights of each cell [-]; none: does not relax
+    std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
+    double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
 };
 
 /// A piece of the body's surface at rest.
@@ -48,7 +50,8 @@ struct ElasticBody {
     std::vector<SurfaceCell> cells;   // that the surface runs through, by z, then y, then x
     std::vector<std::uint32_t> rows;  // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
     std::vector<SurfacePoint> points;
-    bool held = true;  // false: the body had nothing fixed, and was laid on its back
+    bool held = true;      // false: the body had nothing fixed, and was laid on its back
+    bool relaxes = false;  // its moduli are those right after a step
 };
 
 /// @param cells        centres of the finest level's cells; two layers of cells at its border must be empty: a surface that
@@ -57,12 +60,14 @@ struct ElasticBody {
 /// @param poissonCap   Poisson's ratios above are lowered to this [-], under 0.5
 /// @param toolRadius   of the smallest tool that will press: the surface has points closer than that; 0: of any that is
 ///                     larger than a cell [m]
+/// @param relaxes      the moduli become those right after a step, and cells keep the weights of their Prony series
 ///
 /// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A body without fixed
 /// tissue lies on its back: the nodes of the rear 5 % are fixed (frame LPS: y to the back).
 ///
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
-                        const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0);
+                        const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0,
+                        bool relaxes = false);
 
 }  // namespace palpate::chainmail

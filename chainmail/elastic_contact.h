@@ -31,6 +31,7 @@ struct ElasticLoad {
     std::span<const ElasticTool> tools;
     std::span<const Tie> ties;
     Focus focus;
+    int periods = 1;  // since the call before, see ElasticOptions: tissue that relaxes goes on by as much
 };
 
 /// Where tool and tissue meet: a point of the surface that a tool may press, or a tie.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace palpate::chainmail {
 
@@ -16,7 +17,8 @@ constexpr double rounding = 1e-6;       // relative: sums of single-precision pr
 constexpr double mostFurther = 4.0;     // steps that force and energy may be carried on along a parabola
 constexpr double parabolic = 0.1;       // of what a step gains: by how much the energy may be off the parabola
 constexpr double leastStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
-constexpr double mostNearness = 10.0;   // of that expectation, bounds
+constexpr double noLimit = -std::numeric_limits<double>::infinity();
+constexpr double mostNearness = 10.0;  // of that expectation, bounds
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
 // half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
@@ -47,8 +49,8 @@ double Elastic::lineSearch(double slope, double curvature, Along at, int steps) 
     double alpha = 0.0;
     for (int i = 0; i < steps; ++i) {
         at = i > 0 ? contactsAlong(sites(), alpha) : at;
-        const double stiffness = curvature + (1.0 - memory_) * at.curvature;
-        const double change = -(slope + alpha * curvature + (1.0 - memory_) * at.slope) / stiffness;
+        const double stiffness = curvature + at.curvature;
+        const double change = -(slope + alpha * curvature + at.slope) / stiffness;
         if (!(stiffness > 0.0) || !std::isfinite(change)) {
             return 0.0;
         }
@@ -63,14 +65,14 @@ double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexc
 {
     const double start = energy_;
     const double before = start + contactEnergy();
-    const double slope = to.viscous + to.tissue.slope;
-    const double steepness = slope + (1.0 - memory_) * to.contacts.slope;
+    const double slope = to.tissue.slope;
+    const double steepness = slope + to.contacts.slope;
     double length = lineSearch(slope, to.tissue.curvature, to.contacts, newtonSteps);
     for (int i = 0; length != 0.0; ++i) {
         moveSites(length);
         energy_ = start + to.tissue.at(length);
-        const double change = energy_ + to.viscous * length + contactEnergy() - before;
-        if (change <= rounding * (std::abs(before) + std::abs(slope * length))) {
+        const double change = energy_ + contactEnergy() - before;
+        if (change <= rounding * (std::abs(before) + std::abs(historyEnergy_) + std::abs(slope * length))) {
             return length;
         }
         moveSites(-length);
@@ -86,7 +88,7 @@ double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexc
 bool Elastic::goOn(ElasticResult& result) noexcept
 {
     look();
-    const double length = searchParabola({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0), 0.0}, result);
+    const double length = searchParabola({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, result);
     if (length == 0.0) {
         forgetIncrement();
         return false;
@@ -103,8 +105,8 @@ bool Elastic::goOn(ElasticResult& result) noexcept
 // Evaluates the tissue where goOn() led. False where that is up: then all is as when the call began.
 bool Elastic::confirm(double start) noexcept
 {
-    energy_ = stack_.evaluate(Field::u, Field::f, Field::d, true).energy;
-    if (energy_ + contactEnergy() - start > rounding * std::abs(start)) {
+    energy_ = tissueForce(Field::f, Field::d).energy;
+    if (energy_ + contactEnergy() - start > rounding * (std::abs(start) + std::abs(historyEnergy_))) {
         retreat();
         return false;
     }
@@ -153,8 +155,8 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
     const double start = energy_;
     const double before = std::max(limit, start + contactEnergy());
     const Along& contacts = to.contacts;
-    const double slope = to.viscous + to.tissue.slope;
-    const double steepness = slope + (1.0 - memory_) * contacts.slope;
+    const double slope = to.tissue.slope;
+    const double steepness = slope + contacts.slope;
     double length = lineSearch(slope, to.tissue.curvature, contacts, 1);
     double gone = 0.0;
     for (int i = 0, searches = 0; length != 0.0;) {
@@ -164,7 +166,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
             stack_.combine(Field::u, length - gone, to.field, Field::u);
         }
         gone = length;
-        const auto now = stack_.evaluate(Field::u, Field::f, to.field, true);
+        const auto now = tissueForce(Field::f, to.field);
         const Parabola tissue{to.tissue.slope, (-now.product - to.tissue.slope) / gone};
         const double best = lineSearch(slope, tissue.curvature, contacts, newtonSteps);
         const double further = std::max(1.0, std::abs(best / gone));
@@ -177,8 +179,8 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         length = isNear ? best : gone;
         moveSites(length);
         energy_ = now.energy + tissue.at(length) - tissue.at(gone);
-        const double scale = std::abs(before) + std::abs(slope * length);
-        const double change = energy_ + to.viscous * length + contactEnergy() - before;
+        const double scale = std::abs(before) + std::abs(historyEnergy_) + std::abs(slope * length);
+        const double change = energy_ + contactEnergy() - before;
         if (change <= rounding * scale) {
             Direction found = to;
             found.tissue = tissue;
@@ -205,7 +207,7 @@ void Elastic::keepStep(const Direction& to, KeptStep step) noexcept
     for (ContactSite& s : active()) {
         s.p *= length;
     }
-    stiffness_ = to.tissue.curvature + (1.0 - memory_) * to.contacts.curvature;
+    stiffness_ = to.tissue.curvature + to.contacts.curvature;
     last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length)};
 }
 
@@ -220,26 +222,21 @@ bool Elastic::oneCycle(double limit, ElasticResult& result) noexcept
     double mixed = -product[1];
     double work = product[0];  // of the residual along z
     for (ContactSite& s : active()) {
-        const Vec3 resisted = (1.0 - memory_) * s.resist(s.p);
+        const Vec3 resisted = s.resist(s.p);
         s.z = gather(stack_.windows(), s, Field::z);
         own += glm::dot(s.p, resisted);
         mixed += glm::dot(s.z, resisted);
-        work += (1.0 - memory_) * glm::dot(s.z, s.force);
+        work += glm::dot(s.z, s.force);
     }
     const double beta = own > 0.0 && std::isfinite(mixed / own) ? -mixed / own : 0.0;
     for (ContactSite& s : active()) {
         s.p = s.z + beta * s.p;
     }
-    Direction to{Field::p, beta, {beta * last_.tissue.slope - product[0], 0.0}, contactsAlong(sites(), 0.0), 0.0};
-    if (memory_ > 0.0) {
-        const double held = memory_ * stack_.dot(Field::z, Field::v);
-        to.viscous = held + beta * memory_ * stack_.dot(last_.direction, Field::v);
-        work -= held;
-    }
+    Direction to{Field::p, beta, {beta * last_.tissue.slope - product[0], 0.0}, contactsAlong(sites(), 0.0)};
     // Along z the stiffness is the work but for how near the preconditioner is, as in the cycle before; made conjugate, it
     // is less by what the increment has of it.
     const double conjugate = -beta * mixed;
-    const double contacts = (1.0 - memory_) * to.contacts.curvature;
+    const double contacts = to.contacts.curvature;
     const double expected = std::max(nearness * work - conjugate, leastStiffness * nearness * work);
     to.tissue.curvature = std::max(expected - contacts, leastStiffness * expected);
     const bool stepped = takeStep(to, limit, result);
@@ -253,8 +250,7 @@ bool Elastic::oneCycle(double limit, ElasticResult& result) noexcept
 void Elastic::again(ElasticResult& result) noexcept
 {
     look();
-    const double viscous = memory_ > 0.0 ? memory_ * stack_.dot(Field::d, Field::v) : 0.0;
-    if (!takeStep({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0), viscous}, 0.0, result)) {
+    if (!takeStep({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, noLimit, result)) {
         forgetIncrement();
     }
 }

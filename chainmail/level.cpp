@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace palpate::chainmail {
 
@@ -96,7 +97,7 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
     : shape_(shape),
       surface_(surface),
       elastic_(body, options, focusAt(surface, start)),
-      period_(options.viscosity > 0.0 ? 1 : options.heldPeriod),
+      period_(options.heldPeriod),
       turns_(body.levels.size(), Index3(0))
 {
     const Index3 size = elastic_.stack().windows().front().size();
@@ -165,8 +166,11 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     isShapeOnly_ = isShapeOnly;
     turn_ = takesTurns ? (turn_ + 1) % period_ : 0;
     const bool wasAtRest = elastic_.atRest();
+    ++since_;
     if (turn_ == 0) {
-        last_ = elastic_.relax(load(grip));
+        ElasticLoad all = load(grip);
+        all.periods = std::exchange(since_, 0);
+        last_ = elastic_.relax(all);
     }
     const int shares = takesTurns ? period_ : 1;
     if ((!takesTurns || turn_ == 1) && !(wasAtRest && elastic_.atRest())) {

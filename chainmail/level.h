@@ -91,6 +91,8 @@ public:
                  const ElasticOptions& options, Vec3 start);
     Reaction deform(const Grip& grip) noexcept;
     const Elastic& elastic() const noexcept { return elastic_; }
+    /// Goes on from another level with the same body, whose windows are others: tissue has relaxed as far as there.
+    void takeOver(ElasticLevel& from) noexcept { elastic_.beginWith(from.elastic_.historyShares()); }
     static constexpr std::size_t mostOthers = 7;
 
 private:
@@ -114,6 +116,7 @@ private:
     Elastic elastic_;
     int period_;  // calls from one solution to the next while a tip holds the tissue
     int turn_ = 0;
+    int since_ = 0;                                  // calls since the last solution
     bool isShapeOnly_ = false;                       // the last call's force on the hand was not from here
     std::array<ElasticTool, mostOthers + 1> tools_;  // the others, then the hand's: so each keeps its place
     std::array<Tie, 1 + mostShaftTies> ties_;        // the tip's, then the shaft's

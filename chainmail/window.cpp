@@ -30,13 +30,18 @@ Index3 offsetIn(const Window& fine, const Window& coarse) noexcept
 
 }  // namespace
 
-Window::Window(Index3 size) : layout(Layout::of(size.x, size.y, size.z))
+Window::Window(Index3 size, bool relaxes) : layout(Layout::of(size.x, size.y, size.z))
 {
     for (Floats* cells : {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof}) {
         cells->assign(layout.count + Layout::lanes, 0.0F);
     }
-    for (Floats& f : fields) {
-        f.assign(layout.fieldSize(), 0.0F);
+    const auto always = relaxes ? fieldCount : static_cast<std::size_t>(Field::h);
+    for (std::size_t i = 0; i < always; ++i) {
+        fields[i].assign(layout.fieldSize(), 0.0F);
+    }
+    for (Term& term : terms) {
+        term.mu.assign(relaxes ? layout.count + Layout::lanes : 0, 0.0F);
+        term.lambda = term.mu;
     }
 }
 
@@ -57,6 +62,9 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
     }
     std::copy(mu.begin(), mu.end(), uncoveredMu.begin());
     std::copy(lambda.begin(), lambda.end(), uncoveredLambda.begin());
+    for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
+        placeTerm(level, i);
+    }
     volume::forEachIndex(Index3(0), size() - 1, [&](Index3 n) {
         const std::size_t node = layout.at(n.x, n.y, n.z);
         const std::size_t inLevel = level.nodes.offset(low + n);
@@ -71,6 +79,20 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
     });
 }
 
+void Window::placeTerm(const CellLevel& level, std::size_t i) noexcept
+{
+    for (int k = 0; k + 1 < layout.nz; ++k) {
+        for (int j = 0; j + 1 < layout.ny; ++j) {
+            const float* share = level.relaxing[i].data() + level.nodes.offset(low + Index3(0, j, k));
+            const std::size_t to = layout.at(0, j, k);
+            for (std::size_t c = 0; c + 1 < static_cast<std::size_t>(layout.nx); ++c) {
+                terms[i].mu[to + c] = share[c] * mu[to + c];
+                terms[i].lambda[to + c] = share[c] * lambda[to + c];
+            }
+        }
+    }
+}
+
 void Window::cover(const Window& finer) noexcept
 {
     const Index3 o = offsetIn(finer, *this);
@@ -78,6 +100,11 @@ void Window::cover(const Window& finer) noexcept
     volume::forEachIndex(o, o + cells - 1, [&](Index3 c) {
         uncoveredMu[layout.at(c.x, c.y, c.z)] = 0.0F;
         uncoveredLambda[layout.at(c.x, c.y, c.z)] = 0.0F;
+        for (Term& term : terms) {
+            if (!term.mu.empty()) {
+                term.mu[layout.at(c.x, c.y, c.z)] = term.lambda[layout.at(c.x, c.y, c.z)] = 0.0F;
+            }
+        }
     });
     volume::forEachIndex(o + 1, o + cells - 1, [&](Index3 n) { dof[layout.at(n.x, n.y, n.z)] = 0.0F; });
     // A node on the finer window's border may be left with nothing but empty cells around it.
@@ -146,6 +173,34 @@ void restrictAdd(const Kernels& k, const Window& fine, const float* from, const 
             }
         }
     }
+}
+
+void keepWhereFree(const Window& w, float* force) noexcept
+{
+    for (std::size_t c = 0; c < 3; ++c, force += w.layout.count) {
+        for (std::size_t i = 0; i < w.layout.count; ++i) {
+            force[i] = w.diagonal[i] > 0.0F ? force[i] : 0.0F;
+        }
+    }
+}
+
+void handDown(Window& coarse, Field field, Window& fine) noexcept
+{
+    const Index3 o = offsetIn(fine, coarse);
+    const Index3 last = (fine.size() - 1) / 2;
+    volume::forEachIndex(Index3(0), last, [&](Index3 n) {
+        const bool inside = n == glm::clamp(n, Index3(1), last - 1);
+        if (!inside && anyTissue(coarse.layout, coarse.uncoveredMu, o + n - 1, o + n)) {
+            return;
+        }
+        const Index3 at = glm::clamp(2 * n, Index3(1), fine.size() - 2);
+        const std::size_t to = fine.layout.at(at.x, at.y, at.z);
+        const std::size_t from = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
+        if (fine.diagonal[to] > 0.0F) {
+            fine.add(field, to, coarse.value(field, from));
+        }
+        coarse.add(field, from, -coarse.value(field, from));
+    });
 }
 
 void inject(const Window& fine, const float* from, const Window& coarse, float* to) noexcept

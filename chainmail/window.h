@@ -27,19 +27,22 @@ using Floats = std::vector<float, CacheAligned<float>>;
 
 /// What a window keeps for every node: three components each, Layout::fieldSize() floats.
 enum class Field : std::uint8_t {
-    u,  // displacement [m]
-    a,  // A u, by the elastic energy alone [N]
-    d,  // the last tick's increment of u
-    e,  // and of a
-    p,  // search direction
-    q,  // A p
-    r,  // residual: force of the contacts less a, where the node is a degree of freedom [N]
-    f,  // right side of the cycle
-    z,  // its answer
-    v,  // a at the end of the last call: what viscosity remembers [N]
-    t,  // working memory
+    u,   // displacement [m]
+    a,   // A u, by the elastic energy alone [N]
+    d,   // the last tick's increment of u
+    e,   // and of a
+    p,   // search direction
+    q,   // A p
+    r,   // residual: force of the contacts less a, where the node is a degree of freedom [N]
+    f,   // right side of the cycle
+    z,   // its answer
+    t,   // working memory
+    h,   // history: what relaxation has taken of the tissue's force, all terms together [N]
+    h0,  // the same of each term; these three only where the body relaxes
+    h1,
     count
 };
+static_assert(volume::relaxationTerms == 2, "a field for each term");
 inline constexpr std::size_t fieldCount = static_cast<std::size_t>(Field::count);
 
 /// A box of nodes of one level that follows the tool. Windows are nested; together they are one finite-element space:
@@ -61,10 +64,14 @@ struct Window {
     Floats mu, lambda;                    // of each cell, times spacing / 32 [N/m]
     Floats stiffening;                    // of each cell [-]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
-    Floats diagonal;                      // reciprocal of the operator's diagonal, zero where the node is not free
-    Floats border;                        // nodes that follow the next coarser window
-    Floats open;                          // free, or border
-    Floats dof;                           // degrees of freedom: free and not covered
+    struct Term {
+        Floats mu, lambda;
+    };
+    std::array<Term, volume::relaxationTerms> terms;  // of the Prony series: uncovered moduli times its weight
+    Floats diagonal;  // reciprocal of the operator's diagonal, zero where the node is not free
+    Floats border;    // nodes that follow the next coarser window
+    Floats open;      // free, or border
+    Floats dof;       // degrees of freedom: free and not covered
     std::array<Floats, fieldCount> fields;
     float weight = 0.2F;  // of the smoother
 
@@ -72,6 +79,10 @@ struct Window {
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data(), stiffening.data()}; }
     CellStiffness uncovered() const noexcept { return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data()}; }
+    CellStiffness term(std::size_t i) const noexcept
+    {
+        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data()};
+    }
     Index3 size() const noexcept { return {layout.nx, layout.ny, layout.nz}; }
     bool contains(Index3 node) const noexcept  // in the level's indices
     {
@@ -106,12 +117,15 @@ struct Window {
         volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { visit(coarse.at(parent), share); });
     }
 
-    explicit Window(Index3 size);
+    explicit Window(Index3 size, bool relaxes = false);
 
     /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
     void place(const CellLevel& level, Index3 at, bool coarsest) noexcept;
     /// Leaves out what `finer`, the next finer window, covers.
     void cover(const Window& finer) noexcept;
+
+private:
+    void placeTerm(const CellLevel& level, std::size_t i) noexcept;
 };
 
 /// fine = P coarse: trilinear, at all nodes of the fine window.
@@ -120,6 +134,14 @@ void prolong(const Kernels& k, const Window& coarse, const float* from, const Wi
 /// coarse += P^T fine. `scratch`: as for Kernels::apply() on the fine window.
 void restrictAdd(const Kernels& k, const Window& fine, const float* from, const Window& coarse, float* to,
                  float* scratch) noexcept;
+
+/// Drops a force where a window has no degree of freedom of its own.
+void keepWhereFree(const Window& w, float* force) noexcept;
+
+/// A force at nodes of the coarse window that the fine one covers goes to the fine one's nodes at the same places. So does
+/// that at nodes on its border which have no tissue of the coarse window's own around them, to the next node inside: there
+/// next to nothing would hold against it.
+void handDown(Window& coarse, Field field, Window& fine) noexcept;
 
 /// coarse = fine where the coarse window has a node that the fine one covers.
 void inject(const Window& fine, const float* from, const Window& coarse, float* to) noexcept;

@@ -40,7 +40,7 @@ WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus
     std::size_t scratch = 0;
     const Index3 wanted = windowSize(window, focus);
     for (const auto& level : body.levels) {
-        windows_.emplace_back(glm::min(level.nodes.size, wanted));
+        windows_.emplace_back(glm::min(level.nodes.size, wanted), body.relaxes);
         scratch = std::max(scratch, windows_.back().layout.scratchSize());
     }
     scratch_.assign(scratch, 0.0F);
@@ -116,12 +116,61 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
             }
         }
     }
+    const bool remembers = carry && body_->relaxes;
+    for (std::size_t i = 0; i < volume::relaxationTerms && remembers; ++i) {
+        gatherForces(history(i));
+    }
     place();
     if (carry) {
         transfer(Field::u);
         transfer(Field::d);
     }
+    for (std::size_t i = 0; i < volume::relaxationTerms && remembers; ++i) {
+        handOutForces(history(i));
+    }
+    if (remembers) {
+        combine(history(0), 1.0, history(1), Field::h);
+    }
     return true;
+}
+
+// Adds to every window what all finer ones hold, so that each has the whole force.
+void WindowStack::gatherForces(Field field) noexcept
+{
+    for (std::size_t l = 0; l + 1 < windows_.size(); ++l) {
+        restrictAdd(*kernels_, windows_[l], windows_[l].field(field), windows_[l + 1], windows_[l + 1].field(field),
+                    scratch());
+    }
+}
+
+// The other way round, at the windows' new places: every window keeps what it had there and what no finer one has. What is
+// left over under a finer window, where that was not before, goes down to it node by node. So the work along any
+// displacement that the coarser window has too stays what it was.
+void WindowStack::handOutForces(Field field) noexcept
+{
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        Window& w = windows_[l];
+        std::memset(w.field(Field::t), 0, 3 * w.layout.count * sizeof(float));
+        carryOver(w.layout, oldLow_[l], w.field(field), w.low, w.field(Field::t));
+        float* finer = w.field(Field::f);  // what finer windows have
+        if (l == 0) {
+            std::memset(finer, 0, 3 * w.layout.count * sizeof(float));
+        }
+        kernels_->combine(w.field(Field::t), -1.0F, finer, w.field(field), 3 * w.layout.count);
+        keepWhereFree(w, w.field(field));
+        if (l + 1 < windows_.size()) {
+            Window& coarse = windows_[l + 1];
+            std::memset(coarse.field(Field::f), 0, 3 * coarse.layout.count * sizeof(float));
+            kernels_->combine(finer, 1.0F, w.field(field), finer, 3 * w.layout.count);
+            restrictAdd(*kernels_, w, finer, coarse, coarse.field(Field::f), scratch());
+        }
+    }
+    for (std::size_t l = windows_.size() - 1; l-- > 0;) {
+        handDown(windows_[l + 1], field, windows_[l]);
+    }
+    for (Window& w : windows_) {
+        kernels_->smoothFirst(1.0F, w.dof.data(), w.field(field), w.field(field), w.layout.count);
+    }
 }
 
 void WindowStack::transfer(Field field) noexcept
@@ -150,17 +199,19 @@ void WindowStack::joinBorders(Field x) noexcept
     }
 }
 
-WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, bool finite) noexcept
+WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, bool finite,
+                                             std::optional<std::size_t> term) noexcept
 {
     const Kernels& k = *kernels_;
     Evaluated sum;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         Window& w = windows_[l];
+        const CellStiffness stiffness = term ? w.term(*term) : w.uncovered();
         if (finite) {
             const float inverse = static_cast<float>(1.0 / body_->levels[l].nodes.spacing);
-            sum.energy += k.applyFinite(w.layout, w.uncovered(), inverse, w.field(x), w.field(y), scratch());
+            sum.energy += k.applyFinite(w.layout, stiffness, inverse, w.field(x), w.field(y), scratch());
         } else {
-            k.apply(w.layout, w.uncovered(), w.field(x), w.field(y), scratch());
+            k.apply(w.layout, stiffness, w.field(x), w.field(y), scratch());
         }
     }
     for (std::size_t l = 0; l < windows_.size(); ++l) {

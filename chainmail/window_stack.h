@@ -3,6 +3,7 @@
 #include <chainmail/window.h>
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -40,7 +41,8 @@ public:
     const Kernels& kernels() const noexcept { return *kernels_; }
     float* scratch() noexcept { return scratch_.data(); }
 
-    /// Moves windows whose middle is some nodes away from where `focus` has it; where `carry`, takes u and d along.
+    /// Moves windows whose middle is some nodes away from where `focus` has it; where `carry`, takes u, d and the history
+    /// along. The history is a force: its work along a displacement that the coarser window has too stays what it was.
     /// @returns  true when a window moved: what was computed from u and d has to be computed again
     bool follow(const Focus& focus, bool carry) noexcept;
 
@@ -52,7 +54,12 @@ public:
         double energy = 0;   // at finite strain; else 0 [J]
         double product = 0;  // along . y
     };
-    Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept;
+    Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept { return evaluate(x, y, along, finite, {}); }
+
+    /// The same of term `term` of the Prony series alone: the force at u of tissue with its share of the moduli.
+    void evaluateTerm(std::size_t term, Field y, bool finite) noexcept { evaluate(Field::u, y, Field::u, finite, term); }
+    /// Its history.
+    static Field history(std::size_t term) noexcept { return term == 0 ? Field::h0 : Field::h1; }
 
     /// Gives border nodes what the next coarser window has there. Sums of continuous fields are continuous but for
     /// rounding, and what a multigrid cycle or follow() leaves is continuous.
@@ -89,6 +96,9 @@ private:
     void place() noexcept;
     void addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept;
     void transfer(Field field) noexcept;
+    Evaluated evaluate(Field x, Field y, Field along, bool finite, std::optional<std::size_t> term) noexcept;
+    void gatherForces(Field field) noexcept;
+    void handOutForces(Field field) noexcept;
     static StepFields stepFields(Window& window, Field direction) noexcept;
 
     const ElasticBody* body_;

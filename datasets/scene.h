@@ -69,14 +69,13 @@ inline constexpr std::array<std::string_view, 3> modelLevels{"spring", "chainmai
 
 enum class Strain : std::uint8_t { small, finite };
 
-/// Level `elastic`: relaxation on nested windows around the tool.
+/// Level `elastic`: equilibrium on nested windows around the tool.
 struct ElasticSettings {
     double spacing = 2e-3;  // of the finest window [m]; each window further out is twice as coarse
     int window = 13;        // nodes along each side of a window: odd, 9 to 41
-    int cycles = 2;         // relaxation cycles per tick, at most
+    int cycles = 2;         // of the solver per tick, at most
     Strain strain = Strain::finite;
     double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-], 0 to 0.499
-    double viscosity = 0;      // Kelvin-Voigt: time that a strain lags behind its stress [s]; 0 = none
     double friction = 0;       // of sphere and capsule on tissue (Coulomb) [-]
 
     bool operator==(const ElasticSettings&) const = default;
@@ -92,6 +91,7 @@ struct ModelSettings {
     double spacing = 2e-3;            // of the ChainMail lattice [m]; widened when the body would need over maxNodes
     std::uint32_t maxMoves = 5000;    // node moves per tick; what is left over is reported as residual
     double stiffness = 0;             // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact
+    bool relaxation = false;          // stress that is held falls by the tissue table's Prony series; not at level `spring`
     std::string setting = "default";  // of level `elastic`: the one that `elastic` started from, see elasticSettings()
     bool settingNamed = false;        // the scene's text names a setting, or spacing, window or cycles of its own
     ElasticSettings elastic;

@@ -33,18 +33,18 @@ constexpr std::array<Field<ToolSpec>, 8> toolFields{{
     {"bevel_turn_deg", "deg", -360, 360, degree, &ToolSpec::bevelTurn},
 }};
 
-constexpr std::array<Field<ModelSettings>, 3> modelFields{{
+constexpr std::array<Field<ModelSettings>, 4> modelFields{{
     {"spacing_mm", "mm", 0.2, 20, 1e-3, &ModelSettings::spacing},
     {"max_moves", "", 1, 1e6, 1, &ModelSettings::maxMoves},
     {"stiffness_n_m", "N/m", 0, 10000, 1, &ModelSettings::stiffness},
+    {"relaxation", "", 0, 0, 1, &ModelSettings::relaxation},
 }};
 
-constexpr std::array<Field<ElasticSettings>, 6> elasticFields{{
+constexpr std::array<Field<ElasticSettings>, 5> elasticFields{{
     {"spacing_mm", "mm", 0.2, 20, 1e-3, &ElasticSettings::spacing},
     {"window", "", 9, 41, 1, &ElasticSettings::window},
     {"cycles", "", 1, 100, 1, &ElasticSettings::cycles},
     {"poisson_cap", "", 0, 0.499, 1, &ElasticSettings::poissonCap},
-    {"viscosity_ms", "ms", 0, 1000, 1e-3, &ElasticSettings::viscosity},
     {"friction", "", 0, 5, 1, &ElasticSettings::friction},
 }};
 

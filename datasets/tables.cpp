@@ -20,12 +20,16 @@ using volume::TissueTable;
 
 constexpr std::size_t mostTissues = 64;  // what a sample of tissue has room for
 constexpr double softest = 0.01;         // [kPa]; anything that is not air resists
+constexpr double mostRelaxing = 0.95;    // of the stress right after a step
 
 // These may be left out: they are there where somebody measured them.
-constexpr std::array<Field<TissueRow>, 3> measuredFields{{
+constexpr std::array<Field<TissueRow>, 6> measuredFields{{
     {"stiffening", "", -0.25, 1000, 1, &TissueRow::stiffening},
     {"stiction_n_per_m", "N/m", 0, 10000, 1, &TissueRow::stictionPerMetre},
     {"friction_ns_m2", "N s/m2", 0, 10000, 1, &TissueRow::frictionDamping},
+    {"relaxing_fast", "", 0, 0.95, 1, &TissueRow::relaxingFast},
+    {"relaxing_slow", "", 0, 0.95, 1, &TissueRow::relaxingSlow},
+    {"relaxation_source", "", 0, 0, 1, &TissueRow::relaxationSource},
 }};
 
 constexpr std::array<Field<TissueRow>, 12> tissueFields{{
@@ -101,6 +105,11 @@ std::pair<std::string_view, std::string> misfit(const TissueRow& row)
     if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
         return {"youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest)};
     }
+    if (row.relaxingFast + row.relaxingSlow > mostRelaxing) {
+        return {"relaxing_slow", fmt::format("must not be over {:g} together with relaxing_fast: a solid keeps some of its "
+                                             "stress",
+                                             mostRelaxing)};
+    }
     if (row.cuttingForce > row.punctureForce) {
         return {"cutting_n", "must not be over puncture_n: the force drops after the puncture"};
     }
@@ -123,7 +132,10 @@ TissueRow readTissue(Section& section)
     readAcoustics(section, row.acoustics);
     section.finish();
     if (const auto [key, why] = misfit(row); !key.empty()) {
-        section.refuse(key, why, key == "cutting_n" ? "N" : "kPa");
+        section.refuse(key, why, key == "cutting_n" ? "N" : key == "youngs_kpa" ? "kPa" : "");
+    }
+    if (row.relaxation().any() && row.relaxationSource.empty()) {
+        section.missing("relaxation_source", "where relaxing_fast and relaxing_slow come from");
     }
     return row;
 }

@@ -37,7 +37,13 @@ LocalTissue tissueUnder(const SessionModel& model, const volume::Tissue::Reader&
     }
     const auto row = reader.tissue(point + 1e-3 * inward);
     const double nu = row != 0 ? model.tissue->table().rows[row].poissonRatio : 0.45;
-    return {std::sqrt(arithmetic / harmonic), nu};
+    return {std::sqrt(arithmetic / harmonic) * relaxationOf(model, row).instantaneous(), nu};
+}
+
+volume::Relaxation relaxationOf(const SessionModel& model, std::uint8_t row) noexcept
+{
+    const bool relaxes = model.scene.model.relaxation && model.scene.model.level != datasets::ModelLevel::spring;
+    return relaxes ? model.tissue->table().rows[row].relaxation() : volume::Relaxation{};
 }
 
 double DepthLaw::force(double depth) const noexcept

@@ -12,9 +12,12 @@ struct LocalTissue {
 
 /// Effective tissue under a contact at `point` [m]: Young's modulus along `inward` to a depth of five radii (at least
 /// 10 mm), weighted as the stress under a punch falls off, 1 / (1 + (s / a)^2), and mixed as the root of arithmetic times
-/// harmonic mean.
+/// harmonic mean. Where tissue relaxes, the modulus right after a step.
 LocalTissue tissueUnder(const SessionModel& model, const volume::Tissue::Reader& reader, Vec3 point, Vec3 inward,
                         double radius) noexcept;
+
+/// How stress that is held falls in a tissue: by the table, or not at all where the scene's tissue does not relax.
+volume::Relaxation relaxationOf(const SessionModel& model, std::uint8_t row) noexcept;
 
 /// Force against depth of a tool in soft tissue, F(z) = k z + q z^2 [N], its slope never over `stiffest`.
 ///

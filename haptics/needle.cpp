@@ -39,6 +39,7 @@ struct ShaftHold {
     double stiction = 0;   // [N]
     double damping = 0;    // [N s/m]
     double stiffness = 0;  // [N/m]
+    volume::Relaxation relaxation;
 };
 
 struct Needle {
@@ -86,7 +87,7 @@ struct Needle {
 
     double cutOn(const DepthLaw& law, double ahead) noexcept
     {
-        const double force = law.force(ahead);
+        const double force = law.force(ahead) - state.tipLost.lost();
         const auto next = tissueLeft(tip.proxy + cutStep * tool.axis);
         const bool boundary = next != tip.tissue && next != 0;
         const double cutting = row(tip.tissue).cuttingForce;
@@ -97,6 +98,8 @@ struct Needle {
         const double step = boundary ? std::min(cutStep, ahead) : std::min(cutStep, ahead - law.depth(holds));
         const Vec3 from = tip.proxy;
         tip.proxy += step * tool.axis;
+        const double left = law.force(ahead - step);
+        state.tipLost.renew(boundary ? left : left - holds);
         cutPath(state.cuts, from, tip.proxy, model.scene.tool.radius);
         if (boundary) {
             tip.tissue = next;
@@ -152,7 +155,11 @@ struct Needle {
             hold.sliding += piece * tissue.frictionPerMetre;
             hold.stiction += piece * std::max(tissue.frictionPerMetre, tissue.stictionPerMetre);
             hold.damping += piece * tissue.frictionDamping;
-            modulus += model.youngsModulus.at(at) / shaftSamples;
+            const volume::Relaxation relaxation = relaxationOf(model, tissueLeft(at));
+            modulus += model.youngsModulus.at(at) * relaxation.instantaneous() / shaftSamples;
+            for (std::size_t term = 0; term < relaxation.weights.size(); ++term) {
+                hold.relaxation.weights[term] += relaxation.weights[term] / shaftSamples;
+            }
         }
         constexpr double nu = 0.49;
         const double length = shaftSamples * piece;
@@ -173,6 +180,7 @@ struct Needle {
         // Tissue that lets go takes its share of the force along; tissue that comes to it holds from where it is.
         if (hold.stiffness < state.shaftStiffness) {
             state.shaftForce *= hold.stiffness / state.shaftStiffness;
+            state.shaftLost.scale(hold.stiffness / state.shaftStiffness);
         }
         state.shaftStiffness = hold.stiffness;
         // A rupture drives the tissue back along the shaft, however slow the hand is.
@@ -185,14 +193,18 @@ struct Needle {
         }
         if (state.sliding == 0) {
             state.shaftForce += hold.stiffness * way;
-            if (std::abs(state.shaftForce) > hold.stiction) {
-                state.sliding = state.shaftForce > 0.0 ? 1 : -1;
+            const double held = state.shaftForce - state.shaftLost.lost();
+            if (std::abs(held) > hold.stiction) {
+                state.sliding = held > 0.0 ? 1 : -1;
             }
         }
         if (state.sliding != 0) {
             state.shaftForce = state.sliding * hold.sliding + hold.damping * state.speed;
+            state.shaftLost = {};
         }
-        return -state.shaftForce;
+        const double force = state.shaftForce - state.shaftLost.lost();
+        state.shaftLost.hold(state.shaftForce, hold.relaxation, dt);
+        return -force;
     }
 };
 
@@ -202,7 +214,7 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
 {
     NeedleState& needle = tip.needle;
     tip.phase = Phase::inserted;
-    needle = NeedleState{.entry = tip.proxy, .cuts = needle.cuts};
+    needle = NeedleState{.entry = tip.proxy, .tipLost = std::exchange(tip.lost, {}), .cuts = needle.cuts};
     needle.depth = glm::dot(tool.position - tip.proxy, tool.axis);
     const Vec3 other = std::abs(tool.axis.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
     const Vec3 right = glm::normalize(glm::cross(tool.axis, other));
@@ -225,7 +237,10 @@ Vec3 moveNeedle(const SessionModel& model, const volume::Tissue::Reader& reader,
     if (state.inserted < 0.0) {
         return Vec3(0.0);
     }
-    return (needle.shaftFriction(advance) - law.force(ahead)) * tool.axis + sideways;
+    const double pushed = law.force(ahead);
+    const double atTip = std::max(pushed - state.tipLost.lost(), 0.0);
+    state.tipLost.hold(pushed, relaxationOf(model, tip.tissue), dt);
+    return (needle.shaftFriction(advance) - atTip) * tool.axis + sideways;
 }
 
 DeviceSample bentTool(const DeviceSample& device, const NeedleState& needle) noexcept

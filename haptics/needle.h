@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/cuts.h>
+#include <haptics/relaxing_force.h>
 #include <haptics/session_model.h>
 #include <haptics/tick.h>
 
@@ -10,16 +11,18 @@ struct TipState;
 
 /// A needle that is inside, and what needles have left behind.
 struct NeedleState {
-    Vec3 entry{0.0};            // where it went in, at rest [m]
-    double inserted = 0;        // length of the shaft inside, at rest [m]
-    double depth = 0;           // of the tool's tip from `entry` along the needle, in the tick before [m]
-    double speed = 0;           // of the shaft along the needle, low-passed [m/s]
-    double shaftForce = 0;      // of the shaft on the tissue around it, along the needle [N]
-    double shaftStiffness = 0;  // of that tissue [N/m]
-    double sideStiffness = 0;   // and sideways [N/m]
-    int sliding = 0;            // the way the shaft slides along the needle; 0: it sticks
-    double curvature = 0;       // of a bevelled needle's path [1/m]
-    Vec3 bendsTo{0.0};          // unit vector across the needle
+    Vec3 entry{0.0};               // where it went in, at rest [m]
+    double inserted = 0;           // length of the shaft inside, at rest [m]
+    double depth = 0;              // of the tool's tip from `entry` along the needle, in the tick before [m]
+    double speed = 0;              // of the shaft along the needle, low-passed [m/s]
+    double shaftForce = 0;         // of the shaft on the tissue around it, along the needle [N]
+    double shaftStiffness = 0;     // of that tissue [N/m]
+    double sideStiffness = 0;      // and sideways [N/m]
+    RelaxingForce tipLost = {};    // of the force at the tip
+    RelaxingForce shaftLost = {};  // and of `shaftForce`
+    int sliding = 0;               // the way the shaft slides along the needle; 0: it sticks
+    double curvature = 0;          // of a bevelled needle's path [1/m]
+    Vec3 bendsTo{0.0};             // unit vector across the needle
     Cuts cuts;
 
     /// How far the tissue is carried along with the shaft [m].
@@ -41,6 +44,9 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
 /// tissue's stiffness, 2 pi G L / ln(2.5 L (1 - nu) / r) (Randolph and Wroth, "Analysis of deformation of vertically loaded
 /// piles", 1978), and breaks loose at the stiction of its inserted length; then it slides at its friction, until it is
 /// slower than the window or turns round. When the tissue that holds it changes, the stored energy never grows.
+///
+/// Where the scene's tissue relaxes, what tip and shaft hold falls by its Prony series. Tissue that is cut or slides is new
+/// to the needle: it has not relaxed, and gives the table's forces.
 Vec3 moveNeedle(const SessionModel& model, const volume::Tissue::Reader& reader, const DeviceSample& tool, double dt,
                 TipState& tip, TickRecord& record) noexcept;
 

@@ -75,6 +75,9 @@ std::string modelHash(const SessionModel& model)
         hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
                             row.cuttingForce, row.frictionPerMetre, row.stictionPerMetre, row.frictionDamping,
                             row.fixed ? 1.0 : 0.0, row.stiffening});
+        if (model.scene.model.relaxation) {
+            hash.add(row.relaxation().weights);
+        }
     }
     hash.add(model.tissue->affine());
     for (const auto& s : model.tissue->structures()) {

@@ -80,7 +80,7 @@ chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settin
     options.window = settings.window;
     options.cycles = static_cast<int>(std::lround(settings.cycles * std::max(1.0, period / tickSeconds)));
     options.finiteStrain = settings.strain == datasets::Strain::finite;
-    options.viscosity = settings.viscosity / period;
+    options.period = period;
     return options;
 }
 
@@ -185,6 +185,8 @@ void Simulation::stepDownIfAsked() noexcept
         level_ = datasets::ModelLevel::spring;
     } else if (stepsDown_ + 1 == static_cast<int>(elastic_.size())) {
         level_ = datasets::ModelLevel::chainmail;
+    } else {
+        elastic_[1]->takeOver(*elastic_[0]);
     }
     ++stepsDown_;
     addEvent(record_, {EventKind::stepDown, 0xFF, 0, static_cast<double>(stepsDown_)});

@@ -25,7 +25,7 @@ struct SimulationOptions {
     std::optional<DeviceParameters> device;  // that the stabiliser keeps stable; none: the scene's
 };
 
-/// Windows, cycles, strain and viscosity of a tick of level `elastic`, by the scene's settings.
+/// Windows, cycles, strain and period of a tick of level `elastic`, by the scene's settings.
 /// @param settings  of the scene
 /// @param period  of a tick [s]; longer than the usual one it has time for more cycles
 chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settings, double period = tickSeconds) noexcept;

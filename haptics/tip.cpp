@@ -22,6 +22,7 @@ struct Tip {
     const volume::Tissue::Reader& reader;
     const occupancy::Body& body;
     const DeviceSample& device;
+    double dt;
     TipState& state;
     TickRecord& record;
 
@@ -34,6 +35,7 @@ struct Tip {
     {
         state.phase = Phase::free;
         state.proxy = device.position;
+        state.lost = {};
         state.needle = NeedleState{.cuts = state.needle.cuts};
         addEvent(record, {EventKind::release, 0xFF, 0, 0.0});
     }
@@ -72,9 +74,11 @@ struct Tip {
         const Vec3 under = state.proxy - offset() * state.normal;
         const auto local = tissueUnder(model, reader, under, -state.normal, model.scene.tool.radius);
         const double way = glm::length(away);
-        const double force = needle() ? needleLaw(model, local).force(way) : sphereForce(model, local, way);
+        const double law = needle() ? needleLaw(model, local).force(way) : sphereForce(model, local, way);
+        const double force = std::max(law - state.lost.lost(), 0.0);
         const Vec3 push = -force / way * away;
         state.tissue = reader.tissue(under - 0.5e-3 * state.normal);
+        state.lost.hold(law, relaxationOf(model, state.tissue), dt);
         const double along = -glm::dot(push, device.axis);
         if (!needle() || along <= 0.0 || glm::dot(device.axis, state.normal) > -0.2) {
             return push;
@@ -97,7 +101,7 @@ struct Tip {
 Vec3 moveTip(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
              const DeviceSample& tool, const occupancy::Sweep& way, double dt, TipState& state, TickRecord& record) noexcept
 {
-    Tip tip{model, reader, body, tool, state, record};
+    Tip tip{model, reader, body, tool, dt, state, record};
     if (state.phase == Phase::free) {
         tip.seekContact(way);
     }

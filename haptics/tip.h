@@ -16,6 +16,7 @@ struct TipState {
     Vec3 proxy{0.0};          // at rest; while free: the tip itself [m]
     Vec3 normal{0.0};         // out of the body at the proxy, while in contact
     std::uint8_t tissue = 0;  // row at the proxy
+    RelaxingForce lost;       // of the force while in contact
     NeedleState needle;       // while inserted; its cuts stay
 };
 

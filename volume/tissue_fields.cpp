@@ -151,11 +151,15 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
     } free, held;
     double poisson = 0.0;
     double stiffening = 0.0;
+    std::array<double, relaxationTerms> relaxing{};
     sampler.visit(n, [&](std::uint16_t label, double weight, double scale) {
         if (const TissueRow* row = rows[label]) {
             (row->fixed ? held : free).add(weight, row->youngsModulus * scale);
             poisson += weight * row->poissonRatio;
             stiffening += weight * row->stiffening;
+            for (std::size_t i = 0; i < relaxing.size() && !row->fixed; ++i) {
+                relaxing[i] += weight * row->relaxation().weights[i];
+            }
         }
     });
     const double tissue = free.share + held.share;
@@ -164,8 +168,15 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
     }
     const double rigid = held.share > 0.0 ? held.mean() : std::numeric_limits<double>::infinity();
     const double modulus = free.share > 0.0 ? std::min(free.mean() * tissue / free.share, rigid) : rigid;
-    return {static_cast<float>(tissue * modulus), static_cast<float>(poisson / tissue),
-            static_cast<float>(held.share / tissue), static_cast<float>(stiffening / tissue)};
+    CellMaterial material{static_cast<float>(tissue * modulus),
+                          static_cast<float>(poisson / tissue),
+                          static_cast<float>(held.share / tissue),
+                          static_cast<float>(stiffening / tissue),
+                          {}};
+    for (std::size_t i = 0; i < relaxing.size() && free.share > 0.0; ++i) {
+        material.relaxing[i] = static_cast<float>(relaxing[i] / free.share);
+    }
+    return material;
 }
 
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)

@@ -100,6 +100,11 @@ json toJson(const TissueRow& row)
              {"colour", json::array({row.colour.r, row.colour.g, row.colour.b})},
              {"opacity", row.opacity},
              {"source", row.source}};
+    if (row.relaxation().any()) {
+        out["relaxing_fast"] = row.relaxingFast;
+        out["relaxing_slow"] = row.relaxingSlow;
+        out["relaxation_source"] = row.relaxationSource;
+    }
     if (row.acoustics.given()) {
         out["acoustics"] = toJson(row.acoustics);
     }
@@ -128,6 +133,9 @@ TissueRow rowFrom(const json& j)
     row.frictionPerMetre = j.at("friction_n_m").get<double>();
     row.stictionPerMetre = j.value("stiction_n_m", 0.0);
     row.frictionDamping = j.value("friction_ns_m2", 0.0);
+    row.relaxingFast = j.value("relaxing_fast", 0.0);
+    row.relaxingSlow = j.value("relaxing_slow", 0.0);
+    row.relaxationSource = j.value("relaxation_source", std::string());
     row.fixed = j.at("fixed").get<bool>();
     row.colour = {colour.at(0).get<float>(), colour.at(1).get<float>(), colour.at(2).get<float>()};
     row.opacity = j.at("opacity").get<float>();

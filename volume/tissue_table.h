@@ -1,5 +1,7 @@
 #pragma once
 
+#include <volume/relaxation.h>
+
 #include <glm/vec3.hpp>
 
 #include <array>
@@ -52,11 +54,17 @@ struct TissueRow {
     double stictionPerMetre =
         0;                       // at which a shaft that sticks breaks loose, per metre inside; less than friction: as that
     double frictionDamping = 0;  // grows the friction with the shaft's speed, per metre inside [N s/m^2]
+    double relaxingFast = 0;     // of the stress right after a step, gone within relaxationTimes[0] [-]
+    double relaxingSlow = 0;     // and within relaxationTimes[1] [-]
     bool fixed = false;          // held in space: bone, chest wall
     glm::vec3 colour{1.0F};      // display, RGB in [0, 1]
     float opacity = 0;           // display, in [0, 1]
     std::string source;          // where the numbers come from
-    Acoustics acoustics;         // for the ultrasound picture; forces do not depend on it
+    std::string relaxationSource;  // where relaxingFast and relaxingSlow come from
+    Acoustics acoustics;           // for the ultrasound picture; forces do not depend on it
+
+    /// How its stress falls while it is held.
+    Relaxation relaxation() const noexcept { return {{relaxingFast, relaxingSlow}}; }
 };
 
 /// Rows in order; row 0 is always "air", the outside.

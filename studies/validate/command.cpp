@@ -102,7 +102,7 @@ void Run::run(const std::string& name)
     } else if (name == "needle") {
         add(needleInLiver(data("needle_liver_human_curves.csv"), data("needle_liver_human_hold_relaxation.csv"), tell));
     } else if (name == "relaxation") {
-        add({kelvinVoigt(options.quick, tell)});
+        add(relaxation(options.quick, tell));
     } else if (name == "palpation") {
         add({palpationOrder(data("literature_facts_read.csv"), tell)});
     } else {

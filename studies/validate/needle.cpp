@@ -282,25 +282,30 @@ std::map<double, std::vector<double>> holdRatios(const std::filesystem::path& fi
     return ratios;
 }
 
-Experiment holdExperiment(const NeedleStroke& ours, const std::vector<double>& heldAt, const std::filesystem::path& file)
+// Mean of the curves.
+volume::Relaxation heldRelaxation(const std::filesystem::path& file)
+{
+    std::vector<double> seconds, means;
+    for (const auto& [at, ratios] : holdRatios(file, true)) {
+        seconds.push_back(at);
+        means.push_back(meanFrom(ratios, 0));
+    }
+    return fittedRelaxation(seconds, means);
+}
+
+Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fit, const std::vector<double>& heldAt,
+                          const std::filesystem::path& file)
 {
     Experiment e;
     e.name = "needle-hold";
     e.quantity = "held force over that at the start, largest difference at 1 and 10 s";
     e.source = source;
-    e.fittedOn = "nothing: the needle's law has no parameter for it";
+    e.fittedOn = "curves with even numbers: weights of the tissue's Prony series";
     e.predicted = "held force of the curves with odd numbers, 0.1 to 50 s";
     e.bound = 10.0;
-    const auto measured = holdRatios(file, false), fittedTo = holdRatios(file, true);
-    ValidateCurve mean{"measured, mean of held-back curves", {}, {}, false}, line{"predicted", {}, {}, true},
-        series{"two-term Prony series fitted on the others", {}, {}, true};
-    std::vector<double> fitSeconds, fitRatios;
-    for (const auto& [seconds, ratios] : fittedTo) {
-        fitSeconds.push_back(seconds);
-        fitRatios.push_back(meanFrom(ratios, 0));
-    }
-    const Prony prony = fittedProny(fitSeconds, fitRatios);
-    double pronyWorst = 0.0, spread = 0.0;
+    const auto measured = holdRatios(file, false);
+    ValidateCurve mean{"measured, mean of held-back curves", {}, {}, false}, line{"predicted", {}, {}, true};
+    double spread = 0.0;
     for (std::size_t i = 0; i < heldAt.size(); ++i) {
         const auto found = measured.find(heldAt[i]);
         if (found == measured.end()) {
@@ -310,7 +315,6 @@ Experiment holdExperiment(const NeedleStroke& ours, const std::vector<double>& h
         const double off = ours.held[i] / ours.held.front() - wanted;
         if (heldAt[i] == 1.0 || heldAt[i] == 10.0) {
             e.error = std::max(e.error, 1e2 * std::abs(off));
-            pronyWorst = std::max(pronyWorst, 1e2 * std::abs(prony.ratio(heldAt[i]) - wanted));
         }
         std::vector<double> apart;
         for (const double r : found->second) {
@@ -322,34 +326,31 @@ Experiment holdExperiment(const NeedleStroke& ours, const std::vector<double>& h
         mean.y.push_back(wanted);
         line.x.push_back(heldAt[i]);
         line.y.push_back(ours.held[i] / ours.held.front());
-        series.x.push_back(heldAt[i]);
-        series.y.push_back(prony.ratio(heldAt[i]));
     }
     e.scatter = spread;
-    e.parameters = {{"prony_fast", prony.fast},
-                    {"prony_fast_s", prony.fastTime},
-                    {"prony_slow", prony.slow},
-                    {"prony_slow_s", prony.slowTime},
-                    {"prony_worst_pct", pronyWorst}};
+    e.parameters = {{"relaxing_fast", fit.weights[0]}, {"relaxing_slow", fit.weights[1]}};
     e.note = fmt::format(
-        "the needle's law does not relax: what it holds stays. A series {:.2f} + {:.2f} exp(-t/{:.2g} s) + {:.2f} "
-        "exp(-t/{:.2g} s) fitted on the other curves would be off by {:.1f} points",
-        1.0 - prony.fast - prony.slow, prony.fast, prony.fastTime, prony.slow, prony.slowTime, pronyWorst);
-    e.picture = {"Held needle", "time after the stop [s]", "held force over that at the start [-]", {mean, line, series}};
+        "series {:.2f} + {:.2f} exp(-t / {:g} s) + {:.2f} exp(-t / {:g} s); friction in the guide and "
+        "tissue relax together in the curves",
+        1.0 - fit.weights[0] - fit.weights[1], fit.weights[0], volume::relaxationTimes[0], fit.weights[1],
+        volume::relaxationTimes[1]);
+    e.picture = {"Held needle", "time after the stop [s]", "held force over that at the start [-]", {mean, line}};
     e.judge();
     return e;
 }
 
-haptics::SessionModel liverBlock(double cutting)
+haptics::SessionModel liverBlock(double cutting, const volume::Relaxation& relaxation)
 {
     auto table = datasets::defaultTissues();
     auto& liver = table.rows[*table.find("liver")];
     liver.cuttingForce = cutting;
     liver.punctureForce = cutting;  // the curves show no capsule: the surface was not recorded
+    liver.relaxingFast = relaxation.weights[0];
+    liver.relaxingSlow = relaxation.weights[1];
     auto scene = datasets::parseScene(
         "name = \"liver\"\n[volume]\nphantom = \"block\"\nvoxel_mm = 2\n[volume.parameters]\ntissue = \"liver\"\ntumours = "
         "0\nwidth_mm = 80\nthickness_mm = 110\n[target]\nstructure = \"base\"\nentry_mm = [0, 0, 0]\naim_mm = [0, 112, "
-        "0]\n[dffb]\nmode = \"off\"\n[model]\nlevel = \"chainmail\"\n",
+        "0]\n[dffb]\nmode = \"off\"\n[model]\nlevel = \"chainmail\"\nrelaxation = true\n",
         "liver.toml");
     scene.tool.radius = needleRadius;
     scene.tool.notchRadius = std::min(scene.tool.notchRadius, 0.8 * needleRadius);
@@ -385,45 +386,31 @@ private:
 
 }  // namespace
 
-double Prony::ratio(double seconds) const noexcept
+volume::Relaxation fittedRelaxation(const std::vector<double>& seconds, const std::vector<double>& ratios)
 {
-    return 1.0 - fast * (1.0 - std::exp(-seconds / fastTime)) - slow * (1.0 - std::exp(-seconds / slowTime));
-}
-
-Prony fittedProny(const std::vector<double>& seconds, const std::vector<double>& ratios)
-{
-    Prony best;
-    double least = INFINITY;
-    for (double fast = 0.05; fast < 5.0; fast *= 1.1) {
-        for (double slow = 3.0 * fast; slow < 200.0; slow *= 1.1) {
-            double aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
-            for (std::size_t i = 0; i < seconds.size(); ++i) {
-                const double a = 1.0 - std::exp(-seconds[i] / fast), b = 1.0 - std::exp(-seconds[i] / slow);
-                const double y = 1.0 - ratios[i];
-                aa += a * a;
-                ab += a * b;
-                bb += b * b;
-                ay += a * y;
-                by += b * y;
-            }
-            const double determinant = aa * bb - ab * ab;
-            const Prony now{(ay * bb - by * ab) / determinant, (by * aa - ay * ab) / determinant, fast, slow};
-            double off = 0.0;
-            for (std::size_t i = 0; i < seconds.size(); ++i) {
-                off += std::pow(now.ratio(seconds[i]) - ratios[i], 2);
-            }
-            if (off < least && now.fast >= 0.0 && now.slow >= 0.0 && now.fast + now.slow <= 1.0) {
-                least = off;
-                best = now;
-            }
-        }
+    double aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
+    for (std::size_t i = 0; i < seconds.size(); ++i) {
+        const double a = -std::expm1(-seconds[i] / volume::relaxationTimes[0]);
+        const double b = -std::expm1(-seconds[i] / volume::relaxationTimes[1]);
+        const double y = 1.0 - ratios[i];
+        aa += a * a;
+        ab += a * b;
+        bb += b * b;
+        ay += a * y;
+        by += b * y;
     }
-    return best;
+    const double determinant = aa * bb - ab * ab;
+    const double fast = (ay * bb - by * ab) / determinant, slow = (by * aa - ay * ab) / determinant;
+    if (fast < 0.0) {
+        return {{0.0, std::max(by / bb, 0.0)}};
+    }
+    return slow < 0.0 ? volume::Relaxation{{std::max(ay / aa, 0.0), 0.0}} : volume::Relaxation{{fast, slow}};
 }
 
-NeedleStroke needleStroke(double cutting, double depth, const std::vector<double>& heldAt)
+NeedleStroke needleStroke(double cutting, double depth, const volume::Relaxation& relaxation,
+                          const std::vector<double>& heldAt)
 {
-    const haptics::SessionModel model = liverBlock(cutting);
+    const haptics::SessionModel model = liverBlock(cutting, relaxation);
     const auto methods = ourMethods();
     const StabilityMethod& method = *std::ranges::find(methods, datasets::ModelLevel::chainmail, &StabilityMethod::level);
     const MethodScene scene{model, haptics::deviceParameters(model.scene.device)};
@@ -482,7 +469,8 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     progress("needle");
     const std::vector<double> heldAt{0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0};
     const double surface = static_cast<double>(fit.surface) * strokeStep;
-    const NeedleStroke ours = needleStroke(fit.tip, travel - surface, heldAt);
+    const volume::Relaxation relaxation = heldRelaxation(hold);
+    const NeedleStroke ours = needleStroke(fit.tip, travel - surface, relaxation, heldAt);
     std::vector<double> tip, insertion;
     for (std::size_t i = 0; static_cast<double>(i + 1) * strokeStep < travel; ++i) {
         const std::size_t inside = i - fit.surface;
@@ -497,7 +485,7 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     }
     std::vector<Experiment> out{corridorExperiment("needle-tip", "tip force", tip, measuredTip),
                                 corridorExperiment("needle-insertion", "force on the way in", insertion, measuredIn),
-                                ruptureExperiment(ours, heldBack), holdExperiment(ours, heldAt, hold)};
+                                ruptureExperiment(ours, heldBack), holdExperiment(ours, relaxation, heldAt, hold)};
     out[0].fittedOn = "curves with even numbers: cutting force, and where the tissue begins";
     out[1].fittedOn =
         "curves with even numbers: the same, and the friction of guide and shaft: mean of the way out, bin by bin";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <studies/validate/experiment.h>
+#include <volume/relaxation.h>
 
 #include <filesystem>
 #include <vector>
@@ -18,17 +19,13 @@ inline constexpr double strokeStep = 2e-3;  // of depth [m]
 /// Our needle in a block of liver.
 /// @param cutting  force at its tip inside [N]
 /// @param depth    how far in [m]
+/// @param relaxation  of that liver
 /// @param heldAt   seconds after it stands
-NeedleStroke needleStroke(double cutting, double depth, const std::vector<double>& heldAt);
+NeedleStroke needleStroke(double cutting, double depth, const volume::Relaxation& relaxation,
+                          const std::vector<double>& heldAt);
 
-/// Shares of a force that relaxes, two times and what stays: ratio(t) = 1 - a - b + a exp(-t/s) + b exp(-t/l).
-struct Prony {
-    double fast = 0, slow = 0;          // a, b [-]
-    double fastTime = 1, slowTime = 1;  // s, l [s]
-    double ratio(double seconds) const noexcept;
-};
-/// The series nearest to these ratios, least squares over a grid of times.
-Prony fittedProny(const std::vector<double>& seconds, const std::vector<double>& ratios);
+/// The weights whose Prony series is nearest to these ratios G(t) / G(0), least squares; none is under 0.
+volume::Relaxation fittedRelaxation(const std::vector<double>& seconds, const std::vector<double>& ratios);
 
 /// A needle into human liver: tip force, force on the way in, ruptures, held force. Fitted on the curves with even numbers,
 /// compared with those with odd ones.

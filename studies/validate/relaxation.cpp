@@ -9,41 +9,45 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 
 namespace palpate::studies {
 
 namespace {
 
-constexpr double ballRadius = 5e-3;    // [m]
-constexpr double speed = 20e-3;        // [m/s]
-constexpr double viscousTime = 50e-3;  // [s]
-constexpr double hold = 50e-3;         // [s]
+constexpr double ballRadius = 5e-3;  // [m]
+constexpr double speed = 20e-3;      // [m/s]
+constexpr double depth = 4e-3;       // [m]
+constexpr double above = 0.5e-3;     // where the ball starts, over the tissue [m]
+constexpr double tick = 1e-3;        // [s]
+const char* const source = "closed form of a generalised Maxwell solid; no measurement";
 
-haptics::SessionModel blockWith(double viscosity)
+haptics::SessionModel blockOfLiver(bool relaxes)
 {
     auto scene = datasets::parseScene(
         fmt::format("name = \"relaxation\"\n[volume]\nphantom = \"block\"\nvoxel_mm = 2\n[volume.parameters]\ntumours = "
-                    "0\nwidth_mm = 48\nthickness_mm = 24\n[target]\nstructure = \"base\"\nentry_mm = [0, 0, 0]\naim_mm = "
-                    "[0, 24, 0]\n[dffb]\nmode = \"off\"\n[tool]\nkind = \"sphere\"\nradius_mm = 5\n[model.elastic]\n"
-                    "viscosity_ms = {:g}\n",
-                    1e3 * viscosity),
+                    "0\nwidth_mm = 48\nthickness_mm = 24\ntissue = \"liver\"\n[target]\nstructure = \"base\"\nentry_mm = "
+                    "[0, 0, 0]\naim_mm = [0, 24, 0]\n[dffb]\nmode = \"off\"\n[tool]\nkind = \"sphere\"\nradius_mm = 5\n"
+                    "[model]\nrelaxation = {}\n",
+                    relaxes),
         "relaxation.toml");
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
     return haptics::buildModel(std::move(scene), std::move(tissue));
 }
 
-// Force against the way in, tick by tick [N].
-std::vector<double> pressed(double viscosity, double depth)
+volume::Relaxation ofLiver(const haptics::SessionModel& model)
 {
-    const haptics::SessionModel model = blockWith(viscosity);
-    const double way = depth + 0.5e-3;
+    const auto& table = model.tissue->table();
+    return table.rows[*table.find("liver")].relaxation();
+}
+
+// A ball's force against the way in, tick by tick [N], led by depths [m] that are `apart` seconds from each other.
+std::vector<double> pressed(const haptics::SessionModel& model, const std::vector<double>& depths, double apart)
+{
     PosePath path{"relaxation", {}};
-    const auto at = [&](double y, double seconds) {
-        path.poses.push_back({Vec3(0, y - ballRadius, 0), Vec3(0, 1, 0), seconds});
-    };
-    at(-0.5e-3, 0.0);
-    at(depth, way / speed);
-    at(depth, way / speed + hold);
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+        path.poses.push_back({Vec3(0, depths[i] - ballRadius, 0), Vec3(0, 1, 0), static_cast<double>(i) * apart});
+    }
     PressOptions options;
     options.tool.kind = datasets::ToolKind::sphere;
     options.tool.radius = ballRadius;
@@ -53,57 +57,156 @@ std::vector<double> pressed(double viscosity, double depth)
     return force;
 }
 
-}  // namespace
-
-Experiment kelvinVoigt(bool quick, const ValidateProgress& progress)
+std::vector<double> pressAndHold(double hold)
 {
-    const double depth = quick ? 1.5e-3 : 4e-3;
-    progress("relaxation: without viscosity");
-    const std::vector<double> elastic = pressed(0.0, depth);
-    progress("relaxation: with viscosity");
-    const std::vector<double> viscous = pressed(viscousTime, depth);
-    Experiment e;
-    e.name = "relaxation-kelvin-voigt";
-    e.quantity = "force of a ball pressed in and held, RMS of the difference over the largest force";
-    e.source = "closed form of a Kelvin-Voigt solid, F = F_e + T dF_e/dt; no measurement";
-    e.fittedOn = "nothing";
-    e.predicted = fmt::format("force over time at T = {:g} ms, {:g} mm deep at {:g} mm/s, then held", 1e3 * viscousTime,
-                              1e3 * depth, 1e3 * speed);
-    e.bound = 5.0;
-    e.picture = {"A ball pressed in and held, viscous tissue", "time [ms]", "force [N]", {}};
-    ValidateCurve ours{"simulated", {}, {}, true}, wanted{"Kelvin-Voigt", {}, {}, true},
-        without{"without viscosity", {}, {}, true};
-    double largest = 0.0;
-    std::vector<double> errors;
-    constexpr std::size_t apart = 5;  // ticks of the difference quotient
-    for (std::size_t i = apart; i + apart < std::min(elastic.size(), viscous.size()); ++i) {
-        const double rate = (elastic[i] - elastic[i - apart]) / (1e-3 * apart);
-        const bool turns = std::abs(elastic[i + apart] - 2.0 * elastic[i] + elastic[i - apart]) >
-                           0.3 * std::abs(elastic[i] - elastic[i - apart]) + 1e-6;
-        const double exact = elastic[i] + viscousTime * rate;
-        largest = std::max(largest, exact);
-        if (!turns) {
-            errors.push_back(viscous[i] - exact);
-        }
-        const double now = static_cast<double>(i);
-        ours.x.push_back(now);
-        ours.y.push_back(viscous[i]);
-        wanted.x.push_back(now);
-        wanted.y.push_back(exact);
-        without.x.push_back(now);
-        without.y.push_back(elastic[i]);
+    std::vector<double> depths;
+    const auto ticks = static_cast<int>(std::lround(((depth + above) / speed + hold) / tick));
+    for (int i = 0; i <= ticks; ++i) {
+        depths.push_back(std::min(i * tick * speed - above, depth));
     }
+    return depths;
+}
+
+// Sum of G(t - s) dF(s), F the force right after a step: each term forgets at its own rate.
+std::vector<double> hereditary(const std::vector<double>& force, const volume::Relaxation& relaxation)
+{
+    std::vector<double> out;
+    std::array<double, volume::relaxationTerms> lost{};
+    for (std::size_t i = 0; i < force.size(); ++i) {
+        double left = force[i];
+        for (std::size_t term = 0; term < lost.size() && i > 0; ++term) {
+            const double share = -std::expm1(-tick / volume::relaxationTimes[term]);
+            const double mean = 0.5 * (force[i] + force[i - 1]);
+            lost[term] += share * (relaxation.weights[term] * mean - lost[term]);
+            left -= lost[term];
+        }
+        out.push_back(left);
+    }
+    return out;
+}
+
+Experiment held(bool quick, const ValidateProgress& progress)
+{
+    const haptics::SessionModel soft = blockOfLiver(false), model = blockOfLiver(true);
+    const volume::Relaxation relaxation = ofLiver(model);
+    const std::vector<double> depths = pressAndHold(quick ? 1.5 : 5.0);
+    progress("relaxation: without");
+    std::vector<double> elastic = pressed(soft, depths, tick);
+    for (double& force : elastic) {
+        force *= relaxation.instantaneous();
+    }
+    progress("relaxation: held");
+    const std::vector<double> ours = pressed(model, depths, tick);
+    const std::vector<double> exact = hereditary(elastic, relaxation);
+    Experiment e;
+    e.name = "relaxation-held";
+    e.quantity = "force of a ball pressed in and held, RMS of the difference over the largest force";
+    e.source = source;
+    e.fittedOn = "nothing";
+    e.predicted = fmt::format("force over time, liver, {:g} mm deep at {:g} mm/s, then held", 1e3 * depth, 1e3 * speed);
+    e.bound = 5.0;
+    e.picture = {"A ball pressed in and held, tissue that relaxes", "time [s]", "force [N]", {}};
+    ValidateCurve simulated{"simulated", {}, {}, true}, wanted{"hereditary integral", {}, {}, true};
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < std::min(ours.size(), exact.size()); ++i) {
+        errors.push_back(ours[i] - exact[i]);
+        for (const auto& [curve, force] : {std::pair(&simulated, ours[i]), std::pair(&wanted, exact[i])}) {
+            curve->x.push_back(static_cast<double>(i) * tick);
+            curve->y.push_back(force);
+        }
+    }
+    const double largest = *std::ranges::max_element(exact);
     const ErrorSummary summary = summaryOf(errors);
     e.error = 1e2 * summary.rms / largest;
     e.worst = 1e2 * summary.worst / largest;
-    e.parameters = {{"peak_n", largest}, {"held_n", viscous.back()}, {"elastic_n", elastic.back()}};
-    e.note = fmt::format(
-        "held force over the peak {:.2f}, from the first moment on: Kelvin-Voigt has no slow relaxation, which tissue has "
-        "(needle-hold)",
-        viscous.back() / largest);
-    e.picture.curves = {ours, wanted, without};
+    e.parameters = {{"peak_n", largest}, {"held_n", ours.back()}, {"held_exact_n", exact.back()}};
+    e.note = fmt::format("held force over the peak {:.3f}, by the series {:.3f}",
+                         ours.back() / *std::ranges::max_element(ours), exact.back() / largest);
+    e.picture.curves = {simulated, wanted};
     e.judge();
     return e;
+}
+
+constexpr double swing = 0.2e-3;  // [m]
+constexpr int turns = 3;          // the last counts
+
+// Pressed in, then up and down about there.
+std::vector<double> swinging(double frequency)
+{
+    std::vector<double> depths = pressAndHold(0.0);
+    const auto ticks = static_cast<int>(std::lround(turns / frequency / tick));
+    for (int i = 1; i <= ticks; ++i) {
+        depths.push_back(depth - swing + swing * std::cos(2.0 * std::numbers::pi * frequency * i * tick));
+    }
+    return depths;
+}
+
+// Work of the last turn, as if the force at its end were that at its start: the mean still falls [J].
+double workOfLastTurn(const std::vector<double>& depths, const std::vector<double>& force, double frequency)
+{
+    const auto turn = static_cast<std::size_t>(std::lround(1.0 / frequency / tick));
+    const std::size_t first = depths.size() - 1 - turn;
+    const double drift = (force.back() - force[first]) / static_cast<double>(turn);
+    double work = 0.0;
+    for (std::size_t i = first + 1; i < depths.size(); ++i) {
+        const double mean = 0.5 * (force[i] + force[i - 1]) - drift * (static_cast<double>(i - first) - 0.5);
+        work += mean * (depths[i] - depths[i - 1]);
+    }
+    return work;
+}
+
+Experiment lost(bool quick, const ValidateProgress& progress)
+{
+    const haptics::SessionModel soft = blockOfLiver(false), model = blockOfLiver(true);
+    const volume::Relaxation relaxation = ofLiver(model);
+    Experiment e;
+    e.name = "relaxation-hysteresis";
+    e.quantity = "work lost in a turn of a ball that swings in tissue, largest difference over the closed form";
+    e.source = source;
+    e.fittedOn = "nothing";
+    e.predicted = fmt::format("work lost at several frequencies, liver, {:g} mm about a depth of {:g} mm", 1e3 * swing,
+                              1e3 * (depth - swing));
+    e.bound = 10.0;
+    ValidateCurve simulated{"simulated", {}, {}, false}, wanted{"closed form", {}, {}, true};
+    std::vector<double> errors;
+    for (const double frequency : quick ? std::vector{1.0, 3.0} : std::vector{0.3, 1.0, 3.0}) {
+        progress(fmt::format("relaxation: {:g} Hz", frequency));
+        const std::vector<double> depths = swinging(frequency);
+        const std::vector<double> elastic = pressed(soft, pressAndHold(0.0), tick);
+        const std::vector<double> force = pressed(model, depths, tick);
+        const double ours = workOfLastTurn(depths, force, frequency);
+        // F_e' about the middle of the swing.
+        const auto back = static_cast<std::size_t>(std::lround(2.0 * swing / speed / tick));
+        const std::size_t end = elastic.size() - 1;
+        const double slope = relaxation.instantaneous() * (elastic[end] - elastic[end - back]) / (2.0 * swing);
+        double share = 0.0;
+        for (std::size_t i = 0; i < relaxation.weights.size(); ++i) {
+            const double x = 2.0 * std::numbers::pi * frequency * volume::relaxationTimes[i];
+            share += relaxation.weights[i] * x / (1.0 + x * x);
+        }
+        const double exact = std::numbers::pi * swing * swing * slope * share;
+        errors.push_back(1e2 * (ours - exact) / exact);
+        e.parameters.emplace_back(fmt::format("lost_{:g}_hz_uj", frequency), 1e6 * ours);
+        e.parameters.emplace_back(fmt::format("exact_{:g}_hz_uj", frequency), 1e6 * exact);
+        simulated.x.push_back(frequency);
+        simulated.y.push_back(1e6 * ours);
+        wanted.x.push_back(frequency);
+        wanted.y.push_back(1e6 * exact);
+    }
+    const ErrorSummary summary = summaryOf(errors);
+    e.error = e.worst = summary.worst;
+    e.note = fmt::format("RMS {:.1f} %; what is lost has its largest value near {:.2g} Hz", summary.rms,
+                         1.0 / (2.0 * std::numbers::pi * volume::relaxationTimes.front()));
+    e.picture = {"Work that a swinging ball loses", "frequency [Hz]", "work of a turn [uJ]", {simulated, wanted}};
+    e.judge();
+    return e;
+}
+
+}  // namespace
+
+std::vector<Experiment> relaxation(bool quick, const ValidateProgress& progress)
+{
+    return {held(quick, progress), lost(quick, progress)};
 }
 
 }  // namespace palpate::studies

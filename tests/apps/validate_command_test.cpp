@@ -73,8 +73,8 @@ TEST(ValidateCommand, FolderHasAPageAndPictures)
     const Folder folder;
     const Outcome o = palpate({"validate", "beam", "relaxation", "--quick", "-o", folder / "v"});
     EXPECT_EQ(o.out.find("nan"), std::string::npos) << o.out;
-    for (const char* name :
-         {"validation.html", "validation.csv", "validation.json", "beam.png", "relaxation-kelvin-voigt.png"}) {
+    for (const char* name : {"validation.html", "validation.csv", "validation.json", "beam.png", "relaxation-held.png",
+                             "relaxation-hysteresis.png"}) {
         EXPECT_TRUE(std::filesystem::exists((folder / "v") / name)) << name << o.err;
     }
 }

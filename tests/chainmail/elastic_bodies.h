@@ -18,7 +18,7 @@ namespace palpate::tests {
 
 inline volume::CellMaterial tissue(double youngsModulus, double poissonRatio, bool fixed = false)
 {
-    return {static_cast<float>(youngsModulus), static_cast<float>(poissonRatio), fixed ? 1.0F : 0.0F};
+    return {static_cast<float>(youngsModulus), static_cast<float>(poissonRatio), fixed ? 1.0F : 0.0F, 0.0F, {}};
 }
 
 /// A block of tissue in air. Its surface towards the hand is y = low.y (frame LPS).
@@ -63,7 +63,7 @@ volume::DistanceField distanceOn(const volume::NodeGrid& grid, const Distance& d
     return field;
 }
 
-inline chainmail::ElasticBody bodyOf(const ElasticBlock& block, double poissonCap = 0.4999)
+inline chainmail::ElasticBody bodyOf(const ElasticBlock& block, double poissonCap = 0.4999, bool relaxes = false)
 {
     const double h = block.spacing;
     const volume::NodeGrid grid{block.cells + 2 * block.air, block.low + (0.5 - block.air) * h, h};
@@ -72,7 +72,7 @@ inline chainmail::ElasticBody bodyOf(const ElasticBlock& block, double poissonCa
                          [&](Index3 c) { materials[grid.offset(c + block.air)] = block.material(c); });
     const Vec3 high = block.low + h * Vec3(block.cells);
     const auto surface = distanceOn(grid, [&](Vec3 p) { return boxDistance(p, block.low, high); });
-    return chainmail::elasticBody(grid, std::move(materials), surface, poissonCap);
+    return chainmail::elasticBody(grid, std::move(materials), surface, poissonCap, 0.0, relaxes);
 }
 
 /// Windows around a point [m].

@@ -37,13 +37,12 @@ Scene fullScene(std::mt19937_64& random)
     scene.source.phantom.words = {{"tumour_kind", "ilc"}};
     scene.tool = {ToolKind::needle, draw(1e-3, 2e-3), draw(0.05, 0.2), draw(0.01, 0.03),
                   draw(0.01, 0.03), draw(2e-4, 8e-4), draw(1e-3, 8e-3)};
-    scene.model = {ModelLevel::elastic, draw(1e-3, 4e-3), 3000, draw(0, 1000), "fast", true, {}};
+    scene.model = {ModelLevel::elastic, draw(1e-3, 4e-3), 3000, draw(0, 1000), true, "fast", true, {}};
     scene.model.elastic = {.spacing = draw(1e-3, 4e-3),
                            .window = 9 + 2 * static_cast<int>(draw(0, 16.99)),
                            .cycles = static_cast<int>(draw(1, 9)),
                            .strain = Strain::finite,
                            .poissonCap = draw(0, 0.499),
-                           .viscosity = draw(0, 0.1),
                            .friction = draw(0, 1)};
     scene.dffb.mode = DffbMode::thesis;
     for (ForceTerm* term : {&scene.dffb.surgery, &scene.dffb.structure, &scene.dffb.tissue, &scene.dffb.task}) {
@@ -105,7 +104,7 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
         EXPECT_EQ(a.cycles, e.cycles);
         EXPECT_EQ(a.strain, Strain::finite);
         EXPECT_NEAR(a.poissonCap, e.poissonCap, 1e-12);
-        EXPECT_NEAR(a.viscosity, e.viscosity, 1e-12);
+        EXPECT_EQ(again.model.relaxation, scene.model.relaxation);
         EXPECT_NEAR(a.friction, e.friction, 1e-12);
         EXPECT_EQ(again.probe.kind, ProbeKind::curved);
         EXPECT_NEAR(again.probe.lateral.x, -0.8, 1e-12);
@@ -230,7 +229,7 @@ TEST(ElasticSetting, FromFastToFineNodesAreNearerAndWorkIsMore)
 
 TEST(ElasticSetting, KeepsWhatItsBaseSaysOfTheTissue)
 {
-    const ElasticSettings base{.strain = Strain::finite, .poissonCap = 0.4, .viscosity = 0.01, .friction = 0.3};
+    const ElasticSettings base{.strain = Strain::finite, .poissonCap = 0.4, .friction = 0.3};
     ElasticSettings expected = base;
     expected.spacing = elasticSetting("fine").spacing;
     expected.window = elasticSetting("fine").window;
@@ -250,10 +249,10 @@ TEST(ElasticSetting, IsReadByNameAndKeysBesideItWin)
 
         ElasticSettings expected = elasticSetting(name);
         expected.window = 21;
-        expected.viscosity = 5e-3;
+        expected.friction = 0.5;
         expected.strain = Strain::finite;
         const Scene changed =
-            parseScene(text + "[model.elastic]\nwindow = 21\nviscosity_ms = 5\nstrain = \"finite\"\n", origin);
+            parseScene(text + "[model.elastic]\nwindow = 21\nfriction = 0.5\nstrain = \"finite\"\n", origin);
         EXPECT_EQ(changed.model.elastic, expected);
         EXPECT_EQ(parseScene(sceneText(changed), origin).model.elastic, expected);
     }
@@ -313,8 +312,9 @@ TEST(Scene, EveryBrokenKeyIsNamedWithFileAndLine)
             continue;
         }
         const std::string key = lines[at].substr(0, equals), value = lines[at].substr(equals + 3);
-        const bool number = value[0] != '"' && value[0] != '[';
-        std::vector<std::string> changes{key + " = true", key + " = { a = 1 }", key + " = 1979-05-27",
+        const bool flag = value == "true" || value == "false";
+        const bool number = !flag && value[0] != '"' && value[0] != '[';
+        std::vector<std::string> changes{flag ? key + " = 2" : key + " = true", key + " = { a = 1 }", key + " = 1979-05-27",
                                          number ? key + " = \"text\"" : key + " = 3"};
         if (number) {
             changes.insert(changes.end(), {key + " = nan", key + " = -inf", key + " = 1e9", key + " = -1e9"});
@@ -373,8 +373,8 @@ TEST(Scene, ARangeErrorReadsAsPromised)
               "/data/scenes/full.toml:6: [model.elastic] window = 12: must be odd");
     EXPECT_EQ(errorOf(head + "[model.elastic]\npoisson_cap = 0.5\n"),
               "/data/scenes/full.toml:6: [model.elastic] poisson_cap = 0.5: must be 0 to 0.499");
-    EXPECT_EQ(errorOf(head + "[model.elastic]\nviscosity = 1\n"),
-              "/data/scenes/full.toml:6: [model.elastic] viscosity: unknown key; did you mean viscosity_ms?");
+    EXPECT_EQ(errorOf(head + "[model.elastic]\npoisson = 1\n"),
+              "/data/scenes/full.toml:6: [model.elastic] poisson: unknown key; did you mean poisson_cap?");
     EXPECT_EQ(errorOf(head + "[tool]\nlength_mm = 20\ntip_mm = 20\n"),
               "/data/scenes/full.toml:7: [tool] tip_mm = 20 mm: the tip must be shorter than the needle");
     EXPECT_NE(errorOf("[target]\nstructure = \"a\"\n").find("[volume] is missing"), std::string::npos);

@@ -175,6 +175,24 @@ TEST_F(TissueFile, ErrorsNameFileLineTissueKeyValueAndUnit)
     EXPECT_NE(errorOf(airRow + airRow).find("name = \"air\": is there twice"), std::string::npos);
     EXPECT_NE(errorOf(fat).find("the first tissue, and no other, must be \"air\""), std::string::npos);
     EXPECT_NE(errorOf("[[tissue]\n").find(":1: not TOML: "), std::string::npos);
+    const std::string relaxing = airRow + fat + "relaxing_fast = 0.5\n";
+    EXPECT_NE(errorOf(relaxing).find("tissue 'fat': relaxation_source is missing"), std::string::npos);
+    EXPECT_EQ(errorOf(relaxing + "relaxation_source = \"assumed\"\n"), "no error");
+    EXPECT_NE(errorOf(relaxing + "relaxing_slow = 0.5\nrelaxation_source = \"assumed\"\n")
+                  .find("relaxing_slow = 0.5: must not be over 0.95 together with relaxing_fast"),
+              std::string::npos);
+}
+
+// What relaxes says where its figures come from, and what is held in space does not.
+TEST(Tissues, WeightsOfRelaxationHaveASource)
+{
+    int count = 0;
+    for (const volume::TissueRow& row : defaultTissues().rows) {
+        count += row.relaxation().any() ? 1 : 0;
+        EXPECT_EQ(row.relaxation().any(), !row.relaxationSource.empty()) << row.name;
+        EXPECT_FALSE(row.relaxation().any() && row.fixed) << row.name;
+    }
+    EXPECT_GT(count, 10);
 }
 
 TEST(LabelMap, EveryTissueIsInTheBuiltInTable)

@@ -124,17 +124,37 @@ TEST(CellBody, ReactionsBalanceLoads)
     EXPECT_NEAR(sum.z, -0.03, 2e-5);
 }
 
-TEST(Prony, SeriesIsFoundAgain)
+TEST(FittedRelaxation, WeightsAreFoundAgain)
 {
-    const Prony wanted{0.35, 0.4, 0.6, 18.0};
-    std::vector<double> seconds, ratios;
-    for (double t = 0.1; t < 60.0; t *= 1.4) {
-        seconds.push_back(t);
-        ratios.push_back(wanted.ratio(t));
+    for (const volume::Relaxation& wanted :
+         {volume::Relaxation{{0.35, 0.4}}, volume::Relaxation{{0.0, 0.3}}, volume::Relaxation{{0.2, 0.0}}}) {
+        std::vector<double> seconds, ratios;
+        for (double t = 0.1; t < 60.0; t *= 1.4) {
+            seconds.push_back(t);
+            ratios.push_back(wanted.remaining(t));
+        }
+        const volume::Relaxation found = fittedRelaxation(seconds, ratios);
+        EXPECT_NEAR(found.weights[0], wanted.weights[0], 1e-9);
+        EXPECT_NEAR(found.weights[1], wanted.weights[1], 1e-9);
     }
-    const Prony found = fittedProny(seconds, ratios);
-    for (const double t : {0.2, 1.0, 10.0, 50.0}) {
-        EXPECT_NEAR(found.ratio(t), wanted.ratio(t), 0.005) << t;
+    // Ratios over 1 ask for a weight under 0.
+    EXPECT_EQ(fittedRelaxation({1.0, 10.0}, {1.1, 1.2}).weights, (std::array<double, 2>{0.0, 0.0}));
+}
+
+// A needle that stands keeps of its force what the series of the tissue says, tip and shaft alike.
+TEST(NeedleStroke, HeldForceFollowsTheTissuesSeries)
+{
+    const std::vector<double> at{0.0, 0.2, 1.0, 5.0};
+    const volume::Relaxation relaxation{{0.38, 0.4}};
+    const NeedleStroke stroke = needleStroke(0.3, 20e-3, relaxation, at);
+    const NeedleStroke stiff = needleStroke(0.3, 20e-3, {}, at);
+    for (std::size_t i = 0; i < at.size(); ++i) {
+        EXPECT_NEAR(stroke.held[i] / stroke.held[0], relaxation.remaining(at[i]), 0.02) << at[i];
+        EXPECT_NEAR(stiff.held[i] / stiff.held[0], 1.0, 0.02) << at[i];
+    }
+    // Tissue that is cut is new: the way in has the table's forces, a little earlier since new tissue gives way less.
+    for (std::size_t i = 3; i < stroke.in.size(); ++i) {
+        EXPECT_NEAR(stroke.in[i], stiff.in[i], 0.07 * stiff.in[i]) << i;
     }
 }
 
