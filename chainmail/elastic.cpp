@@ -58,23 +58,11 @@ Vec3 Elastic::displacement(Vec3 rest) const noexcept
     return site.level < stack_.size() ? gather(stack_.windows(), site, Field::u) : Vec3(0.0);
 }
 
-// As displacement(): the middle of a cell lies at (2 m + 1) / 2^(level + 1) of a cell of a coarser level, m a whole number.
 Vec3 Elastic::displacementOf(Index3 cell) const noexcept
 {
-    const auto windows = stack_.windows();
-    for (std::size_t l = 0; l < windows.size(); ++l) {
-        const int scale = 1 << l;
-        const Index3 low = cell / scale;
-        if (!windows[l].contains(low) || !windows[l].contains(low + 1)) {
-            continue;
-        }
-        ContactSite site;
-        site.share = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
-        site.node = static_cast<std::uint32_t>(windows[l].at(low));
-        site.level = static_cast<std::uint16_t>(l);
-        return gather(windows, site, Field::u);
-    }
-    return Vec3(0.0);
+    ContactSite site;
+    locateMiddle(stack_.windows(), cell, site);
+    return site.level < stack_.size() ? gather(stack_.windows(), site, Field::u) : Vec3(0.0);
 }
 
 void Elastic::settle() noexcept

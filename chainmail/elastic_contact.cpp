@@ -150,6 +150,21 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
     site.level = static_cast<std::uint16_t>(windows.size());
 }
 
+void locateMiddle(std::span<const Window> windows, Index3 cell, ContactSite& site) noexcept
+{
+    for (std::size_t l = 0; l < windows.size(); ++l) {
+        const int scale = 1 << l;
+        const Index3 low = cell / scale;
+        if (windows[l].contains(low) && windows[l].contains(low + 1)) {
+            site.share = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
+            site.node = static_cast<std::uint32_t>(windows[l].at(low));
+            site.level = static_cast<std::uint16_t>(l);
+            return;
+        }
+    }
+    site.level = static_cast<std::uint16_t>(windows.size());
+}
+
 double AreaRatio::operator()(const ContactSite& site) noexcept
 {
     if (site.node != node_ || site.level != level_) {

@@ -304,9 +304,8 @@ bool ElasticLevel::findLongLinks(Index3 low, Index3 high) noexcept
         around = around || isLong;
     });
     bool any = false;
-    volume::forEachIndex(low, Index3(low.x, around ? high.y : low.y - 1, high.z), [&](Index3 at) {
-        any = any || longestLink(u + 3 * grid.offset(at), count, row, plane) > third;
-    });
+    volume::forEachIndex(low, Index3(low.x, around ? high.y : low.y - 1, high.z),
+                         [&](Index3 at) { any = any || longestLink(u + 3 * grid.offset(at), count, row, plane) > third; });
     return any;
 }
 

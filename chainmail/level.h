@@ -123,8 +123,9 @@ private:
     std::vector<Vec3f> before_;                      // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;
     std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
-    std::vector<std::uint8_t> longRows_;  // not 0 for rows of a box in which a link begins that is shifted so, to tissue or not
-    std::vector<Index3> turns_;           // by level: where its turn is
+    std::vector<std::uint8_t>
+        longRows_;               // not 0 for rows of a box in which a link begins that is shifted so, to tissue or not
+    std::vector<Index3> turns_;  // by level: where its turn is
     std::size_t revisited_ = 0;
     ElasticResult last_;
 };

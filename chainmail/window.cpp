@@ -166,8 +166,8 @@ void restrictAdd(const Kernels& k, const Window& fine, const float* from, const 
                 const float* after = y + 1 < l.ny ? sum + l.at(0, y + 1, 0) : zeros;
                 k.hat(before, sum + l.at(0, y, 0), after, rows + l.at(0, y / 2, 0), l.row);
             }
-            // Apart from the loop above: what has just been stored cannot be loaded a lane further at once. A row's padding is
-            // zero, so that it is what lies before the next one's first node.
+            // Apart from the loop above: what has just been stored cannot be loaded a lane further at once. A row's padding
+            // is zero, so that it is what lies before the next one's first node.
             for (int y = 0; y < l.ny; y += 2) {
                 k.gatherAdd(rows + l.at(0, y / 2, 0), l.nx, target + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2));
             }

@@ -62,14 +62,14 @@ private:
     void unlink(Element e) noexcept;
     void link(Element e, std::uint32_t cell) noexcept;
 
-    volume::NodeGrid grid_;            // of the elements
-    volume::NodeGrid cells_;           // node = middle of a cell; a margin wider than the lattice
-    float nearHome_;                   // a little under half a spacing [m]
-    std::vector<Element> head_;        // first element of each cell   (cells x 1)
-    std::vector<Element> next_;        // the one behind it            (elements x 1)
-    std::vector<Element> previous_;    // the one before it            (elements x 1)
-    std::vector<std::uint32_t> cell_;  // the cell of each element     (elements x 1)
-    std::vector<std::uint8_t> isHome_; // not 0 where that is its node's (elements x 1)
+    volume::NodeGrid grid_;             // of the elements
+    volume::NodeGrid cells_;            // node = middle of a cell; a margin wider than the lattice
+    float nearHome_;                    // a little under half a spacing [m]
+    std::vector<Element> head_;         // first element of each cell   (cells x 1)
+    std::vector<Element> next_;         // the one behind it            (elements x 1)
+    std::vector<Element> previous_;     // the one before it            (elements x 1)
+    std::vector<std::uint32_t> cell_;   // the cell of each element     (elements x 1)
+    std::vector<std::uint8_t> isHome_;  // not 0 where that is its node's (elements x 1)
     std::uint64_t rewrites_ = 0;
 };
 
