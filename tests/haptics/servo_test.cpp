@@ -75,7 +75,8 @@ TEST(Servo, GapIsCountedAndNotMadeUp)
     EXPECT_GE(stale, 45);
 }
 
-// Two gaps of 20 and 40 ms, far from each other, and three ticks that take 3 ms each.
+// Two gaps of 20 and 40 ms, far from each other, and three ticks that take 3 ms each. At level spring, which most machines
+// compute in time; where more is missed, a gap may join the next.
 TEST(Servo, GapsAndOverrunsAreCounted)
 {
     struct Slow final : Device {
@@ -88,16 +89,20 @@ TEST(Servo, GapsAndOverrunsAreCounted)
         bool finished() const noexcept override { return tick >= 300; }
         int tick = 0;
     } device;
-    Simulation simulation(tests::blockSphere());
+    const SessionModel model = tests::modelOf(tests::blockScene + "[model]\nlevel = \"spring\"\n");
+    Simulation simulation(model);
     const auto sink = [&](const TickRecord& r, const ServoTiming&) {
         std::this_thread::sleep_for(std::chrono::milliseconds(r.tick == 50 ? 20 : r.tick == 120 ? 40 : 0));
     };
     const std::atomic<bool> stop{false};
     const auto timing = runServo(device, simulation, {true, 0.0}, sink, stop);
     EXPECT_GE(timing.overruns, 3U);
-    EXPECT_GE(timing.gaps, 5U);
+    constexpr std::uint64_t made = 19 + 39 + 3 * 3, between = 20 - 4;  // periods missed here; fewest from one gap to the next
+    EXPECT_GE(timing.missed, made);
     EXPECT_GE(timing.longestGap, 39U);
-    EXPECT_GE(timing.missed, 19U + 39U + 3U * 3U);
+    if (timing.missed < made + between) {
+        EXPECT_GE(timing.gaps, 5U);
+    }
     EXPECT_LE(timing.gaps, timing.missed);
     EXPECT_LE(timing.longestGap, timing.missed);
 }
