@@ -97,7 +97,8 @@ TEST(Servo, GapsAndOverrunsAreCounted)
     const std::atomic<bool> stop{false};
     const auto timing = runServo(device, simulation, {true, 0.0}, sink, stop);
     EXPECT_GE(timing.overruns, 3U);
-    constexpr std::uint64_t made = 19 + 39 + 3 * 3, between = 20 - 4;  // periods missed here; fewest from one gap to the next
+    constexpr std::uint64_t made = 19 + 39 + 3 * 3,
+                            between = 20 - 4;  // periods missed here; fewest from one gap to the next
     EXPECT_GE(timing.missed, made);
     EXPECT_GE(timing.longestGap, 39U);
     if (timing.missed < made + between) {
