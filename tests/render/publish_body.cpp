@@ -1,4 +1,5 @@
-// Publishes the made-up body: publish_body SESSION play | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not shipped.
+// Publishes the made-up body: publish_body SESSION play [FILE] | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not shipped.
+// The story begins when FILE is there: a viewer may take longer to start than the story lasts.
 #include <channel/channel.h>
 #include <tests/render/body.h>
 
@@ -6,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <string>
 #include <thread>
 
@@ -13,12 +15,18 @@ namespace {
 
 using namespace palpate;
 
-void publish(const std::string& session, const std::string& mode, double argument)
+void publish(const std::string& session, const std::string& mode, const std::string& word)
 {
+    const double argument = mode == "play" ? 0 : std::atof(word.c_str());
     const bool wave = mode == "wave";
     const int voxels = wave ? static_cast<int>(argument) : 104;
     const channel::Scenery scenery = render::bodyScenery(voxels, 0.104 / voxels);
     channel::Publisher publisher(session, scenery, render::bodyLabels(scenery));
+    if (mode == "play" && !word.empty()) {
+        publisher.setState(render::storyState(scenery, 0));
+        while (!std::filesystem::exists(word))
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
     const auto start = std::chrono::steady_clock::now();
     for (std::uint64_t tick = 1;; ++tick) {
         const double t = 1e-3 * static_cast<double>(tick);
@@ -48,7 +56,7 @@ int main(int argc, char** argv)
     if (argc < 3)
         return 2;
     try {
-        publish(argv[1], argv[2], argc > 3 ? std::atof(argv[3]) : 0);
+        publish(argv[1], argv[2], argc > 3 ? argv[3] : "");
         return 0;
     } catch (const std::exception& e) {
         std::fprintf(stderr, "publish_body: %s\n", e.what());

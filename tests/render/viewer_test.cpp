@@ -103,7 +103,7 @@ protected:
     }
 
     static std::string program() { return std::string(PALPATE_BIN_DIR) + "/palpate-view"; }
-    std::vector<std::string> publish(const std::string& mode, const std::string& argument = "0") const
+    std::vector<std::string> publish(const std::string& mode, const std::string& argument = {}) const
     {
         return {PUBLISH_BODY, session_, mode, argument};
     }
@@ -225,10 +225,9 @@ TEST_F(Viewer, ShowsTheDimpleAndTheNeedleWhereTheyAre)
 
 TEST_F(Viewer, WritesAPictureOfEveryEventAndEndsWithTheSession)
 {
+    Process publisher(publish("play", pictures() + "/frame_00000.png"), log("publisher"));
     Process viewer(view({"--every", "1"}), log("viewer"));
-    ASSERT_TRUE(waitFor(".")) << said("viewer");
-    Process publisher(publish("play"), log("publisher"));
-    EXPECT_EQ(viewer.wait(), 0) << said("viewer");
+    ASSERT_EQ(viewer.wait(), 0) << said("viewer");
     EXPECT_EQ(publisher.wait(), 0) << said("publisher");
     for (const char* name : {"frame_00000.png", "frame_00002.png", "000_contact.png", "001_inserted.png",
                              "002_near_artery.png", "003_fired.png", "004_finished.png"})
