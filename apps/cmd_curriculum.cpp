@@ -142,10 +142,10 @@ void next(const Options& o)
     }
 }
 
-double quantile(std::vector<int> values, double share)
+double quantile(std::vector<int> values, double fraction)
 {
     std::ranges::sort(values);
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+    return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
 }
 
 void simulate(const Options& o)

@@ -157,9 +157,9 @@ nlohmann::json pushOnce(const DevicesOptions& o)
             {"words", falcon::inWords(test)}};
 }
 
-double atShare(const std::vector<double>& sorted, double share)
+double atShare(const std::vector<double>& sorted, double fraction)
 {
-    const auto i = static_cast<std::size_t>(share * static_cast<double>(sorted.size()));
+    const auto i = static_cast<std::size_t>(fraction * static_cast<double>(sorted.size()));
     return sorted[std::min(i, sorted.size() - 1)];
 }
 

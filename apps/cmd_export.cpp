@@ -169,7 +169,7 @@ std::string exportState(const Options& o, const volume::ExportOptions& how, comm
                         nlohmann::json& figures)
 {
     const session::DeformedState state(o.record, timeFrom(o.at),
-                                       [&](double share) { progress.show("computing the session again", share); });
+                                       [&](double fraction) { progress.show("computing the session again", fraction); });
     const auto& lattice = state.model().lattice;
     if (o.what == "labels") {
         volume::exportLabels(o.output, state.labels(), namesOf(*state.model().tissue), how);
@@ -196,17 +196,17 @@ void runExport(Options o)
     progress.show("reading");
     volume::ExportOptions how;
     how.nifti2 = o.nifti2;
-    how.progress = [&](double share) { progress.show("writing", share); };
+    how.progress = [&](double fraction) { progress.show("writing", fraction); };
     nlohmann::json figures{{"file", o.output.string()}, {"what", o.what}};
     std::string more;
     if (o.record.empty()) {
         exportVolume(o, how);
     } else if (o.what == "ultrasound") {
         more = exportUltrasound({o.output, o.record, o.like.empty() ? timeFrom(o.at) : 0.0, o.like, o.width, o.height},
-                                [&](double share) { progress.show("computing the session again", share); });
+                                [&](double fraction) { progress.show("computing the session again", fraction); });
     } else if (o.what == "ct") {
         more = exportCt({o.output, o.record, timeFrom(o.at), o.window, o.height},
-                        [&](double share) { progress.show("computing the session again", share); });
+                        [&](double fraction) { progress.show("computing the session again", fraction); });
     } else {
         more = exportState(o, how, progress, figures);
     }

@@ -74,8 +74,8 @@ void runImport(Options o)
     checkOptions(o);
     const volume::TissueTable table = o.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(o.tissues);
     command::Progress progress(command::Progress::Clock::ticking);
-    const auto tell = [&](const std::string& what, std::optional<double> share) {
-        share ? progress.show(what, *share) : progress.show(what);
+    const auto tell = [&](const std::string& what, std::optional<double> fraction) {
+        fraction ? progress.show(what, *fraction) : progress.show(what);
     };
     o.reading.sheared = o.steps.voxel > 0;
     if (!o.mapping.writeMap.empty()) {

@@ -52,20 +52,20 @@ std::string verdict(const PlanCandidate& c, bool chosen)
 void printCandidates(const Plan& plan)
 {
     fmt::print("{:<52} {:>9} {:>8} {:>8} {:>10}\n", "candidate", "nodes", "error", "force", "predicted");
-    constexpr std::size_t mostUntried = 4;
+    constexpr std::size_t maxUntried = 4;
     std::size_t untried = 0;
     for (std::size_t i = 0; i < plan.candidates.size(); ++i) {
         const PlanCandidate& c = plan.candidates[i];
         untried += c.tried ? 0U : 1U;
-        if (!c.tried && untried > mostUntried) {
+        if (!c.tried && untried > maxUntried) {
             continue;
         }
         const auto percent = [&](double value) { return c.tried ? fmt::format("{:.2f}%", value) : std::string("-"); };
         fmt::print("{:<52} {:>9} {:>8} {:>8} {:>7.0f} us  {}\n", c.name(), c.nodes, percent(c.error),
                    c.force ? percent(*c.force) : "-", c.microseconds, verdict(c, plan.choice == i));
     }
-    if (untried > mostUntried) {
-        fmt::print("and {} more that were not tried (--json has them all)\n", untried - mostUntried);
+    if (untried > maxUntried) {
+        fmt::print("and {} more that were not tried (--json has them all)\n", untried - maxUntried);
     }
 }
 

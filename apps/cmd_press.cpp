@@ -35,9 +35,9 @@ using studies::PressSummary;
 
 namespace {
 
-constexpr double leastRadius = 0.1, mostRadius = 100.0;  // [mm]
-constexpr double mostLength = 500.0;                     // [mm]
-constexpr std::size_t progressEvery = 200;               // ticks
+constexpr double minRadius = 0.1, maxRadius = 100.0;  // [mm]
+constexpr double maxLength = 500.0;                   // [mm]
+constexpr std::size_t progressEvery = 200;            // ticks
 
 struct Options {
     std::string scene, path, at, csv, json;
@@ -94,8 +94,8 @@ ToolSpec toolOf(const Options& o, const ToolSpec& scene)
                         kindName(scene.kind)));
     }
     tool.length = needle && other ? ToolSpec{}.length : tool.length;
-    tool.radius = o.radius ? inRange("--radius-mm", *o.radius, leastRadius, mostRadius) : tool.radius;
-    tool.length = o.length ? inRange("--length-mm", *o.length, 0.0, mostLength) : tool.length;
+    tool.radius = o.radius ? inRange("--radius-mm", *o.radius, minRadius, maxRadius) : tool.radius;
+    tool.length = o.length ? inRange("--length-mm", *o.length, 0.0, maxLength) : tool.length;
     return tool;
 }
 

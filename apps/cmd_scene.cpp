@@ -77,9 +77,9 @@ Scene sceneOf(const Options& o, const volume::Tissue& tissue, const std::optiona
             checkStructure(tissue, "--vital", name);
             scene.vital.push_back({.name = name});
         }
-        if (scene.vital.size() > datasets::mostVital) {
+        if (scene.vital.size() > datasets::maxVital) {
             throw std::runtime_error(
-                fmt::format("--vital: {} names; {} are the most", scene.vital.size(), datasets::mostVital));
+                fmt::format("--vital: {} names; {} are the most", scene.vital.size(), datasets::maxVital));
         }
     }
     if (lesion) {

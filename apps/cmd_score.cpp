@@ -25,7 +25,7 @@ namespace palpate::apps {
 
 namespace {
 
-constexpr std::size_t mostColumns = 12;  // sessions beside one another in a table
+constexpr std::size_t maxColumns = 12;  // sessions beside one another in a table
 constexpr std::size_t shownLosses = 3;
 
 using haptics::Score;
@@ -187,7 +187,7 @@ void printTable(const std::vector<std::string>& heads, const std::vector<std::ve
 
 void printSessions(const std::vector<Session>& sessions)
 {
-    if (sessions.size() > mostColumns) {
+    if (sessions.size() > maxColumns) {
         std::printf("%zu sessions, each in --json\n", sessions.size());
     } else if (sessions.size() == 1) {
         for (const auto& [label, value] : haptics::describe(sessions[0].score)) {

@@ -68,7 +68,7 @@ json figuresOf(const reference::MeshQuality& q, const volume::TissueTable& table
                            {"thickness_mm", 1e3 * t.thickness},
                            {"thinner_than_mesh", t.thin},
                            {"tetrahedra", t.tets},
-                           {"least_dihedral_deg", t.leastDihedral}});
+                           {"least_dihedral_deg", t.minDihedral}});
     }
     return {{"points", q.points},
             {"tetrahedra", q.tets},
@@ -76,7 +76,7 @@ json figuresOf(const reference::MeshQuality& q, const volume::TissueTable& table
             {"faces_between_tissues", q.between},
             {"faces_shared_by_more_than_two", q.overShared},
             {"flipped", q.flipped},
-            {"least_dihedral_deg", q.leastDihedral},
+            {"least_dihedral_deg", q.minDihedral},
             {"largest_dihedral_deg", q.largestDihedral},
             {"median_least_dihedral_deg", q.medianDihedral},
             {"tetrahedra_under_10_deg", q.under10},
@@ -95,11 +95,11 @@ void printQuality(const Options& o, const reference::MeshQuality& q, const volum
                "tetrahedra", "least, °", "thick, mm");
     for (const auto& t : q.tissues) {
         fmt::print("{:<20} {:>11.3f} {:>11.3f} {:>8.2f} {:>10} {:>8.1f} {:>10.2f}{}\n", table.rows[t.row].name,
-                   1e6 * t.voxels, 1e6 * t.mesh, t.percent(), t.tets, t.leastDihedral, 1e3 * t.thickness,
+                   1e6 * t.voxels, 1e6 * t.mesh, t.percent(), t.tets, t.minDihedral, 1e3 * t.thickness,
                    t.thin ? "  thinner than the mesh" : "");
     }
     fmt::print("\ndihedral angles: {:.1f} to {:.1f} degrees, median of the least {:.1f}; {} of {} tetrahedra under 10\n",
-               q.leastDihedral, q.largestDihedral, q.medianDihedral, q.under10, q.tets);
+               q.minDihedral, q.largestDihedral, q.medianDihedral, q.under10, q.tets);
     fmt::print("worst tetrahedron: number {}, at {:.1f} {:.1f} {:.1f} mm\n", q.worst + 1, 1e3 * q.worstAt.x,
                1e3 * q.worstAt.y, 1e3 * q.worstAt.z);
     fmt::print("faces: {} outside, {} between tissues, {} of more than two tetrahedra; {} tetrahedra flipped\n", q.outside,

@@ -27,14 +27,14 @@ namespace {
 
 using namespace haptics;
 
-constexpr std::uint64_t mostStates = 300000, mostShapes = 3000;
+constexpr std::uint64_t maxStates = 300000, maxShapes = 3000;
 
 // Everything there is to see of a record. One thread adds, another looks at what is there.
 class Film {
 public:
     explicit Film(std::uint64_t ticks)
-        : stateStride_((ticks + mostStates - 1) / mostStates),
-          shapeStride_(channel::frameTicks * ((ticks / channel::frameTicks + mostShapes) / mostShapes)),
+        : stateStride_((ticks + maxStates - 1) / maxStates),
+          shapeStride_(channel::frameTicks * ((ticks / channel::frameTicks + maxShapes) / maxShapes)),
           states_(ticks / stateStride_ + 1),
           shapes_(ticks / shapeStride_ + 1)
     {

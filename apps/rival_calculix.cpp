@@ -51,10 +51,10 @@ void addFaces(const RivalPush& push, reference::TetMesh& mesh)
 
 reference::TetMesh meshOf(const RivalPush& push)
 {
-    constexpr std::size_t mostMaterials = std::numeric_limits<std::uint8_t>::max();
-    if (push.materials.size() > mostMaterials) {
+    constexpr std::size_t maxMaterials = std::numeric_limits<std::uint8_t>::max();
+    if (push.materials.size() > maxMaterials) {
         throw std::runtime_error(fmt::format("{} materials: {} are the most; take another --rival-mesh-mm",
-                                             push.materials.size(), mostMaterials));
+                                             push.materials.size(), maxMaterials));
     }
     reference::TetMesh mesh;
     mesh.points = push.points;

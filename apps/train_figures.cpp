@@ -28,16 +28,16 @@ std::string missesInWords(const haptics::ServoTiming& timing)
 std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model)
 {
     constexpr double bearable = 0.01;  // of the ticks
-    const double share =
+    const double fraction =
         static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
-    if (share <= bearable) {
+    if (fraction <= bearable) {
         return "";
     }
     const bool coarser =
         model.level == datasets::ModelLevel::elastic && model.setting != datasets::elasticSettings().front();
     return fmt::format(
         "{:.0f} % of the ticks took over 1 ms: this machine is too slow or too busy for the tissue model; {}\n",
-        100 * share, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
+        100 * fraction, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
 }
 
 }  // namespace

@@ -30,9 +30,9 @@ inline std::size_t editDistance(std::string_view a, std::string_view b)
 /// The one of `words` that a mistyped word may mean: at most two letters off, and fewer than it has. Empty: none.
 inline std::string nearest(std::string_view word, const std::vector<std::string>& words)
 {
-    constexpr std::size_t mostOff = 2;
+    constexpr std::size_t maxOff = 2;
     std::string best;
-    std::size_t least = std::min(mostOff + 1, word.size());
+    std::size_t least = std::min(maxOff + 1, word.size());
     for (const std::string& candidate : words) {
         if (const std::size_t off = editDistance(word, candidate); off < least) {
             least = off;

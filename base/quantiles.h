@@ -6,13 +6,13 @@
 
 namespace palpate::base {
 
-/// The value that a share of all values in any order does not exceed: of two neighbours the lower. 0 of none.
-inline double lowerQuantile(std::vector<double> values, double share)
+/// The value that a fraction of all values in any order does not exceed: of two neighbours the lower. 0 of none.
+inline double lowerQuantile(std::vector<double> values, double fraction)
 {
     if (values.empty()) {
         return 0.0;
     }
-    const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), at, values.end());
     return *at;
 }

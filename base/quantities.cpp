@@ -53,9 +53,9 @@ double parseShare(const std::string& option, const std::string& text)
 {
     const auto parts = split(text);
     if (parts && (parts->second.empty() || parts->second == "%")) {
-        const double share = parts->second.empty() ? parts->first : parts->first / 100.0;
-        if (share > 0.0 && share < 1.0) {
-            return share;
+        const double fraction = parts->second.empty() ? parts->first : parts->first / 100.0;
+        if (fraction > 0.0 && fraction < 1.0) {
+            return fraction;
         }
     }
     throw std::runtime_error(fmt::format("{}: {}: must be over 0 % and under 100 %, as 3% or 0.03", option, text));

@@ -57,7 +57,7 @@ PropagateResult Deformation::deform(std::span<const Seed> seeds, Yield yield) no
     return result;
 }
 
-std::size_t mostPressSeeds(const Lattice& lattice, double radius) noexcept
+std::size_t maxPressSeeds(const Lattice& lattice, double radius) noexcept
 {
     // Nodes in a capsule, widened by one spacing for those on its rim.
     const double r = std::max(radius / lattice.grid.spacing, 1.0) + 1.0;

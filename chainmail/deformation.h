@@ -40,7 +40,7 @@ private:
 std::size_t pressSeeds(const Lattice& lattice, Vec3 from, Vec3 to, double radius, std::span<Seed> out) noexcept;
 
 /// No press of a ball of this radius [m] has more seeds than this.
-std::size_t mostPressSeeds(const Lattice& lattice, double radius) noexcept;
+std::size_t maxPressSeeds(const Lattice& lattice, double radius) noexcept;
 
 /// The nodes within one spacing of `rest` [m], all displaced by `u` [m]: material that sticks to a needle's tip.
 std::size_t dragSeeds(const Lattice& lattice, Vec3 rest, Vec3 u, std::span<Seed> out) noexcept;

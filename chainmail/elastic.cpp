@@ -14,14 +14,14 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr std::size_t mostTools = 16;
-constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
-constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
-constexpr double leastEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
-constexpr int callsPerTurn = 2;       // from one term of the history to the next
-constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
-constexpr double mostBalance = 1.5;   // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;      // cycles, so that windows that moved are not felt
+constexpr std::size_t maxTools = 16;
+constexpr double reach = 0.6;       // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;      // spacings that a tool may move until they are looked for again
+constexpr double minEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr int callsPerTurn = 2;     // from one term of the history to the next
+constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
+constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
+constexpr int moreAfterMove = 2;    // cycles, so that windows that moved are not felt
 constexpr double noLimit = -std::numeric_limits<double>::infinity();
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
@@ -33,11 +33,11 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
       multigrid_(stack_, 8 * options.maxSites),
       sites_(options.maxSites)
 {
-    held_.reserve(mostTools);
-    tools_.reserve(mostTools);
-    shapes_.reserve(mostTools);
-    foundFor_.reserve(mostTools);
-    toolAt_.reserve(mostTools);
+    held_.reserve(maxTools);
+    tools_.reserve(maxTools);
+    shapes_.reserve(maxTools);
+    foundFor_.reserve(maxTools);
+    toolAt_.reserve(maxTools);
     slip_.assign(body.points.size(), Vec3f(0.0F));
 }
 
@@ -168,12 +168,12 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
-    std::array<double, mostTools> share{};
+    std::array<double, maxTools> fraction{};
     for (std::size_t i = 0; i < tools_.size(); ++i) {
         const double depth = glm::length(tools_[i].pushed);
-        share[i] = depth > 0.0
-                       ? resolvedShare(std::sqrt(tools_[i].shape.widest() * depth) / body.levels.front().nodes.spacing)
-                       : 1.0;
+        fraction[i] = depth > 0.0
+                          ? resolvedShare(std::sqrt(tools_[i].shape.widest() * depth) / body.levels.front().nodes.spacing)
+                          : 1.0;
     }
     AreaRatio areaRatio(body, stack_.windows());
     for (ContactSite& s : active()) {
@@ -181,7 +181,7 @@ void Elastic::spreadPressure() noexcept
             // What moved last was measured then.
             const bool isKnown = s.stretch > 0.0;
             const double ratio = !options_.finiteStrain ? 1.0 : isKnown ? s.stretch : areaRatio(s);
-            s.stiffness = share[s.owner] * ratio * s.atRest;
+            s.stiffness = fraction[s.owner] * ratio * s.atRest;
         }
     }
 }
@@ -215,7 +215,7 @@ WindowStack::Evaluated Elastic::tissueForce(Field y, Field along) noexcept
 bool Elastic::springsBack() const noexcept
 {
     return stack_.body().relaxes && !atRest_ &&
-           std::max(std::abs(energy_), std::abs(stack_.dot(Field::h, Field::u))) >= leastEnergy;
+           std::max(std::abs(energy_), std::abs(stack_.dot(Field::h, Field::u))) >= minEnergy;
 }
 
 // What the time since the last call does to the history, where the tissue has lain. By turns: one evaluation of a term.
@@ -238,36 +238,36 @@ void Elastic::remember(int periods) noexcept
     }
     const std::size_t term = std::exchange(term_, (term_ + 1) % volume::relaxationTerms);
     const double seconds = std::exchange(since_[term], 0) * options_.period;
-    const double share = -std::expm1(-seconds / volume::relaxationTimes[term]);
+    const double fraction = -std::expm1(-seconds / volume::relaxationTimes[term]);
     const Field history = WindowStack::history(term);
     stack_.evaluateTerm(term, Field::f, options_.finiteStrain);
     stack_.combine(Field::f, -1.0, history, Field::f);
     const auto work = stack_.dots(Field::f, Field::u, Field::d);
-    stack_.combine(history, share, Field::f, history);
-    stack_.combine(Field::h, share, Field::f, Field::h);
-    stack_.combine(Field::a, -share, Field::f, Field::a);
-    energy_ += share * work[0];
-    historyEnergy_ += share * work[0];
+    stack_.combine(history, fraction, Field::f, history);
+    stack_.combine(Field::h, fraction, Field::f, Field::h);
+    stack_.combine(Field::a, -fraction, Field::f, Field::a);
+    energy_ += fraction * work[0];
+    historyEnergy_ += fraction * work[0];
     if (products_) {
-        (*products_)[0] -= share * work[0];
-        (*products_)[1] -= share * work[1];
+        (*products_)[0] -= fraction * work[0];
+        (*products_)[1] -= fraction * work[1];
     }
 }
 
 Elastic::HistoryShares Elastic::historyShares() noexcept
 {
-    HistoryShares shares{};
-    for (std::size_t i = 0; i < shares.size() && stack_.body().relaxes && !atRest_; ++i) {
+    HistoryShares fractions{};
+    for (std::size_t i = 0; i < fractions.size() && stack_.body().relaxes && !atRest_; ++i) {
         stack_.evaluateTerm(i, Field::f, options_.finiteStrain);
-        const double share = stack_.dot(Field::u, WindowStack::history(i)) / stack_.dot(Field::u, Field::f);
-        shares[i] = std::isfinite(share) ? std::clamp(share, 0.0, 1.0) : 0.0;
+        const double fraction = stack_.dot(Field::u, WindowStack::history(i)) / stack_.dot(Field::u, Field::f);
+        fractions[i] = std::isfinite(fraction) ? std::clamp(fraction, 0.0, 1.0) : 0.0;
     }
-    return shares;
+    return fractions;
 }
 
-void Elastic::beginWith(const HistoryShares& shares) noexcept
+void Elastic::beginWith(const HistoryShares& fractions) noexcept
 {
-    given_ = shares;
+    given_ = fractions;
     givenFor_ = callsOfGiven;
 }
 
@@ -308,7 +308,7 @@ double Elastic::refreshResidual(bool isCopied) noexcept
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             stack_.addForce(s.level, l.corner(s.node, c),
-                            static_cast<double>(s.share[static_cast<std::size_t>(c)]) * s.force);
+                            static_cast<double>(s.fraction[static_cast<std::size_t>(c)]) * s.force);
         }
     }
     return std::sqrt(stack_.dot(Field::r, Field::r));
@@ -325,8 +325,8 @@ void Elastic::prepareContacts() noexcept
             s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
-            const double share = static_cast<double>(s.share[static_cast<std::size_t>(c)]);
-            multigrid_.addContact(s.level, l.corner(s.node, c), share * tangent);
+            const double fraction = static_cast<double>(s.fraction[static_cast<std::size_t>(c)]);
+            multigrid_.addContact(s.level, l.corner(s.node, c), fraction * tangent);
         }
     }
     multigrid_.prepare();
@@ -389,7 +389,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 {
     ElasticResult result;
     ElasticLoad load = all;
-    load.tools = heldTools(load.tools.first(std::min(load.tools.size(), mostTools)), effort.holdsBack);
+    load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.holdsBack);
     multigrid_.clearContacts();
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
@@ -412,12 +412,12 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     bool isOpen = false;  // the tissue's force was not evaluated where it is
     bool hasGone = false;
     if (hasIncrement_) {
-        hasGone = goOn(result);
+        hasGone = warmStart(result);
         isOpen = hasGone && options_.finiteStrain;
     } else {
         forgetIncrement();
     }
-    hasIncrement_ = options_.goOn;
+    hasIncrement_ = options_.warmStart;
     // No hand feels tissue that springs back.
     const int most = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
     for (int i = 0; i < most + (isTouched && effort.far > 0.0 ? 1 : 0); ++i) {
@@ -453,7 +453,7 @@ void Elastic::balance() noexcept
     for (const ContactSite& s : sites()) {
         contacts += glm::dot(s.force, s.u);
     }
-    balance_ = contacts > 0.0 ? std::clamp(tissue / contacts, 1.0 / mostBalance, mostBalance) : 1.0;
+    balance_ = contacts > 0.0 ? std::clamp(tissue / contacts, 1.0 / maxBalance, maxBalance) : 1.0;
 }
 
 void Elastic::measure(ElasticResult& result) noexcept

@@ -17,9 +17,9 @@ struct ElasticOptions {
     bool finiteStrain = false;  // stable neo-Hookean instead of small strain
     double period = 1e-3;       // of a tick [s]: what relaxes does so by the ticks that its loads name
     std::size_t maxSites = 4096;
-    double tolerance = 0.01;           // no more once the forces out of balance are this share of the contacts' [-]
+    double tolerance = 0.01;           // no more once the forces out of balance are this fraction of the contacts' [-]
     int heldPeriod = 3;                // of an ElasticLevel: see there
-    bool goOn = true;                  // begin with the last call's increment; without, a call begins where the tissue lies
+    bool warmStart = true;             // begin with the last call's increment; without, a call begins where the tissue lies
     const Kernels* kernels = nullptr;  // the arithmetic; null: the widest set of this machine. All have the same results
 };
 
@@ -98,12 +98,12 @@ public:
     Vec3 displacementOf(Index3 cell) const noexcept;
     bool atRest() const noexcept { return atRest_; }
 
-    /// Of a body that relaxes: how far each term of its history has got, as a share of where it goes to if nothing moves,
-    /// mean over the body. Uses up working memory, as relax() does.
+    /// Of a body that relaxes: how far each term of its history has got, as a fraction of where it goes to if nothing
+    /// moves, mean over the body. Uses up working memory, as relax() does.
     using HistoryShares = std::array<double, volume::relaxationTerms>;
     HistoryShares historyShares() noexcept;
     /// Begins with such a history, until its own displacement has been found: for windows that take over from others.
-    void beginWith(const HistoryShares& shares) noexcept;
+    void beginWith(const HistoryShares& fractions) noexcept;
     const WindowStack& stack() const noexcept { return stack_; }
     const ElasticBody& body() const noexcept { return stack_.body(); }
     /// Nodes of all windows.
@@ -166,7 +166,7 @@ private:
     void letSlip() noexcept;
     double frictionOf(const ContactSite& site) const noexcept;
     double searchParabola(const Direction& to, ElasticResult& result) noexcept;
-    bool goOn(ElasticResult& result) noexcept;
+    bool warmStart(ElasticResult& result) noexcept;
     bool confirm(double start) noexcept;
     void retreat() noexcept;
     void again(ElasticResult& result) noexcept;

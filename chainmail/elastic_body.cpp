@@ -15,17 +15,17 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr int fewestNodes = 9;        // the coarsest level has at most as many along each side
-constexpr float leastTissue = 0.01F;  // cells with less of a typical stiffness are empty
-constexpr float wholly = 0.98F;       // share of a cell that is held: bone, but for the rounding of samples
+constexpr int fewestNodes = 9;      // the coarsest level has at most as many along each side
+constexpr float minTissue = 0.01F;  // cells with less of a typical stiffness are empty
+constexpr float wholly = 0.98F;     // fraction of a cell that is held: bone, but for the rounding of samples
 constexpr int powerSteps = 30;
-constexpr double onItsBack = 0.05;  // share of the body's depth that is fixed when nothing else is
+constexpr double onItsBack = 0.05;  // fraction of the body's depth that is fixed when nothing else is
 
 struct Moduli {
     double mu = 0;
     double bulk = 0;
     double stiffening = 0;
-    double held = 0;                                         // share of the tissue
+    double held = 0;                                         // fraction of the tissue
     std::array<double, volume::relaxationTerms> relaxing{};  // weights
 };
 
@@ -52,7 +52,7 @@ Index3 paddedNodes(Index3 cells, int& levels)
 // rest of it by as much more. Sources: W. Voigt 1889 and A. Reuss 1929 (bounds); the mean as in docs/decisions.md, 8.
 class BlockMean {
 public:
-    /// @param held  share of the cell's tissue that is held
+    /// @param held  fraction of the cell's tissue that is held
     void add(double modulus, double held)
     {
         ++filled_;
@@ -69,8 +69,8 @@ public:
         if (filled_ == 0) {
             return 0.0;
         }
-        const double share = filled_ / 8.0;
-        return free_ > 0.0 ? std::sqrt(sum_ / inverse_) * filled_ / free_ * share : whole_ / filled_ * share;
+        const double fraction = filled_ / 8.0;
+        return free_ > 0.0 ? std::sqrt(sum_ / inverse_) * filled_ / free_ * fraction : whole_ / filled_ * fraction;
     }
 
 private:
@@ -83,7 +83,7 @@ private:
 
 class Coarsening {
 public:
-    /// @param held  share of each cell's tissue that is held
+    /// @param held  fraction of each cell's tissue that is held
     Coarsening(const CellLevel& fine, const std::vector<float>& held) : fine_(fine), held_(held) {}
 
     /// And the shares of its own cells.
@@ -185,7 +185,7 @@ void fixMostlyHeld(const volume::NodeGrid& cells, const std::vector<volume::Cell
         volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, cells.size - 1), [&](Index3 c) {
             const auto& m = materials[cells.offset(c)];
             held += m.fixed;
-            filled += m.youngsModulus > leastTissue ? 1.0F : 0.0F;
+            filled += m.youngsModulus > minTissue ? 1.0F : 0.0F;
         });
         if (held > 0.0F && held >= 0.5F * wholly * filled) {
             level.fixed[level.nodes.offset(n)] = 1;
@@ -216,7 +216,7 @@ CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMa
     }
     volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
         const auto& m = materials[cells.offset(c)];
-        if (m.youngsModulus <= leastTissue) {
+        if (m.youngsModulus <= minTissue) {
             return;
         }
         const double nu = std::min(static_cast<double>(m.poissonRatio), poissonCap);
@@ -236,7 +236,7 @@ CellLevel finest(const volume::NodeGrid& cells, const std::vector<volume::CellMa
     return level;
 }
 
-// Share of each cell's tissue that is held.
+// Fraction of each cell's tissue that is held.
 std::vector<float> heldShares(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                               const CellLevel& level)
 {
@@ -330,14 +330,14 @@ void addDiagonal(CellLevel& level)
         const float lambda = level.lambda[at];
         if (mu > 0.0F) {
             const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
-            const float share =
+            const float fraction =
                 static_cast<float>(g.spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
-            volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += share; });
+            volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += fraction; });
         }
     });
 }
 
-// By power iteration; a start of random signs has a share of every eigenvector.
+// By power iteration; a start of random signs has a fraction of every eigenvector.
 double spectralRadius(const CellLevel& level)
 {
     const Index3 size = level.nodes.size;

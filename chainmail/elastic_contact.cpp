@@ -14,8 +14,8 @@ namespace {
 constexpr double penalty = 20.0;    // contact stiffness per area, in E / h
 constexpr double unresolved = 3.3;  // compliance that cells lack under a point, in that of the contact
 constexpr double resolved = 1.8;    // radius of a patch that lacks none, in cells
-constexpr double leastRatio = 0.3;  // of areas: bounds far beyond what tissue bears
-constexpr double mostRatio = 30.0;
+constexpr double minRatio = 0.3;    // of areas: bounds far beyond what tissue bears
+constexpr double maxRatio = 30.0;
 
 // Stiffness of a surface point by its area at rest. A whole contact must not be stiffer than `stiffest`: spread over a
 // quarter of the tool's cross-section, what a shallow press touches.
@@ -142,7 +142,7 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
         if (!windows[l].contains(cell) || !windows[l].contains(cell + 1)) {
             continue;
         }
-        site.share = trilinear(at - Vec3(cell));
+        site.fraction = trilinear(at - Vec3(cell));
         site.node = static_cast<std::uint32_t>(windows[l].at(cell));
         site.level = static_cast<std::uint16_t>(l);
         return;
@@ -156,7 +156,7 @@ void locateMiddle(std::span<const Window> windows, Index3 cell, ContactSite& sit
         const int scale = 1 << l;
         const Index3 low = cell / scale;
         if (windows[l].contains(low) && windows[l].contains(low + 1)) {
-            site.share = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
+            site.fraction = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
             site.node = static_cast<std::uint32_t>(windows[l].at(low));
             site.level = static_cast<std::uint16_t>(l);
             return;
@@ -183,7 +183,7 @@ double AreaRatio::operator()(const ContactSite& site) noexcept
     }
     const Vec3 n(body_.points[site.point].normal);
     const Vec3 area = n.x * cofactor_[0] + n.y * cofactor_[1] + n.z * cofactor_[2];
-    return std::clamp(glm::length(area), leastRatio, mostRatio);
+    return std::clamp(glm::length(area), minRatio, maxRatio);
 }
 
 double resolvedShare(double radiusInCells) noexcept
@@ -200,7 +200,7 @@ Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field fiel
     const float* x = w.field(field) + site.node;
     Vec3 sum(0.0);
     for (std::size_t c = 0; c < 8; ++c) {
-        sum += static_cast<double>(site.share[c]) * Vec3(x[at[c]], x[n + at[c]], x[2 * n + at[c]]);
+        sum += static_cast<double>(site.fraction[c]) * Vec3(x[at[c]], x[n + at[c]], x[2 * n + at[c]]);
     }
     return sum;
 }

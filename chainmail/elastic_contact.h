@@ -60,9 +60,9 @@ struct alignas(64) ContactSite {
     std::uint16_t level = 0;
     std::uint16_t owner = 0;  // index of tool or tie
 
-    std::array<float, 8> share{};  // of each node of the cell: trilinear, x fastest
-    Vec3 z{0.0};                   // of the search direction the part that is new [m]
-    double across = 0;             // stiffness of a tie across its axis [N/m]
+    std::array<float, 8> fraction{};  // of each node of the cell: trilinear, x fastest
+    Vec3 z{0.0};                      // of the search direction the part that is new [m]
+    double across = 0;                // stiffness of a tie across its axis [N/m]
 
     Vec3 anchor{0.0};         // the point in a cell that it moves with [m]
     double atRest = 0;        // stiffness of a surface point, by its area at rest [N/m]
@@ -121,7 +121,7 @@ private:
     std::array<Vec3, 3> cofactor_{};  // columns of cof(F)
 };
 
-/// Share of the contact's stiffness that a patch of radius a has on cells of side h.
+/// Fraction of the contact's stiffness that a patch of radius a has on cells of side h.
 ///
 ///     1 / (1 + 3.3 (1 - (a / 1.8 h)^2))    for a < 1.8 h, else 1
 ///
@@ -138,11 +138,11 @@ Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field fiel
 inline std::array<float, 8> trilinear(Vec3 t) noexcept
 {
     const std::array<Vec3, 2> w{1.0 - t, t};
-    std::array<float, 8> share{};
+    std::array<float, 8> fraction{};
     for (std::size_t c = 0; c < 8; ++c) {
-        share[c] = static_cast<float>(w[c & 1].x * w[(c >> 1) & 1].y * w[c >> 2].z);
+        fraction[c] = static_cast<float>(w[c & 1].x * w[(c >> 1) & 1].y * w[c >> 2].z);
     }
-    return share;
+    return fraction;
 }
 
 /// Finest window with the cell around `rest` [m], and where in it. `level` = number of windows when none has it.

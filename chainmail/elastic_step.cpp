@@ -11,14 +11,14 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr int newtonSteps = 3;          // of a line search: contacts open and close along it
-constexpr int mostShortenings = 8;      // of a step that raises the energy
-constexpr double rounding = 1e-6;       // relative: sums of single-precision products are no better
-constexpr double mostFurther = 4.0;     // steps that force and energy may be carried on along a parabola
-constexpr double parabolic = 0.1;       // of what a step gains: by how much the energy may be off the parabola
-constexpr double leastStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
+constexpr int newtonSteps = 3;        // of a line search: contacts open and close along it
+constexpr int maxShortenings = 8;     // of a step that raises the energy
+constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
+constexpr double maxFurther = 4.0;    // steps that force and energy may be carried on along a parabola
+constexpr double parabolic = 0.1;     // of what a step gains: by how much the energy may be off the parabola
+constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
 constexpr double noLimit = -std::numeric_limits<double>::infinity();
-constexpr double mostNearness = 10.0;  // of that expectation, bounds
+constexpr double maxNearness = 10.0;  // of that expectation, bounds
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a
 // half of the way, since the energy is none. Source: J. Nocedal, S. Wright, "Numerical Optimization", 2nd ed., section 3.5.
@@ -76,7 +76,7 @@ double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexc
             return length;
         }
         moveSites(-length);
-        length = i < mostShortenings ? shorter(length, steepness, change) : 0.0;
+        length = i < maxShortenings ? shorter(length, steepness, change) : 0.0;
         ++result.shortened;
     }
     energy_ = start;
@@ -85,7 +85,7 @@ double Elastic::searchParabola(const Direction& to, ElasticResult& result) noexc
 
 // Goes on along the last call's increment d, whose image e is known, as far as lowers the energy. The tissue's force and
 // energy go along the parabola: the next step evaluates them, or confirm().
-bool Elastic::goOn(ElasticResult& result) noexcept
+bool Elastic::warmStart(ElasticResult& result) noexcept
 {
     look();
     const double length = searchParabola({Field::d, 0.0, last_.tissue, contactsAlong(sites(), 0.0)}, result);
@@ -96,7 +96,7 @@ bool Elastic::goOn(ElasticResult& result) noexcept
     for (ContactSite& s : active()) {
         s.p *= length;
     }
-    stack_.goOn(length);
+    stack_.warmStart(length);
     products_.reset();
     last_.tissue = last_.tissue.from(length);
     return true;
@@ -171,7 +171,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         const double best = lineSearch(slope, tissue.curvature, contacts, newtonSteps);
         const double further = std::max(1.0, std::abs(best / gone));
         const double off = std::abs(now.energy - start - tissue.at(gone)) * further * further * further;
-        const bool isNear = further <= mostFurther && off <= parabolic * std::abs(steepness * best);
+        const bool isNear = further <= maxFurther && off <= parabolic * std::abs(steepness * best);
         if (!isNear && best != 0.0 && searches++ == 0) {
             length = best;
             continue;
@@ -189,7 +189,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
             return true;
         }
         moveSites(-length);
-        length = i++ < mostShortenings && length != 0.0 ? shorter(length, steepness, change) : 0.0;
+        length = i++ < maxShortenings && length != 0.0 ? shorter(length, steepness, change) : 0.0;
         ++result.shortened;
     }
     stack_.combine(Field::u, -gone, to.field, Field::u);
@@ -237,11 +237,11 @@ bool Elastic::oneCycle(double limit, ElasticResult& result) noexcept
     // is less by what the increment has of it.
     const double conjugate = -beta * mixed;
     const double contacts = to.contacts.curvature;
-    const double expected = std::max(nearness * work - conjugate, leastStiffness * nearness * work);
-    to.tissue.curvature = std::max(expected - contacts, leastStiffness * expected);
+    const double expected = std::max(nearness * work - conjugate, minStiffness * nearness * work);
+    to.tissue.curvature = std::max(expected - contacts, minStiffness * expected);
     const bool stepped = takeStep(to, limit, result);
     if (const double found = (stiffness_ + conjugate) / work; stepped && std::isfinite(found)) {
-        nearness = 0.5 * (nearness + std::clamp(found, 1.0 / mostNearness, mostNearness));
+        nearness = 0.5 * (nearness + std::clamp(found, 1.0 / maxNearness, maxNearness));
     }
     return stepped;
 }

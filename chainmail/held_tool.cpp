@@ -11,13 +11,13 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr double smallStrain = 1.0;    // deepest that small strain is pressed, in the tool's radii
-constexpr double mostStretch = 6.5;    // of the area under a tool
-constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this share of its radius ...
+constexpr double maxStretch = 6.5;     // of the area under a tool
+constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this fraction of its radius ...
 constexpr double sinkSpacings = 0.15;  // ... and of the spacing,
-constexpr double mostSink = 0.25;      // but not over this share of the radius
+constexpr double maxSink = 0.25;       // but not over this fraction of the radius
 constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness
-constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of mostStretch
-constexpr int mostSteps = 256;         // along a way through the tissue
+constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
+constexpr int maxSteps = 256;          // along a way through the tissue
 
 bool isHeld(const CellLevel& level, Vec3 at) noexcept
 {
@@ -35,7 +35,7 @@ Vec3 foremost(const occupancy::RoundCone& shape, Vec3 inward) noexcept
 // How far the foremost point of the real tool is inside of what is held in space, on its way from where the body's is [m].
 double insideHeld(const CellLevel& level, Vec3 from, Vec3 inward, double way) noexcept
 {
-    const double step = std::max(0.25 * level.nodes.spacing, way / mostSteps);
+    const double step = std::max(0.25 * level.nodes.spacing, way / maxSteps);
     for (double t = 0.0; t < way; t += step) {
         if (isHeld(level, from + t * inward)) {
             return way - t;
@@ -51,9 +51,9 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     const double radius = tool.shape.widest();
     const double wanted = glm::length(tool.pushed);
     const double most = finiteStrain ? wanted : std::min(wanted, smallStrain * radius);
-    const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, mostSink * radius);
+    const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, maxSink * radius);
     const double bears = sink + onBone * load / tool.stiffest;
-    const double further = std::min(bears - depth, ease * radius * (mostStretch - stretch));
+    const double further = std::min(bears - depth, ease * radius * (maxStretch - stretch));
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
     friction = tool.friction;

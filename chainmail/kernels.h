@@ -54,11 +54,11 @@ struct StepFields {
 /// How a step ends: u may have gone along p already, and f is the force there; or, where the force is linear, f is that of
 /// p.
 struct KeptStep {
-    float share = 1;    // of the change of the force that is kept
-    float base = 1;     // the change is f - base a: 1, or 0 where f is the force of p
-    float further = 0;  // how much further u goes along p
-    float length = 1;   // of the step in all
-    float keep = 1;     // of d and e as they were
+    float fraction = 1;  // of the change of the force that is kept
+    float base = 1;      // the change is f - base a: 1, or 0 where f is the force of p
+    float further = 0;   // how much further u goes along p
+    float length = 1;    // of the step in all
+    float keep = 1;      // of d and e as they were
 };
 
 /// A damped Jacobi step: weight, reciprocal diagonal and right side.
@@ -125,7 +125,7 @@ struct Kernels {
     /// out = x + a y; out may be x or y
     void (*combine)(const float* x, float a, const float* y, float* out, std::size_t n) noexcept;
     /// d *= step,  e *= step,  u += d,  a += e,  r = a
-    void (*goOn)(float step, const StepFields& to, std::size_t n) noexcept;
+    void (*warmStart)(float step, const StepFields& to, std::size_t n) noexcept;
     /// p = z + beta last,  u += step p; last may be p
     void (*direct)(const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept;
     /// q = share (f - base a),  a += q,  e = keep e + q,  u += further p,  p *= length,  d = keep d + p,  r = a; p may be d

@@ -12,8 +12,8 @@ namespace {
 
 constexpr Kernels table(const char* name) noexcept
 {
-    return {name,   W,           apply,  residualOf, smoothOf, applyFinite, dots,    combine, goOn,   direct,   keepStep,
-            negate, smoothFirst, smooth, chebyshev,  blend,    addMasked,   average, hat,     spread, gatherAdd};
+    return {name,   W,           apply,  residualOf, smoothOf, applyFinite, dots,    combine, warmStart, direct,   keepStep,
+            negate, smoothFirst, smooth, chebyshev,  blend,    addMasked,   average, hat,     spread,    gatherAdd};
 }
 
 }  // namespace

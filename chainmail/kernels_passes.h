@@ -68,7 +68,7 @@ void combine(const float* x, float a, const float* y, float* out, std::size_t n)
     }
 }
 
-void goOn(float step, const StepFields& to, std::size_t n) noexcept
+void warmStart(float step, const StepFields& to, std::size_t n) noexcept
 {
     for (std::size_t i = 0; i < n; i += W) {
         const Lanes d = step * load(to.d + i);
@@ -157,7 +157,7 @@ void keepStep(const KeptStep& step, const float* f, const StepFields& to, std::s
         [&](std::size_t i, int v) {
             const Lanes p = load(to.p + i);
             const Lanes gone = step.length * p;
-            const Lanes change = step.share * (load(f + i) - step.base * load(to.a + i));
+            const Lanes change = step.fraction * (load(f + i) - step.base * load(to.a + i));
             const Lanes u = load(to.u + i) + step.further * p;
             const Lanes a = load(to.a + i) + change;
             const Lanes d = step.keep * load(to.d + i) + gone;

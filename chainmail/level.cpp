@@ -13,14 +13,14 @@ namespace {
 
 constexpr double shaftPiece = 4e-3;      // of the shaft that one tie stands for, at least [m]
 constexpr double tieStiffness = 8.0;     // of a held point, in E h: stiff beside the tissue, soft enough to converge fast
-constexpr float leastShown = 20e-6F;     // displacements below are not carried to the outer lattice [m]
+constexpr float minShown = 20e-6F;       // displacements below are not carried to the outer lattice [m]
 constexpr int nearNodes = 4;             // nodes to each side of the tool that every call writes
 constexpr int layersPerCall = 4;         // of the finest window, beside those
 constexpr int turnsPerCall = 128;        // nodes of the outer lattice per call and window
 constexpr int turnsAtRest = 512;         // the same, when all go back to rest
 constexpr std::size_t windowsShown = 3;  // the finest, and two by turns
-constexpr float leastVolume = 0.05F;     // of a cell that still counts as not inverted, share of its volume at rest
-constexpr std::array<float, 4> shares{1.0F, 0.5F, 0.25F, 0.0F};
+constexpr float minVolume = 0.05F;       // of a cell that still counts as not inverted, fraction of its volume at rest
+constexpr std::array<float, 4> fractions{1.0F, 0.5F, 0.25F, 0.0F};
 
 // Means over the eight nodes of each of `count` cells in a row, from that of the lowest node `at` on.
 void cellMeans(const Window& window, std::size_t at, std::size_t count, Vec3f* out) noexcept
@@ -67,7 +67,7 @@ Reaction SpringLevel::deform(const Grip&) noexcept
 }
 
 ChainMailLevel::ChainMailLevel(Deformation& deformation, double toolRadius)
-    : deformation_(deformation), seeds_(mostPressSeeds(deformation.shape().lattice(), toolRadius))
+    : deformation_(deformation), seeds_(maxPressSeeds(deformation.shape().lattice(), toolRadius))
 {
 }
 
@@ -111,7 +111,7 @@ ElasticLevel::ElasticLevel(DisplacedLattice& shape, const ElasticBody& body, con
 
 ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
 {
-    const std::size_t others = std::min(grip.others.size(), mostOthers);
+    const std::size_t others = std::min(grip.others.size(), maxOthers);
     std::copy_n(grip.others.begin(), others, tools_.begin());
     ElasticLoad load{{}, {}, focusAt(surface_, grip.position)};
     if (grip.kind == Grip::Kind::press) {
@@ -147,7 +147,7 @@ ElasticLoad ElasticLevel::tie(const Grip& grip) noexcept
     ties_[0] = {rest, grip.position - grip.proxy, grip.axis, stiffness, stiffness};
     std::size_t count = 1;
     const double inserted = glm::distance(grip.entry, grip.proxy);
-    const auto pieces = static_cast<std::size_t>(std::min(inserted / shaftPiece, static_cast<double>(mostShaftTies)));
+    const auto pieces = static_cast<std::size_t>(std::min(inserted / shaftPiece, static_cast<double>(maxShaftTies)));
     for (std::size_t i = 0; grip.inside && i < pieces; ++i) {
         const double back = inserted * (static_cast<double>(i) + 1.0) / (static_cast<double>(pieces) + 1.0);
         const Vec3 at = glm::mix(grip.proxy, grip.entry, back / inserted);
@@ -172,18 +172,18 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
         all.periods = std::exchange(since_, 0);
         last_ = elastic_.relax(all);
     }
-    const int shares = takesTurns ? period_ : 1;
+    const int fractions = takesTurns ? period_ : 1;
     if ((!takesTurns || turn_ == 1) && !(wasAtRest && elastic_.atRest())) {
-        writeFinest(grip.proxy, shares * layersPerCall);
+        writeFinest(grip.proxy, fractions * layersPerCall);
     }
-    for (int i = 0; i < shares && (!takesTurns || turn_ == period_ - 1); ++i) {
+    for (int i = 0; i < fractions && (!takesTurns || turn_ == period_ - 1); ++i) {
         for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
             writeByTurns(l);
         }
         revisitMoved();
     }
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
-    const std::size_t others = std::min(grip.others.size(), mostOthers);
+    const std::size_t others = std::min(grip.others.size(), maxOthers);
     if (grip.kind == Grip::Kind::press) {
         reaction.force = elastic_.toolForce(others);
         reaction.behind = elastic_.behind(others);
@@ -232,11 +232,11 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
             }
         }
     });
-    for (const float share : shares) {
+    for (const float fraction : fractions) {
         forEachRow([&](Index3, std::size_t n, std::size_t first) {
             for (std::size_t i = 0; i < inRow; ++i) {
                 const Vec3f old = before_[first + i];
-                u[n + i] = old + share * (now_[first + i] - old);
+                u[n + i] = old + fraction * (now_[first + i] - old);
             }
         });
         if (keepsOrientation(glm::max(low - 1, Index3(1)), glm::min(high + 1, grid.size - 2))) {
@@ -343,7 +343,7 @@ bool ElasticLevel::upright(Node n) const noexcept
         shift[side / 2] += side % 2 != 0 ? spacing : -spacing;
         edge[static_cast<std::size_t>(side)] = shift;
     }
-    const float least = leastVolume * spacing * spacing * spacing;
+    const float least = minVolume * spacing * spacing * spacing;
     for (std::size_t side = 0; side < 4; ++side) {
         const std::size_t y = side & 1, z = side >> 1;
         const Vec3f across = glm::cross(edge[2 + y], edge[4 + z]);
@@ -360,7 +360,7 @@ void ElasticLevel::write(Node n, Index3 at) noexcept
 {
     const auto& lattice = shape_.lattice();
     Vec3f u(elastic_.atRest() ? Vec3(0.0) : elastic_.displacementOf(at));
-    if (glm::dot(u, u) < leastShown * leastShown) {
+    if (glm::dot(u, u) < minShown * minShown) {
         u = Vec3f(0.0F);
     }
     const auto all = shape_.raw();

@@ -28,7 +28,7 @@ struct Grip {
     Vec3 axis{0, 1, 0};                   // along the tool, towards its tip
     double drag = 0;                      // how far a shaft carries the tissue around it along `axis` [m]
     double friction = 0;                  // of a tool that presses (Coulomb) [-]
-    std::span<const ElasticTool> others;  // tools that press besides, ElasticLevel::mostOthers at most; only level elastic
+    std::span<const ElasticTool> others;  // tools that press besides, ElasticLevel::maxOthers at most; only level elastic
                                           // knows them. They must live until the next call
 };
 
@@ -93,10 +93,10 @@ public:
     const Elastic& elastic() const noexcept { return elastic_; }
     /// Goes on from another level with the same body, whose windows are others: tissue has relaxed as far as there.
     void takeOver(ElasticLevel& from) noexcept { elastic_.beginWith(from.elastic_.historyShares()); }
-    static constexpr std::size_t mostOthers = 7;
+    static constexpr std::size_t maxOthers = 7;
 
 private:
-    static constexpr std::size_t mostShaftTies = 8;
+    static constexpr std::size_t maxShaftTies = 8;
 
     ElasticLoad load(const Grip& grip) noexcept;
     ElasticLoad tie(const Grip& grip) noexcept;
@@ -116,11 +116,11 @@ private:
     Elastic elastic_;
     int period_;  // calls from one solution to the next while a tip holds the tissue
     int turn_ = 0;
-    int since_ = 0;                                  // calls since the last solution
-    bool isShapeOnly_ = false;                       // the last call's force on the hand was not from here
-    std::array<ElasticTool, mostOthers + 1> tools_;  // the others, then the hand's: so each keeps its place
-    std::array<Tie, 1 + mostShaftTies> ties_;        // the tip's, then the shaft's
-    std::vector<Vec3f> before_;                      // nodes of a box as they were, and as the windows have them
+    int since_ = 0;                                 // calls since the last solution
+    bool isShapeOnly_ = false;                      // the last call's force on the hand was not from here
+    std::array<ElasticTool, maxOthers + 1> tools_;  // the others, then the hand's: so each keeps its place
+    std::array<Tie, 1 + maxShaftTies> ties_;        // the tip's, then the shaft's
+    std::vector<Vec3f> before_;                     // nodes of a box as they were, and as the windows have them
     std::vector<Vec3f> now_;
     std::vector<std::uint8_t> strained_;  // not 0 for nodes with a link shifted by over a third of its length
     std::vector<std::uint8_t>

@@ -66,8 +66,9 @@ void Multigrid::prepare() noexcept
                 b.inverse = glm::inverse(glm::dmat3(1.0 / (weight * static_cast<double>(b.diagonal))) + b.stiffness);
             }
             if (l + 1 < blocks_.size()) {
-                w.visitParents(b.node, stack_[l + 1],
-                               [&](std::size_t parent, double share) { addContact(l + 1, parent, share * b.stiffness); });
+                w.visitParents(b.node, stack_[l + 1], [&](std::size_t parent, double fraction) {
+                    addContact(l + 1, parent, fraction * b.stiffness);
+                });
             }
         }
     }

@@ -83,11 +83,11 @@ void Window::placeTerm(const CellLevel& level, std::size_t i) noexcept
 {
     for (int k = 0; k + 1 < layout.nz; ++k) {
         for (int j = 0; j + 1 < layout.ny; ++j) {
-            const float* share = level.relaxing[i].data() + level.nodes.offset(low + Index3(0, j, k));
+            const float* fraction = level.relaxing[i].data() + level.nodes.offset(low + Index3(0, j, k));
             const std::size_t to = layout.at(0, j, k);
             for (std::size_t c = 0; c + 1 < static_cast<std::size_t>(layout.nx); ++c) {
-                terms[i].mu[to + c] = share[c] * mu[to + c];
-                terms[i].lambda[to + c] = share[c] * lambda[to + c];
+                terms[i].mu[to + c] = fraction[c] * mu[to + c];
+                terms[i].lambda[to + c] = fraction[c] * lambda[to + c];
             }
         }
     }

@@ -113,8 +113,8 @@ struct Window {
     {
         const Index3 n = low + Index3(node % layout.row, node % layout.plane / layout.row, node / layout.plane);
         const Index3 odd = n % 2;
-        const double share = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
-        volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { visit(coarse.at(parent), share); });
+        const double fraction = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
+        volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { visit(coarse.at(parent), fraction); });
     }
 
     explicit Window(Index3 size, bool relaxes = false);

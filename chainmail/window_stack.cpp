@@ -227,8 +227,9 @@ WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, bool
 
 void WindowStack::addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept
 {
-    windows_[level].visitParents(node, windows_[level + 1],
-                                 [&](std::size_t parent, double share) { addForce(level + 1, parent, share * force); });
+    windows_[level].visitParents(node, windows_[level + 1], [&](std::size_t parent, double fraction) {
+        addForce(level + 1, parent, fraction * force);
+    });
 }
 
 std::array<double, 2> WindowStack::dots(Field x, Field a, Field b) const noexcept
@@ -256,10 +257,10 @@ StepFields WindowStack::stepFields(Window& w, Field direction) noexcept
             w.field(direction), w.field(Field::q), w.field(Field::r)};
 }
 
-void WindowStack::goOn(double step) noexcept
+void WindowStack::warmStart(double step) noexcept
 {
     for (Window& w : windows_) {
-        kernels_->goOn(static_cast<float>(step), stepFields(w, Field::d), 3 * w.layout.count);
+        kernels_->warmStart(static_cast<float>(step), stepFields(w, Field::d), 3 * w.layout.count);
     }
 }
 

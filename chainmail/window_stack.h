@@ -56,7 +56,7 @@ public:
     };
     Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept { return evaluate(x, y, along, finite, {}); }
 
-    /// The same of term `term` of the Prony series alone: the force at u of tissue with its share of the moduli.
+    /// The same of term `term` of the Prony series alone: the force at u of tissue with its fraction of the moduli.
     void evaluateTerm(std::size_t term, Field y, bool finite) noexcept { evaluate(Field::u, y, Field::u, finite, term); }
     /// Its history.
     static Field history(std::size_t term) noexcept { return term == 0 ? Field::h0 : Field::h1; }
@@ -82,7 +82,7 @@ public:
     /// out = x + a y
     void combine(Field x, double a, Field y, Field out) noexcept;
     /// d *= step, e *= step, u += d, a += e, r = a.
-    void goOn(double step) noexcept;
+    void warmStart(double step) noexcept;
     /// p = z + beta last, u += step p; last may be p.
     void direct(Field last, double beta, double step) noexcept;
     /// The end of a step along `direction`, p or d, see KeptStep; r = a. Returns { a . u, a . d, e . d }.

@@ -12,8 +12,8 @@ constexpr double furthest = 100;   // of a place [m]
 constexpr double strongest = 1e4;  // force [N]
 constexpr double largestValue = 1e12;
 constexpr std::array<std::int32_t, 3> noNodes{};  // of a body that does not deform, or without fine labels
-constexpr std::uint32_t mostSlices = 99;          // of a CT scan
-constexpr std::uint32_t mostPattern = 3;          // of TissueSound
+constexpr std::uint32_t maxSlices = 99;           // of a CT scan
+constexpr std::uint32_t maxPattern = 3;           // of TissueSound
 
 bool upTo(double value, double most) noexcept
 {
@@ -37,8 +37,8 @@ bool sound(const Grid& grid) noexcept
 
 bool sound(const TissueLook& look) noexcept
 {
-    const auto share = [](float v) { return v >= 0.0F && v <= 1.0F; };
-    return ended(look.name) && share(look.opacity) && std::all_of(look.colour.begin(), look.colour.end(), share);
+    const auto fraction = [](float v) { return v >= 0.0F && v <= 1.0F; };
+    return ended(look.name) && fraction(look.opacity) && std::all_of(look.colour.begin(), look.colour.end(), fraction);
 }
 
 bool within(double value, double least, double most) noexcept
@@ -52,7 +52,7 @@ bool sound(const TissueSound& s) noexcept
     return within(static_cast<double>(s.soundSpeed), 0, 1e4) && within(static_cast<double>(s.density), 0, 1e5) &&
            within(static_cast<double>(s.attenuation), 0, 1e3) && within(static_cast<double>(s.attenuationPower), 0, 3) &&
            within(static_cast<double>(s.echo), -100, 60) && within(static_cast<double>(s.echoVariation), 0, 30) &&
-           s.pattern <= mostPattern;
+           s.pattern <= maxPattern;
 }
 
 // The fine labels are of no size where there are none.
@@ -65,7 +65,7 @@ bool soundOfUltrasound(const Scenery& s) noexcept
 
 bool soundOfCt(const Scenery& s) noexcept
 {
-    return s.ctSlices <= mostSlices && within(s.ctWidth, 0, 1) && within(s.ctDoseIndex, 0, 1e4) &&
+    return s.ctSlices <= maxSlices && within(s.ctWidth, 0, 1) && within(s.ctDoseIndex, 0, 1e4) &&
            within(s.ctDoseLength, 0, 1e6);
 }
 

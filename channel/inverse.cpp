@@ -90,13 +90,13 @@ glm::vec3 Inverse::displacement(glm::vec3 g) const noexcept
 }
 
 // Solves shift + share u(g + shift) = 0; whether it got there, and to tissue that is not inside out.
-bool Inverse::newton(glm::vec3 g, float share, int steps, float enough, glm::vec3& shift) const noexcept
+bool Inverse::newton(glm::vec3 g, float fraction, int steps, float enough, glm::vec3& shift) const noexcept
 {
     constexpr float furthest = 2;  // step [spacings]: beyond, the cell's gradient says nothing
     for (int i = 0; i <= steps; ++i) {
         const Local here = local(g + shift);
-        const glm::vec3 residual = shift + share * here.u;
-        const glm::mat3 slope = (1 - share) * glm::mat3(1.0F) + share * here.deformation;
+        const glm::vec3 residual = shift + fraction * here.u;
+        const glm::mat3 slope = (1 - fraction) * glm::mat3(1.0F) + fraction * here.deformation;
         const float volume = glm::determinant(slope);
         if (std::max({std::abs(residual.x), std::abs(residual.y), std::abs(residual.z)}) < enough)
             return volume > 0;

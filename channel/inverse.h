@@ -58,7 +58,7 @@ private:
     Local local(glm::vec3 g) const noexcept;
     Local inCell(glm::ivec3 cell, glm::vec3 part) const noexcept;
     Box seen(glm::ivec3 cell) const noexcept;
-    bool newton(glm::vec3 g, float share, int steps, float enough, glm::vec3& shift) const noexcept;
+    bool newton(glm::vec3 g, float fraction, int steps, float enough, glm::vec3& shift) const noexcept;
     bool alongTheWay(glm::vec3 g, float enough, glm::vec3& shift) const noexcept;
     bool solveInCell(glm::ivec3 cell, glm::vec3 g, glm::vec3& part, float& volume) const noexcept;
     void tryCell(glm::ivec3 cell, glm::vec3 g, Answer& best) const noexcept;

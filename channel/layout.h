@@ -153,7 +153,7 @@ struct State {
     double aheadSpeed = 0;                         // of the tip along it [m/s]
     std::uint32_t aheadTissue = 0;                 // row of the tissue table
     std::uint32_t padding = 0;
-    double coreTarget = 0;  // share of target tissue in the last core
+    double coreTarget = 0;  // fraction of target tissue in the last core
     double coreLength = 0;  // length in the target of the last core [m]
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles

@@ -19,8 +19,8 @@ NeedleShape needleShape(const Scenery& scenery, const State& state) noexcept
     shape[0] = straight - scenery.toolLength * axis;
     const std::size_t steps = shape.size() - 2;
     for (std::size_t i = 0; i <= steps; ++i) {
-        const double share = static_cast<double>(i) / static_cast<double>(steps);
-        shape[i + 1] = straight - (1 - share) * inside * axis + share * share * bend;
+        const double fraction = static_cast<double>(i) / static_cast<double>(steps);
+        shape[i + 1] = straight - (1 - fraction) * inside * axis + fraction * fraction * bend;
     }
     return shape;
 }

@@ -36,11 +36,11 @@ void Progress::show(const std::string& what)
     }
 }
 
-void Progress::show(const std::string& what, double share)
+void Progress::show(const std::string& what, double fraction)
 {
     constexpr int width = 30;  // characters
-    const int done = std::clamp(static_cast<int>(share * width), 0, width);
-    show(fmt::format("{} [{:#<{}}{:.<{}}] {:.0f} %", what, "", done, "", width - done, 100 * share));
+    const int done = std::clamp(static_cast<int>(fraction * width), 0, width);
+    show(fmt::format("{} [{:#<{}}{:.<{}}] {:.0f} %", what, "", done, "", width - done, 100 * fraction));
 }
 
 void Progress::clear()

@@ -20,8 +20,8 @@ public:
     Progress& operator=(const Progress&) = delete;
 
     void show(const std::string& what);
-    /// With a bar; `share` is what is done, 0 to 1.
-    void show(const std::string& what, double share);
+    /// With a bar; `fraction` is what is done, 0 to 1.
+    void show(const std::string& what, double fraction);
     /// Takes the line away, so that something else can be printed.
     void clear();
 

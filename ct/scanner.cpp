@@ -92,8 +92,8 @@ float numberOf(double density) noexcept
 {
     const auto next = std::find_if(table.begin() + 1, table.end() - 1, [&](const Point& p) { return density < p.density; });
     const Point &from = *(next - 1), &to = *next;
-    const double share = std::clamp((density - from.density) / (to.density - from.density), 0.0, 1.0);
-    return static_cast<float>(from.number + share * (to.number - from.number));
+    const double fraction = std::clamp((density - from.density) / (to.density - from.density), 0.0, 1.0);
+    return static_cast<float>(from.number + fraction * (to.number - from.number));
 }
 
 double noiseOf(double width, double doseIndex) noexcept
@@ -157,8 +157,8 @@ void Scanner::addPlane(const channel::State& state, const channel::Deformation& 
             const glm::dvec3 p(f.corner.x + x * f.pixel, f.corner.y + y * f.pixel, plane.z);
             float hu = numberAt(body, body.rest(p, shift));
             if (metal && p.x > low.x && p.y > low.y && p.x < high.x && p.y < high.y) {
-                const double share = std::clamp((radius - distanceToNeedle(needle, p)) / f.pixel + 0.5, 0.0, 1.0);
-                hu += static_cast<float>(share) * (steel - hu);
+                const double fraction = std::clamp((radius - distanceToNeedle(needle, p)) / f.pixel + 0.5, 0.0, 1.0);
+                hu += static_cast<float>(fraction) * (steel - hu);
             }
             plane.sum[static_cast<std::size_t>(y * f.side + x)] += hu / planesOfSlice;
         }

@@ -26,8 +26,8 @@ using volume::Structure;
 using volume::Tissue;
 using Labels = std::vector<std::uint16_t>;
 
-constexpr std::size_t mostSamples = 2'000'000;   // of the search for the target
-constexpr std::size_t mostFieldNodes = 300'000;  // of a distance field
+constexpr std::size_t maxSamples = 2'000'000;   // of the search for the target
+constexpr std::size_t maxFieldNodes = 300'000;  // of a distance field
 constexpr int directionCount = 600;
 constexpr int borderVoxels = 3;          // the body's surface so near to the image's border is a cut, not skin
 constexpr double freeOutside = 0.06;     // length of needle that must be in air before it enters [m]
@@ -35,7 +35,7 @@ constexpr double comfort = 7e-3;         // clearance beyond which more is no be
 constexpr double discSpacing = 0.7e-3;   // of the samples around a line [m]
 constexpr double beyondTip = 3e-3;       // a line must also be clear so far beyond the fired tip [m]
 constexpr double startDistance = 0.03;   // of the tip from the skin, before and after [m]
-constexpr double leastInside = 3e-3;     // the tip is so deep before the gun fires [m]
+constexpr double minInside = 3e-3;       // the tip is so deep before the gun fires [m]
 constexpr double steepest = 0.5;         // cosine between needle and skin's normal; flatter, the tip slips on the skin
 constexpr double skinPatch = 5e-3;       // radius of the patch that tells the skin's normal [m]
 constexpr double otherDirection = 0.94;  // cosine between two proposals, at most
@@ -121,7 +121,7 @@ Vec3 deepestPoint(const Tissue& tissue, const Labels& labels, const Box& box, do
 {
     const Vec3 extent = box.high - box.low;
     const double wanted = std::max(step / 2, std::max({extent.x, extent.y, extent.z}) / 32);
-    const NodeGrid grid = volume::coveringGrid(box, volume::affordableSpacing(box, wanted, step, mostFieldNodes), step);
+    const NodeGrid grid = volume::coveringGrid(box, volume::affordableSpacing(box, wanted, step, maxFieldNodes), step);
     const volume::DistanceField field = tissue.distanceTo(labels, grid);
     const auto deepest = std::min_element(field.values.begin(), field.values.end());
     return grid.position(grid.node(static_cast<std::size_t>(deepest - field.values.begin())));
@@ -133,11 +133,11 @@ std::vector<Vec3> aims(const Scene& scene, const Tissue& tissue)
     if (scene.aim) {
         return {*scene.aim};
     }
-    constexpr std::size_t mostBlobs = 12;
+    constexpr std::size_t maxBlobs = 12;
     const Labels labels = namedLabels(scene, tissue);
     const Vec3 voxel = tissue.affine().spacing();
     const Box body = tissue.box();
-    const double step = volume::affordableSpacing(body, std::max({voxel.x, voxel.y, voxel.z}), 0, mostSamples);
+    const double step = volume::affordableSpacing(body, std::max({voxel.x, voxel.y, voxel.z}), 0, maxSamples);
     const NodeGrid grid = volume::coveringGrid(body, step, 0);
     std::vector<char> inside = samplesInside(tissue, grid, labels);
     const std::vector<Blob> pieces = blobs(grid, inside);
@@ -146,7 +146,7 @@ std::vector<Vec3> aims(const Scene& scene, const Tissue& tissue)
     }
     std::vector<Vec3> points;
     for (const Blob& piece : pieces) {
-        if (points.size() < mostBlobs && 4 * piece.nodes >= pieces.front().nodes) {
+        if (points.size() < maxBlobs && 4 * piece.nodes >= pieces.front().nodes) {
             points.push_back(deepestPoint(tissue, labels, piece.box, step));
         }
     }
@@ -411,7 +411,7 @@ std::vector<Proposal> proposeApproaches(const Scene& scene, const Tissue& tissue
 double firingDepth(const ToolSpec& tool, double length) noexcept
 {
     const double depth = length + halfNotch(tool) - throwOf(tool);
-    return tool.kind == ToolKind::needle ? std::max(leastInside, depth) : depth;
+    return tool.kind == ToolKind::needle ? std::max(minInside, depth) : depth;
 }
 
 std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach)

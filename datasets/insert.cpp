@@ -107,8 +107,8 @@ bool roomFor(const Tissue& tissue, const Tissue::Reader& reader, const Insert& l
     Random random(1);
     for (int i = 0; i < surfaceSamples; ++i) {
         const Vec3 d = random.direction();
-        for (const double share : {0.5, 1.0}) {
-            const auto& row = tissue.table().rows[reader.tissue(lesion.centre + share * radius * d)];
+        for (const double fraction : {0.5, 1.0}) {
+            const auto& row = tissue.table().rows[reader.tissue(lesion.centre + fraction * radius * d)];
             if (row.role == Role::air || row.role == Role::skin || row.role == Role::bone || row.fixed) {
                 return false;
             }
@@ -212,10 +212,10 @@ Insert placeLesion(const Tissue& tissue, const std::filesystem::path& locations,
 
 Insert placeLesionIn(const Tissue& tissue, const std::string& structure, Insert lesion)
 {
-    constexpr std::size_t mostNodes = 4'000'000;
+    constexpr std::size_t maxNodes = 4'000'000;
     const Vec3 voxel = tissue.affine().spacing();
     const double wanted = std::max(std::min({voxel.x, voxel.y, voxel.z}), lesion.diameter / 8);
-    const volume::NodeGrid grid = volume::affordableGrid(tissue.box(), wanted, mostNodes);
+    const volume::NodeGrid grid = volume::affordableGrid(tissue.box(), wanted, maxNodes);
     const volume::DistanceField field = tissue.distanceTo(tissue.labelsNamed(structure), grid);
     const double radius = Shape(lesion).bound();
     std::vector<std::size_t> places;

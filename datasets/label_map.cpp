@@ -20,7 +20,7 @@ namespace palpate::datasets {
 namespace {
 
 constexpr double farthestValue = 1e6;  // of an image
-constexpr double mostFactor = 1e3;     // on a modulus
+constexpr double maxFactor = 1e3;      // on a modulus
 
 // One map: the top of a file, or one [[map]] of several.
 LabelMap readMap(Section& top, const std::string& fallbackName)
@@ -115,7 +115,7 @@ std::vector<std::pair<double, double>> pointsOf(Section& top)
         const auto value = pair != nullptr && pair->size() == 2 ? pair->get(0)->value<double>() : std::nullopt;
         const auto factor = pair != nullptr && pair->size() == 2 ? pair->get(1)->value<double>() : std::nullopt;
         const bool grows = value && std::abs(*value) <= farthestValue && (points.empty() || *value > points.back().first);
-        if (!grows || !factor || !(*factor >= 1 / mostFactor && *factor <= mostFactor)) {
+        if (!grows || !factor || !(*factor >= 1 / maxFactor && *factor <= maxFactor)) {
             top.refuse("points", form);
         }
         points.emplace_back(*value, *factor);

@@ -14,7 +14,7 @@ namespace palpate::datasets {
 
 namespace {
 
-constexpr double mostVoxels = 1024.0 * 1024.0 * 1024.0;
+constexpr double maxVoxels = 1024.0 * 1024.0 * 1024.0;
 constexpr double perVoxel = 4.2;  // of a session's memory at its peak, measured from 60 to 450 million voxels [bytes]
 constexpr double giga = 1e9;
 
@@ -40,7 +40,7 @@ volume::LabelImage phantomImage(const PhantomValues& values, Vec3 low, Vec3 high
         }
     }
     const double count = static_cast<double>(image.size.x) * image.size.y * image.size.z;
-    if (count > mostVoxels) {
+    if (count > maxVoxels) {
         throw std::runtime_error(fmt::format("a phantom of {} x {} x {} voxels is too large: choose a larger voxel",
                                              image.size.x, image.size.y, image.size.z));
     }
@@ -123,14 +123,14 @@ std::vector<Vec3> directions(int count)
 
 double Lump::reach(Vec3 direction) const noexcept
 {
-    double share = 1.0 + lobes * smoothNoise(seed, lobeFrequency * direction);
+    double fraction = 1.0 + lobes * smoothNoise(seed, lobeFrequency * direction);
     for (std::size_t s = 0; s < spicules.size(); ++s) {
         const double t = (glm::dot(direction, spicules[s]) - spiculeCosine) / (1.0 - spiculeCosine);
         if (t > 0) {
-            share += spiculeHeight[s] * t * t;
+            fraction += spiculeHeight[s] * t * t;
         }
     }
-    return radius * scale * share;
+    return radius * scale * fraction;
 }
 
 Lump makeLump(const std::string& kind, double diameter, Random& random)
@@ -258,12 +258,12 @@ std::vector<Tube> growTree(const TreeShape& shape, Vec3 root, Vec3 direction, Ve
     return tubes;
 }
 
-void drawTubes(volume::LabelImage& image, const std::vector<Tube>& tubes, double leastRadius, std::uint16_t label,
+void drawTubes(volume::LabelImage& image, const std::vector<Tube>& tubes, double minRadius, std::uint16_t label,
                const std::function<bool(std::uint16_t)>& over)
 {
     for (Tube tube : tubes) {
-        tube.fromRadius = std::max(tube.fromRadius, leastRadius);
-        tube.toRadius = std::max(tube.toRadius, leastRadius);
+        tube.fromRadius = std::max(tube.fromRadius, minRadius);
+        tube.toRadius = std::max(tube.toRadius, minRadius);
         const double reach = std::max(tube.fromRadius, tube.toRadius);
         forEachVoxel(image, glm::min(tube.from, tube.to), glm::max(tube.from, tube.to), reach, [&](Index3 n, Vec3 centre) {
             std::uint16_t& value = image.values[image.offset(n)];

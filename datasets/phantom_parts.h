@@ -56,10 +56,10 @@ void forEachVoxel(const volume::LabelImage& image, Vec3 low, Vec3 high, double r
 struct Lump {
     Vec3 centre{0.0};   // [mm]
     double radius = 0;  // of the sphere with the same volume [mm]
-    double lobes = 0;   // height of the lobes, share of the radius
+    double lobes = 0;   // height of the lobes, fraction of the radius
     std::uint64_t seed = 0;
     std::vector<Vec3> spicules;         // directions
-    std::vector<double> spiculeHeight;  // share of the radius
+    std::vector<double> spiculeHeight;  // fraction of the radius
     double scale = 1;                   // makes the volume that of the sphere
     double bound = 0;                   // no point is farther from the centre [mm]
 
@@ -86,16 +86,16 @@ struct TreeShape {
     double step = 3;           // length of a tube [mm]
     double branchLength = 18;  // of the first branch [mm]; each next one is a fifth shorter
     int levels = 4;            // of branches
-    double wander = 0.3;       // random share of the direction at every step
-    double pull = 0.15;        // share of the direction towards the goal
+    double wander = 0.3;       // random fraction of the direction at every step
+    double pull = 0.15;        // fraction of the direction towards the goal
 };
 
 /// Grows a tree from `root` towards `goal`; every tube ends where `allowed` (point, radius) holds. Branches that find no
 /// way end early. Radii follow Murray's law (cubes add up at a fork).
 std::vector<Tube> growTree(const TreeShape& shape, Vec3 root, Vec3 direction, Vec3 goal, Random& random,
                            const std::function<bool(Vec3, double)>& allowed);
-/// Draws tubes at least `leastRadius` [mm] thick, so that they stay in one piece on coarse grids.
-void drawTubes(volume::LabelImage& image, const std::vector<Tube>& tubes, double leastRadius, std::uint16_t label,
+/// Draws tubes at least `minRadius` [mm] thick, so that they stay in one piece on coarse grids.
+void drawTubes(volume::LabelImage& image, const std::vector<Tube>& tubes, double minRadius, std::uint16_t label,
                const std::function<bool(std::uint16_t)>& over);
 double distanceToTube(Vec3 p, const Tube& tube) noexcept;
 

@@ -35,7 +35,7 @@ struct ToolSpec {
     double bevelTurn = 0;         // about the needle: which way it bends [rad]
 };
 
-/// A mass, damper and spring with a magnitude: one term of equation 3 of the thesis and its share of equations 6-8.
+/// A mass, damper and spring with a magnitude: one term of equation 3 of the thesis and its fraction of equations 6-8.
 struct ForceTerm {
     double force = 0;      // magnitude [N]
     double mass = 0;       // [kg]

@@ -10,7 +10,7 @@ namespace palpate::datasets {
 
 namespace {
 
-constexpr int mostSlices = 9;
+constexpr int maxSlices = 9;
 constexpr int usualSlices = 3;
 
 constexpr std::array<Field<CtSpec>, 2> ctFields{{
@@ -23,7 +23,7 @@ constexpr std::array<Field<CtSpec>, 2> ctFields{{
 void readCt(Section& top, CtSpec& ct)
 {
     if (std::optional<Section> section = top.section("ct")) {
-        ct.slices = static_cast<int>(section->integer("slices", "", 1, mostSlices).value_or(usualSlices));
+        ct.slices = static_cast<int>(section->integer("slices", "", 1, maxSlices).value_or(usualSlices));
         if (ct.slices % 2 == 0) {
             section->refuse("slices", "must be odd: the middle one goes through the tip");
         }

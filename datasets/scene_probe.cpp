@@ -13,7 +13,7 @@ namespace palpate::datasets {
 namespace {
 
 constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
-constexpr std::size_t mostSteps = 1000;
+constexpr std::size_t maxSteps = 1000;
 
 constexpr std::array<Field<ProbeSpec>, 3> probeFields{{
     {"depth_mm", "mm", 20, 250, 1e-3, &ProbeSpec::depth},
@@ -98,8 +98,8 @@ void readProbe(Section& top, ProbeSpec& probe)
         }
         section.finish();
         probe.script.push_back(step);
-        if (probe.script.size() > mostSteps) {
-            section.refuse("at_s", fmt::format("over {} steps", mostSteps));
+        if (probe.script.size() > maxSteps) {
+            section.refuse("at_s", fmt::format("over {} steps", maxSteps));
         }
     }
 }

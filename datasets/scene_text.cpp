@@ -14,10 +14,10 @@ namespace {
 
 constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr std::size_t mostSteps = 1000;  // of a script
+constexpr std::size_t maxSteps = 1000;  // of a script
 
 constexpr std::array<std::string_view, 2> taskNames{"biopsy", "find"};
-constexpr std::size_t mostInserts = 32;
+constexpr std::size_t maxInserts = 32;
 constexpr std::array<std::string_view, 3> dffbModes{"off", "thesis", "field"};
 constexpr std::array<std::string_view, 2> strains{"small", "finite"};
 constexpr std::array<std::string_view, 5> stepKinds{"move", "press", "fire", "wait", "pierce"};
@@ -238,8 +238,8 @@ void readVital(Section& top, std::vector<VitalStructure>& vital)
         }
         section.finish();
         vital.push_back(std::move(structure));
-        if (vital.size() > mostVital) {
-            section.refuse("name", fmt::format("over {} vital structures", mostVital));
+        if (vital.size() > maxVital) {
+            section.refuse("name", fmt::format("over {} vital structures", maxVital));
         }
     }
 }
@@ -263,8 +263,8 @@ void readInserts(Section& top, std::vector<Insert>& inserts)
         }
         section.finish();
         inserts.push_back(std::move(insert));
-        if (inserts.size() > mostInserts) {
-            section.refuse("name", fmt::format("over {} inserts", mostInserts));
+        if (inserts.size() > maxInserts) {
+            section.refuse("name", fmt::format("over {} inserts", maxInserts));
         }
     }
 }
@@ -288,8 +288,8 @@ void readScript(Section& top, std::vector<TraineeStep>& script)
         }
         section.finish();
         script.push_back(step);
-        if (script.size() > mostSteps) {
-            section.refuse("kind", fmt::format("over {} steps", mostSteps));
+        if (script.size() > maxSteps) {
+            section.refuse("kind", fmt::format("over {} steps", maxSteps));
         }
     }
 }

@@ -12,7 +12,7 @@ namespace palpate::datasets {
 class Section;
 
 /// Vital structures of a scene: a session follows 16 structures, the target among them.
-inline constexpr std::size_t mostVital = 15;
+inline constexpr std::size_t maxVital = 15;
 
 /// The tables [tissue.NAME] of a scene, and back.
 std::vector<TissueChange> readTissueChanges(Section& top);

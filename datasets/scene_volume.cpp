@@ -88,7 +88,7 @@ std::vector<VitalStructure> chooseVital(const Tissue& tissue, const std::string&
     }
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.volume > b.volume; });
-    candidates.resize(std::min(candidates.size(), mostVital));
+    candidates.resize(std::min(candidates.size(), maxVital));
     std::vector<VitalStructure> vital;
     for (const Candidate& c : candidates) {
         vital.push_back({.name = c.name});

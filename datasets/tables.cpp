@@ -18,9 +18,9 @@ using volume::Role;
 using volume::TissueRow;
 using volume::TissueTable;
 
-constexpr std::size_t mostTissues = 64;  // what a sample of tissue has room for
-constexpr double softest = 0.01;         // [kPa]; anything that is not air resists
-constexpr double mostRelaxing = 0.95;    // of the stress right after a step
+constexpr std::size_t maxTissues = 64;  // what a sample of tissue has room for
+constexpr double softest = 0.01;        // [kPa]; anything that is not air resists
+constexpr double maxRelaxing = 0.95;    // of the stress right after a step
 
 // These may be left out: they are there where somebody measured them.
 constexpr std::array<Field<TissueRow>, 6> measuredFields{{
@@ -105,10 +105,10 @@ std::pair<std::string_view, std::string> misfit(const TissueRow& row)
     if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
         return {"youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest)};
     }
-    if (row.relaxingFast + row.relaxingSlow > mostRelaxing) {
+    if (row.relaxingFast + row.relaxingSlow > maxRelaxing) {
         return {"relaxing_slow", fmt::format("must not be over {:g} together with relaxing_fast: a solid keeps some of its "
                                              "stress",
-                                             mostRelaxing)};
+                                             maxRelaxing)};
     }
     if (row.cuttingForce > row.punctureForce) {
         return {"cutting_n", "must not be over puncture_n: the force drops after the puncture"};
@@ -155,8 +155,8 @@ TissueTable readTissues(std::string_view text, const std::string& file)
             section.refuse("role", "the first tissue, and no other, must be \"air\" of role air");
         }
         table.rows.push_back(std::move(row));
-        if (table.rows.size() > mostTissues) {
-            section.refuse("name", fmt::format("over {} tissues", mostTissues));
+        if (table.rows.size() > maxTissues) {
+            section.refuse("name", fmt::format("over {} tissues", maxTissues));
         }
     }
     top.finish();

@@ -42,7 +42,7 @@ struct Pieces {
     }
     void end() noexcept
     {
-        count += run >= leastPiece ? 1U : 0U;
+        count += run >= minPiece ? 1U : 0U;
         run = 0.0;
     }
 };
@@ -107,8 +107,8 @@ void removeCore(const SessionModel& model, const occupancy::Body& body, const Co
                 Cuts& cuts) noexcept
 {
     const auto& tool = model.scene.tool;
-    const auto between = [&](Vec3 from, Vec3 to, double share) {
-        return occupancy::restPoint(body, glm::mix(from, to, share));
+    const auto between = [&](Vec3 from, Vec3 to, double fraction) {
+        return occupancy::restPoint(body, glm::mix(from, to, fraction));
     };
     for (int i = 0; i < coreChannels; ++i) {
         const Vec3 from = between(core.notchStart, core.notchEnd, static_cast<double>(i) / coreChannels);

@@ -13,7 +13,7 @@ namespace palpate::haptics {
 /// for the same volume.
 ///
 /// The core breaks along the notch's axis at a gap, and where soft meets stiff: where Young's modulus changes by
-/// `breakingContrast` or more. Pieces under `leastPiece` are debris. Both are assumed: of fragmentation it is only known
+/// `breakingContrast` or more. Pieces under `minPiece` are debris. Both are assumed: of fragmentation it is only known
 /// that it is common (17 % of the best 14 G cores, Berg et al. 1997) and that cores part at boundaries. Bounded work,
 /// allocates nothing.
 CoreSample takeCore(const SessionModel& model, const volume::Tissue::Reader& reader, const occupancy::Body& body,
@@ -28,6 +28,6 @@ inline constexpr int coreRings = 3;
 inline constexpr int coreSectors = 8;
 inline constexpr int coreSamples = coreSlices * coreRings * coreSectors;
 inline constexpr double breakingContrast = 5.0;  // fat to high-grade carcinoma: 13; fat to skin: 17; fat to gland: 1
-inline constexpr double leastPiece = 1e-3;       // [m]
+inline constexpr double minPiece = 1e-3;         // [m]
 
 }  // namespace palpate::haptics

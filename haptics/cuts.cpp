@@ -8,9 +8,9 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double ends = 1e-9;       // by which a channel's ends count as inside [m]
-constexpr int mostChannels = 16;    // that follow one another ahead of a tip
-constexpr double leastOpen = 1e-7;  // [m]
+constexpr double ends = 1e-9;     // by which a channel's ends count as inside [m]
+constexpr int maxChannels = 16;   // that follow one another ahead of a tip
+constexpr double minOpen = 1e-7;  // [m]
 
 // How far the ray p + s axis stays inside, from p on; 0 when p is outside [m].
 double exitOf(const Channel& c, Vec3 p, Vec3 axis) noexcept
@@ -72,14 +72,14 @@ bool taken(const Cuts& cuts, Vec3 rest) noexcept
 double openAhead(const Cuts& cuts, Vec3 p, Vec3 axis) noexcept
 {
     double open = 0.0;
-    for (int i = 0; i < mostChannels; ++i) {
+    for (int i = 0; i < maxChannels; ++i) {
         double further = 0.0;
         for (const auto& all : {cuts.paths.all(), cuts.cores.all()}) {
             for (const Channel& c : all) {
                 further = std::max(further, exitOf(c, p + open * axis, axis));
             }
         }
-        if (further < leastOpen) {
+        if (further < minOpen) {
             break;
         }
         open += further;

@@ -27,7 +27,7 @@ ForceTerm operator*(double s, const ForceTerm& t) noexcept
     return {s * t.force, s * t.mass, s * t.damping, s * t.stiffness};
 }
 
-// Equation 4, as a share of (structure + tissue).
+// Equation 4, as a fraction of (structure + tissue).
 double nearness(const DffbParameters& p, double distance) noexcept
 {
     return p.floorDistance / std::max(distance, p.floorDistance);
@@ -79,10 +79,10 @@ Vec3 fieldForce(const DffbParameters& p, std::size_t count, const std::array<Pro
     double near = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
         const Proximity& one = structures[i];
-        const double share = nearness(p, one.distance) * fade(p, one.distance);
-        near = std::max(near, share);
+        const double fraction = nearness(p, one.distance) * fade(p, one.distance);
+        near = std::max(near, fraction);
         if (one.vital) {
-            push += one.gain * share * both.force * one.away;
+            push += one.gain * fraction * both.force * one.away;
         }
     }
     const ForceTerm sum = p.surgery + p.task + both;

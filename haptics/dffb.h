@@ -25,7 +25,7 @@ struct DffbState {
     Vec3 last{0.0};           // tip in the tick before [m]
     Vec3 velocity{0.0};       // of the tip, low-passed [m/s]
     std::uint8_t cursor = 1;  // `thesis`: row of the lookup table that is the nearest vital structure now
-    double presence = 0;      // share of the force that contact has brought in
+    double presence = 0;      // fraction of the force that contact has brought in
     double time = 0;          // of the session [s]
     bool started = false;
 };

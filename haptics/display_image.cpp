@@ -53,8 +53,8 @@ std::vector<float> valuesAround(const volume::NodeGrid& grid, const std::vector<
 // Nearest rank; takes the values to pieces.
 GreyWindow percentiles(std::string_view name, std::vector<float> values)
 {
-    const auto at = [&](double share) {
-        const auto rank = static_cast<std::ptrdiff_t>(std::llround(share * static_cast<double>(values.size() - 1)));
+    const auto at = [&](double fraction) {
+        const auto rank = static_cast<std::ptrdiff_t>(std::llround(fraction * static_cast<double>(values.size() - 1)));
         std::nth_element(values.begin(), values.begin() + rank, values.end());
         return static_cast<double>(values[static_cast<std::size_t>(rank)]);
     };

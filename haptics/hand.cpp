@@ -43,7 +43,7 @@ void HandDevice::nextStep() noexcept
 
 bool HandDevice::feltDrop() const noexcept
 {
-    return peak_ > parameters_.leastFelt && glm::length(force_) < (1.0 - parameters_.dropFelt) * peak_;
+    return peak_ > parameters_.minFelt && glm::length(force_) < (1.0 - parameters_.dropFelt) * peak_;
 }
 
 // Seen, where there is something to see: a force that drops may be a device that fades, as after missed ticks.

@@ -14,8 +14,8 @@ struct HandParameters {
     DeviceParameters device = deviceParameters("premium");
     Grip grip;
     double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
-    double dropFelt = 0.4;        // share of the force that must go for the hand to feel that tissue gave way
-    double leastFelt = 0.3;       // forces below are not noticed [N]
+    double dropFelt = 0.4;        // fraction of the force that must go for the hand to feel that tissue gave way
+    double minFelt = 0.3;         // forces below are not noticed [N]
     double braking = 30e-3;       // inside the body the hand stops so long before the mark at its speed [s]; assumed
 };
 

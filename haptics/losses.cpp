@@ -17,14 +17,14 @@ namespace {
 using base::said;
 using base::tr;
 
-constexpr double worthSaying = 1e-3;   // [m]; shorter ways have no direction
-constexpr double worthDepth = 5e-3;    // along the needle [m]: the notch is 20 mm long, and tissue is dragged along
-constexpr double blindFrom = 3e-3;     // way without the tip in the picture that costs points [m]
-constexpr double leastPoints = 0.005;  // less is no loss
+constexpr double worthSaying = 1e-3;  // [m]; shorter ways have no direction
+constexpr double worthDepth = 5e-3;   // along the needle [m]: the notch is 20 mm long, and tissue is dragged along
+constexpr double blindFrom = 3e-3;    // way without the tip in the picture that costs points [m]
+constexpr double minPoints = 0.005;   // less is no loss
 
-double points(double most, double share)
+double points(double most, double fraction)
 {
-    return most * (1 - share);
+    return most * (1 - fraction);
 }
 
 std::string timesInWords(std::uint32_t n)
@@ -133,24 +133,24 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
     if (s.passes == 0) {
         return {{"passes", 75, tr("The gun was not fired: there is no core"), std::nullopt}};
     }
-    const ScoreShares share = sharesOf(s);
-    const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * share.hit * share.stays;
+    const ScoreShares fraction = sharesOf(s);
+    const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * fraction.hit * fraction.stays;
     std::vector<Loss> all{
-        {"best_target_pct", points(50, parts(s).core / 50) + points(25, share.hit), miss(s, target), at(shot)},
-        {"beyond_target_mm", 25 * share.hit * (1 - share.stays),
+        {"best_target_pct", points(50, parts(s).core / 50) + points(25, fraction.hit), miss(s, target), at(shot)},
+        {"beyond_target_mm", 25 * fraction.hit * (1 - fraction.stays),
          said(tr("The needle was pushed {:.1Lf} mm deeper than the {}"), 1e3 * s.beyondTarget, target), at(beyond)},
-        {"passes", points(each, share.passes), said(tr("{} cores were taken; one can do"), s.passes), at(secondShot)},
-        {"skin_contacts", points(each, share.contacts), said(tr("The skin was touched {}"), timesInWords(s.skinContacts)),
-         at(secondContact)},
-        {"redirects", points(each, share.redirects),
+        {"passes", points(each, fraction.passes), said(tr("{} cores were taken; one can do"), s.passes), at(secondShot)},
+        {"skin_contacts", points(each, fraction.contacts),
+         said(tr("The skin was touched {}"), timesInWords(s.skinContacts)), at(secondContact)},
+        {"redirects", points(each, fraction.redirects),
          said(tr("The needle was drawn back and pushed on again {}"), timesInWords(s.redirects)), at(redirect)},
-        {"inserted_path_mm", points(each, share.economy),
+        {"inserted_path_mm", points(each, fraction.economy),
          said(tr("The tip went {:.0f} mm inside the body, {:.0f} mm would have done"), 1e3 * s.insertedPath,
               2e3 * s.deepest),
          std::nullopt},
-        {"peak_force_n", points(each, share.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
+        {"peak_force_n", points(each, fraction.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
     if (s.hasProbe) {
-        all.push_back({"blind_advance_mm", points(each, share.seen),
+        all.push_back({"blind_advance_mm", points(each, fraction.seen),
                        said(tr("The needle went on {:.0f} mm without its tip in the picture"), 1e3 * s.blindAdvance),
                        at(blind)});
     }
@@ -160,7 +160,7 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
 std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info) const
 {
     const std::string target = info.structures.empty() ? tr("lump") : base::spokenHere(info.structures[0]);
-    const ScoreShares share = sharesOf(s);
+    const ScoreShares fraction = sharesOf(s);
     std::string where = std::isfinite(s.markError)
                             ? said(tr("The marks' middle lies {:.1Lf} mm beside that of the {}"), 1e3 * s.markError, target)
                             : said(tr("What was marked cannot be compared with the {}"), target);
@@ -169,11 +169,12 @@ std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info
         const std::string direction = directionInWords(away - glm::dot(away, target_->axis) * target_->axis);
         where += direction.empty() ? "" : ", " + direction;
     }
-    return {{"mark_error_mm", points(30, share.place) + (20 * share.size + 25 * share.gentle) * (1 - share.near), where,
-             at(mark)},
-            {"mark_size_error_mm", points(20, share.size),
-             said(tr("The size was marked {:.1Lf} mm wrong"), 1e3 * s.markSizeError), at(mark)},
-            {"peak_force_n", points(25, share.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
+    return {
+        {"mark_error_mm", points(30, fraction.place) + (20 * fraction.size + 25 * fraction.gentle) * (1 - fraction.near),
+         where, at(mark)},
+        {"mark_size_error_mm", points(20, fraction.size),
+         said(tr("The size was marked {:.1Lf} mm wrong"), 1e3 * s.markSizeError), at(mark)},
+        {"peak_force_n", points(25, fraction.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
 }
 
 std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
@@ -191,7 +192,7 @@ std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
                        : said(tr("Vital structures were touched {}, first {}, for {:.1Lf} s and up to {:.1Lf} mm deep"),
                               timesInWords(s.vitalContacts), structure, s.vitalSeconds, 1e3 * s.vitalDepth),
                    at(touch)});
-    std::erase_if(all, [](const Loss& loss) { return loss.points < leastPoints; });
+    std::erase_if(all, [](const Loss& loss) { return loss.points < minPoints; });
     std::ranges::stable_sort(all, std::ranges::greater{}, &Loss::points);
     return all;
 }

@@ -72,7 +72,7 @@ constexpr std::array<Measure, 34> all{{
     {"needle_in_beam_pct", "beam %", "Shaft in the picture", "%", 0, Listed::ifProbe,
      [](const Score& s) { return ofProbe(s, s.needleShare * 100); }},
     {"least_in_beam_mm", "least mm", "Needle in the picture (least)", "mm", 1, Listed::ifProbe,
-     [](const Score& s) { return ofProbe(s, s.leastInBeam * 1e3); }},
+     [](const Score& s) { return ofProbe(s, s.minInBeam * 1e3); }},
     {"tip_in_beam_pct", "tip %", "Tip in the picture", "%", 0, Listed::ifProbe,
      [](const Score& s) { return ofProbe(s, s.tipShare * 100); }},
     {"blind_advance_mm", "blind mm", "Advanced without seeing it", "mm", 1, Listed::ifProbe,

@@ -20,8 +20,8 @@ inline double normalOf(datasets::Random& random) noexcept
     return sum;
 }
 
-/// Minimum jerk: the share of the way at a share of the time, with speed and acceleration 0 at both ends. Source: Flash and
-/// Hogan, "The coordination of arm movements", J. Neuroscience 5, 1985.
+/// Minimum jerk: the fraction of the way at a fraction of the time, with speed and acceleration 0 at both ends. Source:
+/// Flash and Hogan, "The coordination of arm movements", J. Neuroscience 5, 1985.
 inline double minimumJerk(double t) noexcept
 {
     const double s = std::clamp(t, 0.0, 1.0);

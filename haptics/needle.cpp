@@ -20,17 +20,17 @@ constexpr double sidewaysLimit = 3.0;    // sideways the tissue gives way at thi
 constexpr double sidewaysDepth = 10e-3;  // inserted length that doubles the sideways stiffness [m]
 constexpr double embedding = 10e-3;      // inserted length at which the tip is surrounded [m]
 constexpr int shaftSamples = 16;
-constexpr double leastShaftStiffness = 20.0;  // [N/m]
-constexpr double speedBand = 30.0;            // the shaft's speed passes a low-pass at this frequency [Hz]
-constexpr double steel = 200e9;               // Young's modulus [Pa]
+constexpr double minShaftStiffness = 20.0;  // [N/m]
+constexpr double speedBand = 30.0;          // the shaft's speed passes a low-pass at this frequency [Hz]
+constexpr double steel = 200e9;             // Young's modulus [Pa]
 
 // Inside, tissue resists on all sides: a rigid disc in an infinite medium is twice as stiff as a punch on its surface
 // (Selvadurai, "The displacement of a rigid disc inclusion embedded in an infinite elastic medium", 1979; nu = 0.5). It
 // comes in over `embedding`: sooner, the force would rise while a pierced skin springs back over the needle.
 DepthLaw embedded(DepthLaw surface, double inserted) noexcept
 {
-    const double share = 1.0 + std::clamp(inserted / embedding, 0.0, 1.0);
-    return {share * surface.linear, share * surface.quadratic, surface.stiffest};
+    const double fraction = 1.0 + std::clamp(inserted / embedding, 0.0, 1.0);
+    return {fraction * surface.linear, fraction * surface.quadratic, surface.stiffest};
 }
 
 // What holds the whole of a shaft.
@@ -165,7 +165,7 @@ struct Needle {
         const double length = shaftSamples * piece;
         const double spread = std::max(std::log(2.5 * length * (1.0 - nu) / model.scene.tool.radius), 1.0);
         const double stiffness = 2.0 * std::numbers::pi * modulus / (2.0 * (1.0 + nu)) * length / spread;
-        hold.stiffness = std::clamp(stiffness, leastShaftStiffness, stiffestContact);
+        hold.stiffness = std::clamp(stiffness, minShaftStiffness, stiffestContact);
         return hold;
     }
 
@@ -177,7 +177,7 @@ struct Needle {
         const double blend = 1.0 - 1.0 / (1.0 + 2.0 * std::numbers::pi * speedBand * dt);
         state.speed += blend * (way / dt - state.speed);
         const ShaftHold hold = shaftHold();
-        // Tissue that lets go takes its share of the force along; tissue that comes to it holds from where it is.
+        // Tissue that lets go takes its fraction of the force along; tissue that comes to it holds from where it is.
         if (hold.stiffness < state.shaftStiffness) {
             state.shaftForce *= hold.stiffness / state.shaftStiffness;
             state.shaftLost.scale(hold.stiffness / state.shaftStiffness);

@@ -18,7 +18,7 @@ constexpr double travelSpeed = 60e-3;  // mean [m/s]
 constexpr double pressSpeed = 30e-3;   // mean [m/s]
 constexpr double holdTime = 0.15;      // before the force is judged [s]
 constexpr double markTime = 0.10;      // the button stays down for half of it [s]
-constexpr double leastFelt = 0.05;     // [N]
+constexpr double minFelt = 0.05;       // [N]
 
 Vec3 acrossOf(Vec3 axis)
 {
@@ -117,8 +117,9 @@ void Palpator::findEdges(bool alongU) noexcept
         const Place& in = places_[static_cast<std::size_t>(i)];
         const Place& out = places_[static_cast<std::size_t>(i == last ? i : i + side)];
         const double fall = in.stiffness - out.stiffness;
-        const double share = fall > 0.0 ? std::clamp((in.stiffness - level) / fall, 0.0, 1.0) : 0.0;
-        edges_[(alongU ? 0U : 2U) + (side > 0 ? 1U : 0U)] = {in.u + share * (out.u - in.u), in.v + share * (out.v - in.v)};
+        const double fraction = fall > 0.0 ? std::clamp((in.stiffness - level) / fall, 0.0, 1.0) : 0.0;
+        edges_[(alongU ? 0U : 2U) + (side > 0 ? 1U : 0U)] = {in.u + fraction * (out.u - in.u),
+                                                             in.v + fraction * (out.v - in.v)};
     }
 }
 
@@ -213,7 +214,7 @@ void Palpator::write(Vec3 force) noexcept
 {
     arm_.write(force);
     force_ = -glm::dot(force, axis_);
-    if (touched_ < 0.0 && force_ > leastFelt) {
+    if (touched_ < 0.0 && force_ > minFelt) {
         touched_ = std::max(0.0, glm::dot(arm_.position() - origin_, axis_));
     }
 }

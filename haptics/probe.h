@@ -53,7 +53,7 @@ private:
     datasets::ProbeSpec spec_;
     std::optional<ultrasound::Beam> beam_;
     datasets::ProbePlace at_;
-    std::array<chainmail::ElasticTool, chainmail::ElasticLevel::mostOthers> tools_{};
+    std::array<chainmail::ElasticTool, chainmail::ElasticLevel::maxOthers> tools_{};
     std::size_t count_ = 0;
 };
 

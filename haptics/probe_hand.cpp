@@ -11,11 +11,11 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double shaft = 20e-3;      // of the needle that the plane is laid along [m]
-constexpr double leastAlong = 8e-3;  // between tip and shaft in the picture: below, a turn is not asked for [m]
-constexpr double mostTurn = 0.5;     // from where the scene has the probe [rad]
-constexpr double mostSweep = 25e-3;  // likewise [m]
-constexpr double wanderTime = 1.0;   // after so long it has forgotten which way it went [s]
+constexpr double shaft = 20e-3;     // of the needle that the plane is laid along [m]
+constexpr double minAlong = 8e-3;   // between tip and shaft in the picture: below, a turn is not asked for [m]
+constexpr double maxTurn = 0.5;     // from where the scene has the probe [rad]
+constexpr double maxSweep = 25e-3;  // likewise [m]
+constexpr double wanderTime = 1.0;  // after so long it has forgotten which way it went [s]
 
 }  // namespace
 
@@ -41,11 +41,11 @@ void ProbeHand::look() noexcept
         return;
     }
     const double along = tipAlong_ - shaftAlong_;
-    const double turn = std::abs(along) > leastAlong ? (tipAcross_ - shaftAcross_) / along : 0.0;
+    const double turn = std::abs(along) > minAlong ? (tipAcross_ - shaftAcross_) / along : 0.0;
     const double sweep = tipAcross_ - turn * tipAlong_;
     from_ = to_ = move_;
-    to_.sweep = std::clamp(move_.sweep + sweep + skill_.plane * normal(), -mostSweep, mostSweep);
-    to_.turn = std::clamp(move_.turn + turn + skill_.plane / shaft * normal(), -mostTurn, mostTurn);
+    to_.sweep = std::clamp(move_.sweep + sweep + skill_.plane * normal(), -maxSweep, maxSweep);
+    to_.turn = std::clamp(move_.turn + turn + skill_.plane / shaft * normal(), -maxTurn, maxTurn);
     inLook_ = 0.0;
 }
 
@@ -81,11 +81,11 @@ datasets::ProbeMove ProbeHand::read() noexcept
     wander_ += -fades * wander_ + skill_.wander * std::sqrt(2.0 * fades) * normal();
     if (inLook_ < lookTime) {
         inLook_ += period_;
-        const double share = minimumJerk(inLook_ / lookTime);
-        move_.sweep = from_.sweep + share * (to_.sweep - from_.sweep);
-        move_.turn = from_.turn + share * (to_.turn - from_.turn);
+        const double fraction = minimumJerk(inLook_ / lookTime);
+        move_.sweep = from_.sweep + fraction * (to_.sweep - from_.sweep);
+        move_.turn = from_.turn + fraction * (to_.turn - from_.turn);
     } else {
-        move_.sweep = std::clamp(move_.sweep + wander_ * period_, -mostSweep, mostSweep);
+        move_.sweep = std::clamp(move_.sweep + wander_ * period_, -maxSweep, maxSweep);
     }
     return move_;
 }

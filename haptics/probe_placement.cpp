@@ -17,9 +17,9 @@ namespace palpate::haptics {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double flattest = 10 * degree, steepest = 50 * degree;             // between needle and face
-constexpr double enoughMargin = 4e-3;                                        // from a vital structure [m]
-constexpr double leastBeside = 2e-3, mostBeside = 14e-3, besideStep = 3e-3;  // from the probe's edge to the entry [m]
+constexpr double flattest = 10 * degree, steepest = 50 * degree;          // between needle and face
+constexpr double enoughMargin = 4e-3;                                     // from a vital structure [m]
+constexpr double minBeside = 2e-3, maxBeside = 14e-3, besideStep = 3e-3;  // from the probe's edge to the entry [m]
 constexpr int directions = 24;
 constexpr double wayStep = 0.5e-3;  // [m]
 constexpr double reach = 60e-3;     // along the probe's axis, to find the skin beside it [m]
@@ -111,7 +111,7 @@ ProbePlan planProbe(const datasets::Scene& scene, const volume::Tissue& tissue, 
     for (int i = 0; i < directions; ++i) {
         const double a = 2.0 * std::numbers::pi * i / directions;
         const Vec3 lateral = std::cos(a) * first + std::sin(a) * second;
-        for (double beside = leastBeside; beside <= mostBeside; beside += besideStep) {
+        for (double beside = minBeside; beside <= maxBeside; beside += besideStep) {
             const Vec3 from = plan.face + (half + beside) * lateral - reach * plan.direction;
             const auto entry = skinAlong(surface, from, plan.direction);
             if (!entry) {

@@ -17,8 +17,8 @@ public:
     void hold(double force, const volume::Relaxation& relaxation, double seconds) noexcept
     {
         for (std::size_t i = 0; i < lost_.size(); ++i) {
-            const double share = -std::expm1(-seconds / volume::relaxationTimes[i]);
-            lost_[i] += share * (relaxation.weights[i] * force - lost_[i]);
+            const double fraction = -std::expm1(-seconds / volume::relaxationTimes[i]);
+            lost_[i] += fraction * (relaxation.weights[i] * force - lost_[i]);
         }
     }
     /// Tissue that gave way took its part along: at most `most` is left of it [N].
@@ -29,10 +29,10 @@ public:
             scale(std::max(most, 0.0) / now);
         }
     }
-    void scale(double share) noexcept
+    void scale(double fraction) noexcept
     {
         for (double& lost : lost_) {
-            lost *= share;
+            lost *= fraction;
         }
     }
 

@@ -361,7 +361,7 @@ void Scorer::addPicture(const TickRecord& record) noexcept
     const double further = record.inserted - reached_;
     if (further > 0) {
         score_.blindAdvance += record.tipInBeam ? 0.0 : further;
-        leastInBeam_ = record.inserted > wellInside ? std::min(leastInBeam_, record.needleInBeam) : leastInBeam_;
+        minInBeam_ = record.inserted > wellInside ? std::min(minInBeam_, record.needleInBeam) : minInBeam_;
         reached_ = record.inserted;
     } else if (record.inserted < reached_ - redirectLength) {
         reached_ = record.inserted;  // drawn back: what follows is another way in
@@ -384,7 +384,7 @@ void Scorer::judgeProbe(Score& s) const noexcept
         s.needleShare = shareSum_ / n;
         s.tipShare = static_cast<double>(tipTicks_) / n;
     }
-    s.leastInBeam = std::isfinite(leastInBeam_) ? leastInBeam_ : 0.0;
+    s.minInBeam = std::isfinite(minInBeam_) ? minInBeam_ : 0.0;
 }
 
 void Scorer::judgeMarks(Score& s) const noexcept

@@ -48,8 +48,8 @@ struct Score {
     bool hasProbe = false;
     double probeSeconds = 0;  // time with the probe on the skin; only level `elastic` knows it
     double needleInBeam = 0;  // of the shaft in tissue, what the picture has: mean over the time inside [m]
-    double needleShare = 0;   // the same as a share of the shaft in tissue
-    double leastInBeam = 0;   // least of it while the needle goes on at over 10 mm inside [m]
+    double needleShare = 0;   // the same as a fraction of the shaft in tissue
+    double minInBeam = 0;     // least of it while the needle goes on at over 10 mm inside [m]
     double tipShare = 0;      // of the time inside, with the tip in the picture
     double blindAdvance = 0;  // way that the needle went on inside without its tip in the picture [m]
     std::uint32_t picturesBefore = 0,
@@ -166,7 +166,7 @@ private:
     JerkMeter jerk_;
     // Ultrasound: sums over the ticks inside, and the depth that the needle has been to in this way in.
     std::uint64_t probeTicks_ = 0, insideTicks_ = 0, tipTicks_ = 0;
-    double inBeamSum_ = 0, shareSum_ = 0, leastInBeam_ = std::numeric_limits<double>::infinity(), reached_ = 0;
+    double inBeamSum_ = 0, shareSum_ = 0, minInBeam_ = std::numeric_limits<double>::infinity(), reached_ = 0;
     bool pictureDown_ = false;
     std::array<Vec3, 32> marks_{};  // [m]
     bool markDown_ = false;

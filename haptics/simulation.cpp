@@ -88,7 +88,7 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
     : model_(model),
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
-                   chainmail::mostPressSeeds(model.lattice, model.scene.tool.radius)),
+                   chainmail::maxPressSeeds(model.lattice, model.scene.tool.radius)),
       spring_(deformation_.shape()),
       chainmail_(deformation_, model.scene.tool.radius),
       level_(model.scene.model.level),
@@ -258,7 +258,7 @@ chainmail::Reaction Simulation::deform() noexcept
 
 // Where level `elastic` knows the force of a tool that presses, it is the force, at any depth; else it is the law's. A tool
 // that is faster than the body can follow has left most of its way to be made up for: there it feels at least the law's
-// share of that way, so that it does not get through a thin part unhindered.
+// fraction of that way, so that it does not get through a thin part unhindered.
 Vec3 Simulation::contactForce(Vec3 law, const chainmail::Reaction& reaction) const noexcept
 {
     if (tip_.phase == Phase::free || !reaction.force) {

@@ -29,7 +29,7 @@ constexpr double margin = 1.2;            // of damping over the leak
 constexpr double frictionShare = 0.5;     // of the device's Coulomb friction is counted on
 constexpr double catchUpTime = 0.1;       // of the coupling, standing still [s]
 constexpr double restTime = 0.03;         // after which the hand stands still [s]
-constexpr double mostTissue = 100.0;      // of the cap: larger forces of tissue are that large
+constexpr double maxTissue = 100.0;       // of the cap: larger forces of tissue are that large
 constexpr double noForce = 1e-9;          // what rounding leaves [N]
 constexpr double energyAllowed = 0.4e-3;  // that tissue may give beyond what it got [J]
 constexpr double roundingOff = 1e-9;      // of positions [m]
@@ -128,7 +128,7 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
 
 // How much the force may change where it falls with the motion: that which was estimated, and no more than was read. In
 // periods under a millisecond the way is one of encoder steps: there the speed says what it was, nearly.
-double mostFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness, double period) noexcept
+double maxFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness, double period) noexcept
 {
     const double estimated = period >= tickSeconds
                                  ? slew + stiffness * glm::length(way)
@@ -153,7 +153,7 @@ void store(Vec3 before, Vec3 now, Vec3 way, EnergyLedger& l) noexcept
     l.stored = glm::length(now) < noForce ? 0.0 : std::max(0.0, l.stored - 0.5 * glm::dot(before + now, way));
 }
 
-// The share of the force that, kept on all the way out, leaves no more than twice the energy allowed. Poses that do not
+// The fraction of the force that, kept on all the way out, leaves no more than twice the energy allowed. Poses that do not
 // come say nothing of the energy that goes out: then the worst is presumed, a hand that goes on as fast as it did, straight
 // along the force.
 double guardGain(Vec3 basic, const DeviceSample& device, Vec3 velocity, double dt, StabiliserState& s) noexcept
@@ -173,7 +173,7 @@ RenderedForce scaled(double by, const RenderedForce& f) noexcept
     return {by * f.basic, by * f.additional, by * f.damping};
 }
 
-// The largest share of `step` that keeps |from + share step| at `most` or below, where |from| is.
+// The largest fraction of `step` that keeps |from + share step| at `most` or below, where |from| is.
 double shareWithin(Vec3 from, Vec3 step, double most) noexcept
 {
     const double a = glm::dot(step, step);
@@ -193,13 +193,13 @@ RenderedForce towards(const RenderedForce& from, const RenderedForce& to, double
     const Vec3 way = to.basic - from.basic;
     next.basic = glm::length(way) > most ? from.basic + bounded(way, most) : to.basic;
     const Vec3 additional = to.additional - from.additional, damping = to.damping - from.damping;
-    if (const double share = shareWithin(next.basic - from.basic, damping, most); share < 1.0) {
-        next.damping = from.damping + share * damping;
+    if (const double fraction = shareWithin(next.basic - from.basic, damping, most); fraction < 1.0) {
+        next.damping = from.damping + fraction * damping;
     }
     const Vec3 changed = next.basic - from.basic + next.damping - from.damping;
-    const double share = std::min(shareWithin(changed, additional, most), shareWithin(Vec3(0.0), additional, most));
-    if (share < 1.0) {
-        next.additional = from.additional + share * additional;
+    const double fraction = std::min(shareWithin(changed, additional, most), shareWithin(Vec3(0.0), additional, most));
+    if (fraction < 1.0) {
+        next.additional = from.additional + fraction * additional;
     }
     // To the nearest sum within the cap: no further from the last than before.
     const double size = glm::length(next.total());
@@ -267,7 +267,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
         const StableLimits limits = stableLimits(o);
         const double slew = slewRate * o.period * cap;
         // What is over the cap is no force to return from later; and the ramp alone brings in what is there at the start.
-        const Vec3 tissue = bounded(basic, mostTissue * cap);
+        const Vec3 tissue = bounded(basic, maxTissue * cap);
         if (s.gain <= 0.0) {
             s.tissue = tissue;
             s.coupled = bounded(tissue, cap);
@@ -289,7 +289,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
         // A spring that is let go gives energy where its force does not fall with the motion.
         const bool falls =
             device.fresh && glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
-        sent = towards(s.sent, sent, falls ? mostFall(way, readWay, motion, slew, limits.stiffness, o.period) : slew, cap);
+        sent = towards(s.sent, sent, falls ? maxFall(way, readWay, motion, slew, limits.stiffness, o.period) : slew, cap);
     }
     s.sent = sent;
     s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = sent;

@@ -92,7 +92,7 @@ struct StabiliserState {
     EnergyLedger ledger;
     double speed = 0;     // when a pose was last fresh [m/s]
     double presumed = 0;  // energy that tissue may have given since then [J]
-    double guard = 1;     // share of the basic force that the ledger allows
+    double guard = 1;     // fraction of the basic force that the ledger allows
     double gain = 0;      // start-up ramp, dead-man switch, watchdog
     RenderedForce sent;
     bool faulted = false;  // latched: the output is zero until the session ends

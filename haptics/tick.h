@@ -101,7 +101,7 @@ struct Event {
 struct CoreSample {
     std::array<double, maxTissues> fraction{};  // by row of the tissue table; sums to 1 when anything is in the notch
     double volume = 0;                          // of tissue [m^3]
-    double targetFraction = 0;                  // share of the target structure
+    double targetFraction = 0;                  // fraction of the target structure
     double targetLength = 0;                    // length of the notch's axis inside the target [m]
     std::uint32_t fragments = 0;                // pieces that the core comes out in
     Vec3 notchStart{0.0};                       // patient frame [m]

@@ -34,10 +34,10 @@ void Histogram::add(double seconds) noexcept
     ++impl_->count;
 }
 
-double Histogram::quantile(double share) const noexcept
+double Histogram::quantile(double fraction) const noexcept
 {
     const auto& axis = impl_->bins_.axis();
-    const double wanted = share * static_cast<double>(impl_->count);
+    const double wanted = fraction * static_cast<double>(impl_->count);
     double seen = 0.0;
     for (int i = -1; i <= axis.size(); ++i) {
         seen += static_cast<double>(impl_->bins_.at(i));

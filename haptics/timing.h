@@ -26,8 +26,8 @@ public:
 
     void add(double seconds) noexcept;  // counts one duration [s]
     Percentiles percentiles() const;    // of all that was counted [s]
-    /// The duration that `share` of all do not pass, to 1 % [s].
-    double quantile(double share) const noexcept;
+    /// The duration that `fraction` of all do not pass, to 1 % [s].
+    double quantile(double fraction) const noexcept;
     std::uint64_t count() const noexcept;  // how many durations
 
 private:

@@ -30,11 +30,11 @@ constexpr double safeAhead = 1e-3;      // a vital structure nearer to the fired
 constexpr double triggerTime = 0.05;    // the fire button stays down [s]
 constexpr double lookTime = 1.0;        // at a core [s]
 constexpr double patience = 10.0;       // with a movement that does not get there [s]
-constexpr double learnt = 0.5;          // share of an aim's error that stays when the trainee has seen where it went
-constexpr int mostRedirects = 4;        // in one pass; then it fires or gives up
-constexpr int mostEntries = 8;
-constexpr int mostStrokes = 12;  // on one line
-constexpr int mostLooks = 4;     // at one picture without the tip; then it goes on blind
+constexpr double learnt = 0.5;          // fraction of an aim's error that stays when the trainee has seen where it went
+constexpr int maxRedirects = 4;         // in one pass; then it fires or gives up
+constexpr int maxEntries = 8;
+constexpr int maxStrokes = 12;  // on one line
+constexpr int maxLooks = 4;     // at one picture without the tip; then it goes on blind
 
 }  // namespace
 
@@ -176,12 +176,12 @@ bool Trainee::arrived() const noexcept
 // The goal goes along the movement's line; when tissue holds the tip back at its end, it runs on ahead of it.
 void Trainee::followLeg() noexcept
 {
-    const double share = minimumJerk(inAct_ / duration_);
+    const double fraction = minimumJerk(inAct_ / duration_);
     const Vec3 way = to_ - from_;
     const double length = glm::length(way);
     const double beyond = std::min(std::max(0.0, inAct_ - duration_) * skill_.speed, furthestLead);
-    goal_ = from_ + share * way + (length > 0.0 && !arrived() ? beyond / length : 0.0) * way;
-    axis_ = glm::normalize(glm::mix(fromAxis_, toAxis_, share));
+    goal_ = from_ + fraction * way + (length > 0.0 && !arrived() ? beyond / length : 0.0) * way;
+    axis_ = glm::normalize(glm::mix(fromAxis_, toAxis_, fraction));
 }
 
 bool Trainee::dangerAhead() const noexcept
@@ -215,7 +215,7 @@ void Trainee::afterCheck() noexcept
 {
     const bool wrong = ahead_.structure[0] > model_.scene.tool.throwLength || dangerAhead();
     const bool seen = wrong && random_.between(0.0, 1.0) < skill_.vigilance;
-    if (seen && redirects_ < mostRedirects) {
+    if (seen && redirects_ < maxRedirects) {
         takeAnotherLine();
     } else if (seen && dangerAhead()) {
         begin(Act::retreat);
@@ -226,7 +226,7 @@ void Trainee::afterCheck() noexcept
 
 void Trainee::afterCore() noexcept
 {
-    const bool enough = bestCore_ >= skill_.content || fired_ >= skill_.passes || entries_ >= mostEntries;
+    const bool enough = bestCore_ >= skill_.content || fired_ >= skill_.passes || entries_ >= maxEntries;
     if (enough) {
         act_ = Act::done;
     } else {
@@ -249,7 +249,7 @@ void Trainee::advanceAct() noexcept
             }
             return;
         case Act::advance:
-            if (warnedSince_ >= skill_.reaction && redirects_ < mostRedirects) {
+            if (warnedSince_ >= skill_.reaction && redirects_ < maxRedirects) {
                 takeAnotherLine();
             } else if (there || isDeepEnough()) {
                 begin(Act::look);
@@ -257,12 +257,12 @@ void Trainee::advanceAct() noexcept
             return;
         case Act::look:
             if (inAct_ >= skill_.reaction + (probe_.holds() ? ProbeHand::lookTime : 0.0)) {
-                if (++looks_ < mostLooks && probe_.wantsAnother()) {
+                if (++looks_ < maxLooks && probe_.wantsAnother()) {
                     return begin(Act::look);
                 }
                 looks_ = 0;
                 const double left = depthToFire() - inserted_;
-                const bool deep = (left <= tooShallow && left >= -tooDeep) || strokes_ >= mostStrokes;
+                const bool deep = (left <= tooShallow && left >= -tooDeep) || strokes_ >= maxStrokes;
                 begin(deep ? Act::check : Act::advance);
             }
             return;

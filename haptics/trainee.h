@@ -72,7 +72,7 @@ private:
     double inserted_ = 0;  // [m]
     LookAhead ahead_;
     double insideSince_ = -1, warnedSince_ = -1;  // for so long [s]; below 0: not
-    double bestCore_ = 0;                         // share of target
+    double bestCore_ = 0;                         // fraction of target
     std::uint64_t ticks_ = 0;
     int fired_ = 0, entries_ = 0, redirects_ = 0, strokes_ = 0, looks_ = 0;
     double storing_ = 0;  // the button that stores a picture stays down so long yet [s]

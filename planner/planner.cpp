@@ -22,14 +22,14 @@ namespace {
 constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
 constexpr std::array windows{9, 13, 15, 21, 31};
 constexpr std::array cycles{1, 2};
-constexpr std::size_t mostReferenceCells = 400000;  // both references take some seconds
-constexpr std::size_t mostCells = 4U << 20;         // of any other grid
-constexpr std::size_t mostWindowNodes = 300000;     // no budget under 5 ms pays for more
-constexpr std::size_t mostPoints = 60000;           // at which errors are looked at
+constexpr std::size_t maxReferenceCells = 400000;  // both references take some seconds
+constexpr std::size_t maxCells = 4U << 20;         // of any other grid
+constexpr std::size_t maxWindowNodes = 300000;     // no budget under 5 ms pays for more
+constexpr std::size_t maxPoints = 60000;           // at which errors are looked at
 // What a candidate is taken to need before it is tried: less than it will, so that none is passed over.
-constexpr double leastCycles = 0.8;  // many ticks need none
-constexpr double leastTouched = 50;
-constexpr double leastMoved = 200;
+constexpr double minCycles = 0.8;  // many ticks need none
+constexpr double minTouched = 50;
+constexpr double minMoved = 200;
 
 studies::TrialTool sceneTool(const datasets::ToolSpec& tool)
 {
@@ -46,7 +46,7 @@ studies::TrialTool sceneTool(const datasets::ToolSpec& tool)
 // A twentieth of the least error that is asked for in earnest.
 studies::ReferenceOptions optionsOf(bool finiteStrain)
 {
-    return {.finiteStrain = finiteStrain, .tolerance = 5e-4, .mostCycles = 60, .mostPoints = mostPoints};
+    return {.finiteStrain = finiteStrain, .tolerance = 5e-4, .maxCycles = 60, .maxPoints = maxPoints};
 }
 
 class Planner {
@@ -112,7 +112,7 @@ private:
         return found != bodies_.end() ? found->second
                                       : bodies_
                                             .emplace(spacing, studies::trialBody(*model_.tissue, model_.surface, spacing,
-                                                                                 poissonCap(), mostCells))
+                                                                                 poissonCap(), maxCells))
                                             .first->second;
     }
 
@@ -122,7 +122,7 @@ private:
     {
         progress_("the converged solution");
         const studies::TrialBody finest =
-            studies::trialBody(*model_.tissue, model_.surface, spacings.back(), poissonCap(), mostReferenceCells);
+            studies::trialBody(*model_.tissue, model_.surface, spacings.back(), poissonCap(), maxReferenceCells);
         path_ =
             studies::trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
         const std::array speeds{request_.speed};
@@ -144,7 +144,7 @@ private:
             PlanCandidate c;
             c.level = ModelLevel::chainmail;
             c.spacing = spacing;
-            c.touched = leastMoved;
+            c.touched = minMoved;
             add(c);
         }
         for (const double spacing : spacings) {
@@ -166,12 +166,12 @@ private:
         c.elastic = model_.scene.model.elastic;
         c.elastic.spacing = spacing;
         c.elastic.window = window;
-        c.touched = leastTouched;
-        c.meanCycles = leastCycles;
+        c.touched = minTouched;
+        c.meanCycles = minCycles;
         const chainmail::Elastic elastic(body.body, {.window = window}, studies::TrialLoad(path_).load().focus);
         c.nodes = elastic.nodes();
         c.slots = slotsOf(elastic.stack());
-        if (c.nodes > mostWindowNodes) {
+        if (c.nodes > maxWindowNodes) {
             return;
         }
         for (const int n : cycles) {

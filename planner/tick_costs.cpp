@@ -13,9 +13,9 @@ namespace palpate::planner {
 
 namespace {
 
-constexpr std::size_t mostCells = 4U << 20;
-constexpr std::size_t mostSlots = 200000;  // beyond any tick of a millisecond
-constexpr double speed = 0.02;             // [m/s]
+constexpr std::size_t maxCells = 4U << 20;
+constexpr std::size_t maxSlots = 200000;  // beyond any tick of a millisecond
+constexpr double speed = 0.02;            // [m/s]
 constexpr double poissonCap = 0.49;
 constexpr double nanosecond = 1e-3;  // [us]
 
@@ -45,7 +45,7 @@ void addTimes(const studies::TrialBody& body, const studies::TrialPath& path, bo
     const std::vector<int> windows = quick ? std::vector{9, 13} : std::vector{9, 13, 15, 21, 31};
     for (const int window : windows) {
         const chainmail::WindowStack stack(body.body, window, studies::TrialLoad(path).load().focus);
-        if (slotsOf(stack) > mostSlots) {
+        if (slotsOf(stack) > maxSlots) {
             continue;
         }
         for (const auto& [cycles, finite] : {std::pair(1, false), {2, false}, {1, true}, {2, true}}) {
@@ -116,7 +116,7 @@ std::vector<TickSample> measureTicks(const haptics::SessionModel& model, bool qu
     const auto place = studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     std::vector<TickSample> out;
     for (const double spacing : spacings) {
-        const studies::TrialBody body = studies::trialBody(*model.tissue, model.surface, spacing, poissonCap, mostCells);
+        const studies::TrialBody body = studies::trialBody(*model.tissue, model.surface, spacing, poissonCap, maxCells);
         for (const double radius : {5e-3, 10e-3}) {
             progress(fmt::format("{:g} mm, sphere of {:g} mm", 1e3 * body.cells.spacing, 1e3 * radius));
             const studies::TrialPath path =

@@ -31,7 +31,7 @@ std::size_t runSweep(const std::filesystem::path& folder, const std::string& pla
     const std::size_t all = held.plan().cases(), before = all - cases.size();
     // An interrupt may come while Python reports: the cases in flight are finished and the tables written in any case.
     std::optional<py::error_already_set> stopped;
-    const auto goOn = [&](std::size_t done, std::size_t) {
+    const auto keepGoing = [&](std::size_t done, std::size_t) {
         held.lock().check();
         if (stopped) {
             return false;
@@ -47,7 +47,7 @@ std::size_t runSweep(const std::filesystem::path& folder, const std::string& pla
         }
     };
     if (!cases.empty()) {
-        sweep::runLocally(held, cases, jobs, std::string(base::build()), goOn, [] { return false; });
+        sweep::runLocally(held, cases, jobs, std::string(base::build()), keepGoing, [] { return false; });
     }
     const std::size_t rows = sweep::writeTables(held, held.rows()).rows.size();
     if (stopped) {

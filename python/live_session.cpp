@@ -115,7 +115,7 @@ const haptics::TickRecord& LiveSession::step(const haptics::DeviceSample& sample
 }
 
 bool LiveSession::run(haptics::Device& device, double seconds, const std::function<void(const haptics::TickRecord&)>& each,
-                      const std::function<bool()>& goOn)
+                      const std::function<bool()>& keepGoing)
 {
     std::atomic<bool> stop{false};
     session::RunOptions options;
@@ -131,7 +131,7 @@ bool LiveSession::run(haptics::Device& device, double seconds, const std::functi
         }
         if (const auto now = Clock::now(); now - asked > askEvery) {
             asked = now;
-            stop = !goOn();
+            stop = !keepGoing();
         }
     });
     return !stop;

@@ -60,7 +60,7 @@ public:
     /// @param seconds  at most; 0: no limit
     /// @returns        true when it was not stopped by `goOn`
     bool run(haptics::Device& device, double seconds, const std::function<void(const haptics::TickRecord&)>& each,
-             const std::function<bool()>& goOn);
+             const std::function<bool()>& keepGoing);
     /// Ends the record. Further ticks are errors. Throws std::runtime_error where the record is not whole.
     void close();
 

@@ -259,8 +259,8 @@ private:
     void addHexahedron(int face, int i, int j)
     {
         constexpr double inside = 0.8;
-        const auto node = [&](int a, int b, double share) {
-            return nodeAt(centre_ + share * radius_ * direction(face, i + a, j + b));
+        const auto node = [&](int a, int b, double fraction) {
+            return nodeAt(centre_ + fraction * radius_ * direction(face, i + a, j + b));
         };
         hexahedra.push_back({node(0, 0, inside), node(1, 0, inside), node(1, 1, inside), node(0, 1, inside),
                              node(0, 0, 1.0), node(1, 0, 1.0), node(1, 1, 1.0), node(0, 1, 1.0)});

@@ -11,13 +11,13 @@ namespace palpate::reference {
 namespace {
 
 constexpr double onPlane = 1e-6;      // mm
-constexpr int mostSteps = 30;         // of Newton's method to one load,
+constexpr int maxSteps = 30;          // of Newton's method to one load,
 constexpr int hopeSteps = 10;         // after which the residual
-constexpr double hope = 0.1;          // is to be this share of the first at most
-constexpr int mostLooks = 10;         // along one of them,
-constexpr double goodSlope = 0.3;     // until the energy's slope is that share of the first
-constexpr double mostGrowth = 1.5;    // of the residual
-constexpr int mostNearby = 50;        // iterations with an old factor: a new one costs about as much
+constexpr double hope = 0.1;          // is to be this fraction of the first at most
+constexpr int maxLooks = 10;          // along one of them,
+constexpr double goodSlope = 0.3;     // until the energy's slope is that fraction of the first
+constexpr double maxGrowth = 1.5;     // of the residual
+constexpr int maxNearby = 50;         // iterations with an old factor: a new one costs about as much
 constexpr double nothing = 1e-9;      // residual of a body that no tool touches, by rounding [mN]
 constexpr double linearBest = 1e-4;   // residual of a linear system at last,
 constexpr double linearWorst = 1e-2;  // and at first
@@ -136,12 +136,12 @@ std::vector<double> Equilibrium::direction()
     const SymmetricMatrix matrix = reduced(all, free, number, blocks);
     // As exact as the last step was good.
     const double fall = unbalanced() / std::max(lastUnbalanced_, 1e-300);
-    const double share = std::clamp(fall * fall, linearBest, linearWorst);
+    const double fraction = std::clamp(fall * fall, linearBest, linearWorst);
     lastUnbalanced_ = unbalanced();
-    if (!factor || !solveNearby(matrix, *factor, right, x, share, mostNearby)) {
+    if (!factor || !solveNearby(matrix, *factor, right, x, fraction, maxNearby)) {
         factor.reset();
         factor = std::make_unique<Factor>(matrix);
-        solveNearby(matrix, *factor, right, x, share, mostNearby);
+        solveNearby(matrix, *factor, right, x, fraction, maxNearby);
     }
     for (std::size_t i = 0; i < free.size(); ++i) {
         step[free[i]] = x[i];
@@ -170,31 +170,31 @@ bool Equilibrium::advance(const std::vector<double>& step)
     double low = 0.0;
     double slopeLow = before;
     double high = 1.0;
-    double share = 1.0;
-    for (int look = 0; look <= mostLooks; ++look) {
+    double fraction = 1.0;
+    for (int look = 0; look <= maxLooks; ++look) {
         for (std::size_t i = 0; i < state.size(); ++i) {
-            state[i] = start[i] + share * step[i];
+            state[i] = start[i] + fraction * step[i];
         }
         evaluate();
         if (!finite()) {
-            high = share;
-            share = 0.5 * (low + high);
+            high = fraction;
+            fraction = 0.5 * (low + high);
             continue;
         }
         const double now = minimum ? slope(step) : unbalanced();
-        if (drives || (minimum ? std::abs(now) <= goodSlope * std::abs(before) || (now < 0.0 && share == 1.0)
-                               : now < mostGrowth * before)) {
+        if (drives || (minimum ? std::abs(now) <= goodSlope * std::abs(before) || (now < 0.0 && fraction == 1.0)
+                               : now < maxGrowth * before)) {
             return true;
         }
         if (!minimum) {
-            share *= 0.5;
+            fraction *= 0.5;
         } else if (now > 0.0) {
-            high = share;
-            share = low + (high - low) * std::clamp(slopeLow / (slopeLow - now), 0.1, 0.9);
+            high = fraction;
+            fraction = low + (high - low) * std::clamp(slopeLow / (slopeLow - now), 0.1, 0.9);
         } else {
-            low = share;
+            low = fraction;
             slopeLow = now;
-            share = 0.5 * (low + high);
+            fraction = 0.5 * (low + high);
         }
     }
     if (minimum && low > 0.0) {
@@ -219,7 +219,7 @@ bool Equilibrium::find(double tolerance)
         if (arrived == driven.size() && unbalanced() <= std::max(tolerance * holding(), nothing)) {
             return true;
         }
-        if (step == mostSteps || (driven.empty() && step == hopeSteps && unbalanced() > hope * first)) {
+        if (step == maxSteps || (driven.empty() && step == hopeSteps && unbalanced() > hope * first)) {
             return false;
         }
         ++steps;

@@ -15,7 +15,7 @@ struct Equilibrium {
     /// Numbers the unknowns anew: all that is neither held nor `prescribed` (state x 1).
     void drive(const std::vector<char>& prescribed);
     /// Finds equilibrium from `state`, with the multipliers as they are.
-    /// @param tolerance  residual, share of the forces that hold the body
+    /// @param tolerance  residual, fraction of the forces that hold the body
     /// @returns  whether it got there; the state is anything otherwise
     bool find(double tolerance);
     /// Computes `residual`.

@@ -184,7 +184,7 @@ struct Hessenberg {
 }  // namespace
 
 bool solveNearby(const SymmetricMatrix& a, const Factor& nearby, std::span<const double> b, std::span<double> x,
-                 double share, int most)
+                 double fraction, int most)
 {
     std::fill(x.begin(), x.end(), 0.0);
     const double whole = std::sqrt(dot(b, b));
@@ -198,7 +198,7 @@ bool solveNearby(const SymmetricMatrix& a, const Factor& nearby, std::span<const
     }
     Hessenberg h{.columns = {}, .turns = {}, .right = {whole}};
     double left = whole;
-    for (int step = 0; step < most && left > share * whole; ++step) {
+    for (int step = 0; step < most && left > fraction * whole; ++step) {
         images.push_back(basis.back());
         nearby.solve(images.back());
         std::vector<double> next(b.size());
@@ -219,7 +219,7 @@ bool solveNearby(const SymmetricMatrix& a, const Factor& nearby, std::span<const
     for (std::size_t k = 0; k < y.size(); ++k) {
         addScaled(y[k], images[k], x);
     }
-    return left <= share * whole;
+    return left <= fraction * whole;
 }
 
 }  // namespace palpate::reference

@@ -38,6 +38,6 @@ private:
 /// @returns  whether it got there in `most` iterations; x is its best otherwise
 /// Source: Y. Saad, M. H. Schultz, "GMRES", SIAM J. Sci. Stat. Comput. 7, 1986.
 bool solveNearby(const SymmetricMatrix& a, const Factor& nearby, std::span<const double> b, std::span<double> x,
-                 double share, int most);
+                 double fraction, int most);
 
 }  // namespace palpate::reference

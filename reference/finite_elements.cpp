@@ -24,10 +24,10 @@ constexpr double perPascal = 1e-3;  // kPa
 // The contact's r in moduli per face's edge: without multipliers a pressure of half a modulus would sink a 200th of an edge
 // in, and each update of theirs takes that down some eighty times.
 constexpr double contactStiffness = 100.0;
-constexpr double mostStretch = 30.0;  // of a face's area, that r grows by
-constexpr double onPlane = 1e-9;      // m
-constexpr double reach = 0.25;        // faces this many radii away are looked at
-constexpr int facesRule = 8;          // degree of quadrature on faces: contact ends within one
+constexpr double maxStretch = 30.0;  // of a face's area, that r grows by
+constexpr double onPlane = 1e-9;     // m
+constexpr double reach = 0.25;       // faces this many radii away are looked at
+constexpr int facesRule = 8;         // degree of quadrature on faces: contact ends within one
 
 Vec3 at(const std::vector<double>& state, std::size_t node)
 {
@@ -367,7 +367,7 @@ void FiniteElements::setObstacle(const Obstacle& obstacle)
     impl_->centre = {obstacle.centre.x, obstacle.centre.y, obstacle.centre.z};
     impl_->radius = {obstacle.radius};
     impl_->shaft = {obstacle.shaft.x, obstacle.shaft.y, obstacle.shaft.z};
-    const Vec3 along = obstacle.shares();
+    const Vec3 along = obstacle.fractions();
     impl_->alongShaft = {along.x, along.y, along.z};
 }
 
@@ -395,14 +395,14 @@ void FiniteElements::findContact(const std::vector<double>& state)
 
 void FiniteElements::stiffenContact(const std::vector<double>& state)
 {
-    const auto area = [&](const std::array<std::uint32_t, 6>& six, double share) {
-        const auto corner = [&](std::size_t c) { return impl_->nodes[six[c]] + share * at(state, six[c]); };
+    const auto area = [&](const std::array<std::uint32_t, 6>& six, double fraction) {
+        const auto corner = [&](std::size_t c) { return impl_->nodes[six[c]] + fraction * at(state, six[c]); };
         return glm::length(glm::cross(corner(2) - corner(0), corner(5) - corner(0)));
     };
     for (std::size_t f = 0; f < impl_->faces.size(); ++f) {
         const double ratio = area(impl_->faceNodes[f], 1.0) / area(impl_->faceNodes[f], 0.0);
         const std::size_t cell = impl_->cellField.ind_basic_dof_of_element(impl_->faces[f].tet)[0];
-        impl_->contactR[cell] = impl_->restR[cell] * std::clamp(ratio, 1.0, mostStretch);
+        impl_->contactR[cell] = impl_->restR[cell] * std::clamp(ratio, 1.0, maxStretch);
     }
 }
 

@@ -31,16 +31,17 @@ using Triangulation = CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Se
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation, Domain::Corner_index, Domain::Curve_index>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
-constexpr double inMillimetres = 1e3;   // CGAL's absolute tolerances are made for numbers about 1
-constexpr double surfaceError = 1e-7;   // of a point on a surface, share of the box's radius
-constexpr double facetAngle = 25.0;     // smallest of a facet [degrees]
-constexpr double facetDistance = 0.06;  // of a facet's middle from the surface, share of the edge length: at the contact,
-constexpr double mostDistance = 0.15;   // and anywhere
-constexpr double cellShape = 2.0;       // radius of a circumsphere by the shortest edge, at most
-constexpr double cellRadius = 0.75;     // of a circumsphere, share of the edge length
-constexpr double facetRadius = 0.65;    // of a facet's surface ball, share of the edge length
-constexpr double sliver = 12.0;         // smaller dihedral angles are mended [degrees]
-constexpr int rays = 20;                // from a seed
+constexpr double inMillimetres = 1e3;  // CGAL's absolute tolerances are made for numbers about 1
+constexpr double surfaceError = 1e-7;  // of a point on a surface, fraction of the box's radius
+constexpr double facetAngle = 25.0;    // smallest of a facet [degrees]
+constexpr double facetDistance =
+    0.06;                             // of a facet's middle from the surface, fraction of the edge length: at the contact,
+constexpr double maxDistance = 0.15;  // and anywhere
+constexpr double cellShape = 2.0;     // radius of a circumsphere by the shortest edge, at most
+constexpr double cellRadius = 0.75;   // of a circumsphere, fraction of the edge length
+constexpr double facetRadius = 0.65;  // of a facet's surface ball, fraction of the edge length
+constexpr double sliver = 12.0;       // smaller dihedral angles are mended [degrees]
+constexpr int rays = 20;              // from a seed
 constexpr double golden = 2.399963229728653;  // angle between them [rad]
 
 Point toPoint(Vec3 p)
@@ -73,15 +74,15 @@ struct EdgeField {
 
     const MeshOptions* options;
     const RegionBounds* bounds;
-    double share;
+    double fraction;
 
     FT operator()(const Point_3& p, int dimension, const Index& index) const
     {
         if (dimension == 3 && options->inside > 0.0) {
-            return share * inMillimetres * options->inside;
+            return fraction * inMillimetres * options->inside;
         }
         const double length = edgeLength(*options, toVec(p));
-        return share * inMillimetres * (dimension == 2 ? std::min(length, onPatch(bounds->edge, index)) : length);
+        return fraction * inMillimetres * (dimension == 2 ? std::min(length, onPatch(bounds->edge, index)) : length);
     }
 };
 
@@ -97,8 +98,8 @@ struct DistanceField {
     FT operator()(const Point_3& p, int, const Index& index) const
     {
         const double length = edgeLength(*options, toVec(p));
-        const double share = std::min(facetDistance * std::sqrt(length / options->size), mostDistance);
-        return inMillimetres * std::min(share * length, onPatch(bounds->distance, index));
+        const double fraction = std::min(facetDistance * std::sqrt(length / options->size), maxDistance);
+        return inMillimetres * std::min(fraction * length, onPatch(bounds->distance, index));
     }
 };
 
@@ -180,17 +181,17 @@ Domain domainOf(const SmoothLabels& labels, CGAL::Random& random)
 }  // namespace
 
 std::optional<TetMesh> meshRegions(const SmoothLabels& labels, std::span<const RegionSeed> seeds,
-                                   const MeshOptions& options, const RegionBounds& bounds, std::size_t mostPoints)
+                                   const MeshOptions& options, const RegionBounds& bounds, std::size_t maxPoints)
 {
     namespace param = CGAL::parameters;
     CGAL::get_default_random() = CGAL::Random(1);
     CGAL::Random random(1);
     const Domain domain = domainOf(labels, random);
-    const auto share = [&](double s) { return EdgeField{&options, &bounds, s}; };
-    const Criteria criteria(param::edge_size = share(1.0), param::facet_angle = facetAngle,
-                            param::facet_size = share(facetRadius),
+    const auto fraction = [&](double s) { return EdgeField{&options, &bounds, s}; };
+    const Criteria criteria(param::edge_size = fraction(1.0), param::facet_angle = facetAngle,
+                            param::facet_size = fraction(facetRadius),
                             param::facet_distance = DistanceField{&options, &bounds},
-                            param::cell_radius_edge_ratio = cellShape, param::cell_size = share(cellRadius));
+                            param::cell_radius_edge_ratio = cellShape, param::cell_size = fraction(cellRadius));
     Complex complex;
     CGAL::Mesh_3::internal::C3t3_initializer<Complex, Domain, Criteria, true>()(complex, domain, criteria, true);
     const auto box = domain.bbox();
@@ -198,7 +199,7 @@ std::optional<TetMesh> meshRegions(const SmoothLabels& labels, std::span<const R
     insertSeeds(domain, seeds, reach / inMillimetres, complex);
     CGAL::parameters::internal::Mesh_3_options stop;
     CGAL::Mesh_error_code stopped = CGAL::CGAL_MESH_3_NO_ERROR;
-    stop.maximal_number_of_vertices = mostPoints;
+    stop.maximal_number_of_vertices = maxPoints;
     stop.pointer_to_error_code = &stopped;
     CGAL::refine_mesh_3(complex, domain, criteria, param::no_reset_c3t3(), param::no_perturb(), param::no_exude(), stop);
     if (stopped != CGAL::CGAL_MESH_3_NO_ERROR) {

@@ -16,8 +16,8 @@ struct RegionBounds {
 };
 
 /// Tetrahedra of all regions, in one mesh; faces are left out. Every piece that has a seed is in it.
-/// @param mostPoints  gives up with nothing when there are more; 0: never
+/// @param maxPoints  gives up with nothing when there are more; 0: never
 std::optional<TetMesh> meshRegions(const SmoothLabels& labels, std::span<const RegionSeed> seeds,
-                                   const MeshOptions& options, const RegionBounds& bounds, std::size_t mostPoints);
+                                   const MeshOptions& options, const RegionBounds& bounds, std::size_t maxPoints);
 
 }  // namespace palpate::reference

@@ -89,7 +89,7 @@ MeshQuality qualityOf(const TetMesh& mesh, std::vector<TissueQuality> tissues, d
     MeshQuality q;
     q.points = mesh.points.size();
     q.tets = mesh.tets.size();
-    q.leastDihedral = 180.0;
+    q.minDihedral = 180.0;
     q.worstRadii = 1.0;
     std::array<double, 256> volume{}, least{};
     std::array<std::size_t, 256> count{};
@@ -107,8 +107,8 @@ MeshQuality qualityOf(const TetMesh& mesh, std::vector<TissueQuality> tissues, d
         q.under10 += low < small ? 1U : 0U;
         q.largestDihedral = std::max(q.largestDihedral, high);
         q.worstRadii = std::min(q.worstRadii, radiiOf(mesh, t));
-        if (low < q.leastDihedral) {
-            q.leastDihedral = low;
+        if (low < q.minDihedral) {
+            q.minDihedral = low;
             q.worst = t;
         }
     }
@@ -125,7 +125,7 @@ MeshQuality qualityOf(const TetMesh& mesh, std::vector<TissueQuality> tissues, d
     for (TissueQuality& tissue : tissues) {
         tissue.mesh = volume[tissue.row];
         tissue.tets = count[tissue.row];
-        tissue.leastDihedral = tissue.tets > 0 ? least[tissue.row] : 0.0;
+        tissue.minDihedral = tissue.tets > 0 ? least[tissue.row] : 0.0;
         tissue.thin = tissue.thickness < edge;
     }
     q.tissues = std::move(tissues);

@@ -17,13 +17,13 @@ namespace palpate::reference {
 namespace {
 
 constexpr double volumeTolerance = 2e-3;  // of a region, below which it is not corrected
-constexpr double leastSeed = 0.5;         // volume of a piece worth a seed, in cubes of the edge length there
+constexpr double minSeed = 0.5;           // volume of a piece worth a seed, in cubes of the edge length there
 
 // How many times as long as a tissue is thick the edges around it may become, before it is left out: tried in turn.
 constexpr std::array<double, 5> resolutions{12.0, 6.0, 4.0, 3.0, 2.0};
 
-// Of a facet's middle from the surface, share of the thickness of what it bounds, times the resolution: facets get coarser
-// where thin tissues are left out sooner.
+// Of a facet's middle from the surface, fraction of the thickness of what it bounds, times the resolution: facets get
+// coarser where thin tissues are left out sooner.
 constexpr double layerDistance = 1.2;
 
 // Where each region is thick enough for the edges around it.
@@ -41,12 +41,12 @@ std::vector<double> reachOf(const std::vector<double>& thickness, double resolut
 // Volumes that the regions have by the labels, at eight points of every voxel [m^3].
 std::vector<double> volumesIn(const SmoothLabels& labels)
 {
-    const double share = labels.affine.voxelVolume() / 8.0;
+    const double fraction = labels.affine.voxelVolume() / 8.0;
     std::vector<double> volume(labels.rows.size(), 0.0);
     volume::forEachIndex(Index3(0), 2 * labels.size - 1, [&](Index3 n) {
         const Vec3 index = Vec3(labels.low) + 0.5 * Vec3(n) - 0.25;
         if (const int region = regionAt(labels, labels.affine.toPatient(index)); region >= 0) {
-            volume[static_cast<std::size_t>(region)] += share;
+            volume[static_cast<std::size_t>(region)] += fraction;
         }
     });
     return volume;
@@ -83,13 +83,12 @@ public:
     }
 
 private:
-    std::optional<TetMesh> once(std::size_t mostPoints)
+    std::optional<TetMesh> once(std::size_t maxPoints)
     {
         std::vector<RegionSeed> seeds = regionSeeds(labels_, 0.0);
-        std::erase_if(seeds, [&](const RegionSeed& s) {
-            return s.volume < leastSeed * std::pow(edgeLength(options_, s.point), 3.0);
-        });
-        return meshRegions(labels_, seeds, options_, bounds_, mostPoints);
+        std::erase_if(
+            seeds, [&](const RegionSeed& s) { return s.volume < minSeed * std::pow(edgeLength(options_, s.point), 3.0); });
+        return meshRegions(labels_, seeds, options_, bounds_, maxPoints);
     }
 
     // Chords make regions that bulge too small: asks for as much more, and meshes again. Not for those that are left out

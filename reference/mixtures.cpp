@@ -33,35 +33,35 @@ std::vector<std::array<double, 4>> samplePoints()
     return points;
 }
 
-// Share of each region in a tetrahedron.
+// Fraction of each region in a tetrahedron.
 std::vector<double> sharesIn(const SmoothLabels& all, const TetMesh& mesh, std::size_t tet)
 {
     static const auto points = samplePoints();
-    std::vector<double> shares(all.rows.size(), 0.0);
+    std::vector<double> fractions(all.rows.size(), 0.0);
     for (const auto& weight : points) {
         Vec3 p(0.0);
         for (std::size_t i = 0; i < 4; ++i) {
             p += weight[i] * mesh.points[mesh.tets[tet][i]];
         }
         if (const int region = regionAt(all, p); region >= 0) {
-            shares[static_cast<std::size_t>(region)] += 1.0;
+            fractions[static_cast<std::size_t>(region)] += 1.0;
         }
     }
-    const double sum = std::accumulate(shares.begin(), shares.end(), 0.0);
-    std::ranges::transform(shares, shares.begin(), [&](double s) { return sum > 0.0 ? s / sum : 0.0; });
-    return shares;
+    const double sum = std::accumulate(fractions.begin(), fractions.end(), 0.0);
+    std::ranges::transform(fractions, fractions.begin(), [&](double s) { return sum > 0.0 ? s / sum : 0.0; });
+    return fractions;
 }
 
-Material mixed(const SmoothLabels& labels, const volume::TissueTable& table, const std::vector<double>& shares)
+Material mixed(const SmoothLabels& labels, const volume::TissueTable& table, const std::vector<double>& fractions)
 {
     double stiffness = 0.0, compliance = 0.0;
     Material m;
-    for (std::size_t r = 0; r < shares.size(); ++r) {
+    for (std::size_t r = 0; r < fractions.size(); ++r) {
         const auto& row = table.rows[labels.rows[r]];
-        stiffness += shares[r] * row.youngsModulus;
-        compliance += shares[r] / row.youngsModulus;
-        m.poisson += shares[r] * row.poissonRatio;
-        m.stiffening += shares[r] * row.stiffening;
+        stiffness += fractions[r] * row.youngsModulus;
+        compliance += fractions[r] / row.youngsModulus;
+        m.poisson += fractions[r] * row.poissonRatio;
+        m.stiffening += fractions[r] * row.stiffening;
     }
     m.youngsModulus = std::sqrt(stiffness / compliance);
     return m;
@@ -93,21 +93,21 @@ Mixtures mixTissues(const SmoothLabels& labels, const volume::TissueTable& table
     std::map<long, Bucket> buckets;
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
         const double volume = sixVolumes(mesh, t) / 6.0;
-        const auto shares = leavesOut(labels, mesh, t) ? sharesIn(all, mesh, t) : std::vector<double>();
-        const auto most = std::ranges::max_element(shares);
-        if (most == shares.end() || *most == 0.0) {
+        const auto fractions = leavesOut(labels, mesh, t) ? sharesIn(all, mesh, t) : std::vector<double>();
+        const auto most = std::ranges::max_element(fractions);
+        if (most == fractions.end() || *most == 0.0) {
             ofRow[mesh.tissue[t]] += volume;
             continue;
         }
         if (*most >= whole) {
-            mesh.tissue[t] = labels.rows[static_cast<std::size_t>(most - shares.begin())];
+            mesh.tissue[t] = labels.rows[static_cast<std::size_t>(most - fractions.begin())];
             ofRow[mesh.tissue[t]] += volume;
             continue;
         }
-        for (std::size_t r = 0; r < shares.size(); ++r) {
-            ofRow[labels.rows[r]] += shares[r] * volume;
+        for (std::size_t r = 0; r < fractions.size(); ++r) {
+            ofRow[labels.rows[r]] += fractions[r] * volume;
         }
-        const Material m = mixed(labels, table, shares);
+        const Material m = mixed(labels, table, fractions);
         Bucket& bucket = buckets[std::lround(std::log(m.youngsModulus) / rounding)];
         bucket.tets.push_back(t);
         bucket.volume += volume;

@@ -6,7 +6,7 @@
 
 namespace palpate::reference {
 
-Vec3 Obstacle::shares() const noexcept
+Vec3 Obstacle::fractions() const noexcept
 {
     const double square = glm::dot(shaft, shaft);
     return square > 0.0 ? shaft / square : Vec3(0.0);
@@ -14,8 +14,8 @@ Vec3 Obstacle::shares() const noexcept
 
 double Obstacle::distance(Vec3 p) const noexcept
 {
-    const double share = std::clamp(glm::dot(p - centre, shares()), 0.0, 1.0);
-    return glm::distance(p, centre + share * shaft) - radius;
+    const double fraction = std::clamp(glm::dot(p - centre, fractions()), 0.0, 1.0);
+    return glm::distance(p, centre + fraction * shaft) - radius;
 }
 
 }  // namespace palpate::reference

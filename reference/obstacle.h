@@ -12,8 +12,8 @@ struct Obstacle {
 
     /// To its surface, negative inside [mm].
     double distance(Vec3 p) const noexcept;
-    /// A place on the line, times this, is its share of the line's length; 0 where it has none [1/mm].
-    Vec3 shares() const noexcept;
+    /// A place on the line, times this, is its fraction of the line's length; 0 where it has none [1/mm].
+    Vec3 fractions() const noexcept;
 };
 
 }  // namespace palpate::reference

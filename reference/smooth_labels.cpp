@@ -14,13 +14,13 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double blur = 1.0;          // standard deviation of the Gaussian [voxels]
-constexpr int reach = 3;              // of the Gaussian [voxels]
-constexpr double sheer = 0.8;         // a side is flat when its last layer has this share of the layer two before
-constexpr double onItsBack = 0.05;    // share of the depth that is held when nothing else is, as in chainmail/elastic_body
-constexpr double full = 65535.0;      // a share of one
-constexpr double pure = 0.98;         // share from which on a voxel is one tissue throughout
-constexpr double mostBias = 0.45;     // beyond it a bias would drown the shares
+constexpr double blur = 1.0;        // standard deviation of the Gaussian [voxels]
+constexpr int reach = 3;            // of the Gaussian [voxels]
+constexpr double sheer = 0.8;       // a side is flat when its last layer has this fraction of the layer two before
+constexpr double onItsBack = 0.05;  // fraction of the depth that is held when nothing else is, as in chainmail/elastic_body
+constexpr double full = 65535.0;    // a fraction of one
+constexpr double pure = 0.98;       // share from which on a voxel is one tissue throughout
+constexpr double maxBias = 0.45;    // beyond it a bias would drown the shares
 constexpr double closeEnough = 1e-3;  // of a region's volume
 constexpr int fitPasses = 6;
 
@@ -175,8 +175,8 @@ void blurAxis(const SmoothLabels& labels, int axis, std::vector<float>& values)
 
 void addShares(const SoftVoxels& voxels, SmoothLabels& labels)
 {
-    labels.shares.assign(labels.offset({0, 0, labels.size.z}), 0);
-    std::vector<float> values(labels.shares.size() / labels.rows.size());
+    labels.fractions.assign(labels.offset({0, 0, labels.size.z}), 0);
+    std::vector<float> values(labels.fractions.size() / labels.rows.size());
     const Index3 shift = voxels.low - labels.low;
     for (std::size_t r = 0; r < labels.rows.size(); ++r) {
         std::fill(values.begin(), values.end(), 0.0F);
@@ -189,7 +189,7 @@ void addShares(const SoftVoxels& voxels, SmoothLabels& labels)
             blurAxis(labels, axis, values);
         }
         for (std::size_t i = 0; i < values.size(); ++i) {
-            labels.shares[i * labels.rows.size() + r] =
+            labels.fractions[i * labels.rows.size() + r] =
                 static_cast<std::uint16_t>(std::lround(full * static_cast<double>(values[i])));
         }
     }
@@ -231,14 +231,14 @@ double shareAt(const SmoothLabels& labels, const Corners& c, std::size_t row) no
 {
     double sum = 0.0;
     for (std::size_t i = 0; i < 8; ++i) {
-        sum += c.weight[i] * labels.shares[c.at[i] + row];
+        sum += c.weight[i] * labels.fractions[c.at[i] + row];
     }
     return sum / full;
 }
 
 // Shares at eight points of every voxel near a border, and how many points the others have.
 struct BorderPoints {
-    std::vector<float> shares;       // (points x rows)
+    std::vector<float> fractions;    // (points x rows)
     std::vector<std::size_t> inner;  // points of voxels that are one tissue throughout (rows x 1)
 };
 
@@ -248,13 +248,13 @@ BorderPoints borderPoints(const SmoothLabels& labels)
     BorderPoints out;
     out.inner.assign(rows, 0);
     volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
-        const auto* share = labels.shares.data() + labels.offset(n);
-        const auto* top = std::max_element(share, share + rows);
+        const auto* fraction = labels.fractions.data() + labels.offset(n);
+        const auto* top = std::max_element(fraction, fraction + rows);
         if (*top >= pure * full) {
-            out.inner[static_cast<std::size_t>(top - share)] += 8;
+            out.inner[static_cast<std::size_t>(top - fraction)] += 8;
             return;
         }
-        if (std::accumulate(share, share + rows, 0.0) <= (1.0 - pure) * full) {
+        if (std::accumulate(fraction, fraction + rows, 0.0) <= (1.0 - pure) * full) {
             return;
         }
         for (int i = 0; i < 8; ++i) {
@@ -262,7 +262,7 @@ BorderPoints borderPoints(const SmoothLabels& labels)
             const Vec3 part((i & 1) != 0 ? 0.25 : -0.25, (i & 2) != 0 ? 0.25 : -0.25, (i & 4) != 0 ? 0.25 : -0.25);
             if (cornersAt(labels, Vec3(n) + part, c)) {
                 for (std::size_t r = 0; r < rows; ++r) {
-                    out.shares.push_back(static_cast<float>(shareAt(labels, c, r)));
+                    out.fractions.push_back(static_cast<float>(shareAt(labels, c, r)));
                 }
             }
         }
@@ -287,37 +287,37 @@ void fitBody(SmoothLabels& labels, const BorderPoints& points, double wanted)
 {
     const std::size_t rows = labels.rows.size();
     std::vector<double> margins;
-    for (std::size_t i = 0; i < points.shares.size(); i += rows) {
-        const auto from = points.shares.begin() + static_cast<std::ptrdiff_t>(i);
+    for (std::size_t i = 0; i < points.fractions.size(); i += rows) {
+        const auto from = points.fractions.begin() + static_cast<std::ptrdiff_t>(i);
         margins.push_back(std::accumulate(from, from + static_cast<std::ptrdiff_t>(rows), 0.0) - 0.5 + labels.bodyBias);
     }
     const double inner = std::accumulate(points.inner.begin(), points.inner.end(), 0.0);
-    labels.bodyBias = std::clamp(labels.bodyBias + biasStep(margins, wanted - inner), -mostBias, mostBias);
+    labels.bodyBias = std::clamp(labels.bodyBias + biasStep(margins, wanted - inner), -maxBias, maxBias);
 }
 
 void fitRow(SmoothLabels& labels, const BorderPoints& points, std::size_t row, double wanted)
 {
     const std::size_t rows = labels.rows.size();
     std::vector<double> margins;
-    for (std::size_t i = 0; i < points.shares.size(); i += rows) {
+    for (std::size_t i = 0; i < points.fractions.size(); i += rows) {
         double sum = 0.0, other = -1.0;
         for (std::size_t r = 0; r < rows; ++r) {
-            const double share = points.shares[i + r];
-            sum += share;
-            other = r == row ? other : std::max(other, share + labels.bias[r]);
+            const double fraction = points.fractions[i + r];
+            sum += fraction;
+            other = r == row ? other : std::max(other, fraction + labels.bias[r]);
         }
         if (sum >= 0.5 - labels.bodyBias) {
-            margins.push_back(points.shares[i + row] + labels.bias[row] - other);
+            margins.push_back(points.fractions[i + row] + labels.bias[row] - other);
         }
     }
     const double step = biasStep(margins, wanted - static_cast<double>(points.inner[row]));
-    labels.bias[row] = std::clamp(labels.bias[row] + step, -mostBias, mostBias);
+    labels.bias[row] = std::clamp(labels.bias[row] + step, -maxBias, maxBias);
 }
 
 // Pieces of one region among the samples, by flood.
 class Pieces {
 public:
-    explicit Pieces(const SmoothLabels& labels) : labels_(labels), region_(labels.shares.size() / labels.rows.size())
+    explicit Pieces(const SmoothLabels& labels) : labels_(labels), region_(labels.fractions.size() / labels.rows.size())
     {
         volume::forEachIndex(Index3(0), labels.size - 1,
                              [&](Index3 n) { region_[at(n)] = static_cast<std::int8_t>(regionAt(labels, position(n))); });
@@ -350,7 +350,7 @@ private:
         Index3 best = from;
         for (std::size_t i = 0; i < queue.size(); ++i) {
             const Index3 n = queue[i];
-            best = share(n, region) > share(best, region) ? n : best;
+            best = fraction(n, region) > fraction(best, region) ? n : best;
             for (int side = 0; side < 6; ++side) {
                 Index3 next = n;
                 next[side / 2] += side % 2 == 0 ? -1 : 1;
@@ -363,9 +363,9 @@ private:
         return {region, position(best), static_cast<double>(queue.size()) * labels_.affine.voxelVolume()};
     }
 
-    std::uint16_t share(Index3 n, int region) const noexcept
+    std::uint16_t fraction(Index3 n, int region) const noexcept
     {
-        return labels_.shares[labels_.offset(n) + static_cast<std::size_t>(region)];
+        return labels_.fractions[labels_.offset(n) + static_cast<std::size_t>(region)];
     }
 
     const SmoothLabels& labels_;
@@ -441,15 +441,15 @@ int regionAt(const SmoothLabels& labels, Vec3 p) noexcept
         return -1;
     }
     const double distance = labels.within.empty() ? 0.0 : distanceToLine(p, labels.from, labels.to);
-    std::array<double, 256> share;
+    std::array<double, 256> fraction;
     double sum = 0.0, competing = 0.0;
     for (std::size_t r = 0; r < labels.rows.size(); ++r) {
-        share[r] = shareAt(labels, c, r);
-        sum += share[r];
+        fraction[r] = shareAt(labels, c, r);
+        sum += fraction[r];
         if (!labels.within.empty() && distance > labels.within[r]) {
-            share[r] = 0.0;
+            fraction[r] = 0.0;
         }
-        competing += share[r];
+        competing += fraction[r];
     }
     if (sum < 0.5 - labels.bodyBias) {
         return -1;
@@ -459,8 +459,8 @@ int regionAt(const SmoothLabels& labels, Vec3 p) noexcept
     double best = -1.0;
     int region = labels.largest;
     for (std::size_t r = 0; r < labels.rows.size(); ++r) {
-        if (share[r] > 0.0 && share[r] + left * labels.bias[r] > best) {
-            best = share[r] + left * labels.bias[r];
+        if (fraction[r] > 0.0 && fraction[r] + left * labels.bias[r] > best) {
+            best = fraction[r] + left * labels.bias[r];
             region = static_cast<int>(r);
         }
     }

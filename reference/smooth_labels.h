@@ -19,17 +19,17 @@ namespace palpate::reference {
 ///
 ///     shares  sample (i, j, k) is the voxel low + (i, j, k); rows run fastest, then x, then y, then z
 struct SmoothLabels {
-    volume::Affine affine;              // of the voxels
-    Index3 low{0};                      // voxel of sample (0, 0, 0)
-    Index3 size{0};                     // samples along each axis
-    std::array<bool, 6> flat{};         // sides -i +i -j +j -k +k: the body ends half a voxel beyond the samples
-    std::vector<std::uint8_t> rows;     // of the tissue table: soft ones that are there   (rows x 1)
-    std::vector<std::uint16_t> shares;  // of 65535                                        (samples x rows)
-    std::vector<double> bias;           // of each row's share                             (rows x 1)
-    double bodyBias = 0;                // of all shares together
-    int largest = 0;                    // region with the most volume: others fill their place with it at last
-    std::vector<double> volume;         // of the voxels [m^3]                             (rows x 1)
-    int heldSide = -1;                  // of the six: where a body that nothing holds is held; -1 none
+    volume::Affine affine;                 // of the voxels
+    Index3 low{0};                         // voxel of sample (0, 0, 0)
+    Index3 size{0};                        // samples along each axis
+    std::array<bool, 6> flat{};            // sides -i +i -j +j -k +k: the body ends half a voxel beyond the samples
+    std::vector<std::uint8_t> rows;        // of the tissue table: soft ones that are there   (rows x 1)
+    std::vector<std::uint16_t> fractions;  // of 65535                                        (samples x rows)
+    std::vector<double> bias;              // of each row's share                             (rows x 1)
+    double bodyBias = 0;                   // of all shares together
+    int largest = 0;                       // region with the most volume: others fill their place with it at last
+    std::vector<double> volume;            // of the voxels [m^3]                             (rows x 1)
+    int heldSide = -1;                     // of the six: where a body that nothing holds is held; -1 none
 
     // Where a region is one of its own: within this of a line [m] (rows x 1; empty: everywhere). Beyond, its neighbours
     // fill its place.

@@ -24,12 +24,12 @@ constexpr double pascalPer = 1e3;     // of a kPa
 constexpr double joulePer = 1e-6;     // of a uJ
 constexpr double coarse = 1e-3;       // residual while multipliers still move, at first,
 constexpr double finer = 0.3;         // and from one update of theirs to the next
-constexpr int mostUpdates = 10;       // of the multipliers
-constexpr double sinks = 1e-4;        // how deep a tool may sink in, share of the way it has pressed
+constexpr int maxUpdates = 10;        // of the multipliers
+constexpr double sinks = 1e-4;        // how deep a tool may sink in, fraction of the way it has pressed
 constexpr double stepOfRadius = 0.2;  // load step of a tool at the start of a way, in its radius, at most
-constexpr double leastStride = 0.02;  // and at least
+constexpr double minStride = 0.02;    // and at least
 constexpr int easySteps = 7;          // of Newton's method: the next load step may be longer
-constexpr double shortest = 1e-4;     // share of a load that a step must take
+constexpr double shortest = 1e-4;     // fraction of a load that a step must take
 
 void checkMesh(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options)
 {
@@ -103,7 +103,7 @@ struct Solver::Impl {
     void extrapolate(const Obstacle& to);
     bool moveTool(const Obstacle& to, bool last);
     std::vector<double> prescribed(const Patch& patch);
-    void say(double share) const;
+    void say(double fraction) const;
     Vec3 force() const;
 
     TetMesh mesh;
@@ -187,7 +187,7 @@ double Solver::Impl::sunk(const Obstacle& at) const
 bool Solver::Impl::balance(double depth, bool last)
 {
     double tolerance = coarse;
-    for (int update = 0; update < mostUpdates; ++update, tolerance *= finer) {
+    for (int update = 0; update < maxUpdates; ++update, tolerance *= finer) {
         if (!body.find(std::max(tolerance, body.options.tolerance))) {
             return false;
         }
@@ -219,9 +219,9 @@ void Solver::Impl::extrapolate(const Obstacle& to)
     };
     const double before = unbalanced();
     const std::vector<double> stay = body.state;
-    const double share = straight / glm::dot(lastWay, lastWay);
+    const double fraction = straight / glm::dot(lastWay, lastWay);
     for (std::size_t i = 0; i < body.state.size(); ++i) {
-        body.state[i] += share * lastChange[i];
+        body.state[i] += fraction * lastChange[i];
     }
     if (!(unbalanced() <= before)) {
         body.state = stay;
@@ -276,10 +276,10 @@ std::vector<double> Solver::Impl::prescribed(const Patch& patch)
     return goal;
 }
 
-void Solver::Impl::say(double share) const
+void Solver::Impl::say(double fraction) const
 {
     if (body.options.progress) {
-        fmt::print(stderr, "load {:5.1f} %: {:.4f} N, {} Newton steps\n", 1e2 * share, glm::length(force()), body.steps);
+        fmt::print(stderr, "load {:5.1f} %: {:.4f} N, {} Newton steps\n", 1e2 * fraction, glm::length(force()), body.steps);
     }
 }
 
@@ -351,16 +351,16 @@ void Solver::press(const RigidTool& tool)
     double length = s.stride / std::max(way, 1e-9);
     int before = 0;
     const double done = takeSteps(
-        length, s.body.options.mostSteps,
-        [&](double share) {
+        length, s.body.options.maxSteps,
+        [&](double fraction) {
             before = s.body.steps;
-            const bool moved = s.moveTool({from + share * (to.centre - from), to.radius, to.shaft}, share == 1.0);
-            s.say(share);
+            const bool moved = s.moveTool({from + fraction * (to.centre - from), to.radius, to.shaft}, fraction == 1.0);
+            s.say(fraction);
             return moved;
         },
         [&] { return s.body.steps - before <= easySteps; });
     if (way > 0.0) {
-        s.stride = std::clamp(length * way, leastStride * to.radius, stepOfRadius * to.radius);
+        s.stride = std::clamp(length * way, minStride * to.radius, stepOfRadius * to.radius);
     }
     if (done < 1.0) {
         throw std::runtime_error(fmt::format(
@@ -382,20 +382,20 @@ void Solver::prescribe(const Patch& patch)
         throw std::runtime_error("patch: no free face lies in it: make it larger, or the elements smaller");
     }
     double length = 1.0;
-    const auto step = [&](double share) {
+    const auto step = [&](double fraction) {
         const std::vector<double> state = s.body.state;
         s.body.goal.clear();
         for (const std::uint32_t i : s.body.driven) {
-            s.body.goal.push_back(share * goal[i]);
+            s.body.goal.push_back(fraction * goal[i]);
         }
         if (s.body.find(s.body.options.tolerance)) {
-            s.say(share);
+            s.say(fraction);
             return true;
         }
         s.body.state = state;
         return false;
     };
-    const double done = takeSteps(length, s.body.options.mostSteps, step, [] { return true; });
+    const double done = takeSteps(length, s.body.options.maxSteps, step, [] { return true; });
     if (done < 1.0) {
         double largest = 0.0;
         for (const double g : goal) {

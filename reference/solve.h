@@ -40,8 +40,8 @@ struct Patch {
 struct SolveOptions {
     Law law = Law::linear;
     Elements elements = Elements::p2;
-    int mostSteps = 200;             // load steps between two calls, halved ones included
-    double tolerance = 1e-8;         // residual, share of the forces
+    int maxSteps = 200;              // load steps between two calls, halved ones included
+    double tolerance = 1e-8;         // residual, fraction of the forces
     bool progress = false;           // a line per step on standard error
     std::array<bool, 3> mirrored{};  // the planes x, y, z = 0 are planes of symmetry: what lies on one stays on it
 };

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double perMetre = 1e3;            // mm
 constexpr double regularVolume = 0.117851;  // of a tetrahedron with edges of 1
-constexpr double sameVolume = 1e-6;         // share of the body's volume
+constexpr double sameVolume = 1e-6;         // fraction of the body's volume
 
 std::array<double, 3> inMillimetres(Vec3 p)
 {

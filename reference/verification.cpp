@@ -81,7 +81,7 @@ double meanSize(const std::vector<Vec3>& points, const std::function<Vec3(Vec3)>
     return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-// A row for a field: its quadratic mean, and the error's share of it.
+// A row for a field: its quadratic mean, and the error's fraction of it.
 VerificationRow fieldRow(const char* problem, const std::vector<Vec3>& points, const std::function<Vec3(Vec3)>& exact,
                          double error, double bound)
 {
@@ -276,12 +276,12 @@ VerificationRow punch(double perThickness, double poisson, Fineness fineness)
 
 Rows punches(Fineness fineness)
 {
-    const std::vector<double> shares = fineness == Fineness::quick ? std::vector<double>{0.05, 0.2, 1.0}
-                                                                   : std::vector<double>{0.05, 0.2, 0.4, 0.6, 0.8, 1.0};
+    const std::vector<double> fractions = fineness == Fineness::quick ? std::vector<double>{0.05, 0.2, 1.0}
+                                                                      : std::vector<double>{0.05, 0.2, 0.4, 0.6, 0.8, 1.0};
     Rows rows;
     for (const double poisson : {0.3, 0.45}) {
-        for (const double share : shares) {
-            rows.push_back(punch(share, poisson, fineness));
+        for (const double fraction : fractions) {
+            rows.push_back(punch(fraction, poisson, fineness));
         }
     }
     return rows;

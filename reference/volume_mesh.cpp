@@ -14,9 +14,9 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double resolution = 6.0;                 // see MeshOptions
-constexpr double mostLess = 0.8, mostMore = 1.25;  // of a volume that is asked for anew
-constexpr double mendedAngle = 10.0;               // dihedral angles under it are mended where they can be [degrees]
+constexpr double resolution = 6.0;               // see MeshOptions
+constexpr double maxLess = 0.8, maxMore = 1.25;  // of a volume that is asked for anew
+constexpr double mendedAngle = 10.0;             // dihedral angles under it are mended where they can be [degrees]
 
 Surfaces surfacesByCgal(SmoothLabels& labels, const VolumeMeshOptions& options)
 {
@@ -42,7 +42,7 @@ Surfaces surfacesByNets(SmoothLabels& labels, const VolumeMeshOptions& options)
             surfaceNets(labels, options.size, [](const Surfaces&) { return std::vector<std::array<std::uint32_t, 3>>(); }));
         for (std::size_t r = 0; r < wanted.size(); ++r) {
             const double volume = made[labels.rows[r]];
-            wanted[r] *= volume > 0.0 ? std::clamp(labels.volume[r] / volume, mostLess, mostMore) : 1.0;
+            wanted[r] *= volume > 0.0 ? std::clamp(labels.volume[r] / volume, maxLess, maxMore) : 1.0;
         }
         fitVolumes(labels, wanted);
     }

@@ -19,7 +19,7 @@ using base::tr;
 
 constexpr double atRim = 3e-3;    // from the target's surface: near enough to fire [m]
 constexpr double offLine = 3e-3;  // of tip from planned line that is told [m]
-constexpr double hit = 0.1;       // share of target in a core that is worth taking out
+constexpr double hit = 0.1;       // fraction of target in a core that is worth taking out
 
 const char* directionInWords(glm::dvec3 way)
 {

@@ -15,7 +15,7 @@ struct Event {
     double time = 0;  // of the session [s]
     EventKind kind = EventKind::contact;
     std::uint32_t structure = 0;  // that a warning is about
-    double target = 0;            // fired: share of target tissue
+    double target = 0;            // fired: fraction of target tissue
 };
 
 /// What has happened from one state to the next.

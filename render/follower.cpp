@@ -24,11 +24,11 @@ double seconds(Clock::duration d)
     return std::chrono::duration<double>(d).count();
 }
 
-double quantile(std::vector<double> values, double share)
+double quantile(std::vector<double> values, double fraction)
 {
     if (values.empty())
         return 0;
-    const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
     std::nth_element(values.begin(), values.begin() + at, values.end());
     return values[static_cast<std::size_t>(at)];
 }

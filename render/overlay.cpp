@@ -58,10 +58,10 @@ void drawBar(Pen& pen, const std::string& name, double force, double cap, const 
 {
     pen.down();
     const double from = pen.left + 5.6 * pen.font, to = pen.right - 4.2 * pen.font;
-    const double full = std::max(cap, 0.1), share = std::clamp(force / full, 0.0, 1.0);
+    const double full = std::max(cap, 0.1), fraction = std::clamp(force / full, 0.0, 1.0);
     pen.canvas.text({pen.left, pen.y}, name, pen.font, white);
     pen.canvas.rectangle({from, pen.y}, {to - from, pen.font}, dark);
-    pen.canvas.rectangle({from, pen.y}, {(to - from) * share, pen.font}, colour);
+    pen.canvas.rectangle({from, pen.y}, {(to - from) * fraction, pen.font}, colour);
     pen.canvas.rectangle({to - 2, pen.y - 2}, {2, pen.font + 4}, white);
     pen.canvas.text({pen.right, pen.y}, said("{:.2Lf} N", force), pen.font, white, Align::right);
 }

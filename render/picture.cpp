@@ -170,7 +170,7 @@ void Picture::aimCamera()
     const glm::dvec3 right = glm::normalize(glm::cross(frame.up, from)), up = glm::cross(from, right);
     const ScreenPlan plan = screenPlan();
     constexpr double angle = 25.0;  // of the view, upright [degrees]
-    constexpr double filled = 1.1;  // share of the view; a body hardly fills the corners of its box
+    constexpr double filled = 1.1;  // fraction of the view; a body hardly fills the corners of its box
     const double tall = filled * std::tan(0.5 * angle / 180.0 * std::acos(-1.0));
     const double wide = tall * plan.view.width / plan.view.height;
     double distance = 0;
@@ -473,9 +473,9 @@ void Picture::setCaption(const std::string& words)
     caption_ = words;
 }
 
-void Picture::setTimeline(double share)
+void Picture::setTimeline(double fraction)
 {
-    timeline_ = share;
+    timeline_ = fraction;
 }
 
 void Picture::setDisplayScale(double scale)

@@ -102,8 +102,8 @@ public:
     void setHand(std::optional<glm::dvec3> hand) noexcept { hand_ = hand; }
     /// A few words on top, such as "PAUSED" or "REPLAY x 0.5"; empty = none.
     void setCaption(const std::string& words);
-    /// A bar that shows which share of a record is over, in [0, 1]; negative = none.
-    void setTimeline(double share);
+    /// A bar that shows which fraction of a record is over, in [0, 1]; negative = none.
+    void setTimeline(double fraction);
     /// Pixels per point of the screen, from 1: texts are drawn so many times larger at least.
     void setDisplayScale(double scale);
     /// The point [m] under a pixel (from the lower left) of the 3-D view, in the plane through `point` [m] that faces the

@@ -10,9 +10,9 @@ namespace {
 
 constexpr double affordable = 80e3;  // nodes in every frame: some milliseconds
 
-std::uint8_t byte(float share) noexcept
+std::uint8_t byte(float fraction) noexcept
 {
-    return static_cast<std::uint8_t>(128.5F + 127.0F * share);  // over zero: it is rounded
+    return static_cast<std::uint8_t>(128.5F + 127.0F * fraction);  // over zero: it is rounded
 }
 
 }  // namespace

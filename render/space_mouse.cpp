@@ -30,14 +30,14 @@ ultrasound::ProbeMove SpaceMouse::moved()
             continue;
         const auto& m = event.motion;
         const double seconds = std::min(1e-3 * m.period, longestPeriod);
-        const auto share = [](int v) { return std::clamp(v / fullDeflection, -1.0, 1.0); };
+        const auto fraction = [](int v) { return std::clamp(v / fullDeflection, -1.0, 1.0); };
         const double way = fastest * seconds, angle = fastestTurn * seconds;
-        sum += {.slide = -way * share(m.x),
-                .sweep = -way * share(m.z),
-                .rock = angle * share(m.rz),
-                .turn = angle * share(m.ry),
-                .press = -way * share(m.y),
-                .tilt = angle * share(m.rx)};
+        sum += {.slide = -way * fraction(m.x),
+                .sweep = -way * fraction(m.z),
+                .rock = angle * fraction(m.rz),
+                .turn = angle * fraction(m.ry),
+                .press = -way * fraction(m.y),
+                .tilt = angle * fraction(m.rx)};
     }
     return sum;
 }

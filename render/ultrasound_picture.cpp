@@ -22,7 +22,7 @@ namespace palpate::render {
 namespace {
 
 constexpr double mm = 1e3;
-constexpr std::size_t mostCalipers = 4;
+constexpr std::size_t maxCalipers = 4;
 constexpr Colour caliperColour{0.2, 0.9, 1.0}, guideColour{0.3, 0.95, 0.4};
 
 const char* nameOf(const ultrasound::Transducer& t)
@@ -330,7 +330,7 @@ void UltrasoundPicture::beginCaliper(Point2 pixel)
 {
     if (!drawn_)
         return;
-    if (calipers_.size() == mostCalipers)
+    if (calipers_.size() == maxCalipers)
         calipers_.erase(calipers_.begin());
     const glm::vec2 at = layout(*drawn_).point(static_cast<float>(pixel[0] - area_.x),
                                                static_cast<float>(area_.y + area_.height - 1 - pixel[1]));

@@ -83,7 +83,7 @@ struct ReportData {
     std::vector<Core> cores;
     std::array<TaskTime, haptics::taskCount> tasks{};
     TaskTime tick;       // all tasks together
-    double missing = 0;  // share of ticks without a fresh pose
+    double missing = 0;  // fraction of ticks without a fresh pose
     bool faulted = false;
 };
 

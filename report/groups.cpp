@@ -156,10 +156,10 @@ std::vector<double> rowOf(const haptics::Score& score)
     return row;
 }
 
-double quantile(std::vector<double> values, double share)
+double quantile(std::vector<double> values, double fraction)
 {
     std::ranges::sort(values);
-    const double place = share * static_cast<double>(values.size() - 1);
+    const double place = fraction * static_cast<double>(values.size() - 1);
     const auto below = static_cast<std::size_t>(place);
     const double rest = place - static_cast<double>(below);
     // Between two that are infinite there is no straight line.

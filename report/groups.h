@@ -21,9 +21,9 @@ std::vector<double> rowOf(const haptics::Score& score);
 
 std::vector<double> valuesOf(const ScoredGroup& group, const haptics::Measure& measure);
 
-/// The value below which a share of the values lies, straight between neighbours. Infinity sorts last: the targeting error
-/// of a session that never fired is worse than any other.
-double quantile(std::vector<double> values, double share);
+/// The value below which a fraction of the values lies, straight between neighbours. Infinity sorts last: the targeting
+/// error of a session that never fired is worse than any other.
+double quantile(std::vector<double> values, double fraction);
 
 /// How much more often a value of `a` is above one of `b` than below it, -1 to 1. It needs no distribution.
 /// Source: N. Cliff, "Dominance statistics: ordinal analyses to answer ordinal questions", Psychological Bulletin 114,

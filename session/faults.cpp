@@ -25,7 +25,7 @@ using haptics::tickSeconds;
 
 constexpr double latestStart = 86400.0;  // [s]
 constexpr double longest = 10.0;         // [s]
-constexpr double mostLate = 1.0;         // [s]
+constexpr double maxLate = 1.0;          // [s]
 constexpr double furthestJump = 1.0;     // [m]
 
 // What a fault is called, and what it is when nothing more is said. The amount of the others is their length.
@@ -94,7 +94,7 @@ Fault parseFault(const std::string& text)
     if (amount && fault.kind == FaultKind::jump) {
         fault.amount = within(base::lengthOf(*amount), furthestJump, text, "amount", "m");
     } else if (amount && hasAmount) {
-        fault.amount = within(base::timeOf(*amount), mostLate, text, "amount", "s");
+        fault.amount = within(base::timeOf(*amount), maxLate, text, "amount", "s");
     }
     if (const auto& time = hasAmount ? length : amount ? amount : length) {
         fault.length = within(base::timeOf(*time), longest, text, "length", "s");
@@ -177,7 +177,7 @@ const Fault* FaultyDevice::active(FaultKind kind) const noexcept
 }
 
 // Time that passes for the hand between two ticks.
-void FaultyDevice::goOn(double seconds) noexcept
+void FaultyDevice::advance(double seconds) noexcept
 {
     for (auto n = ticksOf(seconds); n > 0 && !device_->finished(); --n) {
         device_->read();
@@ -187,7 +187,7 @@ void FaultyDevice::goOn(double seconds) noexcept
 haptics::DeviceSample FaultyDevice::read() noexcept
 {
     if (tick_ > 0) {
-        goOn(gapAfter(faults_, tick_ - 1));
+        advance(gapAfter(faults_, tick_ - 1));
     }
     ++tick_;
     haptics::DeviceSample sample = device_->read();
@@ -209,7 +209,7 @@ void FaultyDevice::write(Vec3 force) noexcept
 {
     if (const Fault* late = active(FaultKind::late)) {
         sleepFor(late->amount);
-        goOn(late->amount);
+        advance(late->amount);
     }
     device_->write(active(FaultKind::unplug) != nullptr ? Vec3(0.0) : force);
 }

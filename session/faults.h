@@ -57,7 +57,7 @@ public:
 
 private:
     const Fault* active(FaultKind kind) const noexcept;
-    void goOn(double seconds) noexcept;
+    void advance(double seconds) noexcept;
 
     std::unique_ptr<haptics::Device> device_;
     Faults faults_;

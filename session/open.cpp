@@ -26,7 +26,7 @@ namespace {
 
 using datasets::Scene;
 
-// The share of guidance in trial K of N: all in the first, none in the last.
+// The fraction of guidance in trial K of N: all in the first, none in the last.
 double gainOfTrial(const std::string& trial)
 {
     int k = 0, n = 0, read = 0;

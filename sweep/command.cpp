@@ -217,22 +217,22 @@ std::vector<std::size_t> conclude(const Options& o, const SweepFolder& folder, c
     const auto failed =
         static_cast<std::size_t>(std::ranges::count_if(rows, [](const auto& r) { return r && r->failed(); }));
     const auto processes = static_cast<double>(std::min(begun, static_cast<std::size_t>(o.jobs)));
-    const double share = run.seconds > 0 && processes > 0 ? run.cpuSeconds / (run.seconds * processes) : 0.0;
+    const double fraction = run.seconds > 0 && processes > 0 ? run.cpuSeconds / (run.seconds * processes) : 0.0;
     const fs::path file = folder.path() / "table.csv";
     if (!o.json.empty()) {
         command::writeJson(o.json, {{"cases", wanted.size()},
                                     {"done", table.rows.size()},
                                     {"failed", failed},
                                     {"seconds", run.seconds},
-                                    {"cpu_fraction", share},
+                                    {"cpu_fraction", fraction},
                                     {"table", file.string()}});
     }
     if (o.json != "-") {
         fmt::print("{} of {}, {} failed; {} now in {:.3g} s{}\ntable: {}, {}\n", table.rows.size(),
                    plural(wanted.size(), "case"), failed, run.done, run.seconds,
-                   run.cpuSeconds > 0
-                       ? fmt::format(", {:.0f} % of {}", 100 * share, plural(static_cast<std::size_t>(processes), "core"))
-                       : "",
+                   run.cpuSeconds > 0 ? fmt::format(", {:.0f} % of {}", 100 * fraction,
+                                                    plural(static_cast<std::size_t>(processes), "core"))
+                                      : "",
                    file.string(), (folder.path() / "table.db").string());
     }
     if (!wanted.empty() && failed == wanted.size()) {

@@ -15,8 +15,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t mostRows = 50000;  // in the page: of more, every n-th
-constexpr std::size_t mostErrors = 20;   // listed
+constexpr std::size_t maxRows = 50000;  // in the page: of more, every n-th
+constexpr std::size_t maxErrors = 20;   // listed
 
 json valueOf(const KeyValue& value)
 {
@@ -41,7 +41,7 @@ json axesOf(const SweepPlan& plan)
 json rowsOf(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& rows)
 {
     json out = json::array();
-    const std::size_t step = (rows.size() + mostRows - 1) / mostRows;
+    const std::size_t step = (rows.size() + maxRows - 1) / maxRows;
     for (std::size_t i = 0; i < rows.size(); i += step) {
         if (!rows[i] || rows[i]->failed()) {
             continue;
@@ -68,7 +68,7 @@ std::string failures(const std::vector<std::optional<SweepRow>>& rows)
     std::string list;
     std::size_t count = 0;
     for (const auto& row : rows) {
-        if (row && row->failed() && ++count <= mostErrors) {
+        if (row && row->failed() && ++count <= maxErrors) {
             list += fmt::format("<tr><td>{}</td><td>{}</td></tr>", row->index, report::escape(row->error));
         }
     }

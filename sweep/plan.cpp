@@ -23,9 +23,9 @@ using datasets::Section;
 
 namespace {
 
-constexpr std::int64_t mostSamples = 1'000'000;
-constexpr std::int64_t mostCases = 10'000'000;
-constexpr std::int64_t mostSteps = 100'000;
+constexpr std::int64_t maxSamples = 1'000'000;
+constexpr std::int64_t maxCases = 10'000'000;
+constexpr std::int64_t maxSteps = 100'000;
 constexpr double furthest = 1e12;
 constexpr std::size_t probes = 60;  // cases whose scene is tried before a sweep begins
 
@@ -112,7 +112,7 @@ Axis readAxis(Section& section, DesignKind design)
         axis.log = section.has("log_range");
         readRange(section, axis.log ? "log_range" : "range", axis);
         axis.whole = section.flag("whole").value_or(false);
-        const auto steps = section.integer("steps", "", 2, mostSteps);
+        const auto steps = section.integer("steps", "", 2, maxSteps);
         if (!steps && design == DesignKind::grid) {
             section.missing("steps", "how many values of the range a grid has");
         }
@@ -157,7 +157,7 @@ void readDesign(Section& top, SweepPlan& plan)
     if (const auto kind = section->choice("kind", designNames)) {
         plan.design = static_cast<DesignKind>(*kind);
     }
-    const auto samples = section->integer("samples", "", 1, mostSamples);
+    const auto samples = section->integer("samples", "", 1, maxSamples);
     const bool isList = plan.design == DesignKind::list;
     if ((plan.design == DesignKind::grid || isList) == samples.has_value()) {
         const char* const none = isList ? "a list has none: leave it out" : "a grid has none: leave it out";
@@ -175,7 +175,7 @@ void readSlurm(Section& top, SlurmSettings& slurm)
         slurm.account = section->word("account").value_or("");
         slurm.memory = section->word("memory").value_or("");
         slurm.options = wordsOf(*section, "options");
-        slurm.chunk = section->integer("chunk", "", 1, mostCases).value_or(0);
+        slurm.chunk = section->integer("chunk", "", 1, maxCases).value_or(0);
         section->finish();
     }
 }
@@ -272,8 +272,8 @@ UnitPoints gridPoints(const std::vector<Axis>& axes, Section& top)
     for (const Axis& a : axes) {
         count *= static_cast<double>(a.levels());
     }
-    if (count > static_cast<double>(mostCases)) {
-        top.refuse("axis", fmt::format("a grid of {:.0f} points: {} at most; take samples instead", count, mostCases));
+    if (count > static_cast<double>(maxCases)) {
+        top.refuse("axis", fmt::format("a grid of {:.0f} points: {} at most; take samples instead", count, maxCases));
     }
     UnitPoints points(static_cast<std::size_t>(count), std::vector<double>(axes.size()));
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -407,7 +407,7 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     plan.base = baseScene(*scene, origin);
     plan.seed =
         static_cast<std::uint64_t>(top.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max()).value_or(1));
-    plan.repeats = static_cast<std::size_t>(top.integer("repeats", "", 1, mostSamples).value_or(1));
+    plan.repeats = static_cast<std::size_t>(top.integer("repeats", "", 1, maxSamples).value_or(1));
     plan.commonSeeds = top.flag("common_seeds").value_or(false);
     plan.records = top.flag("records").value_or(false);
     plan.caseLimit = top.number("case_limit_s", "s", 0.001, 1e7).value_or(3600.0);
@@ -434,8 +434,8 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     checkColumns(top, plan);
     plan.points = pointsOf(plan, top);
     applyConstraints(plan, top);
-    if (static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(mostCases)) {
-        top.refuse("repeats", fmt::format("over {} cases", mostCases));
+    if (static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(maxCases)) {
+        top.refuse("repeats", fmt::format("over {} cases", maxCases));
     }
     probe(plan, origin.string());
     probeOutputs(plan, sweepCase(plan, 0), origin.string());

@@ -30,7 +30,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t idle = static_cast<std::size_t>(-1);
-constexpr int mostJobs = 1024;
+constexpr int maxJobs = 1024;
 constexpr auto lookEvery = std::chrono::milliseconds(20);
 constexpr auto tellEvery = std::chrono::milliseconds(100);
 
@@ -38,7 +38,7 @@ constexpr auto tellEvery = std::chrono::milliseconds(100);
 struct Shared {
     std::atomic<std::size_t> next{0}, done{0};
     std::atomic<bool> stop{false}, failed{false};
-    std::array<std::atomic<std::size_t>, mostJobs> item{};
+    std::array<std::atomic<std::size_t>, maxJobs> item{};
     std::array<char, 1024> error{};  // of the process that set `failed`
 };
 
@@ -199,7 +199,7 @@ PoolResult runPool(std::size_t count, int jobs, const PoolWork& work)
     const auto begin = Clock::now();
     const double cpu = cpuOfChildren();
     const auto processes =
-        std::min({count, static_cast<std::size_t>(std::max(jobs, 1)), static_cast<std::size_t>(mostJobs)});
+        std::min({count, static_cast<std::size_t>(std::max(jobs, 1)), static_cast<std::size_t>(maxJobs)});
     {
         Processes all(shared, count, processes, work);
         auto told = begin;

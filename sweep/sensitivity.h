@@ -30,7 +30,7 @@ struct MorrisEffect {
 /// not finite are left out. Empty when an axis has none.
 std::vector<MorrisEffect> morrisEffects(const UnitPoints& points, std::span<const double> outputs);
 
-/// Share of the variance over a full grid that the mean at each value of an axis makes: the first-order index there.
+/// Fraction of the variance over a full grid that the mean at each value of an axis makes: the first-order index there.
 /// `level[i]` is the value's index at output i.
 double mainEffect(std::span<const double> outputs, std::span<const std::size_t> level);
 

@@ -32,11 +32,11 @@ using nlohmann::json;
 namespace {
 
 constexpr std::size_t usualTasks = 100;
-constexpr std::size_t mostTasks = 1000;  // of an array: what a cluster allows by default (MaxArraySize 1001)
-constexpr int mostLosses = 3;
+constexpr std::size_t maxTasks = 1000;  // of an array: what a cluster allows by default (MaxArraySize 1001)
+constexpr int maxLosses = 3;
 constexpr auto lookEvery = std::chrono::milliseconds(500);
 constexpr auto settleTime = std::chrono::seconds(2);  // for files of another machine to be seen here
-constexpr int mostSilence = 600;                      // looks in a row that the controller may leave unanswered
+constexpr int maxSilence = 600;                       // looks in a row that the controller may leave unanswered
 
 struct Answer {
     int status = 0;
@@ -105,7 +105,7 @@ public:
     {
         const std::size_t usual = (cases.size() + usualTasks - 1) / usualTasks;
         const std::size_t wanted = settings_.chunk > 0 ? static_cast<std::size_t>(settings_.chunk) : usual;
-        const std::size_t chunk = std::max(wanted, (cases.size() + mostTasks - 1) / mostTasks);
+        const std::size_t chunk = std::max(wanted, (cases.size() + maxTasks - 1) / maxTasks);
         Submission s;
         json chunks = json::array();
         for (std::size_t at = 0; at < cases.size(); at += chunk) {
@@ -139,7 +139,7 @@ public:
             const Answer answer = ask({"squeue", "-h", "-r", "-j", s.job, "-o", "%K %T"});
             const bool gone = answer.text.find("Invalid job id") != std::string::npos;
             if (answer.status != 0 && !gone) {
-                if (++silence_ > mostSilence) {
+                if (++silence_ > maxSilence) {
                     throw std::runtime_error("squeue: " + oneLine(answer.text));
                 }
                 running += s.tasks.size();
@@ -234,15 +234,15 @@ bool runOnSlurm(SweepFolder& folder, const std::vector<std::size_t>& cases, cons
         folder.lock().check();
         std::vector<std::size_t> again;
         for (const std::size_t i : cluster.look()) {
-            if (++losses[i] < mostLosses) {
+            if (++losses[i] < maxLosses) {
                 again.push_back(i);
                 continue;
             }
             SweepRow row;
             row.index = i;
             row.build = build;
-            row.error = fmt::format("lost {} times: its task was killed, timed out or its node failed; see slurm/*.log",
-                                    mostLosses);
+            row.error =
+                fmt::format("lost {} times: its task was killed, timed out or its node failed; see slurm/*.log", maxLosses);
             folder.write(row);
         }
         if (!again.empty()) {

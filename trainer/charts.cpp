@@ -72,8 +72,9 @@ struct Plane {
 
     float across(std::size_t session) const
     {
-        const float share = (static_cast<float>(session) + 0.5F) / static_cast<float>(std::max<std::size_t>(sessions, 1));
-        return from.x + share * (to.x - from.x);
+        const float fraction =
+            (static_cast<float>(session) + 0.5F) / static_cast<float>(std::max<std::size_t>(sessions, 1));
+        return from.x + fraction * (to.x - from.x);
     }
     float down(double v) const { return to.y - static_cast<float>((v - y.low) / (y.high - y.low)) * (to.y - from.y); }
 };
@@ -226,8 +227,8 @@ void drawSpreads(const ComparedMeasure& measure, float wide, float high)
     }
     const float margin = 0.4F * ImGui::GetFontSize(), row = high / static_cast<float>(measure.groups.size());
     const auto across = [&](double v) {
-        const double share = r.high > r.low ? (v - r.low) / (r.high - r.low) : 0.5;
-        return at.x + margin + static_cast<float>(std::clamp(share, 0.0, 1.0)) * (wide - 2 * margin);
+        const double fraction = r.high > r.low ? (v - r.low) / (r.high - r.low) : 0.5;
+        return at.x + margin + static_cast<float>(std::clamp(fraction, 0.0, 1.0)) * (wide - 2 * margin);
     };
     for (std::size_t g = 0; g < measure.groups.size(); ++g) {
         const Spread& s = measure.groups[g];

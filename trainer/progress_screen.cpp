@@ -53,7 +53,7 @@ Errand drawExercises(State& state, bool entered)
             state.curveShown = state.exerciseShown == i ? state.curveShown : 0;
             state.exerciseShown = i;
             if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left) || enterPressed()) {
-                errand = goOn(state);
+                errand = advance(state);
             }
         }
         if (entered && state.exerciseShown == i) {

@@ -14,8 +14,8 @@ using base::tr;
 void drawParts(const Result& result)
 {
     for (const PartOfScore& part : result.parts) {
-        const float share = part.most > 0 ? static_cast<float>(part.points / part.most) : 0.0F;
-        ImGui::ProgressBar(share, {12 * ImGui::GetFontSize(), 0},
+        const float fraction = part.most > 0 ? static_cast<float>(part.points / part.most) : 0.0F;
+        ImGui::ProgressBar(fraction, {12 * ImGui::GetFontSize(), 0},
                            said(tr("{:.0f} of {:.0f}"), part.points, part.most).c_str());
         ImGui::SameLine();
         ImGui::TextUnformatted(part.name.c_str());

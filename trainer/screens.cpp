@@ -92,7 +92,7 @@ Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
         if (ImGui::Selectable("##choose", state.chosen == i, ImGuiSelectableFlags_AllowDoubleClick, {0, high})) {
             state.chosen = i;
             if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left) || enterPressed()) {
-                errand = goOn(state);
+                errand = advance(state);
             }
         }
         if (entered && state.chosen == i) {
@@ -273,7 +273,7 @@ Errand drawFoot(State& state, bool entered)
     // Where something has the focus, Enter presses that.
     const bool enter = !running && !typing && !ImGui::IsAnyItemFocused() && enterPressed();
     if (pressed || enter) {
-        errand = goOn(state);
+        errand = advance(state);
     }
     return errand;
 }

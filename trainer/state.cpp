@@ -71,7 +71,7 @@ const char* mainButton(const State& state) noexcept
     return state.exercise.empty() ? tr("Next case") : tr("What is next");
 }
 
-Errand goOn(State& state)
+Errand advance(State& state)
 {
     switch (state.screen) {
         case Screen::cases:

@@ -132,7 +132,7 @@ enum class Errand {
 };
 
 /// The screen's main button. @returns  what has to be done for it
-Errand goOn(State& state);
+Errand advance(State& state);
 /// Back to the screen before; quits from the first.
 Errand goBack(State& state);
 /// Result screen: the same case again.

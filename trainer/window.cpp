@@ -18,9 +18,9 @@ namespace {
 constexpr double idle = 0.2;           // between looks at what runs, when nobody does anything [s]
 constexpr double betweenLooks = 0.03;  // for buttons of a device, where there is one [s]
 
-double quantile(const std::vector<double>& sorted, double share)
+double quantile(const std::vector<double>& sorted, double fraction)
 {
-    return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+    return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1))];
 }
 
 ScreenFigures figuresOf(std::string screen, std::vector<double> seconds)

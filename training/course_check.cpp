@@ -156,7 +156,7 @@ std::size_t compare(const std::filesystem::path& file, const std::vector<Simulat
 std::size_t storeAndKill(const std::filesystem::path& file, const std::vector<SimulatedCourse>& courses,
                          std::mt19937_64& random)
 {
-    constexpr int mostHeard = 7;
+    constexpr int maxHeard = 7;
     constexpr useconds_t longest = 12000;  // about two sessions [us]
     int ends[2];
     if (::pipe(ends) != 0) {
@@ -171,7 +171,7 @@ std::size_t storeAndKill(const std::filesystem::path& file, const std::vector<Si
         storeTheRest(file, courses, ends[1]);
     }
     ::close(ends[1]);
-    const auto wanted = random() % mostHeard;
+    const auto wanted = random() % maxHeard;
     std::size_t said = 0;
     char c = 0;
     while (said < wanted && ::read(ends[0], &c, 1) == 1) {

@@ -19,7 +19,7 @@ using datasets::Section;
 
 namespace {
 
-constexpr int mostTrials = 100;
+constexpr int maxTrials = 100;
 constexpr std::array<std::string_view, 3> guidanceNames{"on", "off", "fade"};
 constexpr std::array<std::string_view, 2> modeNames{"any", "test"};
 
@@ -47,7 +47,7 @@ Level readLevel(Section& section)
 Gate readGate(Section& section)
 {
     Gate gate;
-    gate.of = static_cast<int>(section.integer("of", "sessions", 1, mostTrials).value_or(gate.of));
+    gate.of = static_cast<int>(section.integer("of", "sessions", 1, maxTrials).value_or(gate.of));
     gate.pass = static_cast<int>(section.integer("pass", "sessions", 1, gate.of).value_or(std::min(gate.pass, gate.of)));
     gate.testOnly = section.choice("mode", modeNames).value_or(0) == 1;
     for (Section& one : section.sections("level")) {
@@ -95,7 +95,7 @@ Exercise readExercise(Section& section, const Curriculum& before)
     if (section.has("fade_trials") && e.guidance != Guidance::fade) {
         section.refuse("fade_trials", "guidance does not fade here: add guidance = \"fade\"");
     }
-    e.fadeTrials = static_cast<int>(section.integer("fade_trials", "sessions", 2, mostTrials).value_or(e.fadeTrials));
+    e.fadeTrials = static_cast<int>(section.integer("fade_trials", "sessions", 2, maxTrials).value_or(e.fadeTrials));
     e.gate = readGate(section);
     for (const std::string& other : e.after) {
         // Only those before it: so none wait for one another.

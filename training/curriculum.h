@@ -47,7 +47,7 @@ std::vector<Curriculum> allCurricula(std::vector<std::string>* faults = nullptr)
 /// The curriculum called so, or in that file. Throws std::runtime_error, with the nearest name that there is.
 Curriculum findCurriculum(const std::string& id);
 
-/// The share of guidance in trial `number` (from 1 up) of an exercise: 1 all, 0 none.
+/// The fraction of guidance in trial `number` (from 1 up) of an exercise: 1 all, 0 none.
 double guidanceOf(const Exercise& exercise, int number, bool test) noexcept;
 
 }  // namespace palpate::training

@@ -12,8 +12,8 @@ namespace palpate::training {
 
 namespace {
 
-constexpr double tie = 1e-9;              // sums of weights that differ by less are the same
-constexpr std::size_t mostStates = 2000;  // of a chain; finer values are merged beyond
+constexpr double tie = 1e-9;             // sums of weights that differ by less are the same
+constexpr std::size_t maxStates = 2000;  // of a chain; finer values are merged beyond
 
 }  // namespace
 
@@ -64,7 +64,7 @@ double averageRunLength(const CusumPlan& plan, CusumChart chart, double failureR
 
     // All values that can be reached, by what is the same within rounding, or within the limit's share where there are
     // many.
-    const double grain = std::max(1e-7, limit / static_cast<double>(mostStates));
+    const double grain = std::max(1e-7, limit / static_cast<double>(maxStates));
     std::map<std::int64_t, std::size_t> index;
     std::vector<double> values;
     const auto stateOf = [&](double value) {

@@ -24,14 +24,14 @@ double draw(std::mt19937_64& random)
 // A value that meets the level, or one that misses it, between nothing and as much again beyond its limit.
 double valueFor(const Level& level, bool meet, std::mt19937_64& random)
 {
-    const double share = 0.05 + 0.9 * draw(random);
+    const double fraction = 0.05 + 0.9 * draw(random);
     if (level.atLeast && level.atMost) {
         const double width = std::max(*level.atMost - *level.atLeast, 1.0);
-        return meet ? *level.atLeast + share * (*level.atMost - *level.atLeast) : *level.atMost + share * width;
+        return meet ? *level.atLeast + fraction * (*level.atMost - *level.atLeast) : *level.atMost + fraction * width;
     }
     const double limit = level.atLeast ? *level.atLeast : *level.atMost;
     const double size = std::max(std::abs(limit), 1.0);
-    return limit + (meet == level.atLeast.has_value() ? share : -share) * size;
+    return limit + (meet == level.atLeast.has_value() ? fraction : -fraction) * size;
 }
 
 Values valuesFor(const Gate& gate, bool meet, std::mt19937_64& random)

@@ -33,7 +33,7 @@ struct StoredSession {
     std::string caseId;                // empty: none
     std::string curriculum, exercise;  // empty: outside one
     bool test = false;                 // test mode; else practice
-    double guidance = 1;               // share of the guiding force, 0 to 1
+    double guidance = 1;               // fraction of the guiding force, 0 to 1
     std::string scene, device, build;
     std::string record;        // file; empty: none was kept
     std::string recordSha256;  // its seal; empty: none

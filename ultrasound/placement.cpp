@@ -124,7 +124,7 @@ double scoreOf(const Beam& beam, const Pose& pose, const Line& line, double gap)
     return oblique + 500 * place.y + 10 * side + 5e3 * gap + blocked;
 }
 
-// Share of the picture that lies beyond what is known of the body.
+// Fraction of the picture that lies beyond what is known of the body.
 double unknownShare(const Medium& medium, const Beam& beam, const Pose& pose)
 {
     constexpr int points = 12;

@@ -280,12 +280,12 @@ void RayCaster::fillShadows(const View& view, Shade& shade)
             float* a = &shade.left[shade.at(e, s, 0)];
             const float z = static_cast<float>(s) * step_;
             const float apart = view.beam().pitch() * view.beam().metresPerLine(z);
-            const float share = std::min(0.25F, shadowFill * step_ / (apart * apart));
+            const float fraction = std::min(0.25F, shadowFill * step_ / (apart * apart));
             now_[0] = a[0];
             now_[n - 1] = a[n - 1];
             for (std::size_t i = 1; i + 1 < n; ++i)
                 now_[i] =
-                    a[i] / (raw_[i] + 1e-9F) * (before_[i] + share * (before_[i - 1] - 2 * before_[i] + before_[i + 1]));
+                    a[i] / (raw_[i] + 1e-9F) * (before_[i] + fraction * (before_[i - 1] - 2 * before_[i] + before_[i + 1]));
             std::copy_n(a, n, raw_.begin());
             std::copy_n(now_.begin(), n, a);
             std::swap(before_, now_);

@@ -65,7 +65,7 @@ private:
     void deposit(EchoLines& echoes, int line, float depth, float re, float im) const;
     void fillShadows(const View& view, Shade& shade);
 
-    std::array<float, 256> left_{};  // share of the amplitude after one step in a tissue
+    std::array<float, 256> left_{};  // fraction of the amplitude after one step in a tissue
     std::vector<float> planeWeight_;
     std::vector<float> before_, now_, raw_;  // of fillShadows()
     RestShifts rest_;                        // of the plane that is cast

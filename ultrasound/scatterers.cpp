@@ -86,9 +86,9 @@ void Scatterers::forget()
     std::fill(known_.begin(), known_.end(), Known::no);
 }
 
-void Scatterers::setVariation(float share)
+void Scatterers::setVariation(float fraction)
 {
-    variation_ = share;
+    variation_ = fraction;
     forget();
 }
 

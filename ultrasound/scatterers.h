@@ -29,7 +29,7 @@ public:
     /// Echo strengths are looked up again from the labels.
     void forget();
     /// How much echoes vary within a tissue, 0 to 1.
-    void setVariation(float share);
+    void setVariation(float fraction);
     /// Finds the blocks that lie in the picture now.
     void find(const View& view, const Medium& medium);
     /// Adds their echoes.

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int widest = 40;  // of a spread to each side [rows, lines]
 constexpr std::size_t noises = 1U << 15U;
-constexpr float mostCompensation = 75;  // [dB]
+constexpr float maxCompensation = 75;  // [dB]
 
 // Weights of a Gaussian of `sigma` steps, of 1 in the middle; returns how many there are to each side.
 int gaussian(float sigma, float cut, std::array<float, widest + 1>& weight)
@@ -104,12 +104,12 @@ void PointSpread::power(std::vector<float>& out) const
 float gainAt(const Beam& beam, float z) noexcept
 {
     const Settings& s = beam.settings();
-    const float share = z / s.depth * tgcSliders - 0.5F;
-    const float low = std::clamp(std::floor(share), 0.0F, static_cast<float>(tgcSliders - 1));
+    const float fraction = z / s.depth * tgcSliders - 0.5F;
+    const float low = std::clamp(std::floor(fraction), 0.0F, static_cast<float>(tgcSliders - 1));
     const auto i = static_cast<std::size_t>(low), j = std::min<std::size_t>(i + 1, tgcSliders - 1);
-    const float t = std::clamp(share - low, 0.0F, 1.0F), slider = s.tgc[i] + t * (s.tgc[j] - s.tgc[i]);
+    const float t = std::clamp(fraction - low, 0.0F, 1.0F), slider = s.tgc[i] + t * (s.tgc[j] - s.tgc[i]);
     const float perMetre = 100 * beam.transducer().compensation * beam.megahertz();
-    return beam.transducer().baseGain + s.gain + slider + std::min(mostCompensation, perMetre * z);
+    return beam.transducer().baseGain + s.gain + slider + std::min(maxCompensation, perMetre * z);
 }
 
 void PointSpread::compress(const Beam& beam, std::vector<std::uint8_t>& grey) const

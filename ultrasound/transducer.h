@@ -20,7 +20,7 @@ struct Transducer {
     float width = 38e-3F;                                    // linear: of the face [m]
     float radius = 50e-3F, sector = 1.15F;                   // curved: of the face [m], [rad]
     float frequency = 9e6F, lowest = 5e6F, highest = 14e6F;  // at first, and what there is to choose from [Hz]
-    float bandwidth = 0.5F;                                  // pulse-echo at -6 dB, share of the frequency
+    float bandwidth = 0.5F;                                  // pulse-echo at -6 dB, fraction of the frequency
     float fNumber = 2;                                       // of transmit and receive
     // In elevation the lens is fixed: width at its focus at -6 dB, focus, depth of field [m].
     float elevationWidth = 1.3e-3F, elevationFocus = 18e-3F, elevationRange = 14e-3F;

@@ -311,10 +311,10 @@ struct Histogram {
     float high = 1;
     std::array<double, bins> cells{};
 
-    void add(float value, double share)
+    void add(float value, double fraction)
     {
         const float bin = (value - low) / (high - low) * static_cast<float>(bins);
-        cells[static_cast<std::size_t>(std::clamp(bin, 0.0F, static_cast<float>(bins - 1)))] += share;
+        cells[static_cast<std::size_t>(std::clamp(bin, 0.0F, static_cast<float>(bins - 1)))] += fraction;
     }
     double above(float level) const
     {

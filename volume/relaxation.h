@@ -35,11 +35,11 @@ struct Relaxation {
     /// G(t) / G(0), at the time `seconds` after a step.
     double remaining(double seconds) const noexcept
     {
-        double share = 1.0;
+        double fraction = 1.0;
         for (std::size_t i = 0; i < weights.size(); ++i) {
-            share -= weights[i] * (1.0 - std::exp(-seconds / relaxationTimes[i]));
+            fraction -= weights[i] * (1.0 - std::exp(-seconds / relaxationTimes[i]));
         }
-        return share;
+        return fraction;
     }
     /// The modulus right after a step, in that of the table.
     double instantaneous() const noexcept { return any() ? 1.0 / remaining(modulusTime) : 1.0; }

@@ -16,11 +16,11 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr int blockSide = 8;         // new voxels that are looked at together
-constexpr int mostSamples = 8;       // along an axis of a new voxel
-constexpr double equal = 1e-9;       // shares that differ by less are the same
-constexpr double mostLoss = 0.1;     // of a structure's volume before it gets voxels back
-constexpr float leastShare = 1e-4F;  // of a voxel that a structure can get back
+constexpr int blockSide = 8;       // new voxels that are looked at together
+constexpr int maxSamples = 8;      // along an axis of a new voxel
+constexpr double equal = 1e-9;     // shares that differ by less are the same
+constexpr double maxLoss = 0.1;    // of a structure's volume before it gets voxels back
+constexpr float minShare = 1e-4F;  // of a voxel that a structure can get back
 
 std::size_t countOf(Index3 size)
 {
@@ -46,7 +46,7 @@ struct Share {
     double weight = 0;
 };
 
-// Finds the share of each label in new voxels.
+// Finds the fraction of each label in new voxels.
 class Sampler {
 public:
     Sampler(const LabelImage& image, const VoxelGrid& grid, std::span<const std::uint64_t> voxels)
@@ -60,7 +60,7 @@ public:
         Index3 samples(1);
         for (int k = 0; k < 3; ++k) {
             const double widest = std::max({std::abs(step_[k].x), std::abs(step_[k].y), std::abs(step_[k].z)});
-            samples[k] = std::clamp(static_cast<int>(std::ceil(widest - 1e-6)), 1, mostSamples);
+            samples[k] = std::clamp(static_cast<int>(std::ceil(widest - 1e-6)), 1, maxSamples);
             interpolate_[k] = old[k] > 0.499 * std::min({spacing.x, spacing.y, spacing.z});
         }
         forEachIndex(Index3(0), samples - 1,
@@ -99,7 +99,7 @@ public:
     }
 
     // The shares of the labels in new voxel `n`; what is beyond the image counts as label 0. They add up to 1.
-    void shares(Index3 n, std::vector<Share>& out) const
+    void fractions(Index3 n, std::vector<Share>& out) const
     {
         out.clear();
         const Vec3 centre = start_ + step_ * Vec3(n);
@@ -118,10 +118,10 @@ public:
         }
     }
 
-    std::uint16_t winner(const std::vector<Share>& shares) const
+    std::uint16_t winner(const std::vector<Share>& fractions) const
     {
-        const Share* best = &shares.front();
-        for (const Share& s : shares) {
+        const Share* best = &fractions.front();
+        for (const Share& s : fractions) {
             const bool more = s.weight > best->weight + equal;
             const bool same = !more && s.weight > best->weight - equal;
             const auto rank = [&](std::uint16_t label) { return std::pair(voxels_[label], label); };
@@ -153,9 +153,9 @@ private:
     glm::bvec3 interpolate_{false};
 };
 
-// A voxel that a thin structure may get: it fills `share` of it.
+// A voxel that a thin structure may get: it fills `fraction` of it.
 struct Claim {
-    float share = 0;
+    float fraction = 0;
     std::size_t voxel = 0;
 };
 
@@ -213,7 +213,7 @@ private:
         for (int first = 0; first < blocks.z; first += atOnce) {
             tbb::parallel_for(first, std::min(first + atOnce, blocks.z), [&](int bz) {
                 Slab& slab = slabs[static_cast<std::size_t>(bz)];
-                std::vector<Share> shares;
+                std::vector<Share> fractions;
                 forEachIndex(Index3(0, 0, bz), Index3(blocks.x - 1, blocks.y - 1, bz), [&](Index3 block) {
                     const Index3 low = block * blockSide;
                     const Index3 high = glm::min(low + blockSide, grid_.size) - 1;
@@ -222,8 +222,8 @@ private:
                         return;
                     }
                     forEachIndex(low, high, [&](Index3 n) {
-                        sampler.shares(n, shares);
-                        visit(out_.offset(n), shares, sampler, slab);
+                        sampler.fractions(n, fractions);
+                        visit(out_.offset(n), fractions, sampler, slab);
                     });
                 });
             });
@@ -248,9 +248,9 @@ private:
         };
         const auto slabs = sweep(
             0, 0.8,
-            [&](std::size_t voxel, const std::vector<Share>& shares, const Sampler& sampler, Slab& slab) {
-                out_.values[voxel] = sampler.winner(shares);
-                for (const Share& s : shares) {
+            [&](std::size_t voxel, const std::vector<Share>& fractions, const Sampler& sampler, Slab& slab) {
+                out_.values[voxel] = sampler.winner(fractions);
+                for (const Share& s : fractions) {
                     count(slab, s.label, s.weight);
                 }
             },
@@ -274,7 +274,7 @@ private:
         std::vector<std::uint16_t> thin;
         std::vector<char> isThin(65536, 0);
         for (std::size_t v = 1; v < voxels_.size(); ++v) {
-            if (voxels_[v] > 0 && filled[v] > 0 && static_cast<double>(won[v]) < (1 - mostLoss) * filled[v]) {
+            if (voxels_[v] > 0 && filled[v] > 0 && static_cast<double>(won[v]) < (1 - maxLoss) * filled[v]) {
                 thin.push_back(static_cast<std::uint16_t>(v));
                 isThin[v] = 1;
             }
@@ -303,14 +303,14 @@ private:
         return got;
     }
 
-    // By label: voxels that it has a share of but not won, those that it fills most of first.
+    // By label: voxels that it has a fraction of but not won, those that it fills most of first.
     std::vector<std::vector<Claim>> claimsOf(const std::vector<char>& isThin)
     {
         const auto slabs = sweep(
             0.8, 1,
-            [&](std::size_t voxel, const std::vector<Share>& shares, const Sampler&, Slab& slab) {
-                for (const Share& s : shares) {
-                    if (isThin[s.label] == 0 || out_.values[voxel] == s.label || s.weight < leastShare) {
+            [&](std::size_t voxel, const std::vector<Share>& fractions, const Sampler&, Slab& slab) {
+                for (const Share& s : fractions) {
+                    if (isThin[s.label] == 0 || out_.values[voxel] == s.label || s.weight < minShare) {
                         continue;
                     }
                     auto at = std::find_if(slab.claims.begin(), slab.claims.end(),
@@ -330,7 +330,7 @@ private:
         }
         for (auto& list : claims) {
             std::sort(list.begin(), list.end(), [](const Claim& a, const Claim& b) {
-                return std::pair(-a.share, a.voxel) < std::pair(-b.share, b.voxel);
+                return std::pair(-a.fraction, a.voxel) < std::pair(-b.fraction, b.voxel);
             });
         }
         return claims;

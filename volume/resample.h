@@ -35,9 +35,9 @@ struct ResampledLabels {
 
 /// A label map on another grid.
 ///
-/// The share of each label in a new voxel is the mean over that voxel of the label's indicator, trilinear along axes that
-/// the old voxels are not finer on. The label with the largest share wins; of equal shares that of the structure with fewer
-/// voxels, so that the values of the labels decide nothing.
+/// The fraction of each label in a new voxel is the mean over that voxel of the label's indicator, trilinear along axes
+/// that the old voxels are not finer on. The label with the largest share wins; of equal shares that of the structure with
+/// fewer voxels, so that the values of the labels decide nothing.
 ///
 /// Thin structures: one that so has lost over a tenth of its volume gets more voxels, those that it fills most of first,
 /// until it has its volume again, and one at least; the smallest structure is served first and keeps what it got. A sheet

@@ -57,11 +57,11 @@ struct CompanionImage {
 
 /// The tissue in a cell as one elastic material.
 struct CellMaterial {
-    /// Root of arithmetic times harmonic mean, times the share of the cell that is tissue; where some of it is held in
+    /// Root of arithmetic times harmonic mean, times the fraction of the cell that is tissue; where some of it is held in
     /// space, that of the rest, stiffer by as much as it is thinner [Pa].
     float youngsModulus = 0;
     float poissonRatio = 0;                         // mean over the tissue [-]
-    float fixed = 0;                                // share of the tissue that is held in space [-]
+    float fixed = 0;                                // fraction of the tissue that is held in space [-]
     float stiffening = 0;                           // mean over the tissue [-]
     std::array<float, relaxationTerms> relaxing{};  // weights of Relaxation, mean over what is not held [-]
 };

@@ -54,20 +54,20 @@ public:
     void visit(Index3 n, const Visit& visit) const
     {
         const Vec3 centre = start_ + step_ * Vec3(n);
-        const double share = 1.0 / static_cast<double>(offsets_.size());
+        const double fraction = 1.0 / static_cast<double>(offsets_.size());
         for (const Vec3& offset : offsets_) {
             const Vec3 at = centre + offset;
             if (glm::any(interpolate_)) {
-                visitAround(at, share, visit);
+                visitAround(at, fraction, visit);
             } else {
-                read(Index3(glm::floor(at + 0.5)), share, visit);
+                read(Index3(glm::floor(at + 0.5)), fraction, visit);
             }
         }
     }
 
 private:
     template <typename Visit>
-    void visitAround(Vec3 at, double share, const Visit& visit) const
+    void visitAround(Vec3 at, double fraction, const Visit& visit) const
     {
         const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
         const Vec3 t = (at - low) * Vec3(interpolate_);
@@ -76,7 +76,7 @@ private:
             const Vec3 w = glm::mix(1.0 - t, t, Vec3(step));
             const double weight = w.x * w.y * w.z;
             if (weight > 0) {
-                read(Index3(low) + step, share * weight, visit);
+                read(Index3(low) + step, fraction * weight, visit);
             }
         }
     }
@@ -140,10 +140,10 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
 CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vector<const TissueRow*>& rows)
 {
     struct Sums {
-        double share = 0.0, stiffness = 0.0, compliance = 0.0;
+        double fraction = 0.0, stiffness = 0.0, compliance = 0.0;
         void add(double weight, double modulus)
         {
-            share += weight;
+            fraction += weight;
             stiffness += weight * modulus;
             compliance += weight / modulus;
         }
@@ -162,19 +162,19 @@ CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vecto
             }
         }
     });
-    const double tissue = free.share + held.share;
+    const double tissue = free.fraction + held.fraction;
     if (tissue <= 0.0) {
         return {};
     }
-    const double rigid = held.share > 0.0 ? held.mean() : std::numeric_limits<double>::infinity();
-    const double modulus = free.share > 0.0 ? std::min(free.mean() * tissue / free.share, rigid) : rigid;
+    const double rigid = held.fraction > 0.0 ? held.mean() : std::numeric_limits<double>::infinity();
+    const double modulus = free.fraction > 0.0 ? std::min(free.mean() * tissue / free.fraction, rigid) : rigid;
     CellMaterial material{static_cast<float>(tissue * modulus),
                           static_cast<float>(poisson / tissue),
-                          static_cast<float>(held.share / tissue),
+                          static_cast<float>(held.fraction / tissue),
                           static_cast<float>(stiffening / tissue),
                           {}};
-    for (std::size_t i = 0; i < relaxing.size() && free.share > 0.0; ++i) {
-        material.relaxing[i] = static_cast<float>(relaxing[i] / free.share);
+    for (std::size_t i = 0; i < relaxing.size() && free.fraction > 0.0; ++i) {
+        material.relaxing[i] = static_cast<float>(relaxing[i] / free.fraction);
     }
     return material;
 }
@@ -196,7 +196,7 @@ NodeRange nodesAround(const TissueData& tissue, const NodeGrid& grid, const Inde
     return grown({Index3(low), Index3(high)}, grid, Index3(0));
 }
 
-// Share of each node's cell that is filled by marked labels (nodes x 1).
+// Fraction of each node's cell that is filled by marked labels (nodes x 1).
 std::vector<float> fractionOf(const TissueData& tissue, const NodeGrid& grid, const NodeRange& range,
                               const std::vector<std::uint8_t>& wanted)
 {

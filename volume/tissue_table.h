@@ -45,9 +45,9 @@ struct TissueRow {
     double poissonRatio = 0;      // [-]
     double stiffening = 0;        // b: the shear modulus grows as 1 + b (I_C - 3) with finite strain [-]
     double density = 0;           // [kg/m^3]
-    double compress = 0;          // ChainMail: shortest link, share of its rest length, in (0, 1]
-    double stretch = 0;           // ChainMail: longest link, share of its rest length, >= 1
-    double shear = 0;             // ChainMail: largest shift across a link, share of its rest length, >= 0
+    double compress = 0;          // ChainMail: shortest link, fraction of its rest length, in (0, 1]
+    double stretch = 0;           // ChainMail: longest link, fraction of its rest length, >= 1
+    double shear = 0;             // ChainMail: largest shift across a link, fraction of its rest length, >= 0
     double punctureForce = 0;     // tip force at which a 14 G needle enters [N]
     double cuttingForce = 0;      // tip force while it cuts on [N]
     double frictionPerMetre = 0;  // on a sliding shaft, per metre inside [N/m]

@@ -67,9 +67,9 @@ void Emulator::makeReady()
     offset_ = {};
 }
 
-bool Emulator::chance(double share)
+bool Emulator::chance(double fraction)
 {
-    return share > 0.0 && static_cast<double>(random_() >> 11U) * 0x1.0p-53 < share;
+    return fraction > 0.0 && static_cast<double>(random_() >> 11U) * 0x1.0p-53 < fraction;
 }
 
 double Emulator::byteTime() const noexcept

@@ -23,8 +23,8 @@ struct Mishaps {
     bool leadingZero = false;  // before the loader's greeting
     bool wrongGreeting = false;
     long wrongEcho = -1;  // byte of the upload that comes back changed
-    double garbled = 0;   // share of the bytes that come in changed
-    double dropped = 0;   // share of the bytes that come in missing
+    double garbled = 0;   // fraction of the bytes that come in changed
+    double dropped = 0;   // fraction of the bytes that come in missing
     double latency = 0;   // more of it, until an answer can be fetched [s]
 };
 
@@ -85,7 +85,7 @@ private:
     void live(double seconds);
     void moveHand(double seconds);
     double byteTime() const noexcept;
-    bool chance(double share);
+    bool chance(double fraction);
 
     std::vector<std::uint8_t> firmware_;
     std::mt19937_64 random_;

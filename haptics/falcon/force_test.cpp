@@ -16,7 +16,7 @@ bool held(const Link& link)
     return (link.pose().buttons & buttonCentre) != 0U;
 }
 
-// Share of the push at `t` seconds after its begin.
+// Fraction of the push at `t` seconds after its begin.
 double shape(double t)
 {
     return std::clamp(std::min(t / rise, (rise + stay + fall - t) / fall), 0.0, 1.0);

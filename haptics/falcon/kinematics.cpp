@@ -14,7 +14,7 @@ namespace {
 constexpr Geometry delta;
 constexpr double radPerDegree = std::numbers::pi / 180.0;
 constexpr double workspaceApex = 0.182;  // of the cone towards the user [m]
-constexpr int mostSteps = 40;            // of Newton's method
+constexpr int maxSteps = 40;             // of Newton's method
 constexpr double converged = 1e-12;      // [m]
 constexpr double longestStep = 0.03;     // of Newton's method [m]
 constexpr double widestSide = 0.95;      // of the shin's way sideways, over its length
@@ -139,7 +139,7 @@ std::optional<Angles> anglesAt(Vec3 position) noexcept
 std::optional<Vec3> positionAt(const Angles& angles, Vec3 near) noexcept
 {
     Vec3 position = plausible(near) ? near : Vec3(0.0, 0.0, 0.13);
-    for (int i = 0; i < mostSteps; ++i) {
+    for (int i = 0; i < maxSteps; ++i) {
         const System system = systemAt(position, angles);
         const glm::dmat3 matrix = glm::transpose(system.rows);
         if (!(std::abs(glm::determinant(matrix)) > 1e-6)) {

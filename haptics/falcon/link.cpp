@@ -17,7 +17,7 @@ constexpr double probeTime = 0.2;         // for a loaded Falcon to answer [s]
 constexpr double bootTime = 2.0;          // for the firmware to begin [s]
 constexpr double betweenAttempts = 0.5;   // [s]
 constexpr double restTime = 30e-3;        // [s]
-constexpr int leastMoved = 8;             // counts by which an encoder has moved for sure
+constexpr int minMoved = 8;               // counts by which an encoder has moved for sure
 constexpr double countsPerSecond = 60e3;  // faster than any hand: 38 rad/s, over 2 m/s of the grip
 constexpr double countsAtOnce = 30;
 constexpr int believed = 3;        // readings that follow each other
@@ -177,7 +177,7 @@ void Link::homeGrip(const std::atomic<bool>& stop)
 
 void Link::seeEncodersMove(const std::atomic<bool>& stop)
 {
-    const auto moved = [this](std::size_t i) { return most_[i] - least_[i] >= leastMoved; };
+    const auto moved = [this](std::size_t i) { return most_[i] - least_[i] >= minMoved; };
     const auto allMoved = [&] { return moved(0) && moved(1) && moved(2); };
     if (!allMoved()) {
         say_("move the Falcon's grip a little to every side");
@@ -295,9 +295,9 @@ Triple Link::motorFor(const ForceOrder& order, double now) noexcept
         forcesOff_ = now;
         return {};
     }
-    const double share = falling(std::max(age, silent), fresh, faded) * falling(posture_->margin, wellPosed, singular) *
-                         std::clamp((now - forcesOff_) / ramp, 0.0, 1.0);
-    const Torques torques = torquesFor(*posture_, share * (order.force + Vec3(0.0, options_.weight, 0.0)));
+    const double fraction = falling(std::max(age, silent), fresh, faded) * falling(posture_->margin, wellPosed, singular) *
+                            std::clamp((now - forcesOff_) / ramp, 0.0, 1.0);
+    const Torques torques = torquesFor(*posture_, fraction * (order.force + Vec3(0.0, options_.weight, 0.0)));
     return slewed(motorCommand(torques), now);
 }
 
@@ -310,10 +310,10 @@ Triple Link::slewed(const Triple& wanted, double now) noexcept
         largest = std::max(largest, std::abs(change[i]));
     }
     const double most = commandPerSecond * std::clamp(now - sent_, 0.0, 5e-3);
-    const double share = largest > most ? most / largest : 1.0;
+    const double fraction = largest > most ? most / largest : 1.0;
     Triple motor{};
     for (std::size_t i = 0; i < 3; ++i) {
-        motor[i] = static_cast<std::int16_t>(command_.motor[i] + std::lround(share * change[i]));
+        motor[i] = static_cast<std::int16_t>(command_.motor[i] + std::lround(fraction * change[i]));
     }
     return motor;
 }

@@ -24,7 +24,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr unsigned controlTime = 1000;  // [ms]
 constexpr std::size_t readers = 8, writers = 4;
-constexpr int mostErrors = 100;  // of transfers in a row, before the Falcon counts as gone
+constexpr int maxErrors = 100;  // of transfers in a row, before the Falcon counts as gone
 constexpr int interface = 0;
 
 void check(int result, const char* what)
@@ -111,7 +111,7 @@ private:
     struct Slot {
         UsbTransport* owner = nullptr;
         libusb_transfer* transfer = nullptr;
-        bool flying = false;
+        bool inFlight = false;
         std::array<std::uint8_t, usbPacket> bytes{};
     };
 
@@ -123,7 +123,7 @@ private:
     bool anyFlying() const noexcept;
     void note(const libusb_transfer& transfer) noexcept;
     void live(double seconds) noexcept;
-    void land() noexcept;
+    void cancelTransfers() noexcept;
     void restart() noexcept;
 
     Context context_;
@@ -203,9 +203,9 @@ void UsbTransport::makeSlots()
 bool UsbTransport::submit(Slot& slot) noexcept
 {
     const int result = libusb_submit_transfer(slot.transfer);
-    slot.flying = result == 0;
+    slot.inFlight = result == 0;
     gone_ = gone_ || result == LIBUSB_ERROR_NO_DEVICE;
-    return slot.flying;
+    return slot.inFlight;
 }
 
 void UsbTransport::note(const libusb_transfer& transfer) noexcept
@@ -223,7 +223,7 @@ void UsbTransport::note(const libusb_transfer& transfer) noexcept
             stalled_ = true;
             break;
         default:
-            gone_ = ++errors_ > mostErrors || gone_;
+            gone_ = ++errors_ > maxErrors || gone_;
             break;
     }
 }
@@ -232,7 +232,7 @@ void UsbTransport::onIn(libusb_transfer* transfer)
 {
     Slot& slot = *static_cast<Slot*>(transfer->user_data);
     UsbTransport& wire = *slot.owner;
-    slot.flying = false;
+    slot.inFlight = false;
     wire.note(*transfer);
     if (transfer->status == LIBUSB_TRANSFER_COMPLETED) {
         wire.bytes_.takeTransfer({transfer->buffer, static_cast<std::size_t>(transfer->actual_length)});
@@ -245,7 +245,7 @@ void UsbTransport::onIn(libusb_transfer* transfer)
 void UsbTransport::onOut(libusb_transfer* transfer)
 {
     Slot& slot = *static_cast<Slot*>(transfer->user_data);
-    slot.flying = false;
+    slot.inFlight = false;
     slot.owner->note(*transfer);
 }
 
@@ -253,10 +253,10 @@ bool UsbTransport::anyFlying() const noexcept
 {
     bool any = false;
     for (const Slot& slot : in_) {
-        any = any || slot.flying;
+        any = any || slot.inFlight;
     }
     for (const Slot& slot : out_) {
-        any = any || slot.flying;
+        any = any || slot.inFlight;
     }
     return any;
 }
@@ -270,13 +270,13 @@ void UsbTransport::live(double seconds) noexcept
 }
 
 // Cancels what is on its way and waits for it.
-void UsbTransport::land() noexcept
+void UsbTransport::cancelTransfers() noexcept
 {
     closing_ = true;
     for (auto* slots : {in_.data(), out_.data()}) {
         const std::size_t count = slots == in_.data() ? readers : writers;
         for (std::size_t i = 0; i < count; ++i) {
-            if (slots[i].flying) {
+            if (slots[i].inFlight) {
                 libusb_cancel_transfer(slots[i].transfer);
             }
         }
@@ -289,7 +289,7 @@ void UsbTransport::land() noexcept
 // After a stall of the endpoint, which has to be cleared with nothing on its way.
 void UsbTransport::restart() noexcept
 {
-    land();
+    cancelTransfers();
     libusb_clear_halt(handle_, endpointIn);
     closing_ = stalled_ = false;
     for (Slot& slot : in_) {
@@ -299,14 +299,14 @@ void UsbTransport::restart() noexcept
 
 void UsbTransport::close() noexcept
 {
-    land();
+    cancelTransfers();
     const auto free = [](Slot& slot) {
         // One that never came back is still the kernel's.
-        if (slot.transfer != nullptr && !slot.flying) {
+        if (slot.transfer != nullptr && !slot.inFlight) {
             libusb_free_transfer(slot.transfer);
         }
         slot.transfer = nullptr;
-        slot.flying = false;
+        slot.inFlight = false;
     };
     for (Slot& slot : in_) {
         free(slot);
@@ -353,7 +353,7 @@ bool UsbTransport::send(std::span<const std::uint8_t> bytes) noexcept
         return false;
     }
     for (Slot& slot : out_) {
-        if (!slot.flying) {
+        if (!slot.inFlight) {
             std::copy(bytes.begin(), bytes.end(), slot.bytes.begin());
             slot.transfer->length = static_cast<int>(bytes.size());
             return submit(slot);

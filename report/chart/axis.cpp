@@ -121,11 +121,11 @@ DrawableChart drawableChart(Chart chart, const std::filesystem::path& file)
 
 std::vector<AxisTick> logTicks(AxisRange range)
 {
-    constexpr int mostLabels = 8;
+    constexpr int maxLabels = 8;
     const int first = static_cast<int>(std::floor(std::log10(range.low) + 1e-9));
     const int last = static_cast<int>(std::ceil(std::log10(range.high) - 1e-9));
     const bool fine = std::log10(range.high) - std::log10(range.low) < 2.1;
-    const int every = (last - first) / mostLabels + 1;
+    const int every = (last - first) / maxLabels + 1;
     std::vector<AxisTick> ticks;
     for (int power = first; power <= last; ++power) {
         for (int step = 1; step < 10; ++step) {

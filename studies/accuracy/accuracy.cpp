@@ -19,7 +19,7 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t mostNodes = 4U << 20;
+constexpr std::size_t maxNodes = 4U << 20;
 constexpr double speed = 20e-3;  // [m/s]
 
 // Windows of level elastic. Those with a name of datasets::elasticSettings() are these settings.
@@ -58,7 +58,7 @@ public:
             body_.reset();  // two at a time may be more than the memory holds
             spacing_ = spacing;
             body_ = std::make_shared<const TrialBody>(
-                trialBody(scene_.tissue, scene_.surface, spacing, scene_.poissonCap, mostNodes));
+                trialBody(scene_.tissue, scene_.surface, spacing, scene_.poissonCap, maxNodes));
         }
         return body_;
     }
@@ -98,10 +98,10 @@ double secondsSince(std::chrono::steady_clock::time_point start)
 }
 
 // Refuses to go on when all ticks together have taken too long.
-TrialModel limited(TrialModel model, double mostSeconds)
+TrialModel limited(TrialModel model, double maxSeconds)
 {
-    model.tick = [tick = std::move(model.tick), mostSeconds, used = 0.0, count = 0](const TrialLoad& load) mutable {
-        if (used > mostSeconds) {
+    model.tick = [tick = std::move(model.tick), maxSeconds, used = 0.0, count = 0](const TrialLoad& load) mutable {
+        if (used > maxSeconds) {
             throw std::runtime_error(
                 fmt::format("takes {:.0f} ms per tick: stopped after {:.0f} s", 1e3 * used / count, used));
         }
@@ -201,12 +201,12 @@ std::vector<Baseline> accuracyMethods(const AccuracySubject& subject)
 }
 
 AccuracyRun runAccuracy(const Baseline& method, const AccuracySubject& subject,
-                        std::span<const Reference* const> references, double mostSeconds)
+                        std::span<const Reference* const> references, double maxSeconds)
 {
     AccuracyRun run;
     try {
         const auto start = std::chrono::steady_clock::now();
-        const TrialModel model = limited(method.build(), mostSeconds);
+        const TrialModel model = limited(method.build(), maxSeconds);
         run.buildSeconds = secondsSince(start);
         run.hasForce = static_cast<bool>(model.force);
         run.results = runTrials(model, subject.path, subject.speed, references);

@@ -42,9 +42,9 @@ struct AccuracyRun {
 };
 
 /// Builds the method and drives it along the subject's path. One that throws std::runtime_error, or whose ticks take
-/// longer than `mostSeconds` in all, has failed.
+/// longer than `maxSeconds` in all, has failed.
 AccuracyRun runAccuracy(const Baseline& method, const AccuracySubject& subject,
-                        std::span<const Reference* const> references, double mostSeconds);
+                        std::span<const Reference* const> references, double maxSeconds);
 
 /// Time and error of a method at a setting.
 struct AccuracyPoint {

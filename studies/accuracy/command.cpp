@@ -38,7 +38,7 @@ struct Options {
     std::vector<std::string> scenes, volumes, methods;
     std::vector<std::string> laws{"linear", "neo-hookean"};
     std::string folder, references, json;
-    double mostSeconds = 60;  // per case
+    double maxSeconds = 60;  // per case
     std::vector<std::string> rivals;
     std::vector<double> rivalSpacings{4};  // [mm]
     double rivalSeconds = 600;             // per scene and mesh
@@ -191,7 +191,7 @@ std::string caseName(const std::string& scene, const Baseline& method)
 AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* const> references, const Options& o)
 {
     if (what.rival == nullptr) {
-        return runAccuracy(what.method, s.subject, references, o.mostSeconds);
+        return runAccuracy(what.method, s.subject, references, o.maxSeconds);
     }
     const auto answered = [&](const std::filesystem::path& folder) {
         return runRival(*what.rival, what.spacing, s.scene, s.subject, references, folder, o.rivalSeconds);
@@ -349,7 +349,7 @@ void accuracyCommand(Options o)
         return;
     }
     if (o.quick) {
-        o.mostSeconds = std::min(o.mostSeconds, quickSeconds);
+        o.maxSeconds = std::min(o.maxSeconds, quickSeconds);
     }
     std::vector<std::string> subjects = o.scenes;
     if (subjects.empty() && o.volumes.empty()) {
@@ -390,8 +390,7 @@ void addAccuracy(CLI::App& app)
     accuracy->add_option("--references", o->references,
                          "Folder of solved references, and for new ones (default: ~/.cache/palpate/references)");
     accuracy->add_option("--law", o->laws, "Laws of the references")->delimiter(',')->capture_default_str();
-    accuracy
-        ->add_option("--limit", o->mostSeconds, "Most seconds for a method's ticks in one scene; beyond, it is left out")
+    accuracy->add_option("--limit", o->maxSeconds, "Most seconds for a method's ticks in one scene; beyond, it is left out")
         ->check(CLI::Range(1.0, 1e6))
         ->capture_default_str();
     auto* rival = accuracy->add_option(

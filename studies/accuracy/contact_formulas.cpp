@@ -46,15 +46,15 @@ double flatPunchForce(double youngsModulus, double poisson, double radius, doubl
     return 2.0 * youngsModulus * radius * depth / (1.0 - poisson * poisson);
 }
 
-double deepPunchFactor(double poisson, double share) noexcept
+double deepPunchFactor(double poisson, double fraction) noexcept
 {
-    return 1.0 - 2.0 * alphaOf(poisson) / std::numbers::pi * share;
+    return 1.0 - 2.0 * alphaOf(poisson) / std::numbers::pi * fraction;
 }
 
-double thinLayerPunchFactor(double poisson, double share) noexcept
+double thinLayerPunchFactor(double poisson, double fraction) noexcept
 {
     constexpr std::array soft{1.207, 1.472, 1.784, 2.124, 2.480}, stiff{1.252, 1.599, 2.031, 2.532, 3.085};
-    const double row = share / 0.2 - 1.0;
+    const double row = fraction / 0.2 - 1.0;
     const auto at = static_cast<std::size_t>(std::lround(row < 0.0 ? 99.0 : row));
     const bool known = at < soft.size() && std::abs(row - std::round(row)) < 1e-6;
     if (known && std::abs(poisson - 0.3) < 1e-9) {

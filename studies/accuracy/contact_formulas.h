@@ -26,11 +26,11 @@ double flatPunchForce(double youngsModulus, double poisson, double radius, doubl
 
 /// Flat punch on a layer that is bonded to a rigid base, as a multiple of that force: 1 - 2 a0 / pi (a / h), its error of
 /// the order of (a / h)^2.
-double deepPunchFactor(double poisson, double share) noexcept;
+double deepPunchFactor(double poisson, double fraction) noexcept;
 
 /// The same from the table of the exact solution, for a / h of 0.2, 0.4, .. 1 and nu of 0.3 or 0.45; 0 for others.
 /// Source: W. C. Hayes, L. M. Keer, G. Herrmann, L. F. Mockros, "A mathematical analysis for indentation tests of articular
 /// cartilage", J. Biomechanics 5, 1972.
-double thinLayerPunchFactor(double poisson, double share) noexcept;
+double thinLayerPunchFactor(double poisson, double fraction) noexcept;
 
 }  // namespace palpate::studies

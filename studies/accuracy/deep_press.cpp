@@ -21,7 +21,7 @@ using namespace chainmail;
 namespace {
 
 constexpr int holdTicks = 200;
-constexpr std::size_t mostNodes = 4U << 20;
+constexpr std::size_t maxNodes = 4U << 20;
 
 constexpr std::array<GridPlace, 6> sixPlaces{
     {{0.0, 0.0, 1}, {0.25, 0.0, 4}, {0.5, 0.0, 2}, {0.25, 0.25, 4}, {0.5, 0.25, 4}, {0.5, 0.5, 1}}};
@@ -84,8 +84,8 @@ Vec3 forceAt(std::span<const Felt> felt, PressWay way, double depth)
             return f.force;
         }
         if (before != nullptr && (before->depth - depth) * (f.depth - depth) < 0.0) {
-            const double share = (depth - before->depth) / (f.depth - before->depth);
-            return (1.0 - share) * before->force + share * f.force;
+            const double fraction = (depth - before->depth) / (f.depth - before->depth);
+            return (1.0 - fraction) * before->force + fraction * f.force;
         }
         before = &f;
     }
@@ -157,7 +157,7 @@ DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, co
     const TrialPlace entry = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     for (std::size_t i = 0; i < options.places.size(); ++i) {
         const GridPlace& at = options.places[i];
-        const TrialBody body = trialBody(*model.tissue, model.surface, settings.spacing, settings.poissonCap, mostNodes,
+        const TrialBody body = trialBody(*model.tissue, model.surface, settings.spacing, settings.poissonCap, maxNodes,
                                          Vec3(at.across, 0.0, at.along));
         out.spacing = body.cells.spacing;
         TrialPath path = trialPath(*model.tissue, model.surface, entry, what.tool, out.spacing);

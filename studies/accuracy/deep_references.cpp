@@ -20,7 +20,7 @@ constexpr std::array<std::string_view, 11> columns{"scene", "tool", "radius_mm",
                                                    "fx_n",  "fy_n", "fz_n",      "edges_mm",  "elements"};
 constexpr double longest = 200.0;  // of a tool and its way [mm]
 constexpr double strongest = 1e3;  // [N]
-constexpr double mostElements = 1e8;
+constexpr double maxElements = 1e8;
 
 // A line of the table.
 class Row {
@@ -85,7 +85,7 @@ DeepReference referenceOf(const Row& row)
     out.force = {row.number(6, -strongest, strongest), row.number(7, -strongest, strongest),
                  row.number(8, -strongest, strongest)};
     out.edges = 1e-3 * row.number(9, least, longest);
-    out.elements = static_cast<std::size_t>(row.number(10, 1.0, mostElements));
+    out.elements = static_cast<std::size_t>(row.number(10, 1.0, maxElements));
     return out;
 }
 

@@ -22,8 +22,8 @@ namespace {
 constexpr double youngsModulus = 3000.0;  // [Pa]: no closed form here depends on it
 constexpr double noCap = 0.4999;
 constexpr int window = 31;      // nodes
-constexpr double tight = 1e-5;  // residual, share of the contacts' forces
-constexpr int mostCycles = 400;
+constexpr double tight = 1e-5;  // residual, fraction of the contacts' forces
+constexpr int maxCycles = 400;
 constexpr int air = 8;  // cells around a slab: coarser cells end at its surface, too
 
 /// A square slab, its top at y = 0 and pushed towards +y, bonded to a rigid base.
@@ -73,7 +73,7 @@ double sphereForce(const ElasticBody& body, double radius, double depth, Vec3 be
     tool.stiffest = 1e6;
     const ElasticLoad load{{&tool, 1}, {}, {beside, inward, 0.0}};
     Elastic elastic(body, {.window = window, .maxSites = 1U << 16}, load.focus);
-    elastic.relax(load, mostCycles, tight);
+    elastic.relax(load, maxCycles, tight);
     return glm::length(elastic.toolForce(0));
 }
 
@@ -86,7 +86,7 @@ double tiesForce(const ElasticBody& body, std::span<const Vec3> points, double s
     }
     const ElasticLoad load{{}, ties, {Vec3(0.0), inward, 0.0}};
     Elastic elastic(body, {.window = window, .maxSites = ties.size()}, load.focus);
-    elastic.relax(load, mostCycles, tight);
+    elastic.relax(load, maxCycles, tight);
     Vec3 sum(0.0);
     for (std::size_t i = 0; i < ties.size(); ++i) {
         sum += elastic.tieForce(i);

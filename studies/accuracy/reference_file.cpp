@@ -31,7 +31,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr int format = 1;
 constexpr double quanta = 32000.0;
-constexpr std::size_t mostBytes = 1UL << 30U;  // unpacked: a damaged file shall not fill the memory
+constexpr std::size_t maxBytes = 1UL << 30U;  // unpacked: a damaged file shall not fill the memory
 
 template <typename Word>
 Bytes packed(const std::vector<Word>& words)
@@ -193,7 +193,7 @@ Bytes inflated(const std::string& bytes)
     Bytes out;
     Bytes part(1U << 20U);
     int status = Z_OK;
-    while (status == Z_OK && out.size() < mostBytes) {
+    while (status == Z_OK && out.size() < maxBytes) {
         stream.next_out = part.data();
         stream.avail_out = static_cast<uInt>(part.size());
         status = inflate(&stream, Z_NO_FLUSH);
@@ -214,7 +214,7 @@ std::pair<Reference, ReferenceInfo> parsed(const std::string& bytes)
     }
     Reference r;
     const auto count = in.at("count").get<std::size_t>();
-    if (count > mostBytes / sizeof(Vec3f)) {
+    if (count > maxBytes / sizeof(Vec3f)) {
         throw std::runtime_error("lists of different lengths");
     }
     r.position = positionOf(in.at("position"), count);

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t mostPoints = 400'000;  // of a mesh
+constexpr std::size_t maxPoints = 400'000;  // of a mesh
 
 // Words of a command that are files, as they are or in PATH.
 std::vector<fs::path> filesIn(const std::string& command)
@@ -134,7 +134,7 @@ std::string lastWords(const fs::path& log)
     return last.empty() ? "" : fmt::format(" ({} ends with: {})", log.filename().string(), last.substr(0, longest));
 }
 
-void runCommand(const Rival& rival, const fs::path& folder, double mostSeconds)
+void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)
 {
     const fs::path log = folder / "log.txt";
     const File none("/dev/null", O_RDONLY), said(log, O_WRONLY | O_CREAT | O_TRUNC);
@@ -147,14 +147,14 @@ void runCommand(const Rival& rival, const fs::path& folder, double mostSeconds)
                                            true},
                              "a rival's command is a line for /bin/sh");
     const EndsWithUs guard(child.pid());
-    const int status = child.wait(mostSeconds);
+    const int status = child.wait(maxSeconds);
     constexpr int signalled = 128;  // more is the shell's way to say that a signal has ended the command
     if (child.killed() || status > signalled) {
         const std::string which = child.killed() ? "a signal" : fmt::format("signal {}", status - signalled);
         throw std::runtime_error(fmt::format("was ended by {}{}", which, lastWords(log)));
     }
     if (child.pid() > 0) {
-        throw std::runtime_error(fmt::format("has not ended in {:g} s (--rival-limit){}", mostSeconds, lastWords(log)));
+        throw std::runtime_error(fmt::format("has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log)));
     }
     if (status != 0) {
         throw std::runtime_error(fmt::format("exit status {}{}", status, lastWords(log)));
@@ -194,11 +194,11 @@ TrialResult compared(const RivalAnswer& answer, const LatticeTets& mesh, const A
 }
 
 void answerPush(const Rival& rival, const LatticeTets& mesh, const AccuracySubject& subject,
-                std::span<const Reference* const> references, const fs::path& folder, double mostSeconds, AccuracyRun& run)
+                std::span<const Reference* const> references, const fs::path& folder, double maxSeconds, AccuracyRun& run)
 {
     using Clock = std::chrono::steady_clock;
     const auto start = Clock::now();
-    runCommand(rival, folder, mostSeconds);
+    runCommand(rival, folder, maxSeconds);
     const double took = std::chrono::duration<double>(Clock::now() - start).count();
     const auto ticks = schedule(subject.path, subject.speed);
     const auto looks = static_cast<std::size_t>(std::ranges::count_if(ticks, &TrialTick::look));
@@ -246,7 +246,7 @@ std::string settingOf(const Rival& rival, double spacing)
 }
 
 AccuracyRun runRival(const Rival& rival, double spacing, const std::string& scene, const AccuracySubject& subject,
-                     std::span<const Reference* const> references, const fs::path& folder, double mostSeconds)
+                     std::span<const Reference* const> references, const fs::path& folder, double maxSeconds)
 {
     AccuracyRun run;
     try {
@@ -255,9 +255,9 @@ AccuracyRun runRival(const Rival& rival, double spacing, const std::string& scen
             fs::remove(folder / old);
         }
         const BaselineScene body = subject.scene();
-        const LatticeTets mesh = latticeTets(body.tissue, body.surface, spacing, body.poissonCap, mostPoints);
+        const LatticeTets mesh = latticeTets(body.tissue, body.surface, spacing, body.poissonCap, maxPoints);
         writeRivalPush(folder, scene, subject, mesh);
-        answerPush(rival, mesh, subject, references, folder, mostSeconds, run);
+        answerPush(rival, mesh, subject, references, folder, maxSeconds, run);
     } catch (const std::runtime_error& e) {
         run.results.clear();
         run.failure = e.what();

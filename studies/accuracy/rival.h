@@ -36,8 +36,8 @@ std::string settingOf(const Rival& rival, double spacing);
 /// @param scene        the scene's name
 /// @param references   of the subject's path and speed
 /// @param folder       is made, and holds push, answer and log.txt, the command's standard output and error
-/// @param mostSeconds  for the command to end [s]
+/// @param maxSeconds  for the command to end [s]
 AccuracyRun runRival(const Rival& rival, double spacing, const std::string& scene, const AccuracySubject& subject,
-                     std::span<const Reference* const> references, const std::filesystem::path& folder, double mostSeconds);
+                     std::span<const Reference* const> references, const std::filesystem::path& folder, double maxSeconds);
 
 }  // namespace palpate::studies

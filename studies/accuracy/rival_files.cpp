@@ -169,7 +169,7 @@ void writeRivalPush(const std::filesystem::path& folder, const std::string& scen
 
 RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t looks, std::size_t points)
 {
-    constexpr std::size_t mostTimes = 10'000'000;
+    constexpr std::size_t maxTimes = 10'000'000;
     RivalAnswer out;
     std::vector<Vec3> all;
     const auto displacements = folder / "displacements.csv";
@@ -185,7 +185,7 @@ RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t loo
                                             [&](std::span<const double> v) { out.force.emplace_back(v[0], v[1], v[2]); });
     checkRows(forces, forceRows, looks, "one per look");
     const auto times = folder / "times.csv";
-    readTable(times, "processor_s", mostTimes, [&](std::span<const double> v) {
+    readTable(times, "processor_s", maxTimes, [&](std::span<const double> v) {
         if (v[0] <= 0.0) {
             throw std::runtime_error(fmt::format("{}: {:g} s: must be over 0", times.filename().string(), v[0]));
         }

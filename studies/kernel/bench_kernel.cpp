@@ -10,7 +10,7 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t mostNodes = 4U << 20;
+constexpr std::size_t maxNodes = 4U << 20;
 
 // Of the same ticks again, with arithmetic that counts.
 std::vector<KernelWork> workOf(const ElasticBody& body, const TrialPath& path, double speed, ElasticOptions options)
@@ -38,7 +38,7 @@ public:
     {
         const auto elastic = datasets::elasticSetting(setting, model_.scene.model.elastic);
         progress_(fmt::format("{}: body of setting {}", model_.scene.name, setting));
-        const TrialBody body = trialBody(*model_.tissue, model_.surface, elastic.spacing, elastic.poissonCap, mostNodes);
+        const TrialBody body = trialBody(*model_.tissue, model_.surface, elastic.spacing, elastic.poissonCap, maxNodes);
         for (const TrialTool& tool : request_.tools) {
             runTool(setting, elastic, body, tool);
         }
@@ -86,7 +86,7 @@ private:
         r.singleGrids =
             singleGridTrials(*model_.tissue, model_.surface, body, path, speed, reference, elastic, request_.rivalCycles);
         ElasticOptions standing = options;
-        standing.goOn = false;
+        standing.warmStart = false;
         r.standing = elasticTrial(body.body, path, speed, reference, standing);
         r.chainMail = chainMailTrial(lattice, path, speed, reference, model_.scene.model.maxMoves);
         r.nothing = runTrial(nothingModel(), path, speed, reference);

@@ -29,7 +29,7 @@ struct KernelCase {
     std::size_t nodes = 0;      // of the windows
     std::size_t fullNodes = 0;  // of the whole grid
     double strain = 0;          // largest that the reference sees, see ReferenceState
-    double residual = 0;        // of the reference, share of the contacts' forces
+    double residual = 0;        // of the reference, fraction of the contacts' forces
     TrialResult result;
     std::vector<KernelWork> work;  // of the solver, per tick in contact
     std::optional<KernelRivals> rivals;

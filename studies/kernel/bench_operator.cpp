@@ -77,9 +77,9 @@ double secondsPerNode(const Cube& cube, Call&& call)
 OperatorCase timed(const std::string& set, bool finite, Cube& cube, const MachineRates& rates, double seconds)
 {
     const OperatorCost cost = operatorCost(finite);
-    const double share = cube.cells() / cube.nodes();
-    const double least = leastTime(cost, rates);
-    return {set, finite, cube.layout.nx, seconds, share * least, least <= cost.bytes / rates.bytes};
+    const double fraction = cube.cells() / cube.nodes();
+    const double least = minTime(cost, rates);
+    return {set, finite, cube.layout.nx, seconds, fraction * least, least <= cost.bytes / rates.bytes};
 }
 
 void timeSet(const Kernels& k, const MachineRates& rates, Cube& cube, std::vector<OperatorCase>& cases)
@@ -104,7 +104,7 @@ OperatorCost operatorCost(bool finiteStrain) noexcept
     return finiteStrain ? OperatorCost{327, 235, bytes} : OperatorCost{128, 28, bytes};
 }
 
-double leastTime(const OperatorCost& cost, const MachineRates& rates) noexcept
+double minTime(const OperatorCost& cost, const MachineRates& rates) noexcept
 {
     return std::max(
         {cost.additions / rates.additions, cost.multiplications / rates.multiplications,

@@ -29,7 +29,7 @@ struct OperatorCase {
 
 /// The least time for a node [s]: additions, multiplications and both together at the machine's rates, or the bytes at that
 /// of its second-level cache, whichever takes longer.
-double leastTime(const OperatorCost& cost, const MachineRates& rates) noexcept;
+double minTime(const OperatorCost& cost, const MachineRates& rates) noexcept;
 
 struct OperatorBench {
     struct Set {

@@ -92,12 +92,12 @@ void printWork(const std::vector<KernelCase>& cases, const std::string& setting,
                shown->scene, shown->tool, 1e3 * shown->speed, "operation", "calls", "nodes", "kB", "bound us");
     for (const KernelWork& w : shown->work) {
         fmt::print("{:<12} {:>7.1f} {:>9.0f} {:>9.0f} {:>9.1f}  {}\n", w.operation, w.calls, w.nodes, 1e-3 * w.bytes,
-                   1e6 * leastTime(std::span(&w, 1), rates), w.purpose);
+                   1e6 * minTime(std::span(&w, 1), rates), w.purpose);
     }
     fmt::print("\n{:<10} {:<12} {:>5} {:<8} {:>14} {:>9} {:>7}\n", "scene", "tool", "mm/s", "setting", "us, processor",
                "bound us", "share");
     for (const KernelCase& c : cases) {
-        const double bound = leastTime(c.work, rates);
+        const double bound = minTime(c.work, rates);
         fmt::print("{:<10} {:<12} {:>5g} {:<8} {:>14.0f} {:>9.0f} {:>6.0f}%\n", c.scene, c.tool, 1e3 * c.speed, c.setting,
                    1e6 * c.result.cpu, 1e6 * bound, 100.0 * bound / c.result.cpu);
     }

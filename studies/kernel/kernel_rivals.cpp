@@ -40,9 +40,9 @@ Grip gripOf(const TrialLoad& load)
 }  // namespace
 
 TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& surface, double wanted, double poissonCap,
-                    std::size_t mostNodes, Vec3 shift)
+                    std::size_t maxNodes, Vec3 shift)
 {
-    auto cells = volume::affordableGrid(tissue.box(), wanted, mostNodes);
+    auto cells = volume::affordableGrid(tissue.box(), wanted, maxNodes);
     cells.origin += cells.spacing * shift;
     return {cells, elasticBody(cells, tissue.materialOn(cells), surface, poissonCap)};
 }
@@ -59,7 +59,7 @@ TrialModel chainMailModel(std::shared_ptr<const Lattice> lattice, const TrialPat
     struct Mail {
         Mail(std::shared_ptr<const Lattice> nodes, double radius, std::uint32_t maxMoves)
             : lattice(std::move(nodes)),
-              deformation(*lattice, maxMoves, mostPressSeeds(*lattice, radius)),
+              deformation(*lattice, maxMoves, maxPressSeeds(*lattice, radius)),
               level(deformation, radius)
         {
         }
@@ -86,24 +86,23 @@ TrialResult chainMailTrial(const Lattice& lattice, const TrialPath& path, double
 
 std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volume::DistanceField& surface,
                                        const TrialBody& fine, const TrialPath& path, double speed,
-                                       const Reference& reference, const datasets::ElasticSettings& settings,
-                                       int mostCycles)
+                                       const Reference& reference, const datasets::ElasticSettings& settings, int maxCycles)
 {
     constexpr int coarsest = 4;
-    constexpr int mostFineCycles = 2;
+    constexpr int maxFineCycles = 2;
     const bool finite = settings.strain == datasets::Strain::finite;
     std::vector<RivalRun> runs;
     const auto run = [&](const ElasticBody& body, int coarsening, int cycles) {
         Elastic elastic(body, wholeGrid(cycles, finite), TrialLoad(path).load().focus);
         runs.push_back({coarsening, cycles, elastic.nodes(), runTrial(elasticModel(elastic), path, speed, reference)});
     };
-    for (int cycles = 1; cycles <= std::min(mostCycles, mostFineCycles); ++cycles) {
+    for (int cycles = 1; cycles <= std::min(maxCycles, maxFineCycles); ++cycles) {
         run(fine.body, 1, cycles);
     }
     for (int coarsening = 2; coarsening <= coarsest; ++coarsening) {
         const TrialBody coarse =
             trialBody(tissue, surface, coarsening * fine.cells.spacing, settings.poissonCap, fine.cells.count());
-        for (int cycles = 1; cycles <= mostCycles; ++cycles) {
+        for (int cycles = 1; cycles <= maxCycles; ++cycles) {
             run(coarse.body, coarsening, cycles);
         }
     }

@@ -14,10 +14,10 @@ struct TrialBody {
     chainmail::ElasticBody body;
 };
 
-/// @param wanted    spacing of the finest nodes; widened where the body would need over `mostNodes` [m]
+/// @param wanted    spacing of the finest nodes; widened where the body would need over `maxNodes` [m]
 /// @param shift     of the grid of cells, while tissue and surface stay where they are [cells]
 TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& surface, double wanted, double poissonCap,
-                    std::size_t mostNodes, Vec3 shift = Vec3(0.0));
+                    std::size_t maxNodes, Vec3 shift = Vec3(0.0));
 
 /// The trial with windows around the tool, or with the whole grid, by its options.
 TrialResult elasticTrial(const chainmail::ElasticBody& body, const TrialPath& path, double speed,
@@ -38,12 +38,12 @@ struct RivalRun {
     TrialResult result;
 };
 
-/// Whole grids of 2, 3 and 4 times the spacing, 1 to `mostCycles` cycles per tick, against the reference on the fine one;
+/// Whole grids of 2, 3 and 4 times the spacing, 1 to `maxCycles` cycles per tick, against the reference on the fine one;
 /// and the fine one itself, with 1 and 2 cycles. Strain and the bound of Poisson's ratio are those of `settings`.
 std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volume::DistanceField& surface,
                                        const TrialBody& fine, const TrialPath& path, double speed,
                                        const Reference& reference, const datasets::ElasticSettings& settings,
-                                       int mostCycles);
+                                       int maxCycles);
 
 /// Time of the fastest run whose median error in `figure` is not over `error`, in units of `seconds`; 0 when none is.
 double ratioAtEqualError(std::span<const RivalRun> runs, double TrialErrors::*figure, double error, double seconds);

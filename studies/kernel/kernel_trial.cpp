@@ -97,7 +97,7 @@ double converge(Elastic& elastic, const ElasticLoad& load, const ReferenceOption
         none.focus = load.focus;
         elastic.relax(none, 0, 0.0);
     }
-    result = elastic.relax(load, options.mostCycles, options.tolerance);
+    result = elastic.relax(load, options.maxCycles, options.tolerance);
     return shareLeft(elastic, result);
 }
 
@@ -246,7 +246,7 @@ Reference solveReference(const ElasticBody& body, const TrialPath& path, std::sp
     Reference reference;
     const auto& level = body.levels.front();
     const std::vector<Index3> nodes = freeNodes(level);
-    const std::size_t stride = nodes.size() / options.mostPoints + 1;
+    const std::size_t stride = nodes.size() / options.maxPoints + 1;
     for (std::size_t i = 0; i < nodes.size(); i += stride) {
         reference.position.emplace_back(level.nodes.position(nodes[i]));
     }

@@ -20,7 +20,7 @@ struct ReferenceState {
     double energy = 0;     // [J]
     double largest = 0;    // displacement of any node [m]
     double strain = 0;     // equivalent strain that a tenth of a millilitre of tissue exceeds [-]
-    double residual = 0;   // share of the contacts' forces
+    double residual = 0;   // fraction of the contacts' forces
     std::uint32_t sites = 0;
 };
 
@@ -31,12 +31,12 @@ struct Reference {
     std::size_t nodes = 0;  // of the grid
     double peakForce = 0;   // [N]
     double strain = 0;      // largest of any state [-]
-    double residual = 0;    // worst of any state, share of the contacts' forces
+    double residual = 0;    // worst of any state, fraction of the contacts' forces
 };
 
 /// The point itself, or where it lies outside the cells' staircase, the nearest one in a cell with tissue beside it [m].
 Vec3 nearestTissue(const chainmail::CellLevel& level, Vec3 rest);
-/// What is left of the residual, as a share of the contacts' forces.
+/// What is left of the residual, as a fraction of the contacts' forces.
 double shareLeft(const chainmail::Elastic& elastic, const chainmail::ElasticResult& result);
 
 /// A whole body in one window: every level covers all of it.
@@ -44,9 +44,9 @@ chainmail::ElasticOptions wholeGrid(int cycles, bool finiteStrain);
 
 struct ReferenceOptions {
     bool finiteStrain = false;
-    double tolerance = 3e-5;                                           // residual, share of the contacts' forces
-    int mostCycles = 200;                                              // per look
-    std::size_t mostPoints = std::numeric_limits<std::size_t>::max();  // of Reference::position: every n-th free node
+    double tolerance = 3e-5;                                          // residual, fraction of the contacts' forces
+    int maxCycles = 200;                                              // per look
+    std::size_t maxPoints = std::numeric_limits<std::size_t>::max();  // of Reference::position: every n-th free node
 };
 
 /// Solves the looks of the path at all these speeds. Small strain is solved from rest at every look, so that no rounding is

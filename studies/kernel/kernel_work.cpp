@@ -17,7 +17,7 @@ enum class Operation : std::uint8_t {
     applyFinite,
     dots,
     combine,
-    goOn,
+    warmStart,
     direct,
     keepStep,
     negate,
@@ -45,7 +45,7 @@ constexpr std::array<Meaning, operations> meanings{{
     {"applyFinite", "force and energy at finite strain: once per cycle"},
     {"dots", "slope and curvature of a step"},
     {"combine", "sum of two fields"},
-    {"goOn", "start: along the last call's increment"},
+    {"warmStart", "start: along the last call's increment"},
     {"direct", "direction conjugate to the step before, and its trial"},
     {"keepStep", "end of a step, with its three products"},
     {"negate", "sign and degrees of freedom of a force"},
@@ -128,9 +128,9 @@ void countPasses(Kernels& k) noexcept
         pass(Operation::combine, n, 3);
         counted->combine(x, a, y, out, n);
     };
-    k.goOn = [](float step, const StepFields& to, std::size_t n) noexcept {
-        pass(Operation::goOn, n, 4 + 5);
-        counted->goOn(step, to, n);
+    k.warmStart = [](float step, const StepFields& to, std::size_t n) noexcept {
+        pass(Operation::warmStart, n, 4 + 5);
+        counted->warmStart(step, to, n);
     };
     k.direct = [](const float* z, float beta, const float* last, float step, const StepFields& to, std::size_t n) noexcept {
         pass(Operation::direct, n, 3 + 2);
@@ -230,11 +230,11 @@ std::vector<KernelWork> CountedKernels::work(double parts) const
     return all;
 }
 
-double leastTime(std::span<const KernelWork> work, const MachineRates& rates) noexcept
+double minTime(std::span<const KernelWork> work, const MachineRates& rates) noexcept
 {
     double sum = 0;
     for (const KernelWork& w : work) {
-        sum += leastTime(OperatorCost{w.additions, w.multiplications, w.bytes}, rates);
+        sum += minTime(OperatorCost{w.additions, w.multiplications, w.bytes}, rates);
     }
     return sum;
 }

@@ -35,6 +35,6 @@ public:
 
 /// The least time for the work [s]: of each operation its additions, multiplications and both together at the machine's
 /// rates, or its bytes at that of a copy in the second-level cache, whichever takes longer.
-double leastTime(std::span<const KernelWork> work, const MachineRates& rates) noexcept;
+double minTime(std::span<const KernelWork> work, const MachineRates& rates) noexcept;
 
 }  // namespace palpate::studies

@@ -21,16 +21,16 @@ Vec3 valueAt(const volume::NodeGrid& grid, Vec3 rest, Has&& has, Value&& value)
     const Index3 low(glm::floor(at));
     const Vec3 t = at - Vec3(low);
     Vec3 sum(0.0), nearest(0.0);
-    double shares = 0.0, least = std::numeric_limits<double>::max();
+    double fractions = 0.0, least = std::numeric_limits<double>::max();
     volume::forEachIndex(low, low + 1, [&](Index3 n) {
         if (grid.contains(n) && has(n)) {
             const Vec3 s = glm::mix(1.0 - t, t, glm::bvec3(n - low));
             sum += s.x * s.y * s.z * value(n);
-            shares += s.x * s.y * s.z;
+            fractions += s.x * s.y * s.z;
         }
     });
-    if (shares > 1e-9) {
-        return sum / shares;
+    if (fractions > 1e-9) {
+        return sum / fractions;
     }
     volume::forEachIndex(low - 1, low + 2, [&](Index3 n) {
         const double distance = glm::distance(Vec3(n), at);

@@ -16,8 +16,8 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double leastForce = 0.05;  // share of the path's peak
-constexpr double samePose = 1e-8;    // another machine may round the path otherwise [m]
+constexpr double minForce = 0.05;  // fraction of the path's peak
+constexpr double samePose = 1e-8;  // another machine may round the path otherwise [m]
 
 // The shortest way along x between two positions of one line.
 double latticeStep(std::span<const Vec3f> position)
@@ -154,7 +154,7 @@ TrialErrors errorsOf(std::span<const Vec3> u, const std::optional<Vec3>& force, 
     errors.near = percent * std::sqrt(near / static_cast<double>(std::max<std::size_t>(nearCount, 1)));
     errors.max = percent * std::sqrt(worst);
     errors.volume = volumeError(u, reference, cells, state);
-    const double scale = std::max(glm::length(state.force), leastForce * reference.peakForce);
+    const double scale = std::max(glm::length(state.force), minForce * reference.peakForce);
     if (force && scale > 0.0) {
         errors.force = 100.0 * glm::distance(*force, state.force) / scale;
     }

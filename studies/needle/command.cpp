@@ -24,7 +24,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr double leastFall = 0.1;     // of a force that gives way [N]
+constexpr double minFall = 0.1;       // of a force that gives way [N]
 constexpr double chartStep = 0.1e-3;  // between points of a curve [m]
 constexpr double liverBreaks = 1.5;   // where the chart's published curve ends [N]
 constexpr double onsetSpeed = 5e-3;   // [m/s]
@@ -163,7 +163,7 @@ json boundariesEntry(const std::vector<NeedleBoundary>& boundaries)
 json curveEntry(const NeedleCurve& c)
 {
     json falls = json::array();
-    for (const double depth : fallsOf(c, leastFall)) {
+    for (const double depth : fallsOf(c, minFall)) {
         falls.push_back(1e3 * depth);
     }
     const auto turn = c.force.begin() + static_cast<std::ptrdiff_t>(c.turn);

@@ -24,8 +24,8 @@ namespace {
 
 constexpr double farthest = 10.0;    // from the origin along each axis [m]
 constexpr double latest = 1e9;       // more than any clock says [s]
-constexpr double mostTicks = 10e6;   // nearly three hours
-constexpr double leastAxis = 1e-6;   // shorter ones have no direction
+constexpr double maxTicks = 10e6;    // nearly three hours
+constexpr double minAxis = 1e-6;     // shorter ones have no direction
 constexpr double halfTurn = -0.999;  // cosine between axes of which neither way round is the shorter
 constexpr double rounding = 1e-6;    // of a tick
 
@@ -158,7 +158,7 @@ Vec3 axisOf(const NumberFile& file)
     constexpr double most = 1e6;
     const Vec3 along(file.number(axis, most, ""), file.number(axis + 1, most, ""), file.number(axis + 2, most, ""));
     const double length = glm::length(along);
-    if (length < leastAxis) {
+    if (length < minAxis) {
         throw std::runtime_error(file.where() + ": the axis is zero: it must say where the tool points to");
     }
     return along / length;
@@ -190,9 +190,9 @@ ToolPose PosePath::at(std::size_t tick) const noexcept
     const auto after = std::ranges::upper_bound(poses, t, {}, &ToolPose::seconds);
     ToolPose pose = after == poses.begin() ? poses.front() : *(after - 1);
     if (after != poses.begin() && after != poses.end()) {
-        const double share = (t - pose.seconds) / (after->seconds - pose.seconds);
-        pose.position = glm::mix(pose.position, after->position, share);
-        pose.axis = glm::normalize(glm::mix(pose.axis, after->axis, share));
+        const double fraction = (t - pose.seconds) / (after->seconds - pose.seconds);
+        pose.position = glm::mix(pose.position, after->position, fraction);
+        pose.axis = glm::normalize(glm::mix(pose.axis, after->axis, fraction));
     }
     pose.seconds = t;
     return pose;
@@ -215,9 +215,9 @@ PosePath readPosePath(std::istream& in, const std::string& origin, Vec3 standard
             checkFollows(file, path.poses.back(), pose);
         }
         path.poses.push_back(pose);
-        if (const double span = pose.seconds - path.poses.front().seconds; span > mostTicks * tickSeconds) {
+        if (const double span = pose.seconds - path.poses.front().seconds; span > maxTicks * tickSeconds) {
             throw std::runtime_error(fmt::format("{}: {:g} s after the first row: a path may take {:g} s at most",
-                                                 file.where(), span, mostTicks * tickSeconds));
+                                                 file.where(), span, maxTicks * tickSeconds));
         }
     }
     if (path.poses.empty()) {

@@ -26,7 +26,7 @@ struct PressSample {
     Vec3 force{0.0};                 // of the tissue on the tool [N]
     double contactArea = 0;          // [m^2]
     double energy = 0;               // of tissue and contacts [J]
-    double residual = 0;             // forces out of balance before the tick's last step, share of the contacts' forces
+    double residual = 0;             // forces out of balance before the tick's last step, fraction of the contacts' forces
     double depth = 0;                // of the deepest point of tissue inside the tool [m]
     double behind = 0;               // by how much the tool is held back, see chainmail::Elastic [m]
     double took = 0;                 // this thread's processor time [s]
@@ -45,7 +45,7 @@ struct PressSummary {
     std::optional<double> heldFrom;  // when the tool is first held back [s]
 };
 
-/// Residual to which PressOptions::converge solves, share of the contacts' forces.
+/// Residual to which PressOptions::converge solves, fraction of the contacts' forces.
 inline constexpr double pressTolerance = 1e-4;
 
 /// Area of the surface that a tool presses, as it is stretched [m^2].

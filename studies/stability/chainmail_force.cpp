@@ -18,13 +18,13 @@ using chainmail::Node;
 // ChainMail goes on from the shape of the tick before, and nothing relaxes it. The nodes in the tool are put onto its
 // surface; their links, stretched as springs, make the force.
 struct ChainMailForce {
-    static constexpr std::uint32_t mostMoves = 5000;
-    static constexpr std::size_t mostSeeds = 4096;
+    static constexpr std::uint32_t maxMoves = 5000;
+    static constexpr std::size_t maxSeeds = 4096;
 
     explicit ChainMailForce(const MethodScene& at)
-        : scene(at), lattice(at.model.lattice), u(lattice.grid.count(), Vec3f(0.0F)), scratch(lattice, mostMoves, mostSeeds)
+        : scene(at), lattice(at.model.lattice), u(lattice.grid.count(), Vec3f(0.0F)), scratch(lattice, maxMoves, maxSeeds)
     {
-        seeds.reserve(mostSeeds);
+        seeds.reserve(maxSeeds);
     }
 
     Vec3 tick(const haptics::DeviceSample& sample) noexcept
@@ -52,7 +52,7 @@ struct ChainMailForce {
     {
         seeds.clear();
         const double radius = std::max(scene.model.scene.tool.radius, lattice.grid.spacing);
-        for (Node n = 0; n < u.size() && seeds.size() < mostSeeds; ++n) {
+        for (Node n = 0; n < u.size() && seeds.size() < maxSeeds; ++n) {
             if (!lattice.isNode(n) || lattice.isFixed(n)) {
                 continue;
             }

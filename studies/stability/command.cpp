@@ -23,7 +23,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t mostNamed = 6;  // failed cells in the last line
+constexpr std::size_t maxNamed = 6;  // failed cells in the last line
 
 struct Options {
     std::string folder, json, cell, record;
@@ -70,8 +70,8 @@ void checkOurs(const json& figures, const StabilityModels& models)
     }
     if (!failed.empty()) {
         const std::size_t count = failed.size();
-        const std::string more = count > mostNamed ? fmt::format(" and {} more", count - mostNamed) : "";
-        failed.resize(std::min(count, mostNamed));
+        const std::string more = count > maxNamed ? fmt::format(" and {} more", count - maxNamed) : "";
+        failed.resize(std::min(count, maxNamed));
         throw std::runtime_error(fmt::format("{} cell{} of the default method failed: {}{}", count, count == 1 ? "" : "s",
                                              fmt::join(failed, ", "), more));
     }

@@ -33,7 +33,7 @@ constexpr std::array<int, 4> rates{500, 1000, 2000, 4000};
 constexpr std::array<const char*, 11> scenes{"plate-1mm",   "outer-60deg",     "inner-60deg", "slide-30deg-20mm_s",
                                              "tumour-step", "puncture-energy", "wall-rest",   "let-go",
                                              "deep-press",  "capsule-retreat", "thin-pinch"};
-constexpr double leastPull = 0.01;    // of the cap
+constexpr double minPull = 0.01;      // of the cap
 constexpr double fastestHand = 10.0;  // [m/s]
 constexpr double flatWithin = 0.95;   // cosine between normals of a face that is flat
 
@@ -140,7 +140,7 @@ public:
     }
 
 private:
-    bool chance(double share) { return random_.between(0, 1) < share; }
+    bool chance(double fraction) { return random_.between(0, 1) < fraction; }
 
     void wander()
     {
@@ -236,7 +236,7 @@ public:
         if (!watches_ || !pressed_ || record.phase != haptics::Phase::contact) {
             return false;
         }
-        const double least = leastPull * cap;
+        const double least = minPull * cap;
         return -glm::dot(tissue, out) > least && -glm::dot(record.total, out) > least && isFlat(model_, record.proxy, out);
     }
 
@@ -263,7 +263,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
         const RunningMethod running = method.start(at);
         Hostile hand(random, at.period, scene);
         const double cap = capOf(at);
-        const double mostStep = slewPerSecond * cap * at.period;
+        const double maxStep = slewPerSecond * cap * at.period;
         const double stiffest = haptics::stableLimits({at.device, at.period, cap}).stiffness;
         PullWatch watch(at.model, at.period);
         Vec3 before(0.0), position(0.0);
@@ -279,7 +279,7 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
             r.overCap += size > cap * (1.0 + rounding) ? 1 : 0;
             // Switched off is switched off at once, and a spring that is let go may fall with the motion.
             const double fall = size < glm::length(before) ? stiffest * glm::distance(sample.position, position) : 0.0;
-            r.overSlew += size > 0.0 && glm::distance(force, before) > mostStep + fall + rounding * cap ? 1 : 0;
+            r.overSlew += size > 0.0 && glm::distance(force, before) > maxStep + fall + rounding * cap ? 1 : 0;
             r.pulled += watch.pulls(*running.record(), running.tissue(), cap) ? 1 : 0;
             before = finite ? force : Vec3(0.0);
             position = sample.position;

@@ -10,8 +10,8 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr int mostCrossings = 4096;  // of voxel faces on one way
-constexpr double gap = 1e-6;         // between god-object and a face, in voxels
+constexpr int maxCrossings = 4096;  // of voxel faces on one way
+constexpr double gap = 1e-6;        // between god-object and a face, in voxels
 
 // What stops a point on its way: the axis of the face, or -1 when nothing does. `p` goes as far as it gets. In voxels.
 int travel(const ContactVoxels& voxels, Vec3& p, Vec3 to) noexcept
@@ -19,7 +19,7 @@ int travel(const ContactVoxels& voxels, Vec3& p, Vec3 to) noexcept
     const Vec3 way = to - p;
     Index3 n(glm::floor(p));
     double done = 0.0;
-    for (int i = 0; i < mostCrossings; ++i) {
+    for (int i = 0; i < maxCrossings; ++i) {
         int axis = -1;
         double first = 1.0;
         for (int a = 0; a < 3; ++a) {

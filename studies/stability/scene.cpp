@@ -15,11 +15,11 @@ namespace palpate::studies {
 namespace {
 
 // Bodies and paths are written in mm.
-constexpr double ball = 3;            // radius of the tool [mm]
-constexpr double thickBall = 6;       // of the tool that presses deep, as a fingertip [mm]
-constexpr double thinBall = 0.5;      // of the tool that stabs [mm]
-constexpr double leastEnergy = 1e-3;  // what a hand does not notice [J]
-constexpr Bounded noEnergy{Figure::energyMade, leastEnergy};
+constexpr double ball = 3;          // radius of the tool [mm]
+constexpr double thickBall = 6;     // of the tool that presses deep, as a fingertip [mm]
+constexpr double thinBall = 0.5;    // of the tool that stabs [mm]
+constexpr double minEnergy = 1e-3;  // what a hand does not notice [J]
+constexpr Bounded noEnergy{Figure::energyMade, minEnergy};
 constexpr Bounded noPull{Figure::pull, 0.0};
 constexpr double stepBound = 5.0;    // of the cap per ms
 constexpr double rippleBound = 5.0;  // of the force; the least that is felt is 7 to 10 %

@@ -11,7 +11,7 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double leastPush = 0.005;  // force below this share of the cap pushes nothing back
+constexpr double minPush = 0.005;  // force below this fraction of the cap pushes nothing back
 
 struct Window {
     std::size_t first, last;  // ticks, `last` not in it
@@ -30,7 +30,7 @@ double popThrough(const Trace& t, const StabilityScene& scene, Window w)
     double most = 0.0;
     for (std::size_t i = std::max<std::size_t>(w.first, 1); i < w.last; ++i) {
         const bool leaves = t.position[i].y < t.position[i - 1].y;
-        if (!leaves && -t.force[i].y <= leastPush * t.cap) {
+        if (!leaves && -t.force[i].y <= minPush * t.cap) {
             most = std::max(most, t.position[i].y - scene.farFace);
         }
     }

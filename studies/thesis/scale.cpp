@@ -39,8 +39,8 @@ struct Options {
 constexpr double tick = 1e-3;                           // [s]
 constexpr std::array<double, 2> bounds{80e-6, 500e-6};  // of the haptic part: chapter VI, and half of a tick [s]
 constexpr std::size_t fewObjects = 1000;
-constexpr std::uint64_t mostObjects = 16'000'000;
-constexpr std::uint64_t fewVoxels = 64, mostVoxels = 1024;  // along a side; a phantom takes no more
+constexpr std::uint64_t maxObjects = 16'000'000;
+constexpr std::uint64_t fewVoxels = 64, maxVoxels = 1024;  // along a side; a phantom takes no more
 constexpr double bytesPerVoxel = 14.0;           // of labels, grids, and what building them takes, at the peak: measured
 constexpr double bisection = 0.1;                // sizes this near each other are one
 constexpr int firstWindow = 9, lastWindow = 41;  // nodes; see ElasticSettings
@@ -135,7 +135,7 @@ public:
     Largest objects(const Model& model, double bound)
     {
         return grow(
-            fewObjects, mostObjects, bound,
+            fewObjects, maxObjects, bound,
             [&](std::uint64_t n) {
                 return std::pair(InclusionSpec{n, 0, 1}, model.settings);
             },
@@ -145,7 +145,7 @@ public:
     Largest voxels(const Model& model, double bound)
     {
         return grow(
-            fewVoxels, mostVoxels, bound,
+            fewVoxels, maxVoxels, bound,
             [&](std::uint64_t n) {
                 return std::pair(InclusionSpec{fewObjects, static_cast<int>(n), 1}, model.settings);
             },
@@ -181,7 +181,7 @@ private:
     // What a scene will need at its peak [GB].
     double needed(const InclusionSpec& spec) const
     {
-        const double more = std::max(0.0, voxelsOf(spec) - mostVoxels_);
+        const double more = std::max(0.0, voxelsOf(spec) - maxVoxels_);
         return 1e-3 * session::peakMemoryMb() + 1e-9 * bytesPerVoxel * more;
     }
 
@@ -203,7 +203,7 @@ private:
                 return false;
             }
             const Measured m = measure(spec, settings, o_.frames);
-            mostVoxels_ = std::max(mostVoxels_, voxelsOf(spec));
+            maxVoxels_ = std::max(maxVoxels_, voxelsOf(spec));
             if (!m.holds(bound)) {
                 const std::string size =
                     *what == '\0' ? fmt::format("{} active nodes", m.nodes) : fmt::format("{} {}", n, what);
@@ -233,7 +233,7 @@ private:
     const Options& o_;
     command::Progress& progress_;
     std::vector<Measured> smallest_;  // scenes, by model of the ladder
-    double mostVoxels_ = 0;           // of a scene that was made
+    double maxVoxels_ = 0;            // of a scene that was made
 };
 
 json entryOf(const Largest& l)

@@ -10,7 +10,7 @@ struct LineFit {
     std::size_t points = 0;
     double slope = 0, slopeError = 0;
     double intercept = 0, interceptError = 0;
-    double rSquared = 0;  // share of the variance of y that the line explains; 1 where y does not vary
+    double rSquared = 0;  // fraction of the variance of y that the line explains; 1 where y does not vary
     double residual = 0;  // standard deviation of the points about the line
 
     double at(double x) const noexcept { return intercept + slope * x; }

@@ -58,7 +58,7 @@ struct Ball {
 // Voxels along the block's width, checked.
 int sideOf(const InclusionSpec& spec)
 {
-    const int least = leastPitch * cellsFor(spec.inclusions);
+    const int least = minPitch * cellsFor(spec.inclusions);
     const int side = spec.voxelsPerSide > 0 ? spec.voxelsPerSide : voxelsFor(spec.inclusions);
     if (spec.inclusions == 0 || side < least) {
         throw std::runtime_error(fmt::format("{} inclusions in a block of {} voxels a side: needs 1 or more, and {} voxels",
@@ -112,7 +112,7 @@ void draw(volume::LabelImage& image, const Ball& inclusion)
 
 int voxelsFor(std::size_t inclusions) noexcept
 {
-    return std::max(fewestVoxels, leastPitch * cellsFor(inclusions));
+    return std::max(fewestVoxels, minPitch * cellsFor(inclusions));
 }
 
 std::vector<Inclusion> inclusionsOf(const InclusionSpec& spec)

@@ -24,7 +24,7 @@ struct InclusionSpec {
 inline constexpr double inclusionBlockSide = 64e-3;  // width, height and thickness [m]
 inline constexpr double inclusionBase = 4e-3;        // thickness of the bone behind [m]
 /// Voxels from one ball to the next, at least: three across, and one between.
-inline constexpr int leastPitch = 4;
+inline constexpr int minPitch = 4;
 
 /// The fewest voxels along the block's width that tell so many balls apart.
 int voxelsFor(std::size_t inclusions) noexcept;

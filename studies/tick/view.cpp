@@ -65,7 +65,7 @@ public:
         }
     }
 
-    double share() const { return static_cast<double>(nodes_.size()) / static_cast<double>(grid_.count()); }
+    double fraction() const { return static_cast<double>(nodes_.size()) / static_cast<double>(grid_.count()); }
 
     void at(double time, channel::Displaced& out) const
     {
@@ -209,7 +209,7 @@ nlohmann::json measure(const Options& o, const haptics::SessionModel& model, int
                           {"layout", layout},
                           {"width", o.width},
                           {"height", o.height},
-                          {"moving_share", wave.share()},
+                          {"moving_share", wave.fraction()},
                           {"renderer", figures["display"]},
                           {"frames", figures["frames"]},
                           {"frames_per_second", figures["frames_per_second"]},

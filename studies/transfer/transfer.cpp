@@ -33,7 +33,7 @@ namespace {
 
 using namespace haptics;
 
-constexpr std::size_t mostMessages = 1U << 17U;
+constexpr std::size_t maxMessages = 1U << 17U;
 constexpr double startDistance = 30e-3;  // the hand begins this far outside the body [m]
 
 // What goes through the pipe.
@@ -47,12 +47,12 @@ struct Message {
 struct Seen {
     std::atomic<bool> ready{false}, stop{false};
     std::atomic<std::uint64_t> count{0};
-    std::array<double, mostMessages> seconds;
+    std::array<double, maxMessages> seconds;
 
     void add(double latency) noexcept
     {
         const std::uint64_t n = count.load(std::memory_order_relaxed);
-        if (n < mostMessages) {
+        if (n < maxMessages) {
             seconds[n] = latency;
             count.store(n + 1, std::memory_order_release);
         }

@@ -108,7 +108,7 @@ double meanDrop(const std::array<Vec3, 3>& at)
     return -1e3 * (at[0].z + at[1].z + at[2].z) / 3.0;
 }
 
-// Half the difference of two runs, share of their mean [%].
+// Half the difference of two runs, fraction of their mean [%].
 double scatterOf(const std::vector<MeasuredDrop>& drops)
 {
     std::vector<double> relative;
@@ -158,8 +158,8 @@ std::array<Vec3, 3> beamMarkers(const Beam& beam)
             }
         });
         for (int y = 0; y <= cells.y; ++y) {
-            const double share = (y == 0 || y == cells.y ? 0.5 : 1.0) / cells.y;
-            body.load({cells.x, y, cells.z}, Vec3(0, 0, -share * beam.tipLoad / loadSteps));
+            const double fraction = (y == 0 || y == cells.y ? 0.5 : 1.0) / cells.y;
+            body.load({cells.x, y, cells.z}, Vec3(0, 0, -fraction * beam.tipLoad / loadSteps));
         }
         if (step > 1) {
             body.scale(static_cast<double>(step) / (step - 1));

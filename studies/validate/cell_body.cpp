@@ -12,7 +12,7 @@ using namespace chainmail;
 namespace {
 
 constexpr std::size_t remembered = 6;  // steps: more cost more than they save
-constexpr int mostHalvings = 12;
+constexpr int maxHalvings = 12;
 
 double dot(const std::vector<double>& a, const std::vector<double>& b) noexcept
 {
@@ -69,9 +69,9 @@ std::size_t CellBody::at(Index3 node, int component) const noexcept
     return static_cast<std::size_t>(component) * layout_.count + layout_.at(node.x, node.y, node.z);
 }
 
-void CellBody::fill(Index3 cell, const Material& material, double share)
+void CellBody::fill(Index3 cell, const Material& material, double fraction)
 {
-    const double mu = share * material.youngsModulus / (2.0 * (1.0 + material.poisson));
+    const double mu = fraction * material.youngsModulus / (2.0 * (1.0 + material.poisson));
     const double lambda = 2.0 * mu * material.poisson / (1.0 - 2.0 * material.poisson);
     const std::size_t index = layout_.at(cell.x, cell.y, cell.z);
     const double scaled = side_ / 32.0;
@@ -178,7 +178,7 @@ bool CellBody::advance(const std::vector<double>& step)
     }
     double gone = 1.0;
     add(u_, 1.0, step);
-    for (int i = 0; i < mostHalvings; ++i) {
+    for (int i = 0; i < maxHalvings; ++i) {
         evaluate();
         const double slope = dot(gradient_, step);
         if (std::isfinite(slope) && slope <= -0.9 * before) {

@@ -20,8 +20,8 @@ public:
     /// @param sides   of a cell [m]; cubic
     CellBody(Index3 cells, double side);
 
-    /// @param share  of the cell that is tissue [-]; its modulus is so much less
-    void fill(Index3 cell, const Material& material, double share = 1.0);
+    /// @param fraction  of the cell that is tissue [-]; its modulus is so much less
+    void fill(Index3 cell, const Material& material, double fraction = 1.0);
     /// Prescribes one component of a node's displacement [m]; again: another value.
     void prescribe(Index3 node, int component, double value);
     /// Adds a dead load to a node [N].
@@ -30,7 +30,7 @@ public:
     void scale(double factor) noexcept;
 
     /// Minimises the energy (limited-memory quasi-Newton, Nocedal 1980).
-    /// @param tolerance  residual, share of the forces that hold and load the body
+    /// @param tolerance  residual, fraction of the forces that hold and load the body
     /// @returns  whether it got there within `most` evaluations
     bool solve(double tolerance, int most);
 

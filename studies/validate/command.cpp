@@ -67,7 +67,7 @@ Experiment Run::ultrasoundChecks()
         }
         return haptics::soundOf(table.rows[*row]);
     };
-    checks = ultrasound::runChecks(soundOf, [&](double share) { progress.show("ultrasound", share); });
+    checks = ultrasound::runChecks(soundOf, [&](double fraction) { progress.show("ultrasound", fraction); });
     Experiment e;
     e.name = "ultrasound";
     e.quantity = "figures of the picture beside closed forms, the largest difference in what is allowed";

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double speed = 5e-3;           // [m/s]
 constexpr double travel = 85.3e-3;       // of the stage [m]
-constexpr double leastRupture = 0.15;    // [N]
+constexpr double minRupture = 0.15;      // [N]
 constexpr double needleRadius = 0.5e-3;  // inner needle of an 18 G set [m]
 const char* const source =
     "de Jong, Dankelman, van den Dobbelsteen 2017, doi 10.1016/j.dib.2017.01.018: 20 insertions into one ex-vivo human "
@@ -101,14 +101,14 @@ std::size_t onsetOf(const std::vector<double>& tip)
     return tip.size();
 }
 
-// Falls of `leastRupture` within 1 mm, from a peak to the least force after it.
+// Falls of `minRupture` within 1 mm, from a peak to the least force after it.
 int rupturesOf(const Curve& curve)
 {
     int count = 0;
     for (std::size_t i = 0; i + 2 < curve.fineMax.size(); ++i) {
         const double low = std::min(curve.fineMin[i + 1], curve.fineMin[i + 2]);
         const bool peak = i == 0 || curve.fineMax[i] >= curve.fineMax[i - 1];
-        if (peak && curve.fineMax[i] >= curve.fineMax[i + 1] && curve.fineMax[i] - low >= leastRupture) {
+        if (peak && curve.fineMax[i] >= curve.fineMax[i + 1] && curve.fineMax[i] - low >= minRupture) {
             ++count;
         }
     }
@@ -175,8 +175,8 @@ Corridor corridorOf(const std::vector<std::vector<double>>& curves)
             }
         }
         std::ranges::sort(here);
-        const auto at = [&](double share) {
-            const double place = share * static_cast<double>(here.size() - 1);
+        const auto at = [&](double fraction) {
+            const double place = fraction * static_cast<double>(here.size() - 1);
             const auto low = static_cast<std::size_t>(place);
             const std::size_t high = std::min(low + 1, here.size() - 1);
             return here[low] + (place - static_cast<double>(low)) * (here[high] - here[low]);
@@ -188,7 +188,7 @@ Corridor corridorOf(const std::vector<std::vector<double>>& curves)
     return c;
 }
 
-// Share of the predicted bins that lie in the corridor of the measured ones.
+// Fraction of the predicted bins that lie in the corridor of the measured ones.
 Experiment corridorExperiment(const char* name, const char* what, const std::vector<double>& predicted,
                               const std::vector<std::vector<double>>& measured)
 {
@@ -438,7 +438,7 @@ NeedleStroke needleStroke(double cutting, double depth, const volume::Relaxation
     }
     in.turn = in.depth.size();
     NeedleStroke out;
-    out.falls = fallsOf(in, leastRupture).size();
+    out.falls = fallsOf(in, minRupture).size();
     double t = 0.0, last = in.force.back();
     for (const double at : heldAt) {
         for (; t < at - 0.5 * scene.period; t += scene.period) {

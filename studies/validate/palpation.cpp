@@ -50,13 +50,13 @@ std::vector<double> ranks(const std::vector<double>& values)
     return out;
 }
 
-// z of a share of a normal distribution, by halving.
-double normalScore(double share)
+// z of a fraction of a normal distribution, by halving.
+double normalScore(double fraction)
 {
     double low = -8.0, high = 8.0;
     for (int i = 0; i < 60; ++i) {
         const double middle = 0.5 * (low + high);
-        (0.5 * std::erfc(-middle / std::sqrt(2.0)) < share ? low : high) = middle;
+        (0.5 * std::erfc(-middle / std::sqrt(2.0)) < fraction ? low : high) = middle;
     }
     return low;
 }

@@ -75,9 +75,9 @@ std::vector<double> hereditary(const std::vector<double>& force, const volume::R
     for (std::size_t i = 0; i < force.size(); ++i) {
         double left = force[i];
         for (std::size_t term = 0; term < lost.size() && i > 0; ++term) {
-            const double share = -std::expm1(-tick / volume::relaxationTimes[term]);
+            const double fraction = -std::expm1(-tick / volume::relaxationTimes[term]);
             const double mean = 0.5 * (force[i] + force[i - 1]);
-            lost[term] += share * (relaxation.weights[term] * mean - lost[term]);
+            lost[term] += fraction * (relaxation.weights[term] * mean - lost[term]);
             left -= lost[term];
         }
         out.push_back(left);
@@ -179,12 +179,12 @@ Experiment lost(bool quick, const ValidateProgress& progress)
         const auto back = static_cast<std::size_t>(std::lround(2.0 * swing / speed / tick));
         const std::size_t end = elastic.size() - 1;
         const double slope = relaxation.instantaneous() * (elastic[end] - elastic[end - back]) / (2.0 * swing);
-        double share = 0.0;
+        double fraction = 0.0;
         for (std::size_t i = 0; i < relaxation.weights.size(); ++i) {
             const double x = 2.0 * std::numbers::pi * frequency * volume::relaxationTimes[i];
-            share += relaxation.weights[i] * x / (1.0 + x * x);
+            fraction += relaxation.weights[i] * x / (1.0 + x * x);
         }
-        const double exact = std::numbers::pi * swing * swing * slope * share;
+        const double exact = std::numbers::pi * swing * swing * slope * fraction;
         errors.push_back(1e2 * (ours - exact) / exact);
         e.parameters.emplace_back(fmt::format("lost_{:g}_hz_uj", frequency), 1e6 * ours);
         e.parameters.emplace_back(fmt::format("exact_{:g}_hz_uj", frequency), 1e6 * exact);

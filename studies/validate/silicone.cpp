@@ -238,7 +238,7 @@ Experiment ratioExperiment(const Cylinder& shape)
     return e;
 }
 
-// Share of a cell that lies in the cylinder, by 8 x 8 lines along the axis.
+// Fraction of a cell that lies in the cylinder, by 8 x 8 lines along the axis.
 double shareInside(const Cylinder& shape, Index3 cell)
 {
     constexpr int lines = 8;
@@ -261,8 +261,8 @@ struct Quarter {
     {
         const double youngs = 2.0 * (1.0 + shape.poisson);
         volume::forEachIndex(Index3(0), cells - 1, [&](Index3 cell) {
-            if (const double share = shareInside(shape, cell); share > 0.0) {
-                body.fill(cell, {youngs, shape.poisson, stiffening}, share);
+            if (const double fraction = shareInside(shape, cell); fraction > 0.0) {
+                body.fill(cell, {youngs, shape.poisson, stiffening}, fraction);
             }
         });
         volume::forEachIndex(Index3(0), cells, [&](Index3 node) {

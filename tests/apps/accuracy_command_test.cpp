@@ -42,7 +42,7 @@ struct Place {
             const std::string key = referenceKey(*tissue, subject.path, subject.speed, law);
             const std::array speeds{subject.speed};
             const auto solved = solveReference(body.body, subject.path, speeds,
-                                               {.finiteStrain = law[0] == 'n', .tolerance = 1e-3, .mostCycles = 50});
+                                               {.finiteStrain = law[0] == 'n', .tolerance = 1e-3, .maxCycles = 50});
             saveReference(std::filesystem::path(references) / (std::string(law) + "-" + key + ".ref"), solved,
                           {key, "small", "sphere_10mm", law, "P2", subject.speed, 1, 2, 3.0, "stand-in"});
         }

@@ -19,7 +19,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::uint64_t mostLost = 500;  // ticks that a kill may cost: 0.5 s
+constexpr std::uint64_t maxLost = 500;  // ticks that a kill may cost: 0.5 s
 const std::vector<std::string> scripted{"train", "layered", "--unpaced", "--headless"};
 
 std::vector<std::string> operator+(std::vector<std::string> words, const std::vector<std::string>& more)
@@ -239,7 +239,7 @@ TEST(Session, AKillAtAnyMomentCostsAtMostHalfASecond)
 
         const haptics::Record cut(record);
         EXPECT_FALSE(cut.complete());
-        EXPECT_GE(cut.ticks() + mostLost, seen);
+        EXPECT_GE(cut.ticks() + maxLost, seen);
         if (cut.ticks() == 0) {  // killed before the first batch was written
             EXPECT_EQ(palpate({"replay", record}).status, 1);
             continue;

@@ -16,9 +16,9 @@ const Counts victreVoxels{{0, 43028583}, {1, 15949597}, {2, 1280833},  {29, 9363
                           {88, 403012},  {95, 18367},   {125, 102610}, {150, 88660},  {225, 112001}};
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr double mostMemory = 1e9;  // sanitizers keep memory of their own
+constexpr double maxMemory = 1e9;  // sanitizers keep memory of their own
 #else
-constexpr double mostMemory = 2000;  // [MB]
+constexpr double maxMemory = 2000;  // [MB]
 #endif
 
 void expectVolumeKeys(const nlohmann::json& j)
@@ -87,7 +87,7 @@ TEST(VolumeCommands, APatientSizedPhantomIsImportedToTheVoxelAndTrainedOn)
     const auto trained = figures({"train", file, "--unpaced", "--headless", "--seconds", "3", "--record", record});
     EXPECT_EQ(trained.at("ticks"), 3000);
     EXPECT_GT(trained.at("contacts"), 0);
-    EXPECT_LT(trained.at("peak_memory_mb").get<double>(), mostMemory);
+    EXPECT_LT(trained.at("peak_memory_mb").get<double>(), maxMemory);
 
     const auto replayed = figures({"replay", record});
     EXPECT_EQ(replayed.at("identical"), true);

@@ -50,7 +50,7 @@ TEST(Deformation, ShapeDoesNotDependOnThePath)
     }
 }
 
-// However the ball lies and moves, its seeds fit what mostPressSeeds() sets aside.
+// However the ball lies and moves, its seeds fit what maxPressSeeds() sets aside.
 TEST(PressSeeds, NeverMoreThanSetAside)
 {
     const auto lattice = tests::block(40, {}, [](Index3) { return 1; });
@@ -60,7 +60,7 @@ TEST(PressSeeds, NeverMoreThanSetAside)
     for (int i = 0; i < 300; ++i) {
         const auto pick = [&] { return Vec3(place(random), place(random), place(random)); };
         const double radius = size(random);
-        EXPECT_LE(pressSeeds(lattice, pick(), pick(), radius, seeds), mostPressSeeds(lattice, radius));
+        EXPECT_LE(pressSeeds(lattice, pick(), pick(), radius, seeds), maxPressSeeds(lattice, radius));
     }
 }
 

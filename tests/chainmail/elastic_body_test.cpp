@@ -109,18 +109,18 @@ TEST(ElasticBody, WhatIsHeldLeavesLessOfACoarseCellToGiveWay)
 // A base that ends inside of a cell of the finest level holds the nodes on its side, and no others.
 TEST(ElasticBody, NodesAreHeldWhereHalfOfTheTissueAroundThemIs)
 {
-    for (const float share : {0.0F, 0.3F, 0.7F, 1.0F}) {
+    for (const float fraction : {0.0F, 0.3F, 0.7F, 1.0F}) {
         const auto material = [=](Index3 c) {
             volume::CellMaterial m = tests::tissue(1e4, 0.45);
-            m.fixed = c.y < 4 ? 0.0F : c.y == 4 ? share : 1.0F;
+            m.fixed = c.y < 4 ? 0.0F : c.y == 4 ? fraction : 1.0F;
             return m;
         };
         const ElasticBody body = tests::bodyOf(ElasticBlock{Index3(8), 1e-3, material, 1, Vec3(0.0)});
         const CellLevel& level = body.levels.front();
         const auto held = [&](int y) { return level.fixed[level.nodes.offset({4, y + 1, 4})] != 0; };
-        EXPECT_EQ(held(4), share == 1.0F) << share;
-        EXPECT_TRUE(held(5)) << share;
-        EXPECT_FALSE(held(3)) << share;
+        EXPECT_EQ(held(4), fraction == 1.0F) << fraction;
+        EXPECT_TRUE(held(5)) << fraction;
+        EXPECT_FALSE(held(3)) << fraction;
     }
 }
 
@@ -161,8 +161,8 @@ TEST(ElasticBody, SurfacePointsHaveTheAreaOfASphere)
         const Vec3 middle(20.3e-3, 19.8e-3, 20.1e-3);
         std::vector<volume::CellMaterial> materials(grid.count());
         volume::forEachIndex(Index3(0), grid.size - 1, [&](Index3 c) {
-            const double share = std::clamp(0.5 - (glm::distance(grid.position(c), middle) - radius) / 1e-3, 0.0, 1.0);
-            materials[grid.offset(c)] = tests::tissue(1e4 * share, 0.45);
+            const double fraction = std::clamp(0.5 - (glm::distance(grid.position(c), middle) - radius) / 1e-3, 0.0, 1.0);
+            materials[grid.offset(c)] = tests::tissue(1e4 * fraction, 0.45);
         });
         const auto ball = tests::distanceOn(grid, [&](Vec3 p) { return glm::distance(p, middle) - radius; });
         const ElasticBody body = elasticBody(grid, materials, ball, 0.49);

@@ -154,9 +154,9 @@ TEST(ElasticDeep, ThreeRadiiDeepAndBackNothingPulls)
     for (const Tool tool : {Tool{6e-3, 0.0}, Tool{10e-3, 0.0}, Tool{6e-3, 30e-3}}) {
         Way way(body, middle, tool.radius, tool.length, asInASession);
         std::map<double, double> in;
-        for (const double share : {0.25, 0.5, 1.0, 1.5, 2.0}) {
-            way.to(share * tool.radius);
-            in[share] = way.force();
+        for (const double fraction : {0.25, 0.5, 1.0, 1.5, 2.0}) {
+            way.to(fraction * tool.radius);
+            in[fraction] = way.force();
         }
         way.to(3.0 * tool.radius);
         for (auto it = in.rbegin(); it != in.rend(); ++it) {

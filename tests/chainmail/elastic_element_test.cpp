@@ -47,8 +47,8 @@ double bending(int length, int side, double nu)
     return energy / (0.5 * e * inertia * curvature * curvature * length * h);
 }
 
-// A brick integrated in full would be stiffer by a share of 1 / (1 - 2 nu), 500 times at nu 0.499. Ours bends as the beam
-// with two cells across as with eight, whatever Poisson's ratio: what is left is rounding.
+// A brick integrated in full would be stiffer by a fraction of 1 / (1 - 2 nu), 500 times at nu 0.499. Ours bends as the
+// beam with two cells across as with eight, whatever Poisson's ratio: what is left is rounding.
 TEST(ElasticElement, BendsAsABeamUpToPoissonsRatioOfOneHalf)
 {
     for (const double nu : {0.0, 0.3, 0.45, 0.49, 0.499}) {

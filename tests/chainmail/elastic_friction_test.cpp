@@ -51,7 +51,7 @@ public:
     double along(Vec3 way) const { return -glm::dot(force_, way); }
     double across() const { return std::hypot(force_.x, force_.z); }
     // Largest force along the surface over push, of any point.
-    double mostFriction() const
+    double maxFriction() const
     {
         double most = 0.0;
         for (const ContactSite& s : elastic_.sites()) {
@@ -99,7 +99,7 @@ TEST(ElasticFriction, BallThatIsDraggedFeelsCoulombsForce)
         for (int i = 1; i <= 14; ++i) {
             drag.go(depth, 0.25e-3 * i * way);
             const double along = drag.along(way);
-            ASSERT_LT(drag.mostFriction(), mu * (1.0 + 1e-9)) << "mu " << mu << ", " << 0.25 * i << " mm";
+            ASSERT_LT(drag.maxFriction(), mu * (1.0 + 1e-9)) << "mu " << mu << ", " << 0.25 * i << " mm";
             ASSERT_LT(along, 1.15 * mu * drag.normal()) << "mu " << mu << ", " << 0.25 * i << " mm";
             if (i > 8) {
                 EXPECT_NEAR(along, before, 0.12 * before) << "mu " << mu << ", " << 0.25 * i << " mm";

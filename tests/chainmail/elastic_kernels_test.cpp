@@ -58,7 +58,7 @@ void addPoint(Matrix24& k, Vec3 s, double weight, double mu, double lambda)
 
 // Strain at s in [-1/2, 1/2]^3, xx yy zz xy yz zx (shear as angles), of freedom i of node n, by assumed strain: a normal
 // strain that grows along an axis brings the one along that axis with it that leaves no stress there, and no shear.
-std::array<double, 6> assumedStrain(int n, int i, Vec3 s, double share)
+std::array<double, 6> assumedStrain(int n, int i, Vec3 s, double fraction)
 {
     const Vec3 d = 2.0 * Vec3(n & 1, (n >> 1) & 1, n >> 2) - 1.0;
     const int j = (i + 1) % 3;
@@ -69,32 +69,32 @@ std::array<double, 6> assumedStrain(int n, int i, Vec3 s, double share)
     // Index of the angle between axes a and b.
     const auto angle = [](int a, int b) { return 3 + (a + b == 1 ? 0 : a + b == 3 ? 1 : 2); };
     at(i) = 0.25 * d[i] + 0.5 * d[i] * (d[j] * s[j] + d[k] * s[k]) + all * s[j] * s[k];
-    at(j) -= share * 0.5 * d[i] * d[j] * s[j];
-    at(k) -= share * 0.5 * d[i] * d[k] * s[k];
+    at(j) -= fraction * 0.5 * d[i] * d[j] * s[j];
+    at(k) -= fraction * 0.5 * d[i] * d[k] * s[k];
     at(angle(i, j)) = 0.25 * d[j] + 0.5 * d[j] * d[k] * s[k] + all * s[i] * s[k];
     at(angle(i, k)) = 0.25 * d[k] + 0.5 * d[k] * d[j] * s[j] + all * s[i] * s[j];
     return e;
 }
 
 // The part of its divergence that grows along an axis.
-double linearDivergence(int n, int i, Vec3 s, double share)
+double linearDivergence(int n, int i, Vec3 s, double fraction)
 {
     const Vec3 d = 2.0 * Vec3(n & 1, (n >> 1) & 1, n >> 2) - 1.0;
     const int j = (i + 1) % 3;
     const int k = (i + 2) % 3;
-    return (1.0 - share) * 0.5 * d[i] * (d[j] * s[j] + d[k] * s[k]);
+    return (1.0 - fraction) * 0.5 * d[i] * (d[j] * s[j] + d[k] * s[k]);
 }
 
 // Adds weight (2 mu e:e + lambda of the linear divergence) at one point of [-1/2, 1/2]^3.
 void addAssumed(Matrix24& k, Vec3 s, double weight, double mu, double lambda)
 {
-    const double share = lambda / (lambda + 2.0 * mu);
+    const double fraction = lambda / (lambda + 2.0 * mu);
     for (std::size_t a = 0; a < 24; ++a) {
-        const auto ea = assumedStrain(static_cast<int>(a / 3), static_cast<int>(a % 3), s, share);
-        const double da = linearDivergence(static_cast<int>(a / 3), static_cast<int>(a % 3), s, share);
+        const auto ea = assumedStrain(static_cast<int>(a / 3), static_cast<int>(a % 3), s, fraction);
+        const double da = linearDivergence(static_cast<int>(a / 3), static_cast<int>(a % 3), s, fraction);
         for (std::size_t b = 0; b < 24; ++b) {
-            const auto eb = assumedStrain(static_cast<int>(b / 3), static_cast<int>(b % 3), s, share);
-            double sum = lambda * da * linearDivergence(static_cast<int>(b / 3), static_cast<int>(b % 3), s, share);
+            const auto eb = assumedStrain(static_cast<int>(b / 3), static_cast<int>(b % 3), s, fraction);
+            double sum = lambda * da * linearDivergence(static_cast<int>(b / 3), static_cast<int>(b % 3), s, fraction);
             for (std::size_t c = 0; c < 6; ++c) {
                 sum += (c < 3 ? 2.0 : 1.0) * mu * ea[c] * eb[c];
             }

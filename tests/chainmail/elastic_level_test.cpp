@@ -332,10 +332,10 @@ TEST(ElasticLevel, PointThatIsHeldTakesTheTissueAlong)
         }
         const Index3 node(glm::round((glm::max(rest, Vec3(1e-3)) - bench.grid.origin) / spacing));
         const Vec3 u(bench.shape.u()[bench.grid.offset(node)]);
-        const double share = glm::dot(u, pushed) / glm::dot(pushed, pushed);
-        EXPECT_GT(share, 0.6) << deep;
-        EXPECT_LT(share, 1.0) << deep;
-        EXPECT_LT(glm::distance(u, share * pushed), 0.15 * glm::length(pushed)) << deep;
+        const double fraction = glm::dot(u, pushed) / glm::dot(pushed, pushed);
+        EXPECT_GT(fraction, 0.6) << deep;
+        EXPECT_LT(fraction, 1.0) << deep;
+        EXPECT_LT(glm::distance(u, fraction * pushed), 0.15 * glm::length(pushed)) << deep;
     }
 }
 

@@ -118,11 +118,11 @@ TEST(Relaxation, WorkOfALoopIsThatOfTheComplexModulus)
     const double tissue = stiffnessOf(body), u = 1e-3;
     for (const double frequency : {0.1, 0.32, 1.0, 3.0}) {
         const double omega = 2.0 * std::numbers::pi * frequency;
-        std::complex<double> share(1.0);
+        std::complex<double> fraction(1.0);
         for (std::size_t i = 0; i < weights.size(); ++i) {
-            share -= static_cast<double>(weights[i]) / (1.0 + std::complex(0.0, omega * volume::relaxationTimes[i]));
+            fraction -= static_cast<double>(weights[i]) / (1.0 + std::complex(0.0, omega * volume::relaxationTimes[i]));
         }
-        const double lost = std::numbers::pi * u * u * std::imag(1.0 / (1.0 / Led::spring + 1.0 / (tissue * share)));
+        const double lost = std::numbers::pi * u * u * std::imag(1.0 / (1.0 / Led::spring + 1.0 / (tissue * fraction)));
         Led led(body);
         const int turn = static_cast<int>(std::lround(1.0 / frequency / period));
         double work = 0.0, forceBefore = 0.0;

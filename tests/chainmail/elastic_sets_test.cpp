@@ -278,7 +278,7 @@ TEST(ElasticSets, GoingOnMovesItsFieldsElementByElement)
         return f == looked ? y : was.own[static_cast<std::size_t>(f)][i];
     };
     for (int looked = 0; looked < 7; ++looked) {
-        e.expect([&](const Kernels& k, float* y) { k.goOn(step, StepOf(e).fields(looked, y), n); },
+        e.expect([&](const Kernels& k, float* y) { k.warmStart(step, StepOf(e).fields(looked, y), n); },
                  [&](std::size_t i, float y) {
                      const float d = step * of(2, i, looked, y);
                      const float force = of(1, i, looked, y) + step * of(3, i, looked, y);
@@ -294,7 +294,7 @@ TEST(ElasticSets, AStepIsDirectedAndKeptElementByElement)
     Entry e;
     const std::size_t n = 3 * Entry::count;
     const StepOf was(e);
-    const KeptStep step{.share = 0.9F, .base = 0.8F, .further = -0.2F, .length = 1.3F, .keep = 0.7F};
+    const KeptStep step{.fraction = 0.9F, .base = 0.8F, .further = -0.2F, .length = 1.3F, .keep = 0.7F};
     const float* f = e.b();
     for (int looked = 0; looked < 7; ++looked) {
         const auto of = [&](int field, std::size_t i, float y) {
@@ -311,7 +311,7 @@ TEST(ElasticSets, AStepIsDirectedAndKeptElementByElement)
                 k.keepStep(step, f, StepOf(e).fields(looked, y), n, sums.data());
             },
             [&](std::size_t i, float y) {
-                const float change = step.share * (f[i] - step.base * of(1, i, y));
+                const float change = step.fraction * (f[i] - step.base * of(1, i, y));
                 const float gone = step.length * of(4, i, y);
                 const float force = of(1, i, y) + change;
                 const std::array<float, 7> now{of(0, i, y) + step.further * of(4, i, y),
@@ -332,7 +332,7 @@ TEST(ElasticSets, TheDirectionMayBeTheIncrement)
     Entry e;
     const std::size_t n = 3 * Entry::count;
     for (const float keep : {0.0F, 1.0F}) {
-        const KeptStep step{.share = 1.0F, .base = 1.0F, .further = 0.1F, .length = 1.0F - keep, .keep = keep};
+        const KeptStep step{.fraction = 1.0F, .base = 1.0F, .further = 0.1F, .length = 1.0F - keep, .keep = keep};
         e.expect(
             [&](const Kernels& k, float* y) {
                 StepOf own(e);
@@ -350,7 +350,7 @@ TEST(ElasticSets, SumsOfAStepAreThoseOfItsFields)
 {
     Entry e;
     const std::size_t n = 3 * Entry::count;
-    const KeptStep step{.share = 0.9F, .base = 0.8F, .further = -0.2F, .length = 1.3F, .keep = 0.7F};
+    const KeptStep step{.fraction = 0.9F, .base = 0.8F, .further = -0.2F, .length = 1.3F, .keep = 0.7F};
     std::array<double, 3> first{};
     double negated = 0.0;
     for (const Kernels* k : supportedKernels()) {

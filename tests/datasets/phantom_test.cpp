@@ -198,7 +198,7 @@ TEST_P(BreastPhantoms, VesselsAreInOnePieceAndClearOfTheTumour)
 
 INSTANTIATE_TEST_SUITE_P(Seeds, BreastPhantoms, ::testing::Values(1, 2, 3, 42));
 
-// Gland fills the asked share of what lies between skin and muscle.
+// Gland fills the asked fraction of what lies between skin and muscle.
 TEST(BreastPhantom, DensityIsTheShareOfGland)
 {
     for (const double density : {0.15, 0.3, 0.5}) {
@@ -210,8 +210,8 @@ TEST(BreastPhantom, DensityIsTheShareOfGland)
             all += structureNamed(tissue, name)->volume;
         }
         // Fat beside the breast belongs to the sum, so the share seen is a little smaller.
-        const double share = structureNamed(tissue, "gland")->volume / all;
-        EXPECT_TRUE(share > 0.75 * density && share < 1.05 * density) << density << " " << share;
+        const double fraction = structureNamed(tissue, "gland")->volume / all;
+        EXPECT_TRUE(fraction > 0.75 * density && fraction < 1.05 * density) << density << " " << fraction;
     }
 }
 

@@ -177,9 +177,9 @@ TEST(FalconLink, ForcesBeginWithARamp)
     Rig rig;
     rig.link.connect(rig.stop);
     const Vec3 force(0.0, 0.0, 3.0);
-    for (const double share : {0.25, 0.5, 0.75}) {
+    for (const double fraction : {0.25, 0.5, 0.75}) {
         rig.push(force, 0.25 * Link::ramp);
-        const Vec3 expected = share * (force + Vec3(0.0, rig.device.weight(), 0.0));
+        const Vec3 expected = fraction * (force + Vec3(0.0, rig.device.weight(), 0.0));
         EXPECT_LT(glm::distance(rig.device.motorForce(), expected), 0.1);
     }
 }

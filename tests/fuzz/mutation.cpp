@@ -103,7 +103,7 @@ bool contains(const fs::path& file, const char* part)
 }
 
 // What a header without voxels may name.
-std::vector<fs::path> companionsOf(const fs::path& file, std::uint64_t mostBytes)
+std::vector<fs::path> companionsOf(const fs::path& file, std::uint64_t maxBytes)
 {
     std::vector<fs::path> found;
     const std::string ending = file.extension();
@@ -114,7 +114,7 @@ std::vector<fs::path> companionsOf(const fs::path& file, std::uint64_t mostBytes
     for (const auto& other : fs::directory_iterator(file.parent_path())) {
         const fs::path& path = other.path();
         const bool named = data.count(path.extension()) > 0 || contains(path, ".img.gz") || contains(path, "30x30.nii.gz");
-        if (named && other.file_size() <= mostBytes) {
+        if (named && other.file_size() <= maxBytes) {
             found.push_back(path);
         }
     }
@@ -123,7 +123,7 @@ std::vector<fs::path> companionsOf(const fs::path& file, std::uint64_t mostBytes
 
 }  // namespace
 
-std::vector<Seed> seeds(const fs::path& folder, std::uint64_t mostBytes)
+std::vector<Seed> seeds(const fs::path& folder, std::uint64_t maxBytes)
 {
     static const std::set<std::string> names = {".nii", ".hdr", ".nrrd", ".nhdr", ".mha",
                                                 ".mhd", ".mgz", ".dcm",  ".seg",  ".gz"};
@@ -132,10 +132,10 @@ std::vector<Seed> seeds(const fs::path& folder, std::uint64_t mostBytes)
         const fs::path& file = entry.path();
         // Siemens names its files CT.1.3.12...
         const bool named = names.count(file.extension()) > 0 || file.filename().string().rfind("CT.", 0) == 0;
-        if (!entry.is_regular_file() || !named || entry.file_size() > mostBytes || contains(file, ".raw.gz")) {
+        if (!entry.is_regular_file() || !named || entry.file_size() > maxBytes || contains(file, ".raw.gz")) {
             continue;
         }
-        all.push_back({file, companionsOf(file, mostBytes)});
+        all.push_back({file, companionsOf(file, maxBytes)});
     }
     std::sort(all.begin(), all.end(), [](const Seed& a, const Seed& b) { return a.file < b.file; });
     return all;

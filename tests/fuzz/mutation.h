@@ -16,8 +16,8 @@ struct Seed {
     std::vector<std::filesystem::path> companions;
 };
 
-/// Every volume in `folder` and below that has at most `mostBytes`.
-std::vector<Seed> seeds(const std::filesystem::path& folder, std::uint64_t mostBytes);
+/// Every volume in `folder` and below that has at most `maxBytes`.
+std::vector<Seed> seeds(const std::filesystem::path& folder, std::uint64_t maxBytes);
 
 /// One to four faults: bits turned, bytes set, numbers of a text header changed, pieces cut out, doubled or moved, the end
 /// cut off. Half of them hit the first 1000 bytes, where the header is.

@@ -141,7 +141,7 @@ TEST(Probe, CurvedProbesPressWithTheirArc)
     const auto transducer = ultrasound::curvedProbe();
     const double radius = static_cast<double>(transducer.radius);
     const Vec3 middle = Vec3(0, 5e-3, 0) - radius * Vec3(0, 1, 0);
-    ASSERT_EQ(probe.tools().size(), chainmail::ElasticLevel::mostOthers);
+    ASSERT_EQ(probe.tools().size(), chainmail::ElasticLevel::maxOthers);
     for (const auto& tool : probe.tools()) {
         for (const double t : {0.0, 0.5, 1.0}) {
             const double to = glm::distance(tool.shape.a + t * (tool.shape.b - tool.shape.a), middle) + Probe::edge;
@@ -311,7 +311,7 @@ TEST(Probe, MeasuresFollowFromWhatThePictureHad)
     tick(Phase::inserted, 12e-3, 0, false);
     const Score s = scorer.score();
     EXPECT_NEAR(s.blindAdvance, 10e-3, 1e-12) << "withdrawing is no advance";
-    EXPECT_NEAR(s.leastInBeam, 5.5e-3, 1e-12);
+    EXPECT_NEAR(s.minInBeam, 5.5e-3, 1e-12);
     EXPECT_NEAR(s.tipShare, 12.0 / 23.0, 1e-12);
     EXPECT_NEAR(s.needleInBeam, (0.5e-3 * (20 * 21 - 10 * 11) / 2 + 20e-3) / 23, 1e-12);
     EXPECT_NEAR(s.needleShare, (0.5 * 12) / 23, 1e-12);

@@ -250,8 +250,8 @@ TEST(Score, WithoutAFiringThereAreOnlyPointsForTheVitalStructures)
     EXPECT_EQ(scoreTicks(along({{0, -0.03}, {1, -0.01}})).total, 0);
 }
 
-// Half the target share of a full mark, half its length, half its error: 15 + 5 + 5. Two touches, 1 s and 0.5 mm: 25 (1 -
-// 0.8 - 0.1 - 0.05). Three passes, two redirects, two contacts, twice the path, 6.25 N: 5 (0.5 + 0.75 + 0.5 + 0.5 + 0.5).
+// Half the target fraction of a full mark, half its length, half its error: 15 + 5 + 5. Two touches, 1 s and 0.5 mm: 25 (1
+// - 0.8 - 0.1 - 0.05). Three passes, two redirects, two contacts, twice the path, 6.25 N: 5 (0.5 + 0.75 + 0.5 + 0.5 + 0.5).
 TEST(Score, PointsFollowTheFormula)
 {
     Score s;

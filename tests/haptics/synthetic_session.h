@@ -223,13 +223,13 @@ inline TickRecord anyTick(std::uint64_t tick, std::mt19937_64& random)
     }
     r.fired = random() % 50 == 0;
     if (r.fired) {
-        std::uniform_real_distribution<double> share(0, 1);
+        std::uniform_real_distribution<double> fraction(0, 1);
         for (std::size_t i = 0; i < 5; ++i) {
-            r.core.fraction[i] = random() % 2 == 0 ? 0.0 : share(random);
+            r.core.fraction[i] = random() % 2 == 0 ? 0.0 : fraction(random);
         }
-        r.core.volume = 1e-8 * share(random);
-        r.core.targetFraction = share(random);
-        r.core.targetLength = 0.02 * share(random);
+        r.core.volume = 1e-8 * fraction(random);
+        r.core.targetFraction = fraction(random);
+        r.core.targetLength = 0.02 * fraction(random);
         r.core.notchStart = anyVector(10, random);
         r.core.notchEnd = anyVector(10, random);
     }

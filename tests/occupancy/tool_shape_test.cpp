@@ -44,7 +44,7 @@ private:
 
 // Of the spheres that a round cone is made of, the nearest. The distance to one changes by at most 2 m per metre of axis
 // (length and radius), so that it is over the exact one by no more than the distance between two of them.
-double leastOfSpheres(const RoundCone& tool, Vec3 p, int spheres)
+double minOfSpheres(const RoundCone& tool, Vec3 p, int spheres)
 {
     double least = 1e300;
     for (int i = 0; i <= spheres; ++i) {
@@ -61,7 +61,7 @@ TEST(RoundCone, DistanceIsTheLeastToAllItsSpheres)
     for (int i = 0; i < 1000; ++i) {
         const RoundCone tool = random.tool(i);
         const Vec3 p = random.place(1.5);
-        const double sampled = leastOfSpheres(tool, p, spheres);
+        const double sampled = minOfSpheres(tool, p, spheres);
         const double step = std::max(glm::distance(tool.a, tool.b), std::abs(tool.radiusB - tool.radiusA)) / spheres;
         ASSERT_LE(distance(tool, p), sampled + 1e-12) << i;
         ASSERT_GE(distance(tool, p), sampled - step - 1e-12) << i;

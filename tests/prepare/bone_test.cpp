@@ -43,16 +43,16 @@ TEST(Enclosure, IsWholeInsideAShellAndNothingFarFromIt)
 {
     const auto shell = filled<std::uint8_t>(
         cube, [](Vec3 p) { return glm::length(p) > 7 && glm::length(p) <= 10 ? std::uint8_t{1} : std::uint8_t{0}; });
-    const auto share = enclosure(cube, shell, 18e-3);
+    const auto fraction = enclosure(cube, shell, 18e-3);
     const auto none = enclosure(cube, shell, 5e-3);
     volume::forEachIndex(Index3(0), cube.size - 1, [&](Index3 n) {
         const double r = glm::length(Vec3(n - middle));
         if (r <= 7) {
-            EXPECT_EQ(share[at(cube, n)], 1.0F);
+            EXPECT_EQ(fraction[at(cube, n)], 1.0F);
         } else if (r > 15.5) {
             EXPECT_EQ(none[at(cube, n)], 0.0F);
         } else if (r > 10.5) {
-            EXPECT_LE(share[at(cube, n)], 17.0F / 26);  // half of the rays, and those along the face
+            EXPECT_LE(fraction[at(cube, n)], 17.0F / 26);  // half of the rays, and those along the face
         }
     });
 }
@@ -64,9 +64,9 @@ TEST(Enclosure, OfAPipeLacksItsTwoEnds)
     const VoxelGrid pipe{Index3(21, 21, 61), {Mat3(spacing), Vec3(0.0)}};
     const auto wall = filled<std::uint8_t>(
         pipe, [](Vec3 p) { return across(p) > 5 && across(p) <= 8 ? std::uint8_t{1} : std::uint8_t{0}; });
-    const auto share = enclosure(pipe, wall, 12e-3);
-    EXPECT_FLOAT_EQ(share[at(pipe, {10, 10, 30})], 24.0F / 26);
-    EXPECT_FLOAT_EQ(share[at(pipe, {10, 10, 60})], 16.0F / 17);
+    const auto fraction = enclosure(pipe, wall, 12e-3);
+    EXPECT_FLOAT_EQ(fraction[at(pipe, {10, 10, 30})], 24.0F / 26);
+    EXPECT_FLOAT_EQ(fraction[at(pipe, {10, 10, 60})], 16.0F / 17);
 }
 
 // Rays have lengths in space: with voxels twice as long, half as many of them.
@@ -76,11 +76,11 @@ TEST(Enclosure, KnowsLongVoxels)
     lengthy.affine.linear[2] *= 2.0;
     std::vector<std::uint8_t> one(at(cube, {0, 0, 41}), 0);
     one[at(lengthy, middle)] = 1;
-    const auto share = enclosure(lengthy, one, 8e-3);
-    EXPECT_GT(share[at(lengthy, middle + Index3(8, 0, 0))], 0.0F);
-    EXPECT_EQ(share[at(lengthy, middle + Index3(9, 0, 0))], 0.0F);
-    EXPECT_GT(share[at(lengthy, middle + Index3(0, 0, 4))], 0.0F);
-    EXPECT_EQ(share[at(lengthy, middle + Index3(0, 0, 5))], 0.0F);
+    const auto fraction = enclosure(lengthy, one, 8e-3);
+    EXPECT_GT(fraction[at(lengthy, middle + Index3(8, 0, 0))], 0.0F);
+    EXPECT_EQ(fraction[at(lengthy, middle + Index3(9, 0, 0))], 0.0F);
+    EXPECT_GT(fraction[at(lengthy, middle + Index3(0, 0, 4))], 0.0F);
+    EXPECT_EQ(fraction[at(lengthy, middle + Index3(0, 0, 5))], 0.0F);
 }
 
 struct Made {

@@ -122,7 +122,7 @@ double density(double a, double q, const Material& m)
     return 0.5 * mu * i + 0.25 * mu * m.stiffening * i * i + 0.5 * bulk * (j - 1.0) * (j - 1.0);
 }
 
-double leastDensity(double a, const Material& m)
+double minDensity(double a, const Material& m)
 {
     double low = 0.5, high = 1.5;
     for (int i = 0; i < 200; ++i) {
@@ -145,9 +145,9 @@ TEST(Solve, ABarPulledToOneAndAHalfFollowsItsEnergy)
             Solver solver(cube(1, false), tissue, options);
             solver.prescribe(pulledTop(0.5 * side));
             const double h = 1e-4;
-            const double stress = (leastDensity(1.5 + h, tissue[0]) - leastDensity(1.5 - h, tissue[0])) / (2.0 * h);
+            const double stress = (minDensity(1.5 + h, tissue[0]) - minDensity(1.5 - h, tissue[0])) / (2.0 * h);
             EXPECT_NEAR(solver.force().z, -stress * side * side, 1e-5 * stress * side * side);
-            EXPECT_NEAR(solver.energy(), leastDensity(1.5, tissue[0]) * side * side * side, 1e-6 * solver.energy());
+            EXPECT_NEAR(solver.energy(), minDensity(1.5, tissue[0]) * side * side * side, 1e-6 * solver.energy());
         }
     }
 }
@@ -393,7 +393,7 @@ TEST(Solve, WhatCannotBeSolvedIsRefused)
 TEST(Solve, APressThatFailsSaysHowFarItCame)
 {
     SolveOptions options = halved(Law::neoHookean);
-    options.mostSteps = 1;
+    options.maxSteps = 1;
     Solver solver(halfBlock(2e-3), std::vector<Material>{{modulus, 0.45, 0.0}}, options);
     const double radius = 5e-3;
     EXPECT_THAT(messageOf([&] {

@@ -223,7 +223,7 @@ TEST(MeshQuality, HasTheAnglesOfKnownTetrahedra)
     EXPECT_NEAR(dihedralsOf(mesh, 0).first, std::acos(1.0 / 3.0) * degrees, 1e-9);
     EXPECT_NEAR(dihedralsOf(mesh, 0).second, std::acos(1.0 / 3.0) * degrees, 1e-9);
     const MeshQuality q = qualityOf(mesh, {{1, 3.0, 0.0, 5.0}}, 1.0);
-    EXPECT_NEAR(q.leastDihedral, std::acos(1.0 / std::sqrt(3.0)) * degrees, 1e-9);
+    EXPECT_NEAR(q.minDihedral, std::acos(1.0 / std::sqrt(3.0)) * degrees, 1e-9);
     EXPECT_NEAR(q.largestDihedral, 90.0, 1e-9);
     EXPECT_EQ(q.worst, 1U);
     EXPECT_NEAR(q.worstRadii, 3.0 * (1.0 / (3.0 + std::sqrt(3.0))) / (0.5 * std::sqrt(3.0)), 1e-9);
@@ -257,7 +257,7 @@ void expectGood(const MeshQuality& q)
 {
     EXPECT_EQ(q.flipped, 0U);
     EXPECT_EQ(q.overShared, 0U);
-    EXPECT_GT(q.leastDihedral, 5.0);
+    EXPECT_GT(q.minDihedral, 5.0);
     EXPECT_GT(q.tets, 500U);
     bool thick = false;
     for (const TissueQuality& t : q.tissues) {

@@ -43,7 +43,7 @@ glm::dvec3 planAxis()
     return glm::normalize(tumourCentre - entryPoint);
 }
 
-double share(double t, double from, double to)
+double fraction(double t, double from, double to)
 {
     return std::clamp((t - from) / (to - from), 0.0, 1.0);
 }
@@ -54,10 +54,10 @@ double wayAt(double t)
     constexpr double start = -25e-3, pressed = 9e-3;
     const double reach = glm::distance(entryPoint, tumourCentre);
     if (t < contactAt)
-        return start * (1 - share(t, 0, contactAt));
+        return start * (1 - fraction(t, 0, contactAt));
     if (t < punctureAt)
-        return pressed * share(t, contactAt, punctureAt);
-    return pressed + (reach - pressed) * share(t, punctureAt, arrivalAt);
+        return pressed * fraction(t, contactAt, punctureAt);
+    return pressed + (reach - pressed) * fraction(t, punctureAt, arrivalAt);
 }
 
 }  // namespace
@@ -135,9 +135,9 @@ channel::State storyState(const channel::Scenery& scenery, double t)
     s.axis = {axis.x, axis.y, axis.z};
     s.phase = t < contactAt ? channel::Phase::free : t < punctureAt ? channel::Phase::contact : channel::Phase::inserted;
     s.proxy = s.phase == channel::Phase::contact ? scenery.entry : s.tip;
-    const double force = s.phase == channel::Phase::contact ? 4.5 * share(t, contactAt, punctureAt)
+    const double force = s.phase == channel::Phase::contact ? 4.5 * fraction(t, contactAt, punctureAt)
                          : t < punctureAt                   ? 0.0
-                                                            : 1.2 + 1.4 * share(t, punctureAt, arrivalAt);
+                                                            : 1.2 + 1.4 * fraction(t, punctureAt, arrivalAt);
     s.distance[0] = tumourDistance(tip);
     s.distance[1] = arteryDistance(tip);
     const double guide = std::max(0.0, 1 - s.distance[1] / 12e-3);
@@ -169,8 +169,8 @@ channel::State storyState(const channel::Scenery& scenery, double t)
 void storyDisplaced(const channel::Scenery& scenery, double t, channel::Displaced& out)
 {
     const glm::dvec3 axis = planAxis();
-    const double pressed = 9e-3 * share(t, contactAt, punctureAt);
-    const double depth = t < punctureAt ? pressed : 9e-3 - 6e-3 * share(t, punctureAt, punctureAt + 0.2);
+    const double pressed = 9e-3 * fraction(t, contactAt, punctureAt);
+    const double depth = t < punctureAt ? pressed : 9e-3 - 6e-3 * fraction(t, punctureAt, punctureAt + 0.2);
     constexpr double width = 9e-3, least = 5e-5;
     out.count = 0;
     for (std::uint32_t n = 0; depth > 0; ++n) {

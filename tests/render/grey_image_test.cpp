@@ -191,8 +191,8 @@ TEST(SliceOfAnImage, IsTintedByTheTissueAsMuchAsThatIsOpaque)
     const auto tissue = slice.image();
     slice.draw(SliceLook::image);
     const auto grey = slice.image();
-    std::array<std::array<double, 2>, 3> share{};  // per tissue: least and largest
-    share.fill({1, 0});
+    std::array<std::array<double, 2>, 3> fraction{};  // per tissue: least and largest
+    fraction.fill({1, 0});
     for (std::size_t i = 0; i < grey.size(); ++i) {
         const glm::dvec3 p = Slice::at(static_cast<int>(i) % Slice::pixels, static_cast<int>(i) / Slice::pixels);
         if (std::abs(p.y - 10e-3) < 1.6e-3 || std::abs(p.y - 19.5e-3) < 1.1e-3)  // shell, border
@@ -201,18 +201,18 @@ TEST(SliceOfAnImage, IsTintedByTheTissueAsMuchAsThatIsOpaque)
             const int apart = tissue[i][k] - grey[i][k];
             if (std::abs(apart) < 60)
                 continue;
-            auto& [least, most] = share[p.y < 19.5e-3 ? 1 : 2];
+            auto& [least, most] = fraction[p.y < 19.5e-3 ? 1 : 2];
             const double part = static_cast<double>(tinted[i][k] - grey[i][k]) / apart;
             least = std::min(least, part);
             most = std::max(most, part);
         }
     }
     constexpr double rounding = 2.0 / 60;
-    EXPECT_LT(share[1][1] - share[1][0], rounding);
-    EXPECT_LT(share[2][1] - share[2][0], rounding);
-    EXPECT_GT(share[1][0], 0.05);
-    EXPECT_GT(share[2][0], share[1][1] + 0.2);
-    EXPECT_LT(share[2][1], 0.8);
+    EXPECT_LT(fraction[1][1] - fraction[1][0], rounding);
+    EXPECT_LT(fraction[2][1] - fraction[2][0], rounding);
+    EXPECT_GT(fraction[1][0], 0.05);
+    EXPECT_GT(fraction[2][0], fraction[1][1] + 0.2);
+    EXPECT_LT(fraction[2][1], 0.8);
 }
 
 TEST(SliceOfAnImage, KeepsTheShellsUnlessTheImageIsAlone)

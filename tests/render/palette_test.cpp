@@ -132,7 +132,7 @@ dvec3 colourOf(const channel::Scenery& scenery, const std::string& tissue)
     return {};
 }
 
-double leastDifference(const channel::Scenery& scenery, const std::pair<std::string, std::string>& pair)
+double minDifference(const channel::Scenery& scenery, const std::pair<std::string, std::string>& pair)
 {
     double least = 1000;
     for (const auto& [name, vision] : visions)
@@ -152,10 +152,10 @@ TEST(Palette, TissuesThatTouchInTheBuiltInScenesAreToldApartWithEveryKindOfColou
         paint(Palette::colourBlind, safe);
         for (const auto& pair : touching(tissue)) {
             ++pairs;
-            near += leastDifference(asInBody, pair) < 10 ? 1 : 0;
+            near += minDifference(asInBody, pair) < 10 ? 1 : 0;
             const bool patterns =
                 patternOf(Palette::colourBlind, named(pair.first)) != patternOf(Palette::colourBlind, named(pair.second));
-            const double apart = leastDifference(safe, pair);
+            const double apart = minDifference(safe, pair);
             byPattern += apart < 10 ? 1 : 0;
             EXPECT_TRUE(apart >= 10 || patterns) << name << ": " << pair.first << ", " << pair.second << ": " << apart;
         }

@@ -1,5 +1,5 @@
-// Publishes the made-up body: publish_body SESSION play [FILE] | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not shipped.
-// The story begins when FILE is there: a viewer may take longer to start than the story lasts.
+// Publishes the made-up body: publish_body SESSION play [FILE] | hold SECONDS_OF_THE_STORY | wave VOXELS. It is not
+// shipped. The story begins when FILE is there: a viewer may take longer to start than the story lasts.
 #include <channel/channel.h>
 #include <tests/render/body.h>
 

@@ -62,10 +62,11 @@ TEST(ShiftField, LooksUpTheRestPointOfWhatIsSeen)
         return field.largest / 127 * (glm::dvec3(t[0], t[1], t[2]) - 128.0);
     };
     std::mt19937 random(3);
-    std::uniform_real_distribution<double> share(0, 1);
+    std::uniform_real_distribution<double> fraction(0, 1);
     std::vector<double> errors;
     for (int i = 0; i < 20000; ++i) {
-        const glm::dvec3 g = glm::dvec3(share(random), share(random), share(random)) * (glm::dvec3(field.size) - 1.001);
+        const glm::dvec3 g =
+            glm::dvec3(fraction(random), fraction(random), fraction(random)) * (glm::dvec3(field.size) - 1.001);
         const glm::dvec3 x = field.origin + field.spacing * g;
         glm::vec3 start(0);
         if ((deformation.restLabel(deformation.rest(x, start)) & channel::rowBits) == 0)

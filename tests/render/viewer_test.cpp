@@ -178,7 +178,7 @@ int countNear(vtkImageData& image, const Area& area, const Pixel& colour, int to
     return count;
 }
 
-// The image rises along x: grey is 255 times the share of the way through the grid.
+// The image rises along x: grey is 255 times the fraction of the way through the grid.
 TEST_F(Viewer, ShowsTheImageInItsSlices)
 {
     channel::Scenery scenery = bodyScenery();

@@ -46,8 +46,8 @@ ReferenceInfo someInfo()
     return {"0123456789abcdef", "small", "sphere_10mm", "linear", "P2", 20e-3, 1234, 5678, 9.5, "stand-in 1"};
 }
 
-// Follows a reference: its displacements and forces, times `share`.
-TrialModel follower(const Reference& reference, double share)
+// Follows a reference: its displacements and forces, times `fraction`.
+TrialModel follower(const Reference& reference, double fraction)
 {
     auto now = std::make_shared<const ReferenceState*>(nullptr);
     TrialModel model = nothingModel();
@@ -64,9 +64,9 @@ TrialModel follower(const Reference& reference, double share)
     }
     model.displacement = [=](Vec3 rest) {
         const Vec3f p(rest);
-        return share * Vec3((*now)->u[index->at({p.x, p.y, p.z})]);
+        return fraction * Vec3((*now)->u[index->at({p.x, p.y, p.z})]);
     };
-    model.force = [=] { return share * (*now)->force; };
+    model.force = [=] { return fraction * (*now)->force; };
     return model;
 }
 

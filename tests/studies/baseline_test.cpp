@@ -181,7 +181,7 @@ struct Pressed {
     BaselineScene scene{*model.tissue, model.surface, path, 0.45};
     TrialBody body = trialBody(*model.tissue, model.surface, 1e-3, 0.45, 1U << 20);
     std::array<double, 1> speeds{20e-3};
-    Reference reference = solveReference(body.body, path, speeds, {.tolerance = 1e-3, .mostPoints = 4000});
+    Reference reference = solveReference(body.body, path, speeds, {.tolerance = 1e-3, .maxPoints = 4000});
 };
 
 const Pressed& pressed()
@@ -246,12 +246,13 @@ TEST(IncrementMail, TakesAnIncrementThroughTheBodyByTheClosedForm)
     const auto increment = [&](int down) {
         return mail.increment(static_cast<Node>(level.nodes.offset(top + Index3(0, down, 0)))).y;
     };
-    for (const double share : {1.0, 0.5}) {  // and nothing is left of the tick before
-        const std::vector<Seed> seeds{{seed, Vec3f(0, share * step, 0)}};
+    for (const double fraction : {1.0, 0.5}) {  // and nothing is left of the tick before
+        const std::vector<Seed> seeds{{seed, Vec3f(0, fraction * step, 0)}};
         const auto moved = mail.spread(seeds, strain);
         EXPECT_GT(moved.size(), 10U);
         for (int down = 0; down < 10; ++down) {
-            EXPECT_NEAR(static_cast<double>(increment(down)), std::max(0.0, share * step - strain * h * down), 1e-4 * step);
+            EXPECT_NEAR(static_cast<double>(increment(down)), std::max(0.0, fraction * step - strain * h * down),
+                        1e-4 * step);
         }
     }
 }

@@ -283,7 +283,7 @@ TEST(FactoredTets, ConvergeTowardsTheConvergedLattice)
     const auto& p = pressed();
     const TrialBody fine = trialBody(*p.model.tissue, p.model.surface, 1e-3, 0.45, 1U << 20);
     const std::array speeds{speed};
-    const Reference reference = solveReference(fine.body, p.path, speeds, {.mostPoints = 5000});
+    const Reference reference = solveReference(fine.body, p.path, speeds, {.maxPoints = 5000});
     std::vector<double> near, force;
     for (const double spacing : {4e-3, 2e-3, 1.3e-3}) {
         const TrialResult result = runTrial(factoredModel(p.mesh(spacing, 0.45), p.path), p.path, speed, reference);

@@ -72,7 +72,7 @@ TEST(KernelWork, ItsBoundIsTheSumOfTheOperations)
     const MachineRates rates{.additions = 10, .multiplications = 10, .both = 20, .bytes = 100};
     const std::vector<KernelWork> work{{.operation = "apply", .additions = 40, .multiplications = 10, .bytes = 100},
                                        {.operation = "combine", .bytes = 300}};
-    EXPECT_DOUBLE_EQ(leastTime(work, rates), 4.0 + 3.0);
+    EXPECT_DOUBLE_EQ(minTime(work, rates), 4.0 + 3.0);
 }
 
 }  // namespace

@@ -55,10 +55,10 @@ TEST(PlainOperator, AgreesWithTheKernel)
 TEST(LeastTime, IsTheSlowestOfArithmeticAndMemory)
 {
     const MachineRates rates{2, 4, 3, 8};
-    EXPECT_DOUBLE_EQ(leastTime({10, 0, 0}, rates), 5.0);
-    EXPECT_DOUBLE_EQ(leastTime({0, 12, 0}, rates), 3.0);
-    EXPECT_DOUBLE_EQ(leastTime({6, 12, 0}, rates), 4.5);
-    EXPECT_DOUBLE_EQ(leastTime({1, 1, 80}, rates), 10.0);
+    EXPECT_DOUBLE_EQ(minTime({10, 0, 0}, rates), 5.0);
+    EXPECT_DOUBLE_EQ(minTime({0, 12, 0}, rates), 3.0);
+    EXPECT_DOUBLE_EQ(minTime({6, 12, 0}, rates), 4.5);
+    EXPECT_DOUBLE_EQ(minTime({1, 1, 80}, rates), 10.0);
 }
 
 // Twice the rounds are twice the operations, twice the lanes twice as many each round. Nothing of time but a bound that no

@@ -106,8 +106,8 @@ double inwardForce(const Pressed& p)
     return most;
 }
 
-// The largest difference between the forces of press and retreat at the same pose, as a share of the press's, from `least`
-// to `most` deep. The path is the same in both directions, tick by tick.
+// The largest difference between the forces of press and retreat at the same pose, as a fraction of the press's, from
+// `least` to `most` deep. The path is the same in both directions, tick by tick.
 double hysteresis(const Pressed& p, double radius, double least, double most)
 {
     double worst = 0.0;
@@ -122,7 +122,7 @@ double hysteresis(const Pressed& p, double radius, double least, double most)
     return worst;
 }
 
-// Work of the tissue on the tool over the whole way, as a share of that without its sign; by the trapezoidal rule.
+// Work of the tissue on the tool over the whole way, as a fraction of that without its sign; by the trapezoidal rule.
 double workGained(const Pressed& p)
 {
     double work = 0.0, size = 0.0;
@@ -135,7 +135,7 @@ double workGained(const Pressed& p)
     return work / size;
 }
 
-// The largest difference between the forces on the same way, turned, as a share of the peak force.
+// The largest difference between the forces on the same way, turned, as a fraction of the peak force.
 double apart(const Pressed& a, const Pressed& b, const Mat3& turn)
 {
     double worst = 0.0;

@@ -29,7 +29,7 @@ struct Pushed {
     LatticeTets mesh = latticeTets(*subject.model->tissue, subject.model->surface, 4e-3, 0.49);
     TrialBody body = trialBody(*subject.model->tissue, subject.model->surface, 4e-3, 0.49, 1U << 20);
     std::array<double, 1> speeds{subject.speed};
-    Reference reference = solveReference(body.body, subject.path, speeds, {.tolerance = 1e-3, .mostCycles = 50});
+    Reference reference = solveReference(body.body, subject.path, speeds, {.tolerance = 1e-3, .maxCycles = 50});
 
     std::size_t looks() const
     {
@@ -66,11 +66,11 @@ void writeStill(const std::filesystem::path& folder)
     write(folder / "times.csv", "processor_s\n2e-3\n4e-3\n3e-3\n");
 }
 
-AccuracyRun runOf(const std::string& command, const Folder& folder, double mostSeconds = 60)
+AccuracyRun runOf(const std::string& command, const Folder& folder, double maxSeconds = 60)
 {
     const std::array references{&pushed().reference};
     return runRival({"rival", command, "", {4e-3}}, 4e-3, "small", pushed().subject, references, folder / "run",
-                    mostSeconds);
+                    maxSeconds);
 }
 
 // By the theorem of Gauss a closed surface that looks outwards encloses the sum of the tetrahedra's volumes.

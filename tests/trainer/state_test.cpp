@@ -34,19 +34,19 @@ Result scored(double total)
 TEST(State, TheMainButtonAloneLeadsFromTheCaseToTheResultAndToTheNextCase)
 {
     State state = firstState();
-    EXPECT_EQ(goOn(state), Errand::checkDevices);
+    EXPECT_EQ(advance(state), Errand::checkDevices);
     EXPECT_EQ(state.screen, Screen::devices);
-    EXPECT_EQ(goOn(state), Errand::none);
+    EXPECT_EQ(advance(state), Errand::none);
     EXPECT_EQ(state.screen, Screen::briefing);
-    EXPECT_EQ(goOn(state), Errand::startSession);
+    EXPECT_EQ(advance(state), Errand::startSession);
     EXPECT_EQ(state.screen, Screen::briefing) << "only a session that has started leaves the briefing";
     sessionStarted(state, {"a.db", "a.json"}, "palpate train");
     EXPECT_EQ(state.screen, Screen::session);
-    EXPECT_EQ(goOn(state), Errand::endSession);
+    EXPECT_EQ(advance(state), Errand::endSession);
     sessionEnded(state, scored(71));
     EXPECT_EQ(state.screen, Screen::result);
     EXPECT_EQ(debrief(state), Errand::startDebrief);
-    EXPECT_EQ(goOn(state), Errand::none);
+    EXPECT_EQ(advance(state), Errand::none);
     EXPECT_EQ(state.screen, Screen::cases);
     EXPECT_EQ(state.chosen, 1U);
 }
@@ -76,7 +76,7 @@ TEST(State, WhatIsSaidOnAScreenIsNotSaidOnTheNext)
     goBack(state);
     EXPECT_EQ(state.notice, "");
     state.notice = "palpate: no such profile";
-    goOn(state);
+    advance(state);
     EXPECT_EQ(state.notice, "");
 }
 
@@ -95,7 +95,7 @@ TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
         switch (random() % 8) {
             case 0:
             case 1:
-                errand = goOn(state);
+                errand = advance(state);
                 break;
             case 2:
                 errand = goBack(state);
@@ -149,11 +149,11 @@ TEST(State, AnExerciseIsTrainedFromTheProgressScreenAndLeadsBackToIt)
     EXPECT_EQ(state.exerciseShown, 1U) << "the next one";
     EXPECT_EQ(trainExercise(state, 2), Errand::none) << "its gate is shut";
     EXPECT_NE(state.notice, "");
-    EXPECT_EQ(goOn(state), Errand::checkDevices);
+    EXPECT_EQ(advance(state), Errand::checkDevices);
     EXPECT_EQ(state.chosen, 2U);
     EXPECT_TRUE(state.test);
-    goOn(state);
-    EXPECT_EQ(goOn(state), Errand::startSession);
+    advance(state);
+    EXPECT_EQ(advance(state), Errand::startSession);
     const auto words = trainArguments(state, {"r.db", "r.json"});
     EXPECT_NE(std::ranges::find(words, "c/e"), words.end());
     EXPECT_EQ(std::ranges::find(words, "--case"), words.end());
@@ -161,11 +161,11 @@ TEST(State, AnExerciseIsTrainedFromTheProgressScreenAndLeadsBackToIt)
     EXPECT_NE(std::ranges::find(tryout, "left"), tryout.end());
     sessionStarted(state, {}, "");
     sessionEnded(state, scored(50));
-    EXPECT_EQ(goOn(state), Errand::choosePerson);
+    EXPECT_EQ(advance(state), Errand::choosePerson);
     EXPECT_EQ(state.screen, Screen::progress);
     goBack(state);
     EXPECT_EQ(state.screen, Screen::cases);
-    goOn(state);
+    advance(state);
     EXPECT_EQ(state.exercise, "") << "a case of the list is no exercise";
 }
 

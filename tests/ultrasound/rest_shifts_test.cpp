@@ -67,7 +67,7 @@ TEST(RestShifts, AnAffineMapIsExact)
 }
 
 // Between two solved points h apart a linear rule misses at most h^2 / 8 of the second derivative; within a cell of the
-// lattice that of the inverse is small, at its faces the slope jumps by a spacing's share of it: h / 4 of the jump.
+// lattice that of the inverse is small, at its faces the slope jumps by a spacing's fraction of it: h / 4 of the jump.
 TEST(RestShifts, AWaveIsWithinItsCurvature)
 {
     constexpr double amplitude = 1.5e-3, length = 20e-3, k = 6.2831853 / length;

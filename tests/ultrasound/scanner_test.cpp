@@ -216,8 +216,8 @@ TEST(Beam, SlidersAddTheirGain)
     const Transducer probe = linearProbe();
     Settings plain = settingsOf(probe), turned = plain;
     turned.tgc[2] = 8;
-    const auto more = [&](float share) {
-        const float z = share * plain.depth;
+    const auto more = [&](float fraction) {
+        const float z = fraction * plain.depth;
         return gainAt(Beam(probe, turned), z) - gainAt(Beam(probe, plain), z);
     };
     EXPECT_NEAR(more(2.5F / 8), 8, 1e-3);

@@ -111,7 +111,7 @@ TEST(Barrier, ProgressIsToldHere)
 {
     std::vector<double> told;
     ImportOptions options;
-    options.progress = [&](double share) { told.push_back(share); };
+    options.progress = [&](double fraction) { told.push_back(fraction); };
     labelsOf(
         [](const ImportOptions& o) {
             o.progress(0.25);

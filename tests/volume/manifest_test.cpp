@@ -382,11 +382,11 @@ TEST(Manifest, TruncatedCopiesAreRefused)
     for (const std::string& name : files) {
         const fs::path copy = folder / fs::path(name).filename();
         const auto whole = fs::file_size(data / name);
-        for (const double share : {0.0, 0.02, 0.3, 0.7, 0.99}) {
+        for (const double fraction : {0.0, 0.02, 0.3, 0.7, 0.99}) {
             fs::copy_file(data / name, copy, fs::copy_options::overwrite_existing);
             fs::permissions(copy, fs::perms::owner_write, fs::perm_options::add);
-            fs::resize_file(copy, static_cast<std::uintmax_t>(share * static_cast<double>(whole)));
-            EXPECT_THROW(importLabels(copy), std::runtime_error) << name << " cut to " << share;
+            fs::resize_file(copy, static_cast<std::uintmax_t>(fraction * static_cast<double>(whole)));
+            EXPECT_THROW(importLabels(copy), std::runtime_error) << name << " cut to " << fraction;
         }
         fs::copy_file(data / name, copy, fs::copy_options::overwrite_existing);
         EXPECT_NO_THROW(importLabels(copy)) << name;

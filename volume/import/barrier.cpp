@@ -17,7 +17,7 @@ namespace palpate::volume {
 
 namespace {
 
-enum class Said : std::uint8_t { progress, result, refusal, fault };
+enum class Message : std::uint8_t { progress, result, refusal, fault };
 
 /// The child's end of the pipe.
 class Sender {
@@ -203,23 +203,23 @@ template <typename Result, typename Read>
 [[noreturn]] void readAndSend(const Sender& to, const std::filesystem::path& path, ImportOptions options, const Read& read)
 {
     if (options.progress) {
-        options.progress = [&to](double share) {
-            to.put(Said::progress);
-            to.put(share);
+        options.progress = [&to](double fraction) {
+            to.put(Message::progress);
+            to.put(fraction);
         };
     }
     try {
         const Result result = read(options);
-        to.put(Said::result);
+        to.put(Message::result);
         send(to, result);
     } catch (const std::bad_alloc&) {
-        to.put(Said::refusal);
+        to.put(Message::refusal);
         to.put(path.string() + ": needs more memory than there is: crop or resample it first");
     } catch (const std::runtime_error& e) {
-        to.put(Said::refusal);
+        to.put(Message::refusal);
         to.put(std::string(e.what()));
     } catch (const std::exception& e) {
-        to.put(Said::fault);
+        to.put(Message::fault);
         to.put(std::string(e.what()));
     }
     ::_exit(0);
@@ -257,19 +257,19 @@ Result apart(const std::filesystem::path& path, const char* library, const Impor
         refuse(path, fmt::format("no process for reading it can be started ({}): try again", std::strerror(errno)));
     }
     ::fcntl(ends[0], F_SETPIPE_SZ, 1 << 20);
-    Said said{};
+    Message said{};
     while (from.take(said)) {
-        double share = 0;
+        double fraction = 0;
         Result result;
         std::string reason;
-        if (said == Said::progress && from.take(share)) {
-            options.progress(share);
-        } else if (said == Said::result && receive(from, result)) {
+        if (said == Message::progress && from.take(fraction)) {
+            options.progress(fraction);
+        } else if (said == Message::result && receive(from, result)) {
             from.ended();
             return result;
-        } else if (said == Said::refusal && from.take(reason)) {
+        } else if (said == Message::refusal && from.take(reason)) {
             throw std::runtime_error(reason);
-        } else if (said == Said::fault && from.take(reason)) {
+        } else if (said == Message::fault && from.take(reason)) {
             throw std::logic_error(reason);
         }
     }

@@ -210,7 +210,7 @@ std::array<std::uint8_t, 3> rgb(double l, double a, double b)
 void readSegments(DcmDataset& data, DicomObject& object)
 {
     object.segmentationType = text(data, DCM_SegmentationType);
-    object.mostFractional = whole(data, DCM_MaximumFractionalValue, 255);
+    object.maxFractional = whole(data, DCM_MaximumFractionalValue, 255);
     object.padding = whole(data, DCM_PixelPaddingValue, -1);
     DcmSequenceOfItems* sequence = nullptr;
     if (data.findAndGetSequence(DCM_SegmentSequence, sequence).bad() || sequence == nullptr) {

@@ -41,7 +41,7 @@ struct DicomObject {
 
     // A DICOM SEG.
     std::string segmentationType;  // BINARY, FRACTIONAL or LABELMAP; empty for an image
-    int mostFractional = 255;
+    int maxFractional = 255;
     int padding = -1;  // a value that means background, -1 for none
     std::vector<LabelName> segments;
 

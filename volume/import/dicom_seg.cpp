@@ -127,7 +127,7 @@ std::vector<Segment> separateSegments(const DicomObject& object, const Grid& gri
         segments.push_back({name, {}, 0});
     }
     const bool fractional = object.segmentationType == "FRACTIONAL";
-    const double threshold = fractional ? static_cast<double>(options.fractionalThreshold) * object.mostFractional : 0.5;
+    const double threshold = fractional ? static_cast<double>(options.fractionalThreshold) * object.maxFractional : 0.5;
     std::uint64_t between = 0;
     DicomPixels pixels(object);
     std::map<std::pair<std::uint16_t, std::int64_t>, std::size_t> seen;
@@ -146,7 +146,7 @@ std::vector<Segment> separateSegments(const DicomObject& object, const Grid& gri
             if (values[i] > 0 && values[i] >= threshold) {
                 segment.add(first + static_cast<std::uint32_t>(i));
             }
-            between += values[i] > 0 && values[i] < object.mostFractional ? 1 : 0;
+            between += values[i] > 0 && values[i] < object.maxFractional ? 1 : 0;
         }
         done += 1;
         if (options.progress) {

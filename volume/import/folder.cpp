@@ -96,9 +96,9 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
         }
         checkSameGrid(first, source);
         checkBytes(source);
-        const auto progress = [&](double share) {
+        const auto progress = [&](double fraction) {
             if (options.progress) {
-                options.progress((static_cast<double>(i) + share) / static_cast<double>(files.size()));
+                options.progress((static_cast<double>(i) + fraction) / static_cast<double>(files.size()));
             }
         };
         segments.push_back(readMask(source, static_cast<std::uint16_t>(i + 1), progress));

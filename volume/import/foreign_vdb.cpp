@@ -51,8 +51,8 @@ void fill(const std::filesystem::path& file, const Grid& grid, const ImportOptio
     LabelImage& image = out.image;
     image.size = checkedSize(file, {dim.x(), dim.y(), dim.z()});
     // Two voxels far apart make a box that nobody has memory for.
-    constexpr std::size_t mostVoxels = std::size_t{1} << 30;
-    if (image.offset({0, 0, image.size.z}) > mostVoxels) {
+    constexpr std::size_t maxVoxels = std::size_t{1} << 30;
+    if (image.offset({0, 0, image.size.z}) > maxVoxels) {
         refuse(file, fmt::format("its active voxels spread over {} x {} x {}: crop it first", dim.x(), dim.y(), dim.z()));
     }
     const openvdb::math::Transform& to = grid.transform();

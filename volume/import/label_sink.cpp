@@ -8,11 +8,11 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr std::size_t mostDifferent = 1024;  // more different values than this is an image
-constexpr double mostLabel = 65535;
-constexpr double roundable = 1e-3;              // how far from a whole number --round reaches
-constexpr double mostExact = 9007199254740992;  // 2^53: over it a double does not tell whole numbers apart
-constexpr std::size_t mostNamed = 5;            // labels in a warning
+constexpr std::size_t maxDifferent = 1024;  // more different values than this is an image
+constexpr double maxLabel = 65535;
+constexpr double roundable = 1e-3;             // how far from a whole number --round reaches
+constexpr double maxExact = 9007199254740992;  // 2^53: over it a double does not tell whole numbers apart
+constexpr std::size_t maxNamed = 5;            // labels in a warning
 
 double allowed(const LabelRules& rules, double value)
 {
@@ -56,7 +56,7 @@ std::uint16_t LabelSink::label(const std::filesystem::path& file, double value, 
         refuseNan(file, voxel, value);
     }
     const double whole = std::round(value);
-    if (whole < 0 || whole > mostLabel) {
+    if (whole < 0 || whole > maxLabel) {
         refuse(file,
                fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
                            "an image: give the segmentation that was made of it",
@@ -72,7 +72,7 @@ void LabelSink::add(std::span<const double> values)
 {
     for (const double value : values) {
         // In a label map nothing else happens.
-        const auto plain = value >= 0 && value <= mostLabel ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+        const auto plain = value >= 0 && value <= maxLabel ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
         if (static_cast<double>(plain) == value && !rules_.renumber) {
             labels_.push_back(plain);
             seen_[plain] = true;
@@ -101,9 +101,9 @@ void LabelSink::addOdd(double value)
 
 void LabelSink::addWhole(double whole)
 {
-    const bool fits = whole >= 0 && whole <= mostLabel;
+    const bool fits = whole >= 0 && whole <= maxLabel;
     if (rules_.renumber) {
-        const bool exact = std::abs(whole) <= mostExact;
+        const bool exact = std::abs(whole) <= maxExact;
         if (!exact) {
             outside_ = outside_ ? outside_ : std::optional(Odd{here(), whole});
         }
@@ -125,7 +125,7 @@ void LabelSink::addWhole(double whole)
     }
     if (!fits) {
         outside_ = outside_ ? outside_ : std::optional(Odd{here(), whole});
-        if (oddValues_.size() <= mostDifferent) {
+        if (oddValues_.size() <= maxDifferent) {
             oddValues_.insert(whole);
         }
     }
@@ -150,13 +150,13 @@ void LabelSink::refuseOdd(bool surelyLabels) const
                                   "the whole number",
                                   fraction_->voxel, fraction_->value, fractions_, farthest_));
     }
-    if (different() > mostDifferent && !surelyLabels) {
+    if (different() > maxDifferent && !surelyLabels) {
         refuse(file_,
                fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
                            "an image: give the segmentation that was made of it",
                            outside_->voxel, outside_->value));
     }
-    if (std::abs(outside_->value) > mostExact) {
+    if (std::abs(outside_->value) > maxExact) {
         refuse(file_, fmt::format("{} is {:.17g}: whole numbers over 2^53 cannot be told apart, save it with smaller ones",
                                   outside_->voxel, outside_->value));
     }
@@ -191,7 +191,7 @@ std::vector<std::uint16_t> LabelSink::decoded(ImportedLabels& out) const
         *free = true;
         labelOf[code] = static_cast<std::uint16_t>(free - used.begin());
         out.renumbered.push_back({value, labelOf[code]});
-        if (said.size() < mostNamed) {
+        if (said.size() < maxNamed) {
             said.push_back(fmt::format("{} is {}", value, labelOf[code]));
         }
     }
@@ -209,10 +209,10 @@ void LabelSink::finish(bool surelyLabels, ImportedLabels& out)
     if (fraction_ || outside_) {
         refuseOdd(surelyLabels);
     }
-    if (different() > mostDifferent && !surelyLabels) {
+    if (different() > maxDifferent && !surelyLabels) {
         refuse(file_, fmt::format("has {} different values, so it is not a label map (at most {}) but an image: give the "
                                   "segmentation that was made of it",
-                                  different(), mostDifferent));
+                                  different(), maxDifferent));
     }
     if (fractions_ > 0) {
         out.warnings.push_back(

@@ -11,8 +11,8 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr std::size_t mostSaid = 5;    // segments in a warning about each
-constexpr std::size_t mostNamed = 12;  // in a list of names
+constexpr std::size_t maxSaid = 5;    // segments in a warning about each
+constexpr std::size_t maxNamed = 12;  // in a list of names
 
 std::vector<std::string> namesOf(const std::vector<Segment>& segments)
 {
@@ -76,9 +76,9 @@ void makeUnique(const std::filesystem::path& file, std::vector<Segment>& segment
         s.label.value = static_cast<std::uint16_t>(highest);
         taken.insert(s.label.value);
     }
-    if (changed.size() > mostSaid) {
-        changed[mostSaid] = fmt::format("so do {} more", changed.size() - mostSaid);
-        changed.resize(mostSaid + 1);
+    if (changed.size() > maxSaid) {
+        changed[maxSaid] = fmt::format("so do {} more", changed.size() - maxSaid);
+        changed.resize(maxSaid + 1);
     }
     if (!changed.empty()) {
         warnings.push_back(fmt::format("{}", fmt::join(changed, "; ")));
@@ -118,9 +118,9 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
     }
     if (!empty.empty()) {
         const std::size_t all = empty.size();
-        empty.resize(std::min(all, mostNamed));
+        empty.resize(std::min(all, maxNamed));
         out.warnings.push_back(fmt::format("segments without a voxel are left out: {}{}", fmt::join(empty, ", "),
-                                           all > mostNamed ? fmt::format(" and {} more", all - mostNamed) : ""));
+                                           all > maxNamed ? fmt::format(" and {} more", all - maxNamed) : ""));
     }
     makeUnique(file, segments, out.warnings);
     LabelImage& image = out.image;

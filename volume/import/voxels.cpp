@@ -12,11 +12,11 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr std::uint64_t mostVoxels = 0xffffffff;         // of one volume
-constexpr std::uint64_t mostPadding = 16;                // [bytes]
-constexpr std::uint64_t mostBefore = 1 << 30;            // unpacked, in front of voxels that are the last bytes [bytes]
-constexpr double leastSpacing = 0.999e-6;                // below a cell, and units were mistaken [m]
-constexpr double mostShear = 2e-3;                       // cosine between voxel axes
+constexpr std::uint64_t maxVoxels = 0xffffffff;          // of one volume
+constexpr std::uint64_t maxPadding = 16;                 // [bytes]
+constexpr std::uint64_t maxBefore = 1 << 30;             // unpacked, in front of voxels that are the last bytes [bytes]
+constexpr double minSpacing = 0.999e-6;                  // below a cell, and units were mistaken [m]
+constexpr double maxShear = 2e-3;                        // cosine between voxel axes
 constexpr double degree = 3.14159265358979323846 / 180;  // [rad]
 
 template <typename T>
@@ -75,9 +75,8 @@ Index3 checkedSize(const std::filesystem::path& file, const std::vector<std::int
     if (std::any_of(sizes.begin(), sizes.end(), [](std::int64_t n) { return n < 1 || n > 32767; })) {
         refuse(file, fmt::format("its size is {}: each side must be 1 to 32767 voxels, save it again", text));
     }
-    if (static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]) > mostVoxels) {
-        refuse(file,
-               fmt::format("its size is {}: more than {} voxels are not read, crop or resample it", text, mostVoxels));
+    if (static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]) > maxVoxels) {
+        refuse(file, fmt::format("its size is {}: more than {} voxels are not read, crop or resample it", text, maxVoxels));
     }
     return {static_cast<int>(sizes[0]), static_cast<int>(sizes[1]), static_cast<int>(sizes[2])};
 }
@@ -88,7 +87,7 @@ void checkBytes(Source& source)
     const std::uint64_t width = source.encoding == Encoding::text ? sizeof(double) : bytesOf(source.component);
     const std::uint64_t wanted = source.elements() * width;
     const std::uint64_t most =
-        source.fromEnd ? wanted + mostBefore : source.skip + wanted + std::max(mostPadding, source.trailer);
+        source.fromEnd ? wanted + maxBefore : source.skip + wanted + std::max(maxPadding, source.trailer);
     const std::uint64_t there = unpackedSize(source.data, source.offset, source.encoding, most);
     if (source.fromEnd && there >= wanted && (there <= most || source.encoding == Encoding::raw)) {
         source.skip = there - wanted;
@@ -114,7 +113,7 @@ void checkBytes(Source& source)
     // A little padding at the end is harmless; what could be a wrong size, or a header of its own, is not.
     const Index3 n = source.size;
     const auto sheet = static_cast<std::uint64_t>(std::min({n.x * n.y, n.y * n.z, n.x * n.z}));
-    if (there - expected >= std::min(mostPadding, sheet * width)) {
+    if (there - expected >= std::min(maxPadding, sheet * width)) {
         refuse(source.header, sizes + ": its header is wrong or the data begin elsewhere, save it again");
     }
     if (there > expected) {
@@ -191,7 +190,7 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
         refuse(file, fmt::format("its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again",
                                  1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
     }
-    if (std::max({spacing.x, spacing.y, spacing.z}) > 10 || std::min({spacing.x, spacing.y, spacing.z}) < leastSpacing) {
+    if (std::max({spacing.x, spacing.y, spacing.z}) > 10 || std::min({spacing.x, spacing.y, spacing.z}) < minSpacing) {
         refuse(file, fmt::format("its voxels are {} x {} x {} mm: that is no patient, check the units in its header",
                                  1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
     }
@@ -200,7 +199,7 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
     if (affine.voxelVolume() < 1e-3 * spacing.x * spacing.y * spacing.z) {
         refuse(file, "its voxel axes lie in one plane: the directions in its header are wrong, save it again");
     }
-    if (std::sin(shear) <= mostShear) {
+    if (std::sin(shear) <= maxShear) {
         return;
     }
     const std::string said = fmt::format(

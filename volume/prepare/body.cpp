@@ -34,17 +34,17 @@ constexpr float gasBelow = -930;       // gas, where half of a region is so; els
 constexpr float fatTo = -30;           // and above it muscle and other soft tissue
 constexpr float muscleTo = 85;         // smoothed; what is brighter is cartilage, or an organ with contrast medium
 constexpr double vesselTo = 500;       // no blood is brighter
-constexpr double evenness = 0.15;      // standard deviation inside a vessel, share of its mean
-constexpr double shellBrighter = 0.3;  // than the inside, as a share of it: a bone's shell
+constexpr double evenness = 0.15;      // standard deviation inside a vessel, fraction of its mean
+constexpr double shellBrighter = 0.3;  // than the inside, as a fraction of it: a bone's shell
 
 // Lengths [m], areas [m^2] and volumes [m^3].
 constexpr double smoothing = 3e-3;
 constexpr double tableSheet = 4e-3;  // half the thickness of what is taken for table, clothes and cables
 constexpr double keptPiece = 1e-6;   // a loose piece of body with so much of a label is kept
-constexpr double leastLung = 20e-6;
+constexpr double minLung = 20e-6;
 constexpr double lungVessels = 4e-3;  // radius of vessels that count as lung
 constexpr double vesselRim = 2e-3;    // of what is not taken for a vessel's inside
-constexpr double leastVessel = 1e-6;
+constexpr double minVessel = 1e-6;
 constexpr double rimDepth = 10e-3;   // fat so near to the surface is fat under the skin
 constexpr double fatBridge = 6e-3;   // half the thickness of what connects it with further fat under the skin
 constexpr double wallDepth = 12e-3;  // of the muscles under that fat
@@ -231,7 +231,7 @@ private:
                 continue;
             }
             const MaskPiece& piece = pieces.pieces[pieces.of[i] - 1];
-            const bool isLung = static_cast<double>(piece.voxels) * voxel >= leastLung && piece.low < 0.5;
+            const bool isLung = static_cast<double>(piece.voxels) * voxel >= minLung && piece.low < 0.5;
             lungs[i] = isLung ? 1 : 0;
             found_[i] = isLung ? lung : gas;
         }
@@ -269,7 +269,7 @@ private:
             const Judged& j = judged[p];
             const double mean = cores.pieces[p].mean;
             const bool even = std::sqrt(j.square / j.inside) < evenness * mean && j.bright < 0.05 * j.all;
-            isVessel[p + 1] = even && mean < vesselTo && j.all * grid_.affine.voxelVolume() >= leastVessel ? 1 : 0;
+            isVessel[p + 1] = even && mean < vesselTo && j.all * grid_.affine.voxelVolume() >= minVessel ? 1 : 0;
         }
         for (std::size_t i = 0; i < nearest.size(); ++i) {
             found_[i] = isVessel[nearest[i]] != 0 ? vessel : found_[i];
@@ -411,9 +411,9 @@ std::vector<PreparationStep> fill(LabelImage& image, Labeller& labels, const std
 // The labels on a grid that goes on by `before` and `after` voxels along each axis.
 LabelImage extended(const LabelImage& image, Index3 before, Index3 after, const char* option)
 {
-    constexpr double mostVoxels = 4e9;
+    constexpr double maxVoxels = 4e9;
     const Vec3 size = Vec3(image.size + before + after);
-    if (!(size.x * size.y * size.z < mostVoxels)) {
+    if (!(size.x * size.y * size.z < maxVoxels)) {
         throw std::runtime_error(
             fmt::format("{}: makes over 4 thousand million voxels: resample the labels to larger "
                         "ones first, or crop the image",

@@ -25,8 +25,8 @@ constexpr float surelyBone = 200;  // a piece without it is an organ with contra
 constexpr float marrowLike = 80;   // what is darker speaks no more against bone: marrow may be fat
 
 constexpr double rayReach = 40e-3;             // half the width of a pelvis' bones and more
-constexpr std::uint8_t leastAsked = 17;        // rays: those of a voxel in the grid's last layer, half of a bone behind it
-constexpr float enclosedFrom = 0.85F;          // share of rays; a spinal canal and a disc have less
+constexpr std::uint8_t minAsked = 17;          // rays: those of a voxel in the grid's last layer, half of a bone behind it
+constexpr float enclosedFrom = 0.85F;          // fraction of rays; a spinal canal and a disc have less
 constexpr float perShare = 0.05F, perHu = 30;  // a share and HU that count alike
 constexpr float perNeighbour = 0.4F;
 constexpr int sweeps = 3;
@@ -170,11 +170,11 @@ std::vector<float> enclosure(const VoxelGrid& grid, const Mask& mask, double rea
             });
         }
     });
-    std::vector<float> share(mask.size());
-    for (std::size_t i = 0; i < share.size(); ++i) {
-        share[i] = static_cast<float>(met[i]) / static_cast<float>(std::max(asked[i], leastAsked));
+    std::vector<float> fraction(mask.size());
+    for (std::size_t i = 0; i < fraction.size(); ++i) {
+        fraction[i] = static_cast<float>(met[i]) / static_cast<float>(std::max(asked[i], minAsked));
     }
-    return share;
+    return fraction;
 }
 
 Mask findBone(const VoxelGrid& grid, const std::vector<float>& hu, const Mask& may, const Mask& known)

@@ -11,7 +11,7 @@ namespace palpate::prepare {
 /// a millimetre fills little of a large voxel: 150 HU for voxels of a millimetre, 125 HU for those of 3 mm and more.
 float boneThreshold(const volume::VoxelGrid& grid);
 
-/// For each voxel the share of 26 rays, along axes and diagonals, that meet the mask no further than `reach` [m] away.
+/// For each voxel the fraction of 26 rays, along axes and diagonals, that meet the mask no further than `reach` [m] away.
 /// Rays that leave the grid before are not counted, up to nine of them: so many leave at a face of the grid.
 std::vector<float> enclosure(const volume::VoxelGrid& grid, const Mask& mask, double reach);
 

@@ -20,8 +20,8 @@ namespace {
 using datasets::LabelMap;
 using volume::LabelName;
 
-constexpr std::size_t mostListed = 40;  // labels in a message
-constexpr std::size_t mostContradictions = 8;
+constexpr std::size_t maxListed = 40;  // labels in a message
+constexpr std::size_t maxContradictions = 8;
 
 // One --set: which label, by value or name, is made of what.
 struct Setting {
@@ -48,7 +48,7 @@ std::string listOf(const volume::ImportedLabels& labels, const LabelCounts& coun
 {
     std::vector<std::string> list;
     for (const auto& [value, voxels] : counts) {
-        if (list.size() == mostListed) {
+        if (list.size() == maxListed) {
             list.emplace_back("...");
             break;
         }
@@ -202,9 +202,9 @@ private:
             return;
         }
         const std::size_t all = list.size();
-        if (all > mostContradictions) {
-            list.resize(mostContradictions);
-            list.push_back(fmt::format("and {} more", all - mostContradictions));
+        if (all > maxContradictions) {
+            list.resize(maxContradictions);
+            list.push_back(fmt::format("and {} more", all - maxContradictions));
         }
         throw std::runtime_error(fmt::format(
             "{}: --map {} contradicts the names in it: {}: leave out --map, or give that of the program that made it",
@@ -245,8 +245,8 @@ private:
         list.push_back(fmt::format("{}{} ({} voxels{})", u.label.value,
                                    tellsMore(u.label) ? fmt::format(" '{}'", u.label.name) : "", counts.at(u.label.value),
                                    perhaps));
-        if (list.size() == mostListed && unknown.size() > mostListed) {
-            list.push_back(fmt::format("and {} more", unknown.size() - mostListed));
+        if (list.size() == maxListed && unknown.size() > maxListed) {
+            list.push_back(fmt::format("and {} more", unknown.size() - maxListed));
             break;
         }
     }

@@ -17,7 +17,7 @@ using Mask = std::vector<std::uint8_t>;
 struct MaskPiece {
     std::uint64_t voxels = 0;
     double mean = 0;  // of the image over it
-    double low = 0;   // share of its voxels whose image is below the `below` of piecesOf()
+    double low = 0;   // fraction of its voxels whose image is below the `below` of piecesOf()
 };
 
 /// The pieces of a mask.

@@ -13,8 +13,8 @@ namespace {
 using datasets::LabelMap;
 using volume::LabelName;
 
-constexpr std::size_t mostLabels = 4;  // shown of each offer
-constexpr std::size_t mostOffers = 6;
+constexpr std::size_t maxLabels = 4;  // shown of each offer
+constexpr std::size_t maxOffers = 6;
 
 bool covers(const LabelMap& map, const LabelCounts& counts)
 {
@@ -82,7 +82,7 @@ std::string offers(const volume::ImportedLabels& labels, const LabelCounts& coun
         return "";
     }
     std::ranges::sort(largest, std::greater<>());
-    largest.resize(std::min(largest.size(), mostLabels));
+    largest.resize(std::min(largest.size(), maxLabels));
     std::vector<const LabelMap*> fitting;
     for (const LabelMap& map : datasets::labelMaps()) {
         if (covers(map, counts)) {
@@ -91,7 +91,7 @@ std::string offers(const volume::ImportedLabels& labels, const LabelCounts& coun
     }
     std::ranges::stable_sort(fitting, {}, [](const LabelMap* map) { return map->labels.size(); });
     std::vector<std::string> list;
-    for (std::size_t i = 0; i < std::min(fitting.size(), mostOffers); ++i) {
+    for (std::size_t i = 0; i < std::min(fitting.size(), maxOffers); ++i) {
         std::vector<std::string> parts;
         for (const auto& [voxels, value] : largest) {
             parts.push_back(fmt::format("{} is {}", value, find(fitting[i]->labels, value)->name));
@@ -99,7 +99,7 @@ std::string offers(const volume::ImportedLabels& labels, const LabelCounts& coun
         list.push_back(fmt::format("--map {} ({})", fitting[i]->name, fmt::join(parts, ", ")));
     }
     const std::string more =
-        fitting.size() > mostOffers ? fmt::format(", or one of {} more", fitting.size() - mostOffers) : "";
+        fitting.size() > maxOffers ? fmt::format(", or one of {} more", fitting.size() - maxOffers) : "";
     return list.empty() ? ""
                         : fmt::format("; its values would fit {}{}: is it one of these?", fmt::join(list, ", or "), more);
 }

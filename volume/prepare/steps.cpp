@@ -23,7 +23,7 @@ using volume::LabelImage;
 using volume::LabelName;
 using volume::Role;
 
-constexpr double mostVoxels = 4e9;  // after resampling or padding
+constexpr double maxVoxels = 4e9;  // after resampling or padding
 
 class Preparation {
 public:
@@ -210,14 +210,14 @@ private:
     {
         const volume::VoxelGrid grid = volume::isotropicGrid({image_.size, image_.affine}, options_.voxel);
         const double count = static_cast<double>(grid.size.x) * grid.size.y * grid.size.z;
-        if (!(count < mostVoxels)) {
+        if (!(count < maxVoxels)) {
             throw std::runtime_error(
                 fmt::format("--voxel {:g}mm: makes {} x {} x {} voxels, over 4 thousand million: choose "
                             "larger ones, or --crop",
                             1e3 * options_.voxel, grid.size.x, grid.size.y, grid.size.z));
         }
-        volume::ResampledLabels out =
-            volume::resampled(image_, grid, [&](double share) { tell_(fmt::format("resampling: {:.0f} %", 100 * share)); });
+        volume::ResampledLabels out = volume::resampled(
+            image_, grid, [&](double fraction) { tell_(fmt::format("resampling: {:.0f} %", 100 * fraction)); });
         image_ = std::move(out.image);
         report("resample", "", image_.values.size(),
                fmt::format("resampled to {} x {} x {} voxels of {:g} mm", grid.size.x, grid.size.y, grid.size.z,
@@ -326,7 +326,7 @@ private:
     {
         const Index3 by(glm::ceil(options_.pad / image_.affine.spacing() - 1e-6));
         const Vec3 size = Vec3(image_.size + 2 * by);
-        if (!(size.x * size.y * size.z < mostVoxels)) {
+        if (!(size.x * size.y * size.z < maxVoxels)) {
             throw std::runtime_error(fmt::format(
                 "--pad {:g}mm: makes over 4 thousand million voxels: choose less, or larger voxels", 1e3 * options_.pad));
         }

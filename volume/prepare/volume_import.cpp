@@ -28,7 +28,7 @@ volume::ImportedImage readImage(const ImportRequest& o, std::vector<std::string>
     reading.series = o.reading.series;
     reading.volume = o.imageVolume;
     tell("checking the image", {});
-    reading.progress = [&](double share) { tell("reading the image", share); };
+    reading.progress = [&](double fraction) { tell("reading the image", fraction); };
     volume::ImportedImage image = volume::importImage(o.image, reading);
     for (const std::string& warning : image.warnings) {
         notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
@@ -187,7 +187,7 @@ NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
 {
     tell("checking the file", {});
     volume::ImportOptions reading = request.reading;
-    reading.progress = [&](double share) { tell("reading", share); };
+    reading.progress = [&](double fraction) { tell("reading", fraction); };
     NamedLabels read;
     read.labels = volume::importLabels(request.input, reading);
     tell("counting labels", {});

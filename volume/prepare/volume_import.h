@@ -30,8 +30,8 @@ struct ImportRequest {
 /// Throws std::runtime_error for a request that contradicts itself, by the options of `palpate import`.
 void checkRequest(const ImportRequest& request);
 
-/// Told what is going on, and the share of it that is done where that is known.
-using ImportProgress = std::function<void(const std::string& what, std::optional<double> share)>;
+/// Told what is going on, and the fraction of it that is done where that is known.
+using ImportProgress = std::function<void(const std::string& what, std::optional<double> fraction)>;
 
 /// Labels as their file has them, named as far as file and name table go.
 struct NamedLabels {

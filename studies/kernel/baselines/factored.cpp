@@ -17,7 +17,7 @@ namespace {
 
 constexpr double reach = 0.3;      // of points beside the sphere's way, in radii
 constexpr double settled = 1e-10;  // no contact is further off the sphere [m]
-constexpr std::size_t mostSteps = 100;
+constexpr std::size_t maxSteps = 100;
 constexpr std::size_t together = 48;  // columns solved at once
 constexpr std::size_t chunk = 2048;   // unknowns whose sums stay in the first cache
 
@@ -154,7 +154,7 @@ void FactoredTets::balance()
 chainmail::ElasticResult FactoredTets::press(Vec3 centre, double radius)
 {
     double off = meet(centre, radius);
-    for (steps_ = 0; off > settled && steps_ < mostSteps; ++steps_) {
+    for (steps_ = 0; off > settled && steps_ < maxSteps; ++steps_) {
         balance();
         follow();
         off = meet(centre, radius);

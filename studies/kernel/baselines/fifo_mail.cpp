@@ -9,7 +9,7 @@ using namespace chainmail;
 namespace {
 
 constexpr std::size_t movesPerNode = 4;  // held nodes that disagree could keep others moving for ever
-constexpr float rounding = 1e-5F;        // share of the spacing
+constexpr float rounding = 1e-5F;        // fraction of the spacing
 
 void move(FifoScratch& scratch, std::span<Vec3f> u, Node n, Vec3f to)
 {

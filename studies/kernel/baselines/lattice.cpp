@@ -26,9 +26,10 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t mostNodes = 8U << 20;
-// Spacing [m], and the share of the table's limits that erred least over presses and drags of a 10 mm sphere in the scenes
-// `block` and `layered`, among those that cost under a millisecond at 2 mm: the work grows with the share's inverse cube.
+constexpr std::size_t maxNodes = 8U << 20;
+// Spacing [m], and the fraction of the table's limits that erred least over presses and drags of a 10 mm sphere in the
+// scenes `block` and `layered`, among those that cost under a millisecond at 2 mm: the work grows with the share's inverse
+// cube.
 constexpr std::array<std::pair<double, double>, 3> tightened{{{4e-3, 0.25}, {2e-3, 0.15}, {1e-3, 0.15}}};
 // Of a tick's increment through ChainMail, in radii of the contact: chosen as above. Shorter errs more, longer overshoots
 // while the contact is still small.
@@ -36,10 +37,10 @@ constexpr double reachInRadii = 8.0;
 
 volume::NodeGrid gridOf(const BaselineScene& scene, double spacing)
 {
-    const auto grid = volume::affordableGrid(scene.tissue.box(), spacing, mostNodes);
+    const auto grid = volume::affordableGrid(scene.tissue.box(), spacing, maxNodes);
     if (grid.spacing > 1.001 * spacing) {
         throw std::runtime_error(fmt::format("lattice baseline: {:g} mm would need over {} nodes; use {:.2g} mm or more",
-                                             1e3 * spacing, mostNodes, 1e3 * grid.spacing));
+                                             1e3 * spacing, maxNodes, 1e3 * grid.spacing));
     }
     return grid;
 }
@@ -50,10 +51,10 @@ RigidSphere sphereOf(const TrialLoad& load)
     return {shape.b, shape.radiusB};
 }
 
-Lattice latticeOf(const BaselineScene& scene, double spacing, double share)
+Lattice latticeOf(const BaselineScene& scene, double spacing, double fraction)
 {
     const auto grid = gridOf(scene, spacing);
-    return {grid, scene.tissue.tissueOn(grid), withLimits(scene.tissue.table(), share)};
+    return {grid, scene.tissue.tissueOn(grid), withLimits(scene.tissue.table(), fraction)};
 }
 
 // ChainMail from rest, with what it needs to start anew.
@@ -62,7 +63,7 @@ struct FifoMail {
         : lattice(std::move(made)),
           scratch(lattice),
           u(lattice.tissue.size(), Vec3f(0.0F)),
-          seeds(mostPressSeeds(lattice, radius + lattice.grid.spacing)),
+          seeds(maxPressSeeds(lattice, radius + lattice.grid.spacing)),
           sweeps(meanSweeps)
     {
         if (sweeps > 0) {
@@ -124,7 +125,7 @@ volume::Box reachOf(const TrialPath& path)
 
 struct Relaxed {
     Relaxed(const BaselineScene& scene, double spacing, int sweepsPerTick, bool predict)
-        : body(trialBody(scene.tissue, scene.surface, gridOf(scene, spacing).spacing, scene.poissonCap, mostNodes)),
+        : body(trialBody(scene.tissue, scene.surface, gridOf(scene, spacing).spacing, scene.poissonCap, maxNodes)),
           grid(body.body.levels.front(), scene.surface, reachOf(scene.path)),
           sweeps(sweepsPerTick)
     {
@@ -177,20 +178,20 @@ Baseline relaxed(const BaselineScene& scene, const char* method, double spacing,
 
 }  // namespace
 
-volume::TissueTable withLimits(const volume::TissueTable& table, double share)
+volume::TissueTable withLimits(const volume::TissueTable& table, double fraction)
 {
     volume::TissueTable out = table;
     for (auto& row : out.rows) {
-        row.compress = 1.0 - share * (1.0 - row.compress);
-        row.stretch = 1.0 + share * (row.stretch - 1.0);
-        row.shear *= share;
+        row.compress = 1.0 - fraction * (1.0 - row.compress);
+        row.stretch = 1.0 + fraction * (row.stretch - 1.0);
+        row.shear *= fraction;
     }
     return out;
 }
 
-TrialModel fifoMailModel(const BaselineScene& scene, double spacing, double share, int meanSweeps)
+TrialModel fifoMailModel(const BaselineScene& scene, double spacing, double fraction, int meanSweeps)
 {
-    auto mail = std::make_shared<FifoMail>(latticeOf(scene, spacing, share), scene.path.tool.radius, meanSweeps);
+    auto mail = std::make_shared<FifoMail>(latticeOf(scene, spacing, fraction), scene.path.tool.radius, meanSweeps);
     return {[mail](const TrialLoad& load) {
                 mail->press(load);
                 return ElasticResult{};
@@ -220,9 +221,9 @@ TrialModel relaxedModel(const BaselineScene& scene, double spacing, int sweeps, 
 std::vector<Baseline> latticeBaselines(const BaselineScene& scene)
 {
     std::vector<Baseline> all;
-    for (const auto& [spacing, share] : tightened) {
+    for (const auto& [spacing, fraction] : tightened) {
         all.push_back({"chainmail_fifo", fmt::format("{:g} mm", 1e3 * spacing),
-                       [=, share = share, spacing = spacing] { return fifoMailModel(scene, spacing, share, 0); }});
+                       [=, fraction = fraction, spacing = spacing] { return fifoMailModel(scene, spacing, fraction, 0); }});
     }
     for (const double spacing : {4e-3, 2e-3}) {
         all.push_back(

@@ -135,8 +135,8 @@ std::size_t RelaxedGrid::putOn(const RigidSphere& sphere) noexcept
 }
 
 // What pushes the sphere stays on it: a step into it and back again would slide along it. What pulls is let go. Along the
-// sphere go `share` of the forces, so that no step is long beside its radius.
-void RelaxedGrid::letGo(double share) noexcept
+// sphere go `fraction` of the forces, so that no step is long beside its radius.
+void RelaxedGrid::letGo(double fraction) noexcept
 {
     for (ContactNode& c : contacts_) {
         if (c.active) {
@@ -144,7 +144,7 @@ void RelaxedGrid::letGo(double share) noexcept
             const double push = glm::dot(a, c.normal);
             c.active = push >= 0.0;
             const Vec3 along = a - std::max(push, 0.0) * c.normal;
-            window_.add(Field::a, c.at, share * along - a);
+            window_.add(Field::a, c.at, fraction * along - a);
         }
     }
 }

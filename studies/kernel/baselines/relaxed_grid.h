@@ -64,7 +64,7 @@ public:
 private:
     void findContacts(const volume::DistanceField& surface, const volume::Box& reach);
     std::size_t putOn(const RigidSphere& sphere) noexcept;
-    void letGo(double share) noexcept;
+    void letGo(double fraction) noexcept;
 
     const chainmail::CellLevel& level_;
     chainmail::Window window_;  // the box of the body's nodes

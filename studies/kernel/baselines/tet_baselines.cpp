@@ -10,13 +10,13 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr std::size_t mostFactored = 30000;  // points: minutes to factor
-constexpr std::size_t mostStepped = 400000;
+constexpr std::size_t maxFactored = 30000;  // points: minutes to factor
+constexpr std::size_t maxStepped = 400000;
 constexpr double unlocked = 0.45;  // Poisson's ratio at which linear tetrahedra do not lock yet
 
-LatticeTets meshOf(const BaselineScene& scene, double spacing, double poissonCap, std::size_t mostPoints)
+LatticeTets meshOf(const BaselineScene& scene, double spacing, double poissonCap, std::size_t maxPoints)
 {
-    return latticeTets(scene.tissue, scene.surface, spacing, poissonCap, mostPoints);
+    return latticeTets(scene.tissue, scene.surface, spacing, poissonCap, maxPoints);
 }
 
 }  // namespace
@@ -29,11 +29,11 @@ std::vector<Baseline> tetBaselines(const BaselineScene& scene)
     };
     const auto factored = [&](double spacing, double poissonCap) {
         out.push_back({"tets_prefactored", named(spacing, "", poissonCap),
-                       [=] { return factoredModel(meshOf(scene, spacing, poissonCap, mostFactored), scene.path); }});
+                       [=] { return factoredModel(meshOf(scene, spacing, poissonCap, maxFactored), scene.path); }});
     };
     const auto xpbd = [&](double spacing, int substeps, double poissonCap) {
         out.push_back({"xpbd", named(spacing, fmt::format(", {} substeps", substeps), poissonCap),
-                       [=] { return xpbdModel(meshOf(scene, spacing, poissonCap, mostStepped), {.substeps = substeps}); }});
+                       [=] { return xpbdModel(meshOf(scene, spacing, poissonCap, maxStepped), {.substeps = substeps}); }});
     };
     const double gentle = std::min(unlocked, scene.poissonCap);
     for (const double spacing : {6e-3, 4e-3, 3e-3}) {

@@ -15,9 +15,9 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double onItsBack = 0.05;    // share of the body's depth that is held when nothing else is
+constexpr double onItsBack = 0.05;    // fraction of the body's depth that is held when nothing else is
 constexpr double farthestMove = 0.9;  // of a corner to the surface, in spacings
-constexpr double thinnest = 0.2;      // volume of a tetrahedron, as a share of that in a whole cell
+constexpr double thinnest = 0.2;      // volume of a tetrahedron, as a fraction of that in a whole cell
 constexpr int moveHalvings = 6;
 constexpr int anchorCorners = 4;  // held corners with which a cell cannot swing
 
@@ -178,14 +178,14 @@ private:
         dropFlat();
         // Points of thin tetrahedra go half of their way back, until none is thin.
         for (int i = 0; i <= moveHalvings; ++i) {
-            const double share = i < moveHalvings ? 0.5 : 1.0;
+            const double fraction = i < moveHalvings ? 0.5 : 1.0;
             for (const auto& tet : mesh_.tets) {
                 if (!thin(tet)) {
                     continue;
                 }
                 for (const std::uint32_t p : tet) {
-                    mesh_.points[p] -= share * way[p];
-                    way[p] -= share * way[p];
+                    mesh_.points[p] -= fraction * way[p];
+                    way[p] -= fraction * way[p];
                 }
             }
         }
@@ -276,21 +276,21 @@ bool LatticeTets::moves(std::size_t tet) const noexcept
 }
 
 LatticeTets latticeTets(const volume::Tissue& tissue, const volume::DistanceField& surface, double spacing,
-                        double poissonCap, std::size_t mostPoints)
+                        double poissonCap, std::size_t maxPoints)
 {
     const auto cells = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
-    if (cells.count() / 2 > mostPoints) {
+    if (cells.count() / 2 > maxPoints) {
         throw std::runtime_error(fmt::format("{} cells of {:g} mm: too many for {} points; take a larger spacing",
-                                             cells.count(), 1e3 * spacing, mostPoints));
+                                             cells.count(), 1e3 * spacing, maxPoints));
     }
     LatticeTets mesh = Cutter(tissue, cells, poissonCap).cut(surface);
     if (mesh.tets.empty()) {
         throw std::runtime_error(
             fmt::format("no cell of {:g} mm is half full of tissue and held; take a smaller spacing", 1e3 * spacing));
     }
-    if (mesh.points.size() > mostPoints) {
+    if (mesh.points.size() > maxPoints) {
         throw std::runtime_error(fmt::format("{} points at {:g} mm: {} are the most; take a larger spacing",
-                                             mesh.points.size(), 1e3 * spacing, mostPoints));
+                                             mesh.points.size(), 1e3 * spacing, maxPoints));
     }
     return mesh;
 }

@@ -29,13 +29,13 @@ struct LatticeTets {
 
 /// Cells that are half or more full make the body, with the modulus of what is in them; half or more fixed tissue holds
 /// their points. A body without fixed tissue lies on its back, as chainmail::elasticBody() has it. Parts that hang on
-/// nothing are left out. Throws std::runtime_error when nothing is left, or when it would have over `mostPoints`.
+/// nothing are left out. Throws std::runtime_error when nothing is left, or when it would have over `maxPoints`.
 ///
 /// @param surface     signed distance to the body's surface at rest [m]
 /// @param spacing     of the cells [m]
 /// @param poissonCap  Poisson's ratios above are lowered to this [-], under 0.5
 LatticeTets latticeTets(const volume::Tissue& tissue, const volume::DistanceField& surface, double spacing,
-                        double poissonCap, std::size_t mostPoints = 400000);
+                        double poissonCap, std::size_t maxPoints = 400000);
 
 /// Gradients of the four barycentric coordinates, and the volume.
 struct TetShape {
