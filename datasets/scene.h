@@ -92,6 +92,7 @@ struct ModelSettings {
     std::uint32_t maxMoves = 5000;    // node moves per tick; what is left over is reported as residual
     double stiffness = 0;             // level `spring`: K of equation 2 [N/m]; 0 = from the tissue at the contact
     bool relaxation = false;          // stress that is held falls by the tissue table's Prony series; not at level `spring`
+    bool walls = false;               // needles meet the walls that the tissue table has inside a tissue
     std::string setting = "default";  // of level `elastic`: the one that `elastic` started from, see elasticSettings()
     bool settingNamed = false;        // the scene's text names a setting, or spacing, window or cycles of its own
     ElasticSettings elastic;

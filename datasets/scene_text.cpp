@@ -33,11 +33,12 @@ constexpr std::array<Field<ToolSpec>, 8> toolFields{{
     {"bevel_turn_deg", "deg", -360, 360, degree, &ToolSpec::bevelTurn},
 }};
 
-constexpr std::array<Field<ModelSettings>, 4> modelFields{{
+constexpr std::array<Field<ModelSettings>, 5> modelFields{{
     {"spacing_mm", "mm", 0.2, 20, 1e-3, &ModelSettings::spacing},
     {"max_moves", "", 1, 1e6, 1, &ModelSettings::maxMoves},
     {"stiffness_n_m", "N/m", 0, 10000, 1, &ModelSettings::stiffness},
     {"relaxation", "", 0, 0, 1, &ModelSettings::relaxation},
+    {"walls", "", 0, 0, 1, &ModelSettings::walls},
 }};
 
 constexpr std::array<Field<ElasticSettings>, 5> elasticFields{{

@@ -23,13 +23,16 @@ constexpr double softest = 0.01;        // [kPa]; anything that is not air resis
 constexpr double maxRelaxing = 0.95;    // of the stress right after a step
 
 // These may be left out: they are there where somebody measured them.
-constexpr std::array<Field<TissueRow>, 6> measuredFields{{
+constexpr std::array<Field<TissueRow>, 9> measuredFields{{
     {"stiffening", "", -0.25, 1000, 1, &TissueRow::stiffening},
     {"stiction_n_per_m", "N/m", 0, 10000, 1, &TissueRow::stictionPerMetre},
     {"friction_ns_m2", "N s/m2", 0, 10000, 1, &TissueRow::frictionDamping},
     {"relaxing_fast", "", 0, 0.95, 1, &TissueRow::relaxingFast},
     {"relaxing_slow", "", 0, 0.95, 1, &TissueRow::relaxingSlow},
     {"relaxation_source", "", 0, 0, 1, &TissueRow::relaxationSource},
+    {"wall_spacing_mm", "mm", 0.5, 1000, 1e-3, &TissueRow::wallSpacing},
+    {"wall_n", "N", 0.001, 100, 1, &TissueRow::wallForce},
+    {"wall_source", "", 0, 0, 1, &TissueRow::wallSource},
 }};
 
 constexpr std::array<Field<TissueRow>, 12> tissueFields{{
@@ -110,6 +113,9 @@ std::pair<std::string_view, std::string> misfit(const TissueRow& row)
                                              "stress",
                                              maxRelaxing)};
     }
+    if ((row.wallSpacing > 0.0) != (row.wallForce > 0.0)) {
+        return {row.wallSpacing > 0.0 ? "wall_n" : "wall_spacing_mm", "is missing: inner walls have both"};
+    }
     if (row.cuttingForce > row.punctureForce) {
         return {"cutting_n", "must not be over puncture_n: the force drops after the puncture"};
     }
@@ -131,6 +137,15 @@ TissueRow readTissue(Section& section)
     readFields<TissueRow>(section, measuredFields, row, Need::some);
     readAcoustics(section, row.acoustics);
     section.finish();
+    if (row.wallSpacing > 0.0 && row.wallForce <= 0.0) {
+        section.missing("wall_n", "what the walls hold");
+    }
+    if (row.wallForce > 0.0 && row.wallSpacing <= 0.0) {
+        section.missing("wall_spacing_mm", "how far the walls are from each other");
+    }
+    if (row.wallSpacing > 0.0 && row.wallSource.empty()) {
+        section.missing("wall_source", "where wall_spacing_mm and wall_n come from");
+    }
     if (const auto [key, why] = misfit(row); !key.empty()) {
         section.refuse(key, why, key == "cutting_n" ? "N" : key == "youngs_kpa" ? "kPa" : "");
     }

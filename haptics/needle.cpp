@@ -2,6 +2,7 @@
 
 #include <haptics/contact_law.h>
 #include <haptics/events.h>
+#include <haptics/inner_walls.h>
 #include <haptics/tip.h>
 
 #include <glm/common.hpp>
@@ -33,6 +34,13 @@ DepthLaw embedded(DepthLaw surface, double inserted) noexcept
     return {fraction * surface.linear, fraction * surface.quadratic, surface.stiffest};
 }
 
+// The part of a tissue with inner walls that a place lies in; 0 where it has none.
+std::uint64_t lobeOf(const SessionModel& model, std::uint8_t tissue, Vec3 rest) noexcept
+{
+    const auto& row = model.tissue->table().rows[tissue];
+    return hasWalls(model, row) ? lobeAt(rest, row.wallSpacing) : 0;
+}
+
 // What holds the whole of a shaft.
 struct ShaftHold {
     double sliding = 0;    // friction [N]
@@ -60,6 +68,7 @@ struct Needle {
         tip.proxy += way * tool.axis;
         const auto here = tissueLeft(tip.proxy);
         tip.tissue = here != 0 ? here : tip.tissue;
+        state.lobe = way != 0.0 ? lobeOf(model, tip.tissue, tip.proxy) : state.lobe;
     }
 
     // Follows the tool along its axis: back as far as the tissue does not come along with the shaft, forward through what
@@ -91,16 +100,22 @@ struct Needle {
         const auto next = tissueLeft(tip.proxy + cutStep * tool.axis);
         const bool boundary = next != tip.tissue && next != 0;
         const double cutting = row(tip.tissue).cuttingForce;
-        const double holds = boundary ? std::max(cutting, row(next).punctureForce) : cutting;
+        const std::uint64_t lobe = lobeOf(model, boundary ? next : tip.tissue, tip.proxy + cutStep * tool.axis);
+        const bool wall = !boundary && lobe != state.lobe;
+        const double holds = boundary ? std::max(cutting, row(next).punctureForce)
+                             : wall   ? cutting + wallForce(state.lobe, lobe, row(tip.tissue).wallForce)
+                                      : cutting;
         if (force <= holds) {
             return 0.0;
         }
-        const double step = boundary ? std::min(cutStep, ahead) : std::min(cutStep, ahead - law.depth(holds));
+        const bool ruptures = boundary || wall;
+        const double step = ruptures ? std::min(cutStep, ahead) : std::min(cutStep, ahead - law.depth(holds));
         const Vec3 from = tip.proxy;
         tip.proxy += step * tool.axis;
         const double left = law.force(ahead - step);
-        state.tipLost.renew(boundary ? left : left - holds);
+        state.tipLost.renew(ruptures ? left : left - holds);
         cutPath(state.cuts, from, tip.proxy, model.scene.tool.radius);
+        state.lobe = ruptures ? lobe : state.lobe;
         if (boundary) {
             tip.tissue = next;
             addEvent(record, {EventKind::puncture, 0xFF, next, force});
@@ -216,6 +231,7 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
     tip.phase = Phase::inserted;
     needle = NeedleState{.entry = tip.proxy, .tipLost = std::exchange(tip.lost, {}), .cuts = needle.cuts};
     needle.depth = glm::dot(tool.position - tip.proxy, tool.axis);
+    needle.lobe = lobeOf(model, tip.tissue, tip.proxy);
     const Vec3 other = std::abs(tool.axis.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
     const Vec3 right = glm::normalize(glm::cross(tool.axis, other));
     const double turn = model.scene.tool.bevelTurn;

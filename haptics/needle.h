@@ -23,6 +23,7 @@ struct NeedleState {
     int sliding = 0;               // the way the shaft slides along the needle; 0: it sticks
     double curvature = 0;          // of a bevelled needle's path [1/m]
     Vec3 bendsTo{0.0};             // unit vector across the needle
+    std::uint64_t lobe = 0;        // of the tip, between inner walls; 0 where the tissue has none
     Cuts cuts;
 
     /// How far the tissue is carried along with the shaft [m].
@@ -36,8 +37,9 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
 /// Returns the force on the hand [N]; leaves `tip.needle.inserted` negative when it is out.
 ///
 /// Cutting: the tip's force stays at the cutting force of the tissue, and a boundary to another tissue holds until that
-/// one's puncture force is reached. Where it was cut before nothing holds. What a rupture sets free goes into the tissue:
-/// the proxy catches up with the tip, and the hand's force only falls.
+/// one's puncture force is reached, an inner wall until what it has beyond the cutting force is. Where it was cut before
+/// nothing holds. What a rupture sets free goes into the tissue: the proxy catches up with the tip, and the hand's force
+/// only falls.
 ///
 /// Friction: Karnopp's model with the velocity window of Okamura, Simone and O'Leary, "Force modeling for needle insertion
 /// into soft tissue", IEEE Trans. Biomed. Eng. 51, 2004. A shaft that sticks carries the tissue with it against that

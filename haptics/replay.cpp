@@ -78,6 +78,9 @@ std::string modelHash(const SessionModel& model)
         if (model.scene.model.relaxation) {
             hash.add(row.relaxation().weights);
         }
+        if (model.scene.model.walls) {
+            hash.add(std::array{row.wallSpacing, row.wallForce});
+        }
     }
     hash.add(model.tissue->affine());
     for (const auto& s : model.tissue->structures()) {

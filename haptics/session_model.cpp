@@ -46,6 +46,12 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
         cells, tissue.materialOn(cells), surface, scene.model.elastic.poissonCap, presses, scene.model.relaxation));
 }
 
+bool anyWalls(const volume::Tissue& tissue)
+{
+    return std::ranges::any_of(tissue.structures(),
+                               [&](const auto& s) { return tissue.table().rows[s.tissue].wallSpacing > 0.0; });
+}
+
 std::string structureNames(const volume::Tissue& tissue)
 {
     std::string names;
@@ -92,6 +98,11 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     if (tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures) {
         throw std::runtime_error(fmt::format("{}: at most {} tissues and {} vital structures are supported", scene.name,
                                              maxTissues, maxStructures - 1));
+    }
+    if (scene.model.walls && !anyWalls(*tissue)) {
+        throw std::runtime_error(scene.name +
+                                 ": [model] walls = true, but no tissue of the volume has inner walls: give one "
+                                 "of them wall_spacing_mm and wall_n in [tissue.NAME]");
     }
     const auto grid = fieldGrid(*tissue, surfaceNodes);
     const auto coarse = fieldGrid(*tissue, structureNodes);

@@ -105,6 +105,11 @@ json toJson(const TissueRow& row)
         out["relaxing_slow"] = row.relaxingSlow;
         out["relaxation_source"] = row.relaxationSource;
     }
+    if (row.wallSpacing > 0.0) {
+        out["wall_spacing_m"] = row.wallSpacing;
+        out["wall_n"] = row.wallForce;
+        out["wall_source"] = row.wallSource;
+    }
     if (row.acoustics.given()) {
         out["acoustics"] = toJson(row.acoustics);
     }
@@ -136,6 +141,9 @@ TissueRow rowFrom(const json& j)
     row.relaxingFast = j.value("relaxing_fast", 0.0);
     row.relaxingSlow = j.value("relaxing_slow", 0.0);
     row.relaxationSource = j.value("relaxation_source", std::string());
+    row.wallSpacing = j.value("wall_spacing_m", 0.0);
+    row.wallForce = j.value("wall_n", 0.0);
+    row.wallSource = j.value("wall_source", std::string());
     row.fixed = j.at("fixed").get<bool>();
     row.colour = {colour.at(0).get<float>(), colour.at(1).get<float>(), colour.at(2).get<float>()};
     row.opacity = j.at("opacity").get<float>();

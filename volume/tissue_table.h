@@ -56,11 +56,14 @@ struct TissueRow {
     double frictionDamping = 0;  // grows the friction with the shaft's speed, per metre inside [N s/m^2]
     double relaxingFast = 0;     // of the stress right after a step, gone within relaxationTimes[0] [-]
     double relaxingSlow = 0;     // and within relaxationTimes[1] [-]
+    double wallSpacing = 0;      // mean distance between walls inside it, along a needle [m]; 0: none
+    double wallForce = 0;        // mean over these of what they hold beyond the cutting force [N]
     bool fixed = false;          // held in space: bone, chest wall
     glm::vec3 colour{1.0F};      // display, RGB in [0, 1]
     float opacity = 0;           // display, in [0, 1]
     std::string source;          // where the numbers come from
     std::string relaxationSource;  // where relaxingFast and relaxingSlow come from
+    std::string wallSource;        // where wallSpacing and wallForce come from
     Acoustics acoustics;           // for the ultrasound picture; forces do not depend on it
 
     /// How its stress falls while it is held.

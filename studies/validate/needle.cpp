@@ -1,27 +1,21 @@
 #include <studies/validate/needle.h>
 
-#include <datasets/tables.h>
-#include <studies/needle/needle_curves.h>
-#include <studies/stability/method.h>
 #include <studies/validate/measurements.h>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
 #include <stdexcept>
 
 namespace palpate::studies {
 
 namespace {
 
-constexpr double speed = 5e-3;           // [m/s]
-constexpr double travel = 85.3e-3;       // of the stage [m]
-constexpr double minRupture = 0.15;      // [N]
-constexpr double needleRadius = 0.5e-3;  // inner needle of an 18 G set [m]
+constexpr double travel = 85.3e-3;     // of the stage [m]
+constexpr int insertions = 10;         // of ours, at as many places
+constexpr double placesApart = 12e-3;  // [m]
 const char* const source =
     "de Jong, Dankelman, van den Dobbelsteen 2017, doi 10.1016/j.dib.2017.01.018: 20 insertions into one ex-vivo human "
     "liver, trocar tip, 5 mm/s in and out, held 61 s";
@@ -101,26 +95,13 @@ std::size_t onsetOf(const std::vector<double>& tip)
     return tip.size();
 }
 
-// Falls of `minRupture` within 1 mm, from a peak to the least force after it.
-int rupturesOf(const Curve& curve)
-{
-    int count = 0;
-    for (std::size_t i = 0; i + 2 < curve.fineMax.size(); ++i) {
-        const double low = std::min(curve.fineMin[i + 1], curve.fineMin[i + 2]);
-        const bool peak = i == 0 || curve.fineMax[i] >= curve.fineMax[i - 1];
-        if (peak && curve.fineMax[i] >= curve.fineMax[i + 1] && curve.fineMax[i] - low >= minRupture) {
-            ++count;
-        }
-    }
-    return count;
-}
-
 // What is fitted: where the tissue begins in the stage's travel, the tip's force, friction of guide and shaft.
 struct Fit {
     std::size_t surface = 0;         // bin
     double tip = 0;                  // [N]
     std::vector<double> friction;    // of guide and shaft, mean of the way out per bin [N]
     double guide = 0, perMetre = 0;  // the same as a line: of the guide [N], and growing with travel [N/m]
+    double falls = 0, fallSize = 0;  // ruptures per insertion [-], and their mean [N]
 };
 
 Fit fitted(const std::vector<Curve>& curves)
@@ -134,7 +115,10 @@ Fit fitted(const std::vector<Curve>& curves)
     fit.surface = static_cast<std::size_t>(onsets[onsets.size() / 2]);
     double n = 0, x = 0, y = 0, xx = 0, xy = 0;
     std::vector<double> counts;
+    std::vector<double> falls;
     for (const Curve& c : curves) {
+        const std::vector<double> ofCurve = rupturesIn(c.fineMax, c.fineMin);
+        falls.insert(falls.end(), ofCurve.begin(), ofCurve.end());
         fit.tip += meanFrom(tipForce(c), fit.surface) / static_cast<double>(curves.size());
         for (std::size_t i = 0; i < c.out.size(); ++i) {
             if (std::isfinite(c.out[i])) {
@@ -151,6 +135,8 @@ Fit fitted(const std::vector<Curve>& curves)
             }
         }
     }
+    fit.falls = static_cast<double>(falls.size()) / static_cast<double>(curves.size());
+    fit.fallSize = falls.empty() ? minRupture : meanFrom(falls, 0);
     for (std::size_t i = 0; i < counts.size(); ++i) {
         fit.friction[i] /= counts[i];
     }
@@ -223,44 +209,61 @@ Experiment corridorExperiment(const char* name, const char* what, const std::vec
     e.worst *= 1e2 / level;
     e.scatter = 1e2 * meanSpread / level;
     e.parameters = {{"mean_difference_n", meanOff}, {"mean_measured_n", level}, {"half_corridor_n", meanSpread}};
-    e.note = fmt::format("mean {:+.2f} N of {:.2f} N; one curve is predicted, without the spread from place to place",
-                         meanOff, level);
+    e.note = fmt::format("mean {:+.2f} N of {:.2f} N; predicted is the mean of {} insertions", meanOff, level, insertions);
     e.picture = {
         fmt::format("Needle into human liver: {}", what), "travel of the stage [mm]", "force [N]", {ours, low, high, mean}};
     e.judge();
     return e;
 }
 
-Experiment ruptureExperiment(const NeedleStroke& ours, const std::vector<Curve>& measured)
+struct Moments {
+    double mean = 0, spread = 0;
+};
+
+Moments momentsOf(const std::vector<double>& values)
+{
+    double squares = 0.0;
+    const double mean = meanFrom(values, 0);
+    for (const double v : values) {
+        squares += (v - mean) * (v - mean) / static_cast<double>(values.size());
+    }
+    return {mean, std::sqrt(squares)};
+}
+
+Experiment ruptureExperiment(const std::vector<NeedleStroke>& ours, const std::vector<Curve>& measured,
+                             const LiverLaw& liver)
 {
     Experiment e;
     e.name = "needle-ruptures";
     e.quantity = "ruptures of over 0.15 N per insertion, difference of the means";
     e.source = source;
-    e.fittedOn = "nothing: the needle's law has no parameter for them";
-    e.predicted = "ruptures of one insertion";
-    ValidateCurve points{"measured, curve by curve", {}, {}, false}, line{"predicted", {}, {}, true};
-    double sum = 0.0, squares = 0.0;
+    e.fittedOn = "curves with even numbers: distance and mean force of inner walls";
+    e.predicted = fmt::format("ruptures of the curves with odd numbers: mean of {} insertions", insertions);
+    ValidateCurve points{"measured, held-back curves", {}, {}, false}, line{"predicted, insertions of ours", {}, {}, false};
+    std::vector<double> theirCounts, ourCounts;
     for (const Curve& c : measured) {
-        const double n = rupturesOf(c);
-        sum += n;
-        squares += n * n;
-        points.x.push_back(static_cast<double>(points.x.size() + 1));
-        points.y.push_back(n);
-        line.x.push_back(points.x.back());
-        line.y.push_back(static_cast<double>(ours.falls));
+        theirCounts.push_back(static_cast<double>(rupturesIn(c.fineMax, c.fineMin).size()));
+        points.x.push_back(static_cast<double>(theirCounts.size()));
     }
-    const auto count = static_cast<double>(measured.size());
-    const double mean = sum / count;
-    const double spread = std::sqrt(std::max(squares / count - mean * mean, 0.0));
-    e.error = e.worst = 1e2 * std::abs(static_cast<double>(ours.falls) - mean) / mean;
-    e.scatter = e.bound = 1e2 * spread / mean;
-    e.parameters = {{"measured", mean}, {"measured_spread", spread}, {"predicted", static_cast<double>(ours.falls)}};
+    for (const NeedleStroke& stroke : ours) {
+        ourCounts.push_back(static_cast<double>(stroke.falls));
+        line.x.push_back(static_cast<double>(ourCounts.size()));
+    }
+    points.y = theirCounts;
+    line.y = ourCounts;
+    const Moments theirs = momentsOf(theirCounts), predicted = momentsOf(ourCounts);
+    e.error = e.worst = 1e2 * std::abs(predicted.mean - theirs.mean) / theirs.mean;
+    e.scatter = e.bound = 1e2 * theirs.spread / theirs.mean;
+    e.parameters = {{"measured", theirs.mean},
+                    {"measured_spread", theirs.spread},
+                    {"predicted", predicted.mean},
+                    {"predicted_spread", predicted.spread},
+                    {"wall_spacing_mm", 1e3 * liver.wallSpacing},
+                    {"wall_n", liver.wallForce}};
     e.note = fmt::format(
-        "measured {:.1f} +- {:.1f}, predicted {}: inside one tissue the law cuts evenly, and only boundaries of tissues "
-        "give way",
-        mean, spread, ours.falls);
-    e.picture = {"Ruptures per insertion", "held-back curve", "ruptures over 0.15 N", {points, line}};
+        "measured {:.1f} +- {:.1f}, predicted {:.1f} +- {:.1f}: walls every {:.1f} mm that hold {:.2f} N more on average",
+        theirs.mean, theirs.spread, predicted.mean, predicted.spread, 1e3 * liver.wallSpacing, liver.wallForce);
+    e.picture = {"Ruptures per insertion", "insertion", "ruptures over 0.15 N", {points, line}};
     e.judge();
     return e;
 }
@@ -339,51 +342,6 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
     return e;
 }
 
-haptics::SessionModel liverBlock(double cutting, const volume::Relaxation& relaxation)
-{
-    auto table = datasets::defaultTissues();
-    auto& liver = table.rows[*table.find("liver")];
-    liver.cuttingForce = cutting;
-    liver.punctureForce = cutting;  // the curves show no capsule: the surface was not recorded
-    liver.relaxingFast = relaxation.weights[0];
-    liver.relaxingSlow = relaxation.weights[1];
-    auto scene = datasets::parseScene(
-        "name = \"liver\"\n[volume]\nphantom = \"block\"\nvoxel_mm = 2\n[volume.parameters]\ntissue = \"liver\"\ntumours = "
-        "0\nwidth_mm = 80\nthickness_mm = 110\n[target]\nstructure = \"base\"\nentry_mm = [0, 0, 0]\naim_mm = [0, 112, "
-        "0]\n[dffb]\nmode = \"off\"\n[model]\nlevel = \"chainmail\"\nrelaxation = true\n",
-        "liver.toml");
-    scene.tool.radius = needleRadius;
-    scene.tool.notchRadius = std::min(scene.tool.notchRadius, 0.8 * needleRadius);
-    auto tissue = std::make_shared<const volume::Tissue>(datasets::makePhantom(scene.source.phantom, table));
-    return haptics::buildModel(std::move(scene), std::move(tissue));
-}
-
-// Means of a force over the steps of depth.
-class Binned {
-public:
-    void add(double depth, double force)
-    {
-        if (depth >= 0.0) {
-            const auto bin = static_cast<std::size_t>(depth / strokeStep);
-            sum_.resize(std::max(sum_.size(), bin + 1));
-            count_.resize(sum_.size());
-            sum_[bin] += force;
-            count_[bin] += 1.0;
-        }
-    }
-    std::vector<double> means() const
-    {
-        std::vector<double> out(sum_.size(), NAN);
-        for (std::size_t i = 0; i < out.size(); ++i) {
-            out[i] = count_[i] > 0.0 ? sum_[i] / count_[i] : NAN;
-        }
-        return out;
-    }
-
-private:
-    std::vector<double> sum_, count_;
-};
-
 }  // namespace
 
 volume::Relaxation fittedRelaxation(const std::vector<double>& seconds, const std::vector<double>& ratios)
@@ -407,53 +365,32 @@ volume::Relaxation fittedRelaxation(const std::vector<double>& seconds, const st
     return slow < 0.0 ? volume::Relaxation{{std::max(ay / aa, 0.0), 0.0}} : volume::Relaxation{{fast, slow}};
 }
 
-NeedleStroke needleStroke(double cutting, double depth, const volume::Relaxation& relaxation,
-                          const std::vector<double>& heldAt)
+namespace {
+
+// Insertions at places that are `placesApart` from each other; the first of them is held.
+std::vector<NeedleStroke> strokesIn(const LiverLaw& liver, double depth, const std::vector<double>& heldAt)
 {
-    const haptics::SessionModel model = liverBlock(cutting, relaxation);
-    const auto methods = ourMethods();
-    const StabilityMethod& method = *std::ranges::find(methods, datasets::ModelLevel::chainmail, &StabilityMethod::level);
-    const MethodScene scene{model, haptics::deviceParameters(model.scene.device)};
-    const RunningMethod running = method.start(scene);
-    const Vec3 axis(0, 1, 0);
-    const auto force = [&](double at) {
-        haptics::DeviceSample sample;
-        sample.position = model.approach.entry + at * axis;
-        sample.axis = axis;
-        sample.buttons = haptics::buttonDeadMan;
-        return -glm::dot(running.tick(sample), axis);
-    };
-    constexpr double outside = 5e-3;
-    for (double t = 0.0; t < haptics::settledAfter; t += scene.period) {
-        force(-outside);
+    std::vector<NeedleStroke> strokes;
+    for (int i = 0; i < insertions; ++i) {
+        const glm::dvec2 aside = placesApart * glm::dvec2(i % 4 - 1.5, i / 4 - 1);
+        strokes.push_back(needleStroke(liver, aside, depth, i == 0 ? heldAt : std::vector<double>{}));
     }
-    const double step = speed * scene.period;
-    const auto steps = static_cast<int>(std::ceil((depth + outside) / step));
-    NeedleCurve in;
-    Binned inBins, outBins;
-    for (int i = 0; i <= steps; ++i) {
-        in.depth.push_back(std::min(-outside + i * step, depth));
-        in.force.push_back(force(in.depth.back()));
-        inBins.add(in.depth.back(), in.force.back());
-    }
-    in.turn = in.depth.size();
-    NeedleStroke out;
-    out.falls = fallsOf(in, minRupture).size();
-    double t = 0.0, last = in.force.back();
-    for (const double at : heldAt) {
-        for (; t < at - 0.5 * scene.period; t += scene.period) {
-            last = force(depth);
-        }
-        out.held.push_back(last);
-    }
-    for (int i = 1; i <= steps; ++i) {
-        const double at = depth - i * step;
-        outBins.add(at, -force(at));
-    }
-    out.in = inBins.means();
-    out.out = outBins.means();
-    return out;
+    return strokes;
 }
+
+// Mean over the insertions of what the way in has over the way out, per bin [N].
+std::vector<double> meanTipForce(const std::vector<NeedleStroke>& strokes)
+{
+    std::vector<double> mean(std::min(strokes.front().in.size(), strokes.front().out.size()), 0.0);
+    for (const NeedleStroke& stroke : strokes) {
+        for (std::size_t i = 0; i < mean.size(); ++i) {
+            mean[i] += (stroke.in[i] - stroke.out[i]) / static_cast<double>(strokes.size());
+        }
+    }
+    return mean;
+}
+
+}  // namespace
 
 std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const std::filesystem::path& hold,
                                       const ValidateProgress& progress)
@@ -469,13 +406,18 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     progress("needle");
     const std::vector<double> heldAt{0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0};
     const double surface = static_cast<double>(fit.surface) * strokeStep;
-    const volume::Relaxation relaxation = heldRelaxation(hold);
-    const NeedleStroke ours = needleStroke(fit.tip, travel - surface, relaxation, heldAt);
+    LiverLaw liver = fittedWalls(fit.falls, fit.fallSize, travel - surface);
+    liver.relaxation = heldRelaxation(hold);
+    liver.cutting = fit.tip;
+    // Walls hold the tip back as well: without their part the cutting force is less than the mean of the curves.
+    const double withWalls = meanFrom(meanTipForce(strokesIn(liver, travel - surface, {})), 0);
+    liver.cutting = std::max(fit.tip - (withWalls - fit.tip), 0.1 * fit.tip);
+    const std::vector<NeedleStroke> ours = strokesIn(liver, travel - surface, heldAt);
+    const std::vector<double> ourTip = meanTipForce(ours);
     std::vector<double> tip, insertion;
     for (std::size_t i = 0; static_cast<double>(i + 1) * strokeStep < travel; ++i) {
-        const std::size_t inside = i - fit.surface;
-        const bool cuts = i >= fit.surface && inside < ours.in.size() && inside < ours.out.size();
-        tip.push_back(cuts ? ours.in[inside] - ours.out[inside] : 0.0);
+        const bool cuts = i >= fit.surface && i - fit.surface < ourTip.size();
+        tip.push_back(cuts ? ourTip[i - fit.surface] : 0.0);
         insertion.push_back(i < fit.friction.size() ? fit.friction[i] + tip.back() : NAN);
     }
     std::vector<std::vector<double>> measuredTip, measuredIn;
@@ -485,11 +427,12 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     }
     std::vector<Experiment> out{corridorExperiment("needle-tip", "tip force", tip, measuredTip),
                                 corridorExperiment("needle-insertion", "force on the way in", insertion, measuredIn),
-                                ruptureExperiment(ours, heldBack), holdExperiment(ours, relaxation, heldAt, hold)};
-    out[0].fittedOn = "curves with even numbers: cutting force, and where the tissue begins";
+                                ruptureExperiment(ours, heldBack, liver),
+                                holdExperiment(ours.front(), liver.relaxation, heldAt, hold)};
+    out[0].fittedOn = "curves with even numbers: cutting force, inner walls, and where the tissue begins";
     out[1].fittedOn =
         "curves with even numbers: the same, and the friction of guide and shaft: mean of the way out, bin by bin";
-    out[0].parameters.insert(out[0].parameters.end(), {{"cutting_n", fit.tip}, {"surface_mm", 1e3 * surface}});
+    out[0].parameters.insert(out[0].parameters.end(), {{"cutting_n", liver.cutting}, {"surface_mm", 1e3 * surface}});
     out[1].parameters.insert(out[1].parameters.end(),
                              {{"guide_friction_n", fit.guide}, {"friction_n_per_m", fit.perMetre}});
     return out;

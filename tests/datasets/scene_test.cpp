@@ -37,7 +37,7 @@ Scene fullScene(std::mt19937_64& random)
     scene.source.phantom.words = {{"tumour_kind", "ilc"}};
     scene.tool = {ToolKind::needle, draw(1e-3, 2e-3), draw(0.05, 0.2), draw(0.01, 0.03),
                   draw(0.01, 0.03), draw(2e-4, 8e-4), draw(1e-3, 8e-3)};
-    scene.model = {ModelLevel::elastic, draw(1e-3, 4e-3), 3000, draw(0, 1000), true, "fast", true, {}};
+    scene.model = {ModelLevel::elastic, draw(1e-3, 4e-3), 3000, draw(0, 1000), true, true, "fast", true, {}};
     scene.model.elastic = {.spacing = draw(1e-3, 4e-3),
                            .window = 9 + 2 * static_cast<int>(draw(0, 16.99)),
                            .cycles = static_cast<int>(draw(1, 9)),
@@ -105,6 +105,7 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
         EXPECT_EQ(a.strain, Strain::finite);
         EXPECT_NEAR(a.poissonCap, e.poissonCap, 1e-12);
         EXPECT_EQ(again.model.relaxation, scene.model.relaxation);
+        EXPECT_EQ(again.model.walls, scene.model.walls);
         EXPECT_NEAR(a.friction, e.friction, 1e-12);
         EXPECT_EQ(again.probe.kind, ProbeKind::curved);
         EXPECT_NEAR(again.probe.lateral.x, -0.8, 1e-12);

@@ -154,11 +154,16 @@ std::string replaced(std::string text, const std::string& from, const std::strin
     return text.replace(at, from.size(), to);
 }
 
+std::string fatRow()
+{
+    return replaced(replaced(replaced(airRow, "\"air\"", "\"fat\""), "\"air\"", "\"plain\""), "youngs_kpa = 0",
+                    "youngs_kpa = 3");
+}
+
 TEST_F(TissueFile, ErrorsNameFileLineTissueKeyValueAndUnit)
 {
     EXPECT_EQ(errorOf(airRow), "no error");
-    const std::string fat = replaced(replaced(replaced(airRow, "\"air\"", "\"fat\""), "\"air\"", "\"plain\""),
-                                     "youngs_kpa = 0", "youngs_kpa = 3");
+    const std::string fat = fatRow();
     EXPECT_EQ(errorOf(airRow + fat), "no error");
     const std::string at = file_.string() + ":20: tissue 'fat': youngs_kpa";  // 16 lines of air, then the fourth
     EXPECT_EQ(errorOf(airRow + replaced(fat, "youngs_kpa = 3", "youngs_kpa = -3")),
@@ -180,6 +185,17 @@ TEST_F(TissueFile, ErrorsNameFileLineTissueKeyValueAndUnit)
     EXPECT_EQ(errorOf(relaxing + "relaxation_source = \"assumed\"\n"), "no error");
     EXPECT_NE(errorOf(relaxing + "relaxing_slow = 0.5\nrelaxation_source = \"assumed\"\n")
                   .find("relaxing_slow = 0.5: must not be over 0.95 together with relaxing_fast"),
+              std::string::npos);
+}
+
+TEST_F(TissueFile, InnerWallsHaveADistanceAForceAndASource)
+{
+    const std::string fat = fatRow(), spacing = airRow + fat + "wall_spacing_mm = 5\n";
+    EXPECT_NE(errorOf(spacing).find("tissue 'fat': wall_n is missing"), std::string::npos);
+    EXPECT_NE(errorOf(airRow + fat + "wall_n = 0.2\n").find("wall_spacing_mm is missing"), std::string::npos);
+    EXPECT_NE(errorOf(spacing + "wall_n = 0.2\n").find("wall_source is missing"), std::string::npos);
+    EXPECT_EQ(errorOf(spacing + "wall_n = 0.2\nwall_source = \"assumed\"\n"), "no error");
+    EXPECT_NE(errorOf(airRow + fat + "wall_spacing_mm = 0.1\nwall_n = 0.2\nwall_source = \"assumed\"\n").find("0.5"),
               std::string::npos);
 }
 

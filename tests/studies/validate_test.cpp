@@ -141,13 +141,35 @@ TEST(FittedRelaxation, WeightsAreFoundAgain)
     EXPECT_EQ(fittedRelaxation({1.0, 10.0}, {1.1, 1.2}).weights, (std::array<double, 2>{0.0, 0.0}));
 }
 
+// Walls s apart whose forces are exponential with mean m give L / s exp(-limit / m) falls over the limit, m larger on
+// average.
+TEST(FittedWalls, AreThoseThatMakeTheFalls)
+{
+    for (const double mean : {0.05, 0.22, 1.5}) {
+        for (const double spacing : {3e-3, 20e-3}) {
+            constexpr double length = 60e-3;
+            const LiverLaw law = fittedWalls(length / spacing * std::exp(-minRupture / mean), minRupture + mean, length);
+            EXPECT_NEAR(law.wallSpacing, spacing, 1e-9);
+            EXPECT_NEAR(law.wallForce, mean, 1e-9);
+        }
+    }
+    EXPECT_EQ(fittedWalls(0.0, minRupture, 60e-3).wallSpacing, 0.0);
+}
+
+// Walls every 5 mm make a needle's force fall several times on 60 mm, and none does without them.
+TEST(NeedleStroke, InnerWallsMakeRuptures)
+{
+    EXPECT_EQ(needleStroke({.cutting = 0.3}, {}, 60e-3, {}).falls, 0U);
+    EXPECT_GE(needleStroke({.cutting = 0.3, .wallSpacing = 5e-3, .wallForce = 0.25}, {}, 60e-3, {}).falls, 2U);
+}
+
 // A needle that stands keeps of its force what the series of the tissue says, tip and shaft alike.
 TEST(NeedleStroke, HeldForceFollowsTheTissuesSeries)
 {
     const std::vector<double> at{0.0, 0.2, 1.0, 5.0};
     const volume::Relaxation relaxation{{0.38, 0.4}};
-    const NeedleStroke stroke = needleStroke(0.3, 20e-3, relaxation, at);
-    const NeedleStroke stiff = needleStroke(0.3, 20e-3, {}, at);
+    const NeedleStroke stroke = needleStroke({.cutting = 0.3, .relaxation = relaxation}, {}, 20e-3, at);
+    const NeedleStroke stiff = needleStroke({.cutting = 0.3}, {}, 20e-3, at);
     for (std::size_t i = 0; i < at.size(); ++i) {
         EXPECT_NEAR(stroke.held[i] / stroke.held[0], relaxation.remaining(at[i]), 0.02) << at[i];
         EXPECT_NEAR(stiff.held[i] / stiff.held[0], 1.0, 0.02) << at[i];
