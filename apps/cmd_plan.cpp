@@ -22,7 +22,6 @@ namespace palpate::apps {
 namespace {
 
 using datasets::ModelLevel;
-using datasets::Strain;
 using planner::Plan;
 using planner::PlanCandidate;
 
@@ -80,7 +79,7 @@ void printGivenUp(const Plan& plan, const PlanCandidate& c)
     fmt::print("\n");
     if (c.level != ModelLevel::elastic) {
         fmt::print("gives up: forces from the tissue's energy: they come from the contact laws alone\n");
-    } else if (c.elastic.strain == Strain::small && plan.finiteReference) {
+    } else if (volume::isSmall(c.elastic.law) && plan.finiteReference) {
         fmt::print("gives up: finite strain, though {:.0f} % of local strain are reached: its errors above hold that in\n",
                    100.0 * plan.strain);
     }
@@ -95,7 +94,10 @@ void printToml(const PlanCandidate& c)
     if (c.level == ModelLevel::elastic) {
         fmt::print("\n[model.elastic]\nspacing_mm = {:g}\nwindow = {}\ncycles = {}\nstrain = \"{}\"\n",
                    1e3 * c.elastic.spacing, c.elastic.window, c.elastic.cycles,
-                   c.elastic.strain == Strain::finite ? "finite" : "small");
+                   volume::isSmall(c.elastic.law) ? "small" : "finite");
+        if (!volume::isSmall(c.elastic.law)) {
+            fmt::print("law = \"{}\"\n", volume::nameOf(c.elastic.law));
+        }
     }
 }
 

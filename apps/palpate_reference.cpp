@@ -188,7 +188,7 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const s
         path,
         1e-3 * o.speed,
         model.scene.model.elastic.poissonCap,
-        {.law = o.law == "linear" ? reference::Law::linear : reference::Law::neoHookean,
+        {.law = *volume::lawNamed(o.law),
          .elements = o.elements == "P2" ? reference::Elements::p2 : reference::Elements::p2p1,
          .progress = o.progress,
          .mirrored = planesOf(o)},
@@ -326,8 +326,8 @@ void addOptions(CLI::App& app, Options& o)
     app.add_option("-o,--output", o.vtu, "Write the last state for ParaView (.vtu)");
     app.add_flag("--all", o.all, "A .vtu for every look, numbered");
     app.add_option("--tool", o.tool, "Sphere that presses")->capture_default_str();
-    app.add_option("--law", o.law, "linear (small strain) or neo-hookean")
-        ->check(CLI::IsMember({"linear", "neo-hookean"}))
+    app.add_option("--law", o.law, "linear: small strain; the others as in scenes")
+        ->check(CLI::IsMember(std::vector<std::string>(volume::lawNames.begin(), volume::lawNames.end())))
         ->capture_default_str();
     app.add_option("--elements", o.elements,
                    "P2, or P2/P1 (Taylor-Hood): right with fewer tetrahedra where tissue hardly changes its volume")

@@ -29,6 +29,7 @@ constexpr int refreshPeriod = 256;  // calls after which forces that are carried
 
 Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const Focus& focus)
     : options_(options),
+      reach_(volume::reachOf(options.law)),
       stack_(body, options.window, focus, options.kernels != nullptr ? *options.kernels : kernels()),
       multigrid_(stack_, 8 * options.maxSites),
       sites_(options.maxSites)
@@ -98,7 +99,7 @@ std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> too
     held_.resize(tools.size());
     tools_.clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
-        tools_.push_back(held_[i].place(tools[i], stack_.body().levels.front(), options_.finiteStrain, holdsBack));
+        tools_.push_back(held_[i].place(tools[i], stack_.body().levels.front(), volume::isSmall(options_.law), holdsBack));
     }
     return tools_;
 }
@@ -180,7 +181,7 @@ void Elastic::spreadPressure() noexcept
         if (!s.isTie) {
             // What moved last was measured then.
             const bool isKnown = s.stretch > 0.0;
-            const double ratio = !options_.finiteStrain ? 1.0 : isKnown ? s.stretch : areaRatio(s);
+            const double ratio = volume::isSmall(options_.law) ? 1.0 : isKnown ? s.stretch : areaRatio(s);
             s.stiffness = fraction[s.owner] * ratio * s.atRest;
         }
     }
@@ -197,8 +198,8 @@ bool Elastic::touched() const noexcept
 // Force and energy at u: of the tissue right after a step, less its history. At small strain `along` is u.
 WindowStack::Evaluated Elastic::tissueForce(Field y, Field along) noexcept
 {
-    WindowStack::Evaluated now = stack_.evaluate(Field::u, y, along, options_.finiteStrain);
-    if (!options_.finiteStrain) {
+    WindowStack::Evaluated now = stack_.evaluate(Field::u, y, along, options_.law);
+    if (volume::isSmall(options_.law)) {
         now.energy = -0.5 * now.product;
     }
     if (stack_.body().relaxes) {
@@ -240,7 +241,7 @@ void Elastic::remember(int periods) noexcept
     const double seconds = std::exchange(since_[term], 0) * options_.period;
     const double fraction = -std::expm1(-seconds / volume::relaxationTimes[term]);
     const Field history = WindowStack::history(term);
-    stack_.evaluateTerm(term, Field::f, options_.finiteStrain);
+    stack_.evaluateTerm(term, Field::f, options_.law);
     stack_.combine(Field::f, -1.0, history, Field::f);
     const auto work = stack_.dots(Field::f, Field::u, Field::d);
     stack_.combine(history, fraction, Field::f, history);
@@ -258,7 +259,7 @@ Elastic::HistoryShares Elastic::historyShares() noexcept
 {
     HistoryShares fractions{};
     for (std::size_t i = 0; i < fractions.size() && stack_.body().relaxes && !atRest_; ++i) {
-        stack_.evaluateTerm(i, Field::f, options_.finiteStrain);
+        stack_.evaluateTerm(i, Field::f, options_.law);
         const double fraction = stack_.dot(Field::u, WindowStack::history(i)) / stack_.dot(Field::u, Field::f);
         fractions[i] = std::isfinite(fraction) ? std::clamp(fraction, 0.0, 1.0) : 0.0;
     }
@@ -276,7 +277,7 @@ void Elastic::takeGiven() noexcept
 {
     for (std::size_t i = 0; i < given_.size(); ++i) {
         const Field history = WindowStack::history(i);
-        stack_.evaluateTerm(i, history, options_.finiteStrain);
+        stack_.evaluateTerm(i, history, options_.law);
         stack_.combine(history, given_[i] - 1.0, history, history);
     }
     stack_.combine(WindowStack::history(0), 1.0, WindowStack::history(1), Field::h);
@@ -413,7 +414,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     bool hasGone = false;
     if (hasIncrement_) {
         hasGone = warmStart(result);
-        isOpen = hasGone && options_.finiteStrain;
+        isOpen = hasGone && !volume::isSmall(options_.law);
     } else {
         forgetIncrement();
     }

@@ -12,10 +12,10 @@
 namespace palpate::chainmail {
 
 struct ElasticOptions {
-    int window = 15;            // nodes of a window along the way in, odd; see WindowStack
-    int cycles = 2;             // per call of relax(); one more where that leaves much out of balance
-    bool finiteStrain = false;  // stable neo-Hookean instead of small strain
-    double period = 1e-3;       // of a tick [s]: what relaxes does so by the ticks that its loads name
+    int window = 15;                          // nodes of a window along the way in, odd; see WindowStack
+    int cycles = 2;                           // per call of relax(); one more where that leaves much out of balance
+    volume::Law law = volume::SmallStrain{};  // of all tissue
+    double period = 1e-3;                     // of a tick [s]: what relaxes does so by the ticks that its loads name
     std::size_t maxSites = 4096;
     double tolerance = 0.01;           // no more once the forces out of balance are this fraction of the contacts' [-]
     int heldPeriod = 3;                // of an ElasticLevel: see there
@@ -183,6 +183,7 @@ private:
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
 
     ElasticOptions options_;
+    volume::Reach reach_;
     WindowStack stack_;
     Multigrid multigrid_;
     std::vector<ContactSite> sites_;

@@ -14,8 +14,6 @@ namespace {
 constexpr int newtonSteps = 3;        // of a line search: contacts open and close along it
 constexpr int maxShortenings = 8;     // of a step that raises the energy
 constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
-constexpr double maxFurther = 4.0;    // steps that force and energy may be carried on along a parabola
-constexpr double parabolic = 0.1;     // of what a step gains: by how much the energy may be off the parabola
 constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
 constexpr double noLimit = -std::numeric_limits<double>::infinity();
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
@@ -135,7 +133,7 @@ bool Elastic::takeLinearStep(Direction to, ElasticResult& result) noexcept
     if (to.field == Field::p) {
         stack_.direct(last_.direction, to.beta, 0.0);
     }
-    to.tissue.curvature = -stack_.evaluate(to.field, Field::f, to.field, false).product;
+    to.tissue.curvature = -stack_.evaluate(to.field, Field::f, to.field, volume::SmallStrain{}).product;
     const double length = searchParabola(to, result);
     if (length != 0.0) {
         keepStep(to, {static_cast<float>(length), 0.0F, static_cast<float>(length), static_cast<float>(length)});
@@ -149,7 +147,7 @@ bool Elastic::takeLinearStep(Direction to, ElasticResult& result) noexcept
 // at last (the contacts' line search is of first order, and finite strain has no parabola). False: nowhere.
 bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result) noexcept
 {
-    if (!options_.finiteStrain) {
+    if (volume::isSmall(options_.law)) {
         return takeLinearStep(to, result);
     }
     const double start = energy_;
@@ -171,7 +169,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
         const double best = lineSearch(slope, tissue.curvature, contacts, newtonSteps);
         const double further = std::max(1.0, std::abs(best / gone));
         const double off = std::abs(now.energy - start - tissue.at(gone)) * further * further * further;
-        const bool isNear = further <= maxFurther && off <= parabolic * std::abs(steepness * best);
+        const bool isNear = further <= reach_.further && off <= reach_.off * std::abs(steepness * best);
         if (!isNear && best != 0.0 && searches++ == 0) {
             length = best;
             continue;

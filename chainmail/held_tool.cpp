@@ -46,11 +46,11 @@ double insideHeld(const CellLevel& level, Vec3 from, Vec3 inward, double way) no
 
 }  // namespace
 
-ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bool finiteStrain, bool holdsBack) noexcept
+ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bool isSmall, bool holdsBack) noexcept
 {
     const double radius = tool.shape.widest();
     const double wanted = glm::length(tool.pushed);
-    const double most = finiteStrain ? wanted : std::min(wanted, smallStrain * radius);
+    const double most = isSmall ? std::min(wanted, smallStrain * radius) : wanted;
     const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, maxSink * radius);
     const double bears = sink + onBone * load / tool.stiffest;
     const double further = std::min(bears - depth, ease * radius * (maxStretch - stretch));

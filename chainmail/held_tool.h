@@ -29,7 +29,7 @@ struct HeldTool {
     void forgetContacts() noexcept { depth = load = stretch = 0.0; }
     /// The tool for this call, as deep as the last one lets it go.
     /// @param holdsBack  false: as it is
-    ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool finiteStrain, bool holdsBack) noexcept;
+    ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool isSmall, bool holdsBack) noexcept;
     /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
     /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
     Vec3 force(Vec3 felt) const noexcept;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <volume/law.h>
+
 #include <cstddef>
 #include <span>
 
@@ -30,15 +32,14 @@ struct Layout {
     std::size_t scratchSize() const noexcept { return 24 * plane + 6 * row + lanes; }
 };
 
-/// Stiffness of each cell (count x 1), both scaled by spacing / 32; zero where there is no tissue.
+/// Stiffness of each cell (count x 1), both moduli scaled by spacing / 32, zero where there is no tissue; and the law that
+/// they belong to.
 struct CellStiffness {
-    const float* mu = nullptr;          // Lame's second parameter, times h / 32 [N/m]
-    const float* lambda = nullptr;      // Lame's first parameter, times h / 32 [N/m]
-    const float* stiffening = nullptr;  // b of finite strain [-]; none: 0
+    const float* mu = nullptr;                               // Lame's second parameter, times h / 32 [N/m]
+    const float* lambda = nullptr;                           // Lame's first parameter, times h / 32 [N/m]
+    const float* stiffening = nullptr;                       // b of finite strain [-]; none: 0
+    std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
 };
-
-/// I_C - 3 up to which tissue with b < 0 softens [-].
-inline constexpr float softensTo = 1.0F;
 
 /// The fields that a step of the solver moves.
 struct StepFields {
@@ -108,14 +109,12 @@ struct Kernels {
     void (*smoothOf)(const Layout& layout, CellStiffness stiffness, const Smoother& by, float* u, float* out,
                      float* scratch) noexcept;
 
-    /// As apply(), for finite strain: the mean deformation gradient F of each cell goes through the stable neo-Hookean
-    /// energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim, "Stable
-    /// Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite when a
-    /// cell inverts. The other modes have the energy above in axes that turn and stretch with the cell, F^T m for a mode m,
-    /// so that a turn costs nothing. Yeoh's law with two terms, mu/2 (I_C - 3) + mu/4 b (I_C - 3)^2 where I_C > 3: tissue
-    /// stiffens for b > 0. For b < 0 it softens up to I_C - 3 = softensTo, beyond which the second term goes on along its
-    /// tangent, so that with b >= -1/4 the stress of a stretch always rises. (O. H. Yeoh, "Some forms of the strain energy
-    /// function for rubber", Rubber Chem. Technol. 66, 1993.) `inverse` is 1 / spacing [1/m].
+    /// As apply(), for a law of finite strain: the mean deformation gradient F of each cell goes through the stable
+    /// neo-Hookean energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim,
+    /// "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite
+    /// when a cell inverts, and where I_C > 3 what the law adds to it (volume/law.h). The other modes have the energy above
+    /// in axes that turn and stretch with the cell, F^T m for a mode m, so that a turn costs nothing. `inverse` is
+    /// 1 / spacing [1/m].
     /// @returns  the energy [J]
     double (*applyFinite)(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                           float* scratch) noexcept;

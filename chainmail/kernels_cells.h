@@ -93,8 +93,8 @@ inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]
 
 // The same in axes that turn and stretch with the cell: with F its mean deformation gradient, a mode m becomes F^T m.
 // Adds to g the gradient of that energy, and returns twice the energy.
-inline Lanes hourglassTurned(Lanes mu, Lanes lambda, float quarter, const Lanes (&f)[3][3], const Modes (&m)[3],
-                             Modes (&g)[3]) noexcept
+[[gnu::always_inline]] inline Lanes hourglassTurned(Lanes mu, Lanes lambda, float quarter, const Lanes (&f)[3][3],
+                                                    const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
     Modes b[3];
     Modes w[3];
@@ -141,9 +141,11 @@ struct Linear {
     }
 };
 
-// Finite strain: stable neo-Hookean on the mean deformation gradient. With modes eight times their size F = I + m / (4 h),
-// and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h times the scaled stiffness.
-struct NeoHookean {
+// Finite strain: stable neo-Hookean and what the law has beyond it, on the mean deformation gradient. With modes eight
+// times their size F = I + m / (4 h), and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h
+// times the scaled stiffness.
+template <typename Law>
+struct Finite {
     float inverse;                         // 1 / h
     const float* stiffening;               // of each cell, or none
     Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
@@ -176,14 +178,11 @@ struct NeoHookean {
         for (int i = 0; i < 3; ++i) {
             square += f[i][0] * f[i][0] + f[i][1] * f[i][1] + f[i][2] * f[i][2];
         }
-        // I_C - 3, where it is more than 0, and what the tissue stiffens by it.
-        const Lanes stretch = 2.0F * trace + square;
+        // I, where it is more than 0.
+        const Lanes stretch = Law::ofShape ? square - 2.0F * (minors + determinant) : 2.0F * trace + square;
         const Lanes more = stretch > 0.0F ? stretch : Lanes{};
-        const Lanes b = stiffening != nullptr ? load(stiffening + cell) * mu : Lanes{};
-        // Tissue that softens (b < 0) goes on at the slope that it has at softensTo.
-        const Lanes bounded = more > softensTo ? Lanes{} + softensTo : more;
-        const Lanes shaped = b < 0.0F ? bounded : more;
-        const Lanes extra = b * shaped;
+        const volume::Stiffening<Lanes> beyond =
+            Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, more);
         Lanes p[3][3];
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
@@ -192,7 +191,9 @@ struct NeoHookean {
                 // Cofactor of F, less I: tr G I - G^T + cof G.
                 const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
                 p[i][j] = h8 * (mu * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor) +
-                                extra * (i == j ? f[i][j] + 1.0F : f[i][j]));
+                                beyond.slope * (Law::ofShape ? f[i][j] - cofactor
+                                                : i == j     ? f[i][j] + 1.0F
+                                                             : f[i][j]));
             }
         }
         g[0].x = p[0][0];
@@ -207,9 +208,8 @@ struct NeoHookean {
         const Lanes bend = hourglassTurned(mu, lambda, q, f, m, g);
         // h^3 W is 32 h^2 times W of the scaled stiffness.
         const float h2 = 32.0F / (inverse * inverse);
-        energy[turn] += h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume +
-                              0.25F * extra * (more + (more - shaped))) +
-                        0.5F * bend;
+        energy[turn] +=
+            h2 * (mu * (0.5F * square - minors - determinant) + 0.5F * pressure * volume + beyond.energy) + 0.5F * bend;
         turn = (turn + 1) % (Layout::lanes / W);
     }
 };
@@ -407,16 +407,43 @@ void smoothOf(const Layout& layout, CellStiffness stiffness, const Smoother& by,
     sweepCells(layout, stiffness, u, KeepSmooth{by.weight, by.diagonal, by.r, u, out, layout.count}, scratch, law);
 }
 
-double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
-                   float* scratch) noexcept
+template <typename Law>
+double applyLaw(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
+                float* scratch) noexcept
 {
-    NeoHookean law{inverse, stiffness.stiffening};
+    Finite<Law> law{inverse, stiffness.stiffening};
     sweepCells(layout, stiffness, u, Keep{out, layout.count}, scratch, law);
     double sum = 0.0;
     for (const Lanes& part : law.energy) {
         addLanes(sum, part);
     }
     return sum;
+}
+
+using ApplyFinite = decltype(Kernels::applyFinite);
+
+template <typename Law>
+constexpr ApplyFinite finiteOf() noexcept
+{
+    if constexpr (Law::finite) {
+        return applyLaw<Law>;
+    } else {
+        return nullptr;
+    }
+}
+
+// One for each law, in the order of the list.
+template <typename List>
+struct FiniteLaws;
+template <typename... Laws>
+struct FiniteLaws<std::variant<Laws...>> {
+    static constexpr ApplyFinite apply[] = {finiteOf<Laws>()...};
+};
+
+double applyFinite(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
+                   float* scratch) noexcept
+{
+    return FiniteLaws<volume::Law>::apply[stiffness.law](layout, stiffness, inverse, u, out, scratch);
 }
 
 }  // namespace

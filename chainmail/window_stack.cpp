@@ -199,15 +199,16 @@ void WindowStack::joinBorders(Field x) noexcept
     }
 }
 
-WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, bool finite,
+WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, const volume::Law& law,
                                              std::optional<std::size_t> term) noexcept
 {
     const Kernels& k = *kernels_;
     Evaluated sum;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         Window& w = windows_[l];
-        const CellStiffness stiffness = term ? w.term(*term) : w.uncovered();
-        if (finite) {
+        CellStiffness stiffness = term ? w.term(*term) : w.uncovered();
+        stiffness.law = law.index();
+        if (!volume::isSmall(law)) {
             const float inverse = static_cast<float>(1.0 / body_->levels[l].nodes.spacing);
             sum.energy += k.applyFinite(w.layout, stiffness, inverse, w.field(x), w.field(y), scratch());
         } else {

@@ -47,17 +47,23 @@ public:
     bool follow(const Focus& focus, bool carry) noexcept;
 
     /// y = -A x on the degrees of freedom, over all windows. x must be continuous at the windows' borders.
-    void apply(Field x, Field y) noexcept { evaluate(x, y, x, false); }
+    void apply(Field x, Field y) noexcept { evaluate(x, y, x, volume::SmallStrain{}); }
 
     /// The tissue's force y at displacement x, which must be continuous at the windows' borders.
     struct Evaluated {
         double energy = 0;   // at finite strain; else 0 [J]
         double product = 0;  // along . y
     };
-    Evaluated evaluate(Field x, Field y, Field along, bool finite) noexcept { return evaluate(x, y, along, finite, {}); }
+    Evaluated evaluate(Field x, Field y, Field along, const volume::Law& law) noexcept
+    {
+        return evaluate(x, y, along, law, {});
+    }
 
     /// The same of term `term` of the Prony series alone: the force at u of tissue with its fraction of the moduli.
-    void evaluateTerm(std::size_t term, Field y, bool finite) noexcept { evaluate(Field::u, y, Field::u, finite, term); }
+    void evaluateTerm(std::size_t term, Field y, const volume::Law& law) noexcept
+    {
+        evaluate(Field::u, y, Field::u, law, term);
+    }
     /// Its history.
     static Field history(std::size_t term) noexcept { return term == 0 ? Field::h0 : Field::h1; }
 
@@ -96,7 +102,7 @@ private:
     void place() noexcept;
     void addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept;
     void transfer(Field field) noexcept;
-    Evaluated evaluate(Field x, Field y, Field along, bool finite, std::optional<std::size_t> term) noexcept;
+    Evaluated evaluate(Field x, Field y, Field along, const volume::Law& law, std::optional<std::size_t> term) noexcept;
     void gatherForces(Field field) noexcept;
     void handOutForces(Field field) noexcept;
     static StepFields stepFields(Window& window, Field direction) noexcept;

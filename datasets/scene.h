@@ -4,6 +4,7 @@
 #include <datasets/phantom.h>
 #include <datasets/probe.h>
 #include <volume/geometry.h>
+#include <volume/law.h>
 #include <volume/tissue.h>
 
 #include <array>
@@ -67,14 +68,12 @@ enum class ModelLevel : std::uint8_t { spring, chainmail, elastic };
 /// Their names in scenes, records and on the command line, in the order of the enum.
 inline constexpr std::array<std::string_view, 3> modelLevels{"spring", "chainmail", "elastic"};
 
-enum class Strain : std::uint8_t { small, finite };
-
 /// Level `elastic`: equilibrium on nested windows around the tool.
 struct ElasticSettings {
     double spacing = 2e-3;  // of the finest window [m]; each window further out is twice as coarse
     int window = 13;        // nodes along each side of a window: odd, 9 to 41
     int cycles = 2;         // of the solver per tick, at most
-    Strain strain = Strain::finite;
+    volume::Law law = volume::NeoHookean{};
     double poissonCap = 0.49;  // Poisson's ratios above are lowered to this [-], 0 to 0.499
     double friction = 0;       // of sphere and capsule on tissue (Coulomb) [-]
 

@@ -186,6 +186,21 @@ void readTool(Section& top, ToolSpec& tool)
     }
 }
 
+// `strain` says whether the law is that of small strain, `law` which one of finite strain it is.
+void readLaw(Section& elastic, volume::Law& law)
+{
+    if (const auto strain = elastic.choice("strain", strains)) {
+        law = *strain == 0 ? volume::Law(volume::SmallStrain{}) : volume::Law(volume::NeoHookean{});
+    }
+    const auto finite = std::span(volume::lawNames).subspan(1);
+    if (const auto index = elastic.choice("law", finite)) {
+        if (volume::isSmall(law)) {
+            elastic.refuse("law", "small strain has one law: leave this out, or set strain = \"finite\"");
+        }
+        law = *volume::lawNamed(finite[*index]);
+    }
+}
+
 // Returns whether it says anything of what a setting is about.
 bool readElastic(Section& model, ElasticSettings& elastic)
 {
@@ -193,7 +208,7 @@ bool readElastic(Section& model, ElasticSettings& elastic)
     if (std::optional<Section> section = model.section("elastic")) {
         named = section->has("spacing_mm") || section->has("window") || section->has("cycles");
         readFields<ElasticSettings>(*section, elasticFields, elastic, Need::some);
-        readChoice(*section, "strain", strains, elastic.strain);
+        readLaw(*section, elastic.law);
         section->finish();
         if (elastic.window % 2 == 0) {
             section->refuse("window", "must be odd");
@@ -339,8 +354,12 @@ std::string modelText(const ModelSettings& model)
     std::string out = fmt::format("\n[model]\nlevel = \"{}\"\n{}", modelLevels[static_cast<std::size_t>(model.level)],
                                   writeFields<ModelSettings>(modelFields, model));
     out += fmt::format("setting = {}\n", tomlString(model.setting));
-    out += fmt::format("\n[model.elastic]\nstrain = \"{}\"\n{}", strains[static_cast<std::size_t>(model.elastic.strain)],
-                       writeFields<ElasticSettings>(elasticFields, model.elastic));
+    const volume::Law& law = model.elastic.law;
+    out += fmt::format("\n[model.elastic]\nstrain = \"{}\"\n", strains[volume::isSmall(law) ? 0 : 1]);
+    if (!volume::isSmall(law) && law != volume::Law(volume::NeoHookean{})) {
+        out += fmt::format("law = \"{}\"\n", volume::nameOf(law));
+    }
+    out += writeFields<ElasticSettings>(elasticFields, model.elastic);
     return out;
 }
 

@@ -3,6 +3,7 @@
 #include <datasets/embedded.h>
 #include <datasets/scene_text.h>
 #include <datasets/toml_fields.h>
+#include <volume/law.h>
 
 #include <algorithm>
 #include <array>
@@ -24,7 +25,7 @@ constexpr double maxRelaxing = 0.95;    // of the stress right after a step
 
 // These may be left out: they are there where somebody measured them.
 constexpr std::array<Field<TissueRow>, 9> measuredFields{{
-    {"stiffening", "", -0.25, 1000, 1, &TissueRow::stiffening},
+    {"stiffening", "", volume::minStiffening, volume::maxStiffening, 1, &TissueRow::stiffening},
     {"stiction_n_per_m", "N/m", 0, 10000, 1, &TissueRow::stictionPerMetre},
     {"friction_ns_m2", "N s/m2", 0, 10000, 1, &TissueRow::frictionDamping},
     {"relaxing_fast", "", 0, 0.95, 1, &TissueRow::relaxingFast},

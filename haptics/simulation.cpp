@@ -79,7 +79,7 @@ chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settin
     chainmail::ElasticOptions options;
     options.window = settings.window;
     options.cycles = static_cast<int>(std::lround(settings.cycles * std::max(1.0, period / tickSeconds)));
-    options.finiteStrain = settings.strain == datasets::Strain::finite;
+    options.law = settings.law;
     options.period = period;
     return options;
 }

@@ -5,7 +5,6 @@
 namespace palpate::planner {
 
 using datasets::ModelLevel;
-using datasets::Strain;
 
 namespace {
 
@@ -21,7 +20,7 @@ nlohmann::json candidateFigures(const PlanCandidate& c)
                        {"spacing_mm", 1e3 * spacingOf(c)},
                        {"windows", nlohmann::json::array()},
                        {"sweeps", elastic ? c.elastic.cycles : 0},
-                       {"strain", elastic && c.elastic.strain == Strain::finite ? "finite" : "small"},
+                       {"strain", elastic && !volume::isSmall(c.elastic.law) ? "finite" : "small"},
                        {"nodes", c.nodes},
                        {"slots", c.slots},
                        {"cycles", c.meanCycles},

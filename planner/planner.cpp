@@ -14,7 +14,6 @@ namespace palpate::planner {
 
 using datasets::ElasticSettings;
 using datasets::ModelLevel;
-using datasets::Strain;
 
 namespace {
 
@@ -44,9 +43,9 @@ studies::TrialTool sceneTool(const datasets::ToolSpec& tool)
 }
 
 // A twentieth of the least error that is asked for in earnest.
-studies::ReferenceOptions optionsOf(bool finiteStrain)
+studies::ReferenceOptions optionsOf(const volume::Law& law)
 {
-    return {.finiteStrain = finiteStrain, .tolerance = 5e-4, .maxCycles = 60, .maxPoints = maxPoints};
+    return {.law = law, .tolerance = 5e-4, .maxCycles = 60, .maxPoints = maxPoints};
 }
 
 class Planner {
@@ -118,6 +117,8 @@ private:
 
     double poissonCap() const { return model_.scene.model.elastic.poissonCap; }
 
+    volume::Law finiteLaw() const { return volume::finiteOf(model_.scene.model.elastic.law); }
+
     void solve()
     {
         progress_("the converged solution");
@@ -126,12 +127,12 @@ private:
         path_ =
             studies::trialPath(*model_.tissue, model_.surface, place_, sceneTool(model_.scene.tool), finest.cells.spacing);
         const std::array speeds{request_.speed};
-        reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(false));
+        reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(volume::SmallStrain{}));
         plan_.strain = reference_.strain;
         plan_.finiteReference = reference_.strain > largeStrain;
         if (plan_.finiteReference) {
             progress_("the converged solution at finite strain");
-            reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(true));
+            reference_ = studies::solveReference(finest.body, path_, speeds, optionsOf(finiteLaw()));
         }
         plan_.referenceSpacing = finest.cells.spacing;
         plan_.referenceNodes = reference_.nodes;
@@ -176,10 +177,10 @@ private:
         }
         for (const int n : cycles) {
             c.elastic.cycles = n;
-            c.elastic.strain = Strain::small;
+            c.elastic.law = volume::SmallStrain{};
             add(c);
             if (plan_.finiteReference) {
-                c.elastic.strain = Strain::finite;
+                c.elastic.law = finiteLaw();
                 add(c);
             }
         }
@@ -202,9 +203,8 @@ private:
             const chainmail::Lattice lattice(cells, model_.tissue->tissueOn(cells), model_.tissue->table());
             return studies::chainMailTrial(lattice, path_, request_.speed, reference_, model_.scene.model.maxMoves);
         }
-        return studies::elasticTrial(
-            bodyAt(c.elastic.spacing).body, path_, request_.speed, reference_,
-            {.window = c.elastic.window, .cycles = c.elastic.cycles, .finiteStrain = c.elastic.strain == Strain::finite});
+        return studies::elasticTrial(bodyAt(c.elastic.spacing).body, path_, request_.speed, reference_,
+                                     {.window = c.elastic.window, .cycles = c.elastic.cycles, .law = c.elastic.law});
     }
 
     void attempt(PlanCandidate& c)
@@ -266,8 +266,24 @@ std::string PlanCandidate::name() const
         default:
             return fmt::format("elastic, {:g} mm, window {}, {} cycle{}{}", 1e3 * elastic.spacing, elastic.window,
                                elastic.cycles, elastic.cycles == 1 ? "" : "s",
-                               elastic.strain == Strain::finite ? ", finite strain" : "");
+                               volume::isSmall(elastic.law) ? "" : ", finite strain");
     }
+}
+
+LawCosts PlanCosts::of(const volume::Law& law) const noexcept
+{
+    return std::visit(
+        [this](auto of) {
+            if constexpr (decltype(of)::finite) {
+                LawCosts costs = finite;
+                costs.perSlot *= of.work;
+                costs.perSlotCycle *= of.work;
+                return costs;
+            } else {
+                return small;
+            }
+        },
+        law);
 }
 
 double predictedTime(const PlanCandidate& c, const PlanCosts& costs) noexcept
@@ -281,8 +297,7 @@ double predictedTime(const PlanCandidate& c, const PlanCosts& costs) noexcept
         default:
             break;
     }
-    const LawCosts& law = c.elastic.strain == Strain::finite ? costs.finite : costs.small;
-    return costs.usPerTick + tickTime(law, {static_cast<double>(c.slots), c.meanCycles, c.touched});
+    return costs.usPerTick + tickTime(costs.of(c.elastic.law), {static_cast<double>(c.slots), c.meanCycles, c.touched});
 }
 
 Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,

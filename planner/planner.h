@@ -12,13 +12,16 @@
 
 namespace palpate::planner {
 
-/// What a tick costs, by counts: measured, see docs/accuracy.md; `palpate bench costs` measures a machine's own. These are
-/// of one core of an x86-64 server of 2024 (Zen 5, AVX-512).
+/// What a tick costs, by counts, of small strain and of neo-Hookean tissue: measured, see docs/accuracy.md; `palpate bench
+/// costs` measures a machine's own. These are of one core of an x86-64 server of 2024 (Zen 5, AVX-512).
 struct PlanCosts {
     LawCosts small{1.6, 8.8, 60, 105};
     LawCosts finite{7.0, 10.7, 43, 118};
     double nsPerMove = 230;  // per node that ChainMail moves
     double usPerTick = 20;   // collision, distances, forces and the rest of a tick [us]
+
+    /// Of a law: a law of finite strain costs what neo-Hookean does, and more per node by its `work`.
+    LawCosts of(const volume::Law& law) const noexcept;
 };
 
 struct PlanRequest {

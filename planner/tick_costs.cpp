@@ -34,7 +34,7 @@ TickSample timed(const chainmail::ElasticBody& body, const studies::TrialPath& p
     const studies::TrialResult result = studies::timeTrial(studies::elasticModel(elastic), path, speed);
     TickSample sample;
     sample.work = {static_cast<double>(slotsOf(elastic.stack())), result.meanCycles, result.meanTouched};
-    sample.finite = options.finiteStrain;
+    sample.finite = !volume::isSmall(options.law);
     sample.microseconds = 1e6 * result.cpu;
     return sample;
 }
@@ -49,7 +49,8 @@ void addTimes(const studies::TrialBody& body, const studies::TrialPath& path, bo
             continue;
         }
         for (const auto& [cycles, finite] : {std::pair(1, false), {2, false}, {1, true}, {2, true}}) {
-            out.push_back(timed(body.body, path, {.window = window, .cycles = cycles, .finiteStrain = finite}));
+            const volume::Law law = finite ? volume::finiteOf({}) : volume::Law();
+            out.push_back(timed(body.body, path, {.window = window, .cycles = cycles, .law = law}));
             out.back().name =
                 fmt::format("{:g} mm, window {}, {} cycle{}{}, sphere {:g} mm", 1e3 * body.cells.spacing, window, cycles,
                             cycles == 1 ? "" : "s", finite ? ", finite strain" : "", 1e3 * path.tool.radius);

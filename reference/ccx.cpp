@@ -142,7 +142,7 @@ void writeMaterials(std::ostream& out, const TetMesh& mesh, std::span<const Mate
         const Material& m = materials[row];
         const double modulus = perPascal * m.youngsModulus;
         fmt::print(out, "*MATERIAL, NAME=M{}\n", row);
-        if (law == Law::linear) {
+        if (volume::isSmall(law)) {
             fmt::print(out, "*ELASTIC\n{:.12g},{:.12g}\n", modulus, m.poisson);
         } else {
             const double shear = modulus / (2.0 * (1.0 + m.poisson));
@@ -342,7 +342,7 @@ void writeSteps(std::ostream& out, const CcxPress& press)
 void checkStiffening(std::span<const Material> materials, Law law, const std::filesystem::path& file)
 {
     for (const Material& m : materials) {
-        if (law == Law::neoHookean && m.stiffening != 0.0) {
+        if (!volume::isSmall(law) && m.stiffening != 0.0) {
             throw std::runtime_error(
                 fmt::format("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0", file.string(), m.stiffening));
         }
@@ -386,7 +386,7 @@ void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const S
             fmt::print(out, "{},\n", n + 1);
         }
     }
-    out << (options.law == Law::linear ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n0.2,1.,1e-3,0.2\n")
+    out << (volume::isSmall(options.law) ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n0.2,1.,1e-3,0.2\n")
         << "*BOUNDARY\n";
     for (const auto& [where, u] : fixed.value) {
         fmt::print(out, "{},{},{},{:.12g}\n", where.first + 1, where.second + 1, where.second + 1, perMetre * u);
@@ -428,13 +428,13 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
                     const std::filesystem::path& file)
 {
     constexpr double pressurePer = 50.0;  // mm of overclosure, in the softest modulus
-    checkStiffening(materials, Law::neoHookean, file);
+    checkStiffening(materials, NeoHookean{}, file);
     const QuadraticMesh quadratic(mesh);
     const ShellMesh shell(press.start, press.radius, glm::normalize(press.centres.front() - press.start),
                           quadratic.nodes.size());
     std::ofstream out(file);
     writeElements(out, mesh, quadratic);
-    writeMaterials(out, mesh, materials, Law::neoHookean);
+    writeMaterials(out, mesh, materials, NeoHookean{});
     writeShell(out, shell, quadratic.nodes.size(), mesh.tets.size());
     writeMeetable(out, mesh, press);
     double softest = materials.front().youngsModulus;

@@ -1,4 +1,5 @@
 #include <reference/finite_elements.h>
+#include <reference/tissue_terms.h>
 
 #include <getfem/getfem_generic_assembly.h>
 #include <getfem/getfem_interpolation.h>
@@ -32,28 +33,6 @@ constexpr int facesRule = 8;         // degree of quadrature on faces: contact e
 Vec3 at(const std::vector<double>& state, std::size_t node)
 {
     return {state[3 * node], state[3 * node + 1], state[3 * node + 2]};
-}
-
-// With `softens` also for tissue of b < 0, whose second term goes on along its tangent from I = 1 on.
-std::string tissueEnergy(const SolveOptions& options, bool softens)
-{
-    const bool linear = options.law == Law::linear;
-    const std::string volume = linear ? "Trace(Grad_u)" : "(Det(F)-1)";
-    const std::string shape = linear    ? "mu*Norm_sqr(Deviator(Sym(Grad_u)))"
-                              : softens ? "mu/2*(I+b/2*sqr(I)+s*half_sqr_pos_part(I-1))"
-                                        : "mu/2*(I+b/2*sqr(I))";
-    return shape + (options.elements == Elements::p2p1 ? "+p*" + volume + "-sqr(p)/(2*K)" : "+K/2*sqr(" + volume + ")");
-}
-
-// Cauchy stress, times Test_s.
-std::string testedStress(const SolveOptions& options, bool softens)
-{
-    const bool linear = options.law == Law::linear;
-    const std::string pressure = options.elements == Elements::p2p1 ? "p" : linear ? "K*Trace(Grad_u)" : "K*(Det(F)-1)";
-    const std::string shape = linear    ? "2*mu*Deviator(Sym(Grad_u))"
-                              : softens ? "mu*(1+b*I+s*pos_part(I-1))*pow(Det(F),-5/3)*Deviator(F*F')"
-                                        : "mu*(1+b*I)*pow(Det(F),-5/3)*Deviator(F*F')";
-    return "(" + shape + "+" + pressure + "*Id(3)):Test_s";
 }
 
 // With Q from the nearest point of the tool's middle line to where a point is.
@@ -103,9 +82,9 @@ struct FiniteElements::Impl {
     getfem::mesh mesh;
     getfem::mesh_fem uField, pField, cellField, vertexField;
     getfem::mesh_im volumeRule, faceRule;
-    std::vector<double> mu, bulk, stiffening, softening;  // of each tetrahedron
-    std::vector<double> restR, contactR;                  // of each, at rest and now
-    bool stiffens = false, softens = false;
+    std::vector<double> mu, bulk, stiffening;  // of each tetrahedron
+    std::vector<double> restR, contactR;       // of each, at rest and now
+    bool stiffens = false;
     Matrix linear;  // second derivative of the tissue's energy, with small strain
 
     struct Face {
@@ -176,7 +155,7 @@ void FiniteElements::Impl::findFaces(const TetMesh& from)
 
 void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Material> materials)
 {
-    for (auto* field : {&mu, &bulk, &stiffening, &softening, &contactR}) {
+    for (auto* field : {&mu, &bulk, &stiffening, &contactR}) {
         field->resize(cellField.nb_dof());
     }
     for (std::size_t t = 0; t < from.tets.size(); ++t) {
@@ -186,9 +165,7 @@ void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Mat
         mu[cell] = modulus / (2.0 * (1.0 + m.poisson));
         bulk[cell] = modulus / (3.0 * (1.0 - 2.0 * m.poisson));
         stiffening[cell] = m.stiffening;
-        softening[cell] = std::max(-m.stiffening, 0.0);
         stiffens = stiffens || m.stiffening != 0.0;
-        softens = softens || m.stiffening < 0.0;
         contactR[cell] = contactStiffness * modulus;
     }
     for (const Face& face : faces) {
@@ -221,11 +198,6 @@ void FiniteElements::Impl::addTissue(getfem::ga_workspace& space, const Fields& 
     space.add_fem_constant("K", cellField, bulk);
     if (stiffens) {
         space.add_fem_constant("b", cellField, stiffening);
-    } else {
-        space.add_macro("b", "0");
-    }
-    if (softens) {
-        space.add_fem_constant("s", cellField, softening);
     }
     space.add_macro("F", "(Id(3)+Grad_u)");
     space.add_macro("I", "(pow(Det(F),-2/3)*Norm_sqr(F)-3)");
@@ -251,7 +223,7 @@ const Matrix& FiniteElements::Impl::linearTissue()
         getfem::ga_workspace space;
         addTissue(space, zero);
         gmm::resize(linear, size(), size());
-        space.add_expression(tissueEnergy(options, softens), volumeRule);
+        space.add_expression(tissueEnergy(options, stiffens), volumeRule);
         space.set_assembled_matrix(linear);
         space.assembly(2);
     }
@@ -263,6 +235,7 @@ FiniteElements::FiniteElements(const TetMesh& mesh, std::span<const Material> ma
 {
     gmm::set_traces_level(0);
     gmm::set_warning_level(0);
+    defineLaws();
     impl_->addMesh(mesh);
     impl_->findFaces(mesh);
     impl_->addMaterials(mesh, materials);
@@ -300,7 +273,7 @@ double FiniteElements::energy(const std::vector<double>& state) const
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addTissue(space, fields);
-    space.add_expression(tissueEnergy(impl_->options, impl_->softens), impl_->volumeRule,
+    space.add_expression(tissueEnergy(impl_->options, impl_->stiffens), impl_->volumeRule,
                          getfem::mesh_region::all_convexes(), 0);
     space.assembly(0);
     return space.assembled_potential();
@@ -309,14 +282,14 @@ double FiniteElements::energy(const std::vector<double>& state) const
 std::vector<double> FiniteElements::tissueForces(const std::vector<double>& state) const
 {
     std::vector<double> forces(state.size());
-    if (impl_->options.law == Law::linear) {
+    if (volume::isSmall(impl_->options.law)) {
         gmm::mult(impl_->linearTissue(), state, forces);
         return forces;
     }
     const Impl::Fields fields = impl_->split(state);
     getfem::ga_workspace space;
     impl_->addTissue(space, fields);
-    space.add_expression(tissueEnergy(impl_->options, impl_->softens), impl_->volumeRule,
+    space.add_expression(tissueEnergy(impl_->options, impl_->stiffens), impl_->volumeRule,
                          getfem::mesh_region::all_convexes(), 1);
     space.set_assembled_vector(forces);
     space.assembly(1);
@@ -325,13 +298,13 @@ std::vector<double> FiniteElements::tissueForces(const std::vector<double>& stat
 
 SymmetricMatrix FiniteElements::tangent(const std::vector<double>& state) const
 {
-    const bool linear = impl_->options.law == Law::linear;
+    const bool linear = volume::isSmall(impl_->options.law);
     const Impl::Fields fields = impl_->split(state);
     Matrix sum(state.size(), state.size());
     if (!linear) {
         getfem::ga_workspace space;
         impl_->addTissue(space, fields);
-        space.add_expression(tissueEnergy(impl_->options, impl_->softens), impl_->volumeRule);
+        space.add_expression(tissueEnergy(impl_->options, impl_->stiffens), impl_->volumeRule);
         space.set_assembled_matrix(sum);
         space.assembly(2);
     }
@@ -500,7 +473,7 @@ std::vector<std::array<double, 6>> FiniteElements::meanStress(const std::vector<
     getfem::ga_workspace space;
     impl_->addTissue(space, fields, Impl::As::given);
     space.add_fem_variable("s", tensors, all, zero);
-    space.add_expression(testedStress(impl_->options, impl_->softens), impl_->volumeRule);
+    space.add_expression(testedStress(impl_->options, impl_->stiffens), impl_->volumeRule);
     space.set_assembled_vector(sums);
     space.assembly(1);
 

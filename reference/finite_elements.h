@@ -17,7 +17,9 @@ namespace palpate::reference {
 /// determinant and I = J^(-2/3) |F|^2 - 3 the energy densities are
 ///
 ///     linear        mu |dev eps|^2 + K/2 (tr eps)^2
-///     neo-Hookean   mu/2 I + mu/4 b I^2 + K/2 (J - 1)^2        K/2 x^2 as  p x - p^2 / 2K  with pressures
+///     the others    mu/2 I + beyond(mu, b, I) + K/2 (J - 1)^2   K/2 x^2 as  p x - p^2 / 2K  with pressures
+///
+/// beyond() being the law's own, the very function that the kernel calls (volume/law.h).
 ///
 /// Tissue stiffens by the isochoric I, which is never negative: pressure alone does not stiffen it. The kernel takes I_C -
 /// 3 where it is positive; where nothing changes its volume, they are the same.

@@ -42,11 +42,12 @@ void checkMesh(const TetMesh& mesh, std::span<const Material> materials, const S
     for (std::size_t i = 0; i < materials.size(); ++i) {
         const Material& m = materials[i];
         const bool used = std::find(mesh.tissue.begin(), mesh.tissue.end(), i) != mesh.tissue.end();
-        if (used && (!(m.youngsModulus > 0.0) || !(m.poisson > -1.0 && m.poisson < 0.5) || !(m.stiffening >= -0.25))) {
+        if (used && (!(m.youngsModulus > 0.0) || !(m.poisson > -1.0 && m.poisson < 0.5) ||
+                     !(m.stiffening >= volume::minStiffening))) {
             throw std::runtime_error(
                 fmt::format("tissue row {}: Young's modulus {:g} kPa, Poisson's ratio {:g}, stiffening {:g}: "
-                            "must be over 0, between -1 and 0.5, and not under -0.25",
-                            i, 1e-3 * m.youngsModulus, m.poisson, m.stiffening));
+                            "must be over 0, between -1 and 0.5, and not under {:g}",
+                            i, 1e-3 * m.youngsModulus, m.poisson, m.stiffening, volume::minStiffening));
         }
     }
     const auto& still = options.mirrored;

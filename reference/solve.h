@@ -1,6 +1,7 @@
 #pragma once
 
 #include <reference/tet_mesh.h>
+#include <volume/law.h>
 
 #include <functional>
 #include <memory>
@@ -10,14 +11,17 @@
 
 namespace palpate::reference {
 
-enum class Law : std::uint8_t { linear, neoHookean };
+using volume::Exponential;
+using volume::Law;
+using volume::NeoHookean;
+using volume::SmallStrain;
 enum class Elements : std::uint8_t { p2, p2p1 };
 
 /// One row of the tissue table, as the reference needs it.
 struct Material {
     double youngsModulus = 0;  // [Pa]
     double poisson = 0;        // [-]
-    double stiffening = 0;     // b, with finite strain, as in TissueRow, from -0.25 [-]
+    double stiffening = 0;     // b, with finite strain, as in TissueRow [-]
 };
 
 /// A rigid sphere or capsule that tissue cannot enter; without friction.
@@ -38,7 +42,7 @@ struct Patch {
 };
 
 struct SolveOptions {
-    Law law = Law::linear;
+    Law law = SmallStrain{};
     Elements elements = Elements::p2;
     int maxSteps = 200;              // load steps between two calls, halved ones included
     double tolerance = 1e-8;         // residual, fraction of the forces

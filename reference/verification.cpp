@@ -108,20 +108,23 @@ Rows bars()
     Rows rows;
     for (const Elements elements : bothElements) {
         Solver bar(mesh, std::vector<Material>{{modulus, poisson, 0.0}},
-                   mirroredIn({true, true, true}, Law::linear, elements));
+                   mirroredIn({true, true, true}, SmallStrain{}, elements));
         bar.prescribe(pulledTop(side, 0.01 * side));
         rows.push_back(rowOf("bar pulled by 1 %", "force [N]", -bar.force().z, 0.01 * modulus * side * side, 1e-4));
         rows.back().source = "Hooke's law, F = E A eps";
         rows.back().setting = fmt::format("linear, {}, nu {}", nameOf(elements), poisson);
-        for (const auto& [stiffening, stretch] : {std::pair(0.0, 1.5), std::pair(1.0, 1.5), std::pair(-0.2, 2.0)}) {
+        using Far = std::tuple<Law, double, double>;
+        for (const auto& [law, stiffening, stretch] :
+             {Far(NeoHookean{}, 0.0, 1.5), Far(NeoHookean{}, 1.0, 1.5), Far(NeoHookean{}, -0.2, 2.0),
+              Far(Exponential{}, 2.0, 1.5), Far(Exponential{}, 18.0, 1.5), Far(Exponential{}, -0.2, 2.0)}) {
             Solver stretched(mesh, std::vector<Material>{{modulus, poisson, stiffening}},
-                             mirroredIn({true, true, true}, Law::neoHookean, elements));
+                             mirroredIn({true, true, true}, law, elements));
             stretched.prescribe(pulledTop(side, (stretch - 1.0) * side));
-            const double stress = studies::neoHookeanTension(modulus, poisson, stiffening, stretch);
+            const double stress = studies::uniaxialTension(law, modulus, poisson, stiffening, stretch);
             rows.push_back(rowOf("bar pulled far", "force [N]", -stretched.force().z, stress * side * side, 1e-4));
             rows.back().source = "uniaxial stretch of its energy density (Ogden 1984)";
-            rows.back().setting =
-                fmt::format("neo-Hookean, stiffening {}, to {}, {}, nu {}", stiffening, stretch, nameOf(elements), poisson);
+            rows.back().setting = fmt::format("{}, stiffening {}, to {}, {}, nu {}", volume::nameOf(law), stiffening,
+                                              stretch, nameOf(elements), poisson);
         }
     }
     return rows;
@@ -150,7 +153,7 @@ Rows pointForce(Fineness fineness)
         for (const int n : cells) {
             const std::vector<double> ends = even(side, n);
             Solver solver(boxMesh(ends, ends, ends, {}), std::vector<Material>{{modulus, poisson, 0.0}},
-                          mirroredIn({true, true, true}, Law::linear, elements));
+                          mirroredIn({true, true, true}, SmallStrain{}, elements));
             solver.prescribe({[](Vec3) { return true; }, exact, {true, true, true}});
             sizes.push_back(1.0 / n);
             errors.push_back(relativeError(solver, points, exact));
@@ -179,7 +182,7 @@ Rows inclusion(Fineness fineness)
     for (const Elements elements : bothElements) {
         Solver solver(ballInBox(ball, side, cells),
                       std::vector<Material>{{modulus, poisson, 0.0}, {ratio * modulus, poisson, 0.0}},
-                      mirroredIn({true, true, true}, Law::linear, elements));
+                      mirroredIn({true, true, true}, SmallStrain{}, elements));
         const auto outside = [](Vec3 p) { return std::max({p.x, p.y, p.z}) > (1.0 - 1e-9) * side; };
         solver.prescribe({outside, exact, {true, true, true}});
         rows.push_back(fieldRow("stiff ball in a matrix", points, exact, relativeError(solver, points, exact), 0.5));
@@ -212,7 +215,7 @@ VerificationRow sphere(const SphereCase& c, double radius, double depth, Finenes
                            .fineTo = 0.3 * contact,
                            .around = quick ? 3 : 5};
     Solver solver(discInSlab(shape), std::vector<Material>{{modulus, c.poisson, 0.0}},
-                  mirroredIn({true, true, false}, Law::linear, c.elements));
+                  mirroredIn({true, true, false}, SmallStrain{}, c.elements));
     solver.press({{0.0, 0.0, radius - depth}, radius});
     const double force = studies::hertzForce(modulus, c.poisson, radius, depth) * c.factor;
     VerificationRow row = rowOf(c.problem, "force [mN]", 1e3 * 4.0 * solver.force().z, 1e3 * force, quick ? 2.0 : 1.0);
@@ -250,7 +253,7 @@ VerificationRow punch(double perThickness, double poisson, Fineness fineness)
         radius,       radius + 5.0 * thickness, thickness, radius / (quick ? 24.0 : 100.0), quick ? 2.0 : 1.6, 0.0,
         quick ? 3 : 5};
     Solver solver(discInSlab(shape), std::vector<Material>{{modulus, poisson, 0.0}},
-                  mirroredIn({true, true, false}, Law::linear, Elements::p2));
+                  mirroredIn({true, true, false}, SmallStrain{}, Elements::p2));
     Patch patch;
     patch.in = [&](Vec3 p) { return p.z > -1e-9 && std::hypot(p.x, p.y) < radius + 0.5 * shape.fine; };
     patch.u = [](Vec3) { return Vec3(0.0, 0.0, -depth); };

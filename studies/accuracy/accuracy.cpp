@@ -159,12 +159,14 @@ std::vector<Baseline> rigidMethods(const AccuracySubject& subject)
 std::vector<Baseline> elasticMethods(const AccuracySubject& subject)
 {
     const auto shelf = std::make_shared<BodyShelf>(subject.scene());
+    const volume::Law law = volume::finiteOf(subject.model->scene.model.elastic.law);
     std::vector<Baseline> out;
     for (const Rung& rung : rungs()) {
         for (const bool finite : {false, true}) {
             if (finite ? rung.finite : rung.small) {
-                out.push_back(elasticBaseline(shelf, finite ? "elastic_finite" : "elastic", rung.name, rung.spacing,
-                                              {.window = rung.window, .cycles = rung.cycles, .finiteStrain = finite}));
+                out.push_back(
+                    elasticBaseline(shelf, finite ? "elastic_finite" : "elastic", rung.name, rung.spacing,
+                                    {.window = rung.window, .cycles = rung.cycles, .law = finite ? law : volume::Law()}));
             }
         }
     }
@@ -175,12 +177,13 @@ std::vector<Baseline> singleGridMethods(const AccuracySubject& subject)
 {
     constexpr std::pair<double, int> grids[]{{8e-3, 1}, {6e-3, 1}, {4e-3, 1}, {4e-3, 4}, {3e-3, 1}, {2e-3, 1}, {2e-3, 4}};
     const auto shelf = std::make_shared<BodyShelf>(subject.scene());
+    const volume::Law law = volume::finiteOf(subject.model->scene.model.elastic.law);
     std::vector<Baseline> out;
     for (const auto& [spacing, cycles] : grids) {
         const std::string name = fmt::format("{:g} mm, {} cycle{}", 1e3 * spacing, cycles, cycles == 1 ? "" : "s");
         for (const bool finite : {false, true}) {
             out.push_back(elasticBaseline(shelf, finite ? "single_grid_finite" : "single_grid", name, spacing,
-                                          wholeGrid(cycles, finite)));
+                                          wholeGrid(cycles, finite ? law : volume::Law())));
         }
     }
     return out;

@@ -326,11 +326,12 @@ void checkRivals(const json& figures, const Options& o)
 void checkLaws(const Options& o)
 {
     if (o.laws.empty()) {
-        throw std::runtime_error("--law: name linear, neo-hookean, or both");
+        throw std::runtime_error(fmt::format("--law: name one of {}, or more", fmt::join(volume::lawNames, ", ")));
     }
     for (const std::string& law : o.laws) {
-        if (law != "linear" && law != "neo-hookean") {
-            throw std::runtime_error(fmt::format("--law {}: there is none; there are linear, neo-hookean", law));
+        if (!volume::lawNamed(law)) {
+            throw std::runtime_error(
+                fmt::format("--law {}: there is none; there are {}", law, fmt::join(volume::lawNames, ", ")));
         }
     }
 }

@@ -1,7 +1,5 @@
 #include <studies/accuracy/elastic_formulas.h>
 
-#include <chainmail/kernels.h>
-
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -48,7 +46,7 @@ Vec3 kelvinDisplacement(double shearModulus, double poisson, Vec3 force, Vec3 x)
            (16.0 * pi * shearModulus * (1.0 - poisson) * r);
 }
 
-double neoHookeanTension(double youngsModulus, double poisson, double stiffening, double stretch)
+double uniaxialTension(const volume::Law& law, double youngsModulus, double poisson, double stiffening, double stretch)
 {
     const double mu = youngsModulus / (2.0 * (1.0 + poisson));
     const double bulk = youngsModulus / (3.0 * (1.0 - 2.0 * poisson));
@@ -57,8 +55,8 @@ double neoHookeanTension(double youngsModulus, double poisson, double stiffening
         const double j = stretch * across * across;
         const double scaled = std::pow(j, -2.0 / 3.0);
         const double i = scaled * (stretch * stretch + 2.0 * across * across) - 3.0;
-        const double until = stiffening < 0.0 ? std::min(i, double{chainmail::softensTo}) : i;
-        const double shape = mu * (1.0 + stiffening * until) * scaled * (stretch * stretch - across * across) / 3.0;
+        const double shape =
+            (mu + volume::beyond(law, mu, stiffening, i).slope) * scaled * (stretch * stretch - across * across) / 3.0;
         const double pressure = bulk * (j - 1.0) * j;
         return std::array<double, 2>{2.0 * shape + pressure, pressure - shape};
     };

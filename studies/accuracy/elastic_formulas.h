@@ -1,6 +1,7 @@
 #pragma once
 
 #include <volume/geometry.h>
+#include <volume/law.h>
 
 #include <span>
 
@@ -27,10 +28,10 @@ Vec3 inclusionDisplacement(const Inclusion& inclusion, Vec3 x);
 Vec3 kelvinDisplacement(double shearModulus, double poisson, Vec3 force, Vec3 x);
 
 /// Nominal stress of a bar stretched to `stretch` times its length, free across, of energy density
-/// mu/2 I + mu/4 b I^2 + K/2 (J - 1)^2 with I = J^(-2/3) |F|^2 - 3 [Pa], the second term along its tangent beyond
-/// I = chainmail::softensTo where b < 0. Solved to rounding.
+/// mu/2 I + what the law has beyond that + K/2 (J - 1)^2 with I = J^(-2/3) |F|^2 - 3 [Pa]. Solved to rounding.
+/// @param law  of finite strain
 /// Source: R. W. Ogden, "Non-Linear Elastic Deformations", 1984, ch. 4 and 7.
-double neoHookeanTension(double youngsModulus, double poisson, double stiffening, double stretch);
+double uniaxialTension(const volume::Law& law, double youngsModulus, double poisson, double stiffening, double stretch);
 
 /// Order of convergence: slope of log(error) over log(size), least squares.
 double convergenceOrder(std::span<const double> sizes, std::span<const double> errors);

@@ -48,11 +48,10 @@ private:
     void runTool(const std::string& setting, const datasets::ElasticSettings& elastic, const TrialBody& body,
                  const TrialTool& tool)
     {
-        const bool finite = elastic.strain == datasets::Strain::finite;
         const TrialPath path = trialPath(*model_.tissue, model_.surface, place_, tool, body.cells.spacing);
         progress_(fmt::format("{}: {}, {}: reference", model_.scene.name, tool.name, setting));
-        const Reference reference = solveReference(body.body, path, request_.speeds, {.finiteStrain = finite});
-        const ElasticOptions options{.window = elastic.window, .cycles = elastic.cycles, .finiteStrain = finite};
+        const Reference reference = solveReference(body.body, path, request_.speeds, {.law = elastic.law});
+        const ElasticOptions options{.window = elastic.window, .cycles = elastic.cycles, .law = elastic.law};
         for (const double speed : request_.speeds) {
             progress_(fmt::format("{}: {}, {}: {:g} mm/s", model_.scene.name, tool.name, setting, 1e3 * speed));
             KernelCase c;
@@ -82,7 +81,7 @@ private:
         progress_(fmt::format("{}: {}: rivals", model_.scene.name, path.tool.name));
         const Lattice lattice(body.cells, model_.tissue->tissueOn(body.cells), model_.tissue->table());
         KernelRivals r;
-        r.full = fullSolve(body.body, path, speed, elastic.strain == datasets::Strain::finite);
+        r.full = fullSolve(body.body, path, speed, elastic.law);
         r.singleGrids =
             singleGridTrials(*model_.tissue, model_.surface, body, path, speed, reference, elastic, request_.rivalCycles);
         ElasticOptions standing = options;

@@ -90,10 +90,9 @@ std::vector<RivalRun> singleGridTrials(const volume::Tissue& tissue, const volum
 {
     constexpr int coarsest = 4;
     constexpr int maxFineCycles = 2;
-    const bool finite = settings.strain == datasets::Strain::finite;
     std::vector<RivalRun> runs;
     const auto run = [&](const ElasticBody& body, int coarsening, int cycles) {
-        Elastic elastic(body, wholeGrid(cycles, finite), TrialLoad(path).load().focus);
+        Elastic elastic(body, wholeGrid(cycles, settings.law), TrialLoad(path).load().focus);
         runs.push_back({coarsening, cycles, elastic.nodes(), runTrial(elasticModel(elastic), path, speed, reference)});
     };
     for (int cycles = 1; cycles <= std::min(maxCycles, maxFineCycles); ++cycles) {

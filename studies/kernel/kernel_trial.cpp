@@ -92,7 +92,7 @@ double contactForces(const Elastic& elastic)
 // From rest, or, where the energy may have more than one minimum, from the state before.
 double converge(Elastic& elastic, const ElasticLoad& load, const ReferenceOptions& options, ElasticResult& result)
 {
-    if (!options.finiteStrain) {
+    if (volume::isSmall(options.law)) {
         ElasticLoad none;
         none.focus = load.focus;
         elastic.relax(none, 0, 0.0);
@@ -235,9 +235,9 @@ double shareLeft(const Elastic& elastic, const ElasticResult& result)
     return force > 0.0 ? result.residual / force : 0.0;
 }
 
-ElasticOptions wholeGrid(int cycles, bool finiteStrain)
+ElasticOptions wholeGrid(int cycles, const volume::Law& law)
 {
-    return {.window = wholeWindow, .cycles = cycles, .finiteStrain = finiteStrain};
+    return {.window = wholeWindow, .cycles = cycles, .law = law};
 }
 
 Reference solveReference(const ElasticBody& body, const TrialPath& path, std::span<const double> speeds,
@@ -251,7 +251,7 @@ Reference solveReference(const ElasticBody& body, const TrialPath& path, std::sp
         reference.position.emplace_back(level.nodes.position(nodes[i]));
     }
     TrialLoad load(path);
-    Elastic elastic(body, wholeGrid(1, options.finiteStrain), load.load().focus);
+    Elastic elastic(body, wholeGrid(1, options.law), load.load().focus);
     reference.nodes = elastic.nodes();
     for (const TrialPose& pose : looksOf(path, speeds)) {
         load.set(pose);
@@ -359,14 +359,14 @@ TickTimes tickTimes(std::vector<double> seconds)
     return {seconds[seconds.size() / 2], seconds[seconds.size() * 99 / 100], seconds.back()};
 }
 
-FullSolve fullSolve(const ElasticBody& body, const TrialPath& path, double speed, bool finiteStrain)
+FullSolve fullSolve(const ElasticBody& body, const TrialPath& path, double speed, const volume::Law& law)
 {
     using Clock = std::chrono::steady_clock;
     constexpr int few = 5;
     constexpr double thousandth = 1e-3;
     constexpr int enough = 200;
     TrialLoad load(path);
-    Elastic elastic(body, wholeGrid(1, finiteStrain), load.load().focus);
+    Elastic elastic(body, wholeGrid(1, law), load.load().focus);
     const double step = speed * 1e-3;
     const auto solve = [&](int tick) {
         load.set({0.6 * path.press + tick * step, 0.0});

@@ -40,10 +40,10 @@ Vec3 nearestTissue(const chainmail::CellLevel& level, Vec3 rest);
 double shareLeft(const chainmail::Elastic& elastic, const chainmail::ElasticResult& result);
 
 /// A whole body in one window: every level covers all of it.
-chainmail::ElasticOptions wholeGrid(int cycles, bool finiteStrain);
+chainmail::ElasticOptions wholeGrid(int cycles, const volume::Law& law);
 
 struct ReferenceOptions {
-    bool finiteStrain = false;
+    volume::Law law = volume::SmallStrain{};
     double tolerance = 3e-5;                                          // residual, fraction of the contacts' forces
     int maxCycles = 200;                                              // per look
     std::size_t maxPoints = std::numeric_limits<std::size_t>::max();  // of Reference::position: every n-th free node
@@ -125,6 +125,6 @@ struct FullSolve {
     double warm = 0;      // from the tick before: median of a few [s]
     double fromRest = 0;  // [s]
 };
-FullSolve fullSolve(const chainmail::ElasticBody& body, const TrialPath& path, double speed, bool finiteStrain);
+FullSolve fullSolve(const chainmail::ElasticBody& body, const TrialPath& path, double speed, const volume::Law& law);
 
 }  // namespace palpate::studies

@@ -1,39 +1,26 @@
 #include <studies/validate/yeoh.h>
 
-#include <chainmail/kernels.h>
-
-#include <algorithm>
 #include <cstddef>
 
 namespace palpate::studies {
 
-namespace {
-
-double bounded(const Yeoh& law, double invariant) noexcept
+double Incompressible::energy(double invariant) const noexcept
 {
-    return law.stiffening < 0.0 ? std::min(invariant, double{chainmail::softensTo}) : invariant;
+    return 0.5 * shear * invariant + volume::beyond(law, shear, stiffening, invariant).energy;
 }
 
-}  // namespace
-
-double Yeoh::energy(double invariant) const noexcept
+double Incompressible::slope(double invariant) const noexcept
 {
-    const double until = bounded(*this, invariant);
-    return 0.5 * shear * (invariant + stiffening * until * (invariant - 0.5 * until));
+    return 0.5 * (shear + volume::beyond(law, shear, stiffening, invariant).slope);
 }
 
-double Yeoh::slope(double invariant) const noexcept
-{
-    return 0.5 * shear * (1.0 + stiffening * bounded(*this, invariant));
-}
-
-double uniaxialStress(const Yeoh& law, double stretch) noexcept
+double uniaxialStress(const Incompressible& law, double stretch) noexcept
 {
     const double invariant = stretch * stretch + 2.0 / stretch - 3.0;
     return 2.0 * law.slope(invariant) * (stretch - 1.0 / (stretch * stretch));
 }
 
-double equibiaxialStress(const Yeoh& law, double stretch) noexcept
+double equibiaxialStress(const Incompressible& law, double stretch) noexcept
 {
     const double fourth = 1.0 / (stretch * stretch * stretch * stretch);
     const double invariant = 2.0 * stretch * stretch + fourth - 3.0;

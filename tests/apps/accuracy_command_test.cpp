@@ -42,7 +42,7 @@ struct Place {
             const std::string key = referenceKey(*tissue, subject.path, subject.speed, law);
             const std::array speeds{subject.speed};
             const auto solved = solveReference(body.body, subject.path, speeds,
-                                               {.finiteStrain = law[0] == 'n', .tolerance = 1e-3, .maxCycles = 50});
+                                               {.law = *volume::lawNamed(law), .tolerance = 1e-3, .maxCycles = 50});
             saveReference(std::filesystem::path(references) / (std::string(law) + "-" + key + ".ref"), solved,
                           {key, "small", "sphere_10mm", law, "P2", subject.speed, 1, 2, 3.0, "stand-in"});
         }
@@ -214,7 +214,7 @@ TEST(AccuracyCommand, RefusesWhatThereIsNot)
     const Place place;
     expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--methods", "magic"},
                   "chainmail, chainmail_fifo");
-    expectRefusal({"accuracy", "--law", "hooke"}, "there are linear, neo-hookean");
+    expectRefusal({"accuracy", "--law", "hooke"}, "there are linear, neo-hookean, exponential");
     expectRefusal({"accuracy", "--scenes", place.scene, "--references", place.references, "--rival", "xpbd=true"},
                   "xpbd is a method of this command");
     expectRefusal({"accuracy", "--rival", "a=true", "--rival", "a=false"}, "there is another one called a");

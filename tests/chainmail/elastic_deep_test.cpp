@@ -140,7 +140,7 @@ ElasticBody softBlock(double poissonRatio = 0.47)
     return tests::bodyOf(block);
 }
 
-constexpr ElasticOptions asInASession{.window = 13, .finiteStrain = true};
+constexpr ElasticOptions asInASession{.window = 13, .law = volume::NeoHookean{}};
 
 // In to three radii, back, and in again: what presses never pulls, the way out has the force of the way in down to where a
 // tool is held back, and the tissue does no work on the whole. Without the deformed area and modes that turn, a ball of 10
@@ -179,7 +179,7 @@ TEST(ElasticDeep, ForceGrowsWithDepth)
     const ElasticBody body = softBlock();
     for (const bool finite : {true, false}) {
         ElasticOptions options = asInASession;
-        options.finiteStrain = finite;
+        options.law = finite ? volume::Law(volume::NeoHookean{}) : volume::Law();
         Way way(body, middle, 8e-3, 0.0, options);
         double before = 0.0;
         for (double depth = 0.5e-3; depth <= 24e-3; depth += 0.5e-3) {

@@ -1,5 +1,6 @@
 #include "elastic_bodies.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -94,11 +95,11 @@ private:
 
 // Every number stays finite, and no call raises the energy that it starts with, but for tissue that relaxes at finite
 // strain.
-void push(const ElasticBody& body, Vec3 size, bool finiteStrain, int pushes)
+void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes)
 {
     ElasticOptions options;
     options.window = 9;
-    options.finiteStrain = finiteStrain;
+    options.law = law;
     options.period = 20e-3;
     Elastic elastic(body, options, tests::focusAt(0.5 * size));
     HostileHand hand(size);
@@ -122,7 +123,7 @@ void push(const ElasticBody& body, Vec3 size, bool finiteStrain, int pushes)
             result = elastic.relax(load);
             // At finite strain the history does not turn with the tissue: springs of 100 kN/m that let go leave it in cells
             // that it turns inside out, where energy is carried along a parabola that says little.
-            if (!body.relaxes || !finiteStrain) {
+            if (!body.relaxes || volume::isSmall(law)) {
                 ASSERT_LE(result.energy, result.start + 1e-5 * peak + 1e-15) << "push " << i << ", again " << again;
             }
         }
@@ -148,21 +149,42 @@ TEST(ElasticHostile, TissueThatRelaxesStaysFiniteAndComesBack)
         return m;
     };
     const ElasticBody body = tests::bodyOf(block, 0.4999, true);
-    for (const bool finite : {false, true}) {
-        push(body, Vec3(20e-3, 14e-3, 17e-3), finite, 3000);
+    for (const volume::Law& law : {volume::Law(volume::SmallStrain{}), volume::Law(volume::NeoHookean{})}) {
+        push(body, Vec3(20e-3, 14e-3, 17e-3), law, 3000);
     }
 }
 
 TEST(ElasticHostile, TenThousandPushesStayFiniteAndNeverRaiseTheEnergy)
 {
     const Vec3 size(20e-3, 14e-3, 17e-3);
-    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, false, 10000);
+    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, volume::SmallStrain{}, 10000);
 }
 
 TEST(ElasticHostile, FiniteStrainStaysFiniteAndNeverRaisesTheEnergy)
 {
     const Vec3 size(20e-3, 14e-3, 17e-3);
-    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, true, 1500);
+    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, volume::NeoHookean{}, 1500);
+}
+
+// Tissue that softens, that stiffens as the tissue table's tumours do, and further than the law lets it. Neo-Hookean tissue
+// of b = 100 is left out: there the energy that a call begins with may be an estimate that is too low.
+TEST(ElasticHostile, TissueThatStiffensStaysFiniteAndNeverRaisesTheEnergy)
+{
+    for (const volume::Law& law : {volume::Law(volume::NeoHookean{}), volume::Law(volume::Exponential{})}) {
+        for (const float b : {-0.25F, 7.0F, 18.0F, 100.0F}) {
+            if (b == 100.0F && law == volume::Law(volume::NeoHookean{})) {
+                continue;
+            }
+            auto block = tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45);
+            block.material = [b](Index3 c) {
+                volume::CellMaterial m = tests::tissue(1e4, 0.45, c.y == 13);
+                m.stiffening = b;
+                return m;
+            };
+            SCOPED_TRACE(fmt::format("{}, b = {}", volume::nameOf(law), b));
+            push(tests::bodyOf(block), Vec3(20e-3, 14e-3, 17e-3), law, 700);
+        }
+    }
 }
 
 }  // namespace

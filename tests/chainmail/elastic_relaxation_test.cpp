@@ -40,7 +40,7 @@ ElasticOptions ofStrain(bool finite, int window = 15)
 {
     ElasticOptions options;
     options.window = window;
-    options.finiteStrain = finite;
+    options.law = finite ? volume::Law(volume::NeoHookean{}) : volume::Law();
     options.period = period;
     return options;
 }

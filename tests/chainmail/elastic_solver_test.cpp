@@ -71,7 +71,7 @@ TEST(Elastic, NoCallRaisesTheEnergy)
     std::uniform_real_distribution<double> unit(-1.0, 1.0);
     for (const bool finite : {false, true}) {
         ElasticOptions options;
-        options.finiteStrain = finite;
+        options.law = finite ? volume::Law(volume::NeoHookean{}) : volume::Law();
         Elastic elastic(block, options, tests::focusUnder(top));
         for (int load = 0; load < 12; ++load) {
             const std::array tools{pressed(2.5e-3 + 2e-3 * unit(random), 5e-3 * Vec3(unit(random), 0.0, unit(random)))};
@@ -245,7 +245,7 @@ TEST(Elastic, RelaxAllocatesNothing)
     for (const bool finite : {false, true}) {
         ElasticOptions options;
         options.window = 11;
-        options.finiteStrain = finite;
+        options.law = finite ? volume::Law(volume::NeoHookean{}) : volume::Law();
         Elastic elastic(block, options, tests::focusUnder(top));
         std::array tools{pressed(1e-3), pressed(0.5e-3)};
         const std::array ties{tieAt(top + Vec3(0.0, 4e-3, 0.0), Vec3(1e-3))};

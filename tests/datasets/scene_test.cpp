@@ -41,7 +41,7 @@ Scene fullScene(std::mt19937_64& random)
     scene.model.elastic = {.spacing = draw(1e-3, 4e-3),
                            .window = 9 + 2 * static_cast<int>(draw(0, 16.99)),
                            .cycles = static_cast<int>(draw(1, 9)),
-                           .strain = Strain::finite,
+                           .law = volume::Exponential{},
                            .poissonCap = draw(0, 0.499),
                            .friction = draw(0, 1)};
     scene.dffb.mode = DffbMode::thesis;
@@ -102,7 +102,7 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
         EXPECT_NEAR(a.spacing, e.spacing, 1e-12);
         EXPECT_EQ(a.window, e.window);
         EXPECT_EQ(a.cycles, e.cycles);
-        EXPECT_EQ(a.strain, Strain::finite);
+        EXPECT_EQ(a.law, volume::Law(volume::Exponential{}));
         EXPECT_NEAR(a.poissonCap, e.poissonCap, 1e-12);
         EXPECT_EQ(again.model.relaxation, scene.model.relaxation);
         EXPECT_EQ(again.model.walls, scene.model.walls);
@@ -230,7 +230,7 @@ TEST(ElasticSetting, FromFastToFineNodesAreNearerAndWorkIsMore)
 
 TEST(ElasticSetting, KeepsWhatItsBaseSaysOfTheTissue)
 {
-    const ElasticSettings base{.strain = Strain::finite, .poissonCap = 0.4, .friction = 0.3};
+    const ElasticSettings base{.law = volume::NeoHookean{}, .poissonCap = 0.4, .friction = 0.3};
     ElasticSettings expected = base;
     expected.spacing = elasticSetting("fine").spacing;
     expected.window = elasticSetting("fine").window;
@@ -251,11 +251,31 @@ TEST(ElasticSetting, IsReadByNameAndKeysBesideItWin)
         ElasticSettings expected = elasticSetting(name);
         expected.window = 21;
         expected.friction = 0.5;
-        expected.strain = Strain::finite;
+        expected.law = volume::NeoHookean{};
         const Scene changed =
             parseScene(text + "[model.elastic]\nwindow = 21\nfriction = 0.5\nstrain = \"finite\"\n", origin);
         EXPECT_EQ(changed.model.elastic, expected);
         EXPECT_EQ(parseScene(sceneText(changed), origin).model.elastic, expected);
+    }
+}
+
+TEST(Scene, LawsGoByName)
+{
+    const auto lawOf = [](const std::string& elastic) {
+        return parseScene("[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n[model.elastic]\n" + elastic,
+                          origin)
+            .model.elastic.law;
+    };
+    EXPECT_EQ(lawOf(""), volume::Law(volume::NeoHookean{}));
+    EXPECT_EQ(lawOf("strain = \"finite\"\n"), volume::Law(volume::NeoHookean{}));
+    EXPECT_EQ(lawOf("strain = \"small\"\n"), volume::Law(volume::SmallStrain{}));
+    for (const volume::Law& law : volume::laws) {
+        if (!volume::isSmall(law)) {
+            EXPECT_EQ(lawOf(fmt::format("law = \"{}\"\n", volume::nameOf(law))), law);
+        }
+    }
+    for (const char* wrong : {"strain = \"small\"\nlaw = \"exponential\"\n", "law = \"linear\"\n", "law = \"hooke\"\n"}) {
+        EXPECT_THROW(lawOf(wrong), std::runtime_error) << wrong;
     }
 }
 

@@ -11,7 +11,6 @@ namespace palpate::planner {
 namespace {
 
 using datasets::ModelLevel;
-using datasets::Strain;
 
 Plan planned(double error, double budget, bool all = false)
 {
@@ -33,10 +32,10 @@ TEST(Planner, TimeIsCountedAndNotMeasured)
     c.slots = 1000;
     c.touched = 100;
     c.meanCycles = 1.5;
-    c.elastic.strain = Strain::small;
+    c.elastic.law = volume::SmallStrain{};
     const PlanCosts costs{.small = {2, 10, 50, 100}, .finite = {4, 20, 50, 100}, .nsPerMove = 200, .usPerTick = 20};
     EXPECT_NEAR(predictedTime(c, costs), 20.0 + 17.0 + 20.0, 1e-9);
-    c.elastic.strain = Strain::finite;
+    c.elastic.law = volume::NeoHookean{};
     EXPECT_NEAR(predictedTime(c, costs), 20.0 + 34.0 + 20.0, 1e-9);
     c.level = ModelLevel::chainmail;
     EXPECT_NEAR(predictedTime(c, costs), 40.0, 1e-9);
@@ -121,9 +120,9 @@ TEST(Planner, PredictsTheErrorAgainstOutsideFiniteElements)
         ASSERT_EQ(c.level, ModelLevel::elastic);
         const studies::TrialBody body =
             studies::trialBody(*tissue, model->surface, c.elastic.spacing, subject.poissonCap(), 4U << 20);
-        const studies::TrialResult found = studies::elasticTrial(
-            body.body, subject.path, subject.speed, outside,
-            {.window = c.elastic.window, .cycles = c.elastic.cycles, .finiteStrain = c.elastic.strain == Strain::finite});
+        const studies::TrialResult found =
+            studies::elasticTrial(body.body, subject.path, subject.speed, outside,
+                                  {.window = c.elastic.window, .cycles = c.elastic.cycles, .law = c.elastic.law});
         const double ratio = studies::spreadOf(found.looks, &studies::TrialErrors::near).worst / c.error;
         EXPECT_GT(ratio, 1.0 / 1.5) << c.name();
         EXPECT_LT(ratio, 1.5) << c.name();
@@ -137,7 +136,7 @@ TEST(Planner, LargeStrainIsHeldAgainstFiniteStrain)
     EXPECT_GT(plan.strain, largeStrain);
     EXPECT_TRUE(plan.finiteReference);
     EXPECT_TRUE(std::ranges::any_of(plan.candidates, [](const PlanCandidate& c) {
-        return c.level == ModelLevel::elastic && c.elastic.strain == Strain::finite;
+        return c.level == ModelLevel::elastic && !volume::isSmall(c.elastic.law);
     }));
 }
 

@@ -76,7 +76,7 @@ void expectAgreement(const Problem& problem)
 
 TEST(Ccx, AgreesOnAPressedBlock)
 {
-    expectAgreement(pressedBlock(Law::linear, 1e-3));
+    expectAgreement(pressedBlock(SmallStrain{}, 1e-3));
 }
 
 TEST(Ccx, AgreesOnAStiffBall)
@@ -86,7 +86,7 @@ TEST(Ccx, AgreesOnAStiffBall)
 
 TEST(Ccx, AgreesOnABlockPressedDeep)
 {
-    expectAgreement(pressedBlock(Law::neoHookean, 4e-3));
+    expectAgreement(pressedBlock(NeoHookean{}, 4e-3));
 }
 
 // A sphere pressed into a block and sideways, by their contact and by ours, on one mesh of quadratic tetrahedra: 3 % apart,
@@ -113,7 +113,7 @@ TEST(Ccx, AgreesOnASphereThatPressesAndDrags)
     exportCcxPress(mesh, materials, press, file);
     const std::vector<CcxSolution> theirs = runCcxPress(file, press.centres.size());
     SolveOptions options;
-    options.law = Law::neoHookean;
+    options.law = NeoHookean{};
     Solver solver(mesh, materials, options);
     const std::vector<Vec3> nodes = quadraticNodes(mesh);
     for (std::size_t step = 0; step < press.centres.size(); ++step) {
@@ -135,7 +135,7 @@ TEST(Ccx, AgreesOnASphereThatPressesAndDrags)
 
 TEST(Ccx, TissueThatStiffensIsRefused)
 {
-    Problem problem = pressedBlock(Law::neoHookean, 1e-3);
+    Problem problem = pressedBlock(NeoHookean{}, 1e-3);
     problem.materials[0].stiffening = 1.0;
     const tests::Folder folder;
     EXPECT_THROW(exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, folder.path() / "problem.inp"),

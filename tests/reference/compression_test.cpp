@@ -31,7 +31,7 @@ double loadOf(const studies::Cylinder& shape, double stiffening, bool bonded, do
 {
     const TetMesh mesh = quarterCylinder(shape, cells);
     SolveOptions options;
-    options.law = Law::neoHookean;
+    options.law = NeoHookean{};
     options.elements = Elements::p2p1;
     options.mirrored = {true, true, true};
     Solver solver(mesh, std::vector<Material>{{2e3 * (1.0 + shape.poisson), shape.poisson, stiffening}}, options);

@@ -135,9 +135,11 @@ TEST(ElasticFormulas, TheInclusionsFieldIsContinuousAndInEquilibrium)
 // At small strain E times it; without change of volume mu (a - 1/a^2).
 TEST(ElasticFormulas, TensionOfANeoHookeanBar)
 {
-    EXPECT_NEAR(studies::neoHookeanTension(3000.0, 0.4, 0.0, 1.0 + 1e-6), 3000.0 * 1e-6, 1e-7);
-    EXPECT_NEAR(studies::neoHookeanTension(3000.0, 0.4999999, 0.0, 1.5), 1000.0 * (1.5 - 1.0 / 2.25), 0.01);
-    EXPECT_GT(studies::neoHookeanTension(3000.0, 0.45, 1.0, 1.5), studies::neoHookeanTension(3000.0, 0.45, 0.0, 1.5));
+    EXPECT_NEAR(studies::uniaxialTension(volume::NeoHookean{}, 3000.0, 0.4, 0.0, 1.0 + 1e-6), 3000.0 * 1e-6, 1e-7);
+    EXPECT_NEAR(studies::uniaxialTension(volume::NeoHookean{}, 3000.0, 0.4999999, 0.0, 1.5), 1000.0 * (1.5 - 1.0 / 2.25),
+                0.01);
+    EXPECT_GT(studies::uniaxialTension(volume::NeoHookean{}, 3000.0, 0.45, 1.0, 1.5),
+              studies::uniaxialTension(volume::NeoHookean{}, 3000.0, 0.45, 0.0, 1.5));
 }
 
 TEST(ElasticFormulas, OrderOfExactPowers)
