@@ -191,7 +191,7 @@ void checkOutputs(const Options& o)
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
 // is now, as it is told.
 std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
-                                                              const datasets::ModelSettings& model, Viewers& viewers,
+                                                              const haptics::SessionModel& model, Viewers& viewers,
                                                               double sessionTook, session::TrainResult& result)
 {
     const auto blame = [&result](const std::string& what) {
@@ -390,16 +390,16 @@ void train(Options o)
     const auto begun = std::chrono::steady_clock::now();
     session::TrainResult result = runToItsEnd(model, info, options);
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-    const auto written = writeOutputs(o, info, model.scene.model, viewers, took, result);
+    const auto written = writeOutputs(o, info, model, viewers, took, result);
     const bool counts = result.signal == 0 && !result.faulted;
     const auto kept = counts ? training.keep(info, result, record) : std::vector<std::string>{};
 
     if (o.json != "-" && !o.tryout) {
-        summarise(result, info, model.scene.model);
+        summarise(result, info, model);
         tell(fitted, written, kept);
     }
     if (resultFolder && result.signal == 0) {
-        command::writeJson(toShow, figuresOf(result, info, model.scene.model));
+        command::writeJson(toShow, figuresOf(result, info, model));
         std::fflush(stdout);
         viewers.waitForWindow();
     }

@@ -44,7 +44,11 @@ volume::Tissue openVolume(const std::string& what)
 {
     const fs::path file(what);
     if (file.extension() == ".toml") {
-        return datasets::sceneVolume(datasets::loadScene(file));
+        const datasets::Scene scene = datasets::loadScene(file);
+        if (scene.gravity.given) {
+            throw std::runtime_error(what + ": [gravity]: a mesh is of the volume as it was taken: leave it out");
+        }
+        return datasets::sceneVolume(scene);
     }
     if (const auto scene = datasets::builtInScene(what); scene && !fs::exists(file)) {
         return datasets::sceneVolume(*scene);

@@ -1,6 +1,7 @@
 #include <apps/train_figures.h>
 
 #include <haptics/measures.h>
+#include <haptics/posed.h>
 #include <haptics/score.h>
 #include <session/figures.h>
 
@@ -43,13 +44,20 @@ std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSe
 }  // namespace
 
 nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
-                         const datasets::ModelSettings& model)
+                         const haptics::SessionModel& model)
 {
     auto figures = session::timingFigures(result.timing);
     figures["scene"] = info.scene;
     figures["model"] = info.model;
-    if (model.level == datasets::ModelLevel::elastic) {
-        figures["setting"] = model.setting;
+    if (model.scene.model.level == datasets::ModelLevel::elastic) {
+        figures["setting"] = model.scene.model.setting;
+    }
+    if (model.posture) {
+        figures["gravity"] = {{"moved_mm", 1e3 * model.posture->farthest},
+                              {"weight_n", model.posture->weight},
+                              {"cells_mm", 1e3 * model.posture->spacing},
+                              {"rounds", model.posture->rounds},
+                              {"unloaded_within_mm", 1e3 * model.posture->residual}};
     }
     figures["device"] = info.device;
     figures["build"] = info.build;
@@ -73,7 +81,7 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
     return figures;
 }
 
-void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model)
+void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model)
 {
     const auto tick = result.timing.work.percentiles();
     const auto late = result.timing.lateness.percentiles();
@@ -81,7 +89,10 @@ void summarise(const session::TrainResult& result, const haptics::SessionInfo& i
         "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
         result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
         1e6 * late.p50, 1e6 * late.p99);
-    fmt::print("{}", slowness(result.timing, model));
+    fmt::print("{}", slowness(result.timing, model.scene.model));
+    if (model.posture) {
+        fmt::print("gravity: {}\n", haptics::textOf(*model.posture));
+    }
     fmt::print("peak force {:.2f} N (tissue {:.2f} N, guidance {:.2f} N)\n", result.peakTotal, result.peakBasic,
                result.peakAdditional);
     for (std::size_t i = 0; i < result.cores.size(); ++i) {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <datasets/scene.h>
 #include <haptics/recorder.h>
+#include <haptics/session_model.h>
 #include <session/trainer.h>
 
 #include <nlohmann/json_fwd.hpp>
@@ -10,8 +10,8 @@ namespace palpate::apps {
 
 /// What `palpate train --json` gives.
 nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
-                         const datasets::ModelSettings& model);
+                         const haptics::SessionModel& model);
 /// The same for people, on standard output.
-void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const datasets::ModelSettings& model);
+void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model);
 
 }  // namespace palpate::apps

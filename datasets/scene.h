@@ -1,6 +1,7 @@
 #pragma once
 
 #include <datasets/ct.h>
+#include <datasets/gravity.h>
 #include <datasets/phantom.h>
 #include <datasets/probe.h>
 #include <volume/geometry.h>
@@ -155,6 +156,7 @@ struct Scene {
     std::vector<TraineeStep> script;  // empty = the standard biopsy along entry and aim
     ProbeSpec probe;
     CtSpec ct;
+    GravitySpec gravity;
 };
 
 /// Reads a scene. Errors: "FILE:LINE: [dffb] range_mm = -4 mm: must be 0 to 100 mm". Unknown keys are errors, with the

@@ -407,6 +407,7 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     readScript(top, scene.script);
     readProbe(top, scene.probe);
     readCt(top, scene.ct);
+    readGravity(top, scene.gravity);
     if (scene.ct.given() && scene.probe.kind != ProbeKind::none) {
         top.refuse("ct", "a scene is guided by ultrasound ([probe]) or by CT ([ct]), not by both");
     }
@@ -474,7 +475,7 @@ std::string sceneText(const Scene& scene)
     for (const TraineeStep& step : scene.script) {
         out += stepText(step);
     }
-    return out + probeText(scene.probe) + ctText(scene.ct);
+    return out + probeText(scene.probe) + ctText(scene.ct) + gravityText(scene.gravity);
 }
 
 }  // namespace palpate::datasets

@@ -26,6 +26,10 @@ std::string probeText(const ProbeSpec& probe);
 void readCt(Section& top, CtSpec& ct);
 std::string ctText(const CtSpec& ct);
 
+/// The table [gravity] of a scene, and back.
+void readGravity(Section& top, GravitySpec& gravity);
+std::string gravityText(const GravitySpec& gravity);
+
 /// A scene as TOML text with every field, for scenes that no one wrote. parseScene() reads it back.
 std::string sceneText(const Scene& scene);
 

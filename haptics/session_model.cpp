@@ -1,6 +1,7 @@
 #include <haptics/session_model.h>
 
 #include <chainmail/deformation.h>
+#include <haptics/posed.h>
 #include <haptics/probe_placement.h>
 
 #include <fmt/format.h>
@@ -77,14 +78,17 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     return s;
 }
 
-// The planned line. A probe that is to lie over the target gets its place.
-datasets::Approach approachOf(datasets::Scene& scene, const volume::Tissue& tissue, const volume::DistanceField& surface,
+// The planned line. A probe that is to lie over the target gets its place. The scene keeps the places of its text.
+datasets::Approach approachOf(datasets::Scene& scene, const Posed& posture, const volume::DistanceField& surface,
                               const std::vector<GuardedStructure>& structures)
 {
+    datasets::Scene planned = scene;
+    planned.entry = posture.entry;
+    planned.aim = posture.aim;
     if (!scene.probe.overTarget) {
-        return datasets::planApproach(scene, tissue);
+        return datasets::planApproach(planned, *posture.tissue);
     }
-    const ProbePlan plan = planProbe(scene, tissue, surface, structures);
+    const ProbePlan plan = planProbe(planned, *posture.tissue, surface, structures);
     scene.probe.face = plan.face;
     scene.probe.direction = plan.direction;
     scene.probe.lateral = plan.lateral;
@@ -104,6 +108,8 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
                                  ": [model] walls = true, but no tissue of the volume has inner walls: give one "
                                  "of them wall_spacing_mm and wall_n in [tissue.NAME]");
     }
+    const Posed posture = posed(scene, std::move(tissue));
+    tissue = posture.tissue;
     const auto grid = fieldGrid(*tissue, surfaceNodes);
     const auto coarse = fieldGrid(*tissue, structureNodes);
     std::vector<GuardedStructure> structures;
@@ -114,7 +120,7 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
         structures.back().gain = vital.gain;
     }
     auto surface = tissue->distanceToBody(grid);
-    const auto approach = approachOf(scene, *tissue, surface, structures);
+    const auto approach = approachOf(scene, posture, surface, structures);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
     if (chainmail::maxPressSeeds(lattice, scene.tool.radius) > maxSeeds) {
@@ -124,8 +130,9 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
                         scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing));
     }
     auto elastic = elasticOf(scene, *tissue, lattice.grid, surface);
-    return {std::move(scene),   std::move(tissue),  approach,           std::move(surface),
-            std::move(modulus), std::move(lattice), std::move(elastic), std::move(structures)};
+    return {std::move(scene),   std::move(tissue),     approach,
+            std::move(surface), std::move(modulus),    std::move(lattice),
+            std::move(elastic), std::move(structures), posture.figures};
 }
 
 }  // namespace palpate::haptics

@@ -2,11 +2,13 @@
 
 #include <chainmail/elastic_body.h>
 #include <chainmail/lattice.h>
+#include <chainmail/posture.h>
 #include <datasets/scene.h>
 #include <haptics/tick.h>
 #include <volume/tissue.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,17 +26,18 @@ struct GuardedStructure {
 /// Everything about a session that does not change while it runs.
 struct SessionModel {
     datasets::Scene scene;                                  // its text is what a record keeps
-    std::shared_ptr<const volume::Tissue> tissue;           // never null
+    std::shared_ptr<const volume::Tissue> tissue;           // in the scene's posture; never null
     datasets::Approach approach;                            // the planned line, patient frame [m]
     volume::DistanceField surface;                          // of the body at rest [m]
     volume::ScalarField youngsModulus;                      // [Pa]
     chainmail::Lattice lattice;                             // its nodes are those of all fields
     std::shared_ptr<const chainmail::ElasticBody> elastic;  // level `elastic`: its cells are the lattice's nodes
     std::vector<GuardedStructure> structures;               // target first, then the lookup table of vital structures
+    std::optional<chainmail::PostureFigures> posture;       // what gravity did to the volume; nothing: nothing
 };
 
-/// Builds fields and lattice. Throws std::runtime_error for structures that the volume does not have, and more of them
-/// than maxStructures.
+/// Builds fields and lattice; puts the volume into the scene's posture first, which takes seconds. Throws
+/// std::runtime_error for structures that the volume does not have, and more of them than maxStructures.
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue);
 
 }  // namespace palpate::haptics

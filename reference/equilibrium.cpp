@@ -1,9 +1,14 @@
 #include <reference/equilibrium.h>
 
+#include <glm/geometric.hpp>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 
 namespace palpate::reference {
@@ -91,6 +96,39 @@ void Equilibrium::evaluate()
     residual = fem.tissueForces(state);
     const std::vector<double> contact = fem.contactForces(state);
     std::transform(residual.begin(), residual.end(), contact.begin(), residual.begin(), std::plus<>());
+    for (std::size_t i = 0; i < load.size(); ++i) {
+        residual[i] -= load[i];
+    }
+}
+
+// The shape functions' integrals over a tetrahedron are -1/20 of its volume at corners and 1/5 at the middles of edges.
+void Equilibrium::weigh(const TetMesh& mesh, std::span<const double> densities, Vec3 acceleration)
+{
+    constexpr double millimetre = 1e-3, millinewton = 1e-3;
+    using Key = std::array<std::int64_t, 3>;
+    const auto keyOf = [](Vec3 mm) {
+        constexpr double grain = 1e-5;  // mm
+        return Key{std::llround(mm.x / grain), std::llround(mm.y / grain), std::llround(mm.z / grain)};
+    };
+    std::map<Key, std::size_t> nodeAt;
+    for (std::size_t n = 0; n < fem.nodes().size(); ++n) {
+        nodeAt.emplace(keyOf(fem.nodes()[n]), n);
+    }
+    load.assign(fem.displacements(), 0.0);
+    for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
+        std::array<Vec3, 4> p;
+        std::ranges::transform(mesh.tets[t], p.begin(), [&](std::uint32_t i) { return mesh.points[i]; });
+        const double volume = glm::dot(glm::cross(p[1] - p[0], p[2] - p[0]), p[3] - p[0]) / 6.0;
+        const Vec3 weight = volume * densities[mesh.tissue[t]] / millinewton * acceleration;
+        for (std::size_t a = 0; a < 4; ++a) {
+            for (std::size_t b = a; b < 4; ++b) {
+                const std::size_t node = nodeAt.at(keyOf(0.5 * (p[a] + p[b]) / millimetre));
+                for (int c = 0; c < 3; ++c) {
+                    load[3 * node + static_cast<std::size_t>(c)] += (a == b ? -0.05 : 0.2) * weight[c];
+                }
+            }
+        }
+    }
 }
 
 // Of the part that ought to vanish.

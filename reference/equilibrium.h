@@ -14,6 +14,11 @@ struct Equilibrium {
 
     /// Numbers the unknowns anew: all that is neither held nor `prescribed` (state x 1).
     void drive(const std::vector<char>& prescribed);
+    /// Makes tissue heavy: dead loads at the nodes, exact for a quadratic displacement.
+    /// @param mesh          that the body was made of
+    /// @param densities     of each row of the tissue table [kg/m^3]
+    /// @param acceleration  [m/s^2]
+    void weigh(const TetMesh& mesh, std::span<const double> densities, Vec3 acceleration);
     /// Finds equilibrium from `state`, with the multipliers as they are.
     /// @param tolerance  residual, fraction of the forces that hold the body
     /// @returns  whether it got there; the state is anything otherwise
@@ -28,6 +33,7 @@ struct Equilibrium {
     FiniteElements fem;
     std::vector<double> state;
     std::vector<double> residual;       // derivative of the energies of tissue and contact (state x 1) [mN]
+    std::vector<double> load;           // dead loads; none: no weight                      (displacements x 1) [mN]
     std::vector<char> held;             // 0 for ever                                       (state x 1)
     std::vector<std::uint32_t> free;    // unknowns, by their place in the state
     std::vector<int> number;            // in `free`, or -1                                 (state x 1)

@@ -1,3 +1,4 @@
+#include <volume/cell_mixture.h>
 #include <volume/distance.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
@@ -135,48 +136,15 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
     });
 }
 
-// What is held in space does not give way: the rest of its cell is a layer on it, as much thinner than the cell as its
-// share is, and as much stiffer. A cell of nothing else has the stiffness of what it is made of.
 CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vector<const TissueRow*>& rows)
 {
-    struct Sums {
-        double fraction = 0.0, stiffness = 0.0, compliance = 0.0;
-        void add(double weight, double modulus)
-        {
-            fraction += weight;
-            stiffness += weight * modulus;
-            compliance += weight / modulus;
-        }
-        double mean() const { return std::sqrt(stiffness / compliance); }
-    } free, held;
-    double poisson = 0.0;
-    double stiffening = 0.0;
-    std::array<double, relaxationTerms> relaxing{};
+    CellMixture mixture;
     sampler.visit(n, [&](std::uint16_t label, double weight, double scale) {
         if (const TissueRow* row = rows[label]) {
-            (row->fixed ? held : free).add(weight, row->youngsModulus * scale);
-            poisson += weight * row->poissonRatio;
-            stiffening += weight * row->stiffening;
-            for (std::size_t i = 0; i < relaxing.size() && !row->fixed; ++i) {
-                relaxing[i] += weight * row->relaxation().weights[i];
-            }
+            mixture.add(*row, weight, scale);
         }
     });
-    const double tissue = free.fraction + held.fraction;
-    if (tissue <= 0.0) {
-        return {};
-    }
-    const double rigid = held.fraction > 0.0 ? held.mean() : std::numeric_limits<double>::infinity();
-    const double modulus = free.fraction > 0.0 ? std::min(free.mean() * tissue / free.fraction, rigid) : rigid;
-    CellMaterial material{static_cast<float>(tissue * modulus),
-                          static_cast<float>(poisson / tissue),
-                          static_cast<float>(held.fraction / tissue),
-                          static_cast<float>(stiffening / tissue),
-                          {}};
-    for (std::size_t i = 0; i < relaxing.size() && free.fraction > 0.0; ++i) {
-        material.relaxing[i] = static_cast<float>(relaxing[i] / free.fraction);
-    }
-    return material;
+    return mixture.material();
 }
 
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)

@@ -55,6 +55,7 @@ std::string sceneWith(const std::string& section, const std::string& line)
                                              {"[target]", "structure = \"tumour\""},
                                              {"[safety]", ""},
                                              {"[ct]", ""},
+                                             {"[gravity]", "posture = \"prone\"\nshape = \"supine\""},
                                              {"[[script]]", "kind = \"fire\""}};
     std::string out;
     for (const auto& [heading, text] : lines) {

@@ -133,6 +133,37 @@ TEST(Scene, CtOfAnySceneComesBackAndADoseFollows)
     EXPECT_FALSE(parseScene(sceneText(scene), origin).ct.given());
 }
 
+TEST(Scene, GravityOfAnySceneComesBack)
+{
+    const std::string scene = "[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n[gravity]\n";
+    const Scene named = parseScene(scene + "posture = \"prone\"\nshape = \"standing\"\nmodulus = 0.5\n", origin);
+    EXPECT_EQ(named.gravity.down, Vec3(0, -1, 0));
+    EXPECT_EQ(named.gravity.shapeDown, Vec3(0, 0, -1));
+    const Scene aslant = parseScene(scene + "direction = [3, 0, -4]\nshape = \"unloaded\"\ng_m_s2 = 1.62\n", origin);
+    EXPECT_NEAR(aslant.gravity.down.z, -0.8, 1e-12);
+    EXPECT_EQ(aslant.gravity.shapeDown, Vec3(0.0));
+    for (const Scene& s : {named, aslant}) {
+        const Scene again = parseScene(sceneText(s), origin);
+        EXPECT_EQ(sceneText(again), sceneText(s));
+        EXPECT_EQ(again.gravity.modulus, s.gravity.modulus);
+        EXPECT_EQ(again.gravity.strength, s.gravity.strength);
+    }
+    EXPECT_FALSE(parseScene("[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n", origin).gravity.given);
+}
+
+TEST(Scene, GravityIsRefusedWhereItSaysTooLittleOrTooMuch)
+{
+    const std::string scene = "[volume]\nphantom = \"block\"\n[target]\naim_mm = [0, 25, 0]\n[gravity]\n";
+    EXPECT_NE(errorOf(scene + "posture = \"prone\"\n").find("[gravity] shape is missing"), std::string::npos)
+        << errorOf(scene + "posture = \"prone\"\n");
+    EXPECT_NE(errorOf(scene + "shape = \"prone\"\n").find("[gravity] posture is missing"), std::string::npos);
+    EXPECT_NE(errorOf(scene + "posture = \"prone\"\ndirection = [0, 0, 1]\nshape = \"prone\"\n").find("direction"),
+              std::string::npos);
+    EXPECT_NE(errorOf(scene + "direction = [0, 0, 0]\nshape = \"prone\"\n").find("must not be [0, 0, 0]"),
+              std::string::npos);
+    EXPECT_NE(errorOf(scene + "posture = \"upside-down\"\nshape = \"prone\"\n").find("supine"), std::string::npos);
+}
+
 TEST(Scene, CtIsRefusedWhereItCannotBe)
 {
     const auto refused = [](const std::string& more) {
