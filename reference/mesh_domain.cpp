@@ -29,7 +29,35 @@ using LabelDomain = CGAL::Labeled_mesh_domain_3<Kernel>;
 using Domain = CGAL::Mesh_domain_with_polyline_features_3<LabelDomain>;
 using Triangulation = CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation, Domain::Corner_index, Domain::Curve_index>;
-using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
+using CellCriteria = CGAL::Mesh_cell_criteria_3<Triangulation>;
+
+// Facets whose circumcircle is smaller than `least` are as they are: where tissues meet, the bound on their angles would
+// put points ever nearer to each other.
+class FacetCriteria : public CGAL::Mesh_facet_criteria_3<Triangulation> {
+public:
+    template <typename Size, typename Distance>
+    FacetCriteria(double angle, const Size& size, const Distance& distance, double least)
+        : Mesh_facet_criteria_3(angle, size, distance), least_(least)
+    {
+    }
+
+    Is_facet_bad operator()(const Triangulation& triangulation, const Triangulation::Facet& facet) const
+    {
+        const auto at = [&](int i) {
+            return facet.first->vertex(Triangulation::vertex_triple_index(facet.second, i))->point().point();
+        };
+        if (least_ > 0.0 && CGAL::squared_radius(at(0), at(1), at(2)) < least_ * least_) {
+            return {};
+        }
+        return Mesh_facet_criteria_3::operator()(triangulation, facet);
+    }
+
+private:
+    double least_;  // [mm]
+};
+
+using Criteria =
+    CGAL::Mesh_criteria_3<Triangulation, CGAL::Mesh_edge_criteria_3<Triangulation>, FacetCriteria, CellCriteria>;
 
 constexpr double inMillimetres = 1e3;  // CGAL's absolute tolerances are made for numbers about 1
 constexpr double surfaceError = 1e-7;  // of a point on a surface, fraction of the box's radius
@@ -37,6 +65,7 @@ constexpr double facetAngle = 25.0;    // smallest of a facet [degrees]
 constexpr double facetDistance =
     0.06;                             // of a facet's middle from the surface, fraction of the edge length: at the contact,
 constexpr double maxDistance = 0.15;  // and anywhere
+constexpr double minFacet = 0.1;      // circumradius of a facet that is refined, fraction of the shortest edge
 constexpr double cellShape = 2.0;     // radius of a circumsphere by the shortest edge, at most
 constexpr double cellRadius = 0.75;   // of a circumsphere, fraction of the edge length
 constexpr double facetRadius = 0.65;  // of a facet's surface ball, fraction of the edge length
@@ -163,19 +192,39 @@ TetMesh extract(const Complex& complex, const SmoothLabels& labels)
     return mesh;
 }
 
-Domain domainOf(const SmoothLabels& labels, CGAL::Random& random)
+Domain domainOf(const SmoothLabels& labels, double least, CGAL::Random& random)
 {
     const std::function<int(const Point&)> label = [&labels](const Point& p) { return regionAt(labels, toVec(p)) + 1; };
     const auto box = boxAround(labels);
     const std::function<bool(int)> outside = [](int subdomain) { return subdomain == 0; };
     Domain domain(label, Kernel::Iso_cuboid_3(box), surfaceError, outside, &random);
+    const Vec3 spacing = labels.affine.spacing();
+    const double voxel = std::max({spacing.x, spacing.y, spacing.z});
     std::vector<std::vector<Point>> lines;
-    for (const auto& line : sharpEdges(labels)) {
+    for (const auto& line : sharpEdges(labels, least / inMillimetres / voxel)) {
         lines.emplace_back();
         std::ranges::transform(line, std::back_inserter(lines.back()), toPoint);
     }
     domain.add_features(lines.begin(), lines.end());
     return domain;
+}
+
+// Of a facet that is refined, and of a line [mm]; nothing where tetrahedra are wanted too.
+double minOf(const MeshOptions& options, const RegionBounds& bounds)
+{
+    double shortest = options.size;
+    for (const double edge : bounds.edge) {
+        shortest = std::min(shortest, edge);
+    }
+    return options.surfacesOnly ? minFacet * inMillimetres * shortest : 0.0;
+}
+
+Criteria criteriaOf(const MeshOptions& options, const RegionBounds& bounds)
+{
+    const auto fraction = [&](double s) { return EdgeField{&options, &bounds, s}; };
+    return {CGAL::Mesh_edge_criteria_3<Triangulation>(fraction(1.0)),
+            FacetCriteria(facetAngle, fraction(facetRadius), DistanceField{&options, &bounds}, minOf(options, bounds)),
+            options.surfacesOnly ? CellCriteria(0.0, 0.0) : CellCriteria(cellShape, fraction(cellRadius))};
 }
 
 }  // namespace
@@ -186,12 +235,8 @@ std::optional<TetMesh> meshRegions(const SmoothLabels& labels, std::span<const R
     namespace param = CGAL::parameters;
     CGAL::get_default_random() = CGAL::Random(1);
     CGAL::Random random(1);
-    const Domain domain = domainOf(labels, random);
-    const auto fraction = [&](double s) { return EdgeField{&options, &bounds, s}; };
-    const Criteria criteria(param::edge_size = fraction(1.0), param::facet_angle = facetAngle,
-                            param::facet_size = fraction(facetRadius),
-                            param::facet_distance = DistanceField{&options, &bounds},
-                            param::cell_radius_edge_ratio = cellShape, param::cell_size = fraction(cellRadius));
+    const Domain domain = domainOf(labels, minOf(options, bounds), random);
+    const Criteria criteria = criteriaOf(options, bounds);
     Complex complex;
     CGAL::Mesh_3::internal::C3t3_initializer<Complex, Domain, Criteria, true>()(complex, domain, criteria, true);
     const auto box = domain.bbox();
@@ -204,6 +249,9 @@ std::optional<TetMesh> meshRegions(const SmoothLabels& labels, std::span<const R
     CGAL::refine_mesh_3(complex, domain, criteria, param::no_reset_c3t3(), param::no_perturb(), param::no_exude(), stop);
     if (stopped != CGAL::CGAL_MESH_3_NO_ERROR) {
         return std::nullopt;
+    }
+    if (options.surfacesOnly) {
+        return extract(complex, labels);
     }
     CGAL::perturb_mesh_3(complex, domain, param::time_limit = 0, param::sliver_bound = sliver);
     CGAL::exude_mesh_3(complex, param::time_limit = 0, param::sliver_bound = sliver);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <reference/label_pieces.h>
 #include <reference/mesher.h>
 #include <reference/smooth_labels.h>
 

@@ -2,6 +2,7 @@
 
 #include <reference/mesh_parts.h>
 #include <reference/mesh_quality.h>
+#include <reference/mesh_swap.h>
 #include <reference/surfaces.h>
 
 #include <glm/geometric.hpp>
@@ -10,13 +11,15 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 namespace palpate::reference {
 
 namespace {
 
-constexpr int passes = 6;
+constexpr int rounds = 4;           // of swaps and moves,
+constexpr int passes = 6;           // and of moves in each
 constexpr double firstStep = 0.25;  // of the mean edge at a point,
 constexpr double lastStep = 0.01;   // and where the search ends
 constexpr double smooth = 0.9;      // cosine between a facet's normal and the mean, from which on a surface is smooth
@@ -50,20 +53,15 @@ public:
     }
 
     // Worst angle of a tetrahedron, from 0 or 180 degrees; negative where it is flipped.
-    double worst(std::uint32_t tet) const
-    {
-        if (sixVolumes(mesh_, tet) <= 0.0) {
-            return -1.0;
-        }
-        const auto [low, high] = dihedralsOf(mesh_, tet);
-        return std::min(low, 180.0 - high);
-    }
+    double worst(std::uint32_t tet) const { return worstDihedral(mesh_, mesh_.tets[tet]); }
 
-    void move(std::uint32_t p)
+    // Whether it is elsewhere now.
+    bool move(std::uint32_t p)
     {
         if (fixed_[p] != 0) {
-            return;
+            return false;
         }
+        const Vec3 before = mesh_.points[p];
         static const std::vector<Vec3> to = directions();
         double best = worstAround(p);
         const double edge = meanEdge(p);
@@ -82,6 +80,7 @@ public:
             mesh_.points[p] = found;
             step *= found == from ? 0.5 : 1.0;
         }
+        return mesh_.points[p] != before;
     }
 
 private:
@@ -151,22 +150,41 @@ private:
 
 }  // namespace
 
-void improveAngles(TetMesh& mesh, double target, Moving moving)
+namespace {
+
+void movePoints(TetMesh& mesh, double target, Moving moving)
 {
     Improver improver(mesh, moving);
-    for (int pass = 0; pass < passes; ++pass) {
+    std::vector<std::uint32_t> look(mesh.tets.size());
+    std::iota(look.begin(), look.end(), 0U);
+    for (int pass = 0; pass < passes && !look.empty(); ++pass) {
         std::vector<std::pair<double, std::uint32_t>> bad;
-        for (std::uint32_t t = 0; t < mesh.tets.size(); ++t) {
+        for (const std::uint32_t t : look) {
             if (const double worst = improver.worst(t); worst < target) {
                 bad.emplace_back(worst, t);
             }
         }
         std::ranges::sort(bad);
+        look.clear();
         for (const auto& [angle, tet] : bad) {
+            bool moved = false;
             for (const std::uint32_t p : mesh.tets[tet]) {
-                improver.move(p);
+                moved = improver.move(p) || moved;
+            }
+            if (moved) {
+                look.push_back(tet);
             }
         }
+    }
+}
+
+}  // namespace
+
+void improveAngles(TetMesh& mesh, double target, Moving moving)
+{
+    movePoints(mesh, target, moving);
+    for (int round = 0; round < rounds && swapBad(mesh, target) > 0; ++round) {
+        movePoints(mesh, target, moving);
     }
 }
 

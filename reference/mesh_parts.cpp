@@ -79,7 +79,11 @@ std::vector<SortedFace> sortedFaces(const TetMesh& mesh)
 
 double sixVolumes(const TetMesh& mesh, std::size_t tet) noexcept
 {
-    const auto& t = mesh.tets[tet];
+    return sixVolumes(mesh, mesh.tets[tet]);
+}
+
+double sixVolumes(const TetMesh& mesh, const std::array<std::uint32_t, 4>& t) noexcept
+{
     const Vec3 a = mesh.points[t[0]];
     return glm::determinant(Mat3(mesh.points[t[1]] - a, mesh.points[t[2]] - a, mesh.points[t[3]] - a));
 }

@@ -24,6 +24,7 @@ std::vector<SortedFace> sortedFaces(const TetMesh& mesh);
 
 /// Six times the volume of a tetrahedron, positive when its points turn the right way [m^3].
 double sixVolumes(const TetMesh& mesh, std::size_t tet) noexcept;
+double sixVolumes(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept;
 /// Volume of each tissue [m^3] (rows x 1).
 std::vector<double> volumesOf(const TetMesh& mesh, std::span<const std::uint8_t> rows);
 /// Of all tetrahedra [degrees].

@@ -60,15 +60,13 @@ void measureEdges(const TetMesh& mesh, MeshQuality& q)
     }
 }
 
-}  // namespace
-
-std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noexcept
+std::pair<double, double> dihedralsOf(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept
 {
     std::array<Vec3, 4> normals;
     for (std::size_t side = 0; side < 4; ++side) {
         const auto& c = faceCorners[side];
-        const Vec3 a = mesh.points[mesh.tets[tet][c[0]]];
-        const Vec3 n = glm::cross(mesh.points[mesh.tets[tet][c[1]]] - a, mesh.points[mesh.tets[tet][c[2]]] - a);
+        const Vec3 a = mesh.points[tet[c[0]]];
+        const Vec3 n = glm::cross(mesh.points[tet[c[1]]] - a, mesh.points[tet[c[2]]] - a);
         const double length = glm::length(n);
         normals[side] = length > 0.0 ? n / length : Vec3(0.0);
     }
@@ -82,6 +80,22 @@ std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noex
     }
     const double degrees = 180.0 / std::numbers::pi;
     return {std::acos(std::clamp(high, -1.0, 1.0)) * degrees, std::acos(std::clamp(low, -1.0, 1.0)) * degrees};
+}
+
+}  // namespace
+
+std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noexcept
+{
+    return dihedralsOf(mesh, mesh.tets[tet]);
+}
+
+double worstDihedral(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept
+{
+    if (sixVolumes(mesh, tet) <= 0.0) {
+        return -1.0;
+    }
+    const auto [low, high] = dihedralsOf(mesh, tet);
+    return std::min(low, 180.0 - high);
 }
 
 MeshQuality qualityOf(const TetMesh& mesh, std::vector<TissueQuality> tissues, double edge)

@@ -3,6 +3,7 @@
 #include <reference/tet_mesh.h>
 #include <volume/tissue_table.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -42,6 +43,10 @@ struct MeshQuality {
 
 /// Least and largest dihedral angle of one tetrahedron [degrees].
 std::pair<double, double> dihedralsOf(const TetMesh& mesh, std::size_t tet) noexcept;
+
+/// Dihedral angle of a tetrahedron of these points that is nearest to 0 or 180 degrees, from there; -1 where it is flipped
+/// [degrees].
+double worstDihedral(const TetMesh& mesh, const std::array<std::uint32_t, 4>& tet) noexcept;
 
 /// @param tissues  with row, voxels and thickness; the rest is filled in
 /// @param edge     of the mesh's facets: what is thinner is thin [m]

@@ -1,5 +1,6 @@
 #include <reference/mesher.h>
 
+#include <reference/label_pieces.h>
 #include <reference/mesh_domain.h>
 #include <reference/mesh_parts.h>
 #include <reference/mixtures.h>
@@ -75,7 +76,7 @@ public:
             std::ranges::transform(thickness_, std::back_inserter(bounds_.distance),
                                    [&](double t) { return layerDistance / resolution * t; });
             out = once(resolution == resolutions.back() ? 0 : options_.most);
-            if (out && out->tets.size() <= options_.most) {
+            if (out && (options_.surfacesOnly || out->tets.size() <= options_.most)) {
                 break;
             }
         }

@@ -10,16 +10,18 @@ namespace palpate::reference {
 
 /// How fine a mesh is, and where.
 struct MeshOptions {
-    Vec3 from{0.0}, to{0.0};   // where the contact begins and ends, on the surface at rest [m]
-    double radius = 10e-3;     // around the line between them edges are as long as `size` [m]
-    double size = 1.5e-3;      // [m]
-    double growth = 0.25;      // how much longer edges are per metre further away [m/m]
-    double largest = 10e-3;    // [m]
-    double inside = 0;         // edges away from surfaces [m]; 0: as above
-    double layer = 2.0;        // edges in a region are at most so many times as long as it is thick
-    double resolution = 12.0;  // edges may be so many times as long as a tissue is thick before it is left out, or less
-    std::size_t most = 50000;  // tetrahedra: more, and thin tissues far from the contact are mixed with what they lie in
-    int volumePasses = 2;      // meshes made anew to keep the regions' volumes
+    Vec3 from{0.0}, to{0.0};    // where the contact begins and ends, on the surface at rest [m]
+    double radius = 10e-3;      // around the line between them edges are as long as `size` [m]
+    double size = 1.5e-3;       // [m]
+    double growth = 0.25;       // how much longer edges are per metre further away [m/m]
+    double largest = 10e-3;     // [m]
+    double inside = 0;          // edges away from surfaces [m]; 0: as above
+    double layer = 2.0;         // edges in a region are at most so many times as long as it is thick
+    double resolution = 12.0;   // edges may be so many times as long as a tissue is thick before it is left out, or less
+    std::size_t most = 50000;   // tetrahedra: more, and thin tissues far from the contact are mixed with what they lie in;
+                                // with `surfacesOnly` points
+    int volumePasses = 2;       // meshes made anew to keep the regions' volumes
+    bool surfacesOnly = false;  // tetrahedra are good for nothing but their faces between regions: those are not refined
 };
 
 /// A body as tetrahedra, and what was kept of it.

@@ -212,9 +212,26 @@ double lengthOf(const std::vector<Vec3>& line)
     return length;
 }
 
+// Makes one of the ends of lines that are shorter than this [samples], and takes them away.
+void contractShort(std::vector<std::vector<Vec3>>& lines, double shortest)
+{
+    const auto isShort = [&](const std::vector<Vec3>& line) {
+        return line.front() != line.back() && lengthOf(line) < shortest;
+    };
+    for (auto found = std::ranges::find_if(lines, isShort); found != lines.end();
+         found = std::ranges::find_if(lines, isShort)) {
+        const Vec3 from = found->back(), to = found->front();
+        lines.erase(found);
+        for (auto& line : lines) {
+            line.front() = line.front() == from ? to : line.front();
+            line.back() = line.back() == from ? to : line.back();
+        }
+    }
+}
+
 }  // namespace
 
-std::vector<std::vector<Vec3>> sharpEdges(const SmoothLabels& labels)
+std::vector<std::vector<Vec3>> sharpEdges(const SmoothLabels& labels, double shortest)
 {
     LineGraph graph;
     for (int side = 0; side < 6; ++side) {
@@ -224,6 +241,7 @@ std::vector<std::vector<Vec3>> sharpEdges(const SmoothLabels& labels)
     }
     graph.markCorners();
     auto lines = graph.lines();
+    contractShort(lines, shortest);
     std::erase_if(lines, [](const std::vector<Vec3>& line) {
         return lengthOf(line) < (line.front() == line.back() ? shortestRing : shortestLine);
     });

@@ -145,22 +145,30 @@ std::array<float, 2 * reach + 1> gaussian()
     return weights;
 }
 
+// Part of the samples: those that one tissue reaches.
+struct SampleBox {
+    Index3 low{0}, size{0};
+
+    std::size_t offset(Index3 n) const noexcept { return static_cast<std::size_t>((n.z * size.y + n.y) * size.x + n.x); }
+};
+
 // One axis of the blur. Beyond a flat side lies its mirror image; beyond the others, nothing.
-void blurAxis(const SmoothLabels& labels, int axis, std::vector<float>& values)
+void blurAxis(const SmoothLabels& labels, const SampleBox& box, int axis, std::vector<float>& values)
 {
     static const auto weights = gaussian();
-    const int count = labels.size[axis];
-    const bool mirrorLow = labels.flat[static_cast<std::size_t>(2 * axis)];
-    const bool mirrorHigh = labels.flat[static_cast<std::size_t>(2 * axis + 1)];
+    const int count = box.size[axis];
+    const bool mirrorLow = labels.flat[static_cast<std::size_t>(2 * axis)] && box.low[axis] == 0;
+    const bool mirrorHigh =
+        labels.flat[static_cast<std::size_t>(2 * axis + 1)] && box.low[axis] + count == labels.size[axis];
     std::size_t stride = 1;
     for (int a = 0; a < axis; ++a) {
-        stride *= static_cast<std::size_t>(labels.size[a]);
+        stride *= static_cast<std::size_t>(box.size[a]);
     }
     std::vector<float> line(static_cast<std::size_t>(count + 2 * reach));
-    Index3 last = labels.size - 1;
+    Index3 last = box.size - 1;
     last[axis] = 0;
     volume::forEachIndex(Index3(0), last, [&](Index3 n) {
-        float* at = values.data() + labels.offset(n) / labels.rows.size();
+        float* at = values.data() + box.offset(n);
         for (int i = -reach; i < count + reach; ++i) {
             const int mirrored = i < 0 ? -1 - i : i >= count ? 2 * count - 1 - i : i;
             const bool there = (i >= 0 || mirrorLow) && (i < count || mirrorHigh) && mirrored >= 0 && mirrored < count;
@@ -173,25 +181,61 @@ void blurAxis(const SmoothLabels& labels, int axis, std::vector<float>& values)
     });
 }
 
+// The samples that each region reaches.
+std::vector<SampleBox> boxesOf(const SoftVoxels& voxels, const SmoothLabels& labels)
+{
+    std::array<std::size_t, 256> region{};
+    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
+        region[labels.rows[r]] = r;
+    }
+    const Index3 shift = voxels.low - labels.low;
+    std::vector<Index3> low(labels.rows.size(), labels.size), high(labels.rows.size(), Index3(-1));
+    volume::forEachIndex(Index3(0), voxels.size - 1, [&](Index3 n) {
+        if (const std::uint8_t row = voxels.row[voxels.offset(n)]; row != 0) {
+            low[region[row]] = glm::min(low[region[row]], n + shift);
+            high[region[row]] = glm::max(high[region[row]], n + shift);
+        }
+    });
+    std::vector<SampleBox> boxes;
+    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
+        const Index3 from = glm::max(low[r] - reach, Index3(0));
+        boxes.push_back({from, glm::min(high[r] + reach, labels.size - 1) - from + 1});
+    }
+    return boxes;
+}
+
 void addShares(const SoftVoxels& voxels, SmoothLabels& labels)
 {
-    labels.fractions.assign(labels.offset({0, 0, labels.size.z}), 0);
-    std::vector<float> values(labels.fractions.size() / labels.rows.size());
+    const std::vector<SampleBox> boxes = boxesOf(voxels, labels);
     const Index3 shift = voxels.low - labels.low;
+    std::vector<std::vector<std::pair<std::size_t, std::uint16_t>>> of(labels.rows.size());  // samples and shares
+    labels.first.assign(labels.samples() + 1, 0);
     for (std::size_t r = 0; r < labels.rows.size(); ++r) {
-        std::fill(values.begin(), values.end(), 0.0F);
-        volume::forEachIndex(Index3(0), voxels.size - 1, [&](Index3 n) {
-            if (voxels.row[voxels.offset(n)] == labels.rows[r]) {
-                values[labels.offset(n + shift) / labels.rows.size()] = 1.0F;
-            }
+        const SampleBox& box = boxes[r];
+        std::vector<float> values(box.offset({0, 0, box.size.z}), 0.0F);
+        const Index3 low = glm::max(box.low, shift), high = glm::min(box.low + box.size, shift + voxels.size) - 1;
+        volume::forEachIndex(low, high, [&](Index3 n) {
+            values[box.offset(n - box.low)] = voxels.row[voxels.offset(n - shift)] == labels.rows[r] ? 1.0F : 0.0F;
         });
         for (int axis = 0; axis < 3; ++axis) {
-            blurAxis(labels, axis, values);
+            blurAxis(labels, box, axis, values);
         }
-        for (std::size_t i = 0; i < values.size(); ++i) {
-            labels.fractions[i * labels.rows.size() + r] =
-                static_cast<std::uint16_t>(std::lround(full * static_cast<double>(values[i])));
+        volume::forEachIndex(Index3(0), box.size - 1, [&](Index3 n) {
+            const auto fraction = std::lround(full * static_cast<double>(values[box.offset(n)]));
+            if (fraction > 0) {
+                of[r].emplace_back(labels.offset(n + box.low), static_cast<std::uint16_t>(fraction));
+                ++labels.first[of[r].back().first + 1];
+            }
+        });
+    }
+    std::partial_sum(labels.first.begin(), labels.first.end(), labels.first.begin());
+    labels.fractions.resize(labels.first.back());
+    std::vector<std::size_t> next(labels.first.begin(), labels.first.end() - 1);
+    for (std::size_t r = 0; r < of.size(); ++r) {
+        for (const auto& [sample, fraction] : of[r]) {
+            labels.fractions[next[sample]++] = {static_cast<std::uint8_t>(r), fraction};
         }
+        of[r] = {};
     }
 }
 
@@ -227,44 +271,93 @@ bool cornersAt(const SmoothLabels& labels, Vec3 q, Corners& c) noexcept
     return true;
 }
 
-double shareAt(const SmoothLabels& labels, const Corners& c, std::size_t row) noexcept
-{
-    double sum = 0.0;
-    for (std::size_t i = 0; i < 8; ++i) {
-        sum += c.weight[i] * labels.fractions[c.at[i] + row];
+// Regions at a place, in order, with their shares.
+struct SharesAt {
+    std::array<std::uint8_t, 256> region;
+    std::array<double, 256> fraction;
+    std::size_t count = 0;
+
+    void add(std::uint8_t r, double more) noexcept
+    {
+        std::size_t at = count;
+        while (at > 0 && region[at - 1] >= r) {
+            --at;
+        }
+        if (at == count || region[at] != r) {
+            std::copy_backward(region.begin() + at, region.begin() + count, region.begin() + count + 1);
+            std::copy_backward(fraction.begin() + at, fraction.begin() + count, fraction.begin() + count + 1);
+            region[at] = r;
+            fraction[at] = 0.0;
+            ++count;
+        }
+        fraction[at] += more;
     }
-    return sum / full;
+};
+
+void sharesAt(const SmoothLabels& labels, const Corners& c, SharesAt& out) noexcept
+{
+    out.count = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+        for (const auto& s : labels.at(c.at[i])) {
+            out.add(s.region, c.weight[i] * s.fraction);
+        }
+    }
+    for (std::size_t i = 0; i < out.count; ++i) {
+        out.fraction[i] /= full;
+    }
 }
 
 // Shares at eight points of every voxel near a border, and how many points the others have.
 struct BorderPoints {
-    std::vector<float> fractions;    // (points x rows)
-    std::vector<std::size_t> inner;  // points of voxels that are one tissue throughout (rows x 1)
+    struct Share {
+        std::uint8_t region = 0;
+        float fraction = 0.0F;
+    };
+    std::vector<std::size_t> first{0};  // of a point, in `shares` (points + 1)
+    std::vector<Share> fractions;
+    std::vector<std::vector<std::uint32_t>> with;  // points that a region is at (rows)
+    std::vector<std::size_t> inner;                // points of voxels that are one tissue throughout (rows x 1)
+
+    std::span<const Share> at(std::size_t point) const
+    {
+        return {fractions.data() + first[point], first[point + 1] - first[point]};
+    }
 };
 
 BorderPoints borderPoints(const SmoothLabels& labels)
 {
-    const std::size_t rows = labels.rows.size();
     BorderPoints out;
-    out.inner.assign(rows, 0);
+    out.inner.assign(labels.rows.size(), 0);
+    out.with.resize(labels.rows.size());
+    SharesAt here;
     volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
-        const auto* fraction = labels.fractions.data() + labels.offset(n);
-        const auto* top = std::max_element(fraction, fraction + rows);
-        if (*top >= pure * full) {
-            out.inner[static_cast<std::size_t>(top - fraction)] += 8;
+        std::uint16_t most = 0;
+        std::uint8_t top = 0;
+        double sum = 0.0;
+        for (const auto& s : labels.at(labels.offset(n))) {
+            top = s.fraction > most ? s.region : top;
+            most = std::max(most, s.fraction);
+            sum += s.fraction;
+        }
+        if (most >= pure * full) {
+            out.inner[top] += 8;
             return;
         }
-        if (std::accumulate(fraction, fraction + rows, 0.0) <= (1.0 - pure) * full) {
+        if (sum <= (1.0 - pure) * full) {
             return;
         }
         for (int i = 0; i < 8; ++i) {
             Corners c;
             const Vec3 part((i & 1) != 0 ? 0.25 : -0.25, (i & 2) != 0 ? 0.25 : -0.25, (i & 4) != 0 ? 0.25 : -0.25);
-            if (cornersAt(labels, Vec3(n) + part, c)) {
-                for (std::size_t r = 0; r < rows; ++r) {
-                    out.fractions.push_back(static_cast<float>(shareAt(labels, c, r)));
-                }
+            if (!cornersAt(labels, Vec3(n) + part, c)) {
+                continue;
             }
+            sharesAt(labels, c, here);
+            for (std::size_t k = 0; k < here.count; ++k) {
+                out.fractions.push_back({here.region[k], static_cast<float>(here.fraction[k])});
+                out.with[here.region[k]].push_back(static_cast<std::uint32_t>(out.first.size() - 1));
+            }
+            out.first.push_back(out.fractions.size());
         }
     });
     return out;
@@ -285,11 +378,13 @@ double biasStep(std::vector<double>& margins, double wanted)
 
 void fitBody(SmoothLabels& labels, const BorderPoints& points, double wanted)
 {
-    const std::size_t rows = labels.rows.size();
     std::vector<double> margins;
-    for (std::size_t i = 0; i < points.fractions.size(); i += rows) {
-        const auto from = points.fractions.begin() + static_cast<std::ptrdiff_t>(i);
-        margins.push_back(std::accumulate(from, from + static_cast<std::ptrdiff_t>(rows), 0.0) - 0.5 + labels.bodyBias);
+    for (std::size_t p = 0; p + 1 < points.first.size(); ++p) {
+        double sum = 0.0;
+        for (const auto& s : points.at(p)) {
+            sum += s.fraction;
+        }
+        margins.push_back(sum - 0.5 + labels.bodyBias);
     }
     const double inner = std::accumulate(points.inner.begin(), points.inner.end(), 0.0);
     labels.bodyBias = std::clamp(labels.bodyBias + biasStep(margins, wanted - inner), -maxBias, maxBias);
@@ -297,80 +392,25 @@ void fitBody(SmoothLabels& labels, const BorderPoints& points, double wanted)
 
 void fitRow(SmoothLabels& labels, const BorderPoints& points, std::size_t row, double wanted)
 {
-    const std::size_t rows = labels.rows.size();
     std::vector<double> margins;
-    for (std::size_t i = 0; i < points.fractions.size(); i += rows) {
-        double sum = 0.0, other = -1.0;
-        for (std::size_t r = 0; r < rows; ++r) {
-            const double fraction = points.fractions[i + r];
+    for (const std::uint32_t p : points.with[row]) {
+        double sum = 0.0, own = 0.0, other = -1.0;
+        for (const auto& s : points.at(p)) {
+            const double fraction = s.fraction;
             sum += fraction;
-            other = r == row ? other : std::max(other, fraction + labels.bias[r]);
+            if (s.region == row) {
+                own = fraction;
+            } else {
+                other = std::max(other, fraction + labels.bias[s.region]);
+            }
         }
         if (sum >= 0.5 - labels.bodyBias) {
-            margins.push_back(points.fractions[i + row] + labels.bias[row] - other);
+            margins.push_back(own + labels.bias[row] - other);
         }
     }
     const double step = biasStep(margins, wanted - static_cast<double>(points.inner[row]));
     labels.bias[row] = std::clamp(labels.bias[row] + step, -maxBias, maxBias);
 }
-
-// Pieces of one region among the samples, by flood.
-class Pieces {
-public:
-    explicit Pieces(const SmoothLabels& labels) : labels_(labels), region_(labels.fractions.size() / labels.rows.size())
-    {
-        volume::forEachIndex(Index3(0), labels.size - 1,
-                             [&](Index3 n) { region_[at(n)] = static_cast<std::int8_t>(regionAt(labels, position(n))); });
-    }
-
-    std::vector<RegionSeed> seeds(double least)
-    {
-        std::vector<RegionSeed> out;
-        volume::forEachIndex(Index3(0), labels_.size - 1, [&](Index3 n) {
-            if (region_[at(n)] >= 0) {
-                const RegionSeed seed = flood(n);
-                if (seed.volume >= least) {
-                    out.push_back(seed);
-                }
-            }
-        });
-        return out;
-    }
-
-private:
-    std::size_t at(Index3 n) const noexcept { return labels_.offset(n) / labels_.rows.size(); }
-    Vec3 position(Index3 n) const noexcept { return labels_.affine.toPatient(Vec3(n + labels_.low)); }
-
-    // Empties the piece around `from`; its sample with the largest share is the seed.
-    RegionSeed flood(Index3 from)
-    {
-        const std::int8_t region = region_[at(from)];
-        std::vector<Index3> queue{from};
-        region_[at(from)] = -1;
-        Index3 best = from;
-        for (std::size_t i = 0; i < queue.size(); ++i) {
-            const Index3 n = queue[i];
-            best = fraction(n, region) > fraction(best, region) ? n : best;
-            for (int side = 0; side < 6; ++side) {
-                Index3 next = n;
-                next[side / 2] += side % 2 == 0 ? -1 : 1;
-                if (next[side / 2] >= 0 && next[side / 2] < labels_.size[side / 2] && region_[at(next)] == region) {
-                    region_[at(next)] = -1;
-                    queue.push_back(next);
-                }
-            }
-        }
-        return {region, position(best), static_cast<double>(queue.size()) * labels_.affine.voxelVolume()};
-    }
-
-    std::uint16_t fraction(Index3 n, int region) const noexcept
-    {
-        return labels_.fractions[labels_.offset(n) + static_cast<std::size_t>(region)];
-    }
-
-    const SmoothLabels& labels_;
-    std::vector<std::int8_t> region_;  // of each sample; -1 outside, and where it was flooded
-};
 
 }  // namespace
 
@@ -441,15 +481,15 @@ int regionAt(const SmoothLabels& labels, Vec3 p) noexcept
         return -1;
     }
     const double distance = labels.within.empty() ? 0.0 : distanceToLine(p, labels.from, labels.to);
-    std::array<double, 256> fraction;
+    SharesAt here;
+    sharesAt(labels, c, here);
     double sum = 0.0, competing = 0.0;
-    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
-        fraction[r] = shareAt(labels, c, r);
-        sum += fraction[r];
-        if (!labels.within.empty() && distance > labels.within[r]) {
-            fraction[r] = 0.0;
+    for (std::size_t i = 0; i < here.count; ++i) {
+        sum += here.fraction[i];
+        if (!labels.within.empty() && distance > labels.within[here.region[i]]) {
+            here.fraction[i] = 0.0;
         }
-        competing += fraction[r];
+        competing += here.fraction[i];
     }
     if (sum < 0.5 - labels.bodyBias) {
         return -1;
@@ -458,38 +498,14 @@ int regionAt(const SmoothLabels& labels, Vec3 p) noexcept
     const double left = competing / sum;
     double best = -1.0;
     int region = labels.largest;
-    for (std::size_t r = 0; r < labels.rows.size(); ++r) {
-        if (fraction[r] > 0.0 && fraction[r] + left * labels.bias[r] > best) {
-            best = fraction[r] + left * labels.bias[r];
-            region = static_cast<int>(r);
+    for (std::size_t i = 0; i < here.count; ++i) {
+        const double score = here.fraction[i] + left * labels.bias[here.region[i]];
+        if (here.fraction[i] > 0.0 && score > best) {
+            best = score;
+            region = here.region[i];
         }
     }
     return region;
-}
-
-std::vector<double> thicknesses(const SmoothLabels& labels)
-{
-    std::vector<double> count(labels.rows.size(), 0.0), border(labels.rows.size(), 0.0);
-    const auto region = [&](Index3 n) { return regionAt(labels, labels.affine.toPatient(Vec3(labels.low + n))); };
-    volume::forEachIndex(Index3(0), labels.size - 1, [&](Index3 n) {
-        const int here = region(n);
-        if (here < 0) {
-            return;
-        }
-        count[static_cast<std::size_t>(here)] += 1.0;
-        for (int side = 0; side < 6; ++side) {
-            Index3 next = n;
-            next[side / 2] += side % 2 == 0 ? -1 : 1;
-            const bool inside = next[side / 2] >= 0 && next[side / 2] < labels.size[side / 2];
-            border[static_cast<std::size_t>(here)] += !inside || region(next) != here ? 1.0 : 0.0;
-        }
-    });
-    const Vec3 spacing = labels.affine.spacing();
-    const double voxel = std::min({spacing.x, spacing.y, spacing.z});
-    for (std::size_t r = 0; r < count.size(); ++r) {
-        count[r] = border[r] > 0.0 ? 2.0 * voxel * count[r] / border[r] : voxel;
-    }
-    return count;
 }
 
 double distanceToLine(Vec3 p, Vec3 from, Vec3 to) noexcept
@@ -498,11 +514,6 @@ double distanceToLine(Vec3 p, Vec3 from, Vec3 to) noexcept
     const double square = glm::dot(along, along);
     const double t = square > 0.0 ? std::clamp(glm::dot(p - from, along) / square, 0.0, 1.0) : 0.0;
     return glm::distance(p, from + t * along);
-}
-
-std::vector<RegionSeed> regionSeeds(const SmoothLabels& labels, double least)
-{
-    return Pieces(labels).seeds(least);
 }
 
 }  // namespace palpate::reference

@@ -17,19 +17,26 @@ namespace palpate::reference {
 /// across a voxel axis, as phantoms and cropped scans do, the voxels are mirrored in that plane, and the body is cut by it:
 /// faces stay exactly where they are, and the edges between them sharp.
 ///
-///     shares  sample (i, j, k) is the voxel low + (i, j, k); rows run fastest, then x, then y, then z
+///     shares  sample (i, j, k) is the voxel low + (i, j, k); x runs fastest, then y, then z; of each sample the regions
+///             that are there, in order
 struct SmoothLabels {
-    volume::Affine affine;                 // of the voxels
-    Index3 low{0};                         // voxel of sample (0, 0, 0)
-    Index3 size{0};                        // samples along each axis
-    std::array<bool, 6> flat{};            // sides -i +i -j +j -k +k: the body ends half a voxel beyond the samples
-    std::vector<std::uint8_t> rows;        // of the tissue table: soft ones that are there   (rows x 1)
-    std::vector<std::uint16_t> fractions;  // of 65535                                        (samples x rows)
-    std::vector<double> bias;              // of each row's share                             (rows x 1)
-    double bodyBias = 0;                   // of all shares together
-    int largest = 0;                       // region with the most volume: others fill their place with it at last
-    std::vector<double> volume;            // of the voxels [m^3]                             (rows x 1)
-    int heldSide = -1;                     // of the six: where a body that nothing holds is held; -1 none
+    struct Share {
+        std::uint8_t region = 0;     // in `rows`
+        std::uint16_t fraction = 0;  // of 65535
+    };
+
+    volume::Affine affine;           // of the voxels
+    Index3 low{0};                   // voxel of sample (0, 0, 0)
+    Index3 size{0};                  // samples along each axis
+    std::array<bool, 6> flat{};      // sides -i +i -j +j -k +k: the body ends half a voxel beyond the samples
+    std::vector<std::uint8_t> rows;  // of the tissue table: soft ones that are there   (rows x 1)
+    std::vector<std::size_t> first;  // of each sample, in `shares`                     (samples + 1)
+    std::vector<Share> fractions;
+    std::vector<double> bias;    // of each row's share                             (rows x 1)
+    double bodyBias = 0;         // of all shares together
+    int largest = 0;             // region with the most volume: others fill their place with it at last
+    std::vector<double> volume;  // of the voxels [m^3]                             (rows x 1)
+    int heldSide = -1;           // of the six: where a body that nothing holds is held; -1 none
 
     // Where a region is one of its own: within this of a line [m] (rows x 1; empty: everywhere). Beyond, its neighbours
     // fill its place.
@@ -38,10 +45,14 @@ struct SmoothLabels {
 
     std::size_t offset(Index3 n) const noexcept
     {
-        return ((static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
-                    static_cast<std::size_t>(size.x) +
-                static_cast<std::size_t>(n.x)) *
-               rows.size();
+        return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size.y) + static_cast<std::size_t>(n.y)) *
+                   static_cast<std::size_t>(size.x) +
+               static_cast<std::size_t>(n.x);
+    }
+    std::size_t samples() const noexcept { return offset({0, 0, size.z}); }
+    std::span<const Share> at(std::size_t sample) const noexcept
+    {
+        return {fractions.data() + first[sample], first[sample + 1] - first[sample]};
     }
 };
 
@@ -59,18 +70,8 @@ void fitVolumes(SmoothLabels& labels, std::span<const double> wanted);
 
 /// Which of SmoothLabels::rows a point [m] belongs to; -1 outside.
 int regionAt(const SmoothLabels& labels, Vec3 p) noexcept;
-/// Twice the volume by the surface of each region, among the samples [m] (rows x 1).
-std::vector<double> thicknesses(const SmoothLabels& labels);
 /// Distance from a point to a line from one point to another [m].
 double distanceToLine(Vec3 p, Vec3 from, Vec3 to) noexcept;
-
-/// A point well inside each connected piece of each region, larger than `least` [m^3].
-struct RegionSeed {
-    int region = 0;
-    Vec3 point{0.0};    // [m]
-    double volume = 0;  // [m^3]
-};
-std::vector<RegionSeed> regionSeeds(const SmoothLabels& labels, double least);
 
 /// Whether a tissue stays where it is and so is no part of the mesh.
 bool isHeld(const volume::TissueRow& row) noexcept;

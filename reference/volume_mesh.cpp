@@ -1,5 +1,6 @@
 #include <reference/volume_mesh.h>
 
+#include <reference/label_pieces.h>
 #include <reference/mesh_improve.h>
 #include <reference/mesher.h>
 #include <reference/smooth_labels.h>
@@ -28,6 +29,7 @@ Surfaces surfacesByCgal(SmoothLabels& labels, const VolumeMeshOptions& options)
     cgal.inside = options.largest;
     cgal.most = options.most;
     cgal.volumePasses = options.volumePasses;
+    cgal.surfacesOnly = true;
     return surfacesOf(meshLabels(labels, cgal));
 }
 

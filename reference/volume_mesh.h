@@ -17,8 +17,8 @@ struct VolumeMeshOptions {
     double size = 3e-3;     // edges of facets [m]; shorter where a tissue is thin
     double largest = 7e-3;  // edges of tetrahedra away from facets [m]
     SurfaceKind surface = SurfaceKind::cgal;
-    std::size_t most = 400000;  // tetrahedra of CGAL's: more, and facets of thin tissues become coarser
-    int volumePasses = 2;       // surfaces made anew to keep the tissues' volumes
+    std::size_t most = 80000;  // points on surfaces by CGAL: more, and facets of thin tissues become coarser
+    int volumePasses = 2;      // surfaces made anew to keep the tissues' volumes
     TetGenOptions tetgen;
     std::function<void(const std::string&)> progress = [](const std::string&) {};
 };

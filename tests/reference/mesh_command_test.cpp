@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 namespace palpate::apps {
@@ -48,6 +49,32 @@ TEST(MeshCommand, PrintsQualityAndWritesMeshAndFigures)
         EXPECT_NE(o.out.find("\n" + tissue.at("tissue").get<std::string>() + " "), std::string::npos) << o.out;
     }
     EXPECT_NE(o.out.find("0 tetrahedra flipped"), std::string::npos) << o.out;
+}
+
+// SPL's abdomen on voxels of 4 mm: 95 labels of 15 tissues, most of them thinner than the mesh.
+TEST(MeshCommand, PatientKeepsItsVolumesAndGoodAngles)
+{
+    const std::string labels = PALPATE_TEST_DATA "/spl_abdomen_atlas/seg.nrrd";
+    if (!std::filesystem::exists(labels)) {
+        GTEST_SKIP() << "no test volumes in " << PALPATE_TEST_DATA << ": " << labels;
+    }
+    const Folder folder;
+    const Outcome import = Program("palpate", {"import", labels, "--map", "spl-abdomen", "--set", "699=air", "--voxel",
+                                               "4mm", "-o", folder / "patient.vdb"})
+                               .wait();
+    ASSERT_EQ(import.status, 0) << import.err;
+    const Outcome o = mesh({folder / "patient.vdb", "-o", folder / "m.vtu", "--size", "16", "--json", folder / "q.json"});
+    ASSERT_EQ(o.status, 0) << o.err;
+    const auto q = nlohmann::json::parse(readText(folder / "q.json"));
+    EXPECT_EQ(q.at("flipped"), 0);
+    EXPECT_EQ(q.at("faces_shared_by_more_than_two"), 0);
+    EXPECT_GT(q.at("least_dihedral_deg").get<double>(), 5.0);
+    EXPECT_EQ(q.at("tissues").size(), 15U);
+    for (const auto& tissue : q.at("tissues")) {
+        EXPECT_TRUE(tissue.at("thickness_mm").get<double>() < 6.0 ||
+                    std::abs(tissue.at("volume_error_pct").get<double>()) < 1.0)
+            << tissue;
+    }
 }
 
 TEST(MeshCommand, BadInputIsOneLine)

@@ -1,12 +1,13 @@
-#include <datasets/phantom.h>
 #include <datasets/tables.h>
 #include <reference/box_mesh.h>
 #include <reference/ccx.h>
 #include <reference/mesh_files.h>
+#include <reference/mesh_improve.h>
 #include <reference/mesh_parts.h>
+#include <reference/mesh_quality.h>
+#include <reference/mesh_swap.h>
 #include <reference/surfaces.h>
 #include <reference/tetgen_mesh.h>
-#include <reference/volume_mesh.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -26,6 +27,7 @@
 #include <fstream>
 #include <map>
 #include <numbers>
+#include <random>
 #include <set>
 
 namespace palpate::reference {
@@ -244,68 +246,89 @@ TEST(MeshQuality, CountsWhatIsFlippedAndSharedByThree)
     EXPECT_EQ(q.overShared, 1U);
 }
 
-volume::Tissue phantom(const std::string& name, double voxel, std::map<std::string, double> numbers)
+// Six tetrahedra a cell, points inside moved at random so that none turns over.
+TetMesh jittered(std::uint8_t inner, double most, std::uint32_t seed)
 {
-    datasets::PhantomSpec spec;
-    spec.name = name;
-    spec.voxel = voxel;
-    spec.numbers = std::move(numbers);
-    return datasets::makePhantom(spec, datasets::defaultTissues());
-}
-
-void expectGood(const MeshQuality& q)
-{
-    EXPECT_EQ(q.flipped, 0U);
-    EXPECT_EQ(q.overShared, 0U);
-    EXPECT_GT(q.minDihedral, 5.0);
-    EXPECT_GT(q.tets, 500U);
-    bool thick = false;
-    for (const TissueQuality& t : q.tissues) {
-        thick = thick || !t.thin;
-        EXPECT_TRUE(t.thin || std::abs(t.percent()) < 1.0) << int{t.row} << ": " << t.percent() << " %";
+    TetMesh mesh = cubeInCube(inner);
+    std::set<std::uint32_t> fixed;
+    for (const auto& f : surfacesOf(mesh, AllPoints::yes).facets) {
+        fixed.insert(f.points.begin(), f.points.end());
     }
-    EXPECT_TRUE(thick);
-}
-
-VolumeMesh meshed(const volume::Tissue& tissue, double size, SurfaceKind surface)
-{
-    VolumeMeshOptions options;
-    options.size = size;
-    options.largest = 3.0 * size;
-    options.surface = surface;
-    options.tetgen = tetgen();
-    VolumeMesh made = meshVolume(tissue, options);
-    expectGood(made.quality);
-    // One region per tissue: every tissue of the voxels, bone too.
-    const std::set<std::uint8_t> rows(made.mesh.tissue.begin(), made.mesh.tissue.end());
-    EXPECT_EQ(rows.size(), made.quality.tissues.size());
-    return made;
-}
-
-volume::Tissue smallBlock()
-{
-    return phantom("block", 2e-3,
-                   {{"width_mm", 40}, {"thickness_mm", 24}, {"tumour_diameter_mm", 14}, {"tumour_centre_mm", 12}});
-}
-
-TEST(VolumeMesh, OfABlockIsGoodAndGraded)
-{
-    const VolumeMesh made = meshed(smallBlock(), 6e-3, SurfaceKind::cgal);
-    EXPECT_GT(made.quality.longest, 9e-3);
-}
-
-TEST(VolumeMesh, WithoutTissueIsRefused)
-{
-    volume::TissueTable table = datasets::defaultTissues();
-    for (auto& row : table.rows) {
-        row.role = volume::Role::air;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> by(-most, most);
+    for (std::uint32_t p = 0; p < mesh.points.size(); ++p) {
+        const Vec3 from = mesh.points[p];
+        mesh.points[p] += fixed.contains(p) ? Vec3(0.0) : Vec3(by(random), by(random), by(random));
+        if (qualityOf(mesh, {}, 1.0).flipped > 0) {
+            mesh.points[p] = from;
+        }
     }
-    datasets::PhantomSpec spec;
-    spec.name = "block";
-    spec.voxel = 5e-3;
-    VolumeMeshOptions options;
-    options.tetgen = tetgen();
-    EXPECT_THROW(meshVolume(datasets::makePhantom(spec, table), options), std::runtime_error);
+    return mesh;
+}
+
+// Whatever is swapped, moved or contracted: the same place is filled, once, and no angle is worse than the worst before.
+TEST(MeshImprove, KeepsTheBodyAndRaisesTheWorstAngle)
+{
+    for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+        TetMesh mesh = jittered(2, 4e-3, seed);
+        const MeshQuality before = qualityOf(mesh, {}, 1.0);
+        ASSERT_LT(before.minDihedral, 5.0);
+        improveAngles(mesh, 20.0, Moving::surfaces);
+        const MeshQuality after = qualityOf(mesh, {}, 1.0);
+        EXPECT_GT(after.minDihedral, 12.0) << seed;
+        EXPECT_LT(after.largestDihedral, 168.0) << seed;
+        EXPECT_EQ(after.flipped + after.overShared, 0U);
+        const auto volume = volumesOf(mesh, std::array<std::uint8_t, 2>{1, 2});
+        EXPECT_NEAR(volume[0] + volume[1], 27e-6, 1e-15);
+        EXPECT_NEAR(volume[1], 1e-6, 2e-8);
+    }
+}
+
+// Without moves, and surfaces as they are, as long as no tetrahedron goes over to another tissue.
+TEST(MeshImprove, SwapsAloneLeaveSurfacesAndVolumes)
+{
+    TetMesh mesh = jittered(1, 4e-3, 9);
+    const auto facets = facetPlaces(surfacesOf(mesh));
+    const double before = qualityOf(mesh, {}, 1.0).minDihedral;
+    EXPECT_GT(swapBad(mesh, 15.0), 10U);
+    const MeshQuality after = qualityOf(mesh, {}, 1.0);
+    EXPECT_GT(after.minDihedral, before);
+    EXPECT_EQ(after.flipped + after.overShared, 0U);
+    EXPECT_EQ(facetPlaces(surfacesOf(mesh)), facets);
+    EXPECT_NEAR(volumesOf(mesh, std::array<std::uint8_t, 1>{1})[0], 27e-6, 1e-15);
+}
+
+// Two slivers in a plane of a cube, each a piece of its own tissue: one goes over to what it lies in, the last one stays.
+TEST(MeshImprove, SliversOfTheirOwnGoToTheirNeighbour)
+{
+    TetMesh mesh = cubeInCube(1);
+    std::size_t made = 0;
+    for (std::size_t t = 200; t < mesh.tets.size() && made < 2; t += 700, ++made) {
+        // The middle of an edge's opposite, nearly in the edge: a thin one, with three more around it.
+        const auto tet = mesh.tets[t];
+        Vec3 middle(0.0);
+        for (const auto p : tet) {
+            middle += 0.25 * mesh.points[p];
+        }
+        const Vec3 face = (mesh.points[tet[1]] + mesh.points[tet[2]] + mesh.points[tet[3]]) / 3.0;
+        mesh.points.push_back(face + 0.02 * (middle - face));
+        const auto fresh = static_cast<std::uint32_t>(mesh.points.size() - 1);
+        for (std::size_t i = 0; i < 4; ++i) {
+            auto part = tet;
+            part[i] = fresh;
+            (i == 0 ? mesh.tets[t] : mesh.tets.emplace_back()) = part;
+            if (i > 0) {
+                mesh.tissue.push_back(mesh.tissue[t]);
+            }
+        }
+        mesh.tissue[t] = 7;
+    }
+    ASSERT_EQ(made, 2U);
+    ASSERT_EQ(std::ranges::count(mesh.tissue, 7), 2);
+    swapBad(mesh, 4.0);
+    EXPECT_EQ(std::ranges::count(mesh.tissue, 7), 1);
+    const MeshQuality q = qualityOf(mesh, {}, 1.0);
+    EXPECT_EQ(q.flipped + q.overShared, 0U);
 }
 
 // A small mesh of two tissues, as every kind of file.
