@@ -100,7 +100,7 @@ bool Elastic::warmStart(ElasticResult& result) noexcept
     return true;
 }
 
-// Evaluates the tissue where goOn() led. False where that is up: then all is as when the call began.
+// Evaluates the tissue where warmStart() led. False where that is up: then all is as when the call began.
 bool Elastic::confirm(double start) noexcept
 {
     energy_ = tissueForce(Field::f, Field::d).energy;

@@ -112,7 +112,7 @@ struct Kernels {
     /// As apply(), for a law of finite strain: the mean deformation gradient F of each cell goes through the stable
     /// neo-Hookean energy  W = mu/2 (I_C - 3) - mu (J - 1) + (lambda + mu)/2 (J - 1)^2  (B. Smith, F. De Goes, T. Kim,
     /// "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018, without its origin barrier), which stays finite
-    /// when a cell inverts, and where I_C > 3 what the law adds to it (volume/law.h). The other modes have the energy above
+    /// when a cell inverts, and what the law adds to it (volume/law.h). The other modes have the energy above
     /// in axes that turn and stretch with the cell, F^T m for a mode m, so that a turn costs nothing. `inverse` is
     /// 1 / spacing [1/m].
     /// @returns  the energy [J]

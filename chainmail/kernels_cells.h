@@ -178,8 +178,8 @@ struct Finite {
         for (int i = 0; i < 3; ++i) {
             square += f[i][0] * f[i][0] + f[i][1] * f[i][1] + f[i][2] * f[i][2];
         }
-        // I, where it is more than 0.
-        const Lanes stretch = Law::ofShape ? square - 2.0F * (minors + determinant) : 2.0F * trace + square;
+        // I_C - 3 - 2 (J - 1), where it is more than 0.
+        const Lanes stretch = square - 2.0F * (minors + determinant);
         const Lanes more = stretch > 0.0F ? stretch : Lanes{};
         const volume::Stiffening<Lanes> beyond =
             Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, more);
@@ -190,10 +190,8 @@ struct Finite {
             for (int j = 0; j < 3; ++j) {
                 // Cofactor of F, less I: tr G I - G^T + cof G.
                 const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
-                p[i][j] = h8 * (mu * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor) +
-                                beyond.slope * (Law::ofShape ? f[i][j] - cofactor
-                                                : i == j     ? f[i][j] + 1.0F
-                                                             : f[i][j]));
+                p[i][j] =
+                    h8 * ((mu + beyond.slope) * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor));
             }
         }
         g[0].x = p[0][0];

@@ -10,8 +10,9 @@
 
 namespace palpate::volume {
 
-/// What tissue's energy has beyond mu/2 I at an invariant I = I_C - 3 >= 0, as its law says: W = mu/2 I + energy, and what
-/// keeps the volume. `Number` is float, double or a vector of floats: kernel, reference and studies call the same formulas.
+/// What tissue's energy has beyond mu/2 I at an invariant I >= 0, as its law says: W = mu/2 I + energy, and what keeps the
+/// volume. Where no volume changes, I = I_C - 3. `Number` is float, double or a vector of floats: kernel, reference and
+/// studies call the same formulas.
 template <typename Number>
 struct Stiffening {
     Number energy{};     // [as mu]
@@ -47,13 +48,12 @@ struct NeoHookean {
     static constexpr std::string_view name = "neo-hookean";
     static constexpr bool finite = true;
     static constexpr double work = 1.0;
-    static constexpr bool ofShape = false;
     static constexpr Reach reach{};
     bool operator==(const NeoHookean&) const = default;
 
     /// @param mu  shear modulus at rest [any unit of stress or stiffness]
     /// @param b   stiffening [-]
-    /// @param i   I_C - 3, not under 0 [-]
+    /// @param i   I, not under 0 [-]
     template <typename Number>
     [[gnu::always_inline]] static Stiffening<Number> beyond(Number mu, Number b, Number i) noexcept
     {
@@ -72,7 +72,6 @@ struct Exponential {
     static constexpr std::string_view name = "exponential";
     static constexpr bool finite = true;
     static constexpr double work = 1.1;
-    static constexpr bool ofShape = true;
     static constexpr Reach reach{2.0, 0.02};   // what hostile hands found to be enough for any b (test ElasticHostile)
     static constexpr float stiffensTo = 4.0F;  // largest b I
     bool operator==(const Exponential&) const = default;
@@ -105,8 +104,8 @@ struct Exponential {
 /// Goes, T. Kim, "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018) and what its beyond() adds. Its
 /// parameters are a tissue's Young's modulus, Poisson's ratio and stiffening b (TissueRow). A new law is a struct as these,
 /// and a place at the end of this list: scenes, the kernel, the reference and the planner go through it. `work` is what a
-/// node costs in a tick, in neo-Hookean's, and `reach` how straight its stress is. The kernel's cells take for I either
-/// I_C - 3, or, `ofShape`, I_C - 3 - 2 (J - 1), which a change of volume leaves as it is, but for its square.
+/// node costs in a tick, in neo-Hookean's, and `reach` how straight its stress is. The kernel's cells take for I what a
+/// change of volume leaves as it is, but for its square: I_C - 3 - 2 (J - 1).
 using Law = std::variant<SmallStrain, NeoHookean, Exponential>;
 inline constexpr std::size_t lawCount = std::variant_size_v<Law>;
 

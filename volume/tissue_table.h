@@ -43,7 +43,7 @@ struct TissueRow {
     Role role = Role::plain;      // what a core or a touch of it means
     double youngsModulus = 0;     // small strain [Pa]
     double poissonRatio = 0;      // [-]
-    double stiffening = 0;        // b of finite strain: the shear modulus begins to grow as 1 + b (I_C - 3), see law.h [-]
+    double stiffening = 0;        // b of finite strain: the shear modulus begins to grow as 1 + b I, see law.h [-]
     double density = 0;           // [kg/m^3]
     double compress = 0;          // ChainMail: shortest link, fraction of its rest length, in (0, 1]
     double stretch = 0;           // ChainMail: longest link, fraction of its rest length, >= 1
