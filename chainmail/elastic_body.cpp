@@ -1,6 +1,7 @@
 #include <chainmail/elastic_body.h>
 
 #include <chainmail/kernels.h>
+#include <volume/cell_mixture.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -142,6 +143,7 @@ private:
     Moduli upscaled(Index3 low) const
     {
         BlockMean mu, bulk, relaxed;
+        volume::StiffeningMean stiffening;
         Moduli mean;
         int filled = 0;
         volume::forEachIndex(low, low + 1, [&](Index3 c) {
@@ -151,7 +153,7 @@ private:
                 const double held = static_cast<double>(held_[at]);
                 mu.add(m, held);
                 bulk.add(static_cast<double>(fine_.lambda[at]) + 2.0 / 3.0 * m, held);
-                mean.stiffening += static_cast<double>(fine_.stiffening[at]);
+                stiffening.add(1.0, m, static_cast<double>(fine_.stiffening[at]));
                 mean.held += held;
                 double left = 1.0;
                 for (std::size_t i = 0; i < mean.relaxing.size() && relaxes(); ++i) {
@@ -169,7 +171,7 @@ private:
         for (double& weight : mean.relaxing) {
             weight *= sum > 0.0 ? gone / sum : 0.0;
         }
-        return {mu.modulus(), bulk.modulus(), mean.stiffening / cells, mean.held / cells, mean.relaxing};
+        return {mu.modulus(), bulk.modulus(), stiffening.mean(), mean.held / cells, mean.relaxing};
     }
 
     const CellLevel& fine_;

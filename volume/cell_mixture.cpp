@@ -22,7 +22,7 @@ void CellMixture::add(const TissueRow& row, double weight, double scale) noexcep
 {
     (row.fixed ? held_ : free_).add(weight, row.youngsModulus * scale);
     poisson_ += weight * row.poissonRatio;
-    stiffening_ += weight * row.stiffening;
+    stiffening_.add(weight, row.youngsModulus * scale, row.stiffening);
     for (std::size_t i = 0; i < relaxing_.size() && !row.fixed; ++i) {
         relaxing_[i] += weight * row.relaxation().weights[i];
     }
@@ -39,7 +39,7 @@ CellMaterial CellMixture::material() const noexcept
     CellMaterial material{static_cast<float>(tissue * modulus),
                           static_cast<float>(poisson_ / tissue),
                           static_cast<float>(held_.fraction / tissue),
-                          static_cast<float>(stiffening_ / tissue),
+                          static_cast<float>(stiffening_.mean()),
                           {}};
     for (std::size_t i = 0; i < relaxing_.size() && free_.fraction > 0.0; ++i) {
         material.relaxing[i] = static_cast<float>(relaxing_[i] / free_.fraction);

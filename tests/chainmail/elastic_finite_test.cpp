@@ -60,6 +60,19 @@ TEST(ElasticFinite, EnergyOfAStretchIsTheLaw)
     EXPECT_NEAR(cells.applyFinite(), stiffer * 220, 1e-5 * stiffer * 220);
 }
 
+// Pressure under a tool must not take stiffening away, nor give any.
+TEST(ElasticFinite, AChangeOfVolumeAloneDoesNotStiffen)
+{
+    for (const double scale : {0.8, 0.97, 1.0, 1.03, 1.2}) {
+        Cells cells({12, 6, 5});
+        cells.fill(2.0, 30.0);
+        cells.move([&](Index3 n) { return (scale - 1.0) * Vec3(n); });
+        const double without = cells.applyFinite();
+        cells.stiffen(100.0);
+        EXPECT_NEAR(cells.applyFinite(), without, 1e-6 * without) << scale;
+    }
+}
+
 // b < 0: the second term goes on along its tangent from I = 1: mu/4 b (2 I - 1).
 TEST(ElasticFinite, SofteningEndsAtItsBound)
 {

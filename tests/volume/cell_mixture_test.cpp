@@ -1,0 +1,87 @@
+#include <volume/cell_mixture.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <span>
+#include <vector>
+
+namespace palpate::volume {
+namespace {
+
+struct Part {
+    double fraction, modulus, b;
+};
+
+double meanOf(std::span<const Part> parts)
+{
+    StiffeningMean mean;
+    for (const Part& p : parts) {
+        mean.add(p.fraction, p.modulus, p.b);
+    }
+    return mean.mean();
+}
+
+// Strain of a part with the stress E e (1 + b e^2), e.g. of W = E/2 (e^2 + b/2 e^4).
+double strainAt(const Part& part, double stress)
+{
+    double e = stress / part.modulus;
+    for (int i = 0; i < 50; ++i) {
+        e -= (part.modulus * e * (1.0 + part.b * e * e) - stress) / (part.modulus * (1.0 + 3.0 * part.b * e * e));
+    }
+    return e;
+}
+
+// Layers one upon the other: stress over strain is E_R (1 + b_R e^2), with E_R the harmonic mean and b_R what the mean is,
+// times by how much more the softer layer is strained than the whole.
+TEST(StiffeningMean, OfLayersInSeriesIsWhatTheirStressHas)
+{
+    for (const auto& parts : {std::array<Part, 2>{{{0.5, 3e3, 0.0}, {0.5, 42e3, 18.0}}},
+                              std::array<Part, 2>{{{0.25, 3e3, 2.2}, {0.75, 10e3, 18.0}}},
+                              std::array<Part, 2>{{{0.9, 5e3, -0.2}, {0.1, 6e3, 7.0}}}}) {
+        double compliance = 0.0, more = 0.0;
+        for (const Part& p : parts) {
+            compliance += p.fraction / p.modulus;
+        }
+        for (const Part& p : parts) {
+            more += p.fraction * std::pow(1.0 / (compliance * p.modulus), 3);
+        }
+        const double stress = 1e-3 / compliance;  // at a strain of about a thousandth
+        double strain = 0.0;
+        for (const Part& p : parts) {
+            strain += p.fraction * strainAt(p, stress);
+        }
+        const double found = (stress * compliance / strain - 1.0) / (strain * strain);
+        EXPECT_NEAR(found, more * meanOf(parts), 1e-3 * more * std::max(1.0, std::abs(meanOf(parts))));
+    }
+}
+
+TEST(StiffeningMean, IsBetweenItsPartsAndTheSofterOneDecides)
+{
+    std::minstd_rand random(7);
+    std::uniform_real_distribution<double> unit(0.01, 1.0);
+    for (int trial = 0; trial < 1000; ++trial) {
+        std::vector<Part> parts;
+        double low = 1e9, high = -1e9;
+        for (int i = 0; i < 1 + trial % 5; ++i) {
+            parts.push_back({unit(random), 1e3 * std::pow(1e4, unit(random)), 20.0 * unit(random) - 0.25});
+            low = std::min(low, parts.back().b);
+            high = std::max(high, parts.back().b);
+        }
+        const double mean = meanOf(parts);
+        EXPECT_GE(mean, low - 1e-9);
+        EXPECT_LE(mean, high + 1e-9);
+        std::ranges::reverse(parts);
+        EXPECT_NEAR(meanOf(parts), mean, 1e-9);
+    }
+    // A tenth of fat in a cell of carcinoma: the cell's strain is the fat's.
+    EXPECT_LT(meanOf(std::array<Part, 2>{{{0.1, 3e3, 0.0}, {0.9, 42e3, 18.0}}}), 0.1);
+    EXPECT_NEAR(meanOf(std::array<Part, 2>{{{0.3, 3e3, 5.0}, {0.7, 42e3, 5.0}}}), 5.0, 1e-12);
+    EXPECT_EQ(meanOf({}), 0.0);
+}
+
+}  // namespace
+}  // namespace palpate::volume
