@@ -19,7 +19,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::array<std::pair<const char*, const char*>, 13> shownNames{
+constexpr std::array<std::pair<const char*, const char*>, 14> shownNames{
     {{"elastic", "Palpate, small strain"},
      {"elastic_finite", "Palpate, finite strain"},
      {"single_grid", "one grid, small strain"},
@@ -30,6 +30,7 @@ constexpr std::array<std::pair<const char*, const char*>, 13> shownNames{
      {"chainmail_navier", "ChainMail + elastic sweeps"},
      {"relaxation", "elastic sweeps alone"},
      {"tets_prefactored", "tetrahedra, factored before"},
+     {"tets_conforming", "conforming tetrahedra (TetGen), factored before"},
      {"xpbd", "XPBD, neo-Hookean"},
      {"bullet", "Bullet, neo-Hookean"},
      {"calculix", "CalculiX, neo-Hookean"}}};

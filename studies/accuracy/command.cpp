@@ -6,6 +6,7 @@
 #include <command/json.h>
 #include <command/progress.h>
 #include <session/open.h>
+#include <studies/accuracy/conforming.h>
 #include <studies/accuracy/deep.h>
 #include <studies/accuracy/figures.h>
 #include <studies/accuracy/installed_rivals.h>
@@ -20,6 +21,7 @@
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
+#include <iterator>
 #include <memory>
 #include <set>
 #include <stdexcept>
@@ -161,9 +163,20 @@ std::vector<Rival> allRivals(const Options& o)
     return rivals;
 }
 
+// Where palpate-mesh is installed: asked for by name, or all methods without --quick.
+void addConforming(const AccuracySubject& subject, const Options& o, std::vector<Baseline>& methods)
+{
+    const std::filesystem::path mesher = ourProgram("palpate-mesh");
+    const bool wanted = std::ranges::find(o.methods, "tets_conforming") != o.methods.end();
+    if (!mesher.empty() && (wanted || !o.quick)) {
+        std::ranges::move(conformingMethods(subject, mesher), std::back_inserter(methods));
+    }
+}
+
 std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, const Options& o)
 {
     std::vector<Baseline> methods = accuracyMethods(s.subject);
+    addConforming(s.subject, o, methods);
     for (const Rival& rival : rivals) {
         if (std::ranges::find(methods, rival.name, &Baseline::method) != methods.end()) {
             throw std::runtime_error(

@@ -161,7 +161,7 @@ void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)
     }
 }
 
-TrialResult compared(const RivalAnswer& answer, const LatticeTets& mesh, const AccuracySubject& subject,
+TrialResult compared(const RivalAnswer& answer, const TetBody& mesh, const AccuracySubject& subject,
                      const Reference& reference)
 {
     const PositionCells cells = positionCells(reference.position);
@@ -193,7 +193,7 @@ TrialResult compared(const RivalAnswer& answer, const LatticeTets& mesh, const A
     return result;
 }
 
-void answerPush(const Rival& rival, const LatticeTets& mesh, const AccuracySubject& subject,
+void answerPush(const Rival& rival, const TetBody& mesh, const AccuracySubject& subject,
                 std::span<const Reference* const> references, const fs::path& folder, double maxSeconds, AccuracyRun& run)
 {
     using Clock = std::chrono::steady_clock;
@@ -255,7 +255,7 @@ AccuracyRun runRival(const Rival& rival, double spacing, const std::string& scen
             fs::remove(folder / old);
         }
         const BaselineScene body = subject.scene();
-        const LatticeTets mesh = latticeTets(body.tissue, body.surface, spacing, body.poissonCap, maxPoints);
+        const TetBody mesh = latticeTets(body.tissue, body.surface, spacing, body.poissonCap, maxPoints);
         writeRivalPush(folder, scene, subject, mesh);
         answerPush(rival, mesh, subject, references, folder, maxSeconds, run);
     } catch (const std::runtime_error& e) {

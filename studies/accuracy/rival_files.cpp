@@ -33,7 +33,7 @@ json listOf(Vec3 v)
 }
 
 // The tissues' elastic constants, each once, and which of them each tetrahedron has.
-void addMaterials(json& push, const LatticeTets& mesh)
+void addMaterials(json& push, const TetBody& mesh)
 {
     std::map<std::pair<double, double>, std::size_t> found;
     json materials = json::array(), own = json::array();
@@ -50,7 +50,7 @@ void addMaterials(json& push, const LatticeTets& mesh)
     push["tet_material"] = std::move(own);
 }
 
-void addMesh(json& push, const LatticeTets& mesh)
+void addMesh(json& push, const TetBody& mesh)
 {
     json points = json::array(), held = json::array();
     for (std::size_t p = 0; p < mesh.points.size(); ++p) {
@@ -131,7 +131,7 @@ void checkRows(const std::filesystem::path& file, std::size_t rows, std::size_t 
 
 }  // namespace
 
-std::vector<std::array<std::uint32_t, 3>> outsideOf(const LatticeTets& mesh)
+std::vector<std::array<std::uint32_t, 3>> outsideOf(const TetBody& mesh)
 {
     using Face = std::array<std::uint32_t, 3>;
     constexpr std::array<std::array<std::size_t, 3>, 4> faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
@@ -158,7 +158,7 @@ std::vector<std::array<std::uint32_t, 3>> outsideOf(const LatticeTets& mesh)
 }
 
 void writeRivalPush(const std::filesystem::path& folder, const std::string& scene, const AccuracySubject& subject,
-                    const LatticeTets& mesh)
+                    const TetBody& mesh)
 {
     json push{{"palpate_push", format}, {"scene", scene}, {"density_kg_m3", density}};
     addPath(push, subject);

@@ -14,7 +14,7 @@ namespace palpate::studies {
 
 /// Triangles on the outside of tetrahedra, counterclockwise seen from outside, in the order of their tetrahedra.
 /// @param mesh  whose tetrahedra have det(b - a, c - a, d - a) > 0
-std::vector<std::array<std::uint32_t, 3>> outsideOf(const LatticeTets& mesh);
+std::vector<std::array<std::uint32_t, 3>> outsideOf(const TetBody& mesh);
 
 /// Writes `push.json` for a rival: mesh, materials, what is held, tool, its path tick by tick, looks. SI, patient frame
 /// LPS. docs/accuracy.md has the keys.
@@ -22,7 +22,7 @@ std::vector<std::array<std::uint32_t, 3>> outsideOf(const LatticeTets& mesh);
 /// @param scene   its name
 /// Throws std::runtime_error when the file cannot be written.
 void writeRivalPush(const std::filesystem::path& folder, const std::string& scene, const AccuracySubject& subject,
-                    const LatticeTets& mesh);
+                    const TetBody& mesh);
 
 /// What a rival found.
 struct RivalAnswer {

@@ -27,7 +27,7 @@ struct Pressed {
     TrialPlace place = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     TrialPath path = trialPath(*model.tissue, model.surface, place, trialTools()[0], 2e-3);
 
-    LatticeTets mesh(double spacing, double poissonCap) const
+    TetBody mesh(double spacing, double poissonCap) const
     {
         return latticeTets(*model.tissue, model.surface, spacing, poissonCap);
     }
@@ -65,7 +65,7 @@ volume::Tissue ballOfFat(double radius)
     return volume::Tissue::fromLabels(image, fatTable(), names, {});
 }
 
-double volumeOf(const LatticeTets& mesh)
+double volumeOf(const TetBody& mesh)
 {
     double sum = 0.0;
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
@@ -75,7 +75,7 @@ double volumeOf(const LatticeTets& mesh)
 }
 
 // How often each triangle occurs.
-std::map<std::array<std::uint32_t, 3>, int> trianglesOf(const LatticeTets& mesh)
+std::map<std::array<std::uint32_t, 3>, int> trianglesOf(const TetBody& mesh)
 {
     std::map<std::array<std::uint32_t, 3>, int> count;
     for (const auto& tet : mesh.tets) {
@@ -92,11 +92,11 @@ std::map<std::array<std::uint32_t, 3>, int> trianglesOf(const LatticeTets& mesh)
 }
 
 // A triangle inside belongs to two tetrahedra, one on the outside to one, and its points are points of the surface.
-TEST(LatticeTets, FillTheBlockAndMeetFaceToFace)
+TEST(TetBody, FillTheBlockAndMeetFaceToFace)
 {
     const auto& p = pressed();
     for (const double spacing : {2e-3, 3e-3}) {
-        const LatticeTets mesh = p.mesh(spacing, 0.49);
+        const TetBody mesh = p.mesh(spacing, 0.49);
         const Vec3 side = p.model.tissue->box().high - p.model.tissue->box().low;
         EXPECT_NEAR(volumeOf(mesh) / (side.x * side.y * side.z), 1.0, 0.08) << 1e3 * spacing << " mm";
         for (const auto& [face, count] : trianglesOf(mesh)) {
@@ -108,13 +108,13 @@ TEST(LatticeTets, FillTheBlockAndMeetFaceToFace)
 }
 
 // The volume of a ball is 4/3 pi r^3. On a staircase of 4 mm its surface would be up to 2 mm off.
-TEST(LatticeTets, TheSurfaceOfABallIsRound)
+TEST(TetBody, TheSurfaceOfABallIsRound)
 {
     constexpr double radius = 16e-3;
     constexpr double spacing = 4e-3;
     const volume::Tissue tissue = ballOfFat(radius);
     const auto surface = tissue.distanceToBody(volume::coveringGrid(tissue.box(), 1e-3, 6e-3));
-    const LatticeTets mesh = latticeTets(tissue, surface, spacing, 0.49);
+    const TetBody mesh = latticeTets(tissue, surface, spacing, 0.49);
     EXPECT_NEAR(volumeOf(mesh) / (4.0 / 3.0 * std::numbers::pi * std::pow(radius, 3)), 1.0, 0.06);
     double square = 0.0;
     std::size_t free = 0, held = 0;
@@ -133,9 +133,9 @@ TEST(LatticeTets, TheSurfaceOfABallIsRound)
     }
 }
 
-TEST(LatticeTets, APlaceIsWhereTheBarycentricSumSays)
+TEST(TetBody, APlaceIsWhereTheBarycentricSumSays)
 {
-    const LatticeTets mesh = pressed().mesh(3e-3, 0.49);
+    const TetBody mesh = pressed().mesh(3e-3, 0.49);
     for (const Vec3 rest : {Vec3(1.1e-3, 5.2e-3, -7.3e-3), Vec3(-9.7e-3, 0.4e-3, 3.9e-3), mesh.points[40]}) {
         const Vec3 found = valueAt(placeOf(mesh, rest), [&](std::uint32_t i) { return mesh.points[i]; });
         EXPECT_LT(glm::distance(found, rest), 1e-12);
@@ -144,14 +144,14 @@ TEST(LatticeTets, APlaceIsWhereTheBarycentricSumSays)
     EXPECT_LT(glm::distance(above, Vec3(0.0)), 1e-3);
 }
 
-TEST(LatticeTets, TooManyPointsAreRefused)
+TEST(TetBody, TooManyPointsAreRefused)
 {
     const auto& p = pressed();
     EXPECT_THROW(latticeTets(*p.model.tissue, p.model.surface, 1e-3, 0.49, 1000), std::runtime_error);
 }
 
 // The mesh with its inner points moved about, and all of its surface held.
-LatticeTets shaken(LatticeTets mesh)
+TetBody shaken(TetBody mesh)
 {
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
         const double n = static_cast<double>(i);
@@ -166,7 +166,7 @@ LatticeTets shaken(LatticeTets mesh)
 }
 
 // Which unknown each point is.
-std::vector<std::uint32_t> unknownsOf(const LatticeTets& mesh, std::size_t& count)
+std::vector<std::uint32_t> unknownsOf(const TetBody& mesh, std::size_t& count)
 {
     std::vector<std::uint32_t> unknown;
     for (std::size_t i = 0; i < mesh.points.size(); ++i) {
@@ -177,7 +177,7 @@ std::vector<std::uint32_t> unknownsOf(const LatticeTets& mesh, std::size_t& coun
 }
 
 // Forces on the free points when the held ones go to G x.
-std::vector<double> loadsBy(const Mat3& gradient, const LatticeTets& mesh, const std::vector<std::uint32_t>& unknown,
+std::vector<double> loadsBy(const Mat3& gradient, const TetBody& mesh, const std::vector<std::uint32_t>& unknown,
                             std::size_t rows)
 {
     std::vector<double> loads(rows, 0.0);
@@ -202,7 +202,7 @@ std::vector<double> loadsBy(const Mat3& gradient, const LatticeTets& mesh, const
 // the gradients, the stiffness and the solver to be right, for several right sides at once.
 TEST(TetFactor, PassesThePatchTest)
 {
-    const LatticeTets mesh = shaken(pressed().mesh(2e-3, 0.45));
+    const TetBody mesh = shaken(pressed().mesh(2e-3, 0.45));
     const std::array<Mat3, 2> gradients{Mat3(1e-3, 2e-3, -3e-3, 4e-3, 5e-3, 6e-3, -7e-3, 8e-3, 9e-3), Mat3(0.01)};
     std::size_t count = 0;
     const std::vector<std::uint32_t> unknown = unknownsOf(mesh, count);
@@ -222,7 +222,7 @@ TEST(TetFactor, PassesThePatchTest)
 
 TEST(TetFactor, WhatNothingHoldsIsRefused)
 {
-    LatticeTets mesh = pressed().mesh(3e-3, 0.45);
+    TetBody mesh = pressed().mesh(3e-3, 0.45);
     std::ranges::fill(mesh.held, std::uint8_t{0});
     EXPECT_THROW(FactoredTets(std::move(mesh), pressed().path), std::runtime_error);
 }
@@ -313,7 +313,7 @@ TEST(Xpbd, ABodyAtRestStaysThere)
 // What tetrahedra do to each other cancels: a free body that is not damped keeps its momentum while it quivers.
 TEST(Xpbd, TetrahedraKeepTheMomentum)
 {
-    LatticeTets mesh = pressed().mesh(3e-3, 0.45);
+    TetBody mesh = pressed().mesh(3e-3, 0.45);
     std::ranges::fill(mesh.held, std::uint8_t{0});
     Xpbd tets(std::move(mesh), {.substeps = 10, .damping = 0.0});
     for (std::size_t i = 0; i < tets.velocities().size(); ++i) {
@@ -330,7 +330,7 @@ TEST(Xpbd, TetrahedraKeepTheMomentum)
 }
 
 // Presses slowly, then waits until nothing moves any more.
-Xpbd settled(const LatticeTets& mesh, double depth, int substeps)
+Xpbd settled(const TetBody& mesh, double depth, int substeps)
 {
     const auto& p = pressed();
     Xpbd tets(mesh, {.substeps = substeps, .damping = 200.0});
@@ -345,7 +345,7 @@ Xpbd settled(const LatticeTets& mesh, double depth, int substeps)
 }
 
 // Elastic force on each point: minus the sum of V P g, P = mu F + l (J - 1 - mu / l) cof F.
-std::vector<Vec3> elasticForces(const LatticeTets& mesh, std::span<const Vec3f> u)
+std::vector<Vec3> elasticForces(const TetBody& mesh, std::span<const Vec3f> u)
 {
     std::vector<Vec3> force(mesh.points.size(), Vec3(0.0));
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
@@ -369,7 +369,7 @@ std::vector<Vec3> elasticForces(const LatticeTets& mesh, std::span<const Vec3f> 
 TEST(Xpbd, SettlesAtTheEquilibriumOfTheEnergy)
 {
     const auto& p = pressed();
-    const LatticeTets mesh = p.mesh(3e-3, 0.45);
+    const TetBody mesh = p.mesh(3e-3, 0.45);
     std::vector<double> off;
     for (const int substeps : {5, 20}) {
         const Xpbd tets = settled(mesh, 3e-3, substeps);
@@ -395,7 +395,7 @@ TEST(Xpbd, SettlesAtTheEquilibriumOfTheEnergy)
 TEST(Xpbd, IsLinearElasticityWhereStrainsAreSmall)
 {
     const auto& p = pressed();
-    const LatticeTets mesh = p.mesh(3e-3, 0.45);
+    const TetBody mesh = p.mesh(3e-3, 0.45);
     constexpr double depth = 0.15e-3;
     const Xpbd tets = settled(mesh, depth, 20);
     FactoredTets linear(mesh, p.path);

@@ -26,7 +26,7 @@ using tests::Folder;
 // The small block under the path's sphere, a mesh of it, and a stand-in reference: its grid of 4 mm, nearly converged.
 struct Pushed {
     AccuracySubject subject = accuracySubject(std::make_shared<const haptics::SessionModel>(smallBlock()));
-    LatticeTets mesh = latticeTets(*subject.model->tissue, subject.model->surface, 4e-3, 0.49);
+    TetBody mesh = latticeTets(*subject.model->tissue, subject.model->surface, 4e-3, 0.49);
     TrialBody body = trialBody(*subject.model->tissue, subject.model->surface, 4e-3, 0.49, 1U << 20);
     std::array<double, 1> speeds{subject.speed};
     Reference reference = solveReference(body.body, subject.path, speeds, {.tolerance = 1e-3, .maxCycles = 50});
@@ -76,7 +76,7 @@ AccuracyRun runOf(const std::string& command, const Folder& folder, double maxSe
 // By the theorem of Gauss a closed surface that looks outwards encloses the sum of the tetrahedra's volumes.
 TEST(Rival, TheOutsideEnclosesTheTetrahedra)
 {
-    const LatticeTets& mesh = pushed().mesh;
+    const TetBody& mesh = pushed().mesh;
     double inside = 0.0, enclosed = 0.0;
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
         inside += shapeOf(mesh, t).volume;
@@ -102,7 +102,7 @@ TEST(Rival, ThePushHasTheSceneAsOurMethodsHaveIt)
     writeRivalPush(folder.path(), "small", pushed().subject, pushed().mesh);
     std::ifstream in(folder / "push.json");
     const json push = json::parse(in);
-    const LatticeTets& mesh = pushed().mesh;
+    const TetBody& mesh = pushed().mesh;
     EXPECT_EQ(push["palpate_push"], 1);
     ASSERT_EQ(push["points_m"].size(), mesh.points.size());
     ASSERT_EQ(push["tets"].size(), mesh.tets.size());

@@ -31,7 +31,7 @@ double distanceToSegment(Vec3 p, Vec3 a, Vec3 b)
 
 }  // namespace
 
-FactoredTets::FactoredTets(LatticeTets mesh, const TrialPath& path) : mesh_(std::move(mesh))
+FactoredTets::FactoredTets(TetBody mesh, const TrialPath& path) : mesh_(std::move(mesh))
 {
     if (path.tool.kind != TrialKind::sphere) {
         throw std::runtime_error("prefactored tetrahedra: " + path.tool.name + " is no sphere; press with a sphere");
@@ -221,7 +221,7 @@ Vec3 FactoredTets::force() const
     return sum;
 }
 
-TrialModel factoredModel(LatticeTets mesh, const TrialPath& path)
+TrialModel factoredModel(TetBody mesh, const TrialPath& path)
 {
     auto tets = std::make_shared<FactoredTets>(std::move(mesh), path);
     return {[tets](const TrialLoad& load) { return tets->press(load.path().at(load.pose()), load.path().tool.radius); },

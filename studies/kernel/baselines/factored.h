@@ -30,14 +30,14 @@ public:
     };
 
     /// Throws std::runtime_error when the path's tool is no sphere or meets no point, and what TetFactor throws.
-    FactoredTets(LatticeTets mesh, const TrialPath& path);
+    FactoredTets(TetBody mesh, const TrialPath& path);
 
     chainmail::ElasticResult press(Vec3 centre, double radius);
     Vec3 displacement(Vec3 rest) const;  // [m]
     Vec3 force() const;                  // on the tool [N]
     std::size_t touched() const noexcept { return touched_; }
     std::span<const Contact> contacts() const noexcept { return contacts_; }  // points that may be met
-    const LatticeTets& mesh() const noexcept { return mesh_; }
+    const TetBody& mesh() const noexcept { return mesh_; }
 
 private:
     // A contact that pushes, or that is inside.
@@ -55,7 +55,7 @@ private:
     void addColumns();
     Vec3 pointAt(std::uint32_t p) const noexcept;
 
-    LatticeTets mesh_;
+    TetBody mesh_;
     std::vector<std::uint32_t> unknown_;  // of each point, TetFactor::held for held ones
     std::size_t unknowns_ = 0;            // points
     std::vector<Contact> contacts_;
@@ -68,6 +68,6 @@ private:
     bool atRest_ = true;
 };
 
-TrialModel factoredModel(LatticeTets mesh, const TrialPath& path);
+TrialModel factoredModel(TetBody mesh, const TrialPath& path);
 
 }  // namespace palpate::studies

@@ -14,7 +14,7 @@ constexpr std::size_t maxFactored = 30000;  // points: minutes to factor
 constexpr std::size_t maxStepped = 400000;
 constexpr double unlocked = 0.45;  // Poisson's ratio at which linear tetrahedra do not lock yet
 
-LatticeTets meshOf(const BaselineScene& scene, double spacing, double poissonCap, std::size_t maxPoints)
+TetBody meshOf(const BaselineScene& scene, double spacing, double poissonCap, std::size_t maxPoints)
 {
     return latticeTets(scene.tissue, scene.surface, spacing, poissonCap, maxPoints);
 }

@@ -28,7 +28,7 @@ void addBlock(const Mat3& block, std::uint32_t p, std::uint32_t q, std::vector<E
 
 }  // namespace
 
-TetFactor::TetFactor(const LatticeTets& mesh, std::span<const std::uint32_t> unknown, std::size_t unknowns)
+TetFactor::TetFactor(const TetBody& mesh, std::span<const std::uint32_t> unknown, std::size_t unknowns)
     : impl_(std::make_unique<Impl>())
 {
     std::vector<Eigen::Triplet<double>> entries;

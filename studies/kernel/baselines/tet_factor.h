@@ -15,7 +15,7 @@ public:
 
     /// @param unknown  number of each point, `held` for those that do not move (count x 1)
     /// Throws std::runtime_error when the matrix is not positive definite: nothing holds the body.
-    TetFactor(const LatticeTets& mesh, std::span<const std::uint32_t> unknown, std::size_t unknowns);
+    TetFactor(const TetBody& mesh, std::span<const std::uint32_t> unknown, std::size_t unknowns);
     ~TetFactor();
 
     /// Solves for several right sides at once, in place.

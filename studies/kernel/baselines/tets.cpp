@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -51,7 +52,7 @@ public:
         std::ranges::transform(rows, full_.begin(), [](std::uint8_t row) { return row != 0 ? 1 : 0; });
     }
 
-    LatticeTets cut(const volume::DistanceField& surface)
+    TetBody cut(const volume::DistanceField& surface)
     {
         hold();
         dropLoose();
@@ -223,6 +224,8 @@ private:
         mesh_.tets.resize(kept);
         mesh_.mu.resize(kept);
         mesh_.lambda.resize(kept);
+        mesh_.inCell.resize(kept);
+        std::iota(mesh_.inCell.begin(), mesh_.inCell.end(), 0U);
         for (std::size_t p = 0; p < used.size(); ++p) {
             mesh_.held[p] = used[p] != 0 ? mesh_.held[p] : 1;
         }
@@ -235,7 +238,7 @@ private:
     std::vector<std::uint8_t> full_;     // by cell
     std::vector<std::uint8_t> held_;     // by corner
     std::vector<std::uint32_t> number_;  // of the point at a corner
-    LatticeTets mesh_;
+    TetBody mesh_;
 };
 
 // The best tetrahedron so far: the one whose least coordinate is largest.
@@ -245,14 +248,15 @@ struct Nearest {
     std::array<double, 4> weights{};
 };
 
-void lookIn(const LatticeTets& mesh, Index3 cell, Vec3 rest, Nearest& best)
+void lookIn(const TetBody& mesh, Index3 cell, Vec3 rest, Nearest& best)
 {
     const auto& g = mesh.corners;
     if (!g.contains(cell)) {
         return;
     }
     const std::size_t at = g.offset(cell);
-    for (std::size_t t = mesh.first[at]; t < mesh.first[at + 1]; ++t) {
+    for (std::size_t i = mesh.first[at]; i < mesh.first[at + 1]; ++i) {
+        const std::uint32_t t = mesh.inCell[i];
         const auto& p = mesh.tets[t];
         const Vec3 a = mesh.points[p[1]] - mesh.points[p[0]];
         const Vec3 b = mesh.points[p[2]] - mesh.points[p[0]];
@@ -270,20 +274,20 @@ void lookIn(const LatticeTets& mesh, Index3 cell, Vec3 rest, Nearest& best)
 
 }  // namespace
 
-bool LatticeTets::moves(std::size_t tet) const noexcept
+bool TetBody::moves(std::size_t tet) const noexcept
 {
     return std::ranges::any_of(tets[tet], [&](std::uint32_t p) { return held[p] == 0; });
 }
 
-LatticeTets latticeTets(const volume::Tissue& tissue, const volume::DistanceField& surface, double spacing,
-                        double poissonCap, std::size_t maxPoints)
+TetBody latticeTets(const volume::Tissue& tissue, const volume::DistanceField& surface, double spacing, double poissonCap,
+                    std::size_t maxPoints)
 {
     const auto cells = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
     if (cells.count() / 2 > maxPoints) {
         throw std::runtime_error(fmt::format("{} cells of {:g} mm: too many for {} points; take a larger spacing",
                                              cells.count(), 1e3 * spacing, maxPoints));
     }
-    LatticeTets mesh = Cutter(tissue, cells, poissonCap).cut(surface);
+    TetBody mesh = Cutter(tissue, cells, poissonCap).cut(surface);
     if (mesh.tets.empty()) {
         throw std::runtime_error(
             fmt::format("no cell of {:g} mm is half full of tissue and held; take a smaller spacing", 1e3 * spacing));
@@ -295,7 +299,7 @@ LatticeTets latticeTets(const volume::Tissue& tissue, const volume::DistanceFiel
     return mesh;
 }
 
-TetShape shapeOf(const LatticeTets& mesh, std::size_t tet)
+TetShape shapeOf(const TetBody& mesh, std::size_t tet)
 {
     const auto& t = mesh.tets[tet];
     const auto edge = [&](std::size_t i) { return mesh.points[t[i]] - mesh.points[t[0]]; };
@@ -310,7 +314,7 @@ TetShape shapeOf(const LatticeTets& mesh, std::size_t tet)
 }
 
 // lambda a b^T + mu (b a^T + a.b I), a and b the gradients.
-std::array<std::array<Mat3, 4>, 4> stiffnessOf(const LatticeTets& mesh, std::size_t tet)
+std::array<std::array<Mat3, 4>, 4> stiffnessOf(const TetBody& mesh, std::size_t tet)
 {
     const TetShape shape = shapeOf(mesh, tet);
     std::array<std::array<Mat3, 4>, 4> out;
@@ -324,7 +328,7 @@ std::array<std::array<Mat3, 4>, 4> stiffnessOf(const LatticeTets& mesh, std::siz
     return out;
 }
 
-TetPlace placeOf(const LatticeTets& mesh, Vec3 rest)
+TetPlace placeOf(const TetBody& mesh, Vec3 rest)
 {
     constexpr double inside = -1e-9;
     const auto& g = mesh.corners;

@@ -20,7 +20,7 @@ constexpr std::size_t colours = 8 * tetsPerCell;
 
 }  // namespace
 
-Xpbd::Xpbd(LatticeTets mesh, const XpbdOptions& options)
+Xpbd::Xpbd(TetBody mesh, const XpbdOptions& options)
     : mesh_(std::move(mesh)), options_(options), substep_(static_cast<float>(options.tick / options.substeps))
 {
     const std::size_t count = mesh_.points.size() + 1;
@@ -258,7 +258,7 @@ Vec3 Xpbd::momentum() const
     return sum;
 }
 
-TrialModel xpbdModel(LatticeTets mesh, const XpbdOptions& options)
+TrialModel xpbdModel(TetBody mesh, const XpbdOptions& options)
 {
     auto tets = std::make_shared<Xpbd>(std::move(mesh), options);
     return {[tets](const TrialLoad& load) { return tets->step(load.path().at(load.pose()), load.path().tool.radius); },

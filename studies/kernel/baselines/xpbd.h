@@ -30,7 +30,7 @@ struct XpbdOptions {
 /// and Games 2021; M. Macklin et al., "Small Steps in Physics Simulation", Symposium on Computer Animation 2019.
 class Xpbd {
 public:
-    Xpbd(LatticeTets mesh, const XpbdOptions& options);
+    Xpbd(TetBody mesh, const XpbdOptions& options);
 
     /// One tick in which the sphere goes from where it was to `centre` [m]; without a radius there is none.
     chainmail::ElasticResult step(Vec3 centre, double radius);
@@ -39,7 +39,7 @@ public:
     double energy() const;                 // of the tissue [J]
     Vec3 momentum() const;                 // [kg m/s]
     std::size_t touched() const noexcept { return touched_; }
-    const LatticeTets& mesh() const noexcept { return mesh_; }
+    const TetBody& mesh() const noexcept { return mesh_; }
     std::span<Vec3f> velocities() noexcept { return std::span(velocity_).first(mesh_.points.size()); }
     std::span<const Vec3f> displacements() const noexcept { return std::span(u_).first(mesh_.points.size()); }
 
@@ -62,7 +62,7 @@ private:
     void project(const Batch& batch);
     void push(Vec3 centre, double radius);
 
-    LatticeTets mesh_;
+    TetBody mesh_;
     XpbdOptions options_;
     float substep_;  // [s]
     std::vector<Batch> batches_;
@@ -80,6 +80,6 @@ private:
     std::size_t touched_ = 0;
 };
 
-TrialModel xpbdModel(LatticeTets mesh, const XpbdOptions& options);
+TrialModel xpbdModel(TetBody mesh, const XpbdOptions& options);
 
 }  // namespace palpate::studies
