@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <stdexcept>
 
 extern char** environ;
 
@@ -82,6 +83,15 @@ int exitStatus(pid_t child) noexcept
     while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+int run(const Program& program)
+{
+    const auto [pid, error] = start(program);
+    if (error != 0) {
+        throw std::runtime_error(program.words[0] + ": cannot be started (" + std::strerror(error) + ")");
+    }
+    return exitStatus(pid);
 }
 
 }  // namespace palpate::base

@@ -30,4 +30,9 @@ StartedProgram start(const Program& program);
 /// Waits for the end of a child. Returns its exit status; -1 when it was killed.
 int exitStatus(pid_t child) noexcept;
 
+/// Runs a program to its end. Returns its exit status; -1 when it was killed.
+/// @pre     at least one word
+/// @throws  std::runtime_error when it cannot be started
+int run(const Program& program);
+
 }  // namespace palpate::base

@@ -10,8 +10,7 @@ namespace palpate::chainmail {
 /// A whole elastic body under dead loads at its nodes, in equilibrium at finite strain: no tool, no windows that follow
 /// one, no clock. For what a body does before a session, such as sag under its weight.
 ///
-/// Quasi-Newton steps with a memory (J. Nocedal, "Updating quasi-Newton matrices with limited storage", Math. Comp. 35,
-/// 1980) over the cells of the finest level; their first guess of the inverse is one multigrid cycle.
+/// QuasiNewton over the cells of the finest level; its first guess of the inverse is one multigrid cycle.
 class LoadedBody {
 public:
     /// The body must outlive it. Allocates some 300 bytes per node.
@@ -40,18 +39,14 @@ public:
     Vec3 reaction() const noexcept;
 
 private:
-    using Values = std::vector<double>;
-    struct Memory;
     void evaluate();
-    Values precondition(const Values& residual);
-    Values direction(const Memory& memory);
-    double advance(const Values& step);
+    void precondition(std::vector<double>& values);
 
     const ElasticBody& body_;
     WindowStack stack_;
     Multigrid multigrid_;
-    Values u_, load_, gradient_;  // by Layout of the finest window (3 count x 1)
-    double residual_ = 0;         // norm of the gradient over that of the load [-]
+    std::vector<double> u_, load_, gradient_;  // by Layout of the finest window (3 count x 1)
+    double residual_ = 0;                      // norm of the gradient over that of the load [-]
 };
 
 }  // namespace palpate::chainmail

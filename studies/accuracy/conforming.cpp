@@ -2,17 +2,14 @@
 
 #include <base/process.h>
 #include <base/temporary_folder.h>
+#include <studies/accuracy/command_log.h>
 #include <studies/accuracy/rival_files.h>
 #include <studies/kernel/baselines/factored.h>
 
 #include <fmt/format.h>
 #include <glm/common.hpp>
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstring>
 #include <fstream>
 #include <iomanip>
 #include <limits>
@@ -25,35 +22,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t maxFactored = 30000;  // points: minutes to factor
-constexpr double unlocked = 0.45;           // Poisson's ratio at which linear tetrahedra do not lock yet
-constexpr double onItsBack = 0.05;          // fraction of the body's depth that is held when nothing else is
-constexpr double growth = 1.25;             // of edges away from surfaces: contact strains what is under it
-constexpr int tetrahedron = 4;              // its type in a file of gmsh
-
-std::string lastLine(const fs::path& file)
-{
-    std::ifstream in(file);
-    std::string last;
-    for (std::string line; std::getline(in, line);) {
-        last = line.empty() ? last : line;
-    }
-    return last;
-}
+constexpr double growth = 1.25;  // of edges away from surfaces: contact strains what is under it
+constexpr int tetrahedron = 4;   // its type in a file of gmsh
 
 void runMesher(const fs::path& mesher, const fs::path& volume, const fs::path& mesh, double size)
 {
     const fs::path log = mesh.parent_path() / "log";
-    const int file = open(log.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-    const auto [pid, error] =
-        base::start({{mesher.string(), volume.string(), "-o", mesh.string(), "--size", fmt::format("{:g}", 1e3 * size),
-                      "--largest", fmt::format("{:g}", 1e3 * growth * size)},
-                     {-1, file, file}});
-    close(file);
-    if (error != 0) {
-        throw std::runtime_error(fmt::format("{}: cannot be started ({})", mesher.string(), std::strerror(error)));
-    }
-    if (base::exitStatus(pid) != 0) {
+    const File said(log, O_WRONLY | O_CREAT);
+    const int status = base::run({{mesher.string(), volume.string(), "-o", mesh.string(), "--size",
+                                   fmt::format("{:g}", 1e3 * size), "--largest", fmt::format("{:g}", 1e3 * growth * size)},
+                                  {-1, said.number(), said.number()}});
+    if (status != 0) {
         throw std::runtime_error(fmt::format("palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log)));
     }
 }
@@ -123,10 +102,7 @@ private:
 
     void add(const std::array<std::uint32_t, 4>& tet, const volume::TissueRow& row)
     {
-        const double nu = std::min(row.poissonRatio, poissonCap_);
-        body_.tets.push_back(tet);
-        body_.mu.push_back(row.youngsModulus / (2.0 * (1.0 + nu)));
-        body_.lambda.push_back(row.youngsModulus * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
+        body_.add(tet, row.youngsModulus, std::min(row.poissonRatio, poissonCap_));
         for (const std::uint32_t p : tet) {
             body_.held.at(p) = row.fixed ? 1 : body_.held.at(p);
         }
@@ -221,13 +197,14 @@ TetBody conformingTets(const fs::path& mesher, const volume::Tissue& tissue, dou
 
 std::vector<Baseline> conformingMethods(const AccuracySubject& subject, const fs::path& mesher)
 {
-    const double poissonCap = std::min(unlocked, subject.poissonCap());
+    const double poissonCap = std::min(unlockedPoisson, subject.poissonCap());
     std::vector<Baseline> out;
     for (const double size : {8e-3, 6e-3}) {
         out.push_back({"tets_conforming", fmt::format("{:g} mm, Poisson {:g}", 1e3 * size, poissonCap),
                        [&subject, mesher, size, poissonCap] {
                            return factoredModel(
-                               conformingTets(mesher, *subject.model->tissue, size, poissonCap, maxFactored), subject.path);
+                               conformingTets(mesher, *subject.model->tissue, size, poissonCap, FactoredTets::maxPoints),
+                               subject.path);
                        }});
     }
     return out;

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -159,11 +158,7 @@ int runReferenceProgram(const std::vector<std::string>& arguments)
 {
     base::Program program{{referenceProgram().string()}, {-1, STDERR_FILENO, -1}};
     program.words.insert(program.words.end(), arguments.begin(), arguments.end());
-    const auto [pid, error] = base::start(program);
-    if (error != 0) {
-        throw std::runtime_error(fmt::format("{}: cannot be started ({})", program.words[0], std::strerror(error)));
-    }
-    return base::exitStatus(pid);
+    return base::run(program);
 }
 
 }  // namespace palpate::studies

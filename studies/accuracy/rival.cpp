@@ -2,12 +2,12 @@
 
 #include <base/child_process.h>
 #include <base/split.h>
+#include <studies/accuracy/command_log.h>
 #include <studies/accuracy/rival_files.h>
 #include <studies/kernel/trial_errors.h>
 
 #include <fmt/format.h>
 
-#include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -71,18 +71,6 @@ std::string nameFor(const std::string& command)
     return files.empty() ? fs::path(first).stem().string() : files.back().stem().string();
 }
 
-class File {
-public:
-    File(const fs::path& path, int flags) : number_(::open(path.c_str(), flags | O_CLOEXEC, 0644)) {}
-    ~File() { ::close(number_); }
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
-    int number() const noexcept { return number_; }
-
-private:
-    int number_;
-};
-
 // While it is there, what ends this program ends the rival first, which is in a group of its own.
 volatile pid_t rivalGroup = 0;
 constexpr std::array endings{SIGINT, SIGTERM, SIGHUP, SIGQUIT};
@@ -123,15 +111,8 @@ public:
 // What the command said last, for a message.
 std::string lastWords(const fs::path& log)
 {
-    constexpr std::size_t longest = 200;
-    std::ifstream in(log);
-    std::string last;
-    for (std::string line; std::getline(in, line);) {
-        last = base::trimmed(line).empty() ? last : std::string(base::trimmed(line));
-    }
-    std::ranges::replace_if(
-        last, [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
-    return last.empty() ? "" : fmt::format(" ({} ends with: {})", log.filename().string(), last.substr(0, longest));
+    const std::string last = lastLine(log);
+    return last.empty() ? "" : fmt::format(" ({} ends with: {})", log.filename().string(), last);
 }
 
 void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)

@@ -139,7 +139,7 @@ std::array<Vec3, 3> beamMarkers(const Beam& beam)
     const Index3 cells(static_cast<int>(std::lround(length / beam.cell)), static_cast<int>(std::lround(width / beam.cell)),
                        static_cast<int>(std::lround(width / beam.cell)));
     constexpr int loadSteps = 4;
-    constexpr double tolerance = 2e-3;
+    constexpr double tolerance = 4e-4;
     constexpr int evaluations = 8000;
     CellBody body(cells, beam.cell);
     const double mass = beam.density * std::pow(beam.cell, 3) / 8.0;

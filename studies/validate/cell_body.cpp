@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
-#include <utility>
 
 namespace palpate::studies {
 
@@ -11,41 +9,9 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t remembered = 6;  // steps: more cost more than they save
-constexpr int maxHalvings = 12;
-
-double dot(const std::vector<double>& a, const std::vector<double>& b) noexcept
-{
-    double sum = 0.0;
-    for (std::size_t i = 0; i < a.size(); ++i) {
-        sum += a[i] * b[i];
-    }
-    return sum;
-}
-
-void add(std::vector<double>& to, double factor, const std::vector<double>& what) noexcept
-{
-    for (std::size_t i = 0; i < to.size(); ++i) {
-        to[i] += factor * what[i];
-    }
-}
+constexpr QuasiNewton::Limits limits{6, 12};  // more steps cost more than they save
 
 }  // namespace
-
-// Pairs of a step and the change of the gradient along it.
-struct CellBody::Memory {
-    std::deque<std::pair<std::vector<double>, std::vector<double>>> pairs;
-
-    void add(std::vector<double> step, std::vector<double> change)
-    {
-        if (dot(step, change) > 0.0) {
-            pairs.emplace_back(std::move(step), std::move(change));
-        }
-        if (pairs.size() > remembered) {
-            pairs.pop_front();
-        }
-    }
-};
 
 CellBody::CellBody(Index3 cells, double side)
     : layout_(Layout::of(cells.x + 1, cells.y + 1, cells.z + 1)),
@@ -138,77 +104,32 @@ void CellBody::evaluate()
     unbalanced_ = all > 0.0 ? std::sqrt(open / all) : 0.0;
 }
 
-// The two loops of Nocedal 1980.
-std::vector<double> CellBody::direction(const Memory& memory) const
+// The inverse's diagonal, scaled by what the last step has shown.
+void CellBody::precondition(std::vector<double>& values, const QuasiNewton::Pair* last) const
 {
-    std::vector<double> q = gradient_;
-    std::vector<double> alpha;
-    for (auto pair = memory.pairs.rbegin(); pair != memory.pairs.rend(); ++pair) {
-        alpha.push_back(dot(pair->first, q) / dot(pair->first, pair->second));
-        add(q, -alpha.back(), pair->second);
-    }
     double scale = 0.5;
-    if (!memory.pairs.empty()) {
-        const auto& [step, change] = memory.pairs.back();
-        double weighted = 0.0;
+    if (last != nullptr) {
+        const auto& [step, change] = *last;
+        double along = 0.0, weighted = 0.0;
         for (std::size_t i = 0; i < change.size(); ++i) {
+            along += step[i] * change[i];
             weighted += diagonal_[i] > 0.0 ? change[i] * change[i] / diagonal_[i] : 0.0;
         }
-        scale = dot(step, change) / weighted;
+        scale = along / weighted;
     }
-    for (std::size_t i = 0; i < q.size(); ++i) {
-        q[i] *= diagonal_[i] > 0.0 ? scale / diagonal_[i] : 0.0;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] *= diagonal_[i] > 0.0 ? scale / diagonal_[i] : 0.0;
     }
-    for (const auto& [step, change] : memory.pairs) {
-        add(q, alpha.back() - dot(change, q) / dot(step, change), step);
-        alpha.pop_back();
-    }
-    for (double& v : q) {
-        v = -v;
-    }
-    return q;
-}
-
-// Goes along `step`, halved until the slope there is no longer steeply up: the energy's last bits are too coarse to tell.
-bool CellBody::advance(const std::vector<double>& step)
-{
-    const double before = dot(gradient_, step);
-    if (!(before < 0.0)) {
-        return false;
-    }
-    double gone = 1.0;
-    add(u_, 1.0, step);
-    for (int i = 0; i < maxHalvings; ++i) {
-        evaluate();
-        const double slope = dot(gradient_, step);
-        if (std::isfinite(slope) && slope <= -0.9 * before) {
-            return true;
-        }
-        add(u_, -0.5 * gone, step);
-        gone *= 0.5;
-    }
-    add(u_, -gone, step);
-    evaluate();
-    return false;
 }
 
 bool CellBody::solve(double tolerance, int most)
 {
     evaluate();
-    Memory memory;
-    for (int i = 0; i < most && unbalanced_ > tolerance; ++i) {
-        const std::vector<double> u = u_, gradient = gradient_;
-        if (!advance(direction(memory))) {
-            if (memory.pairs.empty()) {
-                return false;
-            }
-            memory = {};
-            continue;
-        }
-        std::vector<double> step = u_, change = gradient_;
-        add(step, -1.0, u);
-        add(change, -1.0, gradient);
-        memory.add(std::move(step), std::move(change));
+    QuasiNewton newton(
+        u_, gradient_, limits, [this] { evaluate(); },
+        [this](std::vector<double>& q, const QuasiNewton::Pair* last) { precondition(q, last); });
+    for (int i = 0; i < most && unbalanced_ > tolerance && !newton.stuck(); ++i) {
+        newton.step();
     }
     return unbalanced_ <= tolerance;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chainmail/quasi_newton.h>
 #include <chainmail/window.h>
 #include <volume/geometry.h>
 
@@ -29,7 +30,7 @@ public:
     /// Multiplies displacements, as a start for the next load.
     void scale(double factor) noexcept;
 
-    /// Minimises the energy (limited-memory quasi-Newton, Nocedal 1980).
+    /// Minimises the energy, see QuasiNewton.
     /// @param tolerance  residual, fraction of the forces that hold and load the body
     /// @returns  whether it got there within `most` evaluations
     bool solve(double tolerance, int most);
@@ -42,11 +43,9 @@ public:
     double unbalanced() const noexcept { return unbalanced_; }
 
 private:
-    struct Memory;
     std::size_t at(Index3 node, int component) const noexcept;
     void evaluate();
-    std::vector<double> direction(const Memory& memory) const;
-    bool advance(const std::vector<double>& step);
+    void precondition(std::vector<double>& values, const chainmail::QuasiNewton::Pair* last) const;
 
     chainmail::Layout layout_;
     double side_;

@@ -300,7 +300,7 @@ struct Quarter {
 std::vector<double> compressionLoads(const Cylinder& shape, double stiffening, bool bonded,
                                      const std::vector<double>& strains)
 {
-    constexpr double tolerance = 1e-3;
+    constexpr double tolerance = 2e-4;
     constexpr int evaluations = 6000;
     constexpr double longest = 0.02;  // strain of a load step
     Quarter quarter(shape, stiffening);

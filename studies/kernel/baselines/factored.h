@@ -23,6 +23,7 @@ namespace palpate::studies {
 /// modeling using compliance warping", Computer Graphics International 2008 (contacts on a precomputed compliance).
 class FactoredTets {
 public:
+    static constexpr std::size_t maxPoints = 30000;  // of a body: minutes to factor
     struct Contact {
         std::uint32_t point = 0;
         Vec3 u{0.0};      // [m]

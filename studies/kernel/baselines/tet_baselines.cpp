@@ -10,9 +10,7 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr std::size_t maxFactored = 30000;  // points: minutes to factor
 constexpr std::size_t maxStepped = 400000;
-constexpr double unlocked = 0.45;  // Poisson's ratio at which linear tetrahedra do not lock yet
 
 TetBody meshOf(const BaselineScene& scene, double spacing, double poissonCap, std::size_t maxPoints)
 {
@@ -28,14 +26,15 @@ std::vector<Baseline> tetBaselines(const BaselineScene& scene)
         return fmt::format("{:g} mm{}, Poisson {:g}", 1e3 * spacing, more, poissonCap);
     };
     const auto factored = [&](double spacing, double poissonCap) {
-        out.push_back({"tets_prefactored", named(spacing, "", poissonCap),
-                       [=] { return factoredModel(meshOf(scene, spacing, poissonCap, maxFactored), scene.path); }});
+        out.push_back({"tets_prefactored", named(spacing, "", poissonCap), [=] {
+                           return factoredModel(meshOf(scene, spacing, poissonCap, FactoredTets::maxPoints), scene.path);
+                       }});
     };
     const auto xpbd = [&](double spacing, int substeps, double poissonCap) {
         out.push_back({"xpbd", named(spacing, fmt::format(", {} substeps", substeps), poissonCap),
                        [=] { return xpbdModel(meshOf(scene, spacing, poissonCap, maxStepped), {.substeps = substeps}); }});
     };
-    const double gentle = std::min(unlocked, scene.poissonCap);
+    const double gentle = std::min(unlockedPoisson, scene.poissonCap);
     for (const double spacing : {6e-3, 4e-3, 3e-3}) {
         factored(spacing, gentle);
     }
@@ -45,7 +44,7 @@ std::vector<Baseline> tetBaselines(const BaselineScene& scene)
         }
     }
     xpbd(3e-3, 5, gentle);
-    if (scene.poissonCap > unlocked) {
+    if (scene.poissonCap > unlockedPoisson) {
         factored(4e-3, scene.poissonCap);
         xpbd(4e-3, 10, scene.poissonCap);
     }

@@ -16,7 +16,6 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double onItsBack = 0.05;    // fraction of the body's depth that is held when nothing else is
 constexpr double farthestMove = 0.9;  // of a corner to the surface, in spacings
 constexpr double thinnest = 0.2;      // volume of a tetrahedron, as a fraction of that in a whole cell
 constexpr int moveHalvings = 6;
@@ -160,9 +159,7 @@ private:
             if (determinant(mesh_.points, tet) < 0.0) {
                 std::swap(tet[2], tet[3]);
             }
-            mesh_.tets.push_back(tet);
-            mesh_.mu.push_back(e / (2.0 * (1.0 + nu)));
-            mesh_.lambda.push_back(e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
+            mesh_.add(tet, e, nu);
         }
     }
 
@@ -277,6 +274,13 @@ void lookIn(const TetBody& mesh, Index3 cell, Vec3 rest, Nearest& best)
 bool TetBody::moves(std::size_t tet) const noexcept
 {
     return std::ranges::any_of(tets[tet], [&](std::uint32_t p) { return held[p] == 0; });
+}
+
+void TetBody::add(const std::array<std::uint32_t, 4>& tet, double youngsModulus, double poisson)
+{
+    tets.push_back(tet);
+    mu.push_back(youngsModulus / (2.0 * (1.0 + poisson)));
+    lambda.push_back(youngsModulus * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)));
 }
 
 TetBody latticeTets(const volume::Tissue& tissue, const volume::DistanceField& surface, double spacing, double poissonCap,

@@ -21,7 +21,13 @@ struct TetBody {
     std::vector<std::uint32_t> inCell;               // tetrahedra that reach into each cell
 
     bool moves(std::size_t tet) const noexcept;  // one of its points is free
+    void add(const std::array<std::uint32_t, 4>& tet, double youngsModulus, double poisson);
 };
+
+/// Poisson's ratio at which linear tetrahedra do not lock yet [-].
+inline constexpr double unlockedPoisson = 0.45;
+/// Fraction of a body's depth that is held when nothing else is, as chainmail::elasticBody() has it [-].
+inline constexpr double onItsBack = 0.05;
 
 /// The body on a lattice: five tetrahedra to a cell, mirrored from cell to cell so that they meet. Points of the surface
 /// lie on it: the lattice's corners there are moved to it, as far as no tetrahedron gets thin; flat ones between points of
