@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -50,7 +51,6 @@ struct ElasticBody {
     std::vector<SurfaceCell> cells;   // that the surface runs through, by z, then y, then x
     std::vector<std::uint32_t> rows;  // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
     std::vector<SurfacePoint> points;
-    bool held = true;      // false: the body had nothing fixed, and was laid on its back
     bool relaxes = false;  // its moduli are those right after a step
 };
 
@@ -61,13 +61,14 @@ struct ElasticBody {
 /// @param toolRadius   of the smallest tool that will press: the surface has points closer than that; 0: of any that is
 ///                     larger than a cell [m]
 /// @param relaxes      the moduli become those right after a step, and cells keep the weights of their Prony series
+/// @param support      what holds a body in which no tissue is fixed, see volume::Tissue::support()
 ///
-/// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A body without fixed
-/// tissue lies on its back: the nodes of the rear 5 % are fixed (frame LPS: y to the back).
+/// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A support holds, at
+/// every spacing, the nodes on it or behind it where the body meets it. Something must be held.
 ///
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0,
-                        bool relaxes = false);
+                        bool relaxes = false, const std::optional<volume::Support>& support = {});
 
 }  // namespace palpate::chainmail

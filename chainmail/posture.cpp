@@ -55,15 +55,13 @@ public:
           toIndex_(glm::inverse(tissue.affine().linear)),
           reach_(reach),
           rows_(65536, nullptr),
-          heldRows_(tissue.table().rows),
           scaled_(!tissue.stiffnessMap().points.empty())
     {
         for (const volume::Structure& s : tissue.structures()) {
             const volume::TissueRow& row = tissue.table().rows[s.tissue];
             rows_[s.value] = row.role != volume::Role::air && row.youngsModulus > 0.0 ? &row : nullptr;
         }
-        for (volume::TissueRow& row : heldRows_) {
-            row.fixed = true;
+        for (const volume::TissueRow& row : tissue.table().rows) {
             const auto relaxation = row.relaxation();
             const double left = 1.0 - relaxation.weights[0] - relaxation.weights[1];
             scale_.push_back(settings.modulus * (settings.relaxed ? left * relaxation.instantaneous() : 1.0));
@@ -93,7 +91,8 @@ public:
                 continue;
             }
             const auto at = static_cast<std::size_t>(row - tissue_.table().rows.data());
-            cell.add(beyond ? heldRows_[at] : *row, weight * part, scale_[at] * factor(*row, voxel, stiffness));
+            cell.add(*row, weight * part, scale_[at] * factor(*row, voxel, stiffness),
+                     beyond || row->fixed || behindSupport(voxel));
             density += beyond ? 0.0 : part * row->density;
             fraction += beyond ? 0.0 : part;
         }
@@ -101,6 +100,12 @@ public:
     }
 
 private:
+    bool behindSupport(Index3 voxel) const
+    {
+        const auto& support = tissue_.support();
+        return support && support->height(labels_.affine.toPatient(Vec3(voxel))) < 0.0;
+    }
+
     // What the image makes of the modulus of a voxel's tissue.
     double factor(const volume::TissueRow& row, Index3 voxel, const Tissue::Reader& stiffness) const
     {
@@ -113,7 +118,6 @@ private:
     Mat3 toIndex_;
     double reach_;
     std::vector<const volume::TissueRow*> rows_;  // of each label; null: none (65536 x 1)
-    std::vector<volume::TissueRow> heldRows_;     // of the table, as they are beyond the border
     std::vector<double> scale_;                   // of each row's modulus
     bool scaled_;                                 // the image scales moduli
 };

@@ -43,8 +43,9 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
         return nullptr;
     }
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
-    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(
-        cells, tissue.materialOn(cells), surface, scene.model.elastic.poissonCap, presses, scene.model.relaxation));
+    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells), surface,
+                                                                           scene.model.elastic.poissonCap, presses,
+                                                                           scene.model.relaxation, tissue.support()));
 }
 
 bool anyWalls(const volume::Tissue& tissue)

@@ -13,17 +13,22 @@ void CellMixture::Sums::add(double weight, double modulus) noexcept
     compliance += weight / modulus;
 }
 
+double CellMixture::Sums::arithmetic() const noexcept
+{
+    return stiffness / fraction;
+}
+
 double CellMixture::Sums::mean() const noexcept
 {
     return std::sqrt(stiffness / compliance);
 }
 
-void CellMixture::add(const TissueRow& row, double weight, double scale) noexcept
+void CellMixture::add(const TissueRow& row, double weight, double scale, bool held) noexcept
 {
-    (row.fixed ? held_ : free_).add(weight, row.youngsModulus * scale);
+    (held ? held_ : free_).add(weight, row.youngsModulus * scale);
     poisson_ += weight * row.poissonRatio;
     stiffening_.add(weight, row.youngsModulus * scale, row.stiffening);
-    for (std::size_t i = 0; i < relaxing_.size() && !row.fixed; ++i) {
+    for (std::size_t i = 0; i < relaxing_.size() && !held; ++i) {
         relaxing_[i] += weight * row.relaxation().weights[i];
     }
 }
@@ -40,7 +45,8 @@ CellMaterial CellMixture::material() const noexcept
                           static_cast<float>(poisson_ / tissue),
                           static_cast<float>(held_.fraction / tissue),
                           static_cast<float>(stiffening_.mean()),
-                          {}};
+                          {},
+                          free_.fraction > 0.0 ? static_cast<float>(free_.arithmetic() / free_.mean()) : 1.0F};
     for (std::size_t i = 0; i < relaxing_.size() && free_.fraction > 0.0; ++i) {
         material.relaxing[i] = static_cast<float>(relaxing_[i] / free_.fraction);
     }

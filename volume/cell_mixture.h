@@ -40,7 +40,8 @@ public:
     /// @param row     its tissue
     /// @param weight  fraction of the cell that the sample stands for [-]
     /// @param scale   of its tissue's Young's modulus [-]
-    void add(const TissueRow& row, double weight, double scale) noexcept;
+    /// @param held    in space
+    void add(const TissueRow& row, double weight, double scale, bool held) noexcept;
     /// Of what was added; no stiffness where nothing was.
     CellMaterial material() const noexcept;
     /// Fraction of the cell that is tissue [-].
@@ -50,6 +51,7 @@ private:
     struct Sums {
         double fraction = 0.0, stiffness = 0.0, compliance = 0.0;
         void add(double weight, double modulus) noexcept;
+        double arithmetic() const noexcept;
         double mean() const noexcept;
     } free_, held_;
     double poisson_ = 0.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
@@ -34,6 +35,14 @@ struct Affine {
     Vec3 spacing() const noexcept;
     /// Volume of a voxel [m^3], positive also for left-handed directions.
     double voxelVolume() const noexcept;
+};
+
+/// A plane on which a body rests: what lies behind it is held in space.
+struct Support {
+    Vec3 point{0.0};   // on it [m]
+    Vec3 normal{0.0};  // unit vector to where the body is free
+
+    double height(Vec3 p) const noexcept { return glm::dot(p - point, normal); }  // above it [m]
 };
 
 /// A cubic grid of nodes aligned with the patient axes; x runs fastest.

@@ -4,9 +4,11 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/matrix.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace palpate::volume {
@@ -44,13 +46,39 @@ Box patientBox(const Affine& affine, const IndexBox& extent)
     return box;
 }
 
+namespace {
+
+constexpr double onItsBack = 0.05;  // fraction of a body's depth that is held where no tissue is fixed
+
+Support onItsBackIn(const Affine& affine, IndexBox body)
+{
+    int axis = 0;
+    for (int a = 1; a < 3; ++a) {
+        axis = std::abs(affine.linear[a].y) > std::abs(affine.linear[axis].y) ? a : axis;
+    }
+    const int depth = body.high[axis] - body.low[axis] + 1;
+    const int layers = std::max(1, static_cast<int>(std::lround(onItsBack * depth)));
+    const bool backIsHigh = affine.linear[axis].y > 0.0;
+    Vec3 index(body.low);
+    index[axis] = backIsHigh ? body.high[axis] + 0.5 - layers : body.low[axis] - 0.5 + layers;
+    const Vec3 inIndex = glm::row(glm::inverse(affine.linear), axis);  // grows along the axis alone, in whatever direction
+    return {affine.toPatient(index), glm::normalize(backIsHigh ? -inIndex : inIndex)};
+}
+
+}  // namespace
+
 void TissueData::derive()
 {
     for (const Structure& s : structures) {
         lookup.row[s.value] = s.tissue;
         lookup.solid[s.value] = table.rows[s.tissue].role != Role::air ? 1 : 0;
     }
-    box = patientBox(affine, extentOf(lookup.solid));
+    const IndexBox body = extentOf(lookup.solid);
+    box = patientBox(affine, body);
+    const bool held = std::ranges::any_of(structures, [this](const Structure& s) { return table.rows[s.tissue].fixed; });
+    if (!held && !body.empty()) {
+        support = onItsBackIn(affine, body);
+    }
 }
 
 IndexBox TissueData::extentOf(const std::vector<std::uint8_t>& wanted) const
@@ -105,6 +133,10 @@ const Provenance& Tissue::provenance() const noexcept
 Box Tissue::box() const noexcept
 {
     return impl_->box;
+}
+const std::optional<Support>& Tissue::support() const noexcept
+{
+    return impl_->support;
 }
 
 MemoryUse Tissue::memory() const

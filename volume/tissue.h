@@ -64,6 +64,7 @@ struct CellMaterial {
     float fixed = 0;                                // fraction of the tissue that is held in space [-]
     float stiffening = 0;                           // mean over the tissue [-]
     std::array<float, relaxationTerms> relaxing{};  // weights of Relaxation, mean over what is not held [-]
+    float along = 1;  // of layers along their plane: youngsModulus with the arithmetic mean, over what it is [-]
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.
@@ -107,6 +108,9 @@ public:
     const StiffnessMap& stiffnessMap() const noexcept;  // none: changes nothing
     /// Box of the voxels that hold tissue [m].
     Box box() const noexcept;
+    /// A body in which no tissue is fixed lies on its back: its rear 5 % are held, in whole layers of voxels along the axis
+    /// nearest to y (LPS: to the back), at least one. Nothing where tissue is fixed, or there is none.
+    const std::optional<Support>& support() const noexcept;
     /// The structure called `name`, else those whose tissue is called so. Empty when there is none.
     std::vector<std::uint16_t> labelsNamed(std::string_view name) const;
 

@@ -49,8 +49,8 @@ public:
 
     std::size_t samples() const { return offsets_.size(); }
 
-    // Calls visit(label, weight), or visit(label, weight, factor on its tissue's stiffness), or visit(label, weight,
-    // voxel), for the voxels at node n; the weights add up to 1, less what lies outside the volume.
+    // Calls visit(label, weight), or visit(label, weight, voxel), for the voxels at node n; the weights add up to 1, less
+    // what lies outside the volume.
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
@@ -64,6 +64,17 @@ public:
                 read(Index3(glm::floor(at + 0.5)), fraction, visit);
             }
         }
+    }
+
+    // What the image makes of the modulus of a voxel's tissue.
+    double factor(std::uint16_t label, const openvdb::Coord& voxel) const
+    {
+        if (scaledBy_ == nullptr) {
+            return 1.0;
+        }
+        const double own = scaledBy_->table.rows[scaledBy_->lookup.row[label]].youngsModulus;
+        const double here = 1e3 * static_cast<double>(stiffness_.getValue(voxel));
+        return own > 0 && here > 0 ? here / own : 1.0;
     }
 
 private:
@@ -88,22 +99,12 @@ private:
         if (n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size_.x && n.y < size_.y && n.z < size_.z) {
             const openvdb::Coord ijk(n.x, n.y, n.z);
             const auto label = static_cast<std::uint16_t>(label_.getValue(ijk));
-            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, double>) {
-                visit(label, weight, scaledBy_ != nullptr ? factor(label, ijk) : 1.0);
-            } else if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
+            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
                 visit(label, weight, ijk);
             } else {
                 visit(label, weight);
             }
         }
-    }
-
-    // What the image makes of the modulus of a voxel's tissue.
-    double factor(std::uint16_t label, const openvdb::Coord& ijk) const
-    {
-        const double own = scaledBy_->table.rows[scaledBy_->lookup.row[label]].youngsModulus;
-        const double here = 1e3 * static_cast<double>(stiffness_.getValue(ijk));
-        return own > 0 && here > 0 ? here / own : 1.0;
     }
 
     Index3 size_;
@@ -136,12 +137,15 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
     });
 }
 
-CellMaterial cellMaterial(const CellSampler& sampler, Index3 n, const std::vector<const TissueRow*>& rows)
+CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, Index3 n,
+                          const std::vector<const TissueRow*>& rows)
 {
     CellMixture mixture;
-    sampler.visit(n, [&](std::uint16_t label, double weight, double scale) {
+    sampler.visit(n, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel) {
         if (const TissueRow* row = rows[label]) {
-            mixture.add(*row, weight, scale);
+            const Vec3 place = tissue.affine.toPatient({voxel.x(), voxel.y(), voxel.z()});
+            const bool held = row->fixed || (tissue.support && tissue.support->height(place) < 0.0);
+            mixture.add(*row, weight, sampler.factor(label, voxel), held);
         }
     });
     return mixture.material();
@@ -287,8 +291,8 @@ double cellModulus(const CellSampler& sampler, Index3 n, const std::vector<doubl
     double weight = 0;
     double sum = 0;
     double inverse = 0;
-    sampler.visit(n, [&](std::uint16_t label, double w, double scale) {
-        const double e = modulus[label] * scale;
+    sampler.visit(n, [&](std::uint16_t label, double w, const openvdb::Coord& voxel) {
+        const double e = modulus[label] * sampler.factor(label, voxel);
         if (e > 0) {
             weight += w;
             sum += w * e;
@@ -411,7 +415,7 @@ std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
     const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
     forEachRow(tissue, grid, range, [&](const CellSampler& sampler, Index3 n) {
         for (; n.x <= range.high.x; ++n.x) {
-            cells[grid.offset(n)] = cellMaterial(sampler, n, rows);
+            cells[grid.offset(n)] = cellMaterial(tissue, sampler, n, rows);
         }
     });
     return cells;

@@ -4,6 +4,7 @@
 
 #include <openvdb/openvdb.h>
 
+#include <optional>
 #include <vector>
 
 // Inside volume/ only: everything that knows OpenVDB includes this.
@@ -33,6 +34,7 @@ struct TissueData {
     std::vector<IndexBox> extents;      // voxels of each structure (structures x 1)
     LabelLookup lookup;
     Box box;
+    std::optional<Support> support;
 
     openvdb::Int32Grid::Ptr label;
     openvdb::FloatGrid::Ptr stiffness;  // [kPa]
@@ -41,7 +43,7 @@ struct TissueData {
     std::string imageUnit;
     StiffnessMap stiffnessMap;
 
-    /// Fills `lookup` and `box` from the table, the structures and their extents.
+    /// Fills `lookup`, `box` and `support` from the table, the structures and their extents.
     void derive();
     /// All voxels whose label is marked in `wanted` (65536 x 1).
     IndexBox extentOf(const std::vector<std::uint8_t>& wanted) const;

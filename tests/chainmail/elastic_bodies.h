@@ -18,7 +18,7 @@ namespace palpate::tests {
 
 inline volume::CellMaterial tissue(double youngsModulus, double poissonRatio, bool fixed = false)
 {
-    return {static_cast<float>(youngsModulus), static_cast<float>(poissonRatio), fixed ? 1.0F : 0.0F, 0.0F, {}};
+    return {static_cast<float>(youngsModulus), static_cast<float>(poissonRatio), fixed ? 1.0F : 0.0F, 0.0F, {}, 1.0F};
 }
 
 /// A block of tissue in air. Its surface towards the hand is y = low.y (frame LPS).

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace palpate::chainmail {
 namespace {
@@ -191,25 +193,103 @@ TEST(ElasticBody, RowsListEveryCellAndCellsEveryPoint)
     EXPECT_GT(points, 500U);
 }
 
-// Frame LPS: y to the back. Nothing but the rear twentieth is held, at every level something.
-TEST(ElasticBody, BodyWithoutFixedTissueIsHeldAtItsBack)
+// Soft cells on a plane with nothing fixed; `rest` is the plane's place along y [m].
+ElasticBody restingSlab(double rest)
 {
-    const auto material = [](Index3) { return tests::tissue(1e4, 0.45); };
-    const ElasticBody free = tests::bodyOf(ElasticBlock{{20, 40, 20}, 1e-3, material, 1, Vec3(0.0)});
-    EXPECT_FALSE(free.held);
-    for (const CellLevel& level : free.levels) {
-        int fixed = 0;
-        volume::forEachIndex(Index3(0), level.nodes.size - 1, [&](Index3 n) {
-            const std::size_t at = level.nodes.offset(n);
-            if (level.fixed[at] != 0 && level.diagonal[at] > 0.0F) {
-                ++fixed;
-                EXPECT_GT(level.nodes.position(n).y, 0.95 * 40e-3 - level.nodes.spacing);
+    constexpr double h = 1e-3;
+    const volume::NodeGrid grid{Index3(48), Vec3(0.5 * h), h};
+    const Vec3 low(8 * h), high(40 * h);
+    std::vector<volume::CellMaterial> materials(grid.count());
+    volume::forEachIndex(Index3(8), Index3(39), [&](Index3 c) {
+        const double held = std::clamp((c.y + 1) - rest / h, 0.0, 1.0);
+        volume::CellMaterial m = tests::tissue(held < 1.0 ? 1e4 / (1.0 - held) : 1e4, 0.45);
+        m.fixed = static_cast<float>(held);
+        materials[grid.offset(c)] = m;
+    });
+    const auto surface = tests::distanceOn(grid, [&](Vec3 p) { return tests::boxDistance(p, low, high); });
+    return elasticBody(grid, materials, surface, 0.49, 0.0, false, volume::Support{{0.0, rest, 0.0}, {0.0, -1.0, 0.0}});
+}
+
+// A body on a support, wherever that lies in the grid: at every level the cells before it have the compliance of what is
+// left of the body, and nodes are held where the body meets it.
+TEST(ElasticBody, ASupportLeavesTheBodysOwnComplianceAtEveryLevel)
+{
+    for (const double rest : {36.0e-3, 36.3e-3, 37.9e-3}) {
+        const ElasticBody body = restingSlab(rest);
+        ASSERT_GE(body.levels.size(), 4U);
+        for (const CellLevel& level : body.levels) {
+            const double h = level.nodes.spacing;
+            const Index3 middle(Vec3(24e-3 / h));
+            double compliance = 0.0;
+            for (int y = 0; y + 1 < level.nodes.size.y && level.nodes.position({0, y, 0}).y < rest - 1e-6; ++y) {
+                const double mu = static_cast<double>(level.mu[level.nodes.offset({middle.x, y, middle.z})]);
+                compliance += mu > 0.0 ? h / mu : 0.0;
             }
-        });
-        EXPECT_GT(fixed, 0);
+            EXPECT_NEAR(compliance * 1e4 / 2.9, rest - 8e-3, 1e-5) << "support " << rest << ", spacing " << h;
+            volume::forEachIndex(Index3(0), level.nodes.size - 1, [&](Index3 n) {
+                const Vec3 p = level.nodes.position(n);
+                const double beside = 16e-3 - std::max(std::abs(p.x - 24e-3), std::abs(p.z - 24e-3));  // inside the body
+                const bool under = p.y >= rest - 1e-6 && beside > 0.1e-3;
+                const bool clear = p.y < rest - 1e-5 || beside < -0.6 * h;
+                EXPECT_TRUE(!under || level.fixed[level.nodes.offset(n)] != 0) << h;
+                EXPECT_TRUE(!clear || level.fixed[level.nodes.offset(n)] == 0) << h;
+            });
+        }
     }
-    const ElasticBody held = tests::bodyOf(tests::heldBlock({20, 40, 20}, 1e-3, 1e4, 0.45));
-    EXPECT_TRUE(held.held);
+}
+
+// A ball on its back, 5 % of its depth behind the plane: what holds it is a disc of pi (2 R d - d^2), at every level that
+// has cells enough; it does not grow by the cells' size, which would stop the ball from tipping.
+TEST(ElasticBody, ARoundBodyIsHeldWhereItMeetsItsSupport)
+{
+    constexpr double h = 1e-3, radius = 30e-3;
+    const volume::NodeGrid grid{Index3(72), Vec3(0.5 * h), h};
+    const Vec3 middle(36.2e-3, 36.0e-3, 35.7e-3);
+    const double rest = middle.y + 0.9 * radius;
+    std::vector<volume::CellMaterial> materials(grid.count());
+    volume::forEachIndex(Index3(1), grid.size - 2, [&](Index3 c) {
+        const Vec3 p = grid.position(c);
+        const double fraction = std::clamp(0.5 - (glm::distance(p, middle) - radius) / h, 0.0, 1.0);
+        materials[grid.offset(c)] = tests::tissue(1e4 * fraction, 0.45, p.y > rest);
+    });
+    const auto ball = tests::distanceOn(grid, [&](Vec3 p) { return glm::distance(p, middle) - radius; });
+    const ElasticBody body =
+        elasticBody(grid, materials, ball, 0.49, 0.0, false, volume::Support{{0.0, rest, 0.0}, {0.0, -1.0, 0.0}});
+    const double disc = std::numbers::pi * 0.19 * radius * radius;
+    for (std::size_t l = 0; l < 3; ++l) {
+        const CellLevel& level = body.levels[l];
+        const double side = level.nodes.spacing;
+        int held = 0;  // faces of cells, on the first plane of nodes at the support or behind it
+        volume::forEachIndex(Index3(0), level.nodes.size - 2, [&](Index3 n) {
+            const double behind = level.nodes.position(n).y - rest;
+            bool all = behind >= -1e-6 && behind < side - 1e-6;
+            for (const Index3 corner : {Index3(0, 0, 0), Index3(1, 0, 0), Index3(0, 0, 1), Index3(1, 0, 1)}) {
+                all = all && level.fixed[level.nodes.offset(n + corner)] != 0;
+            }
+            held += all ? 1 : 0;
+        });
+        EXPECT_NEAR(held * side * side / disc, 1.0, l < 2 ? 0.05 : 0.25) << side;
+    }
+}
+
+// Skin of one cell on soft tissue, stiffer by 20: the coarser cells at the surface have the stiffness of layers side by
+// side, shares of each; those that hold the same layers inside of the body have less.
+TEST(ElasticBody, CoarseCellsUnderAFreeSurfaceAreLaminates)
+{
+    constexpr int first = 8, deep = 24;
+    const auto material = [](Index3 c) { return tests::tissue(c.y == 0 || c.y == deep ? 20e3 : 1e3, 0.45, c.y == 31); };
+    const ElasticBody body = tests::bodyOf(ElasticBlock{Index3(32), 1e-3, material, first, Vec3(0.0)});
+    for (std::size_t l = 1; l < 4; ++l) {
+        const CellLevel& level = body.levels[l];
+        const auto modulus = [&](int y) {
+            const int at = static_cast<int>(24 >> l);
+            return 2.9 * static_cast<double>(level.mu[level.nodes.offset({at, (first + y) >> l, at})]);
+        };
+        const double share = 1.0 / (1 << l);
+        const double laminate = 20e3 * share + 1e3 * (1.0 - share);
+        EXPECT_NEAR(modulus(0) / laminate, 1.0, 1e-4) << l;
+        EXPECT_LT(modulus(deep), 0.8 * laminate) << l;
+    }
 }
 
 }  // namespace

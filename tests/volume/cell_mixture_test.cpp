@@ -83,5 +83,30 @@ TEST(StiffeningMean, IsBetweenItsPartsAndTheSofterOneDecides)
     EXPECT_EQ(meanOf({}), 0.0);
 }
 
+// Layers side by side add their stiffness; what stands for the cell otherwise is the root of that times the harmonic mean.
+// A part that is held counts in neither.
+TEST(CellMixture, KnowsTheStiffnessOfItsLayersAlongTheirPlane)
+{
+    TissueRow soft, stiff;
+    soft.youngsModulus = 2e3;
+    stiff.youngsModulus = 80e3;
+    for (const double share : {0.1, 0.5, 0.9}) {
+        for (const double held : {0.0, 0.25}) {
+            CellMixture mixture;
+            mixture.add(soft, (1.0 - held) * (1.0 - share), 1.0, false);
+            mixture.add(stiff, (1.0 - held) * share, 1.0, false);
+            mixture.add(stiff, held, 1.0, true);
+            const double arithmetic = share * 80e3 + (1.0 - share) * 2e3;
+            const double harmonic = 1.0 / (share / 80e3 + (1.0 - share) / 2e3);
+            const CellMaterial material = mixture.material();
+            EXPECT_NEAR(material.along, std::sqrt(arithmetic / harmonic), 1e-5) << share;
+            EXPECT_NEAR(material.fixed, held, 1e-6);
+            if (held <= 0.0) {
+                EXPECT_NEAR(material.youngsModulus * material.along, arithmetic, 1e-2);
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace palpate::volume

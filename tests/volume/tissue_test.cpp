@@ -205,5 +205,39 @@ TEST(Tissue, ANamedZeroIsTissue)
     EXPECT_EQ(reader.youngsModulus(image.affine.toPatient(Vec3(-1, 0, 0))), 0.0);
 }
 
+// Nothing fixed: the rear 5 % in whole layers, at least one, of the voxel axis that is nearest to y, on whichever side of
+// it the back is. What is behind the plane is held in cells of any size. A bone holds the body, and there is no plane.
+TEST(TissueSupport, ABodyThatNothingHoldsLiesOnItsBack)
+{
+    const Index3 size(16, 44, 20);
+    for (const bool mirror : {false, true}) {
+        for (const int deep : {40, 6}) {
+            Affine affine = bodies::centred(bodies::oblique({1.1e-3, 0.9e-3, 1e-3}, Vec3(0.0), mirror), size);
+            affine.linear[1] *= mirror ? -1.0 : 1.0;
+            affine = bodies::centred(affine, size);
+            LabelImage image{size, affine, {}};
+            image.values.assign(image.offset({0, 0, size.z}), 0);
+            forEachIndex({2, 2, 2}, {13, deep + 1, 17}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
+            const auto tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+            ASSERT_TRUE(tissue.support());
+            const int layers = deep == 40 ? 2 : 1;
+            const double border = mirror ? 1.5 + layers : deep + 1.5 - layers;
+            for (const double beside : {0.0, 9.0}) {
+                EXPECT_NEAR(tissue.support()->height(affine.toPatient({beside, border, beside})), 0.0, 1e-12);
+            }
+            EXPECT_GT(tissue.support()->height(affine.toPatient({0, 0.5 * deep, 0})), 0.0);
+            EXPECT_LT(tissue.support()->normal.y, -0.8);
+            const NodeGrid cells = coveringGrid(tissue.box(), 3e-3, 6e-3);
+            double held = 0.0;
+            for (const CellMaterial& m : tissue.materialOn(cells)) {
+                held += m.fixed > 0.0F ? 1.0 : 0.0;
+            }
+            EXPECT_GT(held, 10.0);
+            image.values[image.offset({2, 2, 2})] = 300;
+            EXPECT_FALSE(Tissue::fromLabels(image, bodies::table(), bodies::names(), {}).support());
+        }
+    }
+}
+
 }  // namespace
 }  // namespace palpate::volume

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <chainmail/elastic_body.h>
+
+#include <optional>
+#include <vector>
+
+namespace palpate::chainmail {
+
+/// Fraction of a cell that is held from which on all of it is: bone, but for the rounding of samples.
+inline constexpr float whollyHeld = 0.98F;
+
+/// The finest level, and what coarser ones need to know of its cells.
+struct FinestLevel {
+    CellLevel level;           // without `diagonal` and `radius`
+    std::vector<float> held;   // fraction of each cell's tissue that is held in space (count x 1)
+    std::vector<float> along;  // of each cell, see volume::CellMaterial (count x 1)
+};
+
+/// The levels of a body from its finest on, each twice as coarse as the one before.
+/// @param count    of levels
+/// @param support  what holds a body in which no tissue is fixed; `held` is what lies behind it then
+/// @param surface  signed distance to the body's surface at rest [m]
+std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
+                                  const std::optional<volume::Support>& support, const volume::DistanceField& surface);
+
+}  // namespace palpate::chainmail
