@@ -53,20 +53,46 @@ void checkOutputFolder(const fs::path& folder)
     }
 }
 
+namespace {
+
+// A device or a pipe: it takes what is written and is no place for another file.
+bool takesBytes(const fs::path& file)
+{
+    std::error_code none;
+    const fs::file_status status = fs::status(file, none);
+    return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+}  // namespace
+
+fs::path replaceable(const fs::path& file)
+{
+    if (takesBytes(file)) {
+        throw std::runtime_error(file.string() + ": is no file: give the name of a file");
+    }
+    std::error_code none;
+    const fs::path target = fs::is_symlink(file, none) ? fs::weakly_canonical(file, none) : file;
+    return target.empty() ? file : target;
+}
+
 void writeWhole(const fs::path& file, std::string_view bytes)
 {
-    fs::path half = file;
-    half += ".part";
+    const bool direct = takesBytes(file);
+    const fs::path place = direct ? file : replaceable(file);
+    fs::path half = place;
+    half += direct ? "" : ".part";
     std::ofstream out(half, std::ios::binary);
     out << bytes;
     out.close();
     std::error_code failed;
-    if (out) {
-        fs::rename(half, file, failed);
+    if (out && !direct) {
+        fs::rename(half, place, failed);
     }
     if (!out || failed) {
         std::error_code ignored;
-        fs::remove(half, ignored);
+        if (!direct) {
+            fs::remove(half, ignored);
+        }
         throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
     }
 }

@@ -12,7 +12,12 @@ void checkOutput(const std::filesystem::path& file);
 /// As checkOutput() for a folder that is made, with those above it, when it is not there.
 void checkOutputFolder(const std::filesystem::path& folder);
 
-/// Writes a file that appears whole or not at all; one that is there is replaced. Throws std::runtime_error.
+/// What will be replaced when `file` is written whole and put in its place: itself, or what it links to.
+/// Throws std::runtime_error where that is no file: a device or a pipe would be gone.
+std::filesystem::path replaceable(const std::filesystem::path& file);
+
+/// Writes a file that appears whole or not at all; one that is there is replaced. A device or a pipe is written into.
+/// Throws std::runtime_error.
 void writeWhole(const std::filesystem::path& file, std::string_view bytes);
 
 }  // namespace palpate::base

@@ -440,6 +440,10 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     if (isOpen && !confirm(start)) {
         again(result);
     }
+    if (!std::isfinite(energy_ + contactEnergy())) {
+        startAnew();
+        return result;
+    }
     letSlip();
     balance();
     measure(result);

@@ -147,6 +147,7 @@ private:
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     std::span<const ElasticTool> heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept;
     void settle() noexcept;
+    void startAnew() noexcept;
     void meet(const ElasticLoad& load, bool moved) noexcept;
     void spreadPressure() noexcept;
     bool touched() const noexcept;

@@ -261,6 +261,17 @@ void Elastic::forgetIncrement() noexcept
     forgetStep();
 }
 
+// Springs of 100 kN/m that let go leave a history in tissue that relaxes, with which cells are turned inside out, until
+// numbers end. The body goes to rest, without force, and the next call begins there.
+void Elastic::startAnew() noexcept
+{
+    forgetIncrement();
+    settle();
+    for (const Field f : {Field::p, Field::q, Field::z, Field::f, Field::t}) {
+        stack_.clear(f);
+    }
+}
+
 void Elastic::forgetStep() noexcept
 {
     last_ = {};

@@ -54,6 +54,15 @@ void printGeometry(const volume::Tissue& tissue)
     }
 }
 
+nlohmann::json supportFigures(const volume::Tissue& tissue)
+{
+    if (!tissue.support()) {
+        return nullptr;
+    }
+    const Vec3 p = 1e3 * tissue.support()->point, n = tissue.support()->normal;
+    return {{"point_mm", {p.x, p.y, p.z}}, {"normal", {n.x, n.y, n.z}}};
+}
+
 void printStructures(const volume::Tissue& tissue)
 {
     std::size_t name = 9;
@@ -130,6 +139,7 @@ nlohmann::json volumeFigures(const volume::Tissue& tissue)
               {"stiffness", megabytes(use.stiffness)},
               {"occupancy", megabytes(use.occupancy)},
               {"image", megabytes(use.image)}}},
+            {"support", supportFigures(tissue)},
             {"image", tissue.hasImage() ? nlohmann::json(imageText(tissue)) : nlohmann::json(nullptr)},
             {"done", done},
             {"tissue_table", tissue.table().name},
@@ -148,6 +158,13 @@ void printVolume(const volume::Tissue& tissue)
                tissue.hasImage() ? fmt::format(", image {:.1f}", megabytes(use.image)) : "");
     if (tissue.hasImage()) {
         fmt::print("image        {}\n", imageText(tissue));
+    }
+    if (tissue.support()) {
+        const Vec3 p = 1e3 * tissue.support()->point, n = -tissue.support()->normal;
+        fmt::print(
+            "held         nothing in it is fixed: it lies on its back, held behind {:.1f} {:.1f} {:.1f} mm towards {:.2f} "
+            "{:.2f} {:.2f}; import --set NAME=chest_wall holds a structure\n",
+            p.x, p.y, p.z, n.x, n.y, n.z);
     }
     fmt::print("tissues      {}\n", tissue.table().name);
     for (const auto& [key, value] : tissue.provenance()) {

@@ -1,4 +1,6 @@
 #include <volume/export.h>
+
+#include <base/outputs.h>
 #include <volume/export_source.h>
 #include <volume/runs.h>
 
@@ -146,8 +148,8 @@ struct OutputFile::Impl {
 
 OutputFile::OutputFile(const std::filesystem::path& file) : impl_(std::make_unique<Impl>())
 {
-    impl_->file = file;
-    impl_->part = fmt::format("{}.{}.part", file.string(), ::getpid());
+    impl_->file = base::replaceable(file);
+    impl_->part = fmt::format("{}.{}.part", impl_->file.string(), ::getpid());
     errno = 0;
     impl_->out.open(impl_->part, std::ios::binary | std::ios::trunc);
     if (!impl_->out) {

@@ -2,6 +2,7 @@
 #include <volume/tissue_impl.h>
 
 #include <base/inputs.h>
+#include <base/outputs.h>
 
 #include <fmt/format.h>
 #include <openvdb/io/Archive.h>
@@ -327,11 +328,12 @@ std::string reasonOf(const std::exception& e)
 void Tissue::save(const std::filesystem::path& file) const
 {
     initialise();
-    const std::filesystem::path beside = fmt::format("{}.{}.part", file.string(), ::getpid());
+    const std::filesystem::path place = base::replaceable(file);
+    const std::filesystem::path beside = fmt::format("{}.{}.part", place.string(), ::getpid());
     errno = 0;
     try {
         writeFile(beside, *impl_);
-        std::filesystem::rename(beside, file);
+        std::filesystem::rename(beside, place);
     } catch (const std::exception& e) {
         const std::string why = errno != 0 ? std::strerror(errno) : e.what();
         std::error_code ignored;

@@ -1,5 +1,6 @@
 #include <studies/accuracy/reference_file.h>
 
+#include <base/outputs.h>
 #include <volume/fnv.h>
 
 #include <fmt/format.h>
@@ -283,19 +284,7 @@ void saveReference(const std::filesystem::path& file, const Reference& reference
                    {"states", std::move(states)},        {"nodes", reference.nodes},
                    {"peak_force", reference.peakForce},  {"strain", reference.strain},
                    {"residual", reference.residual}};
-    const std::filesystem::path half = file.string() + ".part";
-    std::ofstream stream(half, std::ios::binary);
-    stream << deflated(json::to_cbor(out));
-    stream.close();
-    std::error_code failed;
-    if (stream) {
-        std::filesystem::rename(half, file, failed);
-    }
-    if (!stream || failed) {
-        std::error_code ignored;
-        std::filesystem::remove(half, ignored);
-        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
-    }
+    base::writeWhole(file, deflated(json::to_cbor(out)));
 }
 
 std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& file)

@@ -82,6 +82,35 @@ TEST_F(Researcher, SegmentsAreMappedByTheirNamesAndUnknownLabelsAreListed)
     EXPECT_EQ(figures({"import", seg, "-o", vdb, "--set", "Left lesion=ilc"}).at("labels").at(2).at("tissue"), "ilc");
 }
 
+// A label without a name of its own goes by the one that the map gives it.
+TEST_F(Researcher, LabelsAreSetByTheNamesInTheMapToo)
+{
+    const std::string map = folder / "map.toml";
+    writeText(
+        map,
+        "name = \"mine\"\nsource = \"a test\"\nlabels = [{value = 1, name = \"trunk\", tissue = \"fat\"}, {value = 2, name "
+        "= \"lump\", tissue = \"tumour\"}, {value = 3, name = \"pipe\", tissue = \"artery\"}]\n");
+    const auto set = figures({"import", bare, "-o", vdb, "--map", map, "--set", "lump=ilc"});
+    EXPECT_EQ(tissueOf(set, "lump"), "ilc");
+    EXPECT_EQ(tissueOf(set, "pipe"), "artery");
+    expectRefusal({"import", bare, "-o", vdb, "--map", map, "--set", "lung=ilc"}, "--set lung=ilc: no voxel has a label");
+    expectRefusal({"import", bare, "-o", vdb, "--map", map, "--set", "lump=ilc", "--set", "2=fat"}, "both name label 2");
+    // In a file with names of its own, these alone count.
+    expectRefusal({"import", seg, "-o", vdb, "--map", map, "--set", "trunk=ilc"}, "trunk=ilc");
+}
+
+// What holds a body is said, and where: nothing in it is fixed, or a structure is.
+TEST_F(Researcher, ABodyThatNothingHoldsSaysWhatItLiesOn)
+{
+    const auto lies = figures({"import", seg, "-o", vdb});
+    EXPECT_LT(lies.at("support").at("normal").at(1).get<double>(), -0.9);
+    EXPECT_EQ(figures({"info", vdb}).at("support"), lies.at("support"));
+    const std::string words = "nothing in it is fixed: it lies on its back, held behind ";
+    EXPECT_NE(palpate({"info", vdb}).out.find(words), std::string::npos);
+    EXPECT_TRUE(figures({"import", seg, "-o", vdb, "--set", "Left lesion=chest_wall"}).at("support").is_null());
+    EXPECT_EQ(palpate({"info", vdb}).out.find(words), std::string::npos);
+}
+
 // Sets of label values as other programs write them, without names. Each would once have become another program's organs.
 TEST_F(Researcher, ValuesAloneNeverDecide)
 {

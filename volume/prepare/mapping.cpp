@@ -95,10 +95,7 @@ public:
             notes.push_back(fmt::format("label map '{}' recognised by the names in the file", map_.name));
         }
         const auto there = [&](const Setting& s) {
-            return std::any_of(counts.begin(), counts.end(), [&](const auto& label) {
-                const LabelName* own = find(labels.names, label.first);
-                return s.names(originalOf(label.first), own != nullptr ? own->name : "");
-            });
+            return std::any_of(counts.begin(), counts.end(), [&](const auto& label) { return fits(s, label.first); });
         };
         for (const Setting& s : settings_) {
             if (!there(s)) {
@@ -127,7 +124,7 @@ public:
             name = value == 0 ? "outside" : fmt::format("label {}", originalOf(value));
         }
         for (const Setting& s : settings_) {
-            if (s.names(originalOf(value), own != nullptr ? own->name : "")) {
+            if (fits(s, value)) {
                 found.label.tissue = s.tissue;
                 return found;
             }
@@ -147,14 +144,21 @@ public:
     }
 
 private:
+    // Whether a setting is about this label: by its value, by its name in the file, or else by that in the map.
+    bool fits(const Setting& s, std::uint16_t value) const
+    {
+        const LabelName* own = find(labels_.names, value);
+        const LabelName* mapped = originalOf(value) == value ? find(map_.labels, value) : nullptr;
+        return s.names(originalOf(value), own != nullptr ? own->name : mapped != nullptr ? mapped->name : "");
+    }
+
     // Two settings of one label, perhaps by its name and by its value, have to agree.
     void checkSettings(const LabelCounts& counts) const
     {
         for (const auto& [value, voxels] : counts) {
-            const LabelName* own = find(labels_.names, value);
             const Setting* first = nullptr;
             for (const Setting& s : settings_) {
-                if (!s.names(originalOf(value), own != nullptr ? own->name : "")) {
+                if (!fits(s, value)) {
                     continue;
                 }
                 if (first != nullptr && first->tissue != s.tissue) {

@@ -1,0 +1,61 @@
+#include <base/outputs.h>
+
+#include <tests/folder.h>
+
+#include <gtest/gtest.h>
+
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+namespace palpate::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string contentOf(const std::string& file)
+{
+    std::ifstream in(file, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// A pipe or a device (/dev/null) takes the bytes and stays what it is; put in its place, a file would end it for everybody.
+TEST(Outputs, APipeIsWrittenIntoAndStaysAPipe)
+{
+    const tests::Folder folder;
+    const std::string pipe = folder / "pipe";
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    std::string read;
+    std::thread reader([&] { read = contentOf(pipe); });
+    writeWhole(pipe, "a,b\n1,2\n");
+    reader.join();
+    EXPECT_EQ(read, "a,b\n1,2\n");
+    EXPECT_TRUE(fs::is_fifo(pipe));
+    EXPECT_THROW(replaceable(pipe), std::runtime_error);
+    EXPECT_EQ(std::distance(fs::directory_iterator(fs::path(pipe).parent_path()), {}), 1);
+}
+
+// A link stays, and what it leads to is replaced; so is a file, whole.
+TEST(Outputs, ALinkStaysALink)
+{
+    const tests::Folder folder;
+    const std::string file = folder / "there.csv", link = folder / "link.csv", fresh = folder / "fresh.csv";
+    writeWhole(file, "what was there, and is longer");
+    fs::create_symlink(file, link);
+    writeWhole(link, "new");
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_EQ(contentOf(file), "new");
+    EXPECT_EQ(replaceable(link), fs::canonical(file));
+    writeWhole(fresh, "first");
+    EXPECT_EQ(contentOf(fresh), "first");
+    EXPECT_EQ(replaceable(fresh), fresh);
+    EXPECT_THROW(writeWhole(folder / "none/of.csv", "x"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace palpate::base
