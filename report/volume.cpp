@@ -160,7 +160,7 @@ void printVolume(const volume::Tissue& tissue)
         fmt::print("image        {}\n", imageText(tissue));
     }
     if (tissue.support()) {
-        const Vec3 p = 1e3 * tissue.support()->point, n = -tissue.support()->normal;
+        const Vec3 p = 1e3 * tissue.support()->point, n = Vec3(0.0) - tissue.support()->normal;
         fmt::print(
             "held         nothing in it is fixed: it lies on its back, held behind {:.1f} {:.1f} {:.1f} mm towards {:.2f} "
             "{:.2f} {:.2f}; import --set NAME=chest_wall holds a structure\n",

@@ -59,7 +59,7 @@ Support onItsBackIn(const Affine& affine, IndexBox body)
     const int depth = body.high[axis] - body.low[axis] + 1;
     const int layers = std::max(1, static_cast<int>(std::lround(onItsBack * depth)));
     const bool backIsHigh = affine.linear[axis].y > 0.0;
-    Vec3 index(body.low);
+    Vec3 index = 0.5 * Vec3(body.low + body.high);
     index[axis] = backIsHigh ? body.high[axis] + 0.5 - layers : body.low[axis] - 0.5 + layers;
     const Vec3 inIndex = glm::row(glm::inverse(affine.linear), axis);  // grows along the axis alone, in whatever direction
     return {affine.toPatient(index), glm::normalize(backIsHigh ? -inIndex : inIndex)};
