@@ -14,13 +14,13 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double blur = 1.0;        // standard deviation of the Gaussian [voxels]
-constexpr int reach = 3;            // of the Gaussian [voxels]
-constexpr double sheer = 0.8;       // a side is flat when its last layer has this fraction of the layer two before
-constexpr double onItsBack = 0.05;  // fraction of the depth that is held when nothing else is, as in chainmail/elastic_body
-constexpr double full = 65535.0;    // a fraction of one
-constexpr double pure = 0.98;       // share from which on a voxel is one tissue throughout
-constexpr double maxBias = 0.45;    // beyond it a bias would drown the shares
+constexpr double blur = 1.0;          // standard deviation of the Gaussian [voxels]
+constexpr int reach = 3;              // of the Gaussian [voxels]
+constexpr double sheer = 0.8;         // a side is flat when its last layer has this fraction of the layer two before
+constexpr double onItsBack = 0.05;    // fraction of the depth that is held when nothing else is: Tissue::support()
+constexpr double full = 65535.0;      // a fraction of one
+constexpr double pure = 0.98;         // share from which on a voxel is one tissue throughout
+constexpr double maxBias = 0.45;      // beyond it a bias would drown the shares
 constexpr double closeEnough = 1e-3;  // of a region's volume
 constexpr int fitPasses = 6;
 

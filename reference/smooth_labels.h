@@ -60,7 +60,7 @@ struct SmoothLabels {
 enum class Keep : std::uint8_t { soft, all };
 
 /// Soft is what is neither air, nor bone, nor fixed. A body of which nothing is fixed lies on its back, as in
-/// chainmail::elasticBody(): its rear 5 %, in whole layers of voxels and at least one, are left out, and it is held there.
+/// volume::Tissue::support(): its rear 5 %, in whole layers of voxels and at least one, are left out, and it is held there.
 /// With Keep::all everything but air is a region, and nothing is left out.
 /// Throws std::runtime_error where there is no such tissue.
 SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep = Keep::soft);

@@ -26,7 +26,7 @@ struct TetBody {
 
 /// Poisson's ratio at which linear tetrahedra do not lock yet [-].
 inline constexpr double unlockedPoisson = 0.45;
-/// Fraction of a body's depth that is held when nothing else is, as chainmail::elasticBody() has it [-].
+/// Fraction of a body's depth that is held when nothing else is, as volume::Tissue::support() has it [-].
 inline constexpr double onItsBack = 0.05;
 
 /// The body on a lattice: five tetrahedra to a cell, mirrored from cell to cell so that they meet. Points of the surface
@@ -35,7 +35,7 @@ inline constexpr double onItsBack = 0.05;
 /// dihedral angles", ACM Trans. Graphics 26, 2007.
 ///
 /// Cells that are half or more full make the body, with the modulus of what is in them; half or more fixed tissue holds
-/// their points. A body without fixed tissue lies on its back, as chainmail::elasticBody() has it. Parts that hang on
+/// their points. A body without fixed tissue lies on its back, as volume::Tissue::support() has it. Parts that hang on
 /// nothing are left out. Throws std::runtime_error when nothing is left, or when it would have over `maxPoints`.
 ///
 /// @param surface     signed distance to the body's surface at rest [m]
