@@ -15,13 +15,14 @@ namespace palpate::chainmail {
 namespace {
 
 constexpr std::size_t maxTools = 16;
-constexpr double reach = 0.6;       // spacings from a tool within which surface points are looked at
-constexpr double drift = 0.25;      // spacings that a tool may move until they are looked for again
-constexpr double minEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
-constexpr int callsPerTurn = 2;     // from one term of the history to the next
-constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
-constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;    // cycles, so that windows that moved are not felt
+constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
+constexpr double minEnergy = 1e-9;    // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr int callsPerTurn = 2;       // from one term of the history to the next
+constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
+constexpr double maxBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
+constexpr int moreAfterMove = 2;      // cycles, so that windows that moved are not felt
+constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
 constexpr double noLimit = -std::numeric_limits<double>::infinity();
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
@@ -110,12 +111,12 @@ bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
     if (moved || atRest_ || load.tools.size() != foundFor_.size() || load.ties.size() != tiesFound_) {
         return false;
     }
-    const double far = drift * stack_.body().levels.front().nodes.spacing;
+    const double spacing = stack_.body().levels.front().nodes.spacing, far = drift * spacing;
     for (std::size_t i = 0; i < foundFor_.size(); ++i) {
         const auto& now = load.tools[i].shape;
-        const auto& then = foundFor_[i];
+        const auto& [then, isQuartered] = foundFor_[i];
         if (glm::distance(now.a, then.a) > far || glm::distance(now.b, then.b) > far || now.radiusA != then.radiusA ||
-            now.radiusB != then.radiusB) {
+            now.radiusB != then.radiusB || isQuartered != touchesLittle(load.tools[i], spacing)) {
             return false;
         }
     }
@@ -137,7 +138,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
     ties_ = load.ties;
     if (!sitesHold(load, moved)) {
-        const double near = reach * stack_.body().levels.front().nodes.spacing;
+        const double spacing = stack_.body().levels.front().nodes.spacing, near = reach * spacing;
         for (const ContactSite& s : sites()) {
             if (!s.isTie) {
                 slip_[s.point] = Vec3f(s.slip);
@@ -146,7 +147,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
         siteCount_ = findSites(stack_.body(), stack_.windows(), load, shapes_, near, sites_);
         foundFor_.clear();
         for (const ElasticTool& tool : load.tools) {
-            foundFor_.push_back(tool.shape);
+            foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});
         }
         tiesFound_ = load.ties.size();
         for (ContactSite& s : active()) {
@@ -169,12 +170,11 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
 void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
-    std::array<double, maxTools> fraction{};
+    const auto& grid = body.levels.front().nodes;
+    std::array<double, maxTools> patch{}, across{};  // radius, in cells; where its middle is
     for (std::size_t i = 0; i < tools_.size(); ++i) {
-        const double depth = glm::length(tools_[i].pushed);
-        fraction[i] = depth > 0.0
-                          ? resolvedShare(std::sqrt(tools_[i].shape.widest() * depth) / body.levels.front().nodes.spacing)
-                          : 1.0;
+        patch[i] = tools_[i].pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tools_[i]) / grid.spacing;
+        across[i] = betweenNodes(grid, tools_[i]);
     }
     AreaRatio areaRatio(body, stack_.windows());
     for (ContactSite& s : active()) {
@@ -182,7 +182,7 @@ void Elastic::spreadPressure() noexcept
             // What moved last was measured then.
             const bool isKnown = s.stretch > 0.0;
             const double ratio = volume::isSmall(options_.law) ? 1.0 : isKnown ? s.stretch : areaRatio(s);
-            s.stiffness = fraction[s.owner] * ratio * s.atRest;
+            s.stiffness = resolvedShare(patch[s.owner], s.between, across[s.owner]) * ratio * s.atRest;
         }
     }
 }

@@ -190,7 +190,11 @@ private:
     std::vector<ContactSite> sites_;
     std::size_t siteCount_ = 0;
     std::vector<occupancy::ShapeDistance> shapes_;
-    std::vector<occupancy::RoundCone> foundFor_;  // the tools when the sites were looked for
+    struct FoundFor {
+        occupancy::RoundCone shape;
+        bool isQuartered = false;
+    };
+    std::vector<FoundFor> foundFor_;  // the tools when the sites were looked for
     std::size_t tiesFound_ = 0;
     std::vector<HeldTool> held_;      // of each tool
     std::vector<ElasticTool> tools_;  // as the body feels them

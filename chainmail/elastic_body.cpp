@@ -140,7 +140,9 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             if (hat <= 0.0 || !finest.nodes.contains(under)) {
                 return;
             }
-            const float mu = finest.mu[finest.nodes.offset(under)];
+            // A cell that the surface runs through is as much softer as it is less full.
+            const double full = std::clamp(0.5 - surface.at(cells.position(under)) / cells.spacing, 0.5, 1.0);
+            const float mu = finest.mu[finest.nodes.offset(under)] / static_cast<float>(full);
             if (mu > 0.0F) {
                 body.points.push_back({Vec3f(on), Vec3f(anchorOf(finest, on, under)), Vec3f(normal),
                                        static_cast<float>(sub * sub * sub * hat / width), mu});

@@ -4,6 +4,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -11,10 +12,26 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double penalty = 20.0;    // contact stiffness per area, in E / h
-constexpr double unresolved = 3.3;  // compliance that cells lack under a point, in that of the contact
-constexpr double resolved = 1.8;    // radius of a patch that lacks none, in cells
-constexpr double minRatio = 0.3;    // of areas: bounds far beyond what tissue bears
+constexpr double penalty = 20.0;           // contact stiffness per area, in E / h
+constexpr double meanBetween = 1.0 / 3.0;  // of betweenNodes() over two edges
+
+// Compliance that cells lack under a patch, in h / E per area: its mean over places in the grid, and by how much it grows
+// with betweenNodes().
+struct Lacking {
+    double radius = 0;  // of the patch, in cells
+    double mean = 0;
+    double across = 0;
+};
+constexpr std::array<Lacking, 6> lacking{{{0.5, 0.185, 0.25},
+                                          {0.75, 0.13, 0.15},
+                                          {1.0, 0.083, -0.17},
+                                          {1.25, 0.056, -0.12},
+                                          {1.5, 0.035, 0.1},
+                                          {2.0, 0.0, 0.0}}};
+constexpr double little = 1.25;   // radius of a patch, in cells, up to which surface points are quartered
+constexpr double coarse = 0.11;   // area of a surface point that is quartered, in that of a cell's face,
+constexpr double close = 0.3;     // and how far from the tool it may be [cells]
+constexpr double minRatio = 0.3;  // of areas: bounds far beyond what tissue bears
 constexpr double maxRatio = 30.0;
 
 // Stiffness of a surface point by its area at rest. A whole contact must not be stiffer than `stiffest`: spread over a
@@ -101,10 +118,57 @@ private:
             site.owner = static_cast<std::uint16_t>(index);
             site.point = i;
             site.atRest = site.stiffness = siteStiffness(point, spacing, tool);
-            if (add(site) && nearest(shape, site.rest, site.u) > near_) {
-                --count_;
+            const bool added = addIfNear(shape, site);
+            if (added && touchesLittle(tool, spacing) && static_cast<double>(point.area) > coarse * spacing * spacing) {
+                quarterLast(shape);
             }
         }
+    }
+
+    // The piece of the surface that was added last as four, where it may soon touch.
+    void quarterLast(const occupancy::ShapeDistance& shape) noexcept
+    {
+        const ContactSite whole = out_[count_ - 1];
+        if (nearest(shape, whole.rest, whole.u) > close * body_.levels.front().nodes.spacing) {
+            return;
+        }
+        --count_;
+        const SurfacePoint& point = body_.points[whole.point];
+        const Vec3 normal(point.normal), size = glm::abs(normal);
+        const Vec3 axis = size.x <= size.y && size.x <= size.z ? Vec3(1, 0, 0)
+                          : size.y <= size.z                   ? Vec3(0, 1, 0)
+                                                               : Vec3(0, 0, 1);
+        const double quarter = 0.25 * std::sqrt(static_cast<double>(point.area));
+        const Vec3 one = quarter * glm::normalize(glm::cross(normal, axis)), other = glm::cross(normal, one);
+        for (const Vec3& off : {-one - other, one - other, other - one, one + other}) {
+            ContactSite site = whole;
+            site.rest += off;
+            site.anchor += hasTissue(site.anchor + off) ? off : Vec3(0.0);
+            site.atRest = site.stiffness = 0.25 * whole.atRest;
+            addIfNear(shape, site);
+        }
+    }
+
+    bool hasTissue(Vec3 at) const noexcept
+    {
+        const CellLevel& finest = body_.levels.front();
+        const Index3 cell(glm::floor((at - finest.nodes.origin) / finest.nodes.spacing));
+        return finest.nodes.contains(cell) && finest.mu[finest.nodes.offset(cell)] > 0.0F;
+    }
+
+    bool addIfNear(const occupancy::ShapeDistance& shape, ContactSite& site) noexcept
+    {
+        if (!add(site)) {
+            return false;
+        }
+        ContactSite& added = out_[count_ - 1];
+        if (nearest(shape, added.rest, added.u) > near_) {
+            --count_;
+            return false;
+        }
+        const Vec3 normal(body_.points[added.point].normal);
+        added.between = static_cast<float>(betweenNodes(body_.levels.front().nodes, added.anchor, normal * normal));
+        return true;
     }
 
     // Tissue that a tool left behind still has to find back to it.
@@ -132,6 +196,16 @@ private:
 };
 
 }  // namespace
+
+double radiusOfPatch(const ElasticTool& tool) noexcept
+{
+    return std::sqrt(tool.shape.widest() * glm::length(tool.pushed));
+}
+
+bool touchesLittle(const ElasticTool& tool, double spacing) noexcept
+{
+    return tool.pushed != Vec3(0.0) && radiusOfPatch(tool) < little * spacing;
+}
 
 void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept
 {
@@ -186,10 +260,35 @@ double AreaRatio::operator()(const ContactSite& site) noexcept
     return std::clamp(glm::length(area), minRatio, maxRatio);
 }
 
-double resolvedShare(double radiusInCells) noexcept
+double betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept
 {
-    const double t = std::min(radiusInCells / resolved, 1.0);
-    return 1.0 / (1.0 + unresolved * (1.0 - t * t));
+    const Vec3 place = glm::fract((at - grid.origin) / grid.spacing);
+    return glm::dot(weights, place * (1.0 - place));
+}
+
+double betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept
+{
+    const double depth = glm::length(tool.pushed);
+    if (depth <= 0.0) {
+        return meanBetween;
+    }
+    const Vec3 inward = tool.pushed / depth;
+    const Vec3 a = tool.shape.a + tool.shape.radiusA * inward, b = tool.shape.b + tool.shape.radiusB * inward;
+    const double ahead = glm::dot(a - b, inward);
+    const double place = betweenNodes(grid, (ahead < 0.0 ? b : a) - tool.pushed, 1.0 - inward * inward);
+    const double isRound = tool.shape.a == tool.shape.b ? 1.0 : std::min(std::abs(ahead) / depth, 1.0);
+    return glm::mix(meanBetween, place, isRound);
+}
+
+double resolvedShare(double radiusInCells, double along, double across) noexcept
+{
+    const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
+                                        [](const Lacking& l, double t) { return l.radius < t; });
+    const Lacking &to = *above, &from = *(above - 1);
+    const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
+    const double lacks = glm::mix(from.mean, to.mean, t) + glm::mix(from.across, to.across, t) * (across - meanBetween) +
+                         0.3 * along * std::max(1.0 - radiusInCells * radiusInCells / 16.0, 0.0);
+    return 1.0 / (1.0 + penalty * std::max(lacks, 0.0));
 }
 
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept

@@ -68,6 +68,7 @@ struct alignas(64) ContactSite {
     double atRest = 0;        // stiffness of a surface point, by its area at rest [N/m]
     double stretch = 0;       // areaRatio() at the end of the last call; 0: not known
     std::uint32_t point = 0;  // index of the surface point
+    float between = 0;        // of the surface point: betweenNodes() along its normal
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
@@ -99,6 +100,12 @@ struct Along {
 /// To first order in the tool's surface: depth falls by normal . p.
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
 
+/// Of the patch that a tool touches, sqrt(R d) by Hertz [m].
+double radiusOfPatch(const ElasticTool& tool) noexcept;
+/// True while that is so small that each surface point is quartered.
+/// @param spacing  of the finest cells [m]
+bool touchesLittle(const ElasticTool& tool, double spacing) noexcept;
+
 /// Fills `out` with the ties and with the surface points that a tool may touch: those within `near` [m] of it, as the
 /// tissue lies now or as it would lie at rest.
 /// @returns  how many; more than out holds are left out
@@ -121,15 +128,26 @@ private:
     std::array<Vec3, 3> cofactor_{};  // columns of cof(F)
 };
 
-/// Fraction of the contact's stiffness that a patch of radius a has on cells of side h.
+/// How far between nodes a place is: sum over the edges of a cell of f (1 - f), f the place along one, 0 to 1, each edge
+/// with its weight.
+double betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept;
+/// The same of the middle of what a tool touches, over the edges across its way. 1/3, the mean, for a capsule that lies
+/// flat.
+double betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
+
+/// Fraction of the contact's stiffness that a point has under a patch of radius a on cells of side h.
 ///
-///     1 / (1 + 3.3 (1 - (a / 1.8 h)^2))    for a < 1.8 h, else 1
+/// Cells do not give way under a patch smaller than themselves as tissue does, least in the middle between nodes. What they
+/// lack there is a compliance c h / E per area:
 ///
-/// Cells do not give way under a patch smaller than themselves as tissue does: a sphere on a half-space was 46 % too stiff
-/// at a = h / 2 and 10 % at a = h, mean over places in the grid. What they lack is a compliance of about 0.15 h / E per
-/// area up to a = h, and nothing from 1.8 h on. The two numbers are those of Hertz's problem; `palpate accuracy --verify`
-/// has it.
-double resolvedShare(double radiusInCells) noexcept;
+///     c = m(a / h) + g(a / h) (across - 1 / 3) + 0.3 along max(0, 1 - (a / 4 h)^2),    share = 1 / (1 + 20 c)
+///
+/// m falls from 0.185 at 0.5 to 0 at 2; g is 0.25 at 0.5, changes its sign and ends there, too. They and the factor of
+/// `along` are what a ball on a half-space (Hertz 1882; nu 0.45 to 0.49) needs on grids shifted along and across the
+/// surface; `palpate accuracy --verify` has the errors that are left.
+/// @param along   betweenNodes() of the point along the surface's normal
+/// @param across  and of the tool
+double resolvedShare(double radiusInCells, double along, double across) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

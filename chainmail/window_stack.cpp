@@ -4,6 +4,7 @@
 #include <glm/vector_relational.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 
 namespace palpate::chainmail {
@@ -52,16 +53,29 @@ WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus
     place();
 }
 
-// Lowest node of a window around the focus, as far as the grid has nodes; not rounded.
+// Lowest node of a window around the focus, as far as the grid has nodes; not rounded. Cells that the surface runs through
+// have nodes outside of the body. On the border of a window, which is held, they would hold the surface: so the border
+// stays a node and a half off them, which leaves one when the window is a `slack` off its place.
 Vec3 WindowStack::wantedPlace(std::size_t level, const Focus& focus) const noexcept
 {
+    constexpr double off = 1.5;
+    constexpr double onNode = 0.05;  // as near to a node as that, a surface has none outside
     const auto& grid = body_->levels[level].nodes;
     const Index3 size = windows_[level].size();
-    // Half of a window less what lies between surface and focus, and a cell and a half for what the grid cuts off.
-    const double half = 0.5 * (std::min({size.x, size.y, size.z}) - 1) - 1.5;
+    // Half of a window less what lies between surface and focus.
+    const double half = 0.5 * (std::min({size.x, size.y, size.z}) - 1) - off;
     const double shift = std::max(0.0, half - focus.depth / grid.spacing);
-    const Vec3 middle = (focus.point - grid.origin) / grid.spacing + shift * focus.inward;
-    return glm::clamp(middle - 0.5 * Vec3(size - 1), Vec3(0.0), Vec3(grid.size - size));
+    const Vec3 at = (focus.point - grid.origin) / grid.spacing;
+    const Vec3 surface = at - focus.depth / grid.spacing * focus.inward;
+    Vec3 low = at + shift * focus.inward - 0.5 * Vec3(size - 1);
+    for (int i = 0; i < 3 && shift > 0.0; ++i) {
+        if (focus.inward[i] > 0.0) {
+            low[i] = std::min(low[i], std::floor(surface[i] + onNode) - off);
+        } else if (focus.inward[i] < 0.0) {
+            low[i] = std::max(low[i], std::ceil(surface[i] - onNode) + off - (size[i] - 1));
+        }
+    }
+    return glm::clamp(low, Vec3(0.0), Vec3(grid.size - size));
 }
 
 Index3 WindowStack::wantedLow(std::size_t level, const Focus& focus) const noexcept

@@ -28,6 +28,7 @@ struct ElasticBlock {
     std::function<volume::CellMaterial(Index3)> material;  // of each cell of tissue, counted from 0
     int air = 1;                                           // cells of nothing around it; 2^n keeps n coarser levels whole
     Vec3 low{0.0};                                         // its lowest corner [m]
+    double full = 1.0;                                     // of the first layer along y: the surface lies in it
 };
 
 /// The same material everywhere; the last layer along y is fixed.
@@ -68,10 +69,13 @@ inline chainmail::ElasticBody bodyOf(const ElasticBlock& block, double poissonCa
     const double h = block.spacing;
     const volume::NodeGrid grid{block.cells + 2 * block.air, block.low + (0.5 - block.air) * h, h};
     std::vector<volume::CellMaterial> materials(grid.count());
-    volume::forEachIndex(Index3(0), block.cells - 1,
-                         [&](Index3 c) { materials[grid.offset(c + block.air)] = block.material(c); });
-    const Vec3 high = block.low + h * Vec3(block.cells);
-    const auto surface = distanceOn(grid, [&](Vec3 p) { return boxDistance(p, block.low, high); });
+    volume::forEachIndex(Index3(0), block.cells - 1, [&](Index3 c) {
+        auto& material = materials[grid.offset(c + block.air)];
+        material = block.material(c);
+        material.youngsModulus *= c.y == 0 ? static_cast<float>(block.full) : 1.0F;
+    });
+    const Vec3 low = block.low + Vec3(0.0, (1.0 - block.full) * h, 0.0), high = block.low + h * Vec3(block.cells);
+    const auto surface = distanceOn(grid, [&](Vec3 p) { return boxDistance(p, low, high); });
     return chainmail::elasticBody(grid, std::move(materials), surface, poissonCap, 0.0, relaxes);
 }
 

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <random>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -224,33 +225,75 @@ TEST(ElasticDeep, AFastToolDoesNotJumpThroughAPlate)
     EXPECT_GT(before, 0.3);
 }
 
-// Force of a ball of 20 mm over Hertz's with the depth's factor (Dimitriadis), mean over places in the grid: cells of 2 mm
-// under contacts of a half to one and a half of them. Without resolvedShare() 32 to 3 % too stiff.
-TEST(ElasticDeep, FirstTouchFollowsHertz)
+// A block of fat, its surface at y = 0 in the middle of cells as full as that, on a floor 40 mm under it.
+ElasticBody blockCutAt(double full, double poissonRatio)
 {
+    auto block = tests::heldBlock({40, full < 1.0 ? 22 : 21, 40}, 2e-3, 3250.0, poissonRatio);
+    block.air = 4;
+    block.full = full;
+    block.low.y = (full - 1.0) * block.spacing;
+    return tests::bodyOf(block);
+}
+
+// Force of a ball of 20 mm over Hertz's with the depth's factor (Dimitriadis): cells of 2 mm under contacts of a half to
+// two of them, at places in the grid across and along the surface, means and worst. With windows whose border held the
+// nodes over a surface, and one share for all places, the worst was 43, 21, 10 and 8 % at 0.5, 1, 1.5 and 2.
+TEST(ElasticDeep, FirstTouchFollowsHertzWhereverTheSurfaceLiesInItsCells)
+{
+    struct Touch {
+        double cells, mean, worst;
+    };
     const double r = 20e-3;
-    const double nu = 0.45;
-    const ElasticBody body = softBlock(nu);
+    const double nu = 0.47;
     const double a0 = -(1.2876 - 1.4678 * nu + 1.3442 * nu * nu) / (1.0 - nu);
-    const auto bounds = std::to_array<std::pair<double, double>>({{0.5, 0.12}, {0.75, 0.05}, {1.0, 0.04}, {1.5, 0.04}});
-    for (const auto& [cells, bound] : bounds) {
-        const double a = cells * 2e-3;
-        const double d = a * a / r;
-        const double chi = a / 40e-3;
-        const double hertz = 4.0 / 3.0 * 3250.0 / (1.0 - nu * nu) * std::sqrt(r) * std::pow(d, 1.5) *
-                             (1.0 - 2.0 * a0 * chi / pi + 4.0 * a0 * a0 * chi * chi / (pi * pi));
-        double sum = 0.0;
-        const auto places =
-            std::to_array<Vec3>({{0, 0, 0}, {1, 0, 1.4}, {2, 0, 2}, {0.6, 0, 0}, {2, 0, 0.8}, {1.5, 0, 0.7}});
-        for (const Vec3 shift : places) {
-            const Vec3 entry = middle + 1e-3 * shift;
-            Elastic elastic(body, {.window = 15}, tests::focusUnder(entry));
-            std::array tools{tests::ball(entry + Vec3(0.0, d - r, 0.0), r)};
-            tools[0].pushed = Vec3(0.0, d, 0.0);
-            tests::settle(elastic, tests::loadOf(tools, {}, entry), 1e-3);
-            sum -= elastic.toolForce(0).y;
+    for (const double full : {1.0, 0.8, 0.5, 0.2}) {
+        const ElasticBody body = blockCutAt(full, nu);
+        for (const Touch touch :
+             {Touch{0.5, 0.04, 0.11}, Touch{0.75, 0.02, 0.022}, Touch{1.0, 0.02, 0.025}, Touch{2.0, 0.02, 0.025}}) {
+            const double a = touch.cells * 2e-3;
+            const double d = a * a / r;
+            const double chi = a / (38e-3 + 2e-3 * full + (full < 1.0 ? 2e-3 : 0.0));
+            const double hertz = 4.0 / 3.0 * 3250.0 / (1.0 - nu * nu) * std::sqrt(r) * std::pow(d, 1.5) *
+                                 (1.0 - 2.0 * a0 * chi / pi + 4.0 * a0 * a0 * chi * chi / (pi * pi));
+            double sum = 0.0;
+            const auto places =
+                std::to_array<Vec3>({{0, 0, 0}, {1, 0, 1}, {0.5, 0, 0}, {1, 0, 0}, {0.5, 0, 0.5}, {1, 0, 0.5}});
+            for (const Vec3 shift : places) {
+                const Vec3 entry = middle + 1e-3 * shift;
+                Elastic elastic(body, {.window = 15}, tests::focusUnder(entry));
+                std::array tools{tests::ball(entry + Vec3(0.0, d - r, 0.0), r)};
+                tools[0].pushed = Vec3(0.0, d, 0.0);
+                tests::settle(elastic, tests::loadOf(tools, {}, entry), 1e-3);
+                const double error = -elastic.toolForce(0).y / hertz - 1.0;
+                EXPECT_NEAR(error, 0.0, touch.worst)
+                    << full << ", a / h " << touch.cells << ", at " << shift.x << " " << shift.z;
+                sum += error;
+            }
+            EXPECT_NEAR(sum / places.size(), 0.0, touch.mean) << full << ", a / h " << touch.cells;
         }
-        EXPECT_NEAR(sum / places.size() / hertz, 1.0, bound) << cells;
+    }
+}
+
+// Wherever the surface lies in its cells, and however a window came there: the border, which is held, has none of their
+// nodes.
+TEST(ElasticDeep, TheBorderOfAWindowStaysOffTheCellsOfTheSurface)
+{
+    const ElasticBody body = blockCutAt(1.0, 0.47);
+    const auto& grid = body.levels.front().nodes;
+    for (const double side : {1.0, -1.0}) {
+        WindowStack stack(body, 13, tests::focusUnder(middle));
+        std::minstd_rand random(3);
+        for (int i = 0; i < 200; ++i) {
+            const double way = 1e-6 * static_cast<double>(random() % 8000), y = side > 0.0 ? way : 38e-3 - way;
+            stack.follow({{middle.x, y, middle.z}, {0.0, side, 0.0}, 0.0}, false);
+            const double node = (y - grid.origin.y) / grid.spacing;
+            const Window& finest = stack[0];
+            if (side > 0.0) {
+                EXPECT_LT(finest.low.y, std::floor(node + 0.05)) << y;
+            } else {
+                EXPECT_GT(finest.low.y + finest.size().y - 1, std::ceil(node - 0.05)) << y;
+            }
+        }
     }
 }
 
