@@ -21,8 +21,8 @@ namespace palpate::volume {
 
 namespace {
 
-// Reads the voxels that fill a node's cell, by s^3 samples of the cell. Along voxel axes that are not finer than half
-// the nodes it interpolates: the nearest voxel alone would shift everything by up to half a voxel where samples fall on the
+// Reads the voxels that fill a node's cell, by s^3 samples of the cell. Along voxel axes that are about as coarse as the
+// samples it interpolates: the nearest voxel alone would shift everything by up to half a voxel where samples fall on the
 // faces between voxels.
 class CellSampler {
 public:
@@ -43,7 +43,7 @@ public:
         step_ = toIndex * grid.spacing;
         start_ = toIndex * (grid.origin - tissue.affine.origin);
         for (int k = 0; k < 3; ++k) {
-            interpolate_[k] = voxel[k] > 0.499 * grid.spacing;
+            interpolate_[k] = voxel[k] > 0.8 * grid.spacing / s;
         }
     }
 

@@ -205,6 +205,31 @@ TEST(Tissue, ANamedZeroIsTissue)
     EXPECT_EQ(reader.youngsModulus(image.affine.toPatient(Vec3(-1, 0, 0))), 0.0);
 }
 
+// A cell that the body's face cuts has the share of the modulus that lies behind the face, wherever samples fall among the
+// voxels: exactly, but for the half voxel at the cell's own ends. By the nearest voxel half a voxel was missing on ties.
+TEST(TissueCells, AreAsFullAsTheBodyIsInThem)
+{
+    constexpr double voxel = 1e-3;
+    const Index3 size(30, 30, 30);
+    LabelImage image{size, {Mat3(voxel), Vec3(0.0)}, {}};
+    image.values.assign(image.offset({0, 0, size.z}), 0);
+    forEachIndex({0, 10, 0}, {29, 29, 29}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
+    const auto tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+    const double whole = tissue.table().rows[1].youngsModulus, face = 9.5 * voxel;
+    for (const double spacing : {1.5e-3, 2e-3, 3e-3, 4e-3}) {
+        for (double shift = 0.0; shift < spacing; shift += 0.125e-3) {
+            const NodeGrid cells{{2, 5, 2}, {15e-3, 4e-3 + shift, 15e-3}, spacing};
+            const auto material = tissue.materialOn(cells);
+            for (int j = 0; j < cells.size.y; ++j) {
+                const double low = cells.position({0, j, 0}).y - 0.5 * spacing;
+                const double full = std::clamp((low + spacing - face) / spacing, 0.0, 1.0);
+                const double found = static_cast<double>(material[cells.offset({0, j, 0})].youngsModulus) / whole;
+                EXPECT_NEAR(found, full, 0.13 * voxel / spacing) << spacing << " " << shift << " " << j;
+            }
+        }
+    }
+}
+
 // Nothing fixed: the rear 5 % in whole layers, at least one, of the voxel axis that is nearest to y, on whichever side of
 // it the back is. What is behind the plane is held in cells of any size. A bone holds the body, and there is no plane.
 TEST(TissueSupport, ABodyThatNothingHoldsLiesOnItsBack)
