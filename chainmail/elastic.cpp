@@ -18,6 +18,7 @@ constexpr std::size_t maxTools = 16;
 constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
 constexpr double minEnergy = 1e-9;    // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr double forgets = 10.0;      // longest times of relaxation after which nothing is left of it
 constexpr int callsPerTurn = 2;       // from one term of the history to the next
 constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
 constexpr double maxBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
@@ -212,10 +213,11 @@ WindowStack::Evaluated Elastic::tissueForce(Field y, Field along) noexcept
     return now;
 }
 
-// A body that no tool touches, and that still has a history.
+// A body that no tool touches, and that still has a history. That is gone after ten of its longest times: what is left then
+// are cells that springs of a hostile hand turned inside out, and that would stay so.
 bool Elastic::springsBack() const noexcept
 {
-    return stack_.body().relaxes && !atRest_ &&
+    return stack_.body().relaxes && !atRest_ && untouchedFor_ < forgets * volume::relaxationTimes.back() &&
            std::max(std::abs(energy_), std::abs(stack_.dot(Field::h, Field::u))) >= minEnergy;
 }
 
@@ -395,6 +397,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
     const bool isTouched = touched();
+    untouchedFor_ = isTouched ? 0.0 : untouchedFor_ + load.periods * options_.period;
     if (!isTouched && !springsBack()) {
         settle();
         return result;

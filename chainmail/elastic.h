@@ -215,6 +215,7 @@ private:
     std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
     double balance_ = 1;                             // see toolForce()
     int sinceRefresh_ = 0;
+    double untouchedFor_ = 0.0;  // [s]
     bool atRest_ = true;
     bool hasIncrement_ = false;
 };
