@@ -1,9 +1,11 @@
 #include <chainmail/cell_levels.h>
 
-#include <chainmail/kernels.h>
+#include <chainmail/cell_layers.h>
+#include <chainmail/window.h>
 #include <volume/cell_mixture.h>
 
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
@@ -71,15 +73,6 @@ private:
     double sum_ = 0.0;   // of moduli without what is held, by share
     double inverse_ = 0.0;
 };
-
-// One of the cells from `low` to `high` or around them is empty.
-bool atSurface(const CellLevel& level, Index3 low, Index3 high)
-{
-    bool empty = false;
-    volume::forEachIndex(glm::max(low - 1, Index3(0)), glm::min(high + 1, level.nodes.size - 2),
-                         [&](Index3 c) { empty = empty || level.mu[level.nodes.offset(c)] <= 0.0F; });
-    return empty;
-}
 
 class Coarsening {
 public:
@@ -197,6 +190,20 @@ void addDiagonal(CellLevel& level)
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += fraction; });
         }
     });
+    for (const CellLayer& l : level.layers) {
+        const std::size_t at = g.offset(l.cell);
+        const float s = level.lambda[at] / (level.lambda[at] + 2.0F * level.mu[at]);
+        const float scaled = static_cast<float>(g.spacing / 32.0) * 4.0F * l.mu * (0.5F + s / 3.0F);
+        for (const Vec3f& middle : {l.middle - l.half, l.middle + l.half}) {
+            volume::forEachIndex(Index3(0), Index3(1), [&](Index3 n) {
+                const Vec3f side = 2.0F * Vec3f(n) - 1.0F;
+                const Vec3f w = 1.0F + side * middle;
+                const Vec3f slope = side * Vec3f(w.y * w.z, w.z * w.x, w.x * w.y);
+                const Vec3f inPlane = slope - glm::dot(slope, l.normal) * l.normal;
+                level.diagonal[g.offset(l.cell + n)] += 0.5F * scaled * glm::dot(inPlane, inPlane);
+            });
+        }
+    }
 }
 
 // A body that rests on a plane. What lies behind the plane is not strained, and is left out where cells are averaged.
@@ -290,14 +297,13 @@ private:
 CellLevel withStiffSkin(const FinestLevel& finest)
 {
     CellLevel level = finest.level;
-    const auto& g = level.nodes;
-    volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
-        const std::size_t at = g.offset(c);
-        if (finest.along[at] > 1.0F && atSurface(finest.level, c, c)) {
-            level.mu[at] *= finest.along[at];
-            level.lambda[at] *= finest.along[at];
+    for (const MixedCell& m : finest.mixed) {
+        if (atSurface(finest.level, m.cell, m.cell)) {
+            const std::size_t at = level.nodes.offset(m.cell);
+            level.mu[at] *= m.along;
+            level.lambda[at] *= m.along;
         }
-    });
+    }
     return level;
 }
 
@@ -325,6 +331,8 @@ double spectralRadius(const CellLevel& level)
     const Layout l = Layout::of(size.x, size.y, size.z);
     const Kernels& k = kernels();
     std::vector<float> mu(l.count + Layout::lanes), lambda(mu), inverse(mu);
+    LayerFields layers(l, !level.layers.empty());
+    layers.place(level, Index3(0));
     std::vector<float> z(l.fieldSize()), az(l.fieldSize()), scratch(l.scratchSize());
     std::minstd_rand random(7);
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);
@@ -349,7 +357,8 @@ double spectralRadius(const CellLevel& level)
         if (before <= 0.0) {
             break;
         }
-        k.apply(l, {mu.data(), lambda.data()}, z.data(), az.data(), scratch.data());
+        k.apply(l, {.mu = mu.data(), .lambda = lambda.data(), .layers = layers.view()}, z.data(), az.data(),
+                scratch.data());
         k.smoothFirst(static_cast<float>(1.0 / before), inverse.data(), az.data(), z.data(), l.count);
         radius = norm();
     }
@@ -370,7 +379,8 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
         addDiagonal(levels.back());
         first.held = std::move(coarser);
     }
-    levels.front() = std::move(first.level);
+    levels.front() = first.level;
+    addLayers(first, finest.held, surface, levels.front());
     addDiagonal(levels.front());
     if (support) {
         rest(Resting(*support, surface), finest, levels);

@@ -10,11 +10,19 @@ namespace palpate::chainmail {
 /// Fraction of a cell that is held from which on all of it is: bone, but for the rounding of samples.
 inline constexpr float whollyHeld = 0.98F;
 
+/// A cell of several tissues, see volume::CellMaterial.
+struct MixedCell {
+    Index3 cell{0};
+    float along = 1;
+    float share = 0;
+    Vec3f middle{0.0F};
+};
+
 /// The finest level, and what coarser ones need to know of its cells.
 struct FinestLevel {
-    CellLevel level;           // without `diagonal` and `radius`
-    std::vector<float> held;   // fraction of each cell's tissue that is held in space (count x 1)
-    std::vector<float> along;  // of each cell, see volume::CellMaterial (count x 1)
+    CellLevel level;               // without layers, `diagonal` and `radius`
+    std::vector<float> held;       // fraction of each cell's tissue that is held in space (count x 1)
+    std::vector<MixedCell> mixed;  // by z, then y, then x
 };
 
 /// The levels of a body from its finest on, each twice as coarse as the one before.

@@ -67,7 +67,6 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
     level.stiffening.assign(level.nodes.count(), 0.0F);
     level.fixed.assign(level.nodes.count(), 0);
     all.held.assign(level.nodes.count(), 0.0F);
-    all.along.assign(level.nodes.count(), 1.0F);
     for (auto& weights : level.relaxing) {
         weights.assign(relaxes ? level.nodes.count() : 0, 0.0F);
     }
@@ -86,7 +85,9 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
         level.lambda[at] = static_cast<float>(e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)));
         level.stiffening[at] = m.stiffening;
         all.held[at] = m.fixed;
-        all.along[at] = m.along;
+        if (m.along > 1.0F) {
+            all.mixed.push_back({c, m.along, m.share, m.middle});
+        }
         if (m.fixed >= whollyHeld) {
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });
         }
@@ -115,13 +116,26 @@ int pointsPerEdge(double spacing, double toolRadius)
     return toolRadius > 0.0 ? std::clamp(static_cast<int>(std::ceil(2.0 * spacing / toolRadius)), fewest, most) : fewest;
 }
 
+// Shear modulus that a tool meets on each cell. Where layers share one, a patch about as wide as the cell meets what is
+// under them if they are thin, and them alone if they are thick: between harmonic and arithmetic mean by their share.
+std::vector<float> touchedModuli(const FinestLevel& all)
+{
+    std::vector<float> mu = all.level.mu;
+    for (const MixedCell& m : all.mixed) {
+        mu[all.level.nodes.offset(m.cell)] *= std::pow(m.along, 2.0F * m.share - 1.0F);
+    }
+    return mu;
+}
+
 // The surface as points with areas: in every sub-cell near it the distance field gives the nearest point, and a hat as wide
 // as the sub-cell looks along the normal shares the area among the sub-cells that see the same piece.
 // Source: B. Engquist, A.-K. Tornberg, R. Tsai, "Discretization of Dirac delta functions in level set methods", J. Comput.
 // Phys. 207, 2005.
-void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surface, int perEdge, const CellLevel& finest,
+void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surface, int perEdge, const FinestLevel& all,
                 ElasticBody& body)
 {
+    const CellLevel& finest = all.level;
+    const std::vector<float> touched = touchedModuli(all);
     const double sub = cells.spacing / perEdge;
     volume::forEachIndex(Index3(1), cells.size - 2, [&](Index3 c) {
         const Vec3 middle = cells.position(c);
@@ -142,7 +156,7 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
             }
             // A cell that the surface runs through is as much softer as it is less full.
             const double full = std::clamp(0.5 - surface.at(cells.position(under)) / cells.spacing, 0.5, 1.0);
-            const float mu = finest.mu[finest.nodes.offset(under)] / static_cast<float>(full);
+            const float mu = touched[finest.nodes.offset(under)] / static_cast<float>(full);
             if (mu > 0.0F) {
                 body.points.push_back({Vec3f(on), Vec3f(anchorOf(finest, on, under)), Vec3f(normal),
                                        static_cast<float>(sub * sub * sub * hat / width), mu});
@@ -178,7 +192,7 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     int levels = 1;
     const Index3 size = paddedNodes(cells.size, levels);
     FinestLevel all = finest(cells, materials, poissonCap, size, relaxes);
-    addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all.level, body);
+    addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
     indexRows(body);
     return body;

@@ -10,6 +10,15 @@
 
 namespace palpate::chainmail {
 
+/// A thin layer in a cell: a membrane beside the cell's own material, which is as soft as the tissues are across it.
+struct CellLayer {
+    Index3 cell{0};
+    float mu = 0;        // what its shear modulus has over the cell's, times its share of the cell [Pa]
+    Vec3f normal{0.0F};  // unit vector across it
+    Vec3f middle{0.0F};  // of it, -1 to 1 along each edge of the cell
+    Vec3f half{0.0F};    // from there to the two places that stand for its thickness, in the same measure
+};
+
 /// The whole body at one spacing: cubic cells, each of one material, between nodes.
 struct CellLevel {
     volume::NodeGrid nodes;           // cell (i, j, k) lies between nodes (i, j, k) and (i + 1, j + 1, k + 1)
@@ -18,6 +27,9 @@ struct CellLevel {
     std::vector<float> stiffening;    // with finite strain, see TissueRow                        [-]    (count x 1)
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
     std::array<std::vector<float>, volume::relaxationTerms> relaxing;  // weights of each cell [-]; none: does not relax
+    std::vector<CellLayer> layers;                                     // by z, then y, then x
+    std::vector<std::uint32_t>
+        layerRows;                // first of `layers` in row (y, z) of cells, at y + z * nodes along y; none: no layers
     std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
     double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
 };

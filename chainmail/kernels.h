@@ -2,7 +2,9 @@
 
 #include <volume/law.h>
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
 namespace palpate::chainmail {
@@ -32,12 +34,22 @@ struct Layout {
     std::size_t scratchSize() const noexcept { return 24 * plane + 6 * row + lanes; }
 };
 
+/// Thin layers of cells (count x 1 each), see CellLayer: its shear modulus times h / 32, 0 where a cell has none.
+struct CellLayers {
+    const float* mu = nullptr;
+    std::array<const float*, 3> normal{};
+    std::array<const float*, 3> middle{};
+    std::array<const float*, 3> half{};
+    const std::uint8_t* any = nullptr;  // not 0 where one of Layout::lanes cells in a row has a layer (count / lanes x 1)
+};
+
 /// Stiffness of each cell (count x 1), both moduli scaled by spacing / 32, zero where there is no tissue; and the law that
 /// they belong to.
 struct CellStiffness {
     const float* mu = nullptr;                               // Lame's second parameter, times h / 32 [N/m]
     const float* lambda = nullptr;                           // Lame's first parameter, times h / 32 [N/m]
     const float* stiffening = nullptr;                       // b of finite strain [-]; none: 0
+    CellLayers layers{};                                     // without mu: no cell has one
     std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
 };
 

@@ -3,6 +3,10 @@
 
 #include <chainmail/kernels_lanes.h>
 //
+#include <chainmail/kernels_modes.h>
+//
+#include <chainmail/kernels_layers.h>
+//
 #include <chainmail/kernels_cells.h>
 #include <chainmail/kernels_passes.h>
 

@@ -30,7 +30,62 @@ Index3 offsetIn(const Window& fine, const Window& coarse) noexcept
 
 }  // namespace
 
-Window::Window(Index3 size, bool relaxes) : layout(Layout::of(size.x, size.y, size.z))
+LayerFields::LayerFields(const Layout& layout, bool any) : layout_(layout)
+{
+    const std::size_t room = any ? layout.count + Layout::lanes : 0;
+    mu_.assign(room, 0.0F);
+    any_.assign(room / Layout::lanes, 0);
+    for (std::size_t c = 0; c < 3; ++c) {
+        normal_[c].assign(room, 0.0F);
+        middle_[c].assign(room, 0.0F);
+        half_[c].assign(room, 0.0F);
+    }
+}
+
+void LayerFields::place(const CellLevel& level, Index3 at) noexcept
+{
+    some_ = false;
+    std::fill(mu_.begin(), mu_.end(), 0.0F);
+    std::fill(any_.begin(), any_.end(), std::uint8_t{0});
+    const int rows = mu_.empty() ? 0 : (layout_.ny - 1) * (layout_.nz - 1);
+    for (int r = 0; r < rows; ++r) {
+        const Index3 first = at + Index3(0, r % (layout_.ny - 1), r / (layout_.ny - 1));
+        const auto row = static_cast<std::size_t>(first.y + first.z * level.nodes.size.y);
+        for (std::uint32_t i = level.layerRows[row]; i < level.layerRows[row + 1]; ++i) {
+            const Index3 cell = level.layers[i].cell - at;
+            if (cell.x >= 0 && cell.x + 1 < layout_.nx) {
+                set(layout_.at(cell.x, cell.y, cell.z), level.layers[i], static_cast<float>(level.nodes.spacing / 32.0));
+            }
+        }
+    }
+}
+
+void LayerFields::set(std::size_t cell, const CellLayer& layer, float scale) noexcept
+{
+    mu_[cell] = scale * layer.mu;
+    for (int c = 0; c < 3; ++c) {
+        normal_[static_cast<std::size_t>(c)][cell] = layer.normal[c];
+        middle_[static_cast<std::size_t>(c)][cell] = layer.middle[c];
+        half_[static_cast<std::size_t>(c)][cell] = layer.half[c];
+    }
+    any_[cell / Layout::lanes] = 1;
+    some_ = true;
+}
+
+CellLayers LayerFields::with(const Floats& mu) const noexcept
+{
+    if (!some_) {
+        return {};
+    }
+    return {mu.data(),
+            {normal_[0].data(), normal_[1].data(), normal_[2].data()},
+            {middle_[0].data(), middle_[1].data(), middle_[2].data()},
+            {half_[0].data(), half_[1].data(), half_[2].data()},
+            any_.data()};
+}
+
+Window::Window(Index3 size, bool relaxes, bool layered)
+    : layout(Layout::of(size.x, size.y, size.z)), layers(layout, layered)
 {
     for (Floats* cells : {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof}) {
         cells->assign(layout.count + Layout::lanes, 0.0F);
@@ -42,6 +97,7 @@ Window::Window(Index3 size, bool relaxes) : layout(Layout::of(size.x, size.y, si
     for (Term& term : terms) {
         term.mu.assign(relaxes ? layout.count + Layout::lanes : 0, 0.0F);
         term.lambda = term.mu;
+        term.layer.assign(relaxes ? layers.mu().size() : 0, 0.0F);
     }
 }
 
@@ -60,6 +116,7 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
             }
         }
     }
+    layers.place(level, at);
     std::copy(mu.begin(), mu.end(), uncoveredMu.begin());
     std::copy(lambda.begin(), lambda.end(), uncoveredLambda.begin());
     for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
@@ -88,6 +145,9 @@ void Window::placeTerm(const CellLevel& level, std::size_t i) noexcept
             for (std::size_t c = 0; c + 1 < static_cast<std::size_t>(layout.nx); ++c) {
                 terms[i].mu[to + c] = fraction[c] * mu[to + c];
                 terms[i].lambda[to + c] = fraction[c] * lambda[to + c];
+            }
+            for (std::size_t c = 0; c + 1 < static_cast<std::size_t>(layout.nx) && !terms[i].layer.empty(); ++c) {
+                terms[i].layer[to + c] = fraction[c] * layers.mu()[to + c];
             }
         }
     }

@@ -45,6 +45,29 @@ enum class Field : std::uint8_t {
 static_assert(volume::relaxationTerms == 2, "a field for each term");
 inline constexpr std::size_t fieldCount = static_cast<std::size_t>(Field::count);
 
+/// The thin layers of the cells in a box.
+class LayerFields {
+public:
+    /// @param any  the level has layers; where it has none, nothing is kept
+    LayerFields(const Layout& layout, bool any);
+    /// Takes those of the level's cells from `at` on.
+    void place(const CellLevel& level, Index3 at) noexcept;
+    /// What the kernels take; without a modulus where no cell of the box has a layer.
+    CellLayers view() const noexcept { return with(mu_); }
+    /// The same with another modulus.
+    CellLayers with(const Floats& mu) const noexcept;
+    const Floats& mu() const noexcept { return mu_; }
+
+private:
+    void set(std::size_t cell, const CellLayer& layer, float scale) noexcept;
+
+    Layout layout_;
+    Floats mu_;
+    std::array<Floats, 3> normal_, middle_, half_;
+    std::vector<std::uint8_t> any_;
+    bool some_ = false;
+};
+
 /// A box of nodes of one level that follows the tool. Windows are nested; together they are one finite-element space:
 ///
 ///     +-----------------------------+      every node inside a window that no finer window covers is a degree of
@@ -64,8 +87,9 @@ struct Window {
     Floats mu, lambda;                    // of each cell, times spacing / 32 [N/m]
     Floats stiffening;                    // of each cell [-]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
+    LayerFields layers;                   // of the finest window only
     struct Term {
-        Floats mu, lambda;
+        Floats mu, lambda, layer;
     };
     std::array<Term, volume::relaxationTerms> terms;  // of the Prony series: uncovered moduli times its weight
     Floats diagonal;  // reciprocal of the operator's diagonal, zero where the node is not free
@@ -77,11 +101,14 @@ struct Window {
 
     float* field(Field f) noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
-    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data(), stiffening.data()}; }
-    CellStiffness uncovered() const noexcept { return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data()}; }
+    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data(), stiffening.data(), layers.view()}; }
+    CellStiffness uncovered() const noexcept
+    {
+        return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data(), layers.view()};
+    }
     CellStiffness term(std::size_t i) const noexcept
     {
-        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data()};
+        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer)};
     }
     Index3 size() const noexcept { return {layout.nx, layout.ny, layout.nz}; }
     bool contains(Index3 node) const noexcept  // in the level's indices
@@ -117,7 +144,7 @@ struct Window {
         volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { visit(coarse.at(parent), fraction); });
     }
 
-    explicit Window(Index3 size, bool relaxes = false);
+    explicit Window(Index3 size, bool relaxes = false, bool layered = false);
 
     /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
     void place(const CellLevel& level, Index3 at, bool coarsest) noexcept;

@@ -41,7 +41,7 @@ WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus
     std::size_t scratch = 0;
     const Index3 wanted = windowSize(window, focus);
     for (const auto& level : body.levels) {
-        windows_.emplace_back(glm::min(level.nodes.size, wanted), body.relaxes);
+        windows_.emplace_back(glm::min(level.nodes.size, wanted), body.relaxes, !level.layers.empty());
         scratch = std::max(scratch, windows_.back().layout.scratchSize());
     }
     scratch_.assign(scratch, 0.0F);

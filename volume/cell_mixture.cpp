@@ -6,11 +6,15 @@
 
 namespace palpate::volume {
 
-void CellMixture::Sums::add(double weight, double modulus) noexcept
+void CellMixture::Sums::add(double weight, double modulus, Vec3 at) noexcept
 {
     fraction += weight;
     stiffness += weight * modulus;
     compliance += weight / modulus;
+    place += weight * at;
+    stiffest += weight * modulus * at;
+    square += weight * modulus * modulus;
+    softest = std::min(softest, modulus);
 }
 
 double CellMixture::Sums::arithmetic() const noexcept
@@ -23,9 +27,19 @@ double CellMixture::Sums::mean() const noexcept
     return std::sqrt(stiffness / compliance);
 }
 
-void CellMixture::add(const TissueRow& row, double weight, double scale, bool held) noexcept
+std::pair<Vec3, double> CellMixture::Sums::layer() const noexcept
 {
-    (held ? held_ : free_).add(weight, row.youngsModulus * scale);
+    const double more = stiffness - fraction * softest;
+    if (!(more > 1e-6 * stiffness)) {
+        return {Vec3(0.0), 0.0};
+    }
+    const double squares = square - 2.0 * softest * stiffness + softest * softest * fraction;
+    return {(stiffest - softest * place) / more, std::min(more * more / (squares * fraction), 1.0)};
+}
+
+void CellMixture::add(const TissueRow& row, double weight, double scale, bool held, Vec3 place) noexcept
+{
+    (held ? held_ : free_).add(weight, row.youngsModulus * scale, place);
     poisson_ += weight * row.poissonRatio;
     stiffening_.add(weight, row.youngsModulus * scale, row.stiffening);
     for (std::size_t i = 0; i < relaxing_.size() && !held; ++i) {
@@ -39,6 +53,7 @@ CellMaterial CellMixture::material() const noexcept
     if (tissue <= 0.0) {
         return {};
     }
+    const auto [middle, share] = free_.layer();
     const double rigid = held_.fraction > 0.0 ? held_.mean() : std::numeric_limits<double>::infinity();
     const double modulus = free_.fraction > 0.0 ? std::min(free_.mean() * tissue / free_.fraction, rigid) : rigid;
     CellMaterial material{static_cast<float>(tissue * modulus),
@@ -46,7 +61,9 @@ CellMaterial CellMixture::material() const noexcept
                           static_cast<float>(held_.fraction / tissue),
                           static_cast<float>(stiffening_.mean()),
                           {},
-                          free_.fraction > 0.0 ? static_cast<float>(free_.arithmetic() / free_.mean()) : 1.0F};
+                          free_.fraction > 0.0 ? static_cast<float>(free_.arithmetic() / free_.mean()) : 1.0F,
+                          Vec3f(middle),
+                          static_cast<float>(share)};
     for (std::size_t i = 0; i < relaxing_.size() && free_.fraction > 0.0; ++i) {
         material.relaxing[i] = static_cast<float>(relaxing_[i] / free_.fraction);
     }

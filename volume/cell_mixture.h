@@ -4,6 +4,8 @@
 #include <volume/tissue_table.h>
 
 #include <array>
+#include <limits>
+#include <utility>
 
 namespace palpate::volume {
 
@@ -41,7 +43,8 @@ public:
     /// @param weight  fraction of the cell that the sample stands for [-]
     /// @param scale   of its tissue's Young's modulus [-]
     /// @param held    in space
-    void add(const TissueRow& row, double weight, double scale, bool held) noexcept;
+    /// @param place   in the cell, -1 to 1 along each edge
+    void add(const TissueRow& row, double weight, double scale, bool held, Vec3 place = Vec3(0.0)) noexcept;
     /// Of what was added; no stiffness where nothing was.
     CellMaterial material() const noexcept;
     /// Fraction of the cell that is tissue [-].
@@ -50,9 +53,14 @@ public:
 private:
     struct Sums {
         double fraction = 0.0, stiffness = 0.0, compliance = 0.0;
-        void add(double weight, double modulus) noexcept;
+        double square = 0.0;  // of moduli
+        double softest = std::numeric_limits<double>::infinity();
+        Vec3 place{0.0}, stiffest{0.0};  // of places, by weight, and by stiffness
+        void add(double weight, double modulus, Vec3 at) noexcept;
         double arithmetic() const noexcept;
         double mean() const noexcept;
+        /// What the modulus has over the softest's: its middle, and the share that an even layer of it would take.
+        std::pair<Vec3, double> layer() const noexcept;
     } free_, held_;
     double poisson_ = 0.0;
     StiffeningMean stiffening_;

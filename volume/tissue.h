@@ -65,6 +65,10 @@ struct CellMaterial {
     float stiffening = 0;                           // mean over the tissue [-]
     std::array<float, relaxationTerms> relaxing{};  // weights of Relaxation, mean over what is not held [-]
     float along = 1;  // of layers along their plane: youngsModulus with the arithmetic mean, over what it is [-]
+    /// Where the stiffer part of it lies, -1 to 1 along each edge of the cell: middle of what its modulus has over the
+    /// softest tissue's.
+    Vec3f middle{0.0F};
+    float share = 0;  // of what is not held: that part [-]
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.

@@ -38,6 +38,7 @@ public:
         const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), 1, 4);
         for (int i = 0; i < s * s * s; ++i) {
             const Vec3 at = (Vec3(i % s, i / s % s, i / s / s) + 0.5) / static_cast<double>(s) - 0.5;
+            places_.push_back(2.0 * at);
             offsets_.push_back(toIndex * (at * grid.spacing));
         }
         step_ = toIndex * grid.spacing;
@@ -50,18 +51,18 @@ public:
     std::size_t samples() const { return offsets_.size(); }
 
     // Calls visit(label, weight), or visit(label, weight, voxel), for the voxels at node n; the weights add up to 1, less
-    // what lies outside the volume.
+    // what lies outside the volume. Or visit(label, weight, voxel, place), with the sample's place in the cell, -1 to 1.
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
         const Vec3 centre = start_ + step_ * Vec3(n);
         const double fraction = 1.0 / static_cast<double>(offsets_.size());
-        for (const Vec3& offset : offsets_) {
-            const Vec3 at = centre + offset;
+        for (std::size_t i = 0; i < offsets_.size(); ++i) {
+            const Vec3 at = centre + offsets_[i];
             if (glm::any(interpolate_)) {
-                visitAround(at, fraction, visit);
+                visitAround(at, fraction, places_[i], visit);
             } else {
-                read(Index3(glm::floor(at + 0.5)), fraction, visit);
+                read(Index3(glm::floor(at + 0.5)), fraction, places_[i], visit);
             }
         }
     }
@@ -79,7 +80,7 @@ public:
 
 private:
     template <typename Visit>
-    void visitAround(Vec3 at, double fraction, const Visit& visit) const
+    void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
     {
         const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
         const Vec3 t = (at - low) * Vec3(interpolate_);
@@ -88,18 +89,20 @@ private:
             const Vec3 w = glm::mix(1.0 - t, t, Vec3(step));
             const double weight = w.x * w.y * w.z;
             if (weight > 0) {
-                read(Index3(low) + step, fraction * weight, visit);
+                read(Index3(low) + step, fraction * weight, place, visit);
             }
         }
     }
 
     template <typename Visit>
-    void read(Index3 n, double weight, const Visit& visit) const
+    void read(Index3 n, double weight, Vec3 place, const Visit& visit) const
     {
         if (n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size_.x && n.y < size_.y && n.z < size_.z) {
             const openvdb::Coord ijk(n.x, n.y, n.z);
             const auto label = static_cast<std::uint16_t>(label_.getValue(ijk));
-            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
+            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&, Vec3>) {
+                visit(label, weight, ijk, place);
+            } else if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
                 visit(label, weight, ijk);
             } else {
                 visit(label, weight);
@@ -112,6 +115,7 @@ private:
     openvdb::FloatGrid::ConstUnsafeAccessor stiffness_;
     const TissueData* scaledBy_;  // null where no image scales the stiffness
     std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
+    std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
     Mat3 step_{1.0};              // node steps in voxels
     Vec3 start_{0.0};             // node (0, 0, 0) in voxels
     glm::bvec3 interpolate_{false};
@@ -141,11 +145,11 @@ CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, 
                           const std::vector<const TissueRow*>& rows)
 {
     CellMixture mixture;
-    sampler.visit(n, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel) {
+    sampler.visit(n, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel, Vec3 at) {
         if (const TissueRow* row = rows[label]) {
             const Vec3 place = tissue.affine.toPatient({voxel.x(), voxel.y(), voxel.z()});
             const bool held = row->fixed || (tissue.support && tissue.support->height(place) < 0.0);
-            mixture.add(*row, weight, sampler.factor(label, voxel), held);
+            mixture.add(*row, weight, sampler.factor(label, voxel), held, at);
         }
     });
     return mixture.material();

@@ -1,12 +1,28 @@
 #pragma once
 
 // Cells and fields as the kernels take them, with nothing around.
+#include <chainmail/cell_layers.h>
 #include <chainmail/window.h>
 
+#include <glm/geometric.hpp>
+
 #include <algorithm>
+#include <cmath>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace palpate::tests {
+
+/// A layer of up to 100 Pa across any direction, all of it in the cell.
+inline chainmail::CellLayer randomLayer(Index3 cell, std::minstd_rand& random)
+{
+    std::uniform_real_distribution<float> value(-1.0F, 1.0F);
+    const Vec3f normal = glm::normalize(Vec3f(value(random), value(random), value(random)) + Vec3f(0.01F));
+    const float half = 0.3F * std::abs(value(random));
+    return {cell, 100.0F * std::abs(value(random)), normal, 0.5F * Vec3f(value(random), value(random), value(random)),
+            half * normal};
+}
 
 /// A box of cells with its fields; spacing 1 m, so that a cell's scaled stiffness is its modulus / 32.
 struct Cells {
@@ -15,6 +31,7 @@ struct Cells {
           mu(layout.count + chainmail::Layout::lanes, 0.0F),
           lambda(mu),
           stiffening(mu),
+          layers(layout, true),
           u(layout.fieldSize(), 0.0F),
           out(u),
           scratch(layout.scratchSize(), 0.0F)
@@ -22,7 +39,7 @@ struct Cells {
     }
 
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
-    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data()}; }
+    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data(), layers.view()}; }
 
     /// Moduli of one cell [Pa].
     void set(Index3 cell, double shear, double lame)
@@ -35,14 +52,28 @@ struct Cells {
     {
         volume::forEachIndex(Index3(0), nodes() - 2, [&](Index3 c) { set(c, shear, lame); });
     }
-    /// Moduli between 1 and 100 Pa, one cell in ten empty.
+    /// By z, then y, then x.
+    void setLayers(std::vector<chainmail::CellLayer> of)
+    {
+        chainmail::CellLevel level;
+        level.nodes = {nodes(), Vec3(0.0), 1.0};
+        level.layers = std::move(of);
+        chainmail::indexLayers(level);
+        layers.place(level, Index3(0));
+    }
+    /// Moduli between 1 and 100 Pa, one cell in ten empty, one of the others in three with a layer of any direction.
     void fillRandom(std::minstd_rand& random)
     {
         std::uniform_real_distribution<double> power(0.0, 2.0);
+        std::vector<chainmail::CellLayer> some;
         volume::forEachIndex(Index3(0), nodes() - 2, [&](Index3 c) {
             const bool empty = random() % 10 == 0;
             set(c, empty ? 0.0 : std::pow(10.0, power(random)), empty ? 0.0 : std::pow(10.0, power(random)));
+            if (!empty && random() % 3 == 0) {
+                some.push_back(randomLayer(c, random));
+            }
         });
+        setLayers(std::move(some));
     }
 
     void stiffen(double b) { std::ranges::fill(stiffening, static_cast<float>(b)); }
@@ -84,7 +115,9 @@ struct Cells {
     }
 
     chainmail::Layout layout;
-    chainmail::Floats mu, lambda, stiffening, u, out, scratch;
+    chainmail::Floats mu, lambda, stiffening;
+    chainmail::LayerFields layers;
+    chainmail::Floats u, out, scratch;
 };
 
 /// Sum over all nodes, in double.

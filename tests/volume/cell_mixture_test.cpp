@@ -7,6 +7,7 @@
 #include <cmath>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace palpate::volume {
@@ -106,6 +107,32 @@ TEST(CellMixture, KnowsTheStiffnessOfItsLayersAlongTheirPlane)
             }
         }
     }
+}
+
+// A layer in a cell, by samples: its middle and its share, however much stiffer it is, and wherever it lies.
+TEST(CellMixture, KnowsWhereItsLayerLies)
+{
+    TissueRow soft, stiff;
+    soft.youngsModulus = 3e3;
+    constexpr int samples = 64;
+    for (const double modulus : {6e3, 60e3}) {
+        stiff.youngsModulus = modulus;
+        for (const auto& [low, high] : std::to_array<std::pair<double, double>>({{-1.0, -0.5}, {-1.0, 0.5}, {0.0, 0.25}})) {
+            CellMixture mixture;
+            for (int i = 0; i < samples; ++i) {
+                const double y = (2.0 * i + 1.0) / samples - 1.0;
+                mixture.add(y > low && y < high ? stiff : soft, 1.0 / samples, 1.0, false, Vec3(0.0, y, 0.0));
+            }
+            const CellMaterial material = mixture.material();
+            EXPECT_NEAR(material.middle.y, 0.5 * (low + high), 1e-5) << modulus << " " << low;
+            EXPECT_NEAR(material.share, 0.5 * (high - low), 1e-5) << modulus << " " << low;
+            EXPECT_EQ(material.middle.x, 0.0F);
+        }
+    }
+    CellMixture plain;
+    plain.add(soft, 1.0, 1.0, false);
+    EXPECT_EQ(plain.material().share, 0.0F);
+    EXPECT_EQ(plain.material().along, 1.0F);
 }
 
 }  // namespace

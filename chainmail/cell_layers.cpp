@@ -1,0 +1,175 @@
+#include <chainmail/cell_layers.h>
+
+#include <volume/cell_mixture.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <unordered_map>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double deepest = 2.0;   // cells under the surface that may have layers along it
+constexpr double aligned = 0.8;   // cosine from which on a layer that is not at the surface runs along it
+constexpr double thinnest = 0.2;  // of a layer's modulus in the cell's, from which on it counts
+
+// The material of a cell as a layer on something soft.
+class Layering {
+public:
+    Layering(const FinestLevel& finest, const volume::DistanceField& surface)
+        : level_(finest.level), g_(level_.nodes), surface_(surface)
+    {
+        for (const MixedCell& m : finest.mixed) {
+            mixed_.emplace(g_.offset(m.cell), &m);
+        }
+    }
+
+    // What is left of the cell's own modulus, and the layer; its modulus is 0 where there is none.
+    std::pair<double, CellLayer> of(Index3 cell) const
+    {
+        const std::size_t at = g_.offset(cell);
+        const Vec3 centre = g_.position(cell) + 0.5 * g_.spacing;
+        const double distance = surface_.at(centre);
+        const auto found = mixed_.find(at);
+        const MixedCell* m = found != mixed_.end() ? found->second : nullptr;
+        if (distance < -deepest * g_.spacing || (m == nullptr && distance < -g_.spacing)) {
+            return {1.0, {}};
+        }
+        const Vec3 normal = surface_.normal(centre);
+        const bool top = atSurface(level_, cell, cell);
+        if (!top && (m == nullptr || glm::dot(Vec3(m->middle), normal) < aligned * glm::length(Vec3(m->middle)))) {
+            return {1.0, {}};
+        }
+        const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
+        const double full = top ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
+        const Mean mean = meanOf(at, full, centre - g_.spacing * normal, normal);
+        if (mean.layer <= thinnest * mean.across) {
+            return {1.0, {}};
+        }
+        const double share = full * (m != nullptr ? static_cast<double>(m->share) : 1.0);
+        const Vec3f middle = m != nullptr ? m->middle : Vec3f((full - 1.0) * wide * normal);
+        return {
+            mean.across / static_cast<double>(level_.mu[at]),
+            {cell, static_cast<float>(mean.layer), Vec3f(normal), middle, Vec3f(share * wide / std::sqrt(3.0) * normal)}};
+    }
+
+private:
+    struct Mean {
+        double across = 0.0;
+        double layer = 0.0;
+    };
+
+    // Across, the material is that of a whole cell right under the surface: what the cell has, and what is under it for as
+    // much as it is empty. Else a layer that the cell's border cuts would bend as if it were as thick as the cell. It is
+    // between the harmonic mean, which is exact for layers thinner than all else, and the geometric one of both bounds, by
+    // the square of the layer's share: a thick layer bears what presses it by its own shear, too.
+    Mean meanOf(std::size_t at, double full, Vec3 under, Vec3 normal) const
+    {
+        volume::CellMixture whole;
+        const Phases own = phasesOf(at, full);
+        add(whole, full * own.share, own.stiff);
+        add(whole, full * (1.0 - own.share), own.soft);
+        const Index3 below(glm::floor((under - g_.origin) / g_.spacing));
+        if (g_.contains(below) && level_.mu[g_.offset(below)] > 0.0F) {
+            const Phases next = phasesOf(g_.offset(below), 1.0);
+            if (own.share >= 1.0 && full * own.stiff <= 1.01 * next.soft) {
+                return {};  // no layer: the same tissue, or a corner of it, where the distance field is round
+            }
+            const double depth = 1.0 - full;
+            const bool stiffFirst = glm::dot(next.middle, normal) > 0.0;
+            const double stiff = stiffFirst ? std::min(next.share, depth) : std::max(depth - (1.0 - next.share), 0.0);
+            add(whole, stiff, next.stiff);
+            add(whole, depth - stiff, next.soft);
+        }
+        const volume::CellMaterial material = whole.material();
+        const double along = static_cast<double>(material.along);
+        const double share = static_cast<double>(material.share);
+        const double across =
+            full * static_cast<double>(material.youngsModulus) / whole.fraction() * std::pow(along, share * share - 1.0);
+        return {across, full * (own.share * own.stiff + (1.0 - own.share) * own.soft) - across};
+    }
+
+    // The two tissues that have a mixed cell's means.
+    struct Phases {
+        double stiff = 0.0, soft = 0.0;
+        double share = 1.0;  // of the stiff one
+        Vec3 middle{0.0};    // of it
+    };
+    Phases phasesOf(std::size_t at, double full) const
+    {
+        const double mean = static_cast<double>(level_.mu[at]) / full;
+        const auto found = mixed_.find(at);
+        if (found == mixed_.end()) {
+            return {mean, mean, 1.0, Vec3(0.0)};
+        }
+        const MixedCell& m = *found->second;
+        const double parallel = mean * static_cast<double>(m.along);
+        const double series = mean / static_cast<double>(m.along);
+        const double s = std::clamp(static_cast<double>(m.share), 0.02, 0.98);
+        // (1 - s) x^2 - b x + (1 - s) parallel series = 0 for the soft one
+        const double b = parallel + series * (1.0 - 2.0 * s);
+        const double root = std::sqrt(std::max(b * b - 4.0 * (1.0 - s) * (1.0 - s) * parallel * series, 0.0));
+        const double soft = (b - root) / (2.0 * (1.0 - s));
+        return {(parallel - (1.0 - s) * soft) / s, soft, s, Vec3(m.middle)};
+    }
+
+    static void add(volume::CellMixture& to, double weight, double modulus)
+    {
+        volume::TissueRow row;
+        row.youngsModulus = modulus;
+        if (weight > 0.0) {
+            to.add(row, weight, 1.0, false);
+        }
+    }
+
+    const CellLevel& level_;
+    const volume::NodeGrid& g_;
+    const volume::DistanceField& surface_;
+    std::unordered_map<std::size_t, const MixedCell*> mixed_;
+};
+
+}  // namespace
+
+bool atSurface(const CellLevel& level, Index3 low, Index3 high)
+{
+    bool empty = false;
+    volume::forEachIndex(glm::max(low - 1, Index3(0)), glm::min(high + 1, level.nodes.size - 2),
+                         [&](Index3 c) { empty = empty || level.mu[level.nodes.offset(c)] <= 0.0F; });
+    return empty;
+}
+
+void addLayers(const FinestLevel& finest, const std::vector<float>& held, const volume::DistanceField& surface,
+               CellLevel& level)
+{
+    const Layering layering(finest, surface);
+    volume::forEachIndex(Index3(0), level.nodes.size - 2, [&](Index3 c) {
+        const std::size_t at = level.nodes.offset(c);
+        if (level.mu[at] <= 0.0F || held[at] > 0.0F) {
+            return;
+        }
+        const auto& [left, layer] = layering.of(c);
+        if (layer.mu > 0.0F) {
+            level.layers.push_back(layer);
+            level.mu[at] *= static_cast<float>(left);
+            level.lambda[at] *= static_cast<float>(left);
+        }
+    });
+    indexLayers(level);
+}
+
+void indexLayers(CellLevel& level)
+{
+    const Index3 size = level.nodes.size;
+    level.layerRows.assign(static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z) + 1, 0);
+    for (const CellLayer& l : level.layers) {
+        ++level.layerRows[static_cast<std::size_t>(l.cell.y + l.cell.z * size.y) + 1];
+    }
+    std::partial_sum(level.layerRows.begin(), level.layerRows.end(), level.layerRows.begin());
+}
+
+}  // namespace palpate::chainmail

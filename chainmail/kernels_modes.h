@@ -1,0 +1,130 @@
+// The modes of a cell, and the energy of those that bend and twist it. Only kernels_body.h includes it.
+
+#include <chainmail/kernels.h>
+
+namespace palpate::chainmail {
+
+namespace {
+
+// Modes of one component in a cell, eight times their size; the constant mode carries no energy.
+struct Modes {
+    Lanes x, y, z, xy, yz, zx, xyz;
+};
+
+// The same in one plane of nodes: sums (s) and differences (d) along x, then y.
+struct Plane {
+    Lanes ss, ds, sd, dd;
+};
+
+inline Plane planeOf(const float* u, std::size_t row) noexcept
+{
+    const Lanes a0 = load(u);
+    const Lanes a1 = load(u + 1);
+    const Lanes b0 = load(u + row);
+    const Lanes b1 = load(u + row + 1);
+    const Lanes as = a0 + a1;
+    const Lanes ad = a1 - a0;
+    const Lanes bs = b0 + b1;
+    const Lanes bd = b1 - b0;
+    return {as + bs, ad + bd, bs - as, bd - ad};
+}
+
+inline Plane loadPlane(const float* p, std::size_t plane) noexcept
+{
+    return {load(p), load(p + plane), load(p + 2 * plane), load(p + 3 * plane)};
+}
+
+inline void storePlane(float* p, std::size_t plane, const Plane& v) noexcept
+{
+    store(p, v.ss);
+    store(p + plane, v.ds);
+    store(p + 2 * plane, v.sd);
+    store(p + 3 * plane, v.dd);
+}
+
+inline Modes modesOf(const Plane& low, const Plane& high) noexcept
+{
+    return {low.ds + high.ds, low.sd + high.sd, high.ss - low.ss, low.dd + high.dd,
+            high.sd - low.sd, high.ds - low.ds, high.dd - low.dd};
+}
+
+// What the modes' gradient gives to the lower and to the upper plane of nodes.
+inline Plane lower(const Modes& g) noexcept
+{
+    return {-g.z, g.x - g.zx, g.y - g.yz, g.xy - g.xyz};
+}
+
+inline Plane upper(const Modes& g) noexcept
+{
+    return {g.z, g.x + g.zx, g.y + g.yz, g.xy + g.xyz};
+}
+
+inline Plane operator+(const Plane& a, const Plane& b) noexcept
+{
+    return {a.ss + b.ss, a.ds + b.ds, a.sd + b.sd, a.dd + b.dd};
+}
+
+constexpr float tiny = 1e-30F;  // so that an empty cell divides by something
+
+// Modes that bend and twist a cell. Bending: with s = lambda / (lambda + 2 mu), the strain across it as free of stress.
+inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+{
+    const Lanes bend = (4.0F / 3.0F) * mu;
+    const Lanes both = bend * lambda / (lambda + 2.0F * mu + tiny);
+    const Lanes twist = (2.0F / 3.0F) * mu;
+    const Lanes ninth = (8.0F / 9.0F) * mu;
+    const Lanes alongX = both * (m[1].xy + m[2].zx);
+    const Lanes alongY = both * (m[0].xy + m[2].yz);
+    const Lanes alongZ = both * (m[0].zx + m[1].yz);
+    const Lanes c = twist * (m[0].yz + m[1].zx + m[2].xy);
+    g[0].xy = bend * m[0].xy + alongY;
+    g[0].zx = bend * m[0].zx + alongZ;
+    g[0].yz = twist * m[0].yz + c;
+    g[1].xy = bend * m[1].xy + alongX;
+    g[1].yz = bend * m[1].yz + alongZ;
+    g[1].zx = twist * m[1].zx + c;
+    g[2].yz = bend * m[2].yz + alongY;
+    g[2].zx = bend * m[2].zx + alongX;
+    g[2].xy = twist * m[2].xy + c;
+#pragma GCC unroll 3
+    for (int q = 0; q < 3; ++q) {
+        g[q].xyz = ninth * m[q].xyz;
+    }
+}
+
+// The same in axes that turn and stretch with the cell: with F its mean deformation gradient, a mode m becomes F^T m.
+// Adds to g the gradient of that energy, and returns twice the energy.
+[[gnu::always_inline]] inline Lanes hourglassTurned(Lanes mu, Lanes lambda, float quarter, const Lanes (&f)[3][3],
+                                                    const Modes (&m)[3], Modes (&g)[3]) noexcept
+{
+    Modes b[3];
+    Modes w[3];
+#pragma GCC unroll 3
+    for (int j = 0; j < 3; ++j) {
+        b[j].xy = m[j].xy + f[0][j] * m[0].xy + f[1][j] * m[1].xy + f[2][j] * m[2].xy;
+        b[j].yz = m[j].yz + f[0][j] * m[0].yz + f[1][j] * m[1].yz + f[2][j] * m[2].yz;
+        b[j].zx = m[j].zx + f[0][j] * m[0].zx + f[1][j] * m[1].zx + f[2][j] * m[2].zx;
+        b[j].xyz = m[j].xyz + f[0][j] * m[0].xyz + f[1][j] * m[1].xyz + f[2][j] * m[2].xyz;
+    }
+    hourglass(mu, lambda, b, w);
+    Lanes twice{};
+#pragma GCC unroll 3
+    for (int i = 0; i < 3; ++i) {
+        g[i].xy = w[i].xy + f[i][0] * w[0].xy + f[i][1] * w[1].xy + f[i][2] * w[2].xy;
+        g[i].yz = w[i].yz + f[i][0] * w[0].yz + f[i][1] * w[1].yz + f[i][2] * w[2].yz;
+        g[i].zx = w[i].zx + f[i][0] * w[0].zx + f[i][1] * w[1].zx + f[i][2] * w[2].zx;
+        g[i].xyz = w[i].xyz + f[i][0] * w[0].xyz + f[i][1] * w[1].xyz + f[i][2] * w[2].xyz;
+        const Lanes byF[3] = {m[i].xy * w[0].xy + m[i].yz * w[0].yz + m[i].zx * w[0].zx + m[i].xyz * w[0].xyz,
+                              m[i].xy * w[1].xy + m[i].yz * w[1].yz + m[i].zx * w[1].zx + m[i].xyz * w[1].xyz,
+                              m[i].xy * w[2].xy + m[i].yz * w[2].yz + m[i].zx * w[2].zx + m[i].xyz * w[2].xyz};
+        g[i].x += quarter * byF[0];
+        g[i].y += quarter * byF[1];
+        g[i].z += quarter * byF[2];
+        twice += w[i].xy * b[i].xy + w[i].yz * b[i].yz + w[i].zx * b[i].zx + w[i].xyz * b[i].xyz;
+    }
+    return twice;
+}
+
+}  // namespace
+
+}  // namespace palpate::chainmail
