@@ -215,5 +215,28 @@ TEST(ElasticHostile, TissueThatStiffensStaysFiniteAndDoesNotRaiseTheEnergy)
     }
 }
 
+// Membranes are turned, folded and torn at by the same hand.
+TEST(ElasticHostile, SkinThinnerThanACellStaysFiniteAndDoesNotRaiseTheEnergy)
+{
+    auto block = tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45);
+    block.material = [](Index3 c) {
+        volume::CellMaterial m = tests::tissue(1e4, 0.45, c.y == 13);
+        m.relaxing = {0.5F, 0.2F};
+        if (c.y == 0) {
+            m.along = 3.0F;
+            m.share = 0.3F;
+            m.middle = {0.0F, -0.7F, 0.0F};
+        }
+        return m;
+    };
+    for (const bool relaxes : {false, true}) {
+        const ElasticBody body = tests::bodyOf(block, 0.4999, relaxes);
+        ASSERT_GT(body.levels.front().layers.size(), 300u);
+        for (const volume::Law& law : {volume::Law(volume::SmallStrain{}), volume::Law(volume::NeoHookean{})}) {
+            push(body, Vec3(20e-3, 14e-3, 17e-3), law, 1500);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace palpate::chainmail
