@@ -16,6 +16,7 @@ namespace {
 
 constexpr double deepest = 2.0;   // cells under the surface that may have layers along it
 constexpr double aligned = 0.8;   // cosine from which on a layer that is not at the surface runs along it
+constexpr double flat = 0.95;     // slope of the distance field from which on there is no edge in the cell
 constexpr double thinnest = 0.2;  // of a layer's modulus in the cell's, from which on it counts
 
 // The material of a cell as a layer on something soft.
@@ -46,7 +47,8 @@ public:
             return {1.0, {}};
         }
         const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
-        const double full = top ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
+        const bool isCut = top && glm::length(surface_.gradient(centre)) > flat;
+        const double full = isCut ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
         const Mean mean = meanOf(at, full, centre - g_.spacing * normal, normal);
         if (mean.layer <= thinnest * mean.across) {
             return {1.0, {}};
@@ -77,9 +79,6 @@ private:
         const Index3 below(glm::floor((under - g_.origin) / g_.spacing));
         if (g_.contains(below) && level_.mu[g_.offset(below)] > 0.0F) {
             const Phases next = phasesOf(g_.offset(below), 1.0);
-            if (own.share >= 1.0 && full * own.stiff <= 1.01 * next.soft) {
-                return {};  // no layer: the same tissue, or a corner of it, where the distance field is round
-            }
             const double depth = 1.0 - full;
             const bool stiffFirst = glm::dot(next.middle, normal) > 0.0;
             const double stiff = stiffFirst ? std::min(next.share, depth) : std::max(depth - (1.0 - next.share), 0.0);

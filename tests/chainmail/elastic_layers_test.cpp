@@ -159,19 +159,14 @@ TEST(ElasticLayers, KeepTheStiffnessOfTheirPlane)
         };
         const ElasticBody body = tests::bodyOf(block);
         const CellLevel& level = body.levels.front();
-        int whole = 0;
+        ASSERT_EQ(level.layers.size(), 36u);
         for (const CellLayer& l : level.layers) {
-            if (l.cell.x < 2 || l.cell.x > 5 || l.cell.z < 2 || l.cell.z > 5) {
-                continue;  // at the block's edges the distance field is round
-            }
-            ++whole;
             const double across = 2.9 * static_cast<double>(level.mu[level.nodes.offset(l.cell)]);
             EXPECT_NEAR(across + 2.9 * static_cast<double>(l.mu), arithmetic, 1.0);
             EXPECT_GE(across, harmonic);
             EXPECT_LT(across, std::sqrt(arithmetic * harmonic));
             EXPECT_EQ(l.cell.y, 1);
         }
-        EXPECT_EQ(whole, 16) << thick;
     }
 }
 
