@@ -36,9 +36,11 @@ public:
         const std::size_t at = g_.offset(cell);
         const Vec3 centre = g_.position(cell) + 0.5 * g_.spacing;
         const double distance = surface_.at(centre);
-        const auto found = mixed_.find(at);
-        const MixedCell* m = found != mixed_.end() ? found->second : nullptr;
-        if (distance < -deepest * g_.spacing || (m == nullptr && distance < -g_.spacing)) {
+        if (distance < -deepest * g_.spacing) {
+            return {1.0, {}};
+        }
+        const MixedCell* m = mixedAt(at);
+        if (m == nullptr && distance < -g_.spacing) {
             return {1.0, {}};
         }
         const Vec3 normal = surface_.normal(centre);
@@ -61,6 +63,12 @@ public:
     }
 
 private:
+    const MixedCell* mixedAt(std::size_t at) const
+    {
+        const auto found = mixed_.find(at);
+        return found != mixed_.end() ? found->second : nullptr;
+    }
+
     struct Mean {
         double across = 0.0;
         double layer = 0.0;
@@ -102,19 +110,18 @@ private:
     Phases phasesOf(std::size_t at, double full) const
     {
         const double mean = static_cast<double>(level_.mu[at]) / full;
-        const auto found = mixed_.find(at);
-        if (found == mixed_.end()) {
+        const MixedCell* m = mixedAt(at);
+        if (m == nullptr) {
             return {mean, mean, 1.0, Vec3(0.0)};
         }
-        const MixedCell& m = *found->second;
-        const double parallel = mean * static_cast<double>(m.along);
-        const double series = mean / static_cast<double>(m.along);
-        const double s = std::clamp(static_cast<double>(m.share), 0.02, 0.98);
+        const double parallel = mean * static_cast<double>(m->along);
+        const double series = mean / static_cast<double>(m->along);
+        const double s = std::clamp(static_cast<double>(m->share), 0.02, 0.98);
         // (1 - s) x^2 - b x + (1 - s) parallel series = 0 for the soft one
         const double b = parallel + series * (1.0 - 2.0 * s);
         const double root = std::sqrt(std::max(b * b - 4.0 * (1.0 - s) * (1.0 - s) * parallel * series, 0.0));
         const double soft = (b - root) / (2.0 * (1.0 - s));
-        return {(parallel - (1.0 - s) * soft) / s, soft, s, Vec3(m.middle)};
+        return {(parallel - (1.0 - s) * soft) / s, soft, s, Vec3(m->middle)};
     }
 
     static void add(volume::CellMixture& to, double weight, double modulus)

@@ -292,8 +292,7 @@ private:
 };
 
 // What coarser levels are made of: at the surface the layers in a cell lie side by side, as in BlockMean. The finest level
-// itself has the mean of both bounds there: what a tool presses is bent over a few cells and sheared, and a cell bends as
-// if all of it were skin.
+// itself is soft across them, see addLayers(): what a tool presses is bent over a few cells and sheared.
 CellLevel withStiffSkin(const FinestLevel& finest)
 {
     CellLevel level = finest.level;
