@@ -28,7 +28,7 @@ namespace palpate::apps {
 
 namespace {
 
-struct Options {
+struct BenchArguments {
     std::string scene = "breast";
     std::vector<int> sides{64, 128, 256};
     session::SceneChanges changes;
@@ -69,7 +69,7 @@ void printHead()
     fmt::print(" {:>8}\n", "moved");
 }
 
-void benchTick(const Options& o)
+void benchTick(const BenchArguments& o)
 {
     base::checkOutput(o.json);
     const bool tell = o.json != "-";
@@ -179,7 +179,7 @@ void addBench(CLI::App& app)
     auto* bench = app.add_subcommand("bench", "Measure");
     bench->require_subcommand(1);
 
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchArguments>();
     auto* tick = bench->add_subcommand("tick", "Time per tick and task, for phantoms of growing resolution");
     tick->add_option("SCENE", o->scene, "Scene with a phantom")->capture_default_str();
     tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")->delimiter(',')->capture_default_str();

@@ -30,13 +30,13 @@ using training::Case;
 constexpr double pictureTimeout = 600;  // [s]
 constexpr const char* pictureSize = "800x600";
 
-struct Options {
+struct CaseArguments {
     std::string id;
     fs::path json, picture;
     training::NewCase made;
 };
 
-nlohmann::json figuresOf(const Case& c)
+nlohmann::json caseFigures(const Case& c)
 {
     return {{"id", c.id},
             {"title", c.title},
@@ -51,7 +51,7 @@ nlohmann::json figuresOf(const Case& c)
             {"source", c.source}};
 }
 
-void list(const Options& o)
+void list(const CaseArguments& o)
 {
     std::vector<std::string> faults;
     const auto all = training::allCases(&faults);
@@ -61,7 +61,7 @@ void list(const Options& o)
     if (!o.json.empty()) {
         auto cases = nlohmann::json::array();
         for (const Case& c : all) {
-            cases.push_back(figuresOf(c));
+            cases.push_back(caseFigures(c));
         }
         command::writeJson(o.json, {{"cases", cases}});
     }
@@ -74,11 +74,11 @@ void list(const Options& o)
     }
 }
 
-void show(const Options& o)
+void show(const CaseArguments& o)
 {
     const Case c = training::findCase(o.id);
     if (!o.json.empty()) {
-        command::writeJson(o.json, figuresOf(c));
+        command::writeJson(o.json, caseFigures(c));
     }
     if (o.json == "-") {
         return;
@@ -97,7 +97,7 @@ void show(const Options& o)
     fmt::print("palpate train --case {}\n", o.id);
 }
 
-void check(const Options& o)
+void check(const CaseArguments& o)
 {
     const Case c = training::findCase(o.id);
     command::Progress progress(command::Progress::Clock::ticking);
@@ -113,7 +113,7 @@ void check(const Options& o)
     fmt::print("{}: good\n", c.id);
 }
 
-void make(const Options& o)
+void make(const CaseArguments& o)
 {
     command::Progress progress(command::Progress::Clock::ticking);
     progress.show("reading " + o.made.volume.string());
@@ -140,7 +140,7 @@ std::vector<std::string> recordBeginning(const Case& c, const fs::path& file)
     return tissuesToFind(model);
 }
 
-void draw(const Options& o)
+void draw(const CaseArguments& o)
 {
     const Case c = training::findCase(o.id);
     const fs::path to = o.picture.empty() ? c.folder / "picture.png" : o.picture;
@@ -180,7 +180,7 @@ void draw(const Options& o)
 
 void addCase(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CaseArguments>();
     CLI::App* const c = app.add_subcommand("case", "What trainees are given: list, show, make and check cases");
     c->require_subcommand(1);
     CLI::App* const all = c->add_subcommand("list", "The cases that there are");

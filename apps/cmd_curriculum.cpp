@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using training::Curriculum;
 using training::CusumChart;
 
-struct Options {
+struct CurriculumArguments {
     std::string id, profile;
     fs::path json, profiles;
     int people = 200, most = 500, kills = 50;
@@ -39,7 +39,7 @@ std::string levelInWords(const training::Level& level)
     return words + (level.atMost ? fmt::format(" at most {:g}", *level.atMost) : "");
 }
 
-void list(const Options& o)
+void listCurricula(const CurriculumArguments& o)
 {
     std::vector<std::string> faults;
     const auto all = training::allCurricula(&faults);
@@ -69,7 +69,7 @@ std::string sessionsInWords(double n)
     return std::isfinite(n) ? fmt::format("{:.0f} sessions", n) : "never";
 }
 
-void check(const Options& o)
+void checkCurriculum(const CurriculumArguments& o)
 {
     const Curriculum c = training::findCurriculum(o.id);
     fmt::print("{}: {}\n", c.id, c.title);
@@ -91,12 +91,12 @@ void check(const Options& o)
     fmt::print("good\n");
 }
 
-fs::path fileOf(const Options& o)
+fs::path fileOf(const CurriculumArguments& o)
 {
     return o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles;
 }
 
-void next(const Options& o)
+void next(const CurriculumArguments& o)
 {
     const training::ProfileStore store(fileOf(o));
     const training::Person person = store.find(o.profile);
@@ -148,7 +148,7 @@ double quantile(std::vector<int> values, double fraction)
     return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
 }
 
-void simulate(const Options& o)
+void simulate(const CurriculumArguments& o)
 {
     const Curriculum c = training::findCurriculum(o.id);
     auto figures = nlohmann::json::array();
@@ -185,7 +185,7 @@ void simulate(const Options& o)
 }
 
 // Gates, alarm rates against theory, and the file of profiles under kill -9.
-void verify(const Options& o)
+void verify(const CurriculumArguments& o)
 {
     constexpr double allowed = 0.2;  // of a rate
     const Curriculum c = training::findCurriculum(o.id);
@@ -243,18 +243,18 @@ void verify(const Options& o)
 
 void addCurriculum(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CurriculumArguments>();
     CLI::App* const c =
         app.add_subcommand("curriculum", "Ways from the first touch to proficiency: list, check, what is next");
     c->require_subcommand(1);
     const auto json = [&](CLI::App* sub) { sub->add_option("--json", o->json, "write it here (- for standard output)"); };
     CLI::App* const all = c->add_subcommand("list", "The curricula that there are");
     json(all);
-    all->final_callback([o] { list(*o); });
+    all->final_callback([o] { listCurricula(*o); });
 
     CLI::App* const checked = c->add_subcommand("check", "What is wrong with a curriculum, or what it asks for");
     checked->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
-    checked->final_callback([o] { check(*o); });
+    checked->final_callback([o] { checkCurriculum(*o); });
 
     CLI::App* const after = c->add_subcommand("next", "What somebody should train next, and why");
     after->add_option("CURRICULUM", o->id, "a curriculum's name or file (that of the last session)");

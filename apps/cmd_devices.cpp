@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 
 constexpr double slow = 400.0;  // exchanges per second, below which a hub or a cable is in the way
 
-struct DevicesOptions {
+struct DevicesArguments {
     session::FalconOptions falcon;
     bool installUdev = false;
     fs::path rules = "/etc/udev/rules.d";
@@ -67,7 +67,7 @@ fs::path ruleIn(const fs::path& folder)
 {
     const fs::path file = folder / falcon::udevRuleFile;
     const fs::path packaged = base::programFolder().parent_path() / "lib/udev/rules.d" / falcon::udevRuleFile;
-    return !fs::exists(file) && folder == DevicesOptions().rules && fs::exists(packaged) ? packaged : file;
+    return !fs::exists(file) && folder == DevicesArguments().rules && fs::exists(packaged) ? packaged : file;
 }
 
 void installRule(const fs::path& folder)
@@ -110,7 +110,7 @@ State look()
 }
 
 // Packets there and back, without torque.
-Exchanges exchange(const DevicesOptions& o)
+Exchanges exchange(const DevicesArguments& o)
 {
     const auto wire = falcon::usbTransport();
     falcon::Link link(*wire, session::linkOptions(o.falcon), session::sayForFalcon);
@@ -139,7 +139,7 @@ Exchanges exchange(const DevicesOptions& o)
 }
 
 // A push of 1 N, to be felt.
-nlohmann::json pushOnce(const DevicesOptions& o)
+nlohmann::json pushOnce(const DevicesArguments& o)
 {
     const auto wire = falcon::usbTransport();
     falcon::Link link(*wire, session::linkOptions(o.falcon), session::sayForFalcon);
@@ -163,7 +163,7 @@ double atShare(const std::vector<double>& sorted, double fraction)
     return sorted[std::min(i, sorted.size() - 1)];
 }
 
-nlohmann::json figuresOf(const Exchanges& e)
+nlohmann::json exchangeFigures(const Exchanges& e)
 {
     return {{"answered", e.counts.exchanges},
             {"unanswered", e.counts.unanswered},
@@ -189,7 +189,7 @@ void printExchanges(const Exchanges& e)
     }
 }
 
-nlohmann::json list(const DevicesOptions& o)
+nlohmann::json list(const DevicesArguments& o)
 {
     const bool quiet = o.json == "-";
     const auto say = [quiet](const std::string& line) { quiet ? void() : fmt::print("{}\n", line); };
@@ -235,7 +235,7 @@ nlohmann::json list(const DevicesOptions& o)
     return all;
 }
 
-void devices(const DevicesOptions& o)
+void devices(const DevicesArguments& o)
 {
     if (o.installUdev) {
         installRule(o.rules);
@@ -248,7 +248,7 @@ void devices(const DevicesOptions& o)
     auto figures = list(o);
     if (o.exchanges > 0) {
         const Exchanges done = exchange(o);
-        figures["exchanges"] = figuresOf(done);
+        figures["exchanges"] = exchangeFigures(done);
         if (o.json != "-") {
             printExchanges(done);
         }
@@ -265,7 +265,7 @@ void devices(const DevicesOptions& o)
 
 void addDevices(CLI::App& app)
 {
-    const auto o = std::make_shared<DevicesOptions>();
+    const auto o = std::make_shared<DevicesArguments>();
     CLI::App* c = app.add_subcommand("devices", "List haptic devices: what is there, what is missing");
     c->add_option("--falcon-firmware", o->falcon.firmware, "Firmware of the Novint Falcon (a file of its maker's)");
     c->add_option("--exchanges", o->exchanges,

@@ -32,7 +32,7 @@ const std::vector<std::string> whatChoices{"labels", "image", "stiffness", "disp
 
 const std::vector<std::string> windowChoices{"soft-tissue", "lung", "bone"};
 
-struct Options {
+struct ExportArguments {
     fs::path volume, output, map, json, like;
     int width = 800, height = 600;
     std::string record, at, what, window = "soft-tissue";
@@ -54,7 +54,7 @@ bool ofRecordOnly(const std::string& what)
     return what == "displacement" || what == "inverse" || what == "ultrasound" || what == "ct";
 }
 
-void checkOptions(Options& o)
+void checkOptions(ExportArguments& o)
 {
     if (o.what.empty()) {
         o.what = isVtu(o.output) ? "displacement" : isPng(o.output) ? "ultrasound" : "labels";
@@ -126,7 +126,7 @@ std::vector<volume::LabelName> namesOf(const volume::Tissue& tissue)
     return names;
 }
 
-void writeMap(const Options& o, const volume::Tissue& tissue)
+void writeMap(const ExportArguments& o, const volume::Tissue& tissue)
 {
     if (o.map.empty()) {
         return;
@@ -148,7 +148,7 @@ std::vector<float> stiffnessOf(const volume::Tissue& tissue)
     return kilopascal;
 }
 
-void exportVolume(const Options& o, const volume::ExportOptions& how)
+void exportVolume(const ExportArguments& o, const volume::ExportOptions& how)
 {
     const volume::Tissue tissue = session::loadVolume(o.volume);
     const volume::VoxelGrid grid{tissue.size(), tissue.affine()};
@@ -165,7 +165,7 @@ void exportVolume(const Options& o, const volume::ExportOptions& how)
 }
 
 // What to say of it behind the file's name.
-std::string exportState(const Options& o, const volume::ExportOptions& how, command::Progress& progress,
+std::string exportState(const ExportArguments& o, const volume::ExportOptions& how, command::Progress& progress,
                         nlohmann::json& figures)
 {
     const session::DeformedState state(o.record, timeFrom(o.at),
@@ -189,7 +189,7 @@ std::string exportState(const Options& o, const volume::ExportOptions& how, comm
     return fmt::format(" at tick {}: {} nodes moved, by up to {:.2f} mm", state.tick(), state.shape().moved().size(), most);
 }
 
-void runExport(Options o)
+void runExport(ExportArguments o)
 {
     checkOptions(o);
     command::Progress progress(command::Progress::Clock::ticking);
@@ -223,7 +223,7 @@ void runExport(Options o)
 
 void addExport(CLI::App& app)
 {
-    const auto o = std::make_shared<Options>();
+    const auto o = std::make_shared<ExportArguments>();
     CLI::App* command = app.add_subcommand(
         "export", "Write a volume, or the deformed state of a record, as NIfTI, NRRD, MetaImage or .vtu");
     command->add_option("volume", o->volume, "Volume (.vdb)")->type_name("V.vdb");

@@ -23,12 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options : prepare::ImportRequest {
+struct ImportArguments : prepare::ImportRequest {
     fs::path output, tissues, json;
     std::string voxel, closeSkinHoles, addSkin, pad, cropMargin, bodyFromHull;  // as they were typed
 };
 
-void readLengths(Options& o)
+void readLengths(ImportArguments& o)
 {
     const auto set = [](double& target, const std::string& option, const std::string& text, double least, double most) {
         target = text.empty() ? target : base::lengthFrom(option, text, least, most);
@@ -43,7 +43,7 @@ void readLengths(Options& o)
     }
 }
 
-nlohmann::json figuresOf(const prepare::ImportedVolume& made)
+nlohmann::json importFigures(const prepare::ImportedVolume& made)
 {
     nlohmann::json figures = report::volumeFigures(made.tissue);
     figures["steps"] = prepare::stepFigures(made.steps);
@@ -54,7 +54,7 @@ nlohmann::json figuresOf(const prepare::ImportedVolume& made)
     return figures;
 }
 
-void checkOptions(const Options& o)
+void checkOptions(const ImportArguments& o)
 {
     if (o.output.empty() == o.mapping.writeMap.empty()) {
         throw std::runtime_error("palpate import: give -o V.vdb, or --write-map FILE to begin a label map instead");
@@ -68,7 +68,7 @@ void checkOptions(const Options& o)
     base::checkOutput(o.json);
 }
 
-void runImport(Options o)
+void runImport(ImportArguments o)
 {
     readLengths(o);
     checkOptions(o);
@@ -94,11 +94,11 @@ void runImport(Options o)
         report::printVolume(made.tissue);
     }
     if (!o.json.empty()) {
-        command::writeJson(o.json, figuresOf(made));
+        command::writeJson(o.json, importFigures(made));
     }
 }
 
-void addReading(CLI::App& command, Options& o)
+void addReading(CLI::App& command, ImportArguments& o)
 {
     command
         .add_option("--overlap", o.reading.overlap,
@@ -145,7 +145,7 @@ void addReading(CLI::App& command, Options& o)
         ->group("Reading");
 }
 
-void addMapping(CLI::App& command, Options& o)
+void addMapping(CLI::App& command, ImportArguments& o)
 {
     command.add_option("--map,--labels", o.mapping.map, "What the labels are: a built-in label map's name, or a TOML file")
         ->type_name("NAME|FILE")
@@ -198,7 +198,7 @@ void addMapping(CLI::App& command, Options& o)
         ->group("Tissue");
 }
 
-void addSteps(CLI::App& command, Options& o)
+void addSteps(CLI::App& command, ImportArguments& o)
 {
     const char* group = "Changes, done in this order; lengths in mm, or with a unit";
     CLI::Option* const crop =
@@ -247,7 +247,7 @@ void addSteps(CLI::App& command, Options& o)
 
 void addImport(CLI::App& app)
 {
-    const auto o = std::make_shared<Options>();
+    const auto o = std::make_shared<ImportArguments>();
     CLI::App* command = app.add_subcommand(
         "import", "Turn a segmentation (NIfTI, NRRD, MetaImage, DICOM, OpenVDB, folder) into a volume of tissue");
     command->add_option("input", o->input, "Label map or segmentation: a file, or a folder of masks or of DICOM")

@@ -13,11 +13,11 @@ namespace palpate::apps {
 
 namespace {
 
-struct InfoOptions {
+struct InfoArguments {
     std::filesystem::path file, json;
 };
 
-void runInfo(const InfoOptions& options)
+void runInfo(const InfoArguments& options)
 {
     const volume::Tissue tissue = session::loadVolume(options.file);
     if (options.json != "-") {
@@ -33,7 +33,7 @@ void runInfo(const InfoOptions& options)
 
 void addInfo(CLI::App& app)
 {
-    const auto options = std::make_shared<InfoOptions>();
+    const auto options = std::make_shared<InfoArguments>();
     CLI::App* command = app.add_subcommand("info", "Show what a volume holds: size, tissues, memory, where it comes from");
     command->add_option("volume", options->file, "Volume (.vdb)")->type_name("V.vdb")->required();
     command->add_option("--json", options->json, "Write the figures here, - for standard output")->type_name("FILE");

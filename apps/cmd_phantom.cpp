@@ -17,7 +17,7 @@ namespace palpate::apps {
 
 namespace {
 
-struct PhantomOptions {
+struct PhantomArguments {
     datasets::PhantomSpec spec;
     double voxel = 1.0;  // [mm]
     std::vector<std::string> settings;
@@ -84,7 +84,7 @@ nlohmann::json figures(const volume::Tissue& tissue, double seconds)
             {"seconds", seconds}};
 }
 
-void printSummary(const PhantomOptions& options, const volume::Tissue& tissue, double seconds)
+void printSummary(const PhantomArguments& options, const volume::Tissue& tissue, double seconds)
 {
     const Index3 size = tissue.size();
     fmt::print("{}: {} x {} x {} voxels of {:g} mm, made in {:.2f} s\n", options.output.string(), size.x, size.y, size.z,
@@ -95,7 +95,7 @@ void printSummary(const PhantomOptions& options, const volume::Tissue& tissue, d
     }
 }
 
-void runPhantom(PhantomOptions& options)
+void runPhantom(PhantomArguments& options)
 {
     if (options.list) {
         for (const std::string& name : datasets::phantomNames()) {
@@ -134,7 +134,7 @@ void runPhantom(PhantomOptions& options)
 
 void addPhantom(CLI::App& app)
 {
-    const auto options = std::make_shared<PhantomOptions>();
+    const auto options = std::make_shared<PhantomArguments>();
     options->spec.name.clear();
     CLI::App* command = app.add_subcommand("phantom", "Make a phantom: breast, layered or block");
     command->add_option("name", options->spec.name, "Which phantom")->type_name("NAME");

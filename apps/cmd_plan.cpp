@@ -25,7 +25,7 @@ using datasets::ModelLevel;
 using planner::Plan;
 using planner::PlanCandidate;
 
-struct Options {
+struct PlanArguments {
     std::string scene;
     std::string error = "3%", forceError, budget = "400us";
     double speed = 20;  // [mm/s]
@@ -117,7 +117,7 @@ void printReference(const Plan& plan, const planner::PlanCosts& costs, const std
         origin.empty() ? "measured on a Zen 5 server core with AVX-512; 'palpate bench costs' measures yours" : origin);
 }
 
-void planScene(const Options& o)
+void planScene(const PlanArguments& o)
 {
     base::checkOutput(o.json);
     planner::PlanRequest request;
@@ -166,7 +166,7 @@ void planScene(const Options& o)
 
 void addPlan(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<PlanArguments>();
     auto* command = app.add_subcommand("plan", "Pick the cheapest tissue model that holds an error and a time per tick");
     command->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
     command

@@ -39,7 +39,7 @@ constexpr double minRadius = 0.1, maxRadius = 100.0;  // [mm]
 constexpr double maxLength = 500.0;                   // [mm]
 constexpr std::size_t progressEvery = 200;            // ticks
 
-struct Options {
+struct PressArguments {
     std::string scene, path, at, csv, json;
     session::SceneChanges changes;
     std::string level = "elastic";
@@ -73,7 +73,7 @@ std::string_view kindName(ToolKind kind)
 }
 
 // The scene's tool with what the command line says of it. What neither says is not guessed.
-ToolSpec toolOf(const Options& o, const ToolSpec& scene)
+ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
 {
     ToolSpec tool = scene;
     if (o.tool) {
@@ -132,7 +132,7 @@ json toolFigures(const Run& run)
     return out;
 }
 
-json pressFigures(const Options& o, const Run& run)
+json pressFigures(const PressArguments& o, const Run& run)
 {
     const auto& settings = run.model.scene.model.elastic;
     const PressSummary& s = run.summary;
@@ -186,7 +186,7 @@ std::string pressTable(const Run& run)
     return text + '\n';
 }
 
-void print(const Options& o, const Run& run)
+void printPress(const PressArguments& o, const Run& run)
 {
     const PressSummary& s = run.summary;
     fmt::print("{}: {} in {}, setting {}, {:g} mm\n", o.scene, kindName(run.press.tool.kind), o.path,
@@ -211,7 +211,7 @@ void print(const Options& o, const Run& run)
     }
 }
 
-void write(const Options& o, const Run& run)
+void write(const PressArguments& o, const Run& run)
 {
     if (o.csv == "-") {
         std::fputs(pressTable(run).c_str(), stdout);
@@ -223,7 +223,7 @@ void write(const Options& o, const Run& run)
     }
 }
 
-void runPress(const Options& o)
+void runPress(const PressArguments& o)
 {
     base::checkOutput(o.json);
     base::checkOutput(o.csv);
@@ -255,7 +255,7 @@ void runPress(const Options& o)
     progress.clear();
     write(o, run);
     if (o.json != "-" && o.csv != "-") {
-        print(o, run);
+        printPress(o, run);
     }
 }
 
@@ -263,7 +263,7 @@ void runPress(const Options& o)
 
 void addPress(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<PressArguments>();
     CLI::App* c = app.add_subcommand("press", "Lead a tool along a path from a file, and give the tissue's raw force");
     c->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
     c->add_option("--path", o->path, "Poses of the tool: CSV with x_mm,y_mm,z_mm and perhaps seconds, axis_x,axis_y,axis_z")

@@ -21,7 +21,7 @@ using training::Hand;
 using training::Person;
 using training::ProfileStore;
 
-struct Options {
+struct ProfileArguments {
     fs::path profiles, output, json;
     std::string name, hand = "right", exercise, caseId, note;
     std::vector<fs::path> records;
@@ -30,7 +30,7 @@ struct Options {
     bool test = false, yes = false;
 };
 
-ProfileStore open(const Options& o)
+ProfileStore open(const ProfileArguments& o)
 {
     return ProfileStore(o.profiles.empty() ? ProfileStore::standardFile() : o.profiles);
 }
@@ -40,21 +40,21 @@ const char* handInWords(Hand hand)
     return hand == Hand::left ? "left" : "right";
 }
 
-void make(const Options& o)
+void make(const ProfileArguments& o)
 {
     ProfileStore store = open(o);
     const Person person = store.add(o.name, o.hand == "left" ? Hand::left : Hand::right);
     fmt::print("{}: made, {} hand, in {}\n", person.name, handInWords(person.hand), store.file().string());
 }
 
-void changeHand(const Options& o)
+void changeHand(const ProfileArguments& o)
 {
     ProfileStore store = open(o);
     store.setHand(store.find(o.name), o.hand == "left" ? Hand::left : Hand::right);
     fmt::print("{}: {} hand\n", o.name, o.hand);
 }
 
-void list(const Options& o)
+void list(const ProfileArguments& o)
 {
     const ProfileStore store = open(o);
     const auto people = store.people();
@@ -78,7 +78,7 @@ void list(const Options& o)
     }
 }
 
-void exportOne(const Options& o)
+void exportOne(const ProfileArguments& o)
 {
     const ProfileStore store = open(o);
     const fs::path to = o.output.empty() ? fs::path("-") : o.output;
@@ -86,7 +86,7 @@ void exportOne(const Options& o)
     command::writeJson(to, store.exported(store.find(o.name)));
 }
 
-void erase(const Options& o)
+void erase(const ProfileArguments& o)
 {
     ProfileStore store = open(o);
     const Person person = store.find(o.name);
@@ -102,14 +102,14 @@ void erase(const Options& o)
     }
 }
 
-void backup(const Options& o)
+void backup(const ProfileArguments& o)
 {
     const ProfileStore store = open(o);
     store.backup(o.output);
     fmt::print("{}: {} profiles\n", o.output.string(), store.people().size());
 }
 
-void addRecords(const Options& o)
+void addRecords(const ProfileArguments& o)
 {
     ProfileStore store = open(o);
     const Person person = store.find(o.name);
@@ -143,7 +143,7 @@ void addRecords(const Options& o)
     }
 }
 
-void note(const Options& o)
+void note(const ProfileArguments& o)
 {
     ProfileStore store = open(o);
     store.annotate(store.find(o.name), o.session, o.note, o.rating);
@@ -154,7 +154,7 @@ void note(const Options& o)
 
 void addProfile(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ProfileArguments>();
     CLI::App* const c = app.add_subcommand("profile", "Who trains: make, list, export, erase and back up profiles");
     c->require_subcommand(1);
     const auto sub = [&](const char* name, const char* what, bool person) {

@@ -22,7 +22,7 @@ using training::CurriculumProgress;
 using training::ExerciseProgress;
 using training::PersonProgress;
 
-struct Options {
+struct ProgressArguments {
     std::vector<std::string> names, groups, curricula;
     std::string caseId, exercise;
     fs::path profiles, html, csv, xapi, json;
@@ -79,7 +79,7 @@ PersonProgress progressOf(const training::ProfileStore& store, const training::P
 }
 
 // "experts=anna,bert": all sessions of these people that the filters let through.
-report::ScoredGroup groupOf(const Options& o, const std::string& text, const training::ProfileStore& store)
+report::ScoredGroup groupOf(const ProgressArguments& o, const std::string& text, const training::ProfileStore& store)
 {
     const std::size_t equals = text.find('=');
     if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
@@ -101,7 +101,7 @@ report::ScoredGroup groupOf(const Options& o, const std::string& text, const tra
     return group;
 }
 
-void print(const PersonProgress& p)
+void printPerson(const PersonProgress& p)
 {
     fmt::print("{} ({} sessions)\n", p.person.name, p.sessions.size());
     for (const CurriculumProgress& c : p.curricula) {
@@ -121,7 +121,7 @@ void print(const PersonProgress& p)
     }
 }
 
-void run(const Options& o)
+void run(const ProgressArguments& o)
 {
     for (const fs::path& file : {o.html, o.csv, o.xapi, o.json}) {
         base::checkOutput(file);
@@ -162,7 +162,7 @@ void run(const Options& o)
     }
     if (o.json != "-") {
         for (const PersonProgress& p : people) {
-            print(p);
+            printPerson(p);
         }
     }
 }
@@ -171,7 +171,7 @@ void run(const Options& o)
 
 void addProgress(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ProgressArguments>();
     CLI::App* const c =
         app.add_subcommand("progress", "Learning curves, what is reached, what to train next; groups compared");
     c->add_option("NAME", o->names, "profiles");

@@ -20,7 +20,7 @@ namespace palpate::apps {
 
 namespace {
 
-struct Options {
+struct ReplayArguments {
     std::string file;
     std::string json;
 };
@@ -62,7 +62,7 @@ std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult&
     return haptics::someOf(faults, faults.size());
 }
 
-void replayRecord(const Options& o)
+void replayRecord(const ReplayArguments& o)
 {
     const haptics::Record record(o.file);
     const auto model = session::reopenSession(o.file, record.info());
@@ -107,7 +107,7 @@ void replayRecord(const Options& o)
 
 void addReplay(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ReplayArguments>();
     auto* command = app.add_subcommand("replay", "Recompute all of a record, compare all bits, and check its seal");
     command->add_option("FILE", o->file, "Record of a session (train --record)")->required();
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)");

@@ -31,7 +31,7 @@ using datasets::Scene;
 
 constexpr double handle = 0.03;  // of the needle that stays outside [m]
 
-struct Options {
+struct SceneArguments {
     fs::path volume, output, json;
     std::string target, margin, lesionIn, lesionSize, lesionTissue = "idc_high_grade";
     std::vector<std::string> vital;
@@ -67,7 +67,7 @@ void checkStructure(const volume::Tissue& tissue, const std::string& option, con
 }
 
 // The scene without a way in.
-Scene sceneOf(const Options& o, const volume::Tissue& tissue, const std::optional<datasets::Insert>& lesion)
+Scene sceneOf(const SceneArguments& o, const volume::Tissue& tissue, const std::optional<datasets::Insert>& lesion)
 {
     const std::string target = lesion ? lesion->name : o.target;
     Scene scene = datasets::sceneForVolume(o.volume, tissue, target);
@@ -88,13 +88,13 @@ Scene sceneOf(const Options& o, const volume::Tissue& tissue, const std::optiona
     return scene;
 }
 
-struct Found {
+struct FoundWays {
     std::string needle;
     std::vector<Proposal> ways;
 };
 
 // Ways in with the first needle that has one; sets the scene's tool.
-Found findWays(Scene& scene, const Options& o, const volume::Tissue& tissue, const std::optional<double>& margin)
+FoundWays findWays(Scene& scene, const SceneArguments& o, const volume::Tissue& tissue, const std::optional<double>& margin)
 {
     std::string why;
     for (const Needle& needle : needles) {
@@ -149,7 +149,7 @@ std::string clearanceText(const Proposal& way)
     return way.clearance >= seen ? fmt::format("> {:.1f}", 1e3 * seen) : fmt::format("{:.1f}", 1e3 * way.clearance);
 }
 
-void writeScene(Scene scene, const Options& o, const Found& found, const Proposal& way,
+void writeScene(Scene scene, const SceneArguments& o, const FoundWays& found, const Proposal& way,
                 const std::vector<std::string>& warnings)
 {
     scene.entry = way.approach.entry;
@@ -200,7 +200,7 @@ std::vector<std::string> warningsOf(const volume::Tissue& tissue, const Proposal
     return warnings;
 }
 
-nlohmann::json figuresOf(const Scene& scene, const Found& found, const Options& o)
+nlohmann::json wayFigures(const Scene& scene, const FoundWays& found, const SceneArguments& o)
 {
     nlohmann::json ways = nlohmann::json::array();
     const auto triple = [](Vec3 p) { return nlohmann::json{1e3 * p.x, 1e3 * p.y, 1e3 * p.z}; };
@@ -223,7 +223,7 @@ nlohmann::json figuresOf(const Scene& scene, const Found& found, const Options& 
             {"needle", found.needle},     {"chosen", o.choose},     {"ways", ways}};
 }
 
-void printWays(const Scene& scene, const Found& found, const Options& o)
+void printWays(const Scene& scene, const FoundWays& found, const SceneArguments& o)
 {
     std::vector<std::string> vital;
     for (const datasets::VitalStructure& v : scene.vital) {
@@ -243,7 +243,7 @@ void printWays(const Scene& scene, const Found& found, const Options& o)
     }
 }
 
-void runScene(const Options& o)
+void runScene(const SceneArguments& o)
 {
     base::checkOutput(o.output);
     base::checkOutput(o.json);
@@ -268,7 +268,7 @@ void runScene(const Options& o)
     }
     Scene scene = sceneOf(o, tissue, lesion);
     progress.show("looking for ways in");
-    const Found found = findWays(scene, o, tissue, margin);
+    const FoundWays found = findWays(scene, o, tissue, margin);
     if (o.choose > static_cast<int>(found.ways.size())) {
         throw std::runtime_error(
             fmt::format("--choose {}: there are {} ways: choose one of these", o.choose, found.ways.size()));
@@ -288,7 +288,7 @@ void runScene(const Options& o)
         fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose, o.output.string());
     }
     if (!o.json.empty()) {
-        command::writeJson(o.json, figuresOf(scene, found, o));
+        command::writeJson(o.json, wayFigures(scene, found, o));
     }
 }
 
@@ -296,7 +296,7 @@ void runScene(const Options& o)
 
 void addScene(CLI::App& app)
 {
-    const auto o = std::make_shared<Options>();
+    const auto o = std::make_shared<SceneArguments>();
     CLI::App* command =
         app.add_subcommand("scene", "Propose ways from the skin to a target in a volume, and write a biopsy as a scene");
     command->add_option("volume", o->volume, "Volume (.vdb)")->type_name("V.vdb")->required();

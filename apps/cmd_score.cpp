@@ -31,7 +31,7 @@ constexpr std::size_t shownLosses = 3;
 using haptics::Score;
 using nlohmann::json;
 
-struct Options {
+struct ScoreArguments {
     std::vector<std::filesystem::path> files;
     std::vector<std::string> groups;
     std::filesystem::path json, report, pictures;
@@ -251,7 +251,7 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
     printTable(heads, columns);
 }
 
-void run(const Options& options)
+void scoreRecord(const ScoreArguments& options)
 {
     std::vector<Session> sessions;
     std::vector<Group> groups;
@@ -294,7 +294,7 @@ void run(const Options& options)
 
 void addScore(CLI::App& app)
 {
-    auto options = std::make_shared<Options>();
+    auto options = std::make_shared<ScoreArguments>();
     CLI::App* score = app.add_subcommand("score", "Score one record or several, and compare groups");
     score->add_option("FILE", options->files, "records of sessions");
     score->add_option("--group", options->groups, "a group to compare: NAME=FILE,FILE; give the option once per group")
@@ -302,7 +302,7 @@ void addScore(CLI::App& app)
     score->add_option("--json", options->json, "write the figures here (- for standard output)");
     score->add_option("--report", options->report, "write an HTML report of the one record, or of the groups, here");
     score->add_option("--pictures", options->pictures, "put the PNG files of this folder into the report");
-    score->callback([options] { run(*options); });
+    score->callback([options] { scoreRecord(*options); });
 }
 
 }  // namespace palpate::apps

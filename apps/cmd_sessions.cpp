@@ -32,7 +32,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Options {
+struct SessionsArguments {
     std::filesystem::path json;
     double every = 0;  // [s]; 0: once
 };
@@ -66,7 +66,7 @@ json millimetres(double metres)
     return std::isfinite(metres) ? json(metres * 1e3) : json();
 }
 
-json figuresOf(const std::string& name, const channel::Subscriber& session, const channel::State& s)
+json stateFigures(const std::string& name, const channel::Subscriber& session, const channel::State& s)
 {
     constexpr std::array warnings{"none", "near", "very near", "touching"};
     const channel::Scenery& scenery = session.scenery();
@@ -96,7 +96,7 @@ json figuresOf(const std::string& name, const channel::Subscriber& session, cons
         {"last_core_target_pct", s.cores > 0 ? json(s.coreTarget * 100) : json()}};
 }
 
-json look()
+json lookAtAll()
 {
     json all = json::array();
     for (const std::string& name : channel::sessions()) {
@@ -108,7 +108,7 @@ json look()
         }
         const auto state = session ? session->state() : std::nullopt;
         if (state) {
-            all.push_back(figuresOf(name, *session, *state));
+            all.push_back(stateFigures(name, *session, *state));
         }
     }
     return all;
@@ -119,7 +119,7 @@ std::string inMillimetres(const json& value)
     return value.is_number() ? fmt::format("{:.1f}", value.get<double>()) : "-";
 }
 
-void print(const json& all)
+void printSessions(const json& all)
 {
     if (all.empty()) {
         fmt::print("no session runs\n");
@@ -139,17 +139,17 @@ void print(const json& all)
     }
 }
 
-void run(const Options& o)
+void listSessions(const SessionsArguments& o)
 {
     base::checkOutput(o.json);
     const pid_t parent = ::getppid();  // without it nobody looks any more
     do {
-        const json all = look();
+        const json all = lookAtAll();
         if (!o.json.empty()) {
             command::writeJson(o.json, {{"sessions", all}});
         }
         if (o.json != "-") {
-            print(all);
+            printSessions(all);
             std::fflush(stdout);
         }
         if (o.every > 0) {
@@ -162,12 +162,12 @@ void run(const Options& o)
 
 void addSessions(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<SessionsArguments>();
     CLI::App* const c = app.add_subcommand("sessions", "Sessions of this user that run here now, with their figures");
     c->add_option("--every", o->every, "Again and again, every so many seconds, until it is ended (Ctrl-C)")
         ->check(CLI::Range(0.05, 3600.0));
     c->add_option("--json", o->json, "write them here (- for standard output)");
-    c->final_callback([o] { run(*o); });
+    c->final_callback([o] { listSessions(*o); });
 }
 
 }  // namespace palpate::apps

@@ -51,7 +51,7 @@ constexpr double longestSession = 86400.0;  // [s]
 constexpr double picturesTimeout = 60.0;    // after the end of a session [s]
 constexpr double laterTimeout = 600.0;  // for pictures that are drawn of the record, and ten times what the session took
 
-struct Options {
+struct TrainArguments {
     std::string scene = "breast";
     bool sceneGiven = false;
     session::SceneChanges changes;
@@ -79,18 +79,18 @@ struct Options {
     session::Faults faults;  // what `inject` says
 };
 
-bool wantsWindow(const Options& o)
+bool wantsWindow(const TrainArguments& o)
 {
     return o.view || (!o.noView && !o.unpaced && std::getenv("DISPLAY") != nullptr);
 }
 
-std::string sessionName(const Options& o)
+std::string sessionName(const TrainArguments& o)
 {
     return o.session.empty() ? fmt::format("train-{}", getpid()) : o.session;
 }
 
 // A report is made from a record: without --record it lies beside the report.
-fs::path recordFile(const Options& o)
+fs::path recordFile(const TrainArguments& o)
 {
     if (!o.record.empty()) {
         return o.record;
@@ -98,20 +98,20 @@ fs::path recordFile(const Options& o)
     return o.report.empty() ? fs::path() : fs::path(o.report).replace_extension(".db");
 }
 
-std::string deviceInWords(const Options& o)
+std::string deviceInWords(const TrainArguments& o)
 {
     return o.trainee.empty() ? o.device : fmt::format("{} (seed {})", o.trainee, o.changes.seed.value_or(1));
 }
 
 // Pictures of a record are those of its events, on a machine that is busy too, and no viewer is beside the servo loop.
-bool drawsLater(const Options& o)
+bool drawsLater(const TrainArguments& o)
 {
     const bool live = wantsWindow(o) || recordFile(o).empty() || session::has(o.faults, session::FaultKind::stallViewer);
     return !o.pictures.empty() && (o.unpaced || !live);
 }
 
 // What would strike nothing would show nothing.
-void checkFaults(const Options& o)
+void checkFaults(const TrainArguments& o)
 {
     const auto need = [&](std::initializer_list<session::FaultKind> kinds, bool there, const char* hint) {
         for (const session::FaultKind kind : kinds) {
@@ -127,7 +127,7 @@ void checkFaults(const Options& o)
     need({session::FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
 }
 
-void checkDevice(const Options& o)
+void checkDevice(const TrainArguments& o)
 {
     const session::DeviceKind& device = session::deviceKind(o.device);
     if (!o.trainee.empty() && o.device != "hand") {
@@ -148,7 +148,7 @@ void checkDevice(const Options& o)
 const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-biopsy",
                                      "near-vessel", "behind-rib",     "find-lump"};
 
-void applyTask(Options& o)
+void applyTask(TrainArguments& o)
 {
     const bool ownScene = !o.task.empty() && o.task != "core-biopsy" && o.task != "find-lump";
     if (ownScene && o.sceneGiven) {
@@ -169,7 +169,7 @@ void applyTask(Options& o)
 }
 
 // Everything that would fail at the end of a session for a reason that is there at its beginning.
-void checkOutputs(const Options& o)
+void checkOutputs(const TrainArguments& o)
 {
     base::checkOutput(o.json);
     base::checkOutput(o.report);
@@ -190,7 +190,7 @@ void checkOutputs(const Options& o)
 
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
 // is now, as it is told.
-std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, const haptics::SessionInfo& info,
+std::vector<std::pair<const char*, std::string>> writeOutputs(const TrainArguments& o, const haptics::SessionInfo& info,
                                                               const haptics::SessionModel& model, Viewers& viewers,
                                                               double sessionTook, session::TrainResult& result)
 {
@@ -238,7 +238,7 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const Options& o, 
 
 // The session's model, unless it asks for more than this machine has: before a record, a window or a device's thread is
 // there.
-haptics::SessionModel openModel(Options& o)
+haptics::SessionModel openModel(TrainArguments& o)
 {
     if (!o.anyway) {
         o.changes.memory = base::availableMemory();
@@ -250,7 +250,7 @@ haptics::SessionModel openModel(Options& o)
     return model;
 }
 
-void applyTraining(Options& o, const Training& training)
+void applyTraining(TrainArguments& o, const Training& training)
 {
     if (const std::string scene = training.scene(); !scene.empty()) {
         if (o.sceneGiven || !o.task.empty()) {
@@ -280,13 +280,13 @@ void tell(const std::string& fitted, const std::vector<std::pair<const char*, st
 }
 
 // Where the figures lie that the window shows at the end: of a session that somebody holds.
-std::optional<base::TemporaryFolder> forResult(const Options& o)
+std::optional<base::TemporaryFolder> forResult(const TrainArguments& o)
 {
     const bool shown = session::deviceKind(o.device).somebodyHolds && wantsWindow(o) && !o.closeAtEnd;
     return shown ? std::optional<base::TemporaryFolder>(std::in_place, "the result that the window shows") : std::nullopt;
 }
 
-ViewersWanted viewersFor(const Options& o, const Training& training, const haptics::SessionModel& model,
+ViewersWanted viewersFor(const TrainArguments& o, const Training& training, const haptics::SessionModel& model,
                          const fs::path& result)
 {
     ViewersWanted wanted;
@@ -306,7 +306,7 @@ ViewersWanted viewersFor(const Options& o, const Training& training, const hapti
 }
 
 // A tryout is a short session for nothing: in a body that is quickly there.
-void applyTryout(Options& o)
+void applyTryout(TrainArguments& o)
 {
     constexpr double tryoutSeconds = 30;
     if (!o.tryout) {
@@ -320,7 +320,7 @@ void applyTryout(Options& o)
     o.view = o.closeAtEnd = true;
 }
 
-void prepare(Options& o, const Training& training)
+void prepare(TrainArguments& o, const Training& training)
 {
     applyTryout(o);
     for (const auto& text : o.inject) {
@@ -333,7 +333,7 @@ void prepare(Options& o, const Training& training)
     checkOutputs(o);
 }
 
-void train(Options o)
+void train(TrainArguments o)
 {
     if (wantsWindow(o)) {
         base::useLanguage();
@@ -443,7 +443,7 @@ std::string seedFault(const std::string& text)
 
 void addTrain(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<TrainArguments>();
     auto* c = app.add_subcommand("train", "Perform a procedure: a built-in scene, a scene file or a volume");
     auto* scene =
         c->add_option("SCENE", o->scene,

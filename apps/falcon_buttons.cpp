@@ -21,7 +21,7 @@ namespace {
 
 constexpr time_t betweenLooks = 1;  // for a Falcon [s]
 
-void print(const std::string& line)
+void printLine(const std::string& line)
 {
     fmt::print("{}\n", line);
     std::fflush(stdout);
@@ -43,16 +43,17 @@ void printButtons(const session::FalconOptions& options)
             const auto wire = falcon::usbTransport();
             falcon::Link falcon(*wire, link, [](const std::string&) {});
             falcon.connect(base::EndInOrder::asked());
-            print("ready: the buttons of the Falcon's grip, as they are pressed");
+            printLine("ready: the buttons of the Falcon's grip, as they are pressed");
             falcon::watchButtons(
-                falcon, *wire, [](std::uint8_t button) { print(fmt::format("button {}", falcon::nameOf(button))); }, ended);
+                falcon, *wire, [](std::uint8_t button) { printLine(fmt::format("button {}", falcon::nameOf(button))); },
+                ended);
             falcon.close();
             before.clear();
         } catch (const std::exception& e) {
             why = e.what();
         }
         if (why != before && !ended()) {
-            print("waiting: " + why);
+            printLine("waiting: " + why);
         }
         before = why;
         // A signal ends the sleep.

@@ -31,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-struct Options {
+struct MeshArguments {
     std::string volume, json;
     fs::path output;
     double size = 3;     // [mm]
@@ -91,7 +91,7 @@ json figuresOf(const reference::MeshQuality& q, const volume::TissueTable& table
             {"tissues", tissues}};
 }
 
-void printQuality(const Options& o, const reference::MeshQuality& q, const volume::TissueTable& table, double seconds)
+void printQuality(const MeshArguments& o, const reference::MeshQuality& q, const volume::TissueTable& table, double seconds)
 {
     fmt::print("{}: {} points, {} tetrahedra, edges {:.2f} to {:.2f} mm, {:.1f} s of processor time\n\n", o.output.string(),
                q.points, q.tets, 1e3 * q.shortest, 1e3 * q.longest, seconds);
@@ -110,7 +110,7 @@ void printQuality(const Options& o, const reference::MeshQuality& q, const volum
                q.between, q.overShared, q.flipped);
 }
 
-void run(const Options& o)
+void run(const MeshArguments& o)
 {
     if (o.volume.empty()) {
         throw std::runtime_error(fmt::format("no volume: name one (.vdb), or a built-in phantom: {}",
@@ -148,7 +148,7 @@ void run(const Options& o)
     }
 }
 
-void addOptions(CLI::App& app, Options& o)
+void addOptions(CLI::App& app, MeshArguments& o)
 {
     app.add_option("volume", o.volume, "Volume (.vdb), scene (.toml), or a built-in phantom by its name");
     app.add_option("-o,--output", o.output, "Mesh to write: " + reference::meshFileEndings())->type_name("FILE");
@@ -176,7 +176,7 @@ int main(int argc, char** argv)
         return palpate::reference::runTetGenJob(argv[2], argv[3]);
     }
     palpate::command::endOnSignals();
-    palpate::apps::Options options;
+    palpate::apps::MeshArguments options;
     return palpate::apps::runParsed(
         argc, argv, "palpate-mesh", "A volume as conforming tetrahedra, one region per tissue",
         [&](CLI::App& app) { palpate::apps::addOptions(app, options); }, [&] { palpate::apps::run(options); });

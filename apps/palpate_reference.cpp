@@ -33,7 +33,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Options {
+struct ReferenceArguments {
     std::string scene;
     std::string vtu, json, save, ccx;
     std::string tool = "sphere_10mm";
@@ -80,7 +80,7 @@ studies::TrialTool toolNamed(const std::string& name)
         fmt::format("--tool {}: the reference is pressed by a sphere: {}", name, fmt::join(names, ", ")));
 }
 
-studies::TrialTool toolOf(const Options& o)
+studies::TrialTool toolOf(const ReferenceArguments& o)
 {
     studies::TrialTool tool = toolNamed(o.tool);
     if (o.radius > 0.0) {
@@ -96,7 +96,7 @@ studies::TrialTool toolOf(const Options& o)
 }
 
 // Straight in, and back out by the same looks.
-std::vector<studies::TrialPose> posesOf(const Options& o, const studies::TrialPath& path)
+std::vector<studies::TrialPose> posesOf(const ReferenceArguments& o, const studies::TrialPath& path)
 {
     std::vector<studies::TrialPose> poses;
     for (const double depth : o.looks) {
@@ -108,7 +108,7 @@ std::vector<studies::TrialPose> posesOf(const Options& o, const studies::TrialPa
     return poses;
 }
 
-std::array<bool, 3> planesOf(const Options& o)
+std::array<bool, 3> planesOf(const ReferenceArguments& o)
 {
     std::array<bool, 3> planes{};
     for (int axis = 0; axis < 3; ++axis) {
@@ -149,7 +149,7 @@ json regionFigures(const reference::BodyMesh& body, const volume::TissueTable& t
 
 // TetGen fills the surfaces of CGAL's mesh, in a process of its own, and takes its points, which are as dense as they must
 // be.
-reference::BodyMesh bodyOf(const Options& o, const reference::PressProblem& problem)
+reference::BodyMesh bodyOf(const ReferenceArguments& o, const reference::PressProblem& problem)
 {
     const auto options = reference::meshOptions(problem, 1e-3 * o.size);
     if (o.mesher == "cgal") {
@@ -179,7 +179,8 @@ struct Results {
     studies::ReferenceInfo info;
 };
 
-Results solveScene(const Options& o, const haptics::SessionModel& model, const studies::TrialPath& path, json& figures)
+Results solveScene(const ReferenceArguments& o, const haptics::SessionModel& model, const studies::TrialPath& path,
+                   json& figures)
 {
     const volume::Tissue part = reference::mirroredPart(*model.tissue, planesOf(o));
     const reference::PressProblem problem{
@@ -223,7 +224,7 @@ Results solveScene(const Options& o, const haptics::SessionModel& model, const s
 }
 
 // Figures beside closed forms; throws when one is off by more than its bound.
-void verify(const Options& o)
+void verify(const ReferenceArguments& o)
 {
     base::checkOutput(o.json);
     json rows = json::array();
@@ -251,7 +252,7 @@ void verify(const Options& o)
     }
 }
 
-void run(const Options& o)
+void run(const ReferenceArguments& o)
 {
     if (o.verify) {
         verify(o);
@@ -320,7 +321,7 @@ void run(const Options& o)
     }
 }
 
-void addOptions(CLI::App& app, Options& o)
+void addOptions(CLI::App& app, ReferenceArguments& o)
 {
     app.add_option("scene", o.scene, "Scene: a built-in name, a file (.toml), or a volume (.vdb)");
     app.add_option("-o,--output", o.vtu, "Write the last state for ParaView (.vtu)");
@@ -371,7 +372,7 @@ void addOptions(CLI::App& app, Options& o)
 
 int main(int argc, char** argv)
 {
-    palpate::apps::Options options;
+    palpate::apps::ReferenceArguments options;
     return palpate::apps::runParsed(
         argc, argv, "palpate-reference", "The finite-element reference of a scene: mesh, solution, and files of both",
         [&](CLI::App& app) { palpate::apps::addOptions(app, options); }, [&] { palpate::apps::run(options); });

@@ -24,8 +24,7 @@ constexpr int callsOfGiven = 20;      // in which windows that take over find th
 constexpr double maxBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
 constexpr int moreAfterMove = 2;      // cycles, so that windows that moved are not felt
 constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
-constexpr double noLimit = -std::numeric_limits<double>::infinity();
-constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
+constexpr int refreshPeriod = 256;    // calls after which forces that are carried along are computed anew
 
 }  // namespace
 

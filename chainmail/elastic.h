@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -171,6 +172,7 @@ private:
     bool confirm(double start) noexcept;
     void retreat() noexcept;
     void again(ElasticResult& result) noexcept;
+    static constexpr double noLimit = -std::numeric_limits<double>::infinity();  // of the energy that a step must go under
     bool takeStep(const Direction& to, double limit, ElasticResult& result) noexcept;
     bool takeLinearStep(Direction to, ElasticResult& result) noexcept;
     void keepStep(const Direction& to, KeptStep step) noexcept;

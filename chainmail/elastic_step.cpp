@@ -15,7 +15,6 @@ constexpr int newtonSteps = 3;        // of a line search: contacts open and clo
 constexpr int maxShortenings = 8;     // of a step that raises the energy
 constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
 constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
-constexpr double noLimit = -std::numeric_limits<double>::infinity();
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
 
 // Where the parabola through the slope at the start and the energy at `alpha` has its lowest point; between a tenth and a

@@ -22,13 +22,13 @@ namespace {
 
 using volume::Tissue;
 
-constexpr int perEdge = 4;           // samples along a cell
-constexpr int room = 3;              // empty cells around what may hold tissue
-constexpr double judged = 0.25;      // fraction of a cell from which on its nodes say how far off a shape is
-constexpr double allowed = 0.1;      // voxels, by which the unloaded shape may miss the volume's
-constexpr double exactness = 0.004;  // voxels, of a solution
-constexpr int maxSteps = 400;        // of a solution
-constexpr double rounding = 1e-9;    // of a voxel's share
+constexpr int perEdge = 4;               // samples along a cell
+constexpr int room = 3;                  // empty cells around what may hold tissue
+constexpr double judged = 0.25;          // fraction of a cell from which on its nodes say how far off a shape is
+constexpr double allowed = 0.1;          // voxels, by which the unloaded shape may miss the volume's
+constexpr double exactness = 0.004;      // voxels, of a solution
+constexpr int maxSolverSteps = 400;      // of a solution
+constexpr double solverRounding = 1e-9;  // of a voxel's share
 constexpr double firstMargin = 0.01, lastMargin = 0.3;  // around the volume's tissue, for the unloaded one [m]
 
 double finestVoxel(const Tissue& tissue)
@@ -86,7 +86,7 @@ public:
             const Vec3 w = glm::mix(1.0 - (inside - low), inside - low, Vec3(side));
             const double part = w.x * w.y * w.z;
             const Index3 voxel = Index3(low) + side;
-            const volume::TissueRow* row = part > rounding ? rows_[labels_.values[labels_.offset(voxel)]] : nullptr;
+            const volume::TissueRow* row = part > solverRounding ? rows_[labels_.values[labels_.offset(voxel)]] : nullptr;
             if (row == nullptr) {
                 continue;
             }
@@ -319,7 +319,7 @@ void UnloadedBody::sag(Vec3 acceleration, bool fromRest, double tolerance)
     for (std::size_t i = 0; i < u_.size() && !fromRest; ++i) {
         loaded.place(nodes_.node(i), known[i] != 0 ? u_[i] : Vec3(0.0));
     }
-    const auto out = loaded.solve(tolerance, maxSteps);
+    const auto out = loaded.solve(tolerance, maxSolverSteps);
     if (!out.balanced) {
         throw std::runtime_error(
             fmt::format("the body has no equilibrium under its weight: after {} steps {:.2g} of it are out of balance",

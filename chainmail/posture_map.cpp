@@ -23,7 +23,7 @@ using volume::Tissue;
 using Corners = std::array<Vec3, 8>;
 
 constexpr double insideBy = 1e-9;  // of a cell: faces belong to both their cells
-constexpr int margin = 4;          // voxels of air around tissue, so that nobody takes its surface for a cut
+constexpr int airAround = 4;       // voxels of air around tissue, so that nobody takes its surface for a cut
 
 double weightOf(int corner, Vec3 at) noexcept
 {
@@ -100,8 +100,8 @@ public:
                 }
             }
         });
-        shift_ = Index3(glm::ceil(-low - 1e-6)) + margin;
-        image_.size = shift_ + glm::max(Index3(glm::ceil(high - 1e-6)) + 1, from_.size) + margin;
+        shift_ = Index3(glm::ceil(-low - 1e-6)) + airAround;
+        image_.size = shift_ + glm::max(Index3(glm::ceil(high - 1e-6)) + 1, from_.size) + airAround;
         image_.affine = {from_.affine.linear, from_.affine.toPatient(-Vec3(shift_))};
         image_.values.assign(image_.offset({0, 0, image_.size.z}), 0);
         source_.assign(image_.values.size(), Vec3f(std::numeric_limits<float>::quiet_NaN()));
@@ -163,11 +163,11 @@ private:
         Extent keep{shift_, shift_ + from_.size - 1};
         const Extent before = extentOf(from_, solid), after = extentOf(image_, solid);
         for (int axis = 0; axis < 3 && after.high.x >= 0; ++axis) {
-            if (after.low[axis] < keep.low[axis] + margin && before.low[axis] + shift_[axis] > after.low[axis]) {
-                keep.low[axis] = std::max(0, std::min(keep.low[axis], after.low[axis] - margin));
+            if (after.low[axis] < keep.low[axis] + airAround && before.low[axis] + shift_[axis] > after.low[axis]) {
+                keep.low[axis] = std::max(0, std::min(keep.low[axis], after.low[axis] - airAround));
             }
-            if (after.high[axis] > keep.high[axis] - margin && before.high[axis] + shift_[axis] < after.high[axis]) {
-                keep.high[axis] = std::min(image_.size[axis] - 1, std::max(keep.high[axis], after.high[axis] + margin));
+            if (after.high[axis] > keep.high[axis] - airAround && before.high[axis] + shift_[axis] < after.high[axis]) {
+                keep.high[axis] = std::min(image_.size[axis] - 1, std::max(keep.high[axis], after.high[axis] + airAround));
             }
         }
         LabelImage kept{keep.high - keep.low + 1, {image_.affine.linear, image_.affine.toPatient(Vec3(keep.low))}, {}};

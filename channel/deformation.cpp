@@ -1,5 +1,7 @@
 #include <channel/deformation.h>
 
+#include <channel/lanes.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -44,14 +46,6 @@ double spline(double d) noexcept
 {
     d = std::abs(d);
     return d < 0.5 ? 0.75 - d * d : 0.5 * (1.5 - d) * (1.5 - d);
-}
-
-// Four floats that are added and multiplied at once.
-using Lanes = float __attribute__((vector_size(16)));
-
-Lanes lanes(const glm::vec4& v) noexcept
-{
-    return Lanes{v.x, v.y, v.z, v.w};
 }
 
 }  // namespace

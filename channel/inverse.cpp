@@ -1,5 +1,7 @@
 #include <channel/inverse.h>
 
+#include <channel/lanes.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -14,14 +16,6 @@ namespace {
 
 constexpr float flat = 0.05F;         // a cell whose volume anywhere falls under this share counts as folded
 constexpr float edgeWithout = 0.57F;  // no cell is folded whose edges change by less (a root of a third) [spacings]
-
-// Four floats that are added and multiplied at once.
-using Lanes = float __attribute__((vector_size(16)));
-
-Lanes lanes(const glm::vec4& v) noexcept
-{
-    return Lanes{v.x, v.y, v.z, v.w};
-}
 
 glm::vec3 vec(Lanes v) noexcept
 {

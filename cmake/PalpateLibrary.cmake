@@ -26,7 +26,6 @@ function(palpate_library name)
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
     VERIFY_INTERFACE_HEADER_SETS ${PALPATE_VERIFY_HEADERS})
-  palpate_precompile(${target})
   if(NOT arg_UNINSTALLED)
     set_property(GLOBAL APPEND PROPERTY PALPATE_INSTALLED ${name})
     install(TARGETS ${target} EXPORT palpateTargets

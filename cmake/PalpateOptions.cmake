@@ -14,7 +14,13 @@ endif()
 add_library(palpate_flags INTERFACE)
 # No fused multiply-add and no fast-math: a replay must give the same bits.
 target_compile_options(palpate_flags INTERFACE
-  -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast)
+  -ffp-contract=off -Wall -Wextra -Wpedantic -Wnon-virtual-dtor -Wold-style-cast)
+if(CMAKE_UNITY_BUILD)
+  # Several sources in one unit: the names of one are global to the next, and none is the main file.
+  target_compile_options(palpate_flags INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local;-Wno-subobject-linkage>)
+else()
+  target_compile_options(palpate_flags INTERFACE -Wshadow)
+endif()
 if(PALPATE_WERROR)
   target_compile_options(palpate_flags INTERFACE -Werror)
 endif()
@@ -26,13 +32,3 @@ else()
   # GCC's -Wconversion fires under -fsanitize on code that is clean without it.
   target_compile_options(palpate_flags INTERFACE -Wconversion)
 endif()
-
-# palpate_precompile(TARGET HEADER...): one set of precompiled headers for each target, as targets differ in their flags.
-function(palpate_precompile target)
-  get_target_property(sources ${target} SOURCES)
-  list(LENGTH sources count)
-  if(PALPATE_PRECOMPILE AND count GREATER 3)
-    target_precompile_headers(${target} PRIVATE <algorithm> <array> <chrono> <cmath> <filesystem> <fstream> <functional>
-      <memory> <optional> <random> <span> <sstream> <stdexcept> <string> <vector> <glm/glm.hpp> ${ARGN})
-  endif()
-endfunction()

@@ -37,7 +37,7 @@ constexpr double beyondTip = 3e-3;       // a line must also be clear so far bey
 constexpr double startDistance = 0.03;   // of the tip from the skin, before and after [m]
 constexpr double minInside = 3e-3;       // the tip is so deep before the gun fires [m]
 constexpr double steepest = 0.5;         // cosine between needle and skin's normal; flatter, the tip slips on the skin
-constexpr double skinPatch = 5e-3;       // radius of the patch that tells the skin's normal [m]
+constexpr double normalPatch = 5e-3;     // radius of the patch that tells the skin's normal [m]
 constexpr double otherDirection = 0.94;  // cosine between two proposals, at most
 constexpr double otherPlace = 10e-3;     // or so far are their aims apart [m]
 constexpr double clearances[] = {4e-3, 2.5e-3, 1.5e-3};  // tried in this order, beside the needle's radius [m]
@@ -246,8 +246,8 @@ Vec3 skinNormal(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
     constexpr int half = 5;
     Vec3 sum(0.0);
     volume::forEachIndex(Index3(-half), Index3(half), [&](Index3 n) {
-        const Vec3 away = skinPatch / half * Vec3(n);
-        if (glm::length(away) <= skinPatch) {
+        const Vec3 away = normalPatch / half * Vec3(n);
+        if (glm::length(away) <= normalPatch) {
             sum += outside(s, reader, p + away) ? away : -away;
         }
     });

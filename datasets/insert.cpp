@@ -22,7 +22,6 @@ using volume::LabelImage;
 using volume::Role;
 using volume::Tissue;
 
-constexpr double farthest = 5000.0;  // a coordinate from the origin [mm]
 constexpr int surfaceSamples = 200;  // of a lesion that looks for room
 
 std::vector<volume::LabelName> namesOf(const Tissue& tissue)
@@ -125,9 +124,9 @@ Vec3 parsePoint(const std::string& line, const std::string& where)
     for (int axis = 0; axis < 3; ++axis) {
         const auto [rest, error] = std::from_chars(at, end, p[axis]);
         const bool separated = axis == 2 ? rest == end : rest != end && *rest == ',';
-        if (error != std::errc() || !separated || !(std::abs(p[axis]) <= farthest)) {
+        if (error != std::errc() || !separated || !(std::abs(p[axis]) <= farthestCoordinate)) {
             throw std::runtime_error(fmt::format("{}: '{}': must be three numbers x,y,z [mm], each -{:g} to {:g}", where,
-                                                 line, farthest, farthest));
+                                                 line, farthestCoordinate, farthestCoordinate));
         }
         at = rest + 1;
     }

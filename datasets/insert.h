@@ -10,6 +10,9 @@
 
 namespace palpate::datasets {
 
+/// A coordinate in a scene or a `.loc` file from the origin, at most [mm].
+inline constexpr double farthestCoordinate = 5000.0;
+
 /// The volume with the inserts in it; only voxels that hold tissue change. Throws std::runtime_error for a tissue that the
 /// volume's table does not have, a name that is there already, and an insert that touches no tissue.
 volume::Tissue withInserts(const volume::Tissue& tissue, std::span<const Insert> inserts);

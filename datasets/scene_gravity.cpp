@@ -13,7 +13,7 @@ namespace palpate::datasets {
 
 namespace {
 
-constexpr double farthest = 5000;  // of a direction's numbers
+constexpr double largest = 5000;  // of a direction's numbers
 
 constexpr std::array<Field<GravitySpec>, 2> gravityFields{{
     {"g_m_s2", "m/s^2", 0, 30, 1, &GravitySpec::strength},
@@ -31,7 +31,7 @@ Vec3 readDown(Section& section, std::string_view named, std::string_view directe
     if (const auto index = section.choice(named, names)) {
         return patientPostures[*index].down;
     }
-    const auto direction = section.point(directed, farthest);
+    const auto direction = section.point(directed, largest);
     if (!direction) {
         section.missing(named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
     }

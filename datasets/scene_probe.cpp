@@ -1,19 +1,18 @@
 #include <datasets/scene_text.h>
 
+#include <base/units.h>
 #include <datasets/toml_fields.h>
 
 #include <glm/geometric.hpp>
 
 #include <array>
 #include <cmath>
-#include <numbers>
 
 namespace palpate::datasets {
 
 namespace {
 
-constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
-constexpr std::size_t maxSteps = 1000;
+constexpr std::size_t maxProbeSteps = 1000;
 
 constexpr std::array<Field<ProbeSpec>, 3> probeFields{{
     {"depth_mm", "mm", 20, 250, 1e-3, &ProbeSpec::depth},
@@ -21,8 +20,8 @@ constexpr std::array<Field<ProbeSpec>, 3> probeFields{{
     {"focus_mm", "mm", 5, 200, 1e-3, &ProbeSpec::focus},
 }};
 
-constexpr double degree = std::numbers::pi / 180.0;
-constexpr std::array<Field<ProbeStep>, 7> stepFields{{
+using units::degree;
+constexpr std::array<Field<ProbeStep>, 7> probeStepFields{{
     {"at_s", "s", 0, 86400, 1, &ProbeStep::time},
     {"press_mm", "mm", -50, 50, 1e-3, &ProbeStep::press},
     {"slide_mm", "mm", -200, 200, 1e-3, &ProbeStep::slide},
@@ -35,7 +34,7 @@ constexpr std::array<Field<ProbeStep>, 7> stepFields{{
 // Any length but 0, given as three numbers; the unit vector.
 Vec3 readDirection(Section& section, std::string_view key)
 {
-    const auto v = section.point(key, farthest);
+    const auto v = section.point(key, farthestCoordinate);
     if (!v) {
         section.missing(key, "a direction [x, y, z] in the patient frame LPS");
     }
@@ -52,7 +51,7 @@ std::string triple(Vec3 v)
 
 void readPlace(Section& section, ProbeSpec& probe)
 {
-    const auto face = section.point("face_mm", farthest);
+    const auto face = section.point("face_mm", farthestCoordinate);
     if (!face) {
         section.missing("face_mm", "the middle of the probe's face: [x, y, z] in mm, or over_target = true");
     }
@@ -92,14 +91,14 @@ void readProbe(Section& top, ProbeSpec& probe)
         if (!section.has("at_s")) {
             section.missing("at_s", "when the probe is there [s]");
         }
-        readFields<ProbeStep>(section, stepFields, step, Need::some);
+        readFields<ProbeStep>(section, probeStepFields, step, Need::some);
         if (!probe.script.empty() && step.time <= probe.script.back().time) {
             section.refuse("at_s", "must be later than the step before", "s");
         }
         section.finish();
         probe.script.push_back(step);
-        if (probe.script.size() > maxSteps) {
-            section.refuse("at_s", fmt::format("over {} steps", maxSteps));
+        if (probe.script.size() > maxProbeSteps) {
+            section.refuse("at_s", fmt::format("over {} steps", maxProbeSteps));
         }
     }
 }
@@ -117,7 +116,7 @@ std::string probeText(const ProbeSpec& probe)
     out += probe.frequency > 0 ? fmt::format("frequency_mhz = {:.12g}\n", 1e-6 * probe.frequency) : "";
     out += probe.focus > 0 ? fmt::format("focus_mm = {:.12g}\n", 1e3 * probe.focus) : "";
     for (const ProbeStep& step : probe.script) {
-        out += "\n[[probe_step]]\n" + writeFields<ProbeStep>(stepFields, step);
+        out += "\n[[probe_step]]\n" + writeFields<ProbeStep>(probeStepFields, step);
     }
     return out;
 }

@@ -1,19 +1,18 @@
 #include <datasets/scene_text.h>
 
+#include <base/units.h>
 #include <datasets/embedded.h>
 #include <datasets/toml_fields.h>
 
 #include <array>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 
 namespace palpate::datasets {
 
 namespace {
 
-constexpr double farthest = 5000;  // of a coordinate from the origin [mm]
-constexpr double degree = std::numbers::pi / 180.0;
+using units::degree;
 constexpr std::size_t maxSteps = 1000;  // of a script
 
 constexpr std::array<std::string_view, 2> taskNames{"biopsy", "find"};
@@ -238,8 +237,8 @@ void readTarget(Section& top, Scene& scene)
 {
     if (std::optional<Section> section = top.section("target")) {
         scene.target = section->word("structure").value_or(scene.target);
-        scene.entry = section->point("entry_mm", farthest);
-        scene.aim = section->point("aim_mm", farthest);
+        scene.entry = section->point("entry_mm", farthestCoordinate);
+        scene.aim = section->point("aim_mm", farthestCoordinate);
         section->finish();
     }
 }
@@ -265,12 +264,12 @@ void readInserts(Section& top, std::vector<Insert>& inserts)
     for (Section& section : top.sections("insert")) {
         Insert insert;
         readFields<Insert>(section, insertFields, insert, Need::some);
-        if (const auto centre = section.point("centre_mm", farthest)) {
+        if (const auto centre = section.point("centre_mm", farthestCoordinate)) {
             insert.centre = *centre;
         } else {
             section.missing("centre_mm", "where it is: [x, y, z] in mm");
         }
-        insert.to = section.point("to_mm", farthest);
+        insert.to = section.point("to_mm", farthestCoordinate);
         if (insert.spiculated && insert.to) {
             section.refuse("spiculated", "a rod has no spikes: leave out to_mm");
         }
@@ -294,7 +293,7 @@ void readScript(Section& top, std::vector<TraineeStep>& script)
         }
         readChoice(section, "kind", stepKinds, step.kind);
         readFields<TraineeStep>(section, stepFields, step, Need::some);
-        if (const auto to = section.point("to_mm", farthest)) {
+        if (const auto to = section.point("to_mm", farthestCoordinate)) {
             step.to = *to;
         } else if (step.kind != TraineeStep::Kind::fire && step.kind != TraineeStep::Kind::wait) {
             section.missing("to_mm", "where the tip shall go: [x, y, z] in mm");

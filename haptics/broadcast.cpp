@@ -13,11 +13,6 @@ namespace {
 
 constexpr std::uint64_t p99Period = 1000;  // a quantile walks over all bins: once a second is enough
 
-channel::Triple triple(Vec3 v) noexcept
-{
-    return {v.x, v.y, v.z};
-}
-
 std::array<float, 3> floats(Vec3 v) noexcept
 {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};

@@ -16,7 +16,7 @@ namespace {
 // A warning ends only this much beyond its distance, so that it cannot flicker.
 constexpr double hysteresis = 1.1;
 constexpr double graspLength = 4e-3;  // distance below which a needle's tip becomes that of the tissue at it [m]
-constexpr double speedBand = 30.0;    // the tip's speed passes a low-pass at this frequency [Hz]
+constexpr double monitorBand = 30.0;  // the tip's speed passes a low-pass at this frequency [Hz]
 constexpr int restSteps = 3;          // from one point of the line to the next
 constexpr int halvings = 5;           // of a step that ends in another tissue
 constexpr double farAway = 1.0;       // where a core was taken every structure is [m]
@@ -103,7 +103,7 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
     }
     state.last = state.started ? state.last : tool.position;
     state.started = true;
-    const double blend = 1.0 - 1.0 / (1.0 + 2.0 * std::numbers::pi * speedBand * dt);
+    const double blend = 1.0 - 1.0 / (1.0 + 2.0 * std::numbers::pi * monitorBand * dt);
     state.speed += blend * (glm::dot(tool.position - state.last, tool.axis) / dt - state.speed);
     state.last = tool.position;
     found.speed = state.speed;

@@ -1,5 +1,6 @@
 #include <haptics/probe_placement.h>
 
+#include <base/units.h>
 #include <datasets/crossing.h>
 #include <haptics/probe.h>
 
@@ -16,13 +17,13 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
+using units::degree;
 constexpr double flattest = 10 * degree, steepest = 50 * degree;          // between needle and face
 constexpr double enoughMargin = 4e-3;                                     // from a vital structure [m]
 constexpr double minBeside = 2e-3, maxBeside = 14e-3, besideStep = 3e-3;  // from the probe's edge to the entry [m]
 constexpr int directions = 24;
-constexpr double wayStep = 0.5e-3;  // [m]
-constexpr double reach = 60e-3;     // along the probe's axis, to find the skin beside it [m]
+constexpr double wayStep = 0.5e-3;   // [m]
+constexpr double skinReach = 60e-3;  // along the probe's axis, to find the skin beside it [m]
 
 // The middle of the target; of one that is not there, its deepest place.
 Vec3 middleOf(const volume::DistanceField& target)
@@ -57,7 +58,7 @@ Vec3 nearestSkin(const volume::DistanceField& surface, Vec3 from)
 std::optional<Vec3> skinAlong(const volume::DistanceField& surface, Vec3 from, Vec3 inward)
 {
     double before = surface.distance(from);
-    for (double t = 0.0; t < 2.0 * reach; t += wayStep) {
+    for (double t = 0.0; t < 2.0 * skinReach; t += wayStep) {
         const double now = surface.distance(from + t * inward);
         if (before > 0.0 && now <= 0.0) {
             return from + (t - wayStep * now / (now - before)) * inward;
@@ -112,7 +113,7 @@ ProbePlan planProbe(const datasets::Scene& scene, const volume::Tissue& tissue, 
         const double a = 2.0 * std::numbers::pi * i / directions;
         const Vec3 lateral = std::cos(a) * first + std::sin(a) * second;
         for (double beside = minBeside; beside <= maxBeside; beside += besideStep) {
-            const Vec3 from = plan.face + (half + beside) * lateral - reach * plan.direction;
+            const Vec3 from = plan.face + (half + beside) * lateral - skinReach * plan.direction;
             const auto entry = skinAlong(surface, from, plan.direction);
             if (!entry) {
                 continue;

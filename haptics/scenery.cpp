@@ -33,11 +33,6 @@ constexpr std::size_t fineNodes = 16'000'000;
 constexpr double finestUltrasound = 0.2e-3;  // [m]
 constexpr double aroundProcedure = 60e-3;    // to each side of the aim [m]
 
-channel::Triple triple(Vec3 v) noexcept
-{
-    return {v.x, v.y, v.z};
-}
-
 channel::Grid gridOf(const volume::NodeGrid& g) noexcept
 {
     return {{g.size.x, g.size.y, g.size.z}, 0, triple(g.origin), g.spacing};

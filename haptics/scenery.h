@@ -17,6 +17,12 @@ struct Showing {
     std::vector<std::uint8_t> fine;    // per node of scenery.fine: tissue row; or empty
 };
 
+/// As viewers have it.
+inline channel::Triple triple(Vec3 v) noexcept
+{
+    return {v.x, v.y, v.z};
+}
+
 /// The first 31 bytes of a text, of UTF-8 whole characters.
 channel::Name nameOf(const std::string& text) noexcept;
 

@@ -32,7 +32,7 @@ constexpr double restTime = 0.03;         // after which the hand stands still [
 constexpr double maxTissue = 100.0;       // of the cap: larger forces of tissue are that large
 constexpr double noForce = 1e-9;          // what rounding leaves [N]
 constexpr double energyAllowed = 0.4e-3;  // that tissue may give beyond what it got [J]
-constexpr double roundingOff = 1e-9;      // of positions [m]
+constexpr double energyRounding = 1e-9;   // of positions [m]
 constexpr double guardTime = 0.02;        // from full force to none, and back [s]
 
 bool finite(Vec3 v) noexcept
@@ -93,7 +93,7 @@ Vec3 answerable(Vec3 change, Vec3 way, double stiffest) noexcept
 // Time that the position has stayed within an encoder step or two of one place.
 void watchRest(Vec3 position, const StabiliserOptions& o, StabiliserState& s) noexcept
 {
-    const bool rests = glm::distance(position, s.resting) <= 1.5 * o.device.encoder + roundingOff;
+    const bool rests = glm::distance(position, s.resting) <= 1.5 * o.device.encoder + energyRounding;
     s.rest = rests ? s.rest + o.period : 0.0;
     s.resting = rests ? s.resting : position;
 }

@@ -20,14 +20,14 @@ constexpr std::array<Skill, 3> skills{{
 
 constexpr double standOff = 3e-3;       // the tip waits so far before the skin [m]
 constexpr double braking = 30e-3;       // the hand stops so long before the mark at its speed; assumed [s]
-constexpr double travelSpeed = 40e-3;   // in air [m/s]
+constexpr double inAirSpeed = 40e-3;    // in air [m/s]
 constexpr double furthestLead = 40e-3;  // how far the goal runs ahead when tissue resists [m]
 constexpr double tolerance = 1e-3;      // of a movement [m]
 constexpr double tooShallow = 2e-3;     // the trainee goes on [m]
 constexpr double tooDeep = 4e-3;        // and back [m]; less, and the shaft only draws the tissue along
 constexpr double shallow = 4e-3;        // drawn back to so little inside before another line is taken [m]
 constexpr double safeAhead = 1e-3;      // a vital structure nearer to the fired tip is seen as in danger [m]
-constexpr double triggerTime = 0.05;    // the fire button stays down [s]
+constexpr double squeezeTime = 0.05;    // the fire button stays down [s]
 constexpr double lookTime = 1.0;        // at a core [s]
 constexpr double patience = 10.0;       // with a movement that does not get there [s]
 constexpr double learnt = 0.5;          // fraction of an aim's error that stays when the trainee has seen where it went
@@ -107,7 +107,7 @@ void Trainee::go(Vec3 to, Vec3 axis) noexcept
     fromAxis_ = axis_;
     toAxis_ = axis;
     const bool inAir = act_ == Act::approach || act_ == Act::retreat;
-    const double speed = inAir ? travelSpeed : skill_.speed;
+    const double speed = inAir ? inAirSpeed : skill_.speed;
     duration_ = std::max(glm::distance(from_, to_) / speed, 0.1);
 }
 
@@ -152,7 +152,7 @@ void Trainee::begin(Act act) noexcept
             break;
         case Act::look:
             probe_.look();
-            storing_ = model_.scene.ct.given() ? triggerTime : 0.0;  // a look is a scan
+            storing_ = model_.scene.ct.given() ? squeezeTime : 0.0;  // a look is a scan
             go(arm_.position(), axis_);
             break;
         case Act::check:
@@ -269,7 +269,7 @@ void Trainee::advanceAct() noexcept
         case Act::check:
             return inAct_ >= skill_.reaction ? afterCheck() : void();
         case Act::fire:
-            if (inAct_ >= 2.0 * triggerTime + skill_.reaction) {
+            if (inAct_ >= 2.0 * squeezeTime + skill_.reaction) {
                 storePicture();
                 begin(Act::retreat);
             }
@@ -288,7 +288,7 @@ void Trainee::advanceAct() noexcept
 // One before and one after the shot belong to the task; where CT guides, a picture is a scan.
 void Trainee::storePicture() noexcept
 {
-    storing_ = model_.scene.ct.given() || probe_.stores() ? triggerTime : 0.0;
+    storing_ = model_.scene.ct.given() || probe_.stores() ? squeezeTime : 0.0;
 }
 
 DeviceSample Trainee::read() noexcept
@@ -303,7 +303,7 @@ DeviceSample Trainee::read() noexcept
     arm_.pull(goal_ + tremor_.at(now));
     sample.position = arm_.read();
     sample.axis = axis_;
-    sample.buttons = buttonDeadMan | (act_ == Act::fire && inAct_ < triggerTime ? buttonFire : 0U);
+    sample.buttons = buttonDeadMan | (act_ == Act::fire && inAct_ < squeezeTime ? buttonFire : 0U);
     sample.probe = probe_.read();
     sample.buttons |= storing_ > 0.0 ? buttonPicture : 0U;
     storing_ -= period_;

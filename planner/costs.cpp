@@ -19,7 +19,7 @@ namespace palpate::planner {
 
 namespace {
 
-struct Options {
+struct CostsArguments {
     std::string scene = "block";
     bool quick = false;
     std::string json;
@@ -71,7 +71,7 @@ void printLaw(const char* law, const LawCosts& costs, std::span<const TickSample
         law, costs.perSlot, costs.perSlotCycle, costs.perContact, costs.perContactCycle, error.rms, error.worst);
 }
 
-void benchCosts(const Options& o)
+void benchCosts(const CostsArguments& o)
 {
     base::checkOutput(o.json);
     session::SceneChanges changes;
@@ -137,7 +137,7 @@ PlanCosts loadCosts(const std::filesystem::path& file)
 
 void addBenchCosts(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CostsArguments>();
     auto* costs = bench.add_subcommand("costs", "What a tick of level elastic costs here, per node, contact and cycle");
     costs->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->capture_default_str();
     costs->add_flag("--quick", o->quick, "Few models: some seconds");

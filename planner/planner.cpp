@@ -22,7 +22,6 @@ constexpr std::array spacings{4e-3, 3e-3, 2e-3, 1.5e-3, 1e-3};
 constexpr std::array windows{9, 13, 15, 21, 31};
 constexpr std::array cycles{1, 2};
 constexpr std::size_t maxReferenceCells = 400000;  // both references take some seconds
-constexpr std::size_t maxCells = 4U << 20;         // of any other grid
 constexpr std::size_t maxWindowNodes = 300000;     // no budget under 5 ms pays for more
 constexpr std::size_t maxPoints = 60000;           // at which errors are looked at
 // What a candidate is taken to need before it is tried: less than it will, so that none is passed over.
@@ -111,7 +110,7 @@ private:
         return found != bodies_.end() ? found->second
                                       : bodies_
                                             .emplace(spacing, studies::trialBody(*model_.tissue, model_.surface, spacing,
-                                                                                 poissonCap(), maxCells))
+                                                                                 poissonCap(), studies::maxTrialNodes))
                                             .first->second;
     }
 

@@ -13,7 +13,6 @@ namespace palpate::planner {
 
 namespace {
 
-constexpr std::size_t maxCells = 4U << 20;
 constexpr std::size_t maxSlots = 200000;  // beyond any tick of a millisecond
 constexpr double speed = 0.02;            // [m/s]
 constexpr double poissonCap = 0.49;
@@ -117,7 +116,8 @@ std::vector<TickSample> measureTicks(const haptics::SessionModel& model, bool qu
     const auto place = studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     std::vector<TickSample> out;
     for (const double spacing : spacings) {
-        const studies::TrialBody body = studies::trialBody(*model.tissue, model.surface, spacing, poissonCap, maxCells);
+        const studies::TrialBody body =
+            studies::trialBody(*model.tissue, model.surface, spacing, poissonCap, studies::maxTrialNodes);
         for (const double radius : {5e-3, 10e-3}) {
             progress(fmt::format("{:g} mm, sphere of {:g} mm", 1e3 * body.cells.spacing, 1e3 * radius));
             const studies::TrialPath path =

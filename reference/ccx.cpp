@@ -1,5 +1,7 @@
 #include <reference/ccx.h>
 
+#include <base/units.h>
+
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 #include <glm/geometric.hpp>
@@ -19,10 +21,8 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double perMetre = 1e3;    // mm
-constexpr double perPascal = 1e-3;  // kPa
-constexpr double newtonPer = 1e-3;  // of a mN
-constexpr double onPlane = 1e-9;    // m
+constexpr double newtonPerMilli = 1e-3;  // of a mN
+constexpr double onPlane = 1e-9;         // m
 constexpr std::size_t stepsPerCentre = 2;
 // Sets of nodes that the patch drives along x, y, z.
 constexpr std::array<const char*, 3> drivenSets{"DRIVENX", "DRIVENY", "DRIVENZ"};
@@ -31,9 +31,9 @@ constexpr std::array<const char*, 3> drivenSets{"DRIVENX", "DRIVENY", "DRIVENZ"}
 constexpr std::array<std::array<std::size_t, 2>, 6> edges{{{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}};
 
 // Nodes by number: a corner's is its own, a middle's that of its edge.
-class QuadraticMesh {
+class CcxMesh {
 public:
-    explicit QuadraticMesh(const TetMesh& mesh) : nodes(mesh.points)
+    explicit CcxMesh(const TetMesh& mesh) : nodes(mesh.points)
     {
         for (const auto& tet : mesh.tets) {
             std::array<std::uint32_t, 10> ten{tet[0], tet[1], tet[2], tet[3]};
@@ -76,7 +76,7 @@ bool mirroredAt(const SolveOptions& options, int axis, Vec3 p)
     return options.mirrored[static_cast<std::size_t>(axis)] && std::abs(p[axis]) < onPlane;
 }
 
-Fixed fixedNodes(const TetMesh& mesh, const SolveOptions& options, const Patch& patch, QuadraticMesh& quadratic)
+Fixed fixedNodes(const TetMesh& mesh, const SolveOptions& options, const Patch& patch, CcxMesh& quadratic)
 {
     Fixed fixed;
     std::vector<char> inPatch(quadratic.nodes.size());
@@ -111,11 +111,11 @@ Fixed fixedNodes(const TetMesh& mesh, const SolveOptions& options, const Patch& 
     return fixed;
 }
 
-void writeElements(std::ostream& out, const TetMesh& mesh, const QuadraticMesh& quadratic)
+void writeElements(std::ostream& out, const TetMesh& mesh, const CcxMesh& quadratic)
 {
     out << "*NODE, NSET=NALL\n";
     for (std::size_t n = 0; n < quadratic.nodes.size(); ++n) {
-        const Vec3 p = perMetre * quadratic.nodes[n];
+        const Vec3 p = units::mm * quadratic.nodes[n];
         fmt::print(out, "{},{:.12g},{:.12g},{:.12g}\n", n + 1, p.x, p.y, p.z);
     }
     for (int tissue = 0; tissue < 256; ++tissue) {
@@ -140,7 +140,7 @@ void writeMaterials(std::ostream& out, const TetMesh& mesh, std::span<const Mate
             continue;
         }
         const Material& m = materials[row];
-        const double modulus = perPascal * m.youngsModulus;
+        const double modulus = units::kPa * m.youngsModulus;
         fmt::print(out, "*MATERIAL, NAME=M{}\n", row);
         if (volume::isSmall(law)) {
             fmt::print(out, "*ELASTIC\n{:.12g},{:.12g}\n", modulus, m.poisson);
@@ -200,7 +200,7 @@ std::vector<Vec3> displacementsIn(const Block& block)
 {
     std::vector<Vec3> u;
     for (const auto& row : block) {
-        u.push_back(Vec3(row.at(1), row.at(2), row.at(3)) / perMetre);
+        u.push_back(Vec3(row.at(1), row.at(2), row.at(3)) / units::mm);
     }
     return u;
 }
@@ -287,7 +287,7 @@ void writeShell(std::ostream& out, const ShellMesh& shell, std::size_t firstNode
 {
     out << "*NODE, NSET=TOOL\n";
     for (std::size_t n = 0; n < shell.nodes.size(); ++n) {
-        const Vec3 p = perMetre * shell.nodes[n];
+        const Vec3 p = units::mm * shell.nodes[n];
         fmt::print(out, "{},{:.12g},{:.12g},{:.12g}\n", firstNode + n + 1, p.x, p.y, p.z);
     }
     out << "*ELEMENT, TYPE=C3D8, ELSET=ETOOL\n";
@@ -329,7 +329,7 @@ void writeSteps(std::ostream& out, const CcxPress& press)
 {
     constexpr std::array<const char*, stepsPerCentre> increments{"0.5,1.,1e-5,0.5", "1.,1."};
     for (std::size_t step = 0; step < stepsPerCentre * press.centres.size(); ++step) {
-        const Vec3 way = perMetre * (press.centres[step / stepsPerCentre] - press.start);
+        const Vec3 way = units::mm * (press.centres[step / stepsPerCentre] - press.start);
         fmt::print(out, "*STEP, NLGEOM, INC=1000\n*STATIC\n{}\n*BOUNDARY\n", increments[step % stepsPerCentre]);
         for (int c = 0; c < 3; ++c) {
             fmt::print(out, "TOOL,{0},{0},{1:.12g}\n", c + 1, way[c]);
@@ -350,7 +350,7 @@ void checkStiffening(std::span<const Material> materials, Law law, const std::fi
 }
 
 // Points that are held, and the middles of edges between two of them.
-std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const QuadraticMesh& quadratic)
+std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const CcxMesh& quadratic)
 {
     const std::set<std::uint32_t> points(held.begin(), held.end());
     std::set<std::uint32_t> nodes = points;
@@ -368,14 +368,14 @@ std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const Qua
 
 std::vector<Vec3> quadraticNodes(const TetMesh& mesh)
 {
-    return QuadraticMesh(mesh).nodes;
+    return CcxMesh(mesh).nodes;
 }
 
 void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
                const std::filesystem::path& file)
 {
     checkStiffening(materials, options.law, file);
-    QuadraticMesh quadratic(mesh);
+    CcxMesh quadratic(mesh);
     const Fixed fixed = fixedNodes(mesh, options, patch, quadratic);
     std::ofstream out(file);
     writeElements(out, mesh, quadratic);
@@ -389,7 +389,7 @@ void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const S
     out << (volume::isSmall(options.law) ? "*STEP\n*STATIC\n" : "*STEP, NLGEOM, INC=1000\n*STATIC\n0.2,1.,1e-3,0.2\n")
         << "*BOUNDARY\n";
     for (const auto& [where, u] : fixed.value) {
-        fmt::print(out, "{},{},{},{:.12g}\n", where.first + 1, where.second + 1, where.second + 1, perMetre * u);
+        fmt::print(out, "{},{},{},{:.12g}\n", where.first + 1, where.second + 1, where.second + 1, units::mm * u);
     }
     out << "*NODE PRINT, NSET=NALL, FREQUENCY=1000\nU\n";
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -419,7 +419,7 @@ CcxSolution runCcx(const std::filesystem::path& file)
     }
     for (int axis = 0; axis < 3; ++axis) {
         const auto total = lastBlock(results, fmt::format("for set {}", drivenSets[static_cast<std::size_t>(axis)]));
-        solution.force[axis] = total.empty() ? 0.0 : -newtonPer * total.back().at(static_cast<std::size_t>(axis));
+        solution.force[axis] = total.empty() ? 0.0 : -newtonPerMilli * total.back().at(static_cast<std::size_t>(axis));
     }
     return solution;
 }
@@ -429,7 +429,7 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
 {
     constexpr double pressurePer = 50.0;  // mm of overclosure, in the softest modulus
     checkStiffening(materials, NeoHookean{}, file);
-    const QuadraticMesh quadratic(mesh);
+    const CcxMesh quadratic(mesh);
     const ShellMesh shell(press.start, press.radius, glm::normalize(press.centres.front() - press.start),
                           quadratic.nodes.size());
     std::ofstream out(file);
@@ -444,7 +444,7 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
     fmt::print(out,
                "*SURFACE INTERACTION, NAME=TOUCH\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{:.12g}\n"
                "*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE\nTISSUE,BALL\n*BOUNDARY\n",
-               pressurePer * perPascal * softest);
+               pressurePer * units::kPa * softest);
     for (const std::uint32_t n : heldNodes(press.held, quadratic)) {
         fmt::print(out, "{},1,3\n", n + 1);
     }
@@ -468,7 +468,7 @@ std::vector<CcxSolution> runCcxPress(const std::filesystem::path& file, std::siz
     std::vector<CcxSolution> solutions;
     for (std::size_t i = stepsPerCentre - 1; i < u.size(); i += stepsPerCentre) {
         const auto& total = force[i].at(0);
-        solutions.push_back({displacementsIn(u[i]), -newtonPer * Vec3(total.at(0), total.at(1), total.at(2))});
+        solutions.push_back({displacementsIn(u[i]), -newtonPerMilli * Vec3(total.at(0), total.at(1), total.at(2))});
     }
     return solutions;
 }

@@ -15,7 +15,7 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double onPlane = 1e-6;      // mm
+constexpr double onMirror = 1e-6;     // mm
 constexpr int maxSteps = 30;          // of Newton's method to one load,
 constexpr int hopeSteps = 10;         // after which the residual
 constexpr double hope = 0.1;          // is to be this fraction of the first at most
@@ -61,7 +61,7 @@ Equilibrium::Equilibrium(const TetMesh& mesh, std::span<const Material> material
     }
     for (std::size_t n = 0; n < fem.nodes().size(); ++n) {
         for (std::size_t c = 0; c < 3; ++c) {
-            if (options.mirrored[c] && std::abs(fem.nodes()[n][static_cast<int>(c)]) < onPlane) {
+            if (options.mirrored[c] && std::abs(fem.nodes()[n][static_cast<int>(c)]) < onMirror) {
                 held[3 * n + c] = 1;
             }
         }

@@ -1,3 +1,4 @@
+#include <base/units.h>
 #include <reference/finite_elements.h>
 #include <reference/tissue_terms.h>
 
@@ -20,13 +21,11 @@ namespace {
 using Matrix = getfem::model_real_sparse_matrix;
 using getfem::size_type;
 
-constexpr double perMetre = 1e3;    // mm
-constexpr double perPascal = 1e-3;  // kPa
 // The contact's r in moduli per face's edge: without multipliers a pressure of half a modulus would sink a 200th of an edge
 // in, and each update of theirs takes that down some eighty times.
 constexpr double contactStiffness = 100.0;
 constexpr double maxStretch = 30.0;  // of a face's area, that r grows by
-constexpr double onPlane = 1e-9;     // m
+constexpr double onItsPlane = 1e-9;  // m
 constexpr double reach = 0.25;       // faces this many radii away are looked at
 constexpr int facesRule = 8;         // degree of quadrature on faces: contact ends within one
 
@@ -106,7 +105,7 @@ struct FiniteElements::Impl {
 void FiniteElements::Impl::addMesh(const TetMesh& from)
 {
     for (const Vec3& p : from.points) {
-        mesh.add_point(bgeot::base_node(perMetre * p.x, perMetre * p.y, perMetre * p.z), 0.0, false);
+        mesh.add_point(bgeot::base_node(units::mm * p.x, units::mm * p.y, units::mm * p.z), 0.0, false);
     }
     for (const auto& tet : from.tets) {
         mesh.add_simplex(3, tet.begin());
@@ -143,8 +142,9 @@ void FiniteElements::Impl::findFaces(const TetMesh& from)
         bool mirrored = false;
         for (int axis = 0; axis < 3; ++axis) {
             mirrored = mirrored || (options.mirrored[static_cast<std::size_t>(axis)] &&
-                                    std::all_of(face.points.begin(), face.points.end(),
-                                                [&](std::uint32_t p) { return std::abs(from.points[p][axis]) < onPlane; }));
+                                    std::all_of(face.points.begin(), face.points.end(), [&](std::uint32_t p) {
+                                        return std::abs(from.points[p][axis]) < onItsPlane;
+                                    }));
         }
         freeFaces.push_back(!face.held && !mirrored ? 1 : 0);
     }
@@ -161,7 +161,7 @@ void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Mat
     for (std::size_t t = 0; t < from.tets.size(); ++t) {
         const std::size_t cell = cellField.ind_basic_dof_of_element(t)[0];
         const Material& m = materials[from.tissue[t]];
-        const double modulus = perPascal * m.youngsModulus;
+        const double modulus = units::kPa * m.youngsModulus;
         mu[cell] = modulus / (2.0 * (1.0 + m.poisson));
         bulk[cell] = modulus / (3.0 * (1.0 - 2.0 * m.poisson));
         stiffening[cell] = m.stiffening;
@@ -172,7 +172,7 @@ void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Mat
         const auto p = mesh.points_of_face_of_convex(face.tet, face.side);
         const double edge = (gmm::vect_dist2(p[0], p[1]) + gmm::vect_dist2(p[1], p[2]) + gmm::vect_dist2(p[2], p[0])) / 3.0;
         const std::size_t cell = cellField.ind_basic_dof_of_element(face.tet)[0];
-        contactR[cell] = contactStiffness * perPascal * materials[from.tissue[face.tet]].youngsModulus / edge;
+        contactR[cell] = contactStiffness * units::kPa * materials[from.tissue[face.tet]].youngsModulus / edge;
     }
     restR = contactR;
 }

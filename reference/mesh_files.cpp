@@ -1,5 +1,6 @@
 #include <reference/mesh_files.h>
 
+#include <base/units.h>
 #include <reference/mesh_parts.h>
 #include <reference/surfaces.h>
 
@@ -27,8 +28,6 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double perMetre = 1e3;     // mm
-constexpr double perPascal = 1e-3;   // kPa
 constexpr std::size_t perLine = 12;  // numbers of a node set
 
 using Text = std::back_insert_iterator<std::string>;
@@ -184,7 +183,7 @@ std::string inpText(const TetMesh& mesh, const volume::TissueTable& table)
         "*NODE, NSET=NALL\n";
     const Text out(text);
     for (std::size_t p = 0; p < mesh.points.size(); ++p) {
-        const Vec3 at = perMetre * mesh.points[p];
+        const Vec3 at = units::mm * mesh.points[p];
         fmt::format_to(out, "{},{:.12g},{:.12g},{:.12g}\n", p + 1, at.x, at.y, at.z);
     }
     for (const std::uint8_t row : tissuesOf(mesh)) {
@@ -200,7 +199,7 @@ std::string inpText(const TetMesh& mesh, const volume::TissueTable& table)
         const auto& tissue = table.rows[row];
         const std::string name = setName(tissue.name);
         fmt::format_to(out, "*MATERIAL, NAME={0}\n*ELASTIC\n{1:.12g},{2:.12g}\n*SOLID SECTION, ELSET={0}, MATERIAL={0}\n",
-                       name, perPascal * tissue.youngsModulus, tissue.poissonRatio);
+                       name, units::kPa * tissue.youngsModulus, tissue.poissonRatio);
     }
     addNodeSets(mesh, table, text);
     return text;

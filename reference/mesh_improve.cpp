@@ -18,7 +18,7 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr int rounds = 4;           // of swaps and moves,
+constexpr int improvingRounds = 4;  // of swaps and moves,
 constexpr int passes = 6;           // and of moves in each
 constexpr double firstStep = 0.25;  // of the mean edge at a point,
 constexpr double lastStep = 0.01;   // and where the search ends
@@ -183,7 +183,7 @@ void movePoints(TetMesh& mesh, double target, Moving moving)
 void improveAngles(TetMesh& mesh, double target, Moving moving)
 {
     movePoints(mesh, target, moving);
-    for (int round = 0; round < rounds && swapBad(mesh, target) > 0; ++round) {
+    for (int round = 0; round < improvingRounds && swapBad(mesh, target) > 0; ++round) {
         movePoints(mesh, target, moving);
     }
 }

@@ -18,7 +18,7 @@ namespace palpate::reference {
 namespace {
 
 constexpr std::size_t maxAround = 10;  // tetrahedra at an edge that is removed
-constexpr double gain = 1e-3;          // least that a change has to bring [degrees]
+constexpr double leastGain = 1e-3;     // least that a change has to bring [degrees]
 constexpr double unchanged = 1e-9;     // share by which the volume around a point inside the body may change, by rounding
 constexpr double outsideChange =
     5e-3;  // six times the volume that one on the outside may change, in cubes of its longest edge
@@ -175,7 +175,7 @@ private:
         }
         const auto& p = ring->points;
         const std::size_t count = p.size();
-        const double enough = worstOf(ring->tets) + gain;
+        const double enough = worstOf(ring->tets) + leastGain;
         // Of the polygon from one point to another: the best worst angle, and the third point of the triangle at its chord.
         std::array<std::array<double, maxAround>, maxAround> best{};
         std::array<std::array<std::size_t, maxAround>, maxAround> third{};
@@ -250,7 +250,7 @@ private:
             made.push_back({a, b, face[i], face[(i + 1) % 3]});
             least = std::min(least, worst(made.back()));
         }
-        if (least <= worstOf({t, other}) + gain) {
+        if (least <= worstOf({t, other}) + leastGain) {
             return false;
         }
         replace({t, other}, made);
@@ -301,7 +301,7 @@ private:
         if (common != neighbours(p, q)) {
             return false;
         }
-        const double enough = worstOf(star_[p]) + gain;
+        const double enough = worstOf(star_[p]) + leastGain;
         double before = 0.0, after = 0.0;
         std::vector<std::uint32_t> lost, kept;
         for (const std::uint32_t t : star_[p]) {

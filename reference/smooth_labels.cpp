@@ -15,7 +15,7 @@ namespace palpate::reference {
 namespace {
 
 constexpr double blur = 1.0;          // standard deviation of the Gaussian [voxels]
-constexpr int reach = 3;              // of the Gaussian [voxels]
+constexpr int gaussReach = 3;         // of the Gaussian [voxels]
 constexpr double sheer = 0.8;         // a side is flat when its last layer has this fraction of the layer two before
 constexpr double onItsBack = 0.05;    // fraction of the depth that is held when nothing else is: Tissue::support()
 constexpr double full = 65535.0;      // a fraction of one
@@ -132,15 +132,16 @@ std::array<bool, 6> flatSides(const SoftVoxels& voxels)
     return flat;
 }
 
-std::array<float, 2 * reach + 1> gaussian()
+std::array<float, 2 * gaussReach + 1> gaussian()
 {
-    std::array<float, 2 * reach + 1> weights{};
+    std::array<float, 2 * gaussReach + 1> weights{};
     double sum = 0.0;
-    for (int t = -reach; t <= reach; ++t) {
+    for (int t = -gaussReach; t <= gaussReach; ++t) {
         sum += std::exp(-t * t / (2.0 * blur * blur));
     }
-    for (int t = -reach; t <= reach; ++t) {
-        weights[static_cast<std::size_t>(t + reach)] = static_cast<float>(std::exp(-t * t / (2.0 * blur * blur)) / sum);
+    for (int t = -gaussReach; t <= gaussReach; ++t) {
+        weights[static_cast<std::size_t>(t + gaussReach)] =
+            static_cast<float>(std::exp(-t * t / (2.0 * blur * blur)) / sum);
     }
     return weights;
 }
@@ -164,15 +165,15 @@ void blurAxis(const SmoothLabels& labels, const SampleBox& box, int axis, std::v
     for (int a = 0; a < axis; ++a) {
         stride *= static_cast<std::size_t>(box.size[a]);
     }
-    std::vector<float> line(static_cast<std::size_t>(count + 2 * reach));
+    std::vector<float> line(static_cast<std::size_t>(count + 2 * gaussReach));
     Index3 last = box.size - 1;
     last[axis] = 0;
     volume::forEachIndex(Index3(0), last, [&](Index3 n) {
         float* at = values.data() + box.offset(n);
-        for (int i = -reach; i < count + reach; ++i) {
+        for (int i = -gaussReach; i < count + gaussReach; ++i) {
             const int mirrored = i < 0 ? -1 - i : i >= count ? 2 * count - 1 - i : i;
             const bool there = (i >= 0 || mirrorLow) && (i < count || mirrorHigh) && mirrored >= 0 && mirrored < count;
-            line[static_cast<std::size_t>(i + reach)] = there ? at[stride * static_cast<std::size_t>(mirrored)] : 0.0F;
+            line[static_cast<std::size_t>(i + gaussReach)] = there ? at[stride * static_cast<std::size_t>(mirrored)] : 0.0F;
         }
         for (int i = 0; i < count; ++i) {
             const float* from = line.data() + i;
@@ -198,8 +199,8 @@ std::vector<SampleBox> boxesOf(const SoftVoxels& voxels, const SmoothLabels& lab
     });
     std::vector<SampleBox> boxes;
     for (std::size_t r = 0; r < labels.rows.size(); ++r) {
-        const Index3 from = glm::max(low[r] - reach, Index3(0));
-        boxes.push_back({from, glm::min(high[r] + reach, labels.size - 1) - from + 1});
+        const Index3 from = glm::max(low[r] - gaussReach, Index3(0));
+        boxes.push_back({from, glm::min(high[r] + gaussReach, labels.size - 1) - from + 1});
     }
     return boxes;
 }
@@ -240,13 +241,13 @@ void addShares(const SoftVoxels& voxels, SmoothLabels& labels)
 }
 
 // The eight samples around a place, with their weights.
-struct Corners {
+struct NearVoxels {
     std::array<std::size_t, 8> at{};
     std::array<double, 8> weight{};
 };
 
 // `q`: in samples. False beyond the samples, and beyond a flat side.
-bool cornersAt(const SmoothLabels& labels, Vec3 q, Corners& c) noexcept
+bool cornersAt(const SmoothLabels& labels, Vec3 q, NearVoxels& c) noexcept
 {
     Index3 base(0), next(0);
     Vec3 f(0.0);
@@ -294,7 +295,7 @@ struct SharesAt {
     }
 };
 
-void sharesAt(const SmoothLabels& labels, const Corners& c, SharesAt& out) noexcept
+void sharesAt(const SmoothLabels& labels, const NearVoxels& c, SharesAt& out) noexcept
 {
     out.count = 0;
     for (std::size_t i = 0; i < 8; ++i) {
@@ -347,7 +348,7 @@ BorderPoints borderPoints(const SmoothLabels& labels)
             return;
         }
         for (int i = 0; i < 8; ++i) {
-            Corners c;
+            NearVoxels c;
             const Vec3 part((i & 1) != 0 ? 0.25 : -0.25, (i & 2) != 0 ? 0.25 : -0.25, (i & 4) != 0 ? 0.25 : -0.25);
             if (!cornersAt(labels, Vec3(n) + part, c)) {
                 continue;
@@ -432,7 +433,7 @@ SmoothLabels smoothLabels(const volume::Tissue& tissue, Keep keep)
     labels.low = voxels.low;
     labels.size = voxels.size;
     for (int side = 0; side < 6; ++side) {
-        const int margin = labels.flat[static_cast<std::size_t>(side)] ? 0 : reach;
+        const int margin = labels.flat[static_cast<std::size_t>(side)] ? 0 : gaussReach;
         labels.low[side / 2] -= side % 2 == 0 ? margin : 0;
         labels.size[side / 2] += margin;
     }
@@ -476,7 +477,7 @@ void fitVolumes(SmoothLabels& labels, std::span<const double> wanted)
 
 int regionAt(const SmoothLabels& labels, Vec3 p) noexcept
 {
-    Corners c;
+    NearVoxels c;
     if (!cornersAt(labels, labels.affine.toIndex(p) - Vec3(labels.low), c)) {
         return -1;
     }

@@ -1,5 +1,6 @@
 #include <reference/solve.h>
 
+#include <base/units.h>
 #include <reference/equilibrium.h>
 
 #include <fmt/format.h>
@@ -18,7 +19,6 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double perMetre = 1e3;      // mm
 constexpr double newtonPer = 1e-3;    // of a mN
 constexpr double pascalPer = 1e3;     // of a kPa
 constexpr double joulePer = 1e-6;     // of a uJ
@@ -256,7 +256,7 @@ bool Solver::Impl::moveTool(const Obstacle& to, bool last)
 // Frees all but what the patch drives; gives the goals of the state.
 std::vector<double> Solver::Impl::prescribed(const Patch& patch)
 {
-    const auto rest = [&](std::uint32_t node) { return body.fem.nodes()[node] / perMetre; };
+    const auto rest = [&](std::uint32_t node) { return body.fem.nodes()[node] / units::mm; };
     std::vector<char> drives(body.fem.size());
     std::vector<double> goal(body.fem.size());
     for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -266,7 +266,7 @@ std::vector<double> Solver::Impl::prescribed(const Patch& patch)
             continue;
         }
         for (const std::uint32_t n : six) {
-            const Vec3 u = perMetre * patch.u(rest(n));
+            const Vec3 u = units::mm * patch.u(rest(n));
             for (std::size_t c = 0; c < 3; ++c) {
                 drives[3 * n + c] = patch.components[c] ? 1 : 0;
                 goal[3 * n + c] = u[static_cast<int>(c)];
@@ -337,7 +337,7 @@ double RigidTool::distance(Vec3 p) const noexcept
 void Solver::press(const RigidTool& tool)
 {
     Impl& s = *impl_;
-    const Obstacle to{perMetre * tool.centre, perMetre * tool.radius, perMetre * tool.shaft};
+    const Obstacle to{units::mm * tool.centre, units::mm * tool.radius, units::mm * tool.shaft};
     if (!s.body.driven.empty()) {
         throw std::runtime_error("tool: displacements are prescribed already: take a new solver");
     }
@@ -423,11 +423,11 @@ std::vector<Vec3> Solver::displacement(std::span<const Vec3> rest) const
 {
     std::vector<Vec3> points(rest.begin(), rest.end());
     for (Vec3& p : points) {
-        p *= perMetre;
+        p *= units::mm;
     }
     std::vector<Vec3> u = impl_->body.fem.displacementAt(impl_->body.state, points);
     for (Vec3& v : u) {
-        v /= perMetre;
+        v /= units::mm;
     }
     return u;
 }

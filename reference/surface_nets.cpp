@@ -14,11 +14,11 @@ namespace palpate::reference {
 namespace {
 
 constexpr int rounds = 8;          // of smoothing
-constexpr double reach = 0.45;     // of a point from its corner, along each axis [cells]
-constexpr int halvings = 10;       // to a border
+constexpr double netReach = 0.45;  // of a point from its corner, along each axis [cells]
+constexpr int netHalvings = 10;    // to a border
 constexpr int pullRounds = 30;     // of points half way back
 constexpr double atCorner = 1e-3;  // nearer than this is there [cells]
-constexpr std::uint32_t none = ~0U;
+constexpr std::uint32_t noNode = ~0U;
 
 // Cells over the samples, which end where these end.
 class Cells {
@@ -86,7 +86,7 @@ public:
         const Index3 corners = cells.count() + 1;
         number_.assign(
             static_cast<std::size_t>(corners.x) * static_cast<std::size_t>(corners.y) * static_cast<std::size_t>(corners.z),
-            none);
+            noNode);
         for (int axis = 0; axis < 3; ++axis) {
             Index3 first(0);
             first[axis] = -1;
@@ -165,7 +165,7 @@ private:
                                 static_cast<std::size_t>(corner.y)) *
                                    static_cast<std::size_t>(corners.x) +
                                static_cast<std::size_t>(corner.x);
-        if (number_[at] == none) {
+        if (number_[at] == noNode) {
             number_[at] = static_cast<std::uint32_t>(points_.size());
             points_.push_back({corner, Vec3(corner), {}, {}});
         }
@@ -198,7 +198,7 @@ private:
     Vec3 kept(const NetPoint& p, Vec3 at) const
     {
         const Vec3 corner(p.corner);
-        at = glm::clamp(at, corner - reach, corner + reach);
+        at = glm::clamp(at, corner - netReach, corner + netReach);
         for (int axis = 0; axis < 3; ++axis) {
             at[axis] = cells_.onFlatSide(axis, p.corner[axis]) ? corner[axis] : at[axis];
         }
@@ -227,12 +227,12 @@ private:
         if (p.regions.size() != 2 || length == 0.0) {
             return;
         }
-        Vec3 low = kept(p, p.at - reach * normal / length), high = kept(p, p.at + reach * normal / length);
+        Vec3 low = kept(p, p.at - netReach * normal / length), high = kept(p, p.at + netReach * normal / length);
         const int first = regionAtCells(low);
         if (first == regionAtCells(high)) {
             return;
         }
-        for (int h = 0; h < halvings; ++h) {
+        for (int h = 0; h < netHalvings; ++h) {
             const Vec3 middle = 0.5 * (low + high);
             (regionAtCells(middle) == first ? low : high) = middle;
         }

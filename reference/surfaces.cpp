@@ -11,7 +11,7 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr std::uint32_t none = ~0U;
+constexpr std::uint32_t noVertex = ~0U;
 
 // Middle and radius of the sphere that touches all four sides [m].
 std::pair<Vec3, double> innerSphere(const TetMesh& mesh, std::size_t tet)
@@ -68,11 +68,11 @@ void addSeeds(const TetMesh& mesh, TissuePieces& pieces, Surfaces& out)
 // Leaves the points that a facet has.
 void dropUnused(Surfaces& surfaces)
 {
-    std::vector<std::uint32_t> to(surfaces.points.size(), none);
+    std::vector<std::uint32_t> to(surfaces.points.size(), noVertex);
     std::vector<Vec3> points;
     for (auto& facet : surfaces.facets) {
         for (auto& p : facet.points) {
-            if (to[p] == none) {
+            if (to[p] == noVertex) {
                 to[p] = static_cast<std::uint32_t>(points.size());
                 points.push_back(surfaces.points[p]);
             }

@@ -2,6 +2,7 @@
 
 #include <base/child_process.h>
 #include <base/temporary_folder.h>
+#include <base/units.h>
 #include <reference/mesh_parts.h>
 #include <reference/tetgen_job.h>
 
@@ -15,25 +16,24 @@ namespace palpate::reference {
 
 namespace {
 
-constexpr double perMetre = 1e3;            // mm
 constexpr double regularVolume = 0.117851;  // of a tetrahedron with edges of 1
 constexpr double sameVolume = 1e-6;         // fraction of the body's volume
 
-std::array<double, 3> inMillimetres(Vec3 p)
+std::array<double, 3> threeMillimetres(Vec3 p)
 {
-    return {perMetre * p.x, perMetre * p.y, perMetre * p.z};
+    return {units::mm * p.x, units::mm * p.y, units::mm * p.z};
 }
 
 TetGenJob jobOf(const Surfaces& surfaces, const TetGenOptions& options)
 {
     TetGenJob job;
     job.switches = options.switches;
-    std::ranges::transform(surfaces.points, std::back_inserter(job.points), inMillimetres);
+    std::ranges::transform(surfaces.points, std::back_inserter(job.points), threeMillimetres);
     std::ranges::transform(surfaces.facets, std::back_inserter(job.facets), &Surfaces::Facet::points);
     for (const auto& seed : surfaces.seeds) {
-        const double edge = perMetre * options.largest;
-        job.regions.push_back(
-            {inMillimetres(seed.point), 1.0 + static_cast<double>(job.regions.size()), regularVolume * edge * edge * edge});
+        const double edge = units::mm * options.largest;
+        job.regions.push_back({threeMillimetres(seed.point), 1.0 + static_cast<double>(job.regions.size()),
+                               regularVolume * edge * edge * edge});
     }
     return job;
 }
@@ -83,7 +83,7 @@ TetMesh meshOf(const TetGenResult& result, const Surfaces& surfaces)
     for (std::size_t p = 0; p < result.points.size(); ++p) {
         const auto& q = result.points[p];
         // Those of the surfaces are what they were, to the bit.
-        mesh.points.push_back(p < surfaces.points.size() ? surfaces.points[p] : Vec3(q[0], q[1], q[2]) / perMetre);
+        mesh.points.push_back(p < surfaces.points.size() ? surfaces.points[p] : Vec3(q[0], q[1], q[2]) / units::mm);
     }
     for (std::size_t t = 0; t < result.tets.size(); ++t) {
         // What has no seed lies outside, in a hollow of the body: TetGen fills that too.

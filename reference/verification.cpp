@@ -51,7 +51,7 @@ VerificationRow rowOf(const char* problem, const char* quantity, double ours, do
 }
 
 // Points all over an eighth of a ball or box, off the elements' corners.
-std::vector<Vec3> samples(double side)
+std::vector<Vec3> sampled(double side)
 {
     std::vector<Vec3> points;
     volume::forEachIndex(Index3(0), Index3(10),
@@ -145,7 +145,7 @@ Rows pointForce(Fineness fineness)
         }
         return u;
     };
-    const std::vector<Vec3> points = samples(side);
+    const std::vector<Vec3> points = sampled(side);
     const std::vector<int> cells = fineness == Fineness::quick ? std::vector<int>{2, 4} : std::vector<int>{2, 4, 8};
     Rows rows;
     for (const Elements elements : bothElements) {
@@ -176,7 +176,7 @@ Rows inclusion(Fineness fineness)
     constexpr double ratio = 10.0;
     const studies::Inclusion problem{ball, poisson, ratio, ratio, 0.01};
     const auto exact = [&](Vec3 x) { return studies::inclusionDisplacement(problem, x); };
-    const std::vector<Vec3> points = samples(side);
+    const std::vector<Vec3> points = sampled(side);
     const int cells = fineness == Fineness::quick ? 3 : 5;
     Rows rows;
     for (const Elements elements : bothElements) {

@@ -18,7 +18,7 @@ namespace {
 using base::marked;
 
 constexpr double turnStep = 2.0 / 180.0 * 3.14159265358979323846;  // of an arrow key [rad]
-constexpr double probeStep = 1e-3, pressStep = 0.5e-3;             // of the probe [m]
+constexpr double probeStep = 1e-3, keyPressStep = 0.5e-3;          // of the probe [m]
 constexpr double opacityStep = 1.25;
 constexpr double tick = 1e-3, frame = 1.0 / 30, leap = 1.0;  // steps through a record [s]
 
@@ -236,7 +236,7 @@ const std::vector<Controls::Key> Controls::keys{
      marked("press it in by 0.5 mm, take it back; with Shift tilt it by 2 degrees"),
      {{GLFW_KEY_PAGE_DOWN, 0, 1, 0, true}, {GLFW_KEY_PAGE_UP, 0, -1, 0, true}},
      [](Controls& c, const Press& p) {
-         p.shift ? c.moveProbe({.tilt = p.sign * turnStep}) : c.moveProbe({.press = p.sign * pressStep});
+         p.shift ? c.moveProbe({.tilt = p.sign * turnStep}) : c.moveProbe({.press = p.sign * keyPressStep});
      },
      false,
      true},

@@ -26,7 +26,7 @@ using base::trn;
 
 constexpr double margin = 0.8;  // in fonts
 
-std::string millimetres(double metres)
+std::string millimetresText(double metres)
 {
     return std::isfinite(metres) ? said("{:.1Lf} mm", metres * 1e3) : std::string("-");
 }
@@ -90,13 +90,13 @@ void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::Stat
     const double distance = state.distance[s];
     const std::string name = spokenHere(text(scenery.structure[s])), when = contactWords(state, s);
     if (s == 0)
-        pen.pair(name + tr(" (target)") + when, distance <= 0 ? tr("INSIDE") : millimetres(distance), good);
+        pen.pair(name + tr(" (target)") + when, distance <= 0 ? tr("INSIDE") : millimetresText(distance), good);
     else if (distance <= 0)
-        pen.pair(name + tr("  TOUCHED"), millimetres(distance), red);
+        pen.pair(name + tr("  TOUCHED"), millimetresText(distance), red);
     else if (distance < scenery.warnDistance[s])
-        pen.pair(name + tr("  NEAR") + when, millimetres(distance), amber);
+        pen.pair(name + tr("  NEAR") + when, millimetresText(distance), amber);
     else
-        pen.pair(name + when, millimetres(distance), white);
+        pen.pair(name + when, millimetresText(distance), white);
 }
 
 void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, int lines, bool targetHidden)
@@ -116,7 +116,7 @@ void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::Sta
     for (std::size_t i = targetHidden ? 1 : 0; i < shown; ++i)
         if (i + 1 == shown && shown < count)
             pen.pair(said(trn("and {} more", "and {} more", count - i), count - i),
-                     said(tr("from {}"), millimetres(state.distance[order[i]])), grey);
+                     said(tr("from {}"), millimetresText(state.distance[order[i]])), grey);
         else
             drawDistance(pen, scenery, state, order[i]);
 }
@@ -143,7 +143,7 @@ void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::Stat
              known ? said(tr("tip in {}"), spokenHere(text(scenery.tissue[state.tissue].name))) : std::string(), white);
     if (state.aheadTissue > 0 && state.aheadTissue < scenery.tissues)
         pen.pair(said(tr("ahead: {}"), spokenHere(text(scenery.tissue[state.aheadTissue].name))),
-                 millimetres(state.aheadTissueDistance), grey);
+                 millimetresText(state.aheadTissueDistance), grey);
     if (state.cores > 0)
         pen.pair(said(tr("core {}: {:.0f} % target"), state.cores, 100 * state.coreTarget),
                  said(tr("{:.1Lf} mm of it"), state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);

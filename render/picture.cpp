@@ -1,5 +1,7 @@
 #include <render/picture.h>
 
+#include <base/units.h>
+
 #include <vtkCallbackCommand.h>
 #include <vtkCamera.h>
 #include <vtkCommand.h>
@@ -17,7 +19,7 @@
 namespace palpate::render {
 namespace {
 
-constexpr double mm = 1e3;
+using units::mm;
 
 // Box of the voxels that can be seen [m].
 std::pair<glm::dvec3, glm::dvec3> bodyBox(const Deformation& deformation)

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double affordable = 80e3;  // nodes in every frame: some milliseconds
 
-std::uint8_t byte(float fraction) noexcept
+std::uint8_t signedByte(float fraction) noexcept
 {
     return static_cast<std::uint8_t>(128.5F + 127.0F * fraction);  // over zero: it is rounded
 }
@@ -56,7 +56,8 @@ void sample(const Deformation& deformation, ShiftField& out)
     out.largest = largest;
     const float scale = largest > 0 ? 1 / largest : 0;
     for (std::size_t i = 0; i < nodes; ++i)
-        out.texels[i] = {byte(scale * out.shifts[i].x), byte(scale * out.shifts[i].y), byte(scale * out.shifts[i].z), 255};
+        out.texels[i] = {signedByte(scale * out.shifts[i].x), signedByte(scale * out.shifts[i].y),
+                         signedByte(scale * out.shifts[i].z), 255};
 }
 
 }  // namespace palpate::render

@@ -18,18 +18,13 @@
 namespace palpate::render {
 namespace {
 
-constexpr Colour white{1, 1, 1}, farTool{0.16, 0.55, 0.65};
+constexpr Colour pureWhite{1, 1, 1}, farTool{0.16, 0.55, 0.65};
 using Pixel = std::array<std::uint8_t, 3>;
 constexpr Pixel airPixel{12, 13, 18};
 
-std::uint8_t byte(float value)
-{
-    return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
-}
-
 Pixel pixelOf(const std::array<float, 3>& colour)
 {
-    return {byte(colour[0]), byte(colour[1]), byte(colour[2])};
+    return {byteOf(colour[0]), byteOf(colour[1]), byteOf(colour[2])};
 }
 
 // What a tissue is drawn with: its own part, and how much of the image's grey comes to it.
@@ -224,7 +219,7 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
                 canvas.line(part->first, part->second, (away ? 0.6 : 1.0) * width, away ? farTool : toolColour);
         }
     if (inside(pixel(tip), area_))
-        canvas.ring(pixel(tip), width / 2 + 2, 2, white);
+        canvas.ring(pixel(tip), width / 2 + 2, 2, pureWhite);
 }
 
 void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channel::State& state, glm::dvec3 aim,
@@ -260,7 +255,7 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
     const double middleX = (left + right) / 2, middleY = (bottom + top) / 2;
     const auto letter = [&](Point2 at, const std::string& words) {
         canvas.rectangle({at[0] - 0.8 * font, at[1] - 2}, {1.6 * font, 1.3 * font}, {0, 0, 0}, 0.55);
-        canvas.text(at, words, font, white, Align::centre, true);
+        canvas.text(at, words, font, pureWhite, Align::centre, true);
     };
     letter({right - font, middleY}, side(frame_.right));
     letter({left + font, middleY}, side(-frame_.right));
@@ -268,14 +263,14 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
     letter({middleX, bottom + 4}, side(-frame_.up));
     const double bar = 0.01 * pixelsPerMetre(frame_, area_);
     canvas.rectangle({left + 0.5 * font, bottom + 2}, {std::max(bar, 3.2 * font) + font, 1.9 * font}, {0, 0, 0}, 0.55);
-    canvas.rectangle({left + font, bottom + 0.35 * font}, {bar, 3}, white);
-    canvas.text({left + font, bottom + 0.6 * font}, "10 mm", 0.9 * font, white);
+    canvas.rectangle({left + font, bottom + 0.35 * font}, {bar, 3}, pureWhite);
+    canvas.text({left + font, bottom + 0.6 * font}, "10 mm", 0.9 * font, pureWhite);
     if (anatomy.imageShown()) {
         const std::string name = anatomy.grey.windowName(), range = anatomy.grey.windowRange();
         const double wide = 0.46 * font * static_cast<double>(std::max(name.size(), range.size())) + font;
         canvas.rectangle({right - wide - 0.2 * font, bottom + 2}, {wide, 2.5 * font}, {0, 0, 0}, 0.55);
-        canvas.text({right - 0.7 * font, bottom + 1.5 * font}, name, 0.9 * font, white, Align::right);
-        canvas.text({right - 0.7 * font, bottom + 0.4 * font}, range, 0.9 * font, white, Align::right);
+        canvas.text({right - 0.7 * font, bottom + 1.5 * font}, name, 0.9 * font, pureWhite, Align::right);
+        canvas.text({right - 0.7 * font, bottom + 0.4 * font}, range, 0.9 * font, pureWhite, Align::right);
     }
 }
 

@@ -1,5 +1,6 @@
 #include <render/tool_picture.h>
 
+#include <base/units.h>
 #include <channel/needle_shape.h>
 
 #include <vtkAppendPolyData.h>
@@ -23,7 +24,7 @@
 namespace palpate::render {
 namespace {
 
-constexpr double mm = 1e3;
+using units::mm;
 constexpr int facets = 24;
 
 void paint(vtkActor& actor, const std::array<double, 3>& colour)

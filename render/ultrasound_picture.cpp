@@ -2,6 +2,7 @@
 
 #include <base/said.h>
 
+#include <base/units.h>
 #include <render/screen_image.h>
 
 #include <base/outputs.h>
@@ -21,7 +22,7 @@
 namespace palpate::render {
 namespace {
 
-constexpr double mm = 1e3;
+using units::mm;
 constexpr std::size_t maxCalipers = 4;
 constexpr Colour caliperColour{0.2, 0.9, 1.0}, guideColour{0.3, 0.95, 0.4};
 

@@ -21,7 +21,7 @@ constexpr std::array<Standard, 3> standards{
     {{{1, 0, 0}, {0, -1, 0}, {0, 0, -1}}, {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}, {{1, 0, 0}, {0, 0, 1}, {0, -1, 0}}}};
 
 // `v` without its part along the unit vector `n`.
-glm::dvec3 across(glm::dvec3 v, glm::dvec3 n)
+glm::dvec3 acrossOf(glm::dvec3 v, glm::dvec3 n)
 {
     return v - glm::dot(v, n) * n;
 }
@@ -48,8 +48,8 @@ ViewFrame viewFrame(const channel::Scenery& scenery)
             chosen = &s;
             break;
         }
-    frame.towards = glm::normalize(across(chosen->towards, line));
-    frame.up = glm::normalize(across(chosen->up, frame.towards));
+    frame.towards = glm::normalize(acrossOf(chosen->towards, line));
+    frame.up = glm::normalize(acrossOf(chosen->up, frame.towards));
     frame.right = glm::cross(frame.up, frame.towards);
     return frame;
 }
@@ -69,12 +69,12 @@ ViewFrame through(const ViewFrame& frame, glm::dvec3 tip, glm::dvec3 axis)
 {
     ViewFrame turned = frame;
     const double length = glm::length(axis);
-    const glm::dvec3 towards = length > 0 ? across(frame.towards, axis / length) : frame.towards;
+    const glm::dvec3 towards = length > 0 ? acrossOf(frame.towards, axis / length) : frame.towards;
     // Nearly end on there is no such plane: keep the planned one.
     constexpr double least = 0.3;
     if (glm::length(towards) > least) {
         turned.towards = glm::normalize(towards);
-        turned.up = glm::normalize(across(frame.up, turned.towards));
+        turned.up = glm::normalize(acrossOf(frame.up, turned.towards));
         turned.right = glm::cross(turned.up, turned.towards);
     }
     turned.centre += glm::dot(tip - turned.centre, turned.towards) * turned.towards;

@@ -1,5 +1,6 @@
 #include <render/volume_picture.h>
 
+#include <base/units.h>
 #include <render/ray_shader.h>
 
 #include <vtkCallbackCommand.h>
@@ -22,12 +23,16 @@
 namespace palpate::render {
 namespace {
 
-constexpr double mm = 1e3;
+using units::mm;
 
-std::uint8_t byte(float value) noexcept
+}  // namespace
+
+std::uint8_t byteOf(float part) noexcept
 {
-    return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(value, 0.0F, 1.0F)));
+    return static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(part, 0.0F, 1.0F)));
 }
+
+namespace {
 
 // Binomial filter of five along one axis: the steps of voxels would show in the light as rings.
 void blur(std::vector<float>& values, std::size_t size, std::size_t stride)
@@ -137,7 +142,7 @@ void VolumePicture::computeLight(const channel::Scenery& scenery, const Deformat
                 };
                 const glm::vec3 step(along(x, size[0] - 1, stride[0]), along(y, size[1] - 1, stride[1]),
                                      along(z, size[2] - 1, stride[2]));
-                light_[i] = byte(lambert(step, light));
+                light_[i] = byteOf(lambert(step, light));
             }
 }
 
@@ -155,7 +160,7 @@ void VolumePicture::paint(const channel::Scenery& scenery, const Deformation& de
         const float light = static_cast<float>(light_[i]) / 255;
         const auto& colour = row == 0 ? fringe : shell ? shellColour : scenery.tissue[row].colour;
         const float opacity = row == 0 ? 0 : std::max(factor[row] * scenery.tissue[row].opacity, shell ? shellOpacity : 0);
-        pixels[i] = {byte(light * colour[0]), byte(light * colour[1]), byte(light * colour[2]), byte(opacity)};
+        pixels[i] = {byteOf(light * colour[0]), byteOf(light * colour[1]), byteOf(light * colour[2]), byteOf(opacity)};
     }
     image_->Modified();
 }

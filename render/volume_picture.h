@@ -28,6 +28,9 @@ enum class Quality : std::uint8_t { moving, still };
 /// How the warning distances of vital structures are drawn.
 inline constexpr std::array<float, 3> shellColour{1.0F, 0.72F, 0.10F};
 
+/// Of a part of the whole, cut to [0, 1] and rounded.
+std::uint8_t byteOf(float part) noexcept;
+
 /// The body, ray cast, cut open along a plane. The volume at rest is uploaded once; the ray caster looks every sample up
 /// where it lies at rest, so that a frame costs the same however much of the body moves and however fine it is. World
 /// coordinates of everything drawn in 3-D are millimetres.

@@ -39,7 +39,7 @@ namespace {
 constexpr std::size_t barWidth = 30;
 constexpr double fileBlock = 4096;  // what a small file takes on a disk
 
-struct Options {
+struct SweepArguments {
     std::string plan, folder, report, json, work, shard, cases;
     std::vector<std::string> merged;  // folders of shards
     SlurmSettings slurm;
@@ -108,7 +108,7 @@ void listAll()
 }
 
 // What a case costs, by some that are run: the first one also builds what all share.
-void dryRun(const Options& o)
+void dryRun(const SweepArguments& o)
 {
     const auto [text, origin] = o.plan.empty() ? planText((fs::path(o.folder) / "plan.toml").string()) : planText(o.plan);
     const bool own = o.plan.empty();
@@ -148,13 +148,13 @@ void dryRun(const Options& o)
     }
 }
 
-bool isPart(const Options& o)
+bool isPart(const SweepArguments& o)
 {
     return !o.shard.empty() || !o.cases.empty();
 }
 
 // A part of a sweep works in a folder of its own.
-fs::path placeOf(const Options& o)
+fs::path placeOf(const SweepArguments& o)
 {
     constexpr std::size_t any = std::size_t{1} << 40U;  // the plan is not known yet
     return !o.shard.empty()   ? shardFolder(o.folder, o.shard)
@@ -162,7 +162,7 @@ fs::path placeOf(const Options& o)
                               : fs::path(o.folder);
 }
 
-CasesWanted wantedOf(const Options& o, const SweepPlan& plan)
+CasesWanted wantedOf(const SweepArguments& o, const SweepPlan& plan)
 {
     CasesWanted wanted{{}, o.retry, o.anyBuild};
     wanted.cases = !o.shard.empty()   ? casesOfShard(o.shard, plan.cases())
@@ -171,7 +171,7 @@ CasesWanted wantedOf(const Options& o, const SweepPlan& plan)
     return wanted;
 }
 
-SlurmSettings merged(const Options& o, const SweepPlan& plan)
+SlurmSettings merged(const SweepArguments& o, const SweepPlan& plan)
 {
     SlurmSettings s = plan.slurm;
     for (const auto member :
@@ -183,7 +183,7 @@ SlurmSettings merged(const Options& o, const SweepPlan& plan)
     return s;
 }
 
-PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std::size_t>& cases, std::size_t all)
+PoolResult runCases(const SweepArguments& o, SweepFolder& folder, const std::vector<std::size_t>& cases, std::size_t all)
 {
     command::Progress progress;
     const auto begin = Clock::now();
@@ -209,8 +209,8 @@ PoolResult runCases(const Options& o, SweepFolder& folder, const std::vector<std
 }
 
 // Table and figures of what there is; which of the wanted cases are not done.
-std::vector<std::size_t> conclude(const Options& o, const SweepFolder& folder, const PoolResult& run, std::size_t begun,
-                                  const std::vector<std::size_t>& wanted)
+std::vector<std::size_t> conclude(const SweepArguments& o, const SweepFolder& folder, const PoolResult& run,
+                                  std::size_t begun, const std::vector<std::size_t>& wanted)
 {
     const auto rows = folder.rows();
     const SweepTable table = writeTables(folder, rows);
@@ -244,7 +244,7 @@ std::vector<std::size_t> conclude(const Options& o, const SweepFolder& folder, c
     return missing;
 }
 
-void run(const Options& o)
+void run(const SweepArguments& o)
 {
     base::checkOutput(o.json);
     heedSignals();
@@ -265,7 +265,7 @@ void run(const Options& o)
 }
 
 // One table of what shards have done, in their folders and in those that are named.
-void merge(const Options& o)
+void merge(const SweepArguments& o)
 {
     base::checkOutput(o.json);
     const std::vector<fs::path> from(o.merged.begin(), o.merged.end());
@@ -280,7 +280,7 @@ void merge(const Options& o)
     }
 }
 
-void report(const Options& o)
+void report(const SweepArguments& o)
 {
     const SweepFolder folder(o.report, "", false);
     const auto rows = folder.rows();
@@ -297,7 +297,7 @@ void report(const Options& o)
     }
 }
 
-void sweepCommand(const Options& o)
+void sweepCommand(const SweepArguments& o)
 {
     // Of each process one core; and processes are forked from one thread.
     const auto alone = oneThread();
@@ -322,7 +322,7 @@ void sweepCommand(const Options& o)
     }
 }
 
-void addParts(CLI::App& c, Options& o)
+void addParts(CLI::App& c, SweepArguments& o)
 {
     auto* shard = c.add_option("--shard", o.shard, "Run part K of N, in DIR/shards/K-of-N, whoever runs the others")
                       ->type_name("K/N");
@@ -347,7 +347,7 @@ void addParts(CLI::App& c, Options& o)
 
 void addSweep(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<SweepArguments>();
     auto* c = app.add_subcommand("sweep", "Many cases of a scene, on all cores or a cluster: a table, and a report");
     c->add_option(
         "PLAN", o->plan,

@@ -34,7 +34,7 @@ namespace {
 constexpr std::size_t usualTasks = 100;
 constexpr std::size_t maxTasks = 1000;  // of an array: what a cluster allows by default (MaxArraySize 1001)
 constexpr int maxLosses = 3;
-constexpr auto lookEvery = std::chrono::milliseconds(500);
+constexpr auto askEvery = std::chrono::milliseconds(500);
 constexpr auto settleTime = std::chrono::seconds(2);  // for files of another machine to be seen here
 constexpr int maxSilence = 600;                       // looks in a row that the controller may leave unanswered
 
@@ -230,7 +230,7 @@ bool runOnSlurm(SweepFolder& folder, const std::vector<std::size_t>& cases, cons
     std::vector<std::size_t> left = cases;
     cluster.submit(cases);
     while (!cluster.idle()) {
-        std::this_thread::sleep_for(lookEvery);
+        std::this_thread::sleep_for(askEvery);
         folder.lock().check();
         std::vector<std::size_t> again;
         for (const std::size_t i : cluster.look()) {

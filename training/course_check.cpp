@@ -20,10 +20,9 @@ namespace palpate::training {
 
 namespace {
 
-constexpr double tie = 1e-9;          // as in cusum()
 constexpr double negligible = 1e-12;  // chance
 
-// What a chain is at: the sessions that the gate looks at, a bit each, and the chart's value in units of `tie`.
+// What a chain is at: the sessions that the gate looks at, a bit each, and the chart's value in units of `cusumTie`.
 using Place = std::pair<std::uint64_t, std::int64_t>;
 using Chances = std::map<Place, double>;
 
@@ -40,15 +39,15 @@ struct Chain {
             return;
         }
         const double weight = sign * (met ? plan.successWeight() : plan.failureWeight());
-        double value = std::max(0.0, static_cast<double>(from.second) * tie + weight);
-        if (value >= limit - tie) {
+        double value = std::max(0.0, static_cast<double>(from.second) * cusumTie + weight);
+        if (value >= limit - cusumTie) {
             signals += chance;
             value = 0;
         }
         const std::uint64_t window = gate.of >= 64 ? ~0ULL : (1ULL << static_cast<unsigned>(gate.of)) - 1;
         const std::uint64_t recent = ((from.first << 1U) | (met ? 1U : 0U)) & window;
         if (std::popcount(recent) < gate.pass) {
-            next[{recent, std::llround(value / tie)}] += chance;
+            next[{recent, std::llround(value / cusumTie)}] += chance;
         }
     }
 };

@@ -12,7 +12,6 @@ namespace palpate::training {
 
 namespace {
 
-constexpr double tie = 1e-9;             // sums of weights that differ by less are the same
 constexpr std::size_t maxStates = 2000;  // of a chain; finer values are merged beyond
 
 }  // namespace
@@ -46,8 +45,8 @@ std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& fa
         CusumPoint p;
         p.alarm = std::max(0.0, alarm + weight);
         p.learning = std::max(0.0, learning - weight);
-        p.alarmed = p.alarm >= plan.alarmLimit() - tie;
-        p.proficient = p.learning >= plan.learningLimit() - tie;
+        p.alarmed = p.alarm >= plan.alarmLimit() - cusumTie;
+        p.proficient = p.learning >= plan.learningLimit() - cusumTie;
         alarm = p.alarmed ? 0 : p.alarm;
         learning = p.proficient ? 0 : p.learning;
         points.push_back(p);
@@ -58,7 +57,7 @@ std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& fa
 double averageRunLength(const CusumPlan& plan, CusumChart chart, double failureRate)
 {
     const double sign = chart == CusumChart::alarm ? 1 : -1;
-    const double limit = (chart == CusumChart::alarm ? plan.alarmLimit() : plan.learningLimit()) - tie;
+    const double limit = (chart == CusumChart::alarm ? plan.alarmLimit() : plan.learningLimit()) - cusumTie;
     const double steps[2] = {sign * plan.failureWeight(), sign * plan.successWeight()};
     const double chances[2] = {failureRate, 1 - failureRate};
 

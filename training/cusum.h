@@ -5,6 +5,9 @@
 
 namespace palpate::training {
 
+/// Sums of weights that differ by less are the same.
+inline constexpr double cusumTie = 1e-9;
+
 /// What a CUSUM chart of failures tells apart, and how sure it is.
 ///
 /// The weight of a session is the logarithm of its likelihood ratio: a failure adds ln(p1/p0), a success adds

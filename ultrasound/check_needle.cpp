@@ -1,5 +1,7 @@
 #include <ultrasound/check_bodies.h>
 
+#include <base/units.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +12,7 @@ namespace palpate::ultrasound {
 
 namespace {
 
-constexpr double degree = 3.14159265358979323846 / 180, mm = 1e3;
+using units::degree, units::mm;
 
 // The brightest of the upper side of a shaft that goes through (0, 14 mm) of the picture at `angle` to the face [dB].
 double shaftEcho(CheckBench& bench, double angle)

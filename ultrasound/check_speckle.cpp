@@ -1,5 +1,7 @@
 #include <ultrasound/check_bodies.h>
 
+#include <base/units.h>
+
 #include <fmt/format.h>
 
 #include <array>
@@ -10,7 +12,7 @@ namespace palpate::ultrasound {
 
 namespace {
 
-constexpr double mm = 1e3;
+using units::mm;
 
 CheckBench plain(const SoundOf& soundOf, const char* tissue)
 {

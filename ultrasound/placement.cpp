@@ -1,5 +1,6 @@
 #include <ultrasound/placement.h>
 
+#include <base/units.h>
 #include <channel/deformation.h>
 
 #include <glm/geometric.hpp>
@@ -15,7 +16,7 @@ namespace palpate::ultrasound {
 
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
+using units::degree;
 constexpr double step = 0.25e-3;     // of a search for the skin [m]
 constexpr double standOff = 0.3e-3;  // gel between face and skin where they are nearest [m]
 

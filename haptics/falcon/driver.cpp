@@ -10,8 +10,8 @@ namespace palpate::falcon {
 
 namespace {
 
-constexpr int priority = 61;           // above the servo thread: it works for microseconds and waits for the wire
-constexpr double betweenLooks = 0.25;  // for a Falcon that is to come back [s]
+constexpr int driverPriority = 61;     // above the servo thread: it works for microseconds and waits for the wire
+constexpr double betweenTries = 0.25;  // for a Falcon that is to come back [s]
 
 bool torqueIn(const Command& command) noexcept
 {
@@ -67,7 +67,7 @@ LinkCounts Driver::counts() const noexcept
 void Driver::run() noexcept
 {
     sched_param parameters{};
-    parameters.sched_priority = priority;
+    parameters.sched_priority = driverPriority;
     sched_setscheduler(0, SCHED_FIFO, &parameters);
     prctl(PR_SET_TIMERSLACK, 1UL);
     try {
@@ -138,7 +138,7 @@ bool Driver::recover()
             if (!(options_.onUnplug == OnUnplug::wait && comesAndGoes)) {
                 throw;
             }
-            wire_->sleep(betweenLooks);
+            wire_->sleep(betweenTries);
         }
     }
     return false;

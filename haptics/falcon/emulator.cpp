@@ -12,12 +12,12 @@ namespace palpate::falcon {
 
 namespace {
 
-constexpr double step = 0.25e-3;                             // of the arm [s]
-constexpr double thinking = 40e-6;                           // of the processor, between a packet and its answer [s]
-constexpr double bootTime = 50e-3;                           // [s]
-constexpr double bits = 10.0;                                // of a byte on the serial line
-constexpr std::size_t roomIn = 384;                          // of the bridge: what nobody fetches is lost beyond it [bytes]
-constexpr Vec3 out(0.0, 0.0, 0.1755), held(0.0, 0.0, 0.15);  // where an obedient hand homes, and then waits [m]
+constexpr double step = 0.25e-3;        // of the arm [s]
+constexpr double thinking = 40e-6;      // of the processor, between a packet and its answer [s]
+constexpr double emulatedBoot = 50e-3;  // [s]
+constexpr double bits = 10.0;           // of a byte on the serial line
+constexpr std::size_t roomIn = 384;     // of the bridge: what nobody fetches is lost beyond it [bytes]
+constexpr Vec3 out(0.0, 0.0, 0.1755), restingPlace(0.0, 0.0, 0.15);  // where an obedient hand homes, and then waits [m]
 constexpr std::uint8_t modemStatus = 0x01, lineStatus = 0x60;
 // A hand that holds a grip: stiff, and damped by its own flesh.
 constexpr haptics::Grip firm{0.1, 8.0, 400.0};
@@ -216,7 +216,7 @@ void Emulator::hearLoader(std::uint8_t byte)
         reply(static_cast<std::uint8_t>(wrong ? byte ^ 0x10 : byte), thinking);
         if (image_ == firmware_) {
             state_ = State::booting;
-            booted_ = time_ + bootTime;
+            booted_ = time_ + emulatedBoot;
         }
     }
 }
@@ -247,7 +247,7 @@ void Emulator::moveHand(double seconds)
 {
     Vec3 wish = hand.goal;
     if (hand.obeys && running() && homed_ != allHomed) {
-        wish = command_.home ? out : held;
+        wish = command_.home ? out : restingPlace;
     }
     goal_ += haptics::bounded(wish - goal_, hand.speed * seconds);
     const double phase = 2.0 * std::numbers::pi * 9.0 * lived_;

@@ -30,9 +30,9 @@ struct Guardian::Pulse {
 
 namespace {
 
-constexpr int look = 20;           // how often the other process looks [ms]
-constexpr unsigned sendTime = 50;  // [ms]
-constexpr int priority = 62;       // above the servo thread
+constexpr int look = 20;              // how often the other process looks [ms]
+constexpr unsigned sendTime = 50;     // [ms]
+constexpr int guardianPriority = 62;  // above the servo thread
 constexpr char another = 'F', none = 'N';
 constexpr std::array crashes{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT};
 
@@ -182,7 +182,7 @@ void Guardian::watch(int socket) noexcept
     setsid();  // Ctrl-C and Ctrl-Z are not for it
     prctl(PR_SET_NAME, "palpate-guard");
     sched_param parameters{};
-    parameters.sched_priority = priority;
+    parameters.sched_priority = guardianPriority;
     sched_setscheduler(0, SCHED_FIFO, &parameters);
     // What its parent has open would stay open for as long as it lives.
     dup2(socket, 0);

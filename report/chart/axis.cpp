@@ -14,7 +14,7 @@ namespace palpate::report {
 
 namespace {
 
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr double noTick = std::numeric_limits<double>::quiet_NaN();
 
 // Room beside the outermost values, so that no marker is cut.
 constexpr double linearRoom = 0.05;  // of what the values span
@@ -75,7 +75,7 @@ std::size_t blank(ChartSeries& series, bool logX, bool logY)
     std::size_t count = 0;
     for (std::size_t i = 0; i < series.x.size(); ++i) {
         if (!drawable(series.x[i], logX) || !drawable(series.y[i], logY)) {
-            series.x[i] = series.y[i] = nothing;
+            series.x[i] = series.y[i] = noTick;
             ++count;
         }
     }

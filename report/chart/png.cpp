@@ -28,10 +28,10 @@ constexpr std::array<const char*, 7> colours{"#0072B2", "#D55E00", "#009E73", "#
 constexpr std::array<int, 12> markers{7, 5, 9, 13, 11, 15, 6, 4, 8, 12, 10, 14};
 constexpr std::size_t markersOnLine = 14;
 
-constexpr int left = 130, right = 24, top = 66, bottom = 96;  // around the plot [px]
-constexpr int plotWidth = 1100, plotHeight = 720;             // [px]
-constexpr int letter = 11, noteLetter = 10, noteLine = 26;    // typical sizes of the fonts below [px]
-constexpr std::size_t legendRows = 22;                        // as many as fit beside the plot
+constexpr int left = 130, afterPlot = 24, top = 66, bottom = 96;  // around the plot [px]
+constexpr int plotColumns = 1100, plotRows = 720;                 // [px]
+constexpr int letter = 11, noteLetter = 10, noteLine = 26;        // typical sizes of the fonts below [px]
+constexpr std::size_t legendRows = 22;                            // as many as fit beside the plot
 constexpr std::size_t longestName = 60, longestTitle = 84, longestLabel = 70, longestPointLabel = 30;
 
 // Text as UTF-8 on one line, at most `most` letters.
@@ -174,10 +174,10 @@ std::string dataCommands(const Chart& chart)
 std::string script(const DrawableChart& drawn)
 {
     const Chart& c = drawn.chart;
-    const int width = left + plotWidth + right + legendWidth(c);
-    const auto note = wrapped(c.note, static_cast<std::size_t>((width - 2 * right) / noteLetter));
+    const int width = left + plotColumns + afterPlot + legendWidth(c);
+    const auto note = wrapped(c.note, static_cast<std::size_t>((width - 2 * afterPlot) / noteLetter));
     const int noteHeight = note.empty() ? 0 : 12 + noteLine * static_cast<int>(note.size());
-    const int height = top + plotHeight + bottom + noteHeight;
+    const int height = top + plotRows + bottom + noteHeight;
     const auto across = [&](int x) { return static_cast<double>(x) / width; };
     const auto up = [&](int y) { return static_cast<double>(y) / height; };
 
@@ -185,19 +185,19 @@ std::string script(const DrawableChart& drawn)
         "set encoding utf8\n"
         "set terminal pngcairo noenhanced color size {},{} font 'Sans,15' background rgb 'white'\n"
         "set margins at screen {}, at screen {}, at screen {}, at screen {}\n",
-        width, height, across(left), across(left + plotWidth), up(bottom + noteHeight),
-        up(bottom + noteHeight + plotHeight));
+        width, height, across(left), across(left + plotColumns), up(bottom + noteHeight),
+        up(bottom + noteHeight + plotRows));
     out +=
         "set border 3 lw 1.5 lc rgb '#333333'\nset tics nomirror out textcolor rgb '#222222'\n"
         "set grid xtics ytics lw 1 lt 1 lc rgb '#DDDDDD'\n"
         "set samples 2\n";
     out +=
         fmt::format("set key at screen {}, screen {} left top Left reverse noinvert samplen 1.6 spacing 1.35 maxrows {}\n",
-                    across(left + plotWidth + right), up(bottom + noteHeight + plotHeight), legendRows);
+                    across(left + plotColumns + afterPlot), up(bottom + noteHeight + plotRows), legendRows);
     out += fmt::format("set title {} font 'Sans Bold,17' offset 0,0.2\n", quoted(c.title, longestTitle));
     for (std::size_t i = 0; i < note.size(); ++i) {
         out += fmt::format("set label {} at screen {}, screen {} left font 'Sans,13' textcolor rgb '#444444'\n",
-                           quoted(note[i], note[i].size()), across(right),
+                           quoted(note[i], note[i].size()), across(afterPlot),
                            up(noteLine * static_cast<int>(note.size() - i) - 6));
     }
     return out + axisCommands('x', c.xLabel, c.logX, drawn.x) + axisCommands('y', c.yLabel, c.logY, drawn.y) +

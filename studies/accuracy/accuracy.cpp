@@ -19,7 +19,6 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t maxNodes = 4U << 20;
 constexpr double speed = 20e-3;  // [m/s]
 
 // Windows of level elastic. Those with a name of datasets::elasticSettings() are these settings.
@@ -58,7 +57,7 @@ public:
             body_.reset();  // two at a time may be more than the memory holds
             spacing_ = spacing;
             body_ = std::make_shared<const TrialBody>(
-                trialBody(scene_.tissue, scene_.surface, spacing, scene_.poissonCap, maxNodes));
+                trialBody(scene_.tissue, scene_.surface, spacing, scene_.poissonCap, maxTrialNodes));
         }
         return body_;
     }

@@ -36,7 +36,7 @@ namespace {
 
 constexpr double quickSeconds = 20.0;  // per case of --quick
 
-struct Options {
+struct AccuracyArguments {
     std::vector<std::string> scenes, volumes, methods;
     std::vector<std::string> laws{"linear", "neo-hookean"};
     std::string folder, references, json;
@@ -75,7 +75,7 @@ std::string shortName(const std::string& what)
     return std::filesystem::path(what).stem().string();
 }
 
-Solved solved(const std::string& what, const Options& o, command::Progress& progress)
+Solved solved(const std::string& what, const AccuracyArguments& o, command::Progress& progress)
 {
     progress.show(what + ": volume");
     session::SceneChanges changes;
@@ -102,7 +102,7 @@ Solved solved(const std::string& what, const Options& o, command::Progress& prog
 }
 
 // What is run of all methods, in their order. Throws for a name that neither they nor an installed rival has.
-std::vector<Baseline> chosen(std::vector<Baseline> all, const Options& o)
+std::vector<Baseline> chosen(std::vector<Baseline> all, const AccuracyArguments& o)
 {
     std::set<std::string> names, taken;
     for (const Baseline& b : all) {
@@ -127,7 +127,7 @@ std::vector<Baseline> chosen(std::vector<Baseline> all, const Options& o)
     return all;
 }
 
-std::vector<Rival> rivalsOf(const Options& o)
+std::vector<Rival> rivalsOf(const AccuracyArguments& o)
 {
     std::vector<double> spacings;
     for (const double mm : o.rivalSpacings) {
@@ -145,13 +145,13 @@ std::vector<Rival> rivalsOf(const Options& o)
     return rivals;
 }
 
-bool asked(const Rival& rival, const Options& o)
+bool asked(const Rival& rival, const AccuracyArguments& o)
 {
     return std::ranges::any_of(o.rivals, [&](const std::string& text) { return rivalOf(text, {}).name == rival.name; });
 }
 
 // Those that were asked for, and those that are installed: without --quick all, but for the names of the former.
-std::vector<Rival> allRivals(const Options& o)
+std::vector<Rival> allRivals(const AccuracyArguments& o)
 {
     std::vector<Rival> rivals = rivalsOf(o);
     for (Rival& rival : installedRivals()) {
@@ -164,7 +164,7 @@ std::vector<Rival> allRivals(const Options& o)
 }
 
 // Where palpate-mesh is installed: asked for by name, or all methods without --quick.
-void addConforming(const AccuracySubject& subject, const Options& o, std::vector<Baseline>& methods)
+void addConforming(const AccuracySubject& subject, const AccuracyArguments& o, std::vector<Baseline>& methods)
 {
     const std::filesystem::path mesher = ourProgram("palpate-mesh");
     const bool wanted = std::ranges::find(o.methods, "tets_conforming") != o.methods.end();
@@ -173,7 +173,7 @@ void addConforming(const AccuracySubject& subject, const Options& o, std::vector
     }
 }
 
-std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, const Options& o)
+std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, const AccuracyArguments& o)
 {
     std::vector<Baseline> methods = accuracyMethods(s.subject);
     addConforming(s.subject, o, methods);
@@ -201,7 +201,7 @@ std::string caseName(const std::string& scene, const Baseline& method)
     return fmt::format("{}: {}{}{}", scene, method.method, method.setting.empty() ? "" : ", ", method.setting);
 }
 
-AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* const> references, const Options& o)
+AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* const> references, const AccuracyArguments& o)
 {
     if (what.rival == nullptr) {
         return runAccuracy(what.method, s.subject, references, o.maxSeconds);
@@ -219,7 +219,7 @@ AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* co
 
 // Runs a case against those references that the log does not have, and logs it. Returns how many. A rival that has failed
 // may have been mended.
-std::size_t runMissing(const Solved& s, const Case& what, const Options& o, AccuracyLog& log)
+std::size_t runMissing(const Solved& s, const Case& what, const AccuracyArguments& o, AccuracyLog& log)
 {
     std::vector<const SolvedReference*> missing;
     std::vector<const Reference*> references;
@@ -267,7 +267,8 @@ void addScene(const Solved& s, const std::vector<Case>& cases, const AccuracyLog
     }
 }
 
-std::vector<Solved> solveAll(const Options& o, const std::vector<std::string>& subjects, command::Progress& progress)
+std::vector<Solved> solveAll(const AccuracyArguments& o, const std::vector<std::string>& subjects,
+                             command::Progress& progress)
 {
     std::vector<Solved> all;
     for (const std::string& what : subjects) {
@@ -284,7 +285,7 @@ std::vector<Solved> solveAll(const Options& o, const std::vector<std::string>& s
     return all;
 }
 
-json runAll(const Options& o, const std::vector<std::string>& subjects)
+json runAll(const AccuracyArguments& o, const std::vector<std::string>& subjects)
 {
     const std::vector<Rival> rivals = allRivals(o);
     command::Progress progress;
@@ -318,7 +319,7 @@ json runAll(const Options& o, const std::vector<std::string>& subjects)
 }
 
 // A rival that failed is in the table with its reason and spoils nothing else; but --rival asked for it.
-void checkRivals(const json& figures, const Options& o)
+void checkRivals(const json& figures, const AccuracyArguments& o)
 {
     std::set<std::string> names, failures;  // laws of one run share their failures
     for (const Rival& rival : rivalsOf(o)) {
@@ -336,7 +337,7 @@ void checkRivals(const json& figures, const Options& o)
     }
 }
 
-void checkLaws(const Options& o)
+void checkLaws(const AccuracyArguments& o)
 {
     if (o.laws.empty()) {
         throw std::runtime_error(fmt::format("--law: name one of {}, or more", fmt::join(volume::lawNames, ", ")));
@@ -349,7 +350,7 @@ void checkLaws(const Options& o)
     }
 }
 
-void accuracyCommand(Options o)
+void accuracyCommand(AccuracyArguments o)
 {
     base::checkOutput(o.json);
     base::checkOutputFolder(o.folder);
@@ -392,7 +393,7 @@ void accuracyCommand(Options o)
 
 void addAccuracy(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<AccuracyArguments>();
     auto* accuracy = app.add_subcommand(
         "accuracy", "Charts error against time per tick: Palpate, and what others would use, against finite elements");
     accuracy->add_option("-o,--output", o->folder,

@@ -152,7 +152,7 @@ void printCase(const json& s)
     row("held", heldEntry(s), nullptr);
 }
 
-void print(const json& figures)
+void printDeep(const json& figures)
 {
     fmt::print("{:<29} {:<8} {:<12} {:^22} {:^22} {:>8} {:>13}\n", "", "", "", "way in", "way out", "pull", "us a tick");
     fmt::print("{:<29} {:<8} {:<12} {:>7} {:>7} {:>6} {:>7} {:>7} {:>6} {:>8} {:>6} {:>6}\n", "case", "setting", "depth",
@@ -226,7 +226,7 @@ void deepCommand(const DeepCommand& c)
 {
     const json figures = runAll(c);
     if (c.json != "-") {
-        print(figures);
+        printDeep(figures);
     }
     if (!c.folder.empty()) {
         const auto pictures = writeDeepFolder(c.folder, figures);

@@ -28,12 +28,12 @@ constexpr std::array<Panel, 3> panels{{{"touch", "first touch", "in", true, 0.0,
                                        {"press", "pressed", "in", false, 0.0, 2.1},
                                        {"retreat", "drawn back", "out", false, 0.0, 2.1}}};
 
-std::string caseOf(const json& entry)
+std::string nameOfCase(const json& entry)
 {
     return entry.at("scene").get<std::string>() + ", " + entry.at("tool").get<std::string>();
 }
 
-std::vector<std::string> valuesOf(const json& entries, const auto& value)
+std::vector<std::string> differentValues(const json& entries, const auto& value)
 {
     std::vector<std::string> out;
     for (const json& e : entries) {
@@ -51,7 +51,7 @@ std::map<double, std::vector<double>> errorsOf(const json& figures, const std::s
     std::map<double, std::vector<double>> out;
     for (const json& e : figures.at("depth")) {
         const double radii = e.at("depth_radii");
-        if (caseOf(e) == what && e.at("setting") == setting && e.at("way") == panel.way && radii >= panel.least &&
+        if (nameOfCase(e) == what && e.at("setting") == setting && e.at("way") == panel.way && radii >= panel.least &&
             radii <= panel.most) {
             out[radii].push_back(std::abs(e.at("error_pct").get<double>()));
         }
@@ -67,7 +67,7 @@ report::Chart chartOf(const json& figures, const std::string& what, const Panel&
     chart.yLabel = "error of the force [%]";
     chart.logX = panel.logX;
     chart.logY = true;
-    for (const auto& setting : valuesOf(figures.at("summary"), [](const json& e) { return e.at("setting"); })) {
+    for (const auto& setting : differentValues(figures.at("summary"), [](const json& e) { return e.at("setting"); })) {
         report::ChartSeries middle, worst;
         middle.name = setting + ", median";
         worst.name = setting + ", worst place";
@@ -125,7 +125,7 @@ std::vector<std::filesystem::path> writeDeepFolder(const std::filesystem::path& 
     base::writeWhole(folder / "depth.csv", csvOf(figures));
     std::vector<report::Chart> charts;
     std::vector<std::filesystem::path> pictures;
-    for (const std::string& what : valuesOf(figures.at("summary"), caseOf)) {
+    for (const std::string& what : differentValues(figures.at("summary"), nameOfCase)) {
         for (const Panel& panel : panels) {
             report::Chart chart = chartOf(figures, what, panel);
             if (chart.series.empty()) {

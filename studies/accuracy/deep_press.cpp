@@ -21,7 +21,6 @@ using namespace chainmail;
 namespace {
 
 constexpr int holdTicks = 200;
-constexpr std::size_t maxNodes = 4U << 20;
 
 constexpr std::array<GridPlace, 6> sixPlaces{
     {{0.0, 0.0, 1}, {0.25, 0.0, 4}, {0.5, 0.0, 2}, {0.25, 0.25, 4}, {0.5, 0.25, 4}, {0.5, 0.5, 1}}};
@@ -157,7 +156,7 @@ DeepPress pressDeep(const haptics::SessionModel& model, const DeepCase& what, co
     const TrialPlace entry = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     for (std::size_t i = 0; i < options.places.size(); ++i) {
         const GridPlace& at = options.places[i];
-        const TrialBody body = trialBody(*model.tissue, model.surface, settings.spacing, settings.poissonCap, maxNodes,
+        const TrialBody body = trialBody(*model.tissue, model.surface, settings.spacing, settings.poissonCap, maxTrialNodes,
                                          Vec3(at.across, 0.0, at.along));
         out.spacing = body.cells.spacing;
         TrialPath path = trialPath(*model.tissue, model.surface, entry, what.tool, out.spacing);

@@ -22,10 +22,10 @@ using nlohmann::json;
 
 namespace {
 
-constexpr int format = 1;        // of push.json
-constexpr double tick = 1e-3;    // of schedule() [s]
-constexpr double density = 1e3;  // of all tissue, for what has inertia [kg/m^3]
-constexpr double largest = 1e6;  // of any number of an answer, in SI: beyond, a solver has run away
+constexpr int fileFormat = 1;       // of push.json
+constexpr double rivalTick = 1e-3;  // of schedule() [s]
+constexpr double density = 1e3;     // of all tissue, for what has inertia [kg/m^3]
+constexpr double largest = 1e6;     // of any number of an answer, in SI: beyond, a solver has run away
 
 json listOf(Vec3 v)
 {
@@ -75,7 +75,7 @@ void addPath(json& push, const AccuracySubject& subject)
         centres.push_back(listOf(subject.path.at(t.pose)));
     }
     push["tool"] = {{"kind", "sphere"}, {"radius_m", subject.path.tool.radius}, {"friction", 0.0}};
-    push["tick_s"] = tick;
+    push["tick_s"] = rivalTick;
     push["tool_centre_m"] = std::move(centres);
     push["look_ticks"] = std::move(looks);
 }
@@ -160,7 +160,7 @@ std::vector<std::array<std::uint32_t, 3>> outsideOf(const TetBody& mesh)
 void writeRivalPush(const std::filesystem::path& folder, const std::string& scene, const AccuracySubject& subject,
                     const TetBody& mesh)
 {
-    json push{{"palpate_push", format}, {"scene", scene}, {"density_kg_m3", density}};
+    json push{{"palpate_push", fileFormat}, {"scene", scene}, {"density_kg_m3", density}};
     addPath(push, subject);
     addMesh(push, mesh);
     addMaterials(push, mesh);

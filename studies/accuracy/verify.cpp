@@ -60,7 +60,7 @@ std::string text(const json& row, const char* key)
     return found != row.end() && found->is_string() ? found->get<std::string>() : "";
 }
 
-void print(const json& rows)
+void printForms(const json& rows)
 {
     fmt::print("{:<10} {:<44} {:<16} {:<22} {:>11} {:>11} {:>9} {:>8} {:>6}\n", "solver", "problem", "quantity", "setting",
                "computed", "closed form", "error", "bound", "order");
@@ -93,7 +93,7 @@ void verifyCommand(bool quick, const std::filesystem::path& file)
     }
     progress.clear();
     if (file != "-") {
-        print(rows);
+        printForms(rows);
         if (!both) {
             fmt::print("{}\n", missing);
         }

@@ -10,8 +10,6 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t maxNodes = 4U << 20;
-
 // Of the same ticks again, with arithmetic that counts.
 std::vector<KernelWork> workOf(const ElasticBody& body, const TrialPath& path, double speed, ElasticOptions options)
 {
@@ -38,7 +36,8 @@ public:
     {
         const auto elastic = datasets::elasticSetting(setting, model_.scene.model.elastic);
         progress_(fmt::format("{}: body of setting {}", model_.scene.name, setting));
-        const TrialBody body = trialBody(*model_.tissue, model_.surface, elastic.spacing, elastic.poissonCap, maxNodes);
+        const TrialBody body =
+            trialBody(*model_.tissue, model_.surface, elastic.spacing, elastic.poissonCap, maxTrialNodes);
         for (const TrialTool& tool : request_.tools) {
             runTool(setting, elastic, body, tool);
         }

@@ -15,7 +15,7 @@ using namespace chainmail;
 namespace {
 
 constexpr double spacing = 2e-3;  // [m]
-constexpr int tries = 15;
+constexpr int operatorTries = 15;
 constexpr double nodesPerTry = 2e6;
 constexpr const char* plainName = "plain loops";
 
@@ -64,7 +64,7 @@ double secondsPerNode(const Cube& cube, Call&& call)
     using Clock = std::chrono::steady_clock;
     const int calls = std::max(1, static_cast<int>(nodesPerTry / cube.nodes()));
     double best = 1.0;
-    for (int i = 0; i < tries; ++i) {
+    for (int i = 0; i < operatorTries; ++i) {
         const auto start = Clock::now();
         for (int c = 0; c < calls; ++c) {
             call();

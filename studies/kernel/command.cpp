@@ -22,7 +22,7 @@ namespace palpate::studies {
 
 namespace {
 
-struct Options {
+struct KernelArguments {
     std::vector<std::string> scenes;
     std::vector<std::string> settings = datasets::elasticSettings();
     std::vector<std::string> tools;
@@ -123,7 +123,7 @@ void printRivals(const std::vector<KernelCase>& cases)
     }
 }
 
-void checkNames(const Options& o)
+void checkNames(const KernelArguments& o)
 {
     const auto known = toolNames();
     for (const std::string& tool : o.tools) {
@@ -141,7 +141,7 @@ void checkNames(const Options& o)
     }
 }
 
-KernelRequest requestOf(const Options& o)
+KernelRequest requestOf(const KernelArguments& o)
 {
     KernelRequest request;
     request.settings = o.settings;
@@ -160,7 +160,7 @@ KernelRequest requestOf(const Options& o)
 }
 
 // One scene, tool and speed, and settings of few nodes: seconds.
-void shorten(Options& o)
+void shorten(KernelArguments& o)
 {
     const auto first = [](auto& list, auto standard) {
         if (list.empty()) {
@@ -181,7 +181,7 @@ void shorten(Options& o)
     }
 }
 
-void benchKernelCommand(Options o)
+void benchKernelCommand(KernelArguments o)
 {
     base::checkOutput(o.json);
     base::checkOutputFolder(o.folder);
@@ -239,7 +239,7 @@ void benchKernelCommand(Options o)
 
 void addBenchKernel(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<KernelArguments>();
     auto* kernel = bench.add_subcommand("kernel", "Error and time of level elastic, against the whole grid solved");
     kernel->add_option("--scenes", o->scenes, "Scenes: built-in names or files (default: all built-in)")->delimiter(',');
     kernel->add_option("--volume", o->volumes, "Volumes (.vdb)")->delimiter(',');

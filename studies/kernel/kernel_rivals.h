@@ -8,6 +8,9 @@
 
 namespace palpate::studies {
 
+/// Nodes of a body that a model is tried on, at most.
+inline constexpr std::size_t maxTrialNodes = 4U << 20;
+
 /// An elastic body for trials, with the grid of its cells.
 struct TrialBody {
     volume::NodeGrid cells;

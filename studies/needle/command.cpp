@@ -29,7 +29,7 @@ constexpr double chartStep = 0.1e-3;  // between points of a curve [m]
 constexpr double liverBreaks = 1.5;   // where the chart's published curve ends [N]
 constexpr double onsetSpeed = 5e-3;   // [m/s]
 
-struct Options {
+struct NeedleArguments {
     std::string folder, json;
     bool quick = false;
 };
@@ -241,7 +241,7 @@ void writeFolder(const std::filesystem::path& folder, const Figures& f, const js
     command::writeJson(folder / "needle.json", figures);
 }
 
-void benchNeedle(const Options& o)
+void benchNeedle(const NeedleArguments& o)
 {
     base::checkOutput(o.json);
     base::checkOutputFolder(o.folder);
@@ -272,7 +272,7 @@ void benchNeedle(const Options& o)
 
 void addBenchNeedle(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<NeedleArguments>();
     auto* c = bench.add_subcommand(
         "needle", "Force against depth: through layers, beside the thesis's model; in liver; and where warnings begin");
     c->add_option("-o,--output", o->folder, "Folder for needle.html, .json and charts (PNG)");

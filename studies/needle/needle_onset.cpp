@@ -11,9 +11,9 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double ballRadius = 14e-3;  // [m]
-constexpr double aside = 2e-3;        // of the ball's way from the vessel's middle [m]
-constexpr double deepest = 12e-3;     // [m]
+constexpr double ballRadius = 14e-3;    // [m]
+constexpr double aside = 2e-3;          // of the ball's way from the vessel's middle [m]
+constexpr double deepestOnset = 12e-3;  // [m]
 constexpr double vesselDepth = 14e-3;
 
 haptics::SessionModel besideVessel()
@@ -55,7 +55,7 @@ Onset warningOnset(double speed)
     onset.warnedAt = std::numeric_limits<double>::infinity();
     haptics::DeviceSample sample;
     sample.buttons = haptics::buttonDeadMan;
-    for (double pressed = -1e-3; pressed <= deepest; pressed += speed * haptics::tickSeconds) {
+    for (double pressed = -1e-3; pressed <= deepestOnset; pressed += speed * haptics::tickSeconds) {
         sample.position = Vec3(aside, pressed - ballRadius, 0);
         const haptics::TickRecord& record = simulation.tick(sample);
         const double moved = occupancy::displacementAt(body, middle).y;

@@ -22,12 +22,12 @@ using haptics::tickSeconds;
 
 namespace {
 
-constexpr double farthest = 10.0;    // from the origin along each axis [m]
-constexpr double latest = 1e9;       // more than any clock says [s]
-constexpr double maxTicks = 10e6;    // nearly three hours
-constexpr double minAxis = 1e-6;     // shorter ones have no direction
-constexpr double halfTurn = -0.999;  // cosine between axes of which neither way round is the shorter
-constexpr double rounding = 1e-6;    // of a tick
+constexpr double farthest = 10.0;      // from the origin along each axis [m]
+constexpr double latest = 1e9;         // more than any clock says [s]
+constexpr double maxTicks = 10e6;      // nearly three hours
+constexpr double minAxis = 1e-6;       // shorter ones have no direction
+constexpr double halfTurn = -0.999;    // cosine between axes of which neither way round is the shorter
+constexpr double pathRounding = 1e-6;  // of a tick
 
 constexpr std::string_view byteOrderMark = "\xEF\xBB\xBF";  // spreadsheets write one
 
@@ -181,7 +181,7 @@ void checkFollows(const NumberFile& file, const ToolPose& before, const ToolPose
 std::size_t PosePath::ticks() const noexcept
 {
     const double span = poses.back().seconds - poses.front().seconds;
-    return 1 + static_cast<std::size_t>(std::max(0.0, std::ceil(span / tickSeconds - rounding)));
+    return 1 + static_cast<std::size_t>(std::max(0.0, std::ceil(span / tickSeconds - pathRounding)));
 }
 
 ToolPose PosePath::at(std::size_t tick) const noexcept

@@ -14,8 +14,8 @@ using datasets::ToolKind;
 
 namespace {
 
-constexpr double tieSpacing = 4e-3;    // along a needle's shaft [m]
-constexpr double touchStep = 0.25e-3;  // at most so deep a tool is found that comes to the surface [m]
+constexpr double loadTieSpacing = 4e-3;  // along a needle's shaft [m]
+constexpr double touchStep = 0.25e-3;    // at most so deep a tool is found that comes to the surface [m]
 
 }  // namespace
 
@@ -37,8 +37,8 @@ PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec&
     if (model.surface.distance(first.position) < 0.0) {
         hold(0.0);
     }
-    for (double s = tieSpacing; holds() && s <= tool_.length && model.surface.distance(onShaft(first, s)) < 0.0;
-         s += tieSpacing) {
+    for (double s = loadTieSpacing; holds() && s <= tool_.length && model.surface.distance(onShaft(first, s)) < 0.0;
+         s += loadTieSpacing) {
         hold(s);
     }
     load_.ties = ties_;

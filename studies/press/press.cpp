@@ -20,7 +20,7 @@ using chainmail::ElasticResult;
 
 namespace {
 
-constexpr int maxCycles = 500;  // of a pose that is solved to convergence
+constexpr int maxPressCycles = 500;  // of a pose that is solved to convergence
 
 // Where the tissue is that was asked for.
 std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const FilePoint> asked)
@@ -93,7 +93,7 @@ private:
         const double start = base::processorTime();
         load_.set(pose);
         const ElasticResult result =
-            converge ? elastic_.relax(load_.load(), maxCycles, pressTolerance) : elastic_.relax(load_.load());
+            converge ? elastic_.relax(load_.load(), maxPressCycles, pressTolerance) : elastic_.relax(load_.load());
         PressSample s;
         s.took = base::processorTime() - start;
         s.pose = pose;

@@ -18,10 +18,10 @@ using nlohmann::json;
 namespace {
 
 // A figure against a number in the scenes' names: "slide-30deg-20mm_s" with prefix "slide-" and ending "deg-20mm_s" is 30.
-struct View {
+struct StabilityView {
     const char *file, *title, *prefix, *ending, *xLabel, *yLabel;
 };
-constexpr View views[] = {
+constexpr StabilityView views[] = {
     {"ripple", "Sliding over a staircase of voxels at 20 mm/s", "slide-", "deg-20mm_s",
      "slope against the voxels [degrees]", "ripple [% of the force]"},
     {"ridge", "Dragged across a ridge at 40 mm/s", "outer-", "deg", "angle of the ridge [degrees]",
@@ -32,7 +32,7 @@ constexpr View views[] = {
 };
 
 // The number in a scene's name, or nothing.
-std::optional<double> numberIn(const std::string& scene, const View& view)
+std::optional<double> numberIn(const std::string& scene, const StabilityView& view)
 {
     if (!scene.starts_with(view.prefix)) {
         return std::nullopt;
@@ -44,7 +44,7 @@ std::optional<double> numberIn(const std::string& scene, const View& view)
 }
 
 // The premium device under a hand that holds on, at 1 kHz.
-std::optional<report::Chart> chartOf(const json& figures, const View& view)
+std::optional<report::Chart> chartOfView(const json& figures, const StabilityView& view)
 {
     report::Chart chart;
     chart.title = view.title;
@@ -172,8 +172,8 @@ void writeStabilityFolder(const std::filesystem::path& folder, const json& figur
     for (const report::Chart& chart : charts) {
         report::writeChartPng(chart, folder / fmt::format("limit-{}.png", &chart - charts.data() + 1));
     }
-    for (const View& view : views) {
-        if (const auto chart = chartOf(figures, view)) {
+    for (const StabilityView& view : views) {
+        if (const auto chart = chartOfView(figures, view)) {
             report::writeChartPng(*chart, folder / fmt::format("{}.png", view.file));
             charts.push_back(*chart);
         }

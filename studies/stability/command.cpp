@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t maxNamed = 6;  // failed cells in the last line
 
-struct Options {
+struct StabilityArguments {
     std::string folder, json, cell, record;
     MatrixChoice choice;
     std::uint64_t seed = 1, fuzz = 0;
@@ -33,7 +33,7 @@ struct Options {
     bool fuzzOnly = false;
 };
 
-json runCells(const Options& o, StabilityModels& models, command::Progress& progress)
+json runCells(const StabilityArguments& o, StabilityModels& models, command::Progress& progress)
 {
     const auto cells = matrixCells(models, o.choice);
     if (cells.empty()) {
@@ -52,7 +52,7 @@ json runCells(const Options& o, StabilityModels& models, command::Progress& prog
     return out;
 }
 
-json runFuzz(const Options& o, StabilityModels& models, command::Progress& progress)
+json runFuzz(const StabilityArguments& o, StabilityModels& models, command::Progress& progress)
 {
     const auto told = [&](std::size_t done) { progress.show(fmt::format("{} of {} hostile sessions", done, o.fuzz)); };
     return fuzzEntry(fuzz(models, o.seed, o.fuzz, o.jobs, told));
@@ -84,7 +84,7 @@ void checkOurs(const json& figures, const StabilityModels& models)
     }
 }
 
-void recordOne(const Options& o, StabilityModels& models)
+void recordOne(const StabilityArguments& o, StabilityModels& models)
 {
     const Cell cell = cellOf(models, o.cell);
     base::checkOutput(o.record);
@@ -99,7 +99,7 @@ void recordOne(const Options& o, StabilityModels& models)
     }
 }
 
-void stabilityCommand(const Options& o)
+void stabilityCommand(const StabilityArguments& o)
 {
     base::checkOutput(o.json);
     base::checkOutputFolder(o.folder);
@@ -145,7 +145,7 @@ void stabilityCommand(const Options& o)
 
 void addStability(CLI::App& app)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<StabilityArguments>();
     auto* c = app.add_subcommand("stability",
                                  "Where haptic methods fail: scenes, methods, devices, grips and rates, against bounds");
     c->add_option("-o,--output", o->folder, "Folder for stability.html, .json, .csv and charts (PNG)");

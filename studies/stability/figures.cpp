@@ -16,8 +16,8 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::array columns{"id",   "scene",  "method",  "device", "grip", "rate_hz",
-                             "pass", "figure", "measure", "unit",   "bound"};
+constexpr std::array cellColumns{"id",   "scene",  "method",  "device", "grip", "rate_hz",
+                                 "pass", "figure", "measure", "unit",   "bound"};
 
 std::string csvCell(const json& value)
 {
@@ -136,10 +136,10 @@ void printStability(const json& figures)
 
 std::string stabilityCsv(const json& figures)
 {
-    std::string out = fmt::format("{}\n", fmt::join(columns, ","));
+    std::string out = fmt::format("{}\n", fmt::join(cellColumns, ","));
     for (const json& cell : figures.at("cells")) {
-        for (const char* const key : columns) {
-            out += (key == columns.front() ? "" : ",") + csvCell(cell.at(key));
+        for (const char* const key : cellColumns) {
+            out += (key == cellColumns.front() ? "" : ",") + csvCell(cell.at(key));
         }
         out += '\n';
     }

@@ -25,7 +25,7 @@ namespace {
 
 using datasets::Random;
 
-constexpr double rounding = 1e-9;  // of the cap
+constexpr double forceRounding = 1e-9;  // of the cap
 // Of the stabiliser, in caps [1/s]; beside it, on the way out the force may fall with the motion.
 constexpr double slewPerSecond = 50.0;
 constexpr std::array<int, 4> rates{500, 1000, 2000, 4000};
@@ -276,10 +276,10 @@ FuzzResult runHostile(const StabilityModels& models, std::uint64_t seed)
             const bool finite = std::isfinite(force.x + force.y + force.z);
             const double size = glm::length(force);
             r.nonFinite += finite ? 0 : 1;
-            r.overCap += size > cap * (1.0 + rounding) ? 1 : 0;
+            r.overCap += size > cap * (1.0 + forceRounding) ? 1 : 0;
             // Switched off is switched off at once, and a spring that is let go may fall with the motion.
             const double fall = size < glm::length(before) ? stiffest * glm::distance(sample.position, position) : 0.0;
-            r.overSlew += size > 0.0 && glm::distance(force, before) > maxStep + fall + rounding * cap ? 1 : 0;
+            r.overSlew += size > 0.0 && glm::distance(force, before) > maxStep + fall + forceRounding * cap ? 1 : 0;
             r.pulled += watch.pulls(*running.record(), running.tissue(), cap) ? 1 : 0;
             before = finite ? force : Vec3(0.0);
             position = sample.position;

@@ -11,7 +11,7 @@ namespace palpate::studies {
 namespace {
 
 constexpr int maxCrossings = 4096;  // of voxel faces on one way
-constexpr double gap = 1e-6;        // between god-object and a face, in voxels
+constexpr double godGap = 1e-6;     // between god-object and a face, in voxels
 
 // What stops a point on its way: the axis of the face, or -1 when nothing does. `p` goes as far as it gets. In voxels.
 int travel(const ContactVoxels& voxels, Vec3& p, Vec3 to) noexcept
@@ -38,7 +38,7 @@ int travel(const ContactVoxels& voxels, Vec3& p, Vec3 to) noexcept
         next[axis] += way[axis] > 0.0 ? 1 : -1;
         if (voxels.solid(next)) {
             const double hit = std::max(first, done);
-            const double face = way[axis] > 0.0 ? n[axis] + 1 - gap : n[axis] + gap;
+            const double face = way[axis] > 0.0 ? n[axis] + 1 - godGap : n[axis] + godGap;
             p += hit * way;
             p[axis] = face;
             return axis;

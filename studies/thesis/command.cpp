@@ -28,7 +28,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct ThesisArguments {
     std::vector<std::size_t> objects;
     std::string level = "elastic", setting = "default";
     int voxels = 0;  // along a side of the block
@@ -47,7 +47,7 @@ std::vector<std::size_t> standardObjects()
     return objects;
 }
 
-datasets::ModelSettings settingsOf(const Options& o)
+datasets::ModelSettings settingsOf(const ThesisArguments& o)
 {
     datasets::ModelSettings settings;
     const auto* const at = std::ranges::find(datasets::modelLevels, o.level);
@@ -100,7 +100,7 @@ std::string timeGraphics(haptics::SessionModel& model, const EventOptions& optio
     return "";
 }
 
-TasksCase measure(const Options& o, std::size_t objects, std::string& graphics)
+TasksCase measure(const ThesisArguments& o, std::size_t objects, std::string& graphics)
 {
     const InclusionSpec spec{objects, o.voxels, o.seed};
     const EventOptions options{o.frames};
@@ -138,7 +138,7 @@ std::vector<std::size_t> shuffled(std::vector<std::size_t> objects, std::uint64_
     return objects;
 }
 
-void benchTasks(const Options& o)
+void benchTasks(const ThesisArguments& o)
 {
     base::checkOutput(o.json);
     base::checkOutput(o.chart);
@@ -182,7 +182,7 @@ void benchTasks(const Options& o)
 
 void addBenchTasks(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ThesisArguments>();
     o->objects = standardObjects();
     auto* c = bench.add_subcommand("tasks",
                                    "Time of the thesis's tasks and events against the number of objects, beside its own "

@@ -30,7 +30,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Options {
+struct ScaleArguments {
     double memoryGb = 1.0;
     int frames = 6;
     std::string json;
@@ -114,7 +114,7 @@ struct Largest {
 
 class Search {
 public:
-    Search(const Options& o, command::Progress& progress) : o_(o), progress_(progress) {}
+    Search(const ScaleArguments& o, command::Progress& progress) : o_(o), progress_(progress) {}
 
     /// The best model under which the smallest scene holds; nothing where none does.
     std::optional<Model> modelFor(double bound)
@@ -230,7 +230,7 @@ private:
         }
     }
 
-    const Options& o_;
+    const ScaleArguments& o_;
     command::Progress& progress_;
     std::vector<Measured> smallest_;  // scenes, by model of the ladder
     double maxVoxels_ = 0;            // of a scene that was made
@@ -263,7 +263,7 @@ void print(const char* what, const json& e)
                e["haptic_us_p99"].get<double>(), e["build_s"].get<double>(), e["limit"].get<std::string>());
 }
 
-void benchScale(const Options& o)
+void benchScale(const ScaleArguments& o)
 {
     base::checkOutput(o.json);
     const bool tell = o.json != "-";
@@ -309,7 +309,7 @@ void benchScale(const Options& o)
 
 void addBenchScale(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ScaleArguments>();
     auto* c =
         bench.add_subcommand("scale",
                              "The largest scene (objects, voxels, active nodes) that holds 1 kHz with the haptic part "

@@ -19,7 +19,10 @@ namespace palpate::studies {
 class ObjectScene {
 public:
     /// @param stiffness  K of equation 2, of every object [N/m]
-    ObjectScene(std::vector<Inclusion> objects, double stiffness) : objects_(std::move(objects)), stiffness_(stiffness) {}
+    ObjectScene(std::vector<PlacedInclusion> objects, double stiffness)
+        : objects_(std::move(objects)), stiffness_(stiffness)
+    {
+    }
 
     static constexpr std::size_t none = static_cast<std::size_t>(-1);
     static constexpr std::size_t monitored = 4;  // objects that the thesis has in the monitored scene at any instant
@@ -31,10 +34,10 @@ public:
     /// H6: how near the first of the lookup table are.
     std::array<haptics::Proximity, haptics::maxStructures> monitor(Vec3 tip) const noexcept;
 
-    const std::vector<Inclusion>& objects() const noexcept { return objects_; }
+    const std::vector<PlacedInclusion>& objects() const noexcept { return objects_; }
 
 private:
-    std::vector<Inclusion> objects_;
+    std::vector<PlacedInclusion> objects_;
     double stiffness_;
 };
 

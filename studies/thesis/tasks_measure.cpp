@@ -28,7 +28,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::uint64_t frameTicks = channel::frameTicks;
 constexpr double swingSeconds = 0.33;  // there and back
 constexpr double inside = 30e-3;       // [m]
-constexpr double outside = 15e-3;      // [m]
+constexpr double outsideBody = 15e-3;  // [m]
 constexpr double wayIn = 0.1;          // speed of the needle into the block [m/s]
 
 /// What one tick took [s].
@@ -39,7 +39,7 @@ struct TaskTimes {
 
 using Rig = std::function<TaskTimes(const DeviceSample&)>;
 
-double secondsSince(Clock::time_point& last) noexcept
+double lap(Clock::time_point& last) noexcept
 {
     const auto now = Clock::now();
     return std::chrono::duration<double>(now - std::exchange(last, now)).count();
@@ -139,7 +139,7 @@ EventTimes timeEvent(const TaskEvent& event, const EventOptions& options, const 
         pace.wait();
         auto last = Clock::now();
         const DeviceSample sample = path.at(n);
-        const double read = secondsSince(last);
+        const double read = lap(last);
         TaskTimes t = rig(sample);
         t.task[static_cast<std::size_t>(Task::h2)] = read;
         // The first frame warms the caches.
@@ -151,19 +151,19 @@ EventTimes timeEvent(const TaskEvent& event, const EventOptions& options, const 
 }
 
 /// The loop in a session of ours. One simulation touches, one does not.
-class Session {
+class TaskSession {
 public:
-    Session(SessionModel& model, const Graphics* graphics)
+    TaskSession(SessionModel& model, const Graphics* graphics)
         : model_(model), graphics_(graphics), touching_(model), free_(model)
     {
         const Vec3 line = model.approach.aim - model.approach.entry;
         in_.axis = out_.axis = glm::normalize(line);
         in_.middle = model.approach.entry + inside * in_.axis;
-        out_.middle = model.approach.entry - outside * out_.axis;
+        out_.middle = model.approach.entry - outsideBody * out_.axis;
         idle_.device = out_.at(0);
-        far_.fill({outside, -out_.axis});
+        far_.fill({outsideBody, -out_.axis});
         const double step = wayIn * tickSeconds;
-        for (double depth = -outside; depth < inside; depth += step) {
+        for (double depth = -outsideBody; depth < inside; depth += step) {
             touching_.tick(in_.pose(model.approach.entry + depth * in_.axis));
         }
     }
@@ -202,10 +202,10 @@ private:
         std::copy(record.seconds.begin(), record.seconds.end(), t.task.begin());
         auto last = Clock::now();
         sent_ = record.total;
-        t.task[static_cast<std::size_t>(Task::h5)] = secondsSince(last);
+        t.task[static_cast<std::size_t>(Task::h5)] = lap(last);
         if (event.graphics) {
             publish(record, simulation);
-            t.publish = secondsSince(last);
+            t.publish = lap(last);
         }
         return t;
     }
@@ -217,12 +217,12 @@ private:
         if (event.additional) {
             sent_ = additionalForce(model_.scene.dffb, model_.structures.size(), far_, sample.position, false, tickSeconds,
                                     dffb_);
-            t.task[static_cast<std::size_t>(Task::h7)] = secondsSince(last);
+            t.task[static_cast<std::size_t>(Task::h7)] = lap(last);
         }
         if (event.graphics) {
             idle_.device = sample;
             publish(idle_, free_);
-            t.publish = secondsSince(last);
+            t.publish = lap(last);
         }
         return t;
     }
@@ -255,7 +255,7 @@ public:
         const auto& first = scene.objects().front();
         in_.middle = first.centre - 0.5 * first.radius * in_.axis;
         in_.reach = std::min(in_.reach, 0.4 * first.radius);  // never out of it
-        out_.middle = -outside * out_.axis;
+        out_.middle = -outsideBody * out_.axis;
     }
 
     EventTimes time(const TaskEvent& event, const EventOptions& options)
@@ -269,7 +269,7 @@ private:
     {
         TaskTimes t;
         auto last = Clock::now();
-        const auto done = [&](Task task) { t.task[static_cast<std::size_t>(task)] = secondsSince(last); };
+        const auto done = [&](Task task) { t.task[static_cast<std::size_t>(task)] = lap(last); };
         std::size_t touched = ObjectScene::none;
         Vec3 basic(0.0), additional(0.0);
         if (event.haptics) {
@@ -333,7 +333,7 @@ std::vector<EventTimes> timeEvents(SessionModel& model, std::span<const TaskEven
 {
     std::vector<EventTimes> out;
     inRealTime([&] {
-        Session session(model, graphics);
+        TaskSession session(model, graphics);
         if (graphics != nullptr && !session.awaitViewer()) {
             return;
         }

@@ -15,7 +15,7 @@ namespace palpate::studies {
 
 namespace {
 
-enum Label : std::uint16_t { air, fat, bone, ball };
+enum Label : std::uint16_t { airLabel, fatLabel, boneLabel, ballLabel };
 
 constexpr int fewestVoxels = 64;       // along a side: 1 mm
 constexpr double radiusShare = 0.3;    // of the distance from one ball to the next
@@ -103,7 +103,7 @@ void draw(volume::LabelImage& image, const Ball& inclusion)
     const int reach = static_cast<int>(inclusion.radius);
     volume::forEachIndex(Index3(-reach), Index3(reach), [&](Index3 d) {
         if (d.x * d.x + d.y * d.y + d.z * d.z <= inclusion.radius * inclusion.radius) {
-            image.values[image.offset(inclusion.centre + airVoxels + d)] = ball;
+            image.values[image.offset(inclusion.centre + airVoxels + d)] = ballLabel;
         }
     });
 }
@@ -115,10 +115,10 @@ int voxelsFor(std::size_t inclusions) noexcept
     return std::max(fewestVoxels, minPitch * cellsFor(inclusions));
 }
 
-std::vector<Inclusion> inclusionsOf(const InclusionSpec& spec)
+std::vector<PlacedInclusion> inclusionsOf(const InclusionSpec& spec)
 {
     const auto affine = affineOf(sideOf(spec));
-    std::vector<Inclusion> out;
+    std::vector<PlacedInclusion> out;
     out.reserve(spec.inclusions);
     for (const Ball& b : ballsOf(spec)) {
         out.push_back({affine.toPatient(Vec3(b.centre + airVoxels)), b.radius * affine.spacing().x});
@@ -133,11 +133,11 @@ volume::LabelImage inclusionLabels(const InclusionSpec& spec)
     volume::LabelImage image;
     image.size = Index3(side, thick, side) + 2 * airVoxels;
     image.affine = affineOf(side);
-    image.values.assign(image.offset(Index3(0, 0, image.size.z)), air);
+    image.values.assign(image.offset(Index3(0, 0, image.size.z)), airLabel);
     for (int k = 0; k < side; ++k) {
         for (int j = 0; j < thick; ++j) {
             const auto row = image.offset(Index3(0, j, k) + airVoxels);
-            std::fill_n(image.values.begin() + static_cast<std::ptrdiff_t>(row), side, j < side ? fat : bone);
+            std::fill_n(image.values.begin() + static_cast<std::ptrdiff_t>(row), side, j < side ? fatLabel : boneLabel);
         }
     }
     for (const Ball& b : ballsOf(spec)) {
@@ -148,8 +148,10 @@ volume::LabelImage inclusionLabels(const InclusionSpec& spec)
 
 std::shared_ptr<const volume::Tissue> inclusionTissue(const InclusionSpec& spec)
 {
-    const volume::LabelName names[]{
-        {air, "air", "air"}, {fat, "fat", "fat"}, {bone, "base", "bone"}, {ball, "inclusions", "idc_high_grade"}};
+    const volume::LabelName names[]{{airLabel, "air", "air"},
+                                    {fatLabel, "fat", "fat"},
+                                    {boneLabel, "base", "bone"},
+                                    {ballLabel, "inclusions", "idc_high_grade"}};
     return std::make_shared<const volume::Tissue>(volume::Tissue::fromLabels(
         inclusionLabels(spec), datasets::defaultTissues(), names, {{"inclusions", fmt::format("{}", spec.inclusions)}}));
 }

@@ -29,14 +29,14 @@ inline constexpr int minPitch = 4;
 /// The fewest voxels along the block's width that tell so many balls apart.
 int voxelsFor(std::size_t inclusions) noexcept;
 
-struct Inclusion {
+struct PlacedInclusion {
     Vec3 centre{0.0};   // middle of a voxel [m]
     double radius = 0;  // [m]
 };
 
 // Same spec, same block. All throw std::runtime_error where so many voxels cannot tell so many balls apart.
 
-std::vector<Inclusion> inclusionsOf(const InclusionSpec& spec);
+std::vector<PlacedInclusion> inclusionsOf(const InclusionSpec& spec);
 /// Labels: 0 air, which is all around; 1 fat, 2 bone, 3 the balls. The front is at y = 0, its middle at the origin.
 volume::LabelImage inclusionLabels(const InclusionSpec& spec);
 std::shared_ptr<const volume::Tissue> inclusionTissue(const InclusionSpec& spec);

@@ -17,7 +17,7 @@ struct Column {
     double slope, slopeError, intercept, interceptError;  // Table 4 [0.1 ms]
 };
 
-constexpr std::array<Column, 8> columns{
+constexpr std::array<Column, 8> thesisColumns{
     {{"A1",
       {1.6, 1.9, 2.125, 2.4, 2.9, 3.35, 3.8, 4.25, 4.8, 5.35, 5.9, 6.55, 6.9, 7.4},
       0.01009,
@@ -88,7 +88,7 @@ const std::vector<ThesisSeries>& thesisSeries()
 {
     static const auto all = [] {
         std::vector<ThesisSeries> series;
-        std::ranges::transform(columns, std::back_inserter(series), seriesOf);
+        std::ranges::transform(thesisColumns, std::back_inserter(series), seriesOf);
         return series;
     }();
     return all;

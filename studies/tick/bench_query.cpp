@@ -18,26 +18,26 @@ using namespace occupancy;
 
 namespace {
 
-constexpr double spacing = 2e-3;     // the default of a scene's lattice [m]
-constexpr double dent = 4e-3;        // how deep [m]
-constexpr double dentRadius = 6e-3;  // standard deviation of the bell [m]
-constexpr double jitter = 1e-3;      // of the poses [m]
+constexpr double cubeSpacing = 2e-3;  // the default of a scene's lattice [m]
+constexpr double dent = 4e-3;         // how deep [m]
+constexpr double dentRadius = 6e-3;   // standard deviation of the bell [m]
+constexpr double jitter = 1e-3;       // of the poses [m]
 constexpr int poses = 2000;
 constexpr int warmUp = 50;
 
 // A cube with its surface at z = 0, tissue below. The surface lies half a spacing above the topmost elements.
-class Cube {
+class QueryCube {
 public:
-    explicit Cube(int side)
-        : grid_{Index3(side), -spacing * Vec3(0.5 * (side - 1), 0.5 * (side - 1), side - 0.5), spacing},
+    explicit QueryCube(int side)
+        : grid_{Index3(side), -cubeSpacing * Vec3(0.5 * (side - 1), 0.5 * (side - 1), side - 0.5), cubeSpacing},
           solid_(grid_.count(), 1),
           u_(grid_.count(), Vec3f(0.0F)),
           map_(grid_, solid_)
     {
         constexpr int margin = 4;
-        surface_.grid = {grid_.size + Index3(2 * margin), grid_.origin - margin * spacing, spacing};
+        surface_.grid = {grid_.size + Index3(2 * margin), grid_.origin - margin * cubeSpacing, cubeSpacing};
         surface_.values.reserve(surface_.grid.count());
-        const Box whole{grid_.origin - 0.5 * spacing, grid_.position(grid_.size - 1) + 0.5 * spacing};
+        const Box whole{grid_.origin - 0.5 * cubeSpacing, grid_.position(grid_.size - 1) + 0.5 * cubeSpacing};
         volume::forEachIndex(Index3(0), surface_.grid.size - 1, [&](Index3 n) {
             surface_.values.push_back(static_cast<float>(distanceTo(whole, surface_.grid.position(n))));
         });
@@ -46,7 +46,7 @@ public:
     // Elements further than five standard deviations from the dent stay at rest.
     void press() noexcept
     {
-        const auto reach = static_cast<int>(5.0 * dentRadius / spacing);
+        const auto reach = static_cast<int>(5.0 * dentRadius / cubeSpacing);
         const Index3 middle(grid_.size.x / 2, grid_.size.y / 2, grid_.size.z - 1);
         const Index3 low = glm::max(middle - reach, Index3(0));
         volume::forEachIndex(low, glm::min(middle + reach, grid_.size - 1), [&](Index3 n) {
@@ -81,7 +81,7 @@ struct Tool {
     double length;
     double radius;
 };
-constexpr std::array<Tool, 3> tools{{{"sphere_3_elements", 0.0, 1.5 * spacing},
+constexpr std::array<Tool, 3> tools{{{"sphere_3_elements", 0.0, 1.5 * cubeSpacing},
                                      {"needle", 6e-3, 1.05e-3},  // the shaft that a tick looks at, 14 G
                                      {"sphere_10mm", 0.0, 10e-3}}};
 
@@ -130,7 +130,7 @@ QueryCase timeCase(const Body& body, const Tool& tool, bool deformed)
 
 std::vector<QueryCase> benchQuery(int elementsPerSide)
 {
-    Cube cube(elementsPerSide);
+    QueryCube cube(elementsPerSide);
     std::vector<QueryCase> cases;
     for (const bool deformed : {false, true}) {
         if (deformed) {

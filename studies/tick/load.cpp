@@ -27,7 +27,7 @@ namespace {
 constexpr double sessionSeconds = 5.0;
 constexpr double longestRun = 600.0;  // stress-ng ends by then, also when this program was killed [s]
 
-struct Options {
+struct LoadArguments {
     std::string scene = "breast";
     session::SceneChanges changes;
     int runs = 3;
@@ -65,7 +65,7 @@ void print(const Run& run)
     std::fflush(stdout);
 }
 
-void benchLoad(const Options& o)
+void benchLoad(const LoadArguments& o)
 {
     base::checkOutput(o.json);
     const bool tell = o.json != "-";
@@ -113,7 +113,7 @@ void benchLoad(const Options& o)
 
 void addBenchLoad(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<LoadArguments>();
     auto* load = bench.add_subcommand("load",
                                       "Lateness of ticks while stress-ng keeps every core busy, with real-time "
                                       "priority and without");

@@ -35,7 +35,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Options {
+struct ViewArguments {
     std::string scene = "breast";
     std::vector<int> sides{128, 256};
     std::vector<std::string> layouts{"trainee"};
@@ -171,7 +171,7 @@ nlohmann::json readFigures(const fs::path& file)
     return figures;
 }
 
-nlohmann::json measure(const Options& o, const haptics::SessionModel& model, int side, const std::string& layout)
+nlohmann::json measure(const ViewArguments& o, const haptics::SessionModel& model, int side, const std::string& layout)
 {
     const auto count = static_cast<std::size_t>(side) * static_cast<std::size_t>(side) * static_cast<std::size_t>(side);
     const Vec3 extent = model.tissue->box().high - model.tissue->box().low;
@@ -244,7 +244,7 @@ void printScans(const nlohmann::json& c)
     fmt::print(" ms\n");
 }
 
-void benchView(const Options& o)
+void benchView(const ViewArguments& o)
 {
     base::checkOutput(o.json);
     const bool tell = o.json != "-";
@@ -291,7 +291,7 @@ void benchView(const Options& o)
 
 void addBenchView(CLI::App& bench)
 {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ViewArguments>();
     auto* view = bench.add_subcommand("view",
                                       "Time of a viewer's picture (on a hidden display) while everything deforms, and the "
                                       "lateness of the servo loop beside it");

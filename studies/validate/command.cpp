@@ -33,14 +33,14 @@ namespace {
 
 constexpr std::array<const char*, 6> allNames{"silicone", "beam", "needle", "relaxation", "palpation", "ultrasound"};
 
-struct Options {
+struct ValidateArguments {
     std::vector<std::string> names;
     std::filesystem::path data, tissues, folder, json, csv;
     bool quick = false;
 };
 
-struct Run {
-    const Options& options;
+struct FolderRun {
+    const ValidateArguments& options;
     std::vector<std::filesystem::path> folders;
     command::Progress& progress;
     std::vector<Experiment> experiments;
@@ -55,7 +55,7 @@ struct Run {
     Experiment ultrasoundChecks();
 };
 
-Experiment Run::ultrasoundChecks()
+Experiment FolderRun::ultrasoundChecks()
 {
     const volume::TissueTable table =
         options.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(options.tissues);
@@ -92,7 +92,7 @@ Experiment Run::ultrasoundChecks()
     return e;
 }
 
-void Run::run(const std::string& name)
+void FolderRun::run(const std::string& name)
 {
     const ValidateProgress tell = [&](const std::string& what) { progress.show(what); };
     if (name == "silicone") {
@@ -119,7 +119,7 @@ void printChecks(const std::vector<ultrasound::Check>& checks)
     }
 }
 
-json figuresOf(const Run& run)
+json figuresOf(const FolderRun& run)
 {
     json figures = experimentsJson(run.experiments);
     if (!run.checks.empty()) {
@@ -158,7 +158,7 @@ void checkVerdicts(const std::vector<Experiment>& experiments)
     }
 }
 
-void validateCommand(const Options& o)
+void validateCommand(const ValidateArguments& o)
 {
     base::checkOutput(o.json);
     base::checkOutput(o.csv);
@@ -167,7 +167,7 @@ void validateCommand(const Options& o)
         throw std::runtime_error(o.data.string() + ": is no folder: name the one with the measurements");
     }
     command::Progress progress(command::Progress::Clock::ticking);
-    Run run{o, measurementFolders(o.data), progress, {}, {}};
+    FolderRun run{o, measurementFolders(o.data), progress, {}, {}};
     for (const char* name : allNames) {
         if (!o.names.empty() && std::ranges::find(o.names, name) == o.names.end()) {
             continue;
@@ -208,7 +208,7 @@ void validateCommand(const Options& o)
 
 void addValidate(CLI::App& app)
 {
-    const auto o = std::make_shared<Options>();
+    const auto o = std::make_shared<ValidateArguments>();
     auto* validate = app.add_subcommand(
         "validate",
         "Compares what is simulated with measurements, published figures and closed forms; exit status 1 when "

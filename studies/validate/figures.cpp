@@ -37,7 +37,7 @@ std::string escaped(const std::string& text)
     return out;
 }
 
-std::string quoted(const std::string& text)
+std::string quotedCell(const std::string& text)
 {
     std::string out = "\"";
     for (const char c : text) {
@@ -138,8 +138,8 @@ std::string experimentsCsv(const std::vector<Experiment>& experiments)
     for (const Experiment& e : experiments) {
         out += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", e.name,
                            e.verdict == Verdict::fails ? "fails" : wordOf(e.verdict), percent(e, e.error),
-                           percent(e, e.worst), percent(e, e.scatter), percent(e, e.bound), quoted(e.quantity),
-                           quoted(e.source), quoted(e.fittedOn), quoted(e.predicted), quoted(e.note));
+                           percent(e, e.worst), percent(e, e.scatter), percent(e, e.bound), quotedCell(e.quantity),
+                           quotedCell(e.source), quotedCell(e.fittedOn), quotedCell(e.predicted), quotedCell(e.note));
     }
     return out;
 }

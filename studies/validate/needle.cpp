@@ -13,10 +13,10 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double travel = 85.3e-3;     // of the stage [m]
-constexpr int insertions = 10;         // of ours, at as many places
-constexpr double placesApart = 12e-3;  // [m]
-const char* const source =
+constexpr double strokeTravel = 85.3e-3;  // of the stage [m]
+constexpr int insertions = 10;            // of ours, at as many places
+constexpr double placesApart = 12e-3;     // [m]
+const char* const needleSource =
     "de Jong, Dankelman, van den Dobbelsteen 2017, doi 10.1016/j.dib.2017.01.018: 20 insertions into one ex-vivo human "
     "liver, trocar tip, 5 mm/s in and out, held 61 s";
 const char* const split = "curves with even numbers";
@@ -182,7 +182,7 @@ Experiment corridorExperiment(const char* name, const char* what, const std::vec
     e.name = name;
     e.quantity =
         fmt::format("{}: share of predicted bins of 2 mm outside the 5 to 95 % corridor of the held-back curves", what);
-    e.source = source;
+    e.source = needleSource;
     e.fittedOn = split;
     e.predicted = fmt::format("{} of the curves with odd numbers", what);
     e.bound = 20.0;
@@ -236,7 +236,7 @@ Experiment ruptureExperiment(const std::vector<NeedleStroke>& ours, const std::v
     Experiment e;
     e.name = "needle-ruptures";
     e.quantity = "ruptures of over 0.15 N per insertion, difference of the means";
-    e.source = source;
+    e.source = needleSource;
     e.fittedOn = "curves with even numbers: distance and mean force of inner walls";
     e.predicted = fmt::format("ruptures of the curves with odd numbers: mean of {} insertions", insertions);
     ValidateCurve points{"measured, held-back curves", {}, {}, false}, line{"predicted, insertions of ours", {}, {}, false};
@@ -302,7 +302,7 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
     Experiment e;
     e.name = "needle-hold";
     e.quantity = "held force over that at the start, largest difference at 1 and 10 s";
-    e.source = source;
+    e.source = needleSource;
     e.fittedOn = "curves with even numbers: weights of the tissue's Prony series";
     e.predicted = "held force of the curves with odd numbers, 0.1 to 50 s";
     e.bound = 10.0;
@@ -406,16 +406,16 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     progress("needle");
     const std::vector<double> heldAt{0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0};
     const double surface = static_cast<double>(fit.surface) * strokeStep;
-    LiverLaw liver = fittedWalls(fit.falls, fit.fallSize, travel - surface);
+    LiverLaw liver = fittedWalls(fit.falls, fit.fallSize, strokeTravel - surface);
     liver.relaxation = heldRelaxation(hold);
     liver.cutting = fit.tip;
     // Walls hold the tip back as well: without their part the cutting force is less than the mean of the curves.
-    const double withWalls = meanFrom(meanTipForce(strokesIn(liver, travel - surface, {})), 0);
+    const double withWalls = meanFrom(meanTipForce(strokesIn(liver, strokeTravel - surface, {})), 0);
     liver.cutting = std::max(fit.tip - (withWalls - fit.tip), 0.1 * fit.tip);
-    const std::vector<NeedleStroke> ours = strokesIn(liver, travel - surface, heldAt);
+    const std::vector<NeedleStroke> ours = strokesIn(liver, strokeTravel - surface, heldAt);
     const std::vector<double> ourTip = meanTipForce(ours);
     std::vector<double> tip, insertion;
-    for (std::size_t i = 0; static_cast<double>(i + 1) * strokeStep < travel; ++i) {
+    for (std::size_t i = 0; static_cast<double>(i + 1) * strokeStep < strokeTravel; ++i) {
         const bool cuts = i >= fit.surface && i - fit.surface < ourTip.size();
         tip.push_back(cuts ? ourTip[i - fit.surface] : 0.0);
         insertion.push_back(i < fit.friction.size() ? fit.friction[i] + tip.back() : NAN);

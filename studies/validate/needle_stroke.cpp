@@ -12,7 +12,7 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double speed = 5e-3;           // [m/s]
+constexpr double strokeSpeed = 5e-3;     // [m/s]
 constexpr double needleRadius = 0.5e-3;  // inner needle of an 18 G set [m]
 
 haptics::SessionModel liverBlock(const LiverLaw& law)
@@ -107,7 +107,7 @@ NeedleStroke needleStroke(const LiverLaw& liver, glm::dvec2 aside, double depth,
     for (double t = 0.0; t < haptics::settledAfter; t += scene.period) {
         force(-outside);
     }
-    const double step = speed * scene.period;
+    const double step = strokeSpeed * scene.period;
     const auto steps = static_cast<int>(std::ceil((depth + outside) / step));
     Binned inBins, outBins;
     std::vector<double> most, least;  // of the force in each fine step of depth

@@ -15,12 +15,12 @@ namespace palpate::studies {
 
 namespace {
 
-constexpr double ballRadius = 5e-3;  // [m]
-constexpr double speed = 20e-3;      // [m/s]
-constexpr double depth = 4e-3;       // [m]
-constexpr double above = 0.5e-3;     // where the ball starts, over the tissue [m]
-constexpr double tick = 1e-3;        // [s]
-const char* const source = "closed form of a generalised Maxwell solid; no measurement";
+constexpr double reliefBall = 5e-3;    // [m]
+constexpr double reliefSpeed = 20e-3;  // [m/s]
+constexpr double depth = 4e-3;         // [m]
+constexpr double above = 0.5e-3;       // where the ball starts, over the tissue [m]
+constexpr double reliefTick = 1e-3;    // [s]
+const char* const relaxationSource = "closed form of a generalised Maxwell solid; no measurement";
 
 haptics::SessionModel blockOfLiver(bool relaxes)
 {
@@ -41,16 +41,17 @@ volume::Relaxation ofLiver(const haptics::SessionModel& model)
     return table.rows[*table.find("liver")].relaxation();
 }
 
-// A ball's force against the way in, tick by tick [N], led by depths [m] that are `apart` seconds from each other.
+// A ball's force against the way in, tick by tick [N], led by depths [m] that are `apart` seconds from each
+// other.
 std::vector<double> pressed(const haptics::SessionModel& model, const std::vector<double>& depths, double apart)
 {
     PosePath path{"relaxation", {}};
     for (std::size_t i = 0; i < depths.size(); ++i) {
-        path.poses.push_back({Vec3(0, depths[i] - ballRadius, 0), Vec3(0, 1, 0), static_cast<double>(i) * apart});
+        path.poses.push_back({Vec3(0, depths[i] - reliefBall, 0), Vec3(0, 1, 0), static_cast<double>(i) * apart});
     }
     PressOptions options;
     options.tool.kind = datasets::ToolKind::sphere;
-    options.tool.radius = ballRadius;
+    options.tool.radius = reliefBall;
     options.converge = true;
     std::vector<double> force;
     press(model, path, {}, options, [&](const PressSample& s) { force.push_back(-s.force.y); });
@@ -60,9 +61,9 @@ std::vector<double> pressed(const haptics::SessionModel& model, const std::vecto
 std::vector<double> pressAndHold(double hold)
 {
     std::vector<double> depths;
-    const auto ticks = static_cast<int>(std::lround(((depth + above) / speed + hold) / tick));
+    const auto ticks = static_cast<int>(std::lround(((depth + above) / reliefSpeed + hold) / reliefTick));
     for (int i = 0; i <= ticks; ++i) {
-        depths.push_back(std::min(i * tick * speed - above, depth));
+        depths.push_back(std::min(i * reliefTick * reliefSpeed - above, depth));
     }
     return depths;
 }
@@ -75,7 +76,7 @@ std::vector<double> hereditary(const std::vector<double>& force, const volume::R
     for (std::size_t i = 0; i < force.size(); ++i) {
         double left = force[i];
         for (std::size_t term = 0; term < lost.size() && i > 0; ++term) {
-            const double fraction = -std::expm1(-tick / volume::relaxationTimes[term]);
+            const double fraction = -std::expm1(-reliefTick / volume::relaxationTimes[term]);
             const double mean = 0.5 * (force[i] + force[i - 1]);
             lost[term] += fraction * (relaxation.weights[term] * mean - lost[term]);
             left -= lost[term];
@@ -91,19 +92,20 @@ Experiment held(bool quick, const ValidateProgress& progress)
     const volume::Relaxation relaxation = ofLiver(model);
     const std::vector<double> depths = pressAndHold(quick ? 1.5 : 5.0);
     progress("relaxation: without");
-    std::vector<double> elastic = pressed(soft, depths, tick);
+    std::vector<double> elastic = pressed(soft, depths, reliefTick);
     for (double& force : elastic) {
         force *= relaxation.instantaneous();
     }
     progress("relaxation: held");
-    const std::vector<double> ours = pressed(model, depths, tick);
+    const std::vector<double> ours = pressed(model, depths, reliefTick);
     const std::vector<double> exact = hereditary(elastic, relaxation);
     Experiment e;
     e.name = "relaxation-held";
     e.quantity = "force of a ball pressed in and held, RMS of the difference over the largest force";
-    e.source = source;
+    e.source = relaxationSource;
     e.fittedOn = "nothing";
-    e.predicted = fmt::format("force over time, liver, {:g} mm deep at {:g} mm/s, then held", 1e3 * depth, 1e3 * speed);
+    e.predicted =
+        fmt::format("force over time, liver, {:g} mm deep at {:g} mm/s, then held", 1e3 * depth, 1e3 * reliefSpeed);
     e.bound = 5.0;
     e.picture = {"A ball pressed in and held, tissue that relaxes", "time [s]", "force [N]", {}};
     ValidateCurve simulated{"simulated", {}, {}, true}, wanted{"hereditary integral", {}, {}, true};
@@ -111,7 +113,7 @@ Experiment held(bool quick, const ValidateProgress& progress)
     for (std::size_t i = 0; i < std::min(ours.size(), exact.size()); ++i) {
         errors.push_back(ours[i] - exact[i]);
         for (const auto& [curve, force] : {std::pair(&simulated, ours[i]), std::pair(&wanted, exact[i])}) {
-            curve->x.push_back(static_cast<double>(i) * tick);
+            curve->x.push_back(static_cast<double>(i) * reliefTick);
             curve->y.push_back(force);
         }
     }
@@ -134,9 +136,9 @@ constexpr int turns = 3;          // the last counts
 std::vector<double> swinging(double frequency)
 {
     std::vector<double> depths = pressAndHold(0.0);
-    const auto ticks = static_cast<int>(std::lround(turns / frequency / tick));
+    const auto ticks = static_cast<int>(std::lround(turns / frequency / reliefTick));
     for (int i = 1; i <= ticks; ++i) {
-        depths.push_back(depth - swing + swing * std::cos(2.0 * std::numbers::pi * frequency * i * tick));
+        depths.push_back(depth - swing + swing * std::cos(2.0 * std::numbers::pi * frequency * i * reliefTick));
     }
     return depths;
 }
@@ -144,7 +146,7 @@ std::vector<double> swinging(double frequency)
 // Work of the last turn, as if the force at its end were that at its start: the mean still falls [J].
 double workOfLastTurn(const std::vector<double>& depths, const std::vector<double>& force, double frequency)
 {
-    const auto turn = static_cast<std::size_t>(std::lround(1.0 / frequency / tick));
+    const auto turn = static_cast<std::size_t>(std::lround(1.0 / frequency / reliefTick));
     const std::size_t first = depths.size() - 1 - turn;
     const double drift = (force.back() - force[first]) / static_cast<double>(turn);
     double work = 0.0;
@@ -162,7 +164,7 @@ Experiment lost(bool quick, const ValidateProgress& progress)
     Experiment e;
     e.name = "relaxation-hysteresis";
     e.quantity = "work lost in a turn of a ball that swings in tissue, largest difference over the closed form";
-    e.source = source;
+    e.source = relaxationSource;
     e.fittedOn = "nothing";
     e.predicted = fmt::format("work lost at several frequencies, liver, {:g} mm about a depth of {:g} mm", 1e3 * swing,
                               1e3 * (depth - swing));
@@ -172,11 +174,11 @@ Experiment lost(bool quick, const ValidateProgress& progress)
     for (const double frequency : quick ? std::vector{1.0, 3.0} : std::vector{0.3, 1.0, 3.0}) {
         progress(fmt::format("relaxation: {:g} Hz", frequency));
         const std::vector<double> depths = swinging(frequency);
-        const std::vector<double> elastic = pressed(soft, pressAndHold(0.0), tick);
-        const std::vector<double> force = pressed(model, depths, tick);
+        const std::vector<double> elastic = pressed(soft, pressAndHold(0.0), reliefTick);
+        const std::vector<double> force = pressed(model, depths, reliefTick);
         const double ours = workOfLastTurn(depths, force, frequency);
         // F_e' about the middle of the swing.
-        const auto back = static_cast<std::size_t>(std::lround(2.0 * swing / speed / tick));
+        const auto back = static_cast<std::size_t>(std::lround(2.0 * swing / reliefSpeed / reliefTick));
         const std::size_t end = elastic.size() - 1;
         const double slope = relaxation.instantaneous() * (elastic[end] - elastic[end - back]) / (2.0 * swing);
         double fraction = 0.0;

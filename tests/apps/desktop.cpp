@@ -54,4 +54,14 @@ std::string Desktop::window(const std::string& name) const
     return {};
 }
 
+void wait(double seconds)
+{
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+glm::dvec3 vec(const channel::Triple& t)
+{
+    return {t[0], t[1], t[2]};
+}
+
 }  // namespace palpate::apps

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <channel/channel.h>
 #include <tests/apps/program.h>
 #include <tests/installed.h>
+
+#include <glm/vec3.hpp>
 
 #include <filesystem>
 #include <memory>
@@ -29,5 +32,10 @@ private:
     std::string display_;
     std::unique_ptr<Program> server_;
 };
+
+/// Lets time pass [s].
+void wait(double seconds);
+
+glm::dvec3 vec(const channel::Triple& t);
 
 }  // namespace palpate::apps

@@ -20,16 +20,6 @@ namespace {
 
 using glm::dvec3;
 
-dvec3 vec(const channel::Triple& t)
-{
-    return {t[0], t[1], t[2]};
-}
-
-void wait(double seconds)
-{
-    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-}
-
 // Somebody at a window: sees the tool as any viewer sees it, and has nothing but mouse and keys.
 class User {
 public:

@@ -24,16 +24,6 @@ namespace fs = std::filesystem;
 
 constexpr int wide = 1000, high = 700;
 
-void wait(double seconds)
-{
-    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-}
-
-glm::dvec3 vec(const channel::Triple& t)
-{
-    return {t[0], t[1], t[2]};
-}
-
 bool can()
 {
     return built("palpate-trainer") && built("palpate-view") && installed("Xvfb") && installed("xdotool");

@@ -21,11 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-void wait(double seconds)
-{
-    std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
-}
-
 // How long viewers are tormented [s]; PALPATE_TORMENT_SECONDS=60 is what docs/viewer.md tells about.
 double tormentSeconds()
 {

@@ -9,14 +9,14 @@
 namespace palpate::chainmail {
 namespace {
 
-constexpr double spacing = 1e-3;
-constexpr double radius = 10e-3;
+constexpr double blockSpacing = 1e-3;
+constexpr double bigRadius = 10e-3;
 constexpr double depth = 0.8e-3;
-const Vec3 top(15e-3, 0.0, 13e-3);
+const Vec3 blockTop(15e-3, 0.0, 13e-3);
 
 const ElasticBody& block()
 {
-    static const ElasticBody body = tests::bodyOf(tests::heldBlock({30, 18, 26}, spacing, 1e4, 0.45));
+    static const ElasticBody body = tests::bodyOf(tests::heldBlock({30, 18, 26}, blockSpacing, 1e4, 0.45));
     return body;
 }
 
@@ -29,20 +29,20 @@ Vec3 alongTop(double degrees)
 // A ball on the block that presses, and is led along a path at equilibrium.
 class Drag {
 public:
-    explicit Drag(double friction) : elastic_(block(), {}, tests::focusUnder(top)), friction_(friction) {}
+    explicit Drag(double friction) : elastic_(block(), {}, tests::focusUnder(blockTop)), friction_(friction) {}
 
     // To `deep` under the top and `aside` of its middle, in steps of 0.1 mm.
     void go(double deep, Vec3 aside)
     {
-        const Vec3 to = top + Vec3(0.0, deep - radius, 0.0) + aside;
+        const Vec3 to = blockTop + Vec3(0.0, deep - bigRadius, 0.0) + aside;
         const int steps = std::max(1, static_cast<int>(std::ceil(glm::distance(at_, to) / 0.1e-3)));
         const Vec3 from = at_;
         for (int i = 1; i <= steps; ++i) {
             const Vec3 before = force_;
             at_ = glm::mix(from, to, static_cast<double>(i) / steps);
-            std::array tools{tests::ball(at_, radius)};
+            std::array tools{tests::ball(at_, bigRadius)};
             tools[0].friction = friction_;
-            energy_ = tests::settle(elastic_, tests::loadOf(tools, {}, top), 1e-4, 100).energy;
+            energy_ = tests::settle(elastic_, tests::loadOf(tools, {}, blockTop), 1e-4, 100).energy;
             force_ = elastic_.toolForce(0);
             work_ -= 0.5 * glm::dot(force_ + before, to - from) / steps;
         }
@@ -67,7 +67,7 @@ public:
 private:
     Elastic elastic_;
     double friction_;
-    Vec3 at_ = top - Vec3(0.0, radius, 0.0);
+    Vec3 at_ = blockTop - Vec3(0.0, bigRadius, 0.0);
     Vec3 force_{0.0};
     double energy_ = 0.0;
     double work_ = 0.0;
@@ -135,7 +135,7 @@ TEST(ElasticFriction, BallThatSticksIsASpring)
     drag.go(depth, 0.1e-3 * way);
     const double stiffness = drag.along(way) / 0.1e-3;
     // A flat punch of the contact's radius that sticks is about as stiff along the surface as 8 G a / (2 - nu).
-    const double contact = std::sqrt(radius * depth);
+    const double contact = std::sqrt(bigRadius * depth);
     EXPECT_NEAR(stiffness, 8.0 * 1e4 / 2.9 * contact / 1.55, 0.25 * stiffness);
     for (const double s : {0.2e-3, 0.3e-3, 0.4e-3}) {
         drag.go(depth, s * way);

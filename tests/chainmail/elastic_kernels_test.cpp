@@ -16,7 +16,7 @@ namespace {
 using tests::Cells;
 using Matrix24 = std::array<std::array<double, 24>, 24>;
 
-constexpr double rounding = 1e-6;  // of single precision, over the operations of a cell
+constexpr double kernelRounding = 1e-6;  // of single precision, over the operations of a cell
 
 Mat3 strainOf(const Mat3& gradient)
 {
@@ -185,7 +185,7 @@ TEST(ElasticKernels, CellIsTheBrickAssembledByQuadrature)
         const Matrix24 theirs = byQuadrature(1.0, lambda);
         for (std::size_t a = 0; a < 24; ++a) {
             for (std::size_t b = 0; b < 24; ++b) {
-                EXPECT_NEAR(ours[a][b], theirs[a][b], rounding * (1.0 + lambda)) << a << " " << b;
+                EXPECT_NEAR(ours[a][b], theirs[a][b], kernelRounding * (1.0 + lambda)) << a << " " << b;
             }
         }
     }
@@ -197,7 +197,7 @@ TEST(ElasticKernels, ExactlySixMotionsOfACellCostNothing)
     for (const double lambda : {0.0, 1.5, 500.0}) {
         const auto values = eigenvalues(byKernel(1.0, lambda));
         for (std::size_t i = 0; i < 6; ++i) {
-            EXPECT_NEAR(values[i], 0.0, rounding * (1.0 + lambda));
+            EXPECT_NEAR(values[i], 0.0, kernelRounding * (1.0 + lambda));
         }
         EXPECT_GT(values[6], 0.05) << "lambda " << lambda;
     }
@@ -227,7 +227,7 @@ TEST(ElasticKernels, RotationsGiveNoForce)
         const auto turn = [&](Index3 n) { return glm::cross(axis, Vec3(n) - Vec3(11, 3, 4)); };
         cells.move(turn);
         cells.apply();
-        EXPECT_LT(cells.largestForce(), rounding * 100.0 * 12.0);
+        EXPECT_LT(cells.largestForce(), kernelRounding * 100.0 * 12.0);
     }
 }
 
@@ -254,7 +254,7 @@ TEST(ElasticKernels, AffineFieldsPassThePatchTest)
             }
             expected += side * squares * stress[axis];
         }
-        EXPECT_LT(glm::distance(cells.force(n), expected), rounding * (2.0 * mu + lambda));
+        EXPECT_LT(glm::distance(cells.force(n), expected), kernelRounding * (2.0 * mu + lambda));
     });
 }
 
@@ -318,7 +318,7 @@ TEST(ElasticKernels, OperatorIsSymmetric)
         a.apply();
         b.apply();
         const double scale = std::sqrt(dot(a, a.u, a.out) * dot(b, b.u, b.out));
-        EXPECT_NEAR(dot(a, a.u, b.out), dot(b, b.u, a.out), rounding * scale);
+        EXPECT_NEAR(dot(a, a.u, b.out), dot(b, b.u, a.out), kernelRounding * scale);
     }
 }
 

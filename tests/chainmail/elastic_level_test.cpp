@@ -16,15 +16,15 @@
 namespace palpate::chainmail {
 namespace {
 
-constexpr double spacing = 2e-3;
-constexpr double radius = 5e-3;  // of the ball that presses
-const Vec3 size = spacing * Vec3(26, 15, 22);
-const Vec3 top(0.5 * size.x, 0.0, 0.5 * size.z);
+constexpr double levelSpacing = 2e-3;
+constexpr double levelRadius = 5e-3;  // of the ball that presses
+const Vec3 size = levelSpacing * Vec3(26, 15, 22);
+const Vec3 levelTop(0.5 * size.x, 0.0, 0.5 * size.z);
 
 // A homogeneous block of tissue, its far side held, as a session has it: lattice, elastic body and surface on one grid.
 struct Bench {
     Bench()
-        : grid{Index3(30, 19, 26), Vec3(-1.5 * spacing), spacing},
+        : grid{Index3(30, 19, 26), Vec3(-1.5 * levelSpacing), levelSpacing},
           surface(tests::distanceOn(grid, [](Vec3 p) { return tests::boxDistance(p, Vec3(0.0), size); })),
           body(bodyOn(grid, surface)),
           lattice(grid, rows(grid), tests::tableOf({})),
@@ -33,7 +33,7 @@ struct Bench {
     }
 
     static bool inside(Vec3 p) { return tests::boxDistance(p, Vec3(0.0), size) < 0.0; }
-    static bool held(Vec3 p) { return p.y > size.y - spacing; }
+    static bool held(Vec3 p) { return p.y > size.y - levelSpacing; }
     static std::vector<std::uint8_t> rows(const volume::NodeGrid& grid)
     {
         std::vector<std::uint8_t> rows(grid.count(), 0);
@@ -70,7 +70,7 @@ ElasticOptions smallWindows()
 Grip away()
 {
     Grip grip;
-    grip.proxy = grip.position = top - Vec3(0.0, 50e-3, 0.0);
+    grip.proxy = grip.position = levelTop - Vec3(0.0, 50e-3, 0.0);
     return grip;
 }
 
@@ -79,16 +79,16 @@ Grip pressed(Vec3 proxy, Vec3 position)
 {
     Grip grip = away();
     grip.kind = Grip::Kind::press;
-    grip.shape = {position, position, radius, radius};
+    grip.shape = {position, position, levelRadius, levelRadius};
     grip.proxy = proxy;
     grip.position = position;
-    grip.radius = radius;
+    grip.radius = levelRadius;
     return grip;
 }
 
 Grip pressedBy(double depth, Vec3 aside = Vec3(0.0))
 {
-    const Vec3 proxy = top + aside - Vec3(0.0, radius, 0.0);
+    const Vec3 proxy = levelTop + aside - Vec3(0.0, levelRadius, 0.0);
     return pressed(proxy, proxy + Vec3(0.0, depth, 0.0));
 }
 
@@ -148,7 +148,7 @@ std::optional<double> worstCorner(const DisplacedLattice& shape)
 
 // A hand that wants to turn tissue inside out: it jumps, pushes 30 mm deep, drags aside, takes hold of points inside and
 // at the surface, and lets go.
-class HostileHand {
+class WildHand {
 public:
     Grip next()
     {
@@ -165,7 +165,7 @@ public:
                 grip_ = held(0.98 * size * Vec3(unit(), unit(), unit()) + 0.01 * size, 30e-3 * jump, true);
                 break;
             case 3:
-                grip_ = held(onTop() + Vec3(0.0, radius, 0.0), 15e-3 * jump + Vec3(0.0, 15e-3, 0.0), false);
+                grip_ = held(onTop() + Vec3(0.0, levelRadius, 0.0), 15e-3 * jump + Vec3(0.0, 15e-3, 0.0), false);
                 break;
             case 4:  // a jump
                 grip_.position += 20e-3 * jump;
@@ -176,14 +176,14 @@ public:
             default:
                 grip_.position += 1e-3 * jump;
         }
-        grip_.shape = {grip_.position, grip_.position, radius, radius};
+        grip_.shape = {grip_.position, grip_.position, levelRadius, levelRadius};
         return grip_;
     }
     int calls() { return 1 + static_cast<int>(random_() % 4); }
 
 private:
     double unit() { return value_(random_); }
-    Vec3 onTop() { return {size.x * unit(), -radius, size.z * unit()}; }
+    Vec3 onTop() { return {size.x * unit(), -levelRadius, size.z * unit()}; }
 
     Grip grip_ = away();
     std::minstd_rand random_{17};
@@ -194,8 +194,8 @@ private:
 TEST(ElasticLevel, NoCellOfTheLatticeEverTurnsOver)
 {
     Bench bench;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
-    HostileHand hand;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
+    WildHand hand;
     double furthest = 0.0;
     for (int i = 0; i < 2000; ++i) {
         const Grip grip = hand.next();
@@ -210,7 +210,7 @@ TEST(ElasticLevel, NoCellOfTheLatticeEverTurnsOver)
         }
     }
     // Hostile it was: tissue went further than a cell is wide.
-    EXPECT_GT(furthest, 2.0 * spacing);
+    EXPECT_GT(furthest, 2.0 * levelSpacing);
 }
 
 // Calls after a release until every node is at rest: what it takes to look at every node once, 512 per call, is half of
@@ -235,7 +235,7 @@ bool allAtRest(const DisplacedLattice& shape)
 TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterRelease)
 {
     Bench bench;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
     for (const double aside : {0.0, 8e-3, -15e-3}) {
         for (int i = 1; i <= 60; ++i) {
             level.deform(pressedBy(std::min(4e-3, 0.2e-3 * i), Vec3(aside * i / 60.0, 0.0, 0.0)));
@@ -250,8 +250,8 @@ TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterRelease)
 TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterWhateverTheHandDid)
 {
     Bench bench;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
-    HostileHand hand;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
+    WildHand hand;
     int releases = 0;
     for (int i = 0; i < 600 && !HasFailure(); ++i) {
         const Grip grip = hand.next();
@@ -271,7 +271,7 @@ TEST(ElasticLevel, EveryNodeIsAtRestSoonAfterWhateverTheHandDid)
 TEST(ElasticLevel, LatticeComesToTheShapeOfTheWindows)
 {
     Bench bench;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
     for (int i = 0; i < 20; ++i) {
         level.deform(pressedBy(0.2e-3 * i, Vec3(-1e-3 * i, 0.0, 0.0)));
     }
@@ -303,7 +303,7 @@ TEST(ElasticLevel, LatticeComesToTheShapeOfTheWindows)
 TEST(ElasticLevel, ForceIsThereForAToolThatPressesAndGoneWithIt)
 {
     Bench bench;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
     Vec3 force(0.0);
     for (int i = 1; i <= 30; ++i) {
         const auto reaction = level.deform(pressedBy(0.1e-3 * i));
@@ -314,7 +314,7 @@ TEST(ElasticLevel, ForceIsThereForAToolThatPressesAndGoneWithIt)
     EXPECT_LT(force.y, -0.02);
     EXPECT_EQ(level.deform(pressedBy(-1e-3)).force, Vec3(0.0));
     EXPECT_TRUE(level.elastic().atRest());
-    EXPECT_FALSE(level.deform(held(top + Vec3(0.0, 2e-3, 0.0), Vec3(0.0, 2e-3, 0.0), true)).force);
+    EXPECT_FALSE(level.deform(held(levelTop + Vec3(0.0, 2e-3, 0.0), Vec3(0.0, 2e-3, 0.0), true)).force);
     EXPECT_FALSE(level.deform(away()).force);
 }
 
@@ -324,13 +324,13 @@ TEST(ElasticLevel, PointThatIsHeldTakesTheTissueAlong)
     const Vec3 pushed(1e-3, 2e-3, -0.5e-3);
     for (const double deep : {0.0, 7e-3}) {
         Bench bench;
-        ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
+        ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
         // A node of the lattice at 7 mm; at the surface the hold is on the node just under it.
         const Vec3 rest(27e-3, deep, 23e-3);
         for (int i = 1; i <= 60; ++i) {
             level.deform(held(rest, std::min(1.0, i / 20.0) * pushed, deep > 0.0));
         }
-        const Index3 node(glm::round((glm::max(rest, Vec3(1e-3)) - bench.grid.origin) / spacing));
+        const Index3 node(glm::round((glm::max(rest, Vec3(1e-3)) - bench.grid.origin) / levelSpacing));
         const Vec3 u(bench.shape.u()[bench.grid.offset(node)]);
         const double fraction = glm::dot(u, pushed) / glm::dot(pushed, pushed);
         EXPECT_GT(fraction, 0.6) << deep;
@@ -348,9 +348,9 @@ TEST(ElasticLevel, HeldPointIsSolvedByTurns)
     Bench bench, inTurns;
     ElasticOptions always = smallWindows();
     always.heldPeriod = 1;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, always, top);
-    ElasticLevel byTurns(inTurns.shape, inTurns.body, inTurns.surface, smallWindows(), top);
-    const std::size_t node = bench.grid.offset(Index3(glm::round((rest - bench.grid.origin) / spacing)));
+    ElasticLevel level(bench.shape, bench.body, bench.surface, always, levelTop);
+    ElasticLevel byTurns(inTurns.shape, inTurns.body, inTurns.surface, smallWindows(), levelTop);
+    const std::size_t node = bench.grid.offset(Index3(glm::round((rest - bench.grid.origin) / levelSpacing)));
     int solved = 0;
     for (int i = 1; i <= 120; ++i) {
         const Grip grip = held(rest, Vec3(0.0, step * std::min(i, 90), 0.0), true);
@@ -368,8 +368,8 @@ TEST(ElasticLevel, HeldPointIsSolvedByTurns)
 TEST(ElasticLevel, DeformTouchesNoHeap)
 {
     Bench bench;
-    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), top);
-    HostileHand hand;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), levelTop);
+    WildHand hand;
     const auto calls = tests::heapCallsIn([&] {
         for (int i = 0; i < 300; ++i) {
             level.deform(hand.next());

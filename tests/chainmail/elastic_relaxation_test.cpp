@@ -14,10 +14,10 @@
 namespace palpate::chainmail {
 namespace {
 
-constexpr double spacing = 2e-3;
-constexpr double period = 2e-3;  // of a call [s]
-constexpr double modulus = 1e4;  // [Pa]
-const Vec3 top(15e-3, 0.0, 15e-3);
+constexpr double cellSpacing = 2e-3;
+constexpr double period = 2e-3;          // of a call [s]
+constexpr double relaxingModulus = 1e4;  // [Pa]
+const Vec3 onTop(15e-3, 0.0, 15e-3);
 
 using Weights = std::array<float, volume::relaxationTerms>;
 
@@ -31,8 +31,11 @@ volume::CellMaterial relaxing(double youngsModulus, double poissonRatio, Weights
 // 30 x 20 x 30 mm on a floor, all of one tissue.
 ElasticBody blockOf(Weights weights, double poissonRatio = 0.45)
 {
-    const tests::ElasticBlock block{
-        {15, 10, 15}, spacing, [=](Index3 c) { return relaxing(modulus, poissonRatio, weights, c.y == 9); }, 1, Vec3(0.0)};
+    const tests::ElasticBlock block{{15, 10, 15},
+                                    cellSpacing,
+                                    [=](Index3 c) { return relaxing(relaxingModulus, poissonRatio, weights, c.y == 9); },
+                                    1,
+                                    Vec3(0.0)};
     return tests::bodyOf(block, 0.4999, true);
 }
 
@@ -49,13 +52,13 @@ ElasticOptions ofStrain(bool finite, int window = 15)
 // answer: one mode, with a stiffness that relaxes as the tissue does.
 class Led {
 public:
-    explicit Led(const ElasticBody& body) : elastic_(body, ofStrain(false), tests::focusUnder(top)) {}
+    explicit Led(const ElasticBody& body) : elastic_(body, ofStrain(false), tests::focusUnder(onTop)) {}
 
     // Force of the spring on the tissue, one period later, its end at `u` [N].
     double to(double u)
     {
         const std::array ties{Tie{at, {0.0, u, 0.0}, {0.0, 1.0, 0.0}, spring, spring}};
-        elastic_.relax(tests::loadOf({}, ties, top), 12, 1e-5);
+        elastic_.relax(tests::loadOf({}, ties, onTop), 12, 1e-5);
         return spring * (u - elastic_.displacement(at).y);
     }
     Elastic& elastic() { return elastic_; }
@@ -63,7 +66,7 @@ public:
     static constexpr double spring = 200.0;  // [N/m]
 
 private:
-    const Vec3 at = top + Vec3(0.0, 4e-3, 0.0);
+    const Vec3 at = onTop + Vec3(0.0, 4e-3, 0.0);
     Elastic elastic_;
 };
 
@@ -171,26 +174,27 @@ TEST(Relaxation, LayersInSeriesCreepEachByItsOwnWeights)
     const Weights upper{0.5F, 0.0F}, lower{0.0F, 0.7F};
     const tests::ElasticBlock block{
         {cells, cells + 1, cells},
-        spacing,
-        [=](Index3 c) { return relaxing(modulus, 0.0, c.y < cells / 2 ? upper : lower, c.y == cells); },
+        cellSpacing,
+        [=](Index3 c) { return relaxing(relaxingModulus, 0.0, c.y < cells / 2 ? upper : lower, c.y == cells); },
         1,
         Vec3(0.0)};
     const ElasticBody body = tests::bodyOf(block, 0.4999, true);
-    const Vec3 middle(0.5 * cells * spacing, 0.0, 0.5 * cells * spacing);
+    const Vec3 middle(0.5 * cells * cellSpacing, 0.0, 0.5 * cells * cellSpacing);
     Elastic elastic(body, ofStrain(false, 21), tests::focusUnder(middle));
     ASSERT_EQ(elastic.stack().size(), 2U);
     constexpr double soft = 1e-3, pull = 1.0;  // springs that give next to nothing [N/m], and the way of their ends [m]
     std::vector<Tie> ties;
     for (int i = 0; i < cells * cells; ++i) {
-        const Vec3 at(spacing * (i % cells + 0.5), 1e-6, spacing * (i / cells + 0.5));
+        const Vec3 at(cellSpacing * (i % cells + 0.5), 1e-6, cellSpacing * (i / cells + 0.5));
         ties.push_back({at, {0.0, pull, 0.0}, {0.0, 1.0, 0.0}, soft, soft});
     }
-    const double stress = soft * pull / (spacing * spacing);
+    const double stress = soft * pull / (cellSpacing * cellSpacing);
     const auto strain = [&](double w, double time, double t) {
-        const double instantaneous = modulus * volume::Relaxation{{w * (time < 1.0), w * (time > 1.0)}}.instantaneous();
+        const double instantaneous =
+            relaxingModulus * volume::Relaxation{{w * (time < 1.0), w * (time > 1.0)}}.instantaneous();
         return stress / instantaneous * (1.0 + w / (1.0 - w) * (1.0 - std::exp(-(1.0 - w) * t / time)));
     };
-    const double height = 0.5 * cells * spacing;
+    const double height = 0.5 * cells * cellSpacing;
     const Vec3 border = middle + Vec3(0.0, height, 0.0);
     for (int i = 0; i < 2000; ++i) {
         elastic.relax(tests::loadOf({}, ties, middle), 12, 1e-5);
@@ -205,13 +209,13 @@ TEST(Relaxation, LayersInSeriesCreepEachByItsOwnWeights)
 double heldShare(bool finite, double depth, Weights weights, double seconds)
 {
     const ElasticBody body = blockOf(weights);
-    Elastic elastic(body, ofStrain(finite), tests::focusUnder(top));
+    Elastic elastic(body, ofStrain(finite), tests::focusUnder(onTop));
     constexpr double radius = 6e-3;
-    std::array tools{tests::ball(top + Vec3(0.0, -radius, 0.0), radius, 1e4)};
+    std::array tools{tests::ball(onTop + Vec3(0.0, -radius, 0.0), radius, 1e4)};
     const auto press = [&](double deep) {
-        tools[0].shape.a = tools[0].shape.b = top + Vec3(0.0, deep - radius, 0.0);
+        tools[0].shape.a = tools[0].shape.b = onTop + Vec3(0.0, deep - radius, 0.0);
         tools[0].pushed = Vec3(0.0, deep, 0.0);
-        elastic.relax(tests::loadOf(tools, {}, top));
+        elastic.relax(tests::loadOf(tools, {}, onTop));
         return -elastic.toolForce(0).y;
     };
     double peak = 0.0, force = 0.0;
@@ -246,11 +250,11 @@ TEST(Relaxation, TissueThatIsLetGoComesBackToExactRest)
     for (int i = 0; i < 1000; ++i) {
         led.to(2e-3);
     }
-    const Vec3 at = top + Vec3(0.0, 4e-3, 0.0);
+    const Vec3 at = onTop + Vec3(0.0, 4e-3, 0.0);
     double before = led.elastic().displacement(at).y;
     int calls = 0;
     for (; !led.elastic().atRest() && calls < 4000; ++calls) {
-        led.elastic().relax(tests::loadOf({}, {}, top), 12, 1e-3);
+        led.elastic().relax(tests::loadOf({}, {}, onTop), 12, 1e-3);
         const double now = led.elastic().displacement(at).y;
         ASSERT_LT(std::abs(now), std::abs(before) + 2e-6) << calls;
         before = now;
@@ -265,8 +269,11 @@ TEST(Relaxation, TissueThatIsLetGoComesBackToExactRest)
 TEST(Relaxation, WindowsThatMoveTakeTheHistoryAlong)
 {
     const Weights weights{0.5F, 0.3F};
-    const tests::ElasticBlock block{
-        {46, 16, 30}, spacing, [=](Index3 c) { return relaxing(modulus, 0.45, weights, c.y == 15); }, 4, Vec3(0.0)};
+    const tests::ElasticBlock block{{46, 16, 30},
+                                    cellSpacing,
+                                    [=](Index3 c) { return relaxing(relaxingModulus, 0.45, weights, c.y == 15); },
+                                    4,
+                                    Vec3(0.0)};
     const ElasticBody body = tests::bodyOf(block, 0.4999, true);
     const Vec3 start(30e-3, 0.0, 30e-3);
     const auto forces = [&](int window, int& moves) {
@@ -302,9 +309,9 @@ TEST(Relaxation, WindowsThatMoveTakeTheHistoryAlong)
 TEST(Relaxation, WindowsThatMoveKeepTheWorkOfTheHistory)
 {
     const tests::ElasticBlock block{{60, 30, 60},
-                                    spacing,
+                                    cellSpacing,
                                     [](Index3) {
-                                        return relaxing(modulus, 0.45, {0.5F, 0.3F});
+                                        return relaxing(relaxingModulus, 0.45, {0.5F, 0.3F});
                                     },
                                     1,
                                     Vec3(0.0)};

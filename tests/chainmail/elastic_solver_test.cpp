@@ -11,12 +11,12 @@
 namespace palpate::chainmail {
 namespace {
 
-constexpr double spacing = 1e-3;
+constexpr double fineSpacing = 1e-3;
 constexpr double radius = 5e-3;
 
 ElasticBody body(double nu = 0.45)
 {
-    return tests::bodyOf(tests::heldBlock({30, 18, 26}, spacing, 1e4, nu));
+    return tests::bodyOf(tests::heldBlock({30, 18, 26}, fineSpacing, 1e4, nu));
 }
 
 const Vec3 top(15e-3, 0.0, 13e-3);

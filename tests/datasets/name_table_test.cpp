@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class Names : public ::testing::Test {
+class NamesOfTables : public ::testing::Test {
 protected:
     fs::path write(const fs::path& name, const std::string& text) const
     {
@@ -36,7 +36,7 @@ protected:
     const LabelCounts counts{{0, 9}, {1, 5}, {2, 3}};
 };
 
-TEST_F(Names, AreReadFromEveryKindOfTable)
+TEST_F(NamesOfTables, AreReadFromEveryKindOfTable)
 {
     EXPECT_EQ(read(write("s.ctbl",
                          "# Color table file s.ctbl\n# 3 values\n0 background 0 0 0 0\n1 right_lung 10 20 30 255\r\n"
@@ -60,7 +60,7 @@ TEST_F(Names, AreReadFromEveryKindOfTable)
     EXPECT_EQ(readNameTable(folder / "nnunet.json").regions, std::vector<std::string>{"whole"});
 }
 
-TEST_F(Names, OfWhatIsNoTableAreRefusedWithTheLine)
+TEST_F(NamesOfTables, OfWhatIsNoTableAreRefusedWithTheLine)
 {
     const auto error = [&](const std::string& text) { return tests::errorOf([&] { read(write("t.txt", text)); }); };
     EXPECT_NE(error("1 a 1 2 3 4\nliver\n").find("t.txt:2: neither VALUE NAME R G B A"), std::string::npos);
@@ -74,7 +74,7 @@ TEST_F(Names, OfWhatIsNoTableAreRefusedWithTheLine)
     EXPECT_NE(tests::errorOf([&] { read(folder.path()); }).find("is a folder, not a file"), std::string::npos);
 }
 
-TEST_F(Names, AreGivenToLabelsThatHaveNone)
+TEST_F(NamesOfTables, AreGivenToLabelsThatHaveNone)
 {
     MappingOptions options;
     options.names = write("t.ctbl", "1 liver 1 2 3 255\n7 spleen 1 2 3 255\n");
@@ -93,7 +93,7 @@ TEST_F(Names, AreGivenToLabelsThatHaveNone)
     EXPECT_EQ(labels.names[1].name, "spleen");
 }
 
-TEST_F(Names, ThatContradictTheFileOrNameNothingAreRefused)
+TEST_F(NamesOfTables, ThatContradictTheFileOrNameNothingAreRefused)
 {
     MappingOptions options;
     options.names = write("t.ctbl", "1 liver 1 2 3 255\n2 tumor 1 2 3 255\n");
@@ -112,7 +112,7 @@ TEST_F(Names, ThatContradictTheFileOrNameNothingAreRefused)
 }
 
 // dataset.json of MSD and nnU-Net where the file lies in their folders, and nowhere else.
-TEST_F(Names, AreFoundOnlyWhereTheyCertainlyBelong)
+TEST_F(NamesOfTables, AreFoundOnlyWhereTheyCertainlyBelong)
 {
     const MappingOptions options;
     const std::string json = R"({"labels": {"0": "background", "1": "liver", "2": "cancer"},

@@ -12,7 +12,7 @@
 namespace palpate::haptics {
 namespace {
 
-constexpr double millimetre = 1e-3;
+constexpr double oneMillimetre = 1e-3;
 
 // Notch of 20 mm along the back direction whose middle lies `away` from a target of 10 mm at 0, after a touch of the skin.
 std::vector<Loss> lossesOfCore(Vec3 away, double fraction, double error)
@@ -42,16 +42,17 @@ std::vector<Loss> lossesOfCore(Vec3 away, double fraction, double error)
 
 TEST(Losses, SayWhereTheCoreLay)
 {
-    const auto feet = lossesOfCore({0, 0, -14 * millimetre}, 0, 9 * millimetre);
+    const auto feet = lossesOfCore({0, 0, -14 * oneMillimetre}, 0, 9 * oneMillimetre);
     ASSERT_FALSE(feet.empty());
     EXPECT_EQ(feet[0].measure, "best_target_pct");
     EXPECT_EQ(feet[0].words,
               "No core hit the tumour: the nearest lay 9.0 mm beside it; it lay 14.0 mm off its middle towards the feet");
     EXPECT_DOUBLE_EQ(feet[0].at.value(), 2.0);
-    EXPECT_TRUE(lossesOfCore({8 * millimetre, 0, 8 * millimetre}, 0, 0.003)[0].words.ends_with(
+    EXPECT_TRUE(lossesOfCore({8 * oneMillimetre, 0, 8 * oneMillimetre}, 0, 0.003)[0].words.ends_with(
         "it lay 11.3 mm off its middle towards the patient's left and the head"));
-    EXPECT_NE(lossesOfCore({0, 12 * millimetre, 0}, 0.2, 0)[0].words.find("it lay 12.0 mm too deep"), std::string::npos);
-    EXPECT_NE(lossesOfCore({0, -12 * millimetre, 0}, 0.2, 0)[0].words.find("12.0 mm not deep enough"), std::string::npos);
+    EXPECT_NE(lossesOfCore({0, 12 * oneMillimetre, 0}, 0.2, 0)[0].words.find("it lay 12.0 mm too deep"), std::string::npos);
+    EXPECT_NE(lossesOfCore({0, -12 * oneMillimetre, 0}, 0.2, 0)[0].words.find("12.0 mm not deep enough"),
+              std::string::npos);
 }
 
 TEST(Losses, HaveDirectionsOfThePatient)
@@ -98,11 +99,11 @@ TEST(Losses, APalpationThatMissesKeepsNoMoreThanABiopsyThatMisses)
     Score s;
     s.skinContacts = 1;
     s.marks = 2;
-    s.markError = 25 * millimetre;
+    s.markError = 25 * oneMillimetre;
     s.markSizeError = 0;
     s.peakForce = 1;
     EXPECT_EQ(parts(s).core + parts(s).technique, 0);
-    s.markError = 9 * millimetre;
+    s.markError = 9 * oneMillimetre;
     EXPECT_EQ(parts(s).technique, 25);
 }
 

@@ -15,9 +15,9 @@
 namespace palpate::haptics {
 namespace {
 
-constexpr double ballRadius = 10e-3;
+constexpr double relaxedBall = 10e-3;
 constexpr double depth = 4e-3;
-constexpr int rampUp = 500;  // ticks of the stabiliser's ramp, and more
+constexpr int relaxedRamp = 500;  // ticks of the stabiliser's ramp, and more
 
 const SessionModel& block(bool relaxes)
 {
@@ -30,10 +30,10 @@ const SessionModel& block(bool relaxes)
     return relaxes ? with : without;
 }
 
-DeviceSample at(double deep)
+DeviceSample sampleAt(double deep)
 {
     DeviceSample s;
-    s.position = {0, deep - ballRadius, 0};
+    s.position = {0, deep - relaxedBall, 0};
     s.axis = {0, 1, 0};
     s.buttons = buttonDeadMan;
     return s;
@@ -42,11 +42,11 @@ DeviceSample at(double deep)
 // Waits, presses in a twentieth of a second, holds for `seconds`.
 std::vector<DeviceSample> pressed(double seconds)
 {
-    std::vector<DeviceSample> samples(rampUp, at(-1e-3));
+    std::vector<DeviceSample> samples(relaxedRamp, sampleAt(-1e-3));
     for (int i = 0; i < 50; ++i) {
-        samples.push_back(at(depth * i / 50.0));
+        samples.push_back(sampleAt(depth * i / 50.0));
     }
-    samples.insert(samples.end(), static_cast<std::size_t>(seconds / tickSeconds), at(depth));
+    samples.insert(samples.end(), static_cast<std::size_t>(seconds / tickSeconds), sampleAt(depth));
     return samples;
 }
 
@@ -71,7 +71,7 @@ TEST(RelaxingTissue, HeldForceFallsByTheTablesSeries)
     ASSERT_TRUE(fat.any());
     const double held = elastic.back();
     for (const double seconds : {0.2, 0.5, 1.0, 3.0}) {
-        const double now = relaxing[static_cast<std::size_t>(rampUp + 50 + seconds / tickSeconds) - 1];
+        const double now = relaxing[static_cast<std::size_t>(relaxedRamp + 50 + seconds / tickSeconds) - 1];
         EXPECT_NEAR(now, held * fat.instantaneous() * fat.remaining(seconds), 0.04 * held) << seconds;
     }
 }
@@ -111,7 +111,7 @@ TEST(RelaxingTissue, LevelSpringHoldsItsForce)
         "structure = \"base\"\naim_mm = [0, 55, 0]\n[model]\nrelaxation = true\nlevel = \"spring\"\n"));
     const auto samples = pressed(1.0);
     const auto force = forces(model, samples);
-    EXPECT_EQ(force.back(), force[rampUp + 60]);
+    EXPECT_EQ(force.back(), force[relaxedRamp + 60]);
 }
 
 }  // namespace

@@ -119,7 +119,7 @@ TEST(Planner, PredictsTheErrorAgainstOutsideFiniteElements)
         const PlanCandidate& c = plan.candidates[*plan.choice];
         ASSERT_EQ(c.level, ModelLevel::elastic);
         const studies::TrialBody body =
-            studies::trialBody(*tissue, model->surface, c.elastic.spacing, subject.poissonCap(), 4U << 20);
+            studies::trialBody(*tissue, model->surface, c.elastic.spacing, subject.poissonCap(), studies::maxTrialNodes);
         const studies::TrialResult found =
             studies::elasticTrial(body.body, subject.path, subject.speed, outside,
                                   {.window = c.elastic.window, .cycles = c.elastic.cycles, .law = c.elastic.law});

@@ -12,7 +12,7 @@
 namespace palpate::reference {
 namespace {
 
-constexpr double side = 20e-3;  // [m]
+constexpr double cubeSide = 20e-3;  // [m]
 
 // The middle of the top is pressed in, the base held, x = 0 and y = 0 planes of symmetry.
 struct Problem {
@@ -24,26 +24,26 @@ struct Problem {
 
 Problem pressedBlock(Law law, double depth)
 {
-    const std::vector<double> ends{0.0, 3e-3, 6e-3, 12e-3, side};
+    const std::vector<double> ends{0.0, 3e-3, 6e-3, 12e-3, cubeSide};
     BoxMeshOptions box;
     box.held = [](Vec3 p) { return p.z < 1e-9; };
     std::vector<double> up;
     for (std::size_t i = ends.size(); i-- > 0;) {
-        up.push_back(side - ends[i]);
+        up.push_back(cubeSide - ends[i]);
     }
     Problem problem{boxMesh(ends, ends, up, box), {{3e3, 0.45, 0.0}}, {}, {}};
     problem.options.law = law;
     problem.options.mirrored = {true, true, false};
-    problem.patch.in = [](Vec3 p) { return p.z > side - 1e-9 && std::max(p.x, p.y) < 6e-3 + 1e-9; };
+    problem.patch.in = [](Vec3 p) { return p.z > cubeSide - 1e-9 && std::max(p.x, p.y) < 6e-3 + 1e-9; };
     problem.patch.u = [depth](Vec3 p) { return Vec3(0.05 * p.y, 0.0, -depth + 5.0 * p.x * p.x); };
     return problem;
 }
 
 Problem inclusion()
 {
-    Problem problem{ballInBox(10e-3, side, 3), {{3e3, 0.45, 0.0}, {30e3, 0.3, 0.0}}, {}, {}};
+    Problem problem{ballInBox(10e-3, cubeSide, 3), {{3e3, 0.45, 0.0}, {30e3, 0.3, 0.0}}, {}, {}};
     problem.options.mirrored = {true, true, true};
-    problem.patch.in = [](Vec3 p) { return p.z > side - 1e-9; };
+    problem.patch.in = [](Vec3 p) { return p.z > cubeSide - 1e-9; };
     problem.patch.u = [](Vec3 p) { return Vec3(0.0, 0.1 * p.x, 1e-3); };
     return problem;
 }

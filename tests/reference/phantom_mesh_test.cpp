@@ -26,7 +26,7 @@
 namespace palpate::reference {
 namespace {
 
-const char* const mesher = PALPATE_BIN_DIR "/palpate-mesh";
+const char* const meshProgram = PALPATE_BIN_DIR "/palpate-mesh";
 
 volume::Tissue phantom(const std::string& name, double voxel, std::map<std::string, double> numbers)
 {
@@ -57,7 +57,7 @@ VolumeMesh meshed(const volume::Tissue& tissue, double size, SurfaceKind surface
     options.size = size;
     options.largest = 3.0 * size;
     options.surface = surface;
-    options.tetgen.program = mesher;
+    options.tetgen.program = meshProgram;
     VolumeMesh made = meshVolume(tissue, options);
     expectGood(made.quality);
     // One region per tissue: every tissue of the voxels, bone too.
@@ -88,7 +88,7 @@ TEST(VolumeMesh, WithoutTissueIsRefused)
     spec.name = "block";
     spec.voxel = 5e-3;
     VolumeMeshOptions options;
-    options.tetgen.program = mesher;
+    options.tetgen.program = meshProgram;
     EXPECT_THROW(meshVolume(datasets::makePhantom(spec, table), options), std::runtime_error);
 }
 

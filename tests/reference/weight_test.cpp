@@ -13,7 +13,7 @@
 namespace palpate::reference {
 namespace {
 
-constexpr double side = 0.016, length = 0.06, density = 1000.0, poisson = 0.45;  // [m], [kg/m^3]
+constexpr double columnSide = 0.016, length = 0.06, massDensity = 1000.0, poisson = 0.45;  // [m], [kg/m^3]
 
 // A bar along y, held at its end y = 60 mm: where the middle of its free end goes, by quadratic tetrahedra.
 Vec3 tipByTheReference(double youngsModulus, double nu, Vec3 acceleration, Law law)
@@ -27,31 +27,31 @@ Vec3 tipByTheReference(double youngsModulus, double nu, Vec3 acceleration, Law l
     };
     BoxMeshOptions box;
     box.held = [](Vec3 p) { return p.y > length - 1e-6; };
-    const TetMesh mesh = boxMesh(even(side, 4), even(length, 12), even(side, 4), box);
+    const TetMesh mesh = boxMesh(even(columnSide, 4), even(length, 12), even(columnSide, 4), box);
     SolveOptions options;
     options.law = law;
     const std::array<Material, 1> materials{{{youngsModulus, nu, 0.0}}};
     Equilibrium body(mesh, materials, options);
-    const std::array<double, 1> densities{density};
+    const std::array<double, 1> densities{massDensity};
     for (const double fraction : {0.25, 0.5, 0.75, 1.0}) {
         body.weigh(mesh, densities, fraction * acceleration);
         EXPECT_TRUE(body.find(1e-6)) << fraction;
     }
-    const std::array<Vec3, 1> tip{1e3 * Vec3(0.5 * side, 0.0, 0.5 * side)};
+    const std::array<Vec3, 1> tip{1e3 * Vec3(0.5 * columnSide, 0.0, 0.5 * columnSide)};
     return 1e-3 * body.fem.displacementAt(body.state, tip)[0];
 }
 
 // The same by the kernel's cells.
 Vec3 tipByTheKernel(double youngsModulus, Vec3 acceleration, int cells)
 {
-    const double h = side / cells;
+    const double h = columnSide / cells;
     const Index3 size(cells, static_cast<int>(std::lround(length / h)) + 1, cells);
     const chainmail::ElasticBody body = tests::bodyOf(tests::heldBlock(size, h, youngsModulus, poisson));
     const auto& nodes = body.levels[0].nodes;
     chainmail::LoadedBody loaded(body);
     const Index3 first(glm::round(-nodes.origin / h));
     volume::forEachIndex(first, first + Index3(cells - 1, size.y - 2, cells - 1), [&](Index3 c) {
-        volume::forEachIndex(c, c + 1, [&](Index3 n) { loaded.load(n, 0.125 * density * h * h * h * acceleration); });
+        volume::forEachIndex(c, c + 1, [&](Index3 n) { loaded.load(n, 0.125 * massDensity * h * h * h * acceleration); });
     });
     EXPECT_TRUE(loaded.solve(1e-7, 400).balanced);
     return loaded.displacement(first + Index3(cells / 2, 0, cells / 2));
@@ -61,7 +61,7 @@ Vec3 tipByTheKernel(double youngsModulus, Vec3 acceleration, int cells)
 TEST(Weight, AHangingBarOfTheReferenceStretchesByTheFormula)
 {
     constexpr double e = 60e3;
-    const double formula = density * 9.81 * length * length / (2.0 * e);
+    const double formula = massDensity * 9.81 * length * length / (2.0 * e);
     EXPECT_NEAR(tipByTheReference(e, 0.0, {0, -9.81, 0}, volume::SmallStrain{}).y, -formula, 1e-3 * formula);
 }
 

@@ -20,13 +20,6 @@ constexpr double bodyRadius = 45e-3, skinThickness = 2e-3, glandRadius = 30e-3, 
 constexpr glm::dvec3 tumourCentre{8e-3, -6e-3, 0};
 constexpr glm::dvec3 entryPoint{-14e-3, -42.77e-3, 0};
 
-channel::Name named(const char* words)
-{
-    channel::Name name{};
-    std::strncpy(name.data(), words, name.size() - 1);
-    return name;
-}
-
 // The artery runs along z beside the planned line.
 double arteryDistance(glm::dvec3 p)
 {
@@ -61,6 +54,13 @@ double wayAt(double t)
 }
 
 }  // namespace
+
+channel::Name named(const std::string& words)
+{
+    channel::Name name{};
+    std::strncpy(name.data(), words.c_str(), name.size() - 1);
+    return name;
+}
 
 channel::Scenery bodyScenery(int voxels, double spacing)
 {

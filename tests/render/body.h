@@ -3,9 +3,13 @@
 #include <channel/channel.h>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace palpate::render {
+
+/// As viewers are told names.
+channel::Name named(const std::string& words);
 
 /// A made-up session for tests of the viewer: a ball of skin, fat and gland with a tumour and an artery, and a needle that
 /// presses a dimple, breaks through, reaches the tumour and fires.

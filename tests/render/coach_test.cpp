@@ -1,6 +1,7 @@
 #include <render/coach.h>
 #include <render/concealment.h>
 #include <render/deformation.h>
+#include <tests/render/body.h>
 
 #include <gtest/gtest.h>
 
@@ -15,13 +16,6 @@ namespace palpate::render {
 namespace {
 
 constexpr double none = std::numeric_limits<double>::infinity();
-
-channel::Name named(const char* words)
-{
-    channel::Name name{};
-    std::strncpy(name.data(), words, name.size() - 1);
-    return name;
-}
 
 // A needle that goes to the back (+y), 20 mm to a tumour's middle.
 channel::Scenery needleScenery()

@@ -2,6 +2,7 @@
 
 #include <render/slice_picture.h>
 #include <render/volume_picture.h>
+#include <tests/render/body.h>
 
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
@@ -25,24 +26,17 @@
 namespace palpate::render {
 namespace {
 
-constexpr int side = 40;
+constexpr int cubeSide = 40;
 constexpr double voxel = 1e-3, node = 2e-3;
 constexpr double low = -100, perMetre = 1.5e4;  // of the ramp along x
-
-channel::Name named(const char* words)
-{
-    channel::Name name{};
-    std::strncpy(name.data(), words, name.size() - 1);
-    return name;
-}
 
 // A cube of tissue 1 in front (y < 20 mm) and 2 behind, with air on both sides of z, a shell in tissue 1, and an image that
 // rises along x.
 struct Block {
     Block()
     {
-        scenery.labels = {{side, side, side}, 0, {0, 0, 0}, voxel};
-        scenery.lattice = {{side / 2, side / 2, side / 2}, 0, {0, 0, 0}, node};
+        scenery.labels = {{cubeSide, cubeSide, cubeSide}, 0, {0, 0, 0}, voxel};
+        scenery.lattice = {{cubeSide / 2, cubeSide / 2, cubeSide / 2}, 0, {0, 0, 0}, node};
         scenery.tissues = 3;
         scenery.tissue[1] = {named("fat"), {0.95F, 0.85F, 0.50F}, 0.0F};
         scenery.tissue[2] = {named("artery"), {0.85F, 0.10F, 0.10F}, 1.0F};
@@ -52,9 +46,9 @@ struct Block {
         scenery.imageUnit = named("HU");
         scenery.imageLow = low;
         scenery.imageStep = perMetre * voxel / 100;
-        for (int i = 0; i < side * side * side; ++i) {
-            const int x = i % side, y = i / side % side, z = i / side / side;
-            const bool air = z < 5 || z >= side - 5;
+        for (int i = 0; i < cubeSide * cubeSide * cubeSide; ++i) {
+            const int x = i % cubeSide, y = i / cubeSide % cubeSide, z = i / cubeSide / cubeSide;
+            const bool air = z < 5 || z >= cubeSide - 5;
             const std::uint8_t shell = y == 10 ? channel::shellBit : 0;
             labels.push_back(air ? 0 : static_cast<std::uint8_t>((y < 20 ? 1 : 2) | shell));
             codes.push_back(static_cast<std::uint16_t>(100 * x));
@@ -77,7 +71,7 @@ TEST(GreyImage, IsExactOnARampAndClipsAtTheWindow)
     const Block block;
     GreyImage image(block.scenery, block.codes);
     std::mt19937 random(5);
-    std::uniform_real_distribution<double> any(0.1e-3, (side - 1.1) * voxel);
+    std::uniform_real_distribution<double> any(0.1e-3, (cubeSide - 1.1) * voxel);
     for (const std::uint32_t window : {0U, 1U, 0U}) {
         ASSERT_EQ(image.window(), window);
         int black = 0, white = 0;
@@ -93,7 +87,7 @@ TEST(GreyImage, IsExactOnARampAndClipsAtTheWindow)
     }
     EXPECT_EQ(image.windowName(), "narrow");
     EXPECT_EQ(image.windowRange(), "0 to 300 HU");
-    for (const double beyond : {-1e-3, side * voxel})
+    for (const double beyond : {-1e-3, cubeSide * voxel})
         EXPECT_EQ(image.at({0.01, beyond, 0.01}), 0);
 }
 
@@ -170,7 +164,7 @@ TEST(SliceOfAnImage, MovesWithTheTissue)
     const Block block;
     for (const double stretch : {-0.05, 0.15}) {
         auto displaced = std::make_unique<channel::Displaced>();
-        constexpr std::uint32_t n = side / 2;
+        constexpr std::uint32_t n = cubeSide / 2;
         for (std::uint32_t i = 0; i < n * n * n; ++i)
             displaced->nodes[displaced->count++] = {i, {static_cast<float>(stretch * node * (i % n)), 0, 0}};
         Slice slice(block, true, displaced.get());

@@ -1,5 +1,7 @@
+#include <base/units.h>
 #include <datasets/scene.h>
 #include <render/palette.h>
+#include <tests/render/body.h>
 #include <volume/tissue.h>
 
 #include <gtest/gtest.h>
@@ -13,7 +15,6 @@
 #include <cmath>
 #include <cstring>
 #include <map>
-#include <numbers>
 #include <set>
 #include <string>
 #include <utility>
@@ -24,7 +25,7 @@ namespace {
 using glm::dmat3;
 using glm::dvec3;
 
-constexpr double degree = std::numbers::pi / 180;
+using units::degree;
 
 // Of linear RGB, rows as printed. Source: G. M. Machado, M. M. Oliveira and L. A. F. Fernandes, "A Physiologically-based
 // Model for Simulation of Color Vision Deficiency", IEEE TVCG 15(6), 2009, severity 1.0.
@@ -85,13 +86,6 @@ TEST(Palette, TheColourDifferenceIsThatOfThePublishedPairs)
     EXPECT_NEAR(difference({50, 0, 0}, {50, -1, 2}), 2.3669, 5e-5);
     EXPECT_NEAR(difference({50, -0.001, 2.49}, {50, 0.0009, -2.49}), 4.8045, 5e-5);
     EXPECT_NEAR(difference({50, 2.5, 0}, {73, 25, -18}), 27.1492, 5e-5);
-}
-
-channel::Name named(const std::string& words)
-{
-    channel::Name name{};
-    std::strncpy(name.data(), words.c_str(), name.size() - 1);
-    return name;
 }
 
 // Names of tissues that touch in a body: neighbours along the axes, air left out.

@@ -33,7 +33,7 @@ namespace palpate::render {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int width = 800, height = 600;
+constexpr int viewWidth = 800, viewHeight = 600;
 
 // A process of ours: killed at the latest when it goes out of scope.
 class Process {
@@ -154,7 +154,7 @@ Pixel pixelAt(vtkImageData& image, int x, int y)
     return {p[0], p[1], p[2]};
 }
 
-bool near(const Pixel& a, const Pixel& b, int tolerance)
+bool nearTo(const Pixel& a, const Pixel& b, int tolerance)
 {
     return std::abs(a[0] - b[0]) <= tolerance && std::abs(a[1] - b[1]) <= tolerance && std::abs(a[2] - b[2]) <= tolerance;
 }
@@ -162,7 +162,7 @@ bool near(const Pixel& a, const Pixel& b, int tolerance)
 // Where the slice shows the point `p` [m] of its plane.
 Pixel onSlice(vtkImageData& image, const channel::Scenery& scenery, glm::dvec3 p)
 {
-    const Area area = ScreenPlan(width, height).slices[0];
+    const Area area = ScreenPlan(viewWidth, viewHeight).slices[0];
     const ViewFrame frame = viewFrame(scenery);
     const glm::dvec3 d = (p - frame.centre) * (std::min(area.width, area.height) / frame.extent);
     return pixelAt(image, area.x + area.width / 2 + static_cast<int>(std::lround(glm::dot(d, frame.right))),
@@ -174,7 +174,7 @@ int countNear(vtkImageData& image, const Area& area, const Pixel& colour, int to
     int count = 0;
     for (int y = area.y; y < area.y + area.height; ++y)
         for (int x = area.x; x < area.x + area.width; ++x)
-            count += near(pixelAt(image, x, y), colour, tolerance);
+            count += nearTo(pixelAt(image, x, y), colour, tolerance);
     return count;
 }
 
@@ -193,15 +193,15 @@ TEST_F(Viewer, ShowsTheImageInItsSlices)
     const channel::Grid& grid = scenery.labels;
     for (const double x : {-30e-3, -12e-3, 10e-3, 25e-3}) {
         const int grey = static_cast<int>(255 * (x - grid.origin[0]) / ((grid.size[0] - 1) * grid.spacing));
-        EXPECT_TRUE(near(onSlice(*reader->GetOutput(), scenery, {x, 15e-3, 0}), {grey, grey, grey}, 3)) << x;
+        EXPECT_TRUE(nearTo(onSlice(*reader->GetOutput(), scenery, {x, 15e-3, 0}), {grey, grey, grey}, 3)) << x;
     }
 }
 
 TEST_F(Viewer, ShowsTheDimpleAndTheNeedleWhereTheyAre)
 {
     const auto before = pictureAt("0.05"), after = pictureAt("1.99");
-    ASSERT_EQ(before->GetDimensions()[0], width);
-    ASSERT_EQ(after->GetDimensions()[1], height);
+    ASSERT_EQ(before->GetDimensions()[0], viewWidth);
+    ASSERT_EQ(after->GetDimensions()[1], viewHeight);
     const channel::Scenery scenery = bodyScenery();
     const glm::dvec3 entry = vec(scenery.entry), axis = glm::normalize(vec(scenery.aim) - entry);
     const ViewFrame frame = viewFrame(scenery);
@@ -209,15 +209,15 @@ TEST_F(Viewer, ShowsTheDimpleAndTheNeedleWhereTheyAre)
     constexpr Pixel fat{242, 217, 128}, air{12, 13, 18}, needle{64, 217, 255};
 
     const glm::dvec3 inDimple = entry + 4.5e-3 * axis + 3e-3 * aside;
-    EXPECT_TRUE(near(onSlice(*before, scenery, inDimple), fat, 3));
-    EXPECT_TRUE(near(onSlice(*after, scenery, inDimple), air, 3));
+    EXPECT_TRUE(nearTo(onSlice(*before, scenery, inDimple), fat, 3));
+    EXPECT_TRUE(nearTo(onSlice(*after, scenery, inDimple), air, 3));
     const glm::dvec3 farAway = entry + 20e-3 * axis - 25e-3 * aside;
     EXPECT_EQ(onSlice(*before, scenery, farAway), onSlice(*after, scenery, farAway));
 
     // Pressed 9 mm deep the shaft is 5 mm inside the rest surface; before that the tip was 23 mm off.
-    EXPECT_TRUE(near(onSlice(*after, scenery, entry + 3e-3 * axis), needle, 3));
-    EXPECT_FALSE(near(onSlice(*before, scenery, entry + 3e-3 * axis), needle, 60));
-    const Area view = ScreenPlan(width, height).view;
+    EXPECT_TRUE(nearTo(onSlice(*after, scenery, entry + 3e-3 * axis), needle, 3));
+    EXPECT_FALSE(nearTo(onSlice(*before, scenery, entry + 3e-3 * axis), needle, 60));
+    const Area view = ScreenPlan(viewWidth, viewHeight).view;
     const int shown = countNear(*before, view, {70, 235, 255}, 60), longer = countNear(*after, view, {70, 235, 255}, 60);
     EXPECT_GT(shown, 50);
     EXPECT_GT(longer, shown + 200);
@@ -299,7 +299,7 @@ int countOnScreen(const fs::path& file, const Pixel& colour)
         return 0;
     int count = 0;
     for (std::size_t at = word(0) + word(19) * colourBytes; at + 3 < bytes.size(); at += 4)
-        count += near({byte(at + 2), byte(at + 1), byte(at)}, colour, 2);
+        count += nearTo({byte(at + 2), byte(at + 1), byte(at)}, colour, 2);
     return count;
 }
 
@@ -333,9 +333,9 @@ TEST_F(Viewer, DrawsFiguresAndSliceInAWindowToo)
 int bodyOnScreen(const fs::path& file)
 {
     constexpr Pixel background{15, 18, 26};
-    const ScreenPlan plan(width, height);
+    const ScreenPlan plan(viewWidth, viewHeight);
     const int empty = countOnScreen(file, background);
-    return empty == 0 ? 0 : width * height - empty - (width - plan.view.width) * height;
+    return empty == 0 ? 0 : viewWidth * viewHeight - empty - (viewWidth - plan.view.width) * viewHeight;
 }
 
 // From the first picture on, through the change from coarse pictures to the fine one 1.2 s after all motion: only on a
@@ -348,7 +348,7 @@ TEST_F(Viewer, TheBodyStaysOnTheScreenWhenMotionStops)
                     "--session", session_, "--size", "800x600", "--wait", "1", "--no-steps"},
                    log("viewer"));
     const fs::path screen = folder_ / "Xvfb_screen0";
-    constexpr int some = width * height / 10;
+    constexpr int some = viewWidth * viewHeight / 10;
     for (int i = 0; i < 600 && bodyOnScreen(screen) < some; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(50));
     std::this_thread::sleep_for(std::chrono::milliseconds(300));

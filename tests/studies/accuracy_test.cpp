@@ -23,7 +23,7 @@ namespace {
 using tests::errorOf;
 
 // The block under a 10 mm sphere, and a stand-in reference: the same body on a grid of 2 mm, converged.
-struct Pressed {
+struct PressedBlock {
     AccuracySubject subject = accuracySubject(std::make_shared<const haptics::SessionModel>(smallBlock()));
     TrialBody body = trialBody(*subject.model->tissue, subject.model->surface, 2e-3, 0.49, 1U << 20);
     std::array<double, 1> speeds{subject.speed};
@@ -35,9 +35,9 @@ struct Pressed {
     }
 };
 
-const Pressed& pressed()
+const PressedBlock& pressedBlock()
 {
-    static const Pressed p;
+    static const PressedBlock p;
     return p;
 }
 
@@ -85,7 +85,7 @@ void write(const std::filesystem::path& file, const std::string& bytes)
 TEST(ReferenceFile, GivesBackWhatWasSaved)
 {
     const tests::Folder folder;
-    const Reference& before = pressed().linear;
+    const Reference& before = pressedBlock().linear;
     saveReference(folder / "a.ref", before, someInfo());
     const auto [after, info] = loadReference(folder / "a.ref");
     EXPECT_EQ(info.key, someInfo().key);
@@ -165,7 +165,7 @@ struct Cube {
 
 TEST(ReferenceFile, TheKeyChangesWithEverythingThatTheSolutionDependsOn)
 {
-    const TrialPath path = pressed().subject.path;
+    const TrialPath path = pressedBlock().subject.path;
     EXPECT_EQ(Cube().key(path), Cube().key(path));
     EXPECT_EQ(Cube().key(path).size(), 16U);
     std::vector<std::string> keys{Cube().key(path), Cube().key(path, 30e-3), Cube().key(path, 20e-3, "neo-hookean")};
@@ -206,7 +206,7 @@ TEST(ReferenceFile, TheKeyChangesWithEverythingThatTheSolutionDependsOn)
 // Another machine's rounding of the path is no other problem.
 TEST(ReferenceFile, TheKeyDoesNotFeelRounding)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     TrialPath path = p.subject.path;
     path.press *= 1.0 + 1e-12;
     path.start *= 1.0 - 1e-12;
@@ -216,7 +216,7 @@ TEST(ReferenceFile, TheKeyDoesNotFeelRounding)
 
 TEST(Accuracy, AModelThatIsTheReferenceHasNoErrorAndHalfOfItHalf)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     const TrialResult same = runTrial(follower(p.linear, 1.0), p.subject.path, p.subject.speed, p.linear);
     ASSERT_FALSE(same.looks.empty());
     for (const TrialErrors& e : same.looks) {
@@ -270,7 +270,7 @@ TEST(Accuracy, PositionsWithoutALatticeHaveNoCells)
 // Against another law the law itself is the error, and the looks are those of a run.
 TEST(Accuracy, TheFloorIsTheErrorOfOneReferenceAgainstTheOther)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     Reference other = p.linear;
     for (ReferenceState& s : other.states) {
         for (Vec3f& u : s.u) {
@@ -294,7 +294,7 @@ TEST(Accuracy, TheFloorIsTheErrorOfOneReferenceAgainstTheOther)
 // One run against two references gives what two runs give.
 TEST(Accuracy, ManyReferencesShareARun)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     Reference half = p.linear;
     half.peakForce *= 0.5;
     for (ReferenceState& s : half.states) {
@@ -339,7 +339,7 @@ TEST(ParetoFront, IsBeatenByNothingAndBeatsTheRest)
 
 TEST(Accuracy, AMethodThatFailsOrIsTooSlowSaysWhy)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     const std::array references{&p.linear};
     const Baseline broken{"broken", "", []() -> TrialModel { throw std::runtime_error("the scene is too large"); }};
     const AccuracyRun failed = runAccuracy(broken, p.subject, references, 10.0);
@@ -353,7 +353,7 @@ TEST(Accuracy, AMethodThatFailsOrIsTooSlowSaysWhy)
 // Level spring pushes straight out of the surface, with a force that is proportional to the depth.
 TEST(Accuracy, LevelSpringsForceIsProportionalToTheDepth)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     const auto methods = rigidMethods(p.subject);
     ASSERT_EQ(methods[1].method, "spring");
     const TrialModel spring = methods[1].build();
@@ -371,7 +371,7 @@ TEST(Accuracy, LevelSpringsForceIsProportionalToTheDepth)
 // The windows of the settings are the settings', and finer ones are nearer to the reference.
 TEST(Accuracy, LevelElasticIsRunAtItsSettings)
 {
-    const auto& p = pressed();
+    const auto& p = pressedBlock();
     const std::array references{&p.linear};
     double fast = 0.0, standard = 0.0;
     for (const Baseline& b : elasticMethods(p.subject)) {

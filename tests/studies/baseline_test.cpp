@@ -22,14 +22,14 @@ using chainmail::Lattice;
 using chainmail::Node;
 using chainmail::Seed;
 
-constexpr double h = 1e-3;                                  // spacing of the test lattices [m]
-constexpr double press = 0.4, lengthen = 0.5, shear = 0.3;  // slack, in spacings
+constexpr double h = 1e-3;                                       // spacing of the test lattices [m]
+constexpr double pressSlack = 0.4, lengthen = 0.5, shear = 0.3;  // slack, in spacings
 
 volume::TissueTable oneTissue()
 {
     volume::TissueTable table;
     table.rows.resize(2);
-    table.rows[1].compress = 1.0 - press;
+    table.rows[1].compress = 1.0 - pressSlack;
     table.rows[1].stretch = 1.0 + lengthen;
     table.rows[1].shear = shear;
     return table;
@@ -61,7 +61,7 @@ TEST(FifoMail, APushedNodeMovesTheOthersByTheClosedForm)
     propagateFifo(lattice, u, scratch, std::vector<Seed>{{static_cast<Node>(lattice.grid.offset(middle)), {0, 0, d}}});
     forEachNode(lattice, [&](Node n, Index3 at) {
         const Index3 off = at - middle;
-        const double along = off.z > 0 ? press * off.z : -lengthen * off.z;
+        const double along = off.z > 0 ? pressSlack * off.z : -lengthen * off.z;
         const double expected = std::max(0.0, d - h * (along + shear * (std::abs(off.x) + std::abs(off.y))));
         EXPECT_NEAR(static_cast<double>(u[n].z), expected, 1e-4 * h);
         EXPECT_EQ(u[n].x, 0.0F);
@@ -174,7 +174,7 @@ TEST(NodeValues, AreTrilinearOverTissue)
 }
 
 // The small block, pressed by the 5 mm sphere.
-struct Pressed {
+struct BasePressed {
     haptics::SessionModel model = smallBlock();
     TrialPlace place = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     TrialPath path = trialPath(*model.tissue, model.surface, place, trialTools()[0], 1e-3);
@@ -184,23 +184,23 @@ struct Pressed {
     Reference reference = solveReference(body.body, path, speeds, {.tolerance = 1e-3, .maxPoints = 4000});
 };
 
-const Pressed& pressed()
+const BasePressed& basePressed()
 {
-    static const Pressed p;
+    static const BasePressed p;
     return p;
 }
 
 TrialErrors medianErrors(const TrialModel& model)
 {
-    const TrialResult result = runTrial(model, pressed().path, 20e-3, pressed().reference);
+    const TrialResult result = runTrial(model, basePressed().path, 20e-3, basePressed().reference);
     return {TrialPhase::press, spreadOf(result.looks, &TrialErrors::rms).median,
             spreadOf(result.looks, &TrialErrors::near).median, 0.0, spreadOf(result.looks, &TrialErrors::force).median};
 }
 
 RigidSphere deepSphere()
 {
-    TrialLoad load(pressed().path);
-    load.set({pressed().path.press, 0.0});
+    TrialLoad load(basePressed().path);
+    load.set({basePressed().path.press, 0.0});
     const auto& shape = load.load().tools.front().shape;
     return {shape.b, shape.radiusB};
 }
@@ -209,7 +209,7 @@ RigidSphere deepSphere()
 // leaves no force across.
 TEST(RelaxedGrid, ItsEndIsTheEquilibriumUnderTheSphere)
 {
-    const auto& p = pressed();
+    const auto& p = basePressed();
     const RigidSphere sphere = deepSphere();
     RelaxedGrid grid(p.body.body.levels.front(), p.model.surface, {sphere.centre - 0.02, sphere.centre + 0.02});
     grid.project(sphere);
@@ -227,7 +227,7 @@ TEST(RelaxedGrid, ItsEndIsTheEquilibriumUnderTheSphere)
 // Another solver with another contact (a soft one, at four points per cell) on the same cells has the same equilibrium.
 TEST(RelaxedGrid, ManySweepsPerTickAgreeWithMultigridOnTheWholeGrid)
 {
-    const TrialErrors errors = medianErrors(relaxedModel(pressed().scene, 1e-3, 60, false));
+    const TrialErrors errors = medianErrors(relaxedModel(basePressed().scene, 1e-3, 60, false));
     EXPECT_LT(errors.rms, 1.0);
     EXPECT_LT(errors.near, 1.5);
     EXPECT_LT(errors.force, 6.0);
@@ -236,7 +236,7 @@ TEST(RelaxedGrid, ManySweepsPerTickAgreeWithMultigridOnTheWholeGrid)
 // The increment of a node on the sphere goes straight down with what the links keep back, whatever the tissue.
 TEST(IncrementMail, TakesAnIncrementThroughTheBodyByTheClosedForm)
 {
-    const auto& level = pressed().body.body.levels.front();
+    const auto& level = basePressed().body.body.levels.front();
     IncrementMail mail(level);
     Index3 top(level.nodes.size / 2);
     for (top.y = 0; level.diagonal[level.nodes.offset(top)] <= 0.0F; ++top.y) {
@@ -259,14 +259,14 @@ TEST(IncrementMail, TakesAnIncrementThroughTheBodyByTheClosedForm)
 
 TEST(LatticeBaselines, ChainMailBeforeTheSweepsIsWorthMoreThanAnotherSweep)
 {
-    const double alone = medianErrors(relaxedModel(pressed().scene, 1e-3, 2, false)).rms;
-    const double predicted = medianErrors(relaxedModel(pressed().scene, 1e-3, 1, true)).rms;
+    const double alone = medianErrors(relaxedModel(basePressed().scene, 1e-3, 2, false)).rms;
+    const double predicted = medianErrors(relaxedModel(basePressed().scene, 1e-3, 1, true)).rms;
     EXPECT_LT(predicted, 0.9 * alone);
 }
 
 TEST(LatticeBaselines, RelaxationTowardsTheMeanImprovesChainMail)
 {
-    const auto& scene = pressed().scene;
+    const auto& scene = basePressed().scene;
     const double rms = medianErrors(fifoMailModel(scene, 2e-3, 1.0, 0)).rms;
     EXPECT_LT(medianErrors(fifoMailModel(scene, 2e-3, 1.0, 10)).rms, 0.95 * rms);
     EXPECT_LT(rms, medianErrors(nothingModel()).rms);
@@ -275,7 +275,7 @@ TEST(LatticeBaselines, RelaxationTowardsTheMeanImprovesChainMail)
 // ChainMail from rest forgets where the tool has been: out of the tissue, everything is at rest.
 TEST(LatticeBaselines, ChainMailFromRestGoesBackToRest)
 {
-    const auto& p = pressed();
+    const auto& p = basePressed();
     for (const int sweeps : {0, 5}) {
         const TrialModel model = fifoMailModel(p.scene, 2e-3, 0.5, sweeps);
         TrialLoad load(p.path);
@@ -295,7 +295,7 @@ TEST(LatticeBaselines, ChainMailFromRestGoesBackToRest)
 
 TEST(LatticeBaselines, EachHasItsOwnNameAndFollowsTheTool)
 {
-    const auto& p = pressed();
+    const auto& p = basePressed();
     std::set<std::string> names;
     for (const Baseline& b : latticeBaselines(p.scene)) {
         EXPECT_TRUE(names.insert(b.method + " " + b.setting).second) << b.method << " " << b.setting;
@@ -315,8 +315,8 @@ TEST(LatticeBaselines, EachHasItsOwnNameAndFollowsTheTool)
 
 TEST(LatticeBaselines, TooFineANetIsRefused)
 {
-    EXPECT_THROW(fifoMailModel(pressed().scene, 0.05e-3, 1.0, 0), std::runtime_error);
-    EXPECT_THROW(relaxedModel(pressed().scene, 0.05e-3, 1, true), std::runtime_error);
+    EXPECT_THROW(fifoMailModel(basePressed().scene, 0.05e-3, 1.0, 0), std::runtime_error);
+    EXPECT_THROW(relaxedModel(basePressed().scene, 0.05e-3, 1, true), std::runtime_error);
 }
 
 }  // namespace

@@ -19,10 +19,10 @@
 namespace palpate::studies {
 namespace {
 
-constexpr double speed = 20e-3;
+constexpr double tetSpeed = 20e-3;
 
 // The block, and the 5 mm sphere's way into it.
-struct Pressed {
+struct TetPressed {
     haptics::SessionModel model = smallBlock();
     TrialPlace place = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     TrialPath path = trialPath(*model.tissue, model.surface, place, trialTools()[0], 2e-3);
@@ -36,15 +36,15 @@ struct Pressed {
     double radius() const { return path.tool.radius; }
 };
 
-const Pressed& pressed()
+const TetPressed& tetPressed()
 {
-    static const Pressed p;
+    static const TetPressed p;
     return p;
 }
 
 volume::TissueTable fatTable()
 {
-    volume::TissueTable table = pressed().model.tissue->table();
+    volume::TissueTable table = tetPressed().model.tissue->table();
     return table;
 }
 
@@ -94,7 +94,7 @@ std::map<std::array<std::uint32_t, 3>, int> trianglesOf(const TetBody& mesh)
 // A triangle inside belongs to two tetrahedra, one on the outside to one, and its points are points of the surface.
 TEST(TetBody, FillTheBlockAndMeetFaceToFace)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     for (const double spacing : {2e-3, 3e-3}) {
         const TetBody mesh = p.mesh(spacing, 0.49);
         const Vec3 side = p.model.tissue->box().high - p.model.tissue->box().low;
@@ -135,7 +135,7 @@ TEST(TetBody, TheSurfaceOfABallIsRound)
 
 TEST(TetBody, APlaceIsWhereTheBarycentricSumSays)
 {
-    const TetBody mesh = pressed().mesh(3e-3, 0.49);
+    const TetBody mesh = tetPressed().mesh(3e-3, 0.49);
     for (const Vec3 rest : {Vec3(1.1e-3, 5.2e-3, -7.3e-3), Vec3(-9.7e-3, 0.4e-3, 3.9e-3), mesh.points[40]}) {
         const Vec3 found = valueAt(placeOf(mesh, rest), [&](std::uint32_t i) { return mesh.points[i]; });
         EXPECT_LT(glm::distance(found, rest), 1e-12);
@@ -146,7 +146,7 @@ TEST(TetBody, APlaceIsWhereTheBarycentricSumSays)
 
 TEST(TetBody, TooManyPointsAreRefused)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     EXPECT_THROW(latticeTets(*p.model.tissue, p.model.surface, 1e-3, 0.49, 1000), std::runtime_error);
 }
 
@@ -202,7 +202,7 @@ std::vector<double> loadsBy(const Mat3& gradient, const TetBody& mesh, const std
 // the gradients, the stiffness and the solver to be right, for several right sides at once.
 TEST(TetFactor, PassesThePatchTest)
 {
-    const TetBody mesh = shaken(pressed().mesh(2e-3, 0.45));
+    const TetBody mesh = shaken(tetPressed().mesh(2e-3, 0.45));
     const std::array<Mat3, 2> gradients{Mat3(1e-3, 2e-3, -3e-3, 4e-3, 5e-3, 6e-3, -7e-3, 8e-3, 9e-3), Mat3(0.01)};
     std::size_t count = 0;
     const std::vector<std::uint32_t> unknown = unknownsOf(mesh, count);
@@ -222,17 +222,17 @@ TEST(TetFactor, PassesThePatchTest)
 
 TEST(TetFactor, WhatNothingHoldsIsRefused)
 {
-    TetBody mesh = pressed().mesh(3e-3, 0.45);
+    TetBody mesh = tetPressed().mesh(3e-3, 0.45);
     std::ranges::fill(mesh.held, std::uint8_t{0});
-    EXPECT_THROW(FactoredTets(std::move(mesh), pressed().path), std::runtime_error);
+    EXPECT_THROW(FactoredTets(std::move(mesh), tetPressed().path), std::runtime_error);
 }
 
 TEST(FactoredTets, NoPointIsInsideTheSphereAndNoneIsPulled)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     FactoredTets tets(p.mesh(2e-3, 0.45), p.path);
     std::size_t most = 0;
-    for (const TrialTick& tick : schedule(p.path, speed)) {
+    for (const TrialTick& tick : schedule(p.path, tetSpeed)) {
         const Vec3 centre = p.centre(tick.pose);
         const auto result = tets.press(centre, p.radius());
         most = std::max(most, tets.touched());
@@ -255,7 +255,7 @@ TEST(FactoredTets, NoPointIsInsideTheSphereAndNoneIsPulled)
 // What the contact points do is what the tetrahedra do.
 TEST(FactoredTets, TheColumnsGiveTheContactsTheirDisplacement)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     FactoredTets tets(p.mesh(2e-3, 0.45), p.path);
     tets.press(p.centreAt(3e-3), p.radius());
     for (const auto& c : tets.contacts()) {
@@ -266,7 +266,7 @@ TEST(FactoredTets, TheColumnsGiveTheContactsTheirDisplacement)
 // Without friction all work goes into the tissue: dE = F dz.
 TEST(FactoredTets, TheForceIsTheDerivativeOfTheEnergy)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     FactoredTets tets(p.mesh(2e-3, 0.45), p.path);
     constexpr double step = 5e-6;
     const double low = tets.press(p.centreAt(2e-3 - step), p.radius()).energy;
@@ -280,13 +280,13 @@ TEST(FactoredTets, TheForceIsTheDerivativeOfTheEnergy)
 // Linear elements come nearer to the converged solution on cells of 1 mm with every finer mesh.
 TEST(FactoredTets, ConvergeTowardsTheConvergedLattice)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     const TrialBody fine = trialBody(*p.model.tissue, p.model.surface, 1e-3, 0.45, 1U << 20);
-    const std::array speeds{speed};
+    const std::array speeds{tetSpeed};
     const Reference reference = solveReference(fine.body, p.path, speeds, {.maxPoints = 5000});
     std::vector<double> near, force;
     for (const double spacing : {4e-3, 2e-3, 1.3e-3}) {
-        const TrialResult result = runTrial(factoredModel(p.mesh(spacing, 0.45), p.path), p.path, speed, reference);
+        const TrialResult result = runTrial(factoredModel(p.mesh(spacing, 0.45), p.path), p.path, tetSpeed, reference);
         near.push_back(spreadOf(result.looks, &TrialErrors::near).median);
         force.push_back(spreadOf(result.looks, &TrialErrors::force).median);
     }
@@ -298,7 +298,7 @@ TEST(FactoredTets, ConvergeTowardsTheConvergedLattice)
 
 TEST(Xpbd, ABodyAtRestStaysThere)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     Xpbd tets(p.mesh(3e-3, 0.49), {.substeps = 10});
     for (int i = 0; i < 50; ++i) {
         tets.step(p.centreAt(-5e-3), p.radius());
@@ -313,7 +313,7 @@ TEST(Xpbd, ABodyAtRestStaysThere)
 // What tetrahedra do to each other cancels: a free body that is not damped keeps its momentum while it quivers.
 TEST(Xpbd, TetrahedraKeepTheMomentum)
 {
-    TetBody mesh = pressed().mesh(3e-3, 0.45);
+    TetBody mesh = tetPressed().mesh(3e-3, 0.45);
     std::ranges::fill(mesh.held, std::uint8_t{0});
     Xpbd tets(std::move(mesh), {.substeps = 10, .damping = 0.0});
     for (std::size_t i = 0; i < tets.velocities().size(); ++i) {
@@ -332,7 +332,7 @@ TEST(Xpbd, TetrahedraKeepTheMomentum)
 // Presses slowly, then waits until nothing moves any more.
 Xpbd settled(const TetBody& mesh, double depth, int substeps)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     Xpbd tets(mesh, {.substeps = substeps, .damping = 200.0});
     constexpr int way = 60;
     for (int i = 1; i <= way; ++i) {
@@ -368,7 +368,7 @@ std::vector<Vec3> elasticForces(const TetBody& mesh, std::span<const Vec3f> u)
 // the points that it does are what XPBD's impulses say. More substeps come nearer.
 TEST(Xpbd, SettlesAtTheEquilibriumOfTheEnergy)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     const TetBody mesh = p.mesh(3e-3, 0.45);
     std::vector<double> off;
     for (const int substeps : {5, 20}) {
@@ -394,7 +394,7 @@ TEST(Xpbd, SettlesAtTheEquilibriumOfTheEnergy)
 // At a small depth finite strain is small strain: lambda and mu mean the same to both.
 TEST(Xpbd, IsLinearElasticityWhereStrainsAreSmall)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     const TetBody mesh = p.mesh(3e-3, 0.45);
     constexpr double depth = 0.15e-3;
     const Xpbd tets = settled(mesh, depth, 20);
@@ -408,18 +408,18 @@ TEST(Xpbd, IsLinearElasticityWhereStrainsAreSmall)
 
 TEST(TetBaselines, EveryOneIsBetterThanNothing)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     const TrialBody body = trialBody(*p.model.tissue, p.model.surface, 2e-3, 0.49, 1U << 20);
-    const std::array speeds{speed};
+    const std::array speeds{tetSpeed};
     const Reference reference = solveReference(body.body, p.path, speeds, {.law = volume::NeoHookean{}});
-    const double nothing = spreadOf(runTrial(nothingModel(), p.path, speed, reference).looks, &TrialErrors::near).median;
+    const double nothing = spreadOf(runTrial(nothingModel(), p.path, tetSpeed, reference).looks, &TrialErrors::near).median;
     std::map<std::string, int> methods;
     for (const Baseline& b : tetBaselines({*p.model.tissue, p.model.surface, p.path})) {
         ++methods[b.method];
         if (b.setting.starts_with("6 mm")) {
             continue;  // a sphere of 5 mm falls between the points
         }
-        const TrialResult result = runTrial(b.build(), p.path, speed, reference);
+        const TrialResult result = runTrial(b.build(), p.path, tetSpeed, reference);
         EXPECT_LT(spreadOf(result.looks, &TrialErrors::near).median, 0.5 * nothing) << b.method << " " << b.setting;
         EXPECT_GT(result.meanTouched, 0.5) << b.method << " " << b.setting;
     }
@@ -429,7 +429,7 @@ TEST(TetBaselines, EveryOneIsBetterThanNothing)
 
 TEST(TetBaselines, ANeedleIsNoSphere)
 {
-    const auto& p = pressed();
+    const auto& p = tetPressed();
     const TrialPath needle = trialPath(*p.model.tissue, p.model.surface, p.place, trialTools()[2], 2e-3);
     EXPECT_THROW(factoredModel(p.mesh(3e-3, 0.45), needle), std::runtime_error);
 }

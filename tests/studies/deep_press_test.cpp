@@ -18,7 +18,7 @@ using tests::errorOf;
 
 const std::string head = "# a comment\nscene,tool,radius_mm,length_mm,depth_mm,way,fx_n,fy_n,fz_n,edges_mm,elements\n";
 
-std::vector<DeepCase> read(const std::string& text)
+std::vector<DeepCase> readCases(const std::string& text)
 {
     std::istringstream in(text);
     return readDeepCases(in, "deep.csv");
@@ -26,9 +26,10 @@ std::vector<DeepCase> read(const std::string& text)
 
 TEST(DeepReferences, RowsOfOneToolAndSceneAreOneCase)
 {
-    const auto cases = read(head +
-                            "block,sphere,10,0,0.5,in,0,-0.1,0.02,0.4,1000\r\nplate,capsule,6,30,1,in,0,-0.2,0,1,10\n\n"
-                            "block,sphere, 10,0,2,out,0,-0.3,0,1.5,2000\n");
+    const auto cases =
+        readCases(head +
+                  "block,sphere,10,0,0.5,in,0,-0.1,0.02,0.4,1000\r\nplate,capsule,6,30,1,in,0,-0.2,0,1,10\n\n"
+                  "block,sphere, 10,0,2,out,0,-0.3,0,1.5,2000\n");
     ASSERT_EQ(cases.size(), 2U);
     EXPECT_EQ(cases[0].scene, "block");
     EXPECT_EQ(cases[0].tool.kind, TrialKind::sphere);
@@ -46,7 +47,7 @@ TEST(DeepReferences, RowsOfOneToolAndSceneAreOneCase)
 
 TEST(DeepReferences, WhatIsWrongIsSaidOnOneLineWithItsPlace)
 {
-    const auto refusal = [](const std::string& text) { return errorOf([&] { read(text); }); };
+    const auto refusal = [](const std::string& text) { return errorOf([&] { readCases(text); }); };
     EXPECT_EQ(refusal(head + "block,sphere,10,0,1,in,0,-0.1\n").find("deep.csv:3: 8 values: must be 11"), 0U);
     EXPECT_EQ(refusal(head + "block,cube,10,0,1,in,0,-0.1,0,1,9\n"),
               "deep.csv:3: tool = 'cube': must be sphere or capsule");

@@ -79,16 +79,16 @@ Label shelf(Vec3 q)
     return std::abs(q.x) > 26e-3 ? bone : fat;
 }
 
-const PressOptions ball{toolOf(ToolKind::sphere, 10e-3, 0.0)};
+const PressOptions tenBall{toolOf(ToolKind::sphere, 10e-3, 0.0)};
 const PressOptions rod{toolOf(ToolKind::capsule, 6e-3, 20e-3)};
 
-constexpr double speed = 20e-3;  // [m/s]
+constexpr double deepSpeed = 20e-3;  // [m/s]
 
 /// From touching the face at `at` straight in by `depth`, a tenth of a second of rest, and back out; all turned.
 PosePath inAndOut(Vec3 at, Vec3 axis, double radius, double depth, const Mat3& turn = upright)
 {
     const Vec3 start = at - Vec3(0, radius + 0.5e-3, 0), end = at + Vec3(0, depth - radius, 0);
-    const double way = (depth + 0.5e-3) / speed;
+    const double way = (depth + 0.5e-3) / deepSpeed;
     PosePath path{"path", {}};
     for (const auto& [p, t] : {std::pair{start, 0.0}, {end, way}, {end, way + 0.1}, {start, 2.0 * way + 0.1}}) {
         path.poses.push_back({turn * p, turn * axis, t});
@@ -145,7 +145,7 @@ double apart(const Pressed& a, const Pressed& b, const Mat3& turn)
     return worst / a.summary.peakForce;
 }
 
-struct DeepPress {
+struct DeepCall {
     const char* name;
     PressOptions options;
     Vec3 at, axis;
@@ -153,16 +153,16 @@ struct DeepPress {
     bool held;  // before it is 2.5 radii deep
 };
 
-const DeepPress deepPresses[]{{"ball", ball, Vec3(-2e-3, 0, 3e-3), Vec3(0, 1, 0), 10e-3, true},
-                              {"upright rod", rod, Vec3(0, 0, 3e-3), Vec3(0, 1, 0), 6e-3, true},
-                              {"lying rod", rod, Vec3(8e-3, 0, 3e-3), Vec3(1, 0, 0), 6e-3, false}};
+const DeepCall deepPresses[]{{"ball", tenBall, Vec3(-2e-3, 0, 3e-3), Vec3(0, 1, 0), 10e-3, true},
+                             {"upright rod", rod, Vec3(0, 0, 3e-3), Vec3(0, 1, 0), 6e-3, true},
+                             {"lying rod", rod, Vec3(8e-3, 0, 3e-3), Vec3(1, 0, 0), 6e-3, false}};
 
 // Through the range where the tool is held back, and back again. In its first quarter of a radius a tool presses on a few
 // cells, and lags by up to a tenth of what is next to no force.
 TEST(PressDeep, TheWayOutHasTheForceOfTheWayInAndNoneThatPulls)
 {
     const auto model = bodyOf(plainBlock);
-    for (const DeepPress& deep : deepPresses) {
+    for (const DeepCall& deep : deepPresses) {
         SCOPED_TRACE(deep.name);
         const double r = deep.radius;
         const Pressed p = pressed(model, inAndOut(deep.at, deep.axis, r, 2.5 * r), deep.options);
@@ -180,7 +180,7 @@ TEST(PressDeep, TheWayOutHasTheForceOfTheWayInAndNoneThatPulls)
 TEST(PressDeep, AToolPressedThroughAThinPartKeepsItsSide)
 {
     const auto model = bodyOf(shelf);
-    for (const DeepPress& deep : deepPresses) {
+    for (const DeepCall& deep : deepPresses) {
         SCOPED_TRACE(deep.name);
         const PosePath path = inAndOut(deep.at, deep.axis, deep.radius, 2.5 * deep.radius);
         PoseLoad load(model, deep.options.tool, path.poses.front());
@@ -209,7 +209,7 @@ TEST(PressDeep, AToolThatSlidesOverAnEdgeIsPushedFromItsNewSide)
                         {{Vec3(0, -8e-3, 14e-3), Vec3(0, 1, 0), 0.0},
                          {Vec3(0, -8e-3, 25e-3), Vec3(0, 1, 0), 0.5},
                          {Vec3(0, 4e-3, 28e-3), Vec3(0, 1, 0), 1.0}}};
-    PoseLoad load(model, ball.tool, path.poses.front());
+    PoseLoad load(model, tenBall.tool, path.poses.front());
     Vec3 before(0.0);
     for (std::size_t tick = 0; tick < path.ticks(); ++tick) {
         load.set(path.at(tick));
@@ -225,11 +225,11 @@ TEST(PressDeep, AToolThatBeginsInsideIsHeldBackUntilTheSurfaceReachesIt)
 {
     const auto model = bodyOf(plainBlock);
     PosePath path{"path", {{Vec3(0.0), Vec3(0, 1, 0), 0.0}, {Vec3(0.0), Vec3(0, 1, 0), 0.1}}};
-    const Pressed p = pressed(model, path, ball);
+    const Pressed p = pressed(model, path, tenBall);
     EXPECT_EQ(p.summary.heldFrom, 0.0);
     EXPECT_GT(p.samples.front().behind, 5e-3);
     EXPECT_EQ(p.samples.back().behind, 0.0);
-    const Pressed slow = pressed(model, inAndOut(Vec3(0.0), Vec3(0, 1, 0), 10e-3, 10e-3), ball);
+    const Pressed slow = pressed(model, inAndOut(Vec3(0.0), Vec3(0, 1, 0), 10e-3, 10e-3), tenBall);
     EXPECT_LT(glm::distance(p.samples.back().force, slow.summary.peakForce * Vec3(0, -1, 0)),
               0.01 * slow.summary.peakForce);
 }
@@ -239,20 +239,20 @@ TEST(PressDeep, AMirroredBodyGivesTheMirroredForce)
 {
     const Mat3 mirror(Vec3(-1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1));
     const Vec3 at(-2e-3, 0, 3e-3), axis(0, 1, 0);
-    const Pressed own = pressed(bodyOf(lumpyBlock), inAndOut(at, axis, 10e-3, 10e-3), ball);
+    const Pressed own = pressed(bodyOf(lumpyBlock), inAndOut(at, axis, 10e-3, 10e-3), tenBall);
     EXPECT_LT(own.samples[own.samples.size() / 2].force.x, -0.02);
-    const Pressed other = pressed(bodyOf(lumpyBlock, mirror), inAndOut(at, axis, 10e-3, 10e-3, mirror), ball);
+    const Pressed other = pressed(bodyOf(lumpyBlock, mirror), inAndOut(at, axis, 10e-3, 10e-3, mirror), tenBall);
     EXPECT_LT(apart(own, other, mirror), 0.01);
 }
 
 TEST(PressDeep, ATurnedBodyGivesTheTurnedForce)
 {
     const Vec3 at(-2e-3, 0, 3e-3), axis(0, 1, 0);
-    const Pressed own = pressed(bodyOf(lumpyBlock), inAndOut(at, axis, 10e-3, 10e-3), ball);
+    const Pressed own = pressed(bodyOf(lumpyBlock), inAndOut(at, axis, 10e-3, 10e-3), tenBall);
     for (const Mat3& turn :
          {Mat3(Vec3(0, 1, 0), Vec3(-1, 0, 0), Vec3(0, 0, 1)), Mat3(Vec3(1, 0, 0), Vec3(0, 0, 1), Vec3(0, -1, 0)),
           Mat3(Vec3(0, 0, 1), Vec3(0, 1, 0), Vec3(-1, 0, 0))}) {
-        const Pressed other = pressed(bodyOf(lumpyBlock, turn), inAndOut(at, axis, 10e-3, 10e-3, turn), ball);
+        const Pressed other = pressed(bodyOf(lumpyBlock, turn), inAndOut(at, axis, 10e-3, 10e-3, turn), tenBall);
         EXPECT_LT(apart(own, other, turn), 0.01);
     }
 }

@@ -44,7 +44,7 @@ const Pushed& pushed()
     return p;
 }
 
-void write(const std::filesystem::path& file, const std::string& text)
+void writeFile(const std::filesystem::path& file, const std::string& text)
 {
     std::ofstream(file) << text;
 }
@@ -61,9 +61,10 @@ std::string table(const std::string& head, std::size_t rows, const std::string& 
 
 void writeStill(const std::filesystem::path& folder)
 {
-    write(folder / "displacements.csv", table("ux_m,uy_m,uz_m", pushed().looks() * pushed().mesh.points.size(), "0,0,0"));
-    write(folder / "forces.csv", table("fx_n,fy_n,fz_n", pushed().looks(), "0,0,0"));
-    write(folder / "times.csv", "processor_s\n2e-3\n4e-3\n3e-3\n");
+    writeFile(folder / "displacements.csv",
+              table("ux_m,uy_m,uz_m", pushed().looks() * pushed().mesh.points.size(), "0,0,0"));
+    writeFile(folder / "forces.csv", table("fx_n,fy_n,fz_n", pushed().looks(), "0,0,0"));
+    writeFile(folder / "times.csv", "processor_s\n2e-3\n4e-3\n3e-3\n");
 }
 
 AccuracyRun runOf(const std::string& command, const Folder& folder, double maxSeconds = 60)
@@ -177,7 +178,7 @@ TEST(Rival, AMalformedAnswerNamesFileAndLine)
     const auto refusal = [&](const std::string& file, const std::string& text) {
         const Folder folder;
         writeStill(folder.path());
-        write(folder / file, text);
+        writeFile(folder / file, text);
         return errorOf([&] { readRivalAnswer(folder.path(), looks, points); });
     };
     const auto expect = [](const std::string& message, const std::string& hint) {
@@ -201,7 +202,7 @@ TEST(Rival, AMalformedAnswerNamesFileAndLine)
 TEST(Rival, HasTheNameThatIsSaidOrThatOfItsFile)
 {
     const Folder folder;
-    write(folder / "spring_net.py", "pass");
+    writeFile(folder / "spring_net.py", "pass");
     const auto named = [](const std::string& text) { return rivalOf(text, {}).name; };
     EXPECT_EQ(named("febio=run-febio --quiet"), "febio");
     EXPECT_EQ(rivalOf("febio=run-febio --quiet", {}).command, "run-febio --quiet");
@@ -216,10 +217,10 @@ TEST(Rival, TheFingerprintFollowsTheFilesInTheCommand)
 {
     const Folder folder;
     const Rival rival{"r", "sh " + (folder / "a.sh").string(), "", {}};
-    write(folder / "a.sh", "true");
+    writeFile(folder / "a.sh", "true");
     const std::string first = fingerprint(rival);
     EXPECT_EQ(fingerprint(rival), first);
-    write(folder / "a.sh", "false");
+    writeFile(folder / "a.sh", "false");
     EXPECT_NE(fingerprint(rival), first);
 }
 

@@ -193,8 +193,8 @@ TEST(InclusionBlock, VoxelsAreBallsWhereTheListSaysSo)
         const bool ball = image.values[image.offset(n)] == 3;
         const double nudge = 1e-9;  // off a surface that goes through the voxel's middle
         const auto p = image.affine.toPatient(Vec3(n)) + nudge;
-        const bool listed =
-            std::ranges::any_of(scene.objects(), [&](const Inclusion& i) { return glm::distance(p, i.centre) < i.radius; });
+        const bool listed = std::ranges::any_of(
+            scene.objects(), [&](const PlacedInclusion& i) { return glm::distance(p, i.centre) < i.radius; });
         different += ball != listed ? 1 : 0;
     });
     EXPECT_LT(different, 5U);
@@ -219,7 +219,7 @@ TEST(ObjectScene, PushesOutOfTheOneObjectThatHoldsTheTip)
         const Vec3 tip(side(random), side(random) + 0.5 * inclusionBlockSide, side(random));
         const auto found = scene.collide(tip);
         const auto holds = std::ranges::find_if(
-            scene.objects(), [&](const Inclusion& o) { return glm::distance(o.centre, tip) < o.radius; });
+            scene.objects(), [&](const PlacedInclusion& o) { return glm::distance(o.centre, tip) < o.radius; });
         if (holds == scene.objects().end()) {
             EXPECT_EQ(found, ObjectScene::none);
             EXPECT_EQ(scene.feedback(found, tip), Vec3(0.0));

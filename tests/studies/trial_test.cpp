@@ -12,7 +12,7 @@ constexpr double spacing = 2e-3;
 constexpr double speed = 20e-3;
 
 // The block, its body and the 5 mm sphere's way, and the path's converged solution: made once.
-struct Pressed {
+struct PressedTrial {
     haptics::SessionModel model = smallBlock();
     TrialPlace place = trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     TrialBody body = trialBody(*model.tissue, model.surface, spacing, 0.49, 1U << 20);
@@ -21,9 +21,9 @@ struct Pressed {
     Reference reference = solveReference(body.body, path, speeds, {});
 };
 
-const Pressed& pressed()
+const PressedTrial& trialPressed()
 {
-    static const Pressed p;
+    static const PressedTrial p;
     return p;
 }
 
@@ -35,7 +35,7 @@ std::size_t looksIn(const std::vector<TrialTick>& ticks, TrialPhase phase)
 
 TEST(TrialPath, GoesInThenSidewaysThenRests)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     EXPECT_NEAR(p.place.thickness, 16e-3, 1.5e-3);
     EXPECT_NEAR(p.path.press, 0.5e-3 + 4e-3, 1e-9);
     EXPECT_NEAR(glm::dot(p.path.inward, p.path.sideways), 0.0, 1e-12);
@@ -57,7 +57,7 @@ TEST(TrialPath, GoesInThenSidewaysThenRests)
 // A thin layer is not pressed through: 40 % of it is the most.
 TEST(TrialPath, SparesThinTissue)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     TrialPlace thin = p.place;
     thin.thickness = 5e-3;
     EXPECT_NEAR(trialPath(*p.model.tissue, p.model.surface, thin, trialTools()[1], spacing).press, 2.5e-3, 1e-9);
@@ -65,7 +65,7 @@ TEST(TrialPath, SparesThinTissue)
 
 TEST(TrialPath, ANeedlesTiesAreEightModuliTimesSpacing)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     const TrialPath needle = trialPath(*p.model.tissue, p.model.surface, p.place, trialTools()[2], spacing);
     ASSERT_EQ(needle.ties.size(), 1U);
     const double e = volume::Tissue::Reader(*p.model.tissue).youngsModulus(needle.ties[0].rest);
@@ -77,7 +77,7 @@ TEST(TrialPath, ANeedlesTiesAreEightModuliTimesSpacing)
 // The whole grid with many cycles per tick is the reference, to the tolerance at which a tick ends.
 TEST(KernelTrial, TheReferenceHasNoErrorAgainstItself)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     EXPECT_LT(p.reference.residual, 1e-4);
     const TrialResult result = elasticTrial(p.body.body, p.path, speed, p.reference, wholeGrid(8, volume::SmallStrain{}));
     EXPECT_LT(spreadOf(result.looks, &TrialErrors::rms).worst, 1.0);
@@ -89,7 +89,7 @@ TEST(KernelTrial, TheReferenceHasNoErrorAgainstItself)
 // Tissue that stays where it is misses the largest displacement by all of it; the force is no question of its shape.
 TEST(KernelTrial, NothingMissesEverythingUnderTheTool)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     const TrialResult result = runTrial(nothingModel(), p.path, speed, p.reference);
     EXPECT_NEAR(spreadOf(result.looks, &TrialErrors::max).median, 100.0, 1e-3);
     EXPECT_EQ(spreadOf(result.looks, &TrialErrors::force).worst, 0.0);
@@ -99,7 +99,7 @@ TEST(KernelTrial, NothingMissesEverythingUnderTheTool)
 // Halving the displacement makes half the error, at every node.
 TEST(KernelTrial, ErrorsAreSharesOfTheLargestDisplacement)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     const ReferenceState* now = nullptr;
     TrialModel half = nothingModel();
     half.tick = [&](const TrialLoad& load) {
@@ -130,7 +130,7 @@ TEST(KernelTrial, ErrorsAreSharesOfTheLargestDisplacement)
 
 TEST(KernelTrial, WindowsAreBetterThanChainMailAndChainMailIsBetterThanNothing)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     const chainmail::Lattice lattice(p.body.cells, p.model.tissue->tissueOn(p.body.cells), p.model.tissue->table());
     const auto rms = [](const TrialResult& r) { return spreadOf(std::span(r.looks).first(4), &TrialErrors::rms).median; };
     const double windows = rms(elasticTrial(p.body.body, p.path, speed, p.reference, {.window = 9, .cycles = 2}));
@@ -142,7 +142,7 @@ TEST(KernelTrial, WindowsAreBetterThanChainMailAndChainMailIsBetterThanNothing)
 
 TEST(KernelTrial, AnotherSpeedThanTheReferencesIsRefused)
 {
-    const auto& p = pressed();
+    const auto& p = trialPressed();
     EXPECT_THROW(runTrial(nothingModel(), p.path, 0.1, p.reference), std::logic_error);
 }
 

@@ -33,8 +33,8 @@ bool waitFor(const std::function<bool()>& holds)
 }
 
 // A homed Falcon that answers, and a finger.
-struct Bench {
-    Bench() : device(syntheticFirmware(600).image), kernel(device) { device.makeReady(); }
+struct GripBench {
+    GripBench() : device(syntheticFirmware(600).image), kernel(device) { device.makeReady(); }
 
     // Whoever listens hears so many packets more.
     bool heard(std::uint64_t packets) const
@@ -80,7 +80,7 @@ int children(int parent, const std::string& words)
 
 TEST(Grip, TheCommandPrintsALineForEachPressAndLetsTheFalconGo)
 {
-    Bench bench;
+    GripBench bench;
     const apps::Folder folder;
     const std::string file = folder / "lines";
     Program command("/usr/bin/env", {"sh", "-c", "exec " PALPATE_BIN_DIR "/palpate devices --buttons > " + file});
@@ -102,7 +102,7 @@ TEST(Grip, TheCommandPrintsALineForEachPressAndLetsTheFalconGo)
 
 TEST(Grip, ACommandThatNobodyListensToEnds)
 {
-    const Bench bench;
+    const GripBench bench;
     {
         // Killed, it leaves the command behind.
         Program shell("/usr/bin/env", {"sh", "-c", PALPATE_BIN_DIR "/palpate devices --buttons & wait"});
@@ -138,7 +138,7 @@ TEST(Grip, ItsButtonsWorkTheScreensAndASessionGetsTheFalcon)
 {
     if (!apps::built("palpate-trainer") || !apps::built("palpate-view"))
         GTEST_SKIP() << "there is no palpate-view";
-    Bench bench;
+    GripBench bench;
     Window window;
     const auto at = [&](const char* screen) { return [&window, screen] { return window.isAt(screen); }; };
     ASSERT_TRUE(waitFor(at("Case")));

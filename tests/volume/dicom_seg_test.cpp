@@ -1,6 +1,7 @@
 // DICOM segmentations made here with DCMTK: sparse, overlapping, packed frames.
 #include <tests/error_of.h>
 #include <tests/folder.h>
+#include <tests/volume/files.h>
 #include <volume/import.h>
 
 #include <dcmtk/config/osconfig.h>
@@ -29,13 +30,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int columns = 7;
-constexpr int rows = 5;
-
-std::string vector(const Vec3& v)
-{
-    return fmt::format("{:.10g}\\{:.10g}\\{:.10g}", v.x, v.y, v.z);
-}
+constexpr int segColumns = 7;
+constexpr int segRows = 5;
 
 /// The bytes of one compressed frame from its pixels.
 using Pack = std::function<std::vector<Uint8>(const std::vector<int>&)>;
@@ -63,8 +59,8 @@ protected:
         data.putAndInsertString(DCM_PhotometricInterpretation, "MONOCHROME2");
         data.putAndInsertUint16(DCM_MaximumFractionalValue, 200);
         data.putAndInsertUint16(DCM_SamplesPerPixel, 1);
-        data.putAndInsertUint16(DCM_Rows, rows);
-        data.putAndInsertUint16(DCM_Columns, columns);
+        data.putAndInsertUint16(DCM_Rows, segRows);
+        data.putAndInsertUint16(DCM_Columns, segColumns);
         data.putAndInsertUint16(DCM_BitsAllocated, static_cast<Uint16>(s.bits));
         data.putAndInsertUint16(DCM_BitsStored, static_cast<Uint16>(s.bits));
         data.putAndInsertUint16(DCM_HighBit, static_cast<Uint16>(s.bits - 1));
@@ -128,7 +124,7 @@ private:
     {
         auto* frames = new DcmPixelSequence(DCM_PixelSequenceTag);
         frames->insert(new DcmPixelItem(DCM_PixelItemTag));  // no table of offsets
-        constexpr std::size_t size = std::size_t{columns} * rows;
+        constexpr std::size_t size = std::size_t{segColumns} * segRows;
         for (std::size_t at = 0; at < values.size(); at += size) {
             std::vector<Uint8> bytes = pack({values.begin() + static_cast<std::ptrdiff_t>(at),
                                              values.begin() + static_cast<std::ptrdiff_t>(at + size)});
@@ -155,8 +151,8 @@ private:
     static bool addFrame(DcmDataset& data, const Segmentation& s, int segment, int k, std::vector<int>& values)
     {
         std::vector<int> frame;
-        for (int j = 0; j < rows; ++j) {
-            for (int i = 0; i < columns; ++i) {
+        for (int j = 0; j < segRows; ++j) {
+            for (int i = 0; i < segColumns; ++i) {
                 frame.push_back(s.inside(segment, i, j, k));
             }
         }
@@ -167,7 +163,7 @@ private:
         DcmItem *item = nullptr, *position = nullptr, *which = nullptr;
         data.findOrCreateSequenceItem(DCM_PerFrameFunctionalGroupsSequence, item, -2);
         item->findOrCreateSequenceItem(DCM_PlanePositionSequence, position);
-        position->putAndInsertString(DCM_ImagePositionPatient, vector(Vec3(10, 20, 30 + 3 * k)).c_str());
+        position->putAndInsertString(DCM_ImagePositionPatient, dicomVector(Vec3(10, 20, 30 + 3 * k)).c_str());
         if (s.type != "LABELMAP") {
             item->findOrCreateSequenceItem(DCM_SegmentIdentificationSequence, which);
             which->putAndInsertUint16(DCM_ReferencedSegmentNumber, static_cast<Uint16>(segment));
@@ -186,7 +182,7 @@ TEST_F(DicomSeg, BinaryFramesAreSparseOverlapAndBeginWithinBytes)
                              return segment == 1 ? one : two;
                          }};
     const ImportedLabels labels = importLabels(write(s));
-    ASSERT_EQ(labels.image.size, Index3(columns, rows, 5));
+    ASSERT_EQ(labels.image.size, Index3(segColumns, segRows, 5));
     forEachIndex(Index3(0), labels.image.size - 1, [&](Index3 n) {
         const int expected = s.inside(2, n.x, n.y, n.z) != 0 ? 2 : s.inside(1, n.x, n.y, n.z);
         ASSERT_EQ(labels.image.values[labels.image.offset(n)], expected);
@@ -211,7 +207,7 @@ TEST_F(DicomSeg, BinaryFramesAreSparseOverlapAndBeginWithinBytes)
 TEST_F(DicomSeg, FractionalVoxelsCountFromTheThreshold)
 {
     const fs::path file =
-        write({"FRACTIONAL", 8, 1, 2, [](int, int i, int j, int k) { return i + columns * j + 100 * k; }});
+        write({"FRACTIONAL", 8, 1, 2, [](int, int i, int j, int k) { return i + segColumns * j + 100 * k; }});
     for (const float threshold : {0.0F, 0.1F, 0.5F, 0.6F}) {
         ImportOptions options;
         options.fractionalThreshold = threshold;
@@ -283,7 +279,7 @@ std::vector<Uint8> deflated(const std::vector<int>& pixels)
     z.next_out = out.data();
     z.avail_out = static_cast<uInt>(out.size());
     deflate(&z, Z_FINISH);
-    out.resize(out.size() - z.avail_out);
+    out.erase(out.end() - z.avail_out, out.end());
     deflateEnd(&z);
     return out;
 }
@@ -293,12 +289,12 @@ std::vector<Uint8> jpeg2000(const fs::path& file, const std::vector<int>& pixels
 {
     opj_image_cmptparm_t shape{};
     shape.dx = shape.dy = 1;
-    shape.w = columns;
-    shape.h = rows;
+    shape.w = segColumns;
+    shape.h = segRows;
     shape.prec = 1;
     opj_image_t* image = opj_image_create(1, &shape, OPJ_CLRSPC_GRAY);
-    image->x1 = columns;
-    image->y1 = rows;
+    image->x1 = segColumns;
+    image->y1 = segRows;
     std::copy(pixels.begin(), pixels.end(), image->comps[0].data);
     opj_cparameters_t parameters;
     opj_set_default_encoder_parameters(&parameters);

@@ -1,4 +1,5 @@
 // DICOM series and segmentations made here with DCMTK, slice by slice.
+#include <tests/volume/files.h>
 #include <volume/import.h>
 
 #include <dcmtk/config/osconfig.h>
@@ -30,11 +31,6 @@ namespace fs = std::filesystem;
 
 constexpr int columns = 7;
 constexpr int rows = 5;
-
-std::string vector(const Vec3& v)
-{
-    return fmt::format("{:.10g}\\{:.10g}\\{:.10g}", v.x, v.y, v.z);
-}
 
 /// A slice to be written. Lengths in mm, as in the file.
 struct Slice {
@@ -68,8 +64,8 @@ protected:
         put(DCM_PhotometricInterpretation, "MONOCHROME2");
         put(DCM_PixelSpacing, "2\\0.5");  // rows 2 mm apart, columns 0.5 mm
         put(DCM_SliceThickness, "9");
-        put(DCM_ImagePositionPatient, vector(slice.position));
-        put(DCM_ImageOrientationPatient, vector(slice.alongRow) + "\\" + vector(slice.alongColumn));
+        put(DCM_ImagePositionPatient, dicomVector(slice.position));
+        put(DCM_ImageOrientationPatient, dicomVector(slice.alongRow) + "\\" + dicomVector(slice.alongColumn));
         put(DCM_RescaleSlope, "2");
         put(DCM_RescaleIntercept, "-1000");
         data.putAndInsertUint16(DCM_SamplesPerPixel, 1);

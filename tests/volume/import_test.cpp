@@ -2,6 +2,7 @@
 
 // Files made here, byte by byte, that tell the truth and that lie.
 #include <tests/folder.h>
+#include <tests/volume/files.h>
 #include <volume/import.h>
 
 #include <fmt/format.h>
@@ -49,12 +50,6 @@ protected:
     const tests::Folder folder;
 };
 
-template <typename T>
-std::string bytesOf(const std::vector<T>& values)
-{
-    return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
-}
-
 // 4 x 5 x 6 voxels, values 0 to 6.
 constexpr int voxels = 120;
 
@@ -67,8 +62,6 @@ std::vector<T> ramp()
     }
     return values;
 }
-
-constexpr const char* straight = "TransformMatrix = 1 0 0 0 1 0 0 0 1\n";
 
 std::string meta(const std::string& extra, const std::string& type = "MET_UCHAR", const std::string& size = "4 5 6",
                  const std::string& data = "LOCAL")
@@ -166,7 +159,7 @@ TEST_F(ImportFile, MetaImageThatLiesAboutItsPackingIsReadAsItIs)
     for (const bool declared : {false, true}) {
         for (const bool packed : {false, true}) {
             const std::string said =
-                std::string(straight) + (declared ? "CompressedData = True\n" : "CompressedData = False\n");
+                std::string(patientAxes) + (declared ? "CompressedData = True\n" : "CompressedData = False\n");
             write("v.raw", packed ? gzip(plain) : plain);
             const auto labels = importLabels(write("v.mhd", meta(said, "MET_USHORT", "4 5 6", "v.raw")));
             expectRamp(labels);

@@ -1,5 +1,6 @@
 // NRRD files made here: every encoding, every order of axes, layers of segments that overlap.
 #include <tests/folder.h>
+#include <tests/volume/files.h>
 #include <volume/import.h>
 
 #include <bzlib.h>
@@ -45,11 +46,6 @@ std::vector<std::uint16_t> ramp()
         values[i] = static_cast<std::uint16_t>(i * 7 % 300);
     }
     return values;
-}
-
-std::string bytesOf(const std::vector<std::uint16_t>& values)
-{
-    return {reinterpret_cast<const char*>(values.data()), 2 * values.size()};
 }
 
 std::string bzip2(std::string plain)

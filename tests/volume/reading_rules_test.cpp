@@ -1,6 +1,7 @@
 // What a file leaves open, and what it says that cannot be: rules that hold for all formats alike (docs/formats.md).
 #include <tests/error_of.h>
 #include <tests/folder.h>
+#include <tests/volume/files.h>
 #include <volume/import.h>
 #include <volume/tissue.h>
 
@@ -21,15 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-template <typename T>
-std::string bytesOf(const std::vector<T>& values)
-{
-    return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)};
-}
-
 // 2 x 3 x 4 voxels of `volumes` volumes: voxel i of volume v is (i + v) % 5.
 template <typename T>
-std::vector<T> ramp(int volumes = 1)
+std::vector<T> smallRamp(int volumes = 1)
 {
     std::vector<T> values;
     for (int v = 0; v < volumes; ++v) {
@@ -41,22 +36,22 @@ std::vector<T> ramp(int volumes = 1)
 }
 
 /// The fields of a NIfTI-1 header, or of Analyze without its magic.
-struct Header {
+struct NiftiFields {
     std::string bytes = std::string(352, '\0');
 
-    Header(std::int16_t type, std::int16_t bits)
+    NiftiFields(std::int16_t type, std::int16_t bits)
     {
         put<std::int32_t>(0, 348).sizes({3, 2, 3, 4, 1}).put(70, type).put(72, bits).put(108, 352.0F);
         put(80, 1.0F).put(84, 2.0F).put(88, 3.0F);
         std::memcpy(bytes.data() + 344, "n+1", 4);
     }
     template <typename T>
-    Header& put(std::size_t at, T value)
+    NiftiFields& put(std::size_t at, T value)
     {
         std::memcpy(bytes.data() + at, &value, sizeof value);
         return *this;
     }
-    Header& sizes(std::initializer_list<std::int16_t> dim)
+    NiftiFields& sizes(std::initializer_list<std::int16_t> dim)
     {
         std::size_t at = 40;
         for (const std::int16_t n : dim) {
@@ -65,15 +60,14 @@ struct Header {
         }
         return *this;
     }
-    Header& oriented() { return put<std::int16_t>(254, 1).put(280, 1.0F).put(300, 2.0F).put(320, 3.0F); }
+    NiftiFields& oriented() { return put<std::int16_t>(254, 1).put(280, 1.0F).put(300, 2.0F).put(320, 3.0F); }
 };
 
-std::string meta(const std::string& extra, const std::string& data = "LOCAL", const std::string& type = "MET_UCHAR")
+std::string smallMeta(const std::string& extra, const std::string& data = "LOCAL", const std::string& type = "MET_UCHAR")
 {
     return fmt::format("NDims = 3\nDimSize = 2 3 4\nElementSpacing = 1 2 3\n{}ElementType = {}\nElementDataFile = {}\n",
                        extra, type, data);
 }
-constexpr const char* straight = "TransformMatrix = 1 0 0 0 1 0 0 0 1\n";
 
 class ReadingRules : public ::testing::Test {
 protected:
@@ -98,10 +92,10 @@ protected:
 // FDA ships p_1.mhd with p_1.raw.gz, and its header names p_1.raw in some releases.
 TEST_F(ReadingRules, ADataFileThatIsOnlyThereGzippedIsRead)
 {
-    const std::string data = bytesOf(ramp<std::uint8_t>());
+    const std::string data = bytesOf(smallRamp<std::uint8_t>());
     write("p.raw.gz", gzip(data));
-    const ImportedLabels labels = importLabels(write("p.mhd", meta(straight, "p.raw")));
-    EXPECT_EQ(labels.image.values, ramp<std::uint16_t>());
+    const ImportedLabels labels = importLabels(write("p.mhd", smallMeta(patientAxes, "p.raw")));
+    EXPECT_EQ(labels.image.values, smallRamp<std::uint16_t>());
     EXPECT_TRUE(warns(labels, "its data file p.raw is not there: p.raw.gz beside it is read"));
     const ImportedLabels nrrd = importLabels(
         write("p.nhdr",
@@ -116,20 +110,20 @@ TEST_F(ReadingRules, ADataFileThatIsOnlyThereGzippedIsRead)
 // One rule: the axes are taken as left, posterior, superior with one warning, and --axes says otherwise.
 TEST_F(ReadingRules, FilesThatDoNotSayWhichSideIsLeftAreTreatedAlike)
 {
-    const std::string data = bytesOf(ramp<std::uint8_t>());
-    Header analyze(2, 8);
+    const std::string data = bytesOf(smallRamp<std::uint8_t>());
+    NiftiFields analyze(2, 8);
     std::memset(analyze.bytes.data() + 344, 0, 4);
     write("analyze.img", data);
     const fs::path files[] = {
-        write("plain.nii", Header(2, 8).bytes + data),
+        write("plain.nii", NiftiFields(2, 8).bytes + data),
         write("analyze.hdr", analyze.put(108, 0.0F).bytes.substr(0, 348)),
-        write("plain.mha", meta("") + data),
+        write("plain.mha", smallMeta("") + data),
         write("plain.nrrd", "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 2 3 4\nspacings: 1 2 3\nencoding: raw\n\n" + data),
     };
     for (const fs::path& file : files) {
         SCOPED_TRACE(file.filename());
         const ImportedLabels labels = importLabels(file);
-        EXPECT_EQ(labels.image.values, ramp<std::uint16_t>());
+        EXPECT_EQ(labels.image.values, smallRamp<std::uint16_t>());
         ASSERT_EQ(labels.warnings.size(), 1U);
         EXPECT_TRUE(warns(labels, "does not say which side is left: its axes are taken as left, posterior, superior"));
         EXPECT_NEAR(glm::length(labels.image.affine.linear[1] - Vec3(0, 2e-3, 0)), 0, 1e-9);
@@ -148,16 +142,16 @@ TEST_F(ReadingRules, FilesThatDoNotSayWhichSideIsLeftAreTreatedAlike)
     ImportOptions options;
     options.axes = "RAS";
     for (const fs::path& file :
-         {write("said.nii", Header(2, 8).oriented().bytes + data), write("said.mha", meta(straight) + data)}) {
+         {write("said.nii", NiftiFields(2, 8).oriented().bytes + data), write("said.mha", smallMeta(patientAxes) + data)}) {
         EXPECT_NE(reason(file, options).find("it says itself where its axes run"), std::string::npos);
     }
-    EXPECT_TRUE(importLabels(write("rai.mha", meta("AnatomicalOrientation = RAI\n") + data)).warnings.empty());
+    EXPECT_TRUE(importLabels(write("rai.mha", smallMeta("AnatomicalOrientation = RAI\n") + data)).warnings.empty());
 }
 
 TEST_F(ReadingRules, AnSformOfZerosGivesWayToAGoodQform)
 {
-    const std::string data = bytesOf(ramp<std::uint8_t>());
-    Header header(2, 8);
+    const std::string data = bytesOf(smallRamp<std::uint8_t>());
+    NiftiFields header(2, 8);
     header.put<std::int16_t>(254, 1).put<std::int16_t>(252, 1).put(268, 5.0F);
     const ImportedLabels labels = importLabels(write("a.nii", header.bytes + data));
     EXPECT_TRUE(warns(labels, "its sform is all zero, though it has a code: the qform is used"));
@@ -171,7 +165,7 @@ TEST_F(ReadingRules, AnSformOfZerosGivesWayToAGoodQform)
 // A fourth side of 1 is no side; volume N of several is what it would be alone.
 TEST_F(ReadingRules, OneVolumeOfFourDimensionsIsReadAndOneOfManyIsChosen)
 {
-    const std::string once = bytesOf(ramp<std::uint8_t>()), thrice = bytesOf(ramp<std::uint8_t>(3));
+    const std::string once = bytesOf(smallRamp<std::uint8_t>()), thrice = bytesOf(smallRamp<std::uint8_t>(3));
     const auto meta4 = [](int volumes) {
         return fmt::format(
             "NDims = 4\nDimSize = 2 3 4 {}\nElementSpacing = 1 2 3 1\nOffset = 10 20 30 0\nTransformMatrix = 0 1 0 0 "
@@ -179,7 +173,7 @@ TEST_F(ReadingRules, OneVolumeOfFourDimensionsIsReadAndOneOfManyIsChosen)
             volumes);
     };
     const ImportedLabels one = importLabels(write("one.mha", meta4(1) + once));
-    EXPECT_EQ(one.image.values, ramp<std::uint16_t>());
+    EXPECT_EQ(one.image.values, smallRamp<std::uint16_t>());
     EXPECT_NEAR(glm::length(one.image.affine.linear[0] - Vec3(0, 1e-3, 0)), 0, 1e-12);
     EXPECT_NEAR(glm::length(one.image.affine.origin - Vec3(10e-3, 20e-3, 30e-3)), 0, 1e-12);
     std::string interleaved;
@@ -193,7 +187,7 @@ TEST_F(ReadingRules, OneVolumeOfFourDimensionsIsReadAndOneOfManyIsChosen)
         "space directions: none (1,0,0) (0,2,0) (0,0,3)\n\n";
     const fs::path files[] = {
         write("many.mha", meta4(3) + thrice),
-        write("many.nii", Header(2, 8).oriented().sizes({4, 2, 3, 4, 3}).bytes + thrice),
+        write("many.nii", NiftiFields(2, 8).oriented().sizes({4, 2, 3, 4, 3}).bytes + thrice),
         write("many.nrrd", fmt::format(fmt::runtime(nrrd), "vector") + interleaved),
         write("layers.nrrd", fmt::format(fmt::runtime(nrrd), "list") + interleaved),
     };
@@ -229,7 +223,7 @@ TEST_F(ReadingRules, LabelsBeyondTheRangeAreRenumberedOnlyForWhoSaysSo)
     values[3] = -3;
     values[4] = 70000;
     values[5] = 1;
-    const fs::path file = write("a.nii", Header(8, 32).oriented().bytes + bytesOf(values));
+    const fs::path file = write("a.nii", NiftiFields(8, 32).oriented().bytes + bytesOf(values));
     EXPECT_NE(
         reason(file).find("voxel (1, 0, 0) is 70000: a label is a whole number from 0 to 65535; if this is a label map, "
                           "--renumber gives such labels free values"),
@@ -249,13 +243,13 @@ TEST_F(ReadingRules, LabelsBeyondTheRangeAreRenumberedOnlyForWhoSaysSo)
     // Over 1024 different values it is an image, and that is the reason.
     std::vector<std::int32_t> many(2000);
     std::iota(many.begin(), many.end(), -1000);
-    const fs::path image = write("i.nii", Header(8, 32).oriented().sizes({3, 20, 10, 10, 1}).bytes + bytesOf(many));
+    const fs::path image = write("i.nii", NiftiFields(8, 32).oriented().sizes({3, 20, 10, 10, 1}).bytes + bytesOf(many));
     EXPECT_NE(reason(image).find("so this is not a label map but an image"), std::string::npos);
     EXPECT_NE(reason(image, options).find("has 2000 different values, so it is not a label map"), std::string::npos);
     // Over 2^53 two numbers may look like one.
     std::vector<std::int64_t> huge(24, 1);
     huge[0] = std::int64_t{1} << 60;
-    const fs::path beyond = write("h.nii", Header(1024, 64).oriented().bytes + bytesOf(huge));
+    const fs::path beyond = write("h.nii", NiftiFields(1024, 64).oriented().bytes + bytesOf(huge));
     EXPECT_NE(reason(beyond, options).find("whole numbers over 2^53 cannot be told apart"), std::string::npos);
 }
 
@@ -263,7 +257,7 @@ TEST_F(ReadingRules, NearlyWholeLabelsAreRoundedOnlyForWhoSaysSo)
 {
     std::vector<float> values(24, 0.99999994F);
     values[0] = 2;
-    const fs::path file = write("a.nii", Header(16, 32).oriented().bytes + bytesOf(values));
+    const fs::path file = write("a.nii", NiftiFields(16, 32).oriented().bytes + bytesOf(values));
     EXPECT_NE(reason(file).find(
                   "voxel (1, 0, 0) is 0.99999994, and 23 voxels like it are up to 6e-08 off a whole number: --round "
                   "takes the whole number"),
@@ -276,7 +270,7 @@ TEST_F(ReadingRules, NearlyWholeLabelsAreRoundedOnlyForWhoSaysSo)
     EXPECT_TRUE(warns(labels, "23 voxels are rounded to whole numbers"));
     // A probability is none that is nearly whole.
     values[5] = 0.4F;
-    const fs::path soft = write("s.nii", Header(16, 32).oriented().bytes + bytesOf(values));
+    const fs::path soft = write("s.nii", NiftiFields(16, 32).oriented().bytes + bytesOf(values));
     EXPECT_NE(reason(soft).find("an image or a probability"), std::string::npos) << reason(soft);
     EXPECT_NE(reason(soft, options).find("voxel (1, 2, 0) is 0.4"), std::string::npos) << reason(soft, options);
 }
@@ -288,10 +282,10 @@ TEST_F(ReadingRules, ANrrdOfTwoBytesThatDoesNotSayItsByteOrderIsTakenWithAWarnin
         "NRRD0004\ntype: {}\ndimension: 3\nspace: LPS\nsizes: 2 3 4\nspace directions: (1,0,0) (0,2,0) (0,0,3)\nencoding: "
         "raw\n\n";
     const ImportedLabels two =
-        importLabels(write("a.nrrd", fmt::format(fmt::runtime(head), "short") + bytesOf(ramp<std::uint16_t>())));
-    EXPECT_EQ(two.image.values, ramp<std::uint16_t>());
+        importLabels(write("a.nrrd", fmt::format(fmt::runtime(head), "short") + bytesOf(smallRamp<std::uint16_t>())));
+    EXPECT_EQ(two.image.values, smallRamp<std::uint16_t>());
     EXPECT_TRUE(warns(two, "does not say endian: little is assumed"));
-    EXPECT_TRUE(importLabels(write("b.nrrd", fmt::format(fmt::runtime(head), "uchar") + bytesOf(ramp<std::uint8_t>())))
+    EXPECT_TRUE(importLabels(write("b.nrrd", fmt::format(fmt::runtime(head), "uchar") + bytesOf(smallRamp<std::uint8_t>())))
                     .warnings.empty());
 }
 
@@ -301,7 +295,7 @@ TEST_F(ReadingRules, WhatIsNoFileIsCalledWhatItIs)
     fs::create_symlink("loop.nii", folder / "loop.nii");
     fs::create_symlink("gone.nii", folder / "broken.nii");
     ASSERT_EQ(::mkfifo((folder / "pipe.nii").c_str(), 0600), 0);
-    write("raw.mhd", meta(straight, "pipe.nii"));
+    write("raw.mhd", smallMeta(patientAxes, "pipe.nii"));
     const std::pair<fs::path, const char*> all[] = {
         {folder / "loop.nii", "is a symbolic link that leads back to itself"},
         {folder / "broken.nii", "is a symbolic link to a file that is not there"},
@@ -330,7 +324,7 @@ TEST_F(ReadingRules, VoxelsOfTenMicrometresBecomeTissue)
     const Tissue::Reader reader(back);
     EXPECT_EQ(reader.label(image.affine.toPatient({3, 4, 5})), 1);
     EXPECT_EQ(reader.label(image.affine.toPatient({30, 4, 5})), 0);
-    const std::string data = bytesOf(ramp<std::uint8_t>());
+    const std::string data = bytesOf(smallRamp<std::uint8_t>());
     const std::string small =
         "NDims = 3\nDimSize = 2 3 4\nElementSpacing = {0} {0} {0}\nTransformMatrix = 1 0 0 0 1 0 0 0 1\n"
         "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n";

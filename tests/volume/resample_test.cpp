@@ -18,7 +18,7 @@ VoxelGrid gridOf(const LabelImage& image)
     return {image.size, image.affine};
 }
 
-std::uint64_t count(const LabelImage& image, std::uint16_t value)
+std::uint64_t countOf(const LabelImage& image, std::uint16_t value)
 {
     return static_cast<std::uint64_t>(std::count(image.values.begin(), image.values.end(), value));
 }
@@ -68,7 +68,7 @@ TEST(Resample, ABallKeepsItsVolumeAndItsMiddle)
     const LabelImage image = voxelise(size, affine, [&](Vec3 p) { return glm::length(p - middle) < radius ? 3 : 0; });
     const VoxelGrid grid = isotropicGrid(gridOf(image), 1e-3);
     const ResampledLabels fine = resampled(image, grid);
-    const double volume = static_cast<double>(count(fine.image, 3)) * 1e-9;
+    const double volume = static_cast<double>(countOf(fine.image, 3)) * 1e-9;
     const double exact = 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
     EXPECT_NEAR(volume / exact, 1.0, 0.02);
     Vec3 sum(0.0);
@@ -77,7 +77,7 @@ TEST(Resample, ABallKeepsItsVolumeAndItsMiddle)
             sum += grid.affine.toPatient(Vec3(n));
         }
     });
-    EXPECT_LT(glm::length(sum / static_cast<double>(count(fine.image, 3)) - middle), 0.3e-3);
+    EXPECT_LT(glm::length(sum / static_cast<double>(countOf(fine.image, 3)) - middle), 0.3e-3);
     ASSERT_EQ(fine.changes.size(), 1U);
     EXPECT_DOUBLE_EQ(fine.changes[0].after, volume);
     EXPECT_EQ(fine.changes[0].regained, 0U);
@@ -100,13 +100,13 @@ TEST(Resample, ThinStructuresKeepTheirVolume)
     ASSERT_EQ(grid.size, Index3(16));
     const ResampledLabels coarse = resampled(image, grid);
     for (const StructureChange& change : coarse.changes) {
-        EXPECT_DOUBLE_EQ(change.after, static_cast<double>(count(coarse.image, change.value)) * 8e-9);
+        EXPECT_DOUBLE_EQ(change.after, static_cast<double>(countOf(coarse.image, change.value)) * 8e-9);
         if (change.value == 2 || change.value == 3) {
             EXPECT_NEAR(change.after / change.before, 1.0, 0.001) << change.value;
-            EXPECT_EQ(change.regained, count(coarse.image, change.value));
+            EXPECT_EQ(change.regained, countOf(coarse.image, change.value));
         }
     }
-    EXPECT_EQ(count(coarse.image, 4), 1U);
+    EXPECT_EQ(countOf(coarse.image, 4), 1U);
     EXPECT_EQ(coarse.image.values[coarse.image.offset({22 / 4, 33 / 4, 44 / 4})], 4);
     // The tube's voxels are those that it runs through.
     forEachIndex(Index3(0), grid.size - 1, [&](Index3 n) {

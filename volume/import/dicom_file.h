@@ -7,6 +7,9 @@
 // Inside volume/import/ only: DCMTK is hidden behind these.
 namespace palpate::volume {
 
+/// Slices and pixels that are nearer to each other are at the same place [m].
+inline constexpr double samePlace = 1e-5;
+
 /// One image of a DICOM file. Patient frame LPS [m].
 struct DicomFrame {
     std::filesystem::path file;

@@ -10,8 +10,6 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr double samePlace = 1e-5;  // [m]
-
 /// A frame and the slice of the volume that it is.
 struct Placed {
     const DicomFrame* frame = nullptr;

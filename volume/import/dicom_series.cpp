@@ -9,7 +9,6 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr double samePlace = 1e-5;      // [m]
 constexpr double sameDirection = 1e-4;  // of unit vectors
 
 struct Slice {
@@ -18,7 +17,7 @@ struct Slice {
     double height = 0;  // along the normal [m]
 };
 
-std::string millimetres(double metres)
+std::string lengthText(double metres)
 {
     return fmt::format("{:.4g} mm", 1e3 * metres);
 }
@@ -116,7 +115,7 @@ Vec3 stepOf(const std::filesystem::path& path, const std::vector<Slice>& slices,
             const double missing = std::round(steps) - 1;
             refuse(path, fmt::format("{} missing between {} and {}, they are {} apart, others {}: get the whole series",
                                      missing == 1 ? "a slice is" : fmt::format("{:.0f} slices are", missing),
-                                     nameOf(slices[i]), nameOf(slices[i + 1]), millimetres(gaps[i]), millimetres(usual)));
+                                     nameOf(slices[i]), nameOf(slices[i + 1]), lengthText(gaps[i]), lengthText(usual)));
         }
     }
     const Vec3 step =
@@ -127,8 +126,8 @@ Vec3 stepOf(const std::filesystem::path& path, const std::vector<Slice>& slices,
         if (glm::length(slices[i].frame->position - expected) > tolerance) {
             refuse(path,
                    fmt::format("its slices are uneven: from {} to {} apart, {} is {} off: resample it to even slices first",
-                               millimetres(sorted.front()), millimetres(sorted.back()), nameOf(slices[i]),
-                               millimetres(glm::length(slices[i].frame->position - expected))));
+                               lengthText(sorted.front()), lengthText(sorted.back()), nameOf(slices[i]),
+                               lengthText(glm::length(slices[i].frame->position - expected))));
         }
     }
     return step;

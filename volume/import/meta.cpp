@@ -49,7 +49,7 @@ std::string firstOf(const Fields& fields, std::initializer_list<const char*> key
     return "";
 }
 
-Component componentNamed(const std::filesystem::path& file, const std::string& type)
+Component metaComponent(const std::filesystem::path& file, const std::string& type)
 {
     static const std::map<std::string, Component> types = {
         {"MET_UCHAR", Component::u8},       {"MET_CHAR", Component::i8},       {"MET_USHORT", Component::u16},
@@ -176,7 +176,7 @@ Source readMeta(const std::filesystem::path& file)
     source.header = file;
     std::size_t dimensions = 3;
     source.size = checkedVolumes(file, sizesOf(file, fields, dimensions), source);
-    source.component = componentNamed(file, fields.at("ElementType"));
+    source.component = metaComponent(file, fields.at("ElementType"));
     source.bigEndian = isTrue(fields, "BinaryDataByteOrderMSB") || isTrue(fields, "ElementByteOrderMSB");
     const std::string channels = firstOf(fields, {"ElementNumberOfChannels"});
     if (!channels.empty() && channels != "1") {

@@ -20,7 +20,7 @@ bool isLength(const std::vector<std::byte>& bytes, std::size_t length, bool swap
     return std::bit_cast<std::int32_t>(raw) == static_cast<std::int32_t>(length);
 }
 
-NiftiHeader readHeader(const std::filesystem::path& file)
+NiftiHeader readNiftiHeader(const std::filesystem::path& file)
 {
     const Encoding encoding = looksLike(file, 0);
     std::vector<std::byte> bytes = unpackedBytes(file, 0, encoding, 0, NiftiHeader::secondBytes);
@@ -176,7 +176,7 @@ Source readNifti(const std::filesystem::path& file)
     if (std::error_code error; !std::filesystem::is_regular_file(source.header, error)) {
         refuse(file, fmt::format("its header {} is not there: put that file beside it", source.header.string()));
     }
-    const NiftiHeader header = readHeader(source.header);
+    const NiftiHeader header = readNiftiHeader(source.header);
     source.size = sizeOf(file, header, source);
     source.component = componentOf(file, header);
     source.bigEndian = header.swapped();

@@ -8,7 +8,7 @@ namespace palpate::volume {
 
 namespace {
 
-NrrdHeader readHeader(const std::filesystem::path& file)
+NrrdHeader readNrrdHeader(const std::filesystem::path& file)
 {
     constexpr std::uint64_t longest = std::uint64_t{16} << 20;
     std::ifstream in(file, std::ios::binary);
@@ -44,7 +44,7 @@ NrrdHeader readHeader(const std::filesystem::path& file)
     return header;
 }
 
-Component componentNamed(const std::filesystem::path& file, const std::string& type)
+Component nrrdComponent(const std::filesystem::path& file, const std::string& type)
 {
     static const std::map<std::string, Component> types = {{"signed char", Component::i8},
                                                            {"int8", Component::i8},
@@ -171,12 +171,12 @@ void judgePacking(Source& source)
 
 Source readNrrd(const std::filesystem::path& file)
 {
-    const NrrdHeader header = readHeader(file);
+    const NrrdHeader header = readNrrdHeader(file);
     Source source;
     source.header = file;
     source.segments = slicerSegments(header);
     placeNrrd(header, source);
-    source.component = componentNamed(file, header.field("type"));
+    source.component = nrrdComponent(file, header.field("type"));
     locateData(header, source);
     judgePacking(source);
     const std::string endian = lowerCase(header.field("endian"));

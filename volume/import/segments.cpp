@@ -11,8 +11,8 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr std::size_t maxSaid = 5;    // segments in a warning about each
-constexpr std::size_t maxNamed = 12;  // in a list of names
+constexpr std::size_t maxSaid = 5;            // segments in a warning about each
+constexpr std::size_t maxSegmentsNamed = 12;  // in a list of names
 
 std::vector<std::string> namesOf(const std::vector<Segment>& segments)
 {
@@ -118,9 +118,10 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
     }
     if (!empty.empty()) {
         const std::size_t all = empty.size();
-        empty.resize(std::min(all, maxNamed));
-        out.warnings.push_back(fmt::format("segments without a voxel are left out: {}{}", fmt::join(empty, ", "),
-                                           all > maxNamed ? fmt::format(" and {} more", all - maxNamed) : ""));
+        empty.resize(std::min(all, maxSegmentsNamed));
+        out.warnings.push_back(
+            fmt::format("segments without a voxel are left out: {}{}", fmt::join(empty, ", "),
+                        all > maxSegmentsNamed ? fmt::format(" and {} more", all - maxSegmentsNamed) : ""));
     }
     makeUnique(file, segments, out.warnings);
     LabelImage& image = out.image;

@@ -1,5 +1,7 @@
 #include <volume/import/source.h>
 
+#include <base/units.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -12,12 +14,12 @@ namespace palpate::volume {
 
 namespace {
 
-constexpr std::uint64_t maxVoxels = 0xffffffff;          // of one volume
-constexpr std::uint64_t maxPadding = 16;                 // [bytes]
-constexpr std::uint64_t maxBefore = 1 << 30;             // unpacked, in front of voxels that are the last bytes [bytes]
-constexpr double minSpacing = 0.999e-6;                  // below a cell, and units were mistaken [m]
-constexpr double maxShear = 2e-3;                        // cosine between voxel axes
-constexpr double degree = 3.14159265358979323846 / 180;  // [rad]
+constexpr std::uint64_t maxVoxels = 0xffffffff;  // of one volume
+constexpr std::uint64_t maxPadding = 16;         // [bytes]
+constexpr std::uint64_t maxBefore = 1 << 30;     // unpacked, in front of voxels that are the last bytes [bytes]
+constexpr double minSpacing = 0.999e-6;          // below a cell, and units were mistaken [m]
+constexpr double maxShear = 2e-3;                // cosine between voxel axes
+using units::degree;
 
 template <typename T>
 void appendAs(std::span<const std::byte> bytes, bool turned, std::vector<double>& out)

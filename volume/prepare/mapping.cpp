@@ -76,7 +76,7 @@ std::vector<Setting> readSettings(const MappingOptions& options, const volume::T
 }
 
 // What a label is made of, and how that is known.
-struct Found {
+struct FoundLabel {
     LabelName label;
     bool certain = true;  // else `label.tissue` is a suggestion, or empty
     bool byItsName = false;
@@ -109,12 +109,12 @@ public:
         }
     }
 
-    Found tissueOf(std::uint16_t value) const
+    FoundLabel tissueOf(std::uint16_t value) const
     {
         const LabelName* own = find(labels_.names, value);
         // A value that --renumber gave says nothing about what the label is.
         const LabelName* mapped = originalOf(value) == value ? find(map_.labels, value) : nullptr;
-        Found found;
+        FoundLabel found;
         found.label = own != nullptr ? *own : LabelName{value, "", ""};
         std::string& name = found.label.name;
         if (mapped != nullptr && !mapped->name.empty()) {
@@ -189,7 +189,7 @@ private:
                 sameName(mapped->name, own->name)) {
                 continue;
             }
-            Found byName;
+            FoundLabel byName;
             searchByName(own->name, byName);
             if (known_ != nullptr) {
                 byName.label.tissue = find(known_->labels, value)->tissue;
@@ -215,7 +215,7 @@ private:
             file.string(), map, fmt::join(list, "; ")));
     }
 
-    void searchByName(const std::string& name, Found& found) const
+    void searchByName(const std::string& name, FoundLabel& found) const
     {
         const auto inTable = [&](const std::optional<std::string>& tissue) {
             return tissue && table_.find(*tissue) ? *tissue : std::string();
@@ -241,10 +241,10 @@ private:
 };
 
 [[noreturn]] void refuseUnknown(const std::filesystem::path& file, const volume::ImportedLabels& labels,
-                                const std::vector<Found>& unknown, const LabelCounts& counts)
+                                const std::vector<FoundLabel>& unknown, const LabelCounts& counts)
 {
     std::vector<std::string> list;
-    for (const Found& u : unknown) {
+    for (const FoundLabel& u : unknown) {
         const std::string perhaps = u.label.tissue.empty() ? "" : fmt::format(", perhaps {}", u.label.tissue);
         list.push_back(fmt::format("{}{} ({} voxels{})", u.label.value,
                                    tellsMore(u.label) ? fmt::format(" '{}'", u.label.name) : "", counts.at(u.label.value),
@@ -316,10 +316,10 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
     }
     const Mapper mapper(options, file, labels, counts, table, notes);
     std::vector<LabelName> named;
-    std::vector<Found> unknown;
+    std::vector<FoundLabel> unknown;
     std::vector<std::string> byName, byDefault, names, values;
     for (const auto& [value, voxels] : counts) {
-        Found found = mapper.tissueOf(value);
+        FoundLabel found = mapper.tissueOf(value);
         if (found.certain) {
             if (found.byItsName) {
                 byName.push_back(
@@ -352,7 +352,7 @@ std::size_t writeLabelMap(const MappingOptions& options, const std::filesystem::
     LabelMap map{file.stem().string(), {}, {}};
     std::set<std::uint16_t> open;
     for (const auto& [value, voxels] : counts) {
-        Found found = mapper.tissueOf(value);
+        FoundLabel found = mapper.tissueOf(value);
         if (value == 0 && found.label.tissue.empty()) {
             continue;
         }

@@ -22,7 +22,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::uintmax_t largestFile = 16U << 20U;
-constexpr std::size_t maxListed = 8;       // labels in a message
+constexpr std::size_t maxRowsListed = 8;   // labels in a message
 constexpr std::size_t longestLine = 1000;  // std::regex needs a frame of the stack for each character
 
 [[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why)
@@ -140,8 +140,9 @@ bool listsCase(const json& root, const std::filesystem::path& labels)
 std::string joined(std::vector<std::string> list)
 {
     const std::size_t all = list.size();
-    list.resize(std::min(all, maxListed));
-    return fmt::format("{}{}", fmt::join(list, "; "), all > maxListed ? fmt::format("; and {} more", all - maxListed) : "");
+    list.resize(std::min(all, maxRowsListed));
+    return fmt::format("{}{}", fmt::join(list, "; "),
+                       all > maxRowsListed ? fmt::format("; and {} more", all - maxRowsListed) : "");
 }
 
 // The value that the file has for a label.

@@ -26,7 +26,6 @@ using namespace chainmail;
 
 namespace {
 
-constexpr std::size_t maxNodes = 8U << 20;
 // Spacing [m], and the fraction of the table's limits that erred least over presses and drags of a 10 mm sphere in the
 // scenes `block` and `layered`, among those that cost under a millisecond at 2 mm: the work grows with the share's inverse
 // cube.
@@ -37,10 +36,10 @@ constexpr double reachInRadii = 8.0;
 
 volume::NodeGrid gridOf(const BaselineScene& scene, double spacing)
 {
-    const auto grid = volume::affordableGrid(scene.tissue.box(), spacing, maxNodes);
+    const auto grid = volume::affordableGrid(scene.tissue.box(), spacing, maxTrialNodes);
     if (grid.spacing > 1.001 * spacing) {
         throw std::runtime_error(fmt::format("lattice baseline: {:g} mm would need over {} nodes; use {:.2g} mm or more",
-                                             1e3 * spacing, maxNodes, 1e3 * grid.spacing));
+                                             1e3 * spacing, maxTrialNodes, 1e3 * grid.spacing));
     }
     return grid;
 }
@@ -125,7 +124,7 @@ volume::Box reachOf(const TrialPath& path)
 
 struct Relaxed {
     Relaxed(const BaselineScene& scene, double spacing, int sweepsPerTick, bool predict)
-        : body(trialBody(scene.tissue, scene.surface, gridOf(scene, spacing).spacing, scene.poissonCap, maxNodes)),
+        : body(trialBody(scene.tissue, scene.surface, gridOf(scene, spacing).spacing, scene.poissonCap, maxTrialNodes)),
           grid(body.body.levels.front(), scene.surface, reachOf(scene.path)),
           sweeps(sweepsPerTick)
     {
