@@ -80,9 +80,8 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
         tool.kind = static_cast<ToolKind>(std::ranges::find(toolKinds, *o.tool) - toolKinds.begin());
     }
     const bool needle = tool.kind == ToolKind::needle, other = tool.kind != scene.kind;
-    if (needle ? o.radius.has_value() : tool.kind == ToolKind::sphere && o.length) {
-        throw std::runtime_error(fmt::format("{}: the tool is a {}: this changes nothing",
-                                             needle ? "--radius-mm" : "--length-mm", kindName(tool.kind)));
+    if (tool.kind == ToolKind::sphere && o.length) {
+        throw std::runtime_error("--length-mm: the tool is a sphere: this changes nothing");
     }
     if (!needle && scene.kind == ToolKind::needle && !o.radius) {
         throw std::runtime_error(fmt::format(
@@ -94,6 +93,7 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
                         kindName(scene.kind)));
     }
     tool.length = needle && other ? ToolSpec{}.length : tool.length;
+    tool.radius = needle && other ? ToolSpec{}.radius : tool.radius;
     tool.radius = o.radius ? inRange("--radius-mm", *o.radius, minRadius, maxRadius) : tool.radius;
     tool.length = o.length ? inRange("--length-mm", *o.length, 0.0, maxLength) : tool.length;
     return tool;
@@ -122,8 +122,8 @@ json toolFigures(const Run& run)
 {
     const ToolSpec& tool = run.press.tool;
     json out{{"kind", kindName(tool.kind)}};
+    out["radius_mm"] = 1e3 * tool.radius;
     if (tool.kind != ToolKind::needle) {
-        out["radius_mm"] = 1e3 * tool.radius;
         out["friction"] = run.model.scene.model.elastic.friction;
     }
     if (tool.kind != ToolKind::sphere) {
@@ -275,7 +275,7 @@ void addPress(CLI::App& app)
         ->capture_default_str();
     c->add_option("--at", o->at, "Points whose displacement is wanted: CSV with x_mm,y_mm,z_mm")->type_name("FILE");
     c->add_option("--tool", o->tool, "Another tool than the scene's")->check(CLI::IsMember(toolKinds));
-    c->add_option("--radius-mm", o->radius, "Its radius (sphere, capsule)");
+    c->add_option("--radius-mm", o->radius, "Its radius");
     c->add_option("--length-mm", o->length, "Its length (capsule: between the middles of its ends; needle)");
     c->add_option("--every", o->every, "A sample every so many milliseconds, and at the end")
         ->check(CLI::Range(std::size_t{1}, std::size_t{10'000'000}))

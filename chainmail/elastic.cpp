@@ -14,7 +14,7 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr std::size_t maxTools = 16;
+constexpr std::size_t maxTools = 16, maxTies = 64;
 constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
 constexpr double minEnergy = 1e-9;    // of tissue that springs back: with less it is at rest, within some micrometres [J]
@@ -39,6 +39,7 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
     tools_.reserve(maxTools);
     shapes_.reserve(maxTools);
     foundFor_.reserve(maxTools);
+    tiesFound_.reserve(maxTies);
     toolAt_.reserve(maxTools);
     slip_.assign(body.points.size(), Vec3f(0.0F));
 }
@@ -108,7 +109,7 @@ std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> too
 // True when the sites found for an earlier call still serve: nothing moved far.
 bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
 {
-    if (moved || atRest_ || load.tools.size() != foundFor_.size() || load.ties.size() != tiesFound_) {
+    if (moved || atRest_ || load.tools.size() != foundFor_.size() || load.ties.size() != tiesFound_.size()) {
         return false;
     }
     const double spacing = stack_.body().levels.front().nodes.spacing, far = drift * spacing;
@@ -120,14 +121,7 @@ bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
             return false;
         }
     }
-    for (std::size_t i = 0; i < tiesFound_; ++i) {
-        const ContactSite& s = sites_[i];
-        const Tie& tie = load.ties[i];
-        if (s.rest != tie.rest || s.stiffness != tie.along || s.across != tie.across || s.normal != tie.axis) {
-            return false;
-        }
-    }
-    return true;
+    return std::ranges::equal(load.ties, tiesFound_, [](const Tie& a, const Tie& b) { return a.holdsAs(b); });
 }
 
 void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
@@ -149,7 +143,8 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
         for (const ElasticTool& tool : load.tools) {
             foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});
         }
-        tiesFound_ = load.ties.size();
+        tiesFound_.assign(load.ties.begin(),
+                          load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
         for (ContactSite& s : active()) {
             s.slip = s.isTie ? Vec3(0.0) : Vec3(slip_[s.point]);
         }
@@ -391,7 +386,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 {
     ElasticResult result;
     ElasticLoad load = all;
-    load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.holdsBack);
+    load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.isTick);
     multigrid_.clearContacts();
     result.moved = stack_.follow(load.focus, !atRest_);
     meet(load, result.moved);
@@ -409,8 +404,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     if (hasLain) {
         remember(load.periods);
     }
-    result.start = energy_ + contactEnergy();
-    const double start = energy_ + contactEnergy();
+    const double start = result.start = energy_ + contactEnergy();
     startEnergy_ = energy_;
     bool isOpen = false;  // the tissue's force was not evaluated where it is
     bool hasGone = false;
@@ -427,7 +421,17 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
         const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
         result.residual = refreshResidual(hasGone);
         if (tolerance > 0.0 && result.residual <= tolerance * loadForce()) {
-            break;
+            if (!isOpen || effort.isTick) {
+                break;
+            }
+            // The force was carried along; it may be another where the tissue is now.
+            isOpen = hasGone = false;
+            if (confirm(start)) {
+                refreshForces();
+            } else {
+                again(result);
+            }
+            continue;
         }
         ++result.cycles;
         hasGone = oneCycle(isOpen ? start : noLimit, result);

@@ -143,7 +143,7 @@ private:
     struct Effort {
         int cycles;
         double first, further, far;
-        bool holdsBack = true;
+        bool isTick = true;  // tools are held back where the body does not bear them, and a warm start may be the last step
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     std::span<const ElasticTool> heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept;
@@ -197,7 +197,7 @@ private:
         bool isQuartered = false;
     };
     std::vector<FoundFor> foundFor_;  // the tools when the sites were looked for
-    std::size_t tiesFound_ = 0;
+    std::vector<Tie> tiesFound_;      // the ties then, as far as there are not more than that
     std::vector<HeldTool> held_;      // of each tool
     std::vector<ElasticTool> tools_;  // as the body feels them
     std::vector<Vec3> toolAt_;        // in the last call [m]

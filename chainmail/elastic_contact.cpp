@@ -28,19 +28,34 @@ constexpr std::array<Lacking, 6> lacking{{{0.5, 0.185, 0.25},
                                           {1.25, 0.056, -0.12},
                                           {1.5, 0.035, 0.1},
                                           {2.0, 0.0, 0.0}}};
-constexpr double little = 1.25;   // radius of a patch, in cells, up to which surface points are quartered
-constexpr double coarse = 0.11;   // area of a surface point that is quartered, in that of a cell's face,
-constexpr double close = 0.3;     // and how far from the tool it may be [cells]
+constexpr double little = 1.25;  // radius of a patch, in cells, up to which surface points are quartered
+constexpr double coarse = 0.11;  // area of a surface point that is quartered, in that of a cell's face,
+constexpr double close = 0.3;    // and how far from the tool it may be [cells]
+constexpr double slightly = 1e-6;
 constexpr double minRatio = 0.3;  // of areas: bounds far beyond what tissue bears
 constexpr double maxRatio = 30.0;
 
 // Stiffness of a surface point by its area at rest. A whole contact must not be stiffer than `stiffest`: spread over a
 // quarter of the tool's cross-section, what a shallow press touches.
+double touchedAtFirst(double radius) noexcept
+{
+    return 0.25 * std::numbers::pi * radius * radius;
+}
+
 double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
 {
-    const double radius = tool.shape.widest();
-    const double cap = tool.stiffest / (0.25 * std::numbers::pi * radius * radius);
+    const double cap = tool.stiffest / touchedAtFirst(tool.shape.widest());
     return std::min(penalty * youngsModulusOf(p.mu) / spacing, cap) * static_cast<double>(p.area);
+}
+
+// A unit vector across a unit vector.
+Vec3 acrossOf(Vec3 way) noexcept
+{
+    const Vec3 size = glm::abs(way);
+    const Vec3 axis = size.x <= size.y && size.x <= size.z ? Vec3(1, 0, 0)
+                      : size.y <= size.z                   ? Vec3(0, 1, 0)
+                                                           : Vec3(0, 0, 1);
+    return glm::normalize(glm::cross(way, axis));
 }
 
 class Finder {
@@ -59,7 +74,11 @@ public:
         site.stiffness = tie.along;
         site.across = tie.across;
         site.normal = tie.axis;
-        add(site);
+        if (tie.piece.radius > 0.0) {
+            addRod(tie, site, index);
+        } else {
+            add(site);
+        }
     }
 
     void addTool(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index) noexcept
@@ -83,6 +102,47 @@ public:
     std::size_t count() const noexcept { return count_; }
 
 private:
+    // A piece of a rod: rings of points around it, one per cell along it. Points that would lie outside of the tissue move
+    // with the axis.
+    void addRod(const Tie& tie, ContactSite site, std::size_t index) noexcept
+    {
+        const double mu = finestMu(tie.rest);
+        locate(body_, windows_, tie.rest, site);
+        if (mu <= 0.0 || site.level >= windows_.size()) {
+            return;
+        }
+        // Next to a window's border cells give way as little as those of the next coarser window, which hold it.
+        const std::size_t level = std::min<std::size_t>(site.level + (atBorder(site) ? 1U : 0U), windows_.size() - 1);
+        const double spacing = body_.levels[level].nodes.spacing;
+        const double rings = std::ceil(tie.piece.length / spacing - slightly);
+        const RodRing ring = ringOf({tie.piece.radius, tie.piece.length / rings, tie.piece.rod}, mu, spacing);
+        site.stiffness = ring.along / ring.points;
+        site.across = ring.across / ring.points;
+        const Vec3 one = acrossOf(tie.restAxis), other = glm::cross(tie.restAxis, one);
+        for (double r = 0.0; r < rings; ++r) {
+            const Vec3 middle = tie.rest + tie.piece.length * ((r + 0.5) / rings - 0.5) * tie.restAxis;
+            for (double i = 0.0; i < ring.points; ++i) {
+                // Pieces are turned against each other: where cells are long, there are several rings in each.
+                const double angle = 2.0 * std::numbers::pi * (i / ring.points + 0.125 * static_cast<double>(index));
+                site.rest = middle + ring.radius * (std::cos(angle) * one + std::sin(angle) * other);
+                site.anchor = finestMu(site.rest) > 0.0 ? site.rest : tie.rest;
+                add(site);
+            }
+        }
+    }
+
+    // Of a site's cell: whether the next coarser window holds one of its nodes.
+    bool atBorder(const ContactSite& site) const noexcept
+    {
+        const Window& w = windows_[site.level];
+        for (int c = 0; c < 8; ++c) {
+            if (w.border[w.layout.corner(site.node, c)] != 0.0F) {
+                return true;
+            }
+        }
+        return false;
+    }
+
     void addRow(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index, std::size_t row,
                 int first, int last) noexcept
     {
@@ -134,12 +194,9 @@ private:
         }
         --count_;
         const SurfacePoint& point = body_.points[whole.point];
-        const Vec3 normal(point.normal), size = glm::abs(normal);
-        const Vec3 axis = size.x <= size.y && size.x <= size.z ? Vec3(1, 0, 0)
-                          : size.y <= size.z                   ? Vec3(0, 1, 0)
-                                                               : Vec3(0, 0, 1);
+        const Vec3 normal(point.normal);
         const double quarter = 0.25 * std::sqrt(static_cast<double>(point.area));
-        const Vec3 one = quarter * glm::normalize(glm::cross(normal, axis)), other = glm::cross(normal, one);
+        const Vec3 one = quarter * acrossOf(normal), other = glm::cross(normal, one);
         for (const Vec3& off : {-one - other, one - other, other - one, one + other}) {
             ContactSite site = whole;
             site.rest += off;
@@ -149,11 +206,13 @@ private:
         }
     }
 
-    bool hasTissue(Vec3 at) const noexcept
+    bool hasTissue(Vec3 at) const noexcept { return finestMu(at) > 0.0; }
+
+    double finestMu(Vec3 at) const noexcept
     {
         const CellLevel& finest = body_.levels.front();
         const Index3 cell(glm::floor((at - finest.nodes.origin) / finest.nodes.spacing));
-        return finest.nodes.contains(cell) && finest.mu[finest.nodes.offset(cell)] > 0.0F;
+        return finest.nodes.contains(cell) ? static_cast<double>(finest.mu[finest.nodes.offset(cell)]) : 0.0;
     }
 
     bool addIfNear(const occupancy::ShapeDistance& shape, ContactSite& site) noexcept
@@ -196,6 +255,18 @@ private:
 };
 
 }  // namespace
+
+double stiffnessUncapped(const ElasticBody& body, double radius) noexcept
+{
+    const CellLevel& finest = body.levels.front();
+    float mu = 0.0F;
+    for (const SurfacePoint& p : body.points) {
+        const Index3 node(glm::round((Vec3(p.anchor) - finest.nodes.origin) / finest.nodes.spacing));
+        const bool isFixed = finest.nodes.contains(node) && finest.fixed[finest.nodes.offset(node)] != 0;
+        mu = isFixed ? mu : std::max(mu, p.mu);
+    }
+    return std::max(ElasticTool().stiffest, penalty * youngsModulusOf(mu) / finest.nodes.spacing * touchedAtFirst(radius));
+}
 
 double radiusOfPatch(const ElasticTool& tool) noexcept
 {
@@ -329,7 +400,7 @@ void addFriction(const ContactSite& s, double alpha, Along& sum) noexcept
 void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept
 {
     if (site.isTie) {
-        const Vec3 stretch = ties[site.owner].u - site.u;
+        const Vec3 stretch = ties[site.owner].pulled(site.rest) - site.u;
         site.force = site.resist(stretch);
         site.energy = 0.5 * glm::dot(site.force, stretch);
         return;
@@ -379,6 +450,24 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
         }
     }
     return sum;
+}
+
+Vec3 Tie::pulled(Vec3 at) const noexcept
+{
+    const Vec3 off = at - rest;
+    if (piece.radius <= 0.0 || axis == restAxis) {
+        return u;
+    }
+    // The least turn from restAxis to axis, see Rodrigues. Against each other they have none: then none is made.
+    const Vec3 turn = glm::cross(restAxis, axis), once = glm::cross(turn, off);
+    const double cosine = glm::dot(restAxis, axis);
+    return cosine > -1.0 + slightly ? u + once + glm::cross(turn, once) / (1.0 + cosine) : u;
+}
+
+bool Tie::holdsAs(const Tie& other) const noexcept
+{
+    return rest == other.rest && axis == other.axis && along == other.along && across == other.across &&
+           piece == other.piece && restAxis == other.restAxis;
 }
 
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,

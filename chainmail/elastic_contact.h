@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chainmail/rod.h>
 #include <chainmail/window_stack.h>
 #include <occupancy/tool_shape.h>
 
@@ -18,13 +19,23 @@ struct ElasticTool {
     double friction = 0;    // Coulomb [-]
 };
 
-/// A material point that is held by springs: by a needle's tip, or along its shaft.
+/// A material point that is held by springs, by a needle's tip; or, with a radius, a piece of a needle's shaft that tissue
+/// sticks to: a rigid rod, see ringOf().
 struct Tie {
-    Vec3 rest{0.0};      // [m]
+    Vec3 rest{0.0};      // of a piece its middle [m]
     Vec3 u{0.0};         // the displacement that the springs pull to [m]
     Vec3 axis{0, 0, 1};  // unit vector
-    double along = 0;    // stiffness along the axis [N/m]
+    double along = 0;    // stiffness of a point along the axis [N/m]
     double across = 0;   // and across it [N/m]
+
+    RodPiece piece{};        // radius 0: a point
+    Vec3 restAxis{0, 0, 1};  // the rod's axis where it got hold of the tissue, unit vector
+
+    /// The displacement that a point which was at `at` at rest is pulled to: the rod's, which has turned from restAxis to
+    /// axis.
+    Vec3 pulled(Vec3 at) const noexcept;
+    /// True where only `u` may be another: the same points are held, as stiffly.
+    bool holdsAs(const Tie& other) const noexcept;
 };
 
 struct ElasticLoad {
@@ -99,6 +110,10 @@ struct Along {
 };
 /// To first order in the tool's surface: depth falls by normal . p.
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
+
+/// ElasticTool::stiffest with which every tissue of the body's surface that gives way is held by 20 E / h: for forces that
+/// no hand will feel. At least the standard.
+double stiffnessUncapped(const ElasticBody& body, double radius) noexcept;
 
 /// Of the patch that a tool touches, sqrt(R d) by Hertz [m].
 double radiusOfPatch(const ElasticTool& tool) noexcept;

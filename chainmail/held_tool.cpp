@@ -15,9 +15,10 @@ constexpr double maxStretch = 6.5;     // of the area under a tool
 constexpr double sinkRadii = 0.03;     // the surface sinks into a tool by at most this fraction of its radius ...
 constexpr double sinkSpacings = 0.15;  // ... and of the spacing,
 constexpr double maxSink = 0.25;       // but not over this fraction of the radius
-constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness
-constexpr double ease = 0.02;          // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
-constexpr int maxSteps = 256;          // along a way through the tissue
+constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness,
+constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius: from one on it would slip around the tool
+constexpr double ease = 0.02;        // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
+constexpr int maxSteps = 256;        // along a way through the tissue
 
 bool isHeld(const CellLevel& level, Vec3 at) noexcept
 {
@@ -52,7 +53,7 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     const double wanted = glm::length(tool.pushed);
     const double most = isSmall ? std::min(wanted, smallStrain * radius) : wanted;
     const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, maxSink * radius);
-    const double bears = sink + onBone * load / tool.stiffest;
+    const double bears = std::min(sink + onBone * load / tool.stiffest, std::max(sink, mostOnBone * radius));
     const double further = std::min(bears - depth, ease * radius * (maxStretch - stretch));
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
@@ -64,7 +65,8 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     felt.shape.b -= behind * inward;
     felt.pushed = given * inward;
     if (behind > 0.0) {
-        stopped = tool.stiffest * insideHeld(finest, foremost(felt.shape, inward), inward, behind);
+        stopped = std::min(tool.stiffest, ElasticTool().stiffest) *
+                  insideHeld(finest, foremost(felt.shape, inward), inward, behind);
     }
     return felt;
 }

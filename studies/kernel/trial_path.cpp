@@ -19,10 +19,11 @@ constexpr double thickShare = 0.4;  // of the tissue's thickness
 constexpr double gap = 0.5e-3;      // between a sphere and the surface at the start [m]
 constexpr double tipDepth = 1e-3;   // of a needle's tip at the start [m]
 constexpr double shaftLength = 20e-3;
-constexpr double tieSpacing = 4e-3;   // along the shaft [m]
-constexpr double tieStiffness = 8.0;  // in E h
-constexpr int looks = 4;              // in press and drag each
-constexpr int turnLooks[] = {5, 20};  // ticks after the turn
+constexpr double shaftPiece = 4e-3;      // that one tie stands for [m]
+constexpr double shaftRadius = 1.05e-3;  // of 14 G [m]
+constexpr double tieStiffness = 8.0;     // in E h
+constexpr int looks = 4;                 // in press and drag each
+constexpr int turnLooks[] = {5, 20};     // ticks after the turn
 constexpr int restTicks = 50;
 
 // How far a line from the surface runs through tissue that gives way [m].
@@ -40,10 +41,11 @@ double softLength(const volume::Tissue& tissue, Vec3 from, Vec3 direction)
     return t - 4.0 * step;
 }
 
-void addTie(const volume::Tissue& tissue, Vec3 rest, double spacing, TrialPath& path)
+// A point, or a piece of a shaft.
+void addTie(const volume::Tissue& tissue, Vec3 rest, double spacing, const chainmail::RodPiece& piece, TrialPath& path)
 {
     const double stiffness = tieStiffness * volume::Tissue::Reader(tissue).youngsModulus(rest) * spacing;
-    path.ties.push_back({rest, Vec3(0.0), path.inward, stiffness, stiffness});
+    path.ties.push_back({rest, Vec3(0.0), path.inward, stiffness, stiffness, piece, path.inward});
 }
 
 // As many as the speed wants, but a multiple of the looks.
@@ -100,10 +102,14 @@ TrialPath trialPath(const volume::Tissue& tissue, const volume::DistanceField& s
     path.sideways = glm::normalize(place.sideways - glm::dot(place.sideways, place.approach) * place.approach);
     path.press = std::min(shaft ? 2e-3 : 5e-3, thickShare * place.shaft);
     path.drag = 3e-3;
-    addTie(tissue, place.entry + std::min(tipDepth, 0.5 * place.shaft) * place.approach, spacing, path);
-    const double end = shaft ? std::min(shaftLength, 0.8 * place.shaft) : 0.0;
-    for (double t = tieSpacing; t <= end; t += tieSpacing) {
-        addTie(tissue, place.entry + t * place.approach, spacing, path);
+    if (!shaft) {
+        addTie(tissue, place.entry + std::min(tipDepth, 0.5 * place.shaft) * place.approach, spacing, {}, path);
+    }
+    const double length = shaft ? std::min(shaftLength, 0.8 * place.shaft) : 0.0;
+    const double pieces = std::max(1.0, std::round(length / shaftPiece));
+    for (double i = 0.5; shaft && i < pieces; ++i) {
+        addTie(tissue, place.entry + i * length / pieces * place.approach, spacing, {shaftRadius, length / pieces, length},
+               path);
     }
     path.start = path.ties.back().rest;
     return path;

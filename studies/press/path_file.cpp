@@ -35,6 +35,16 @@ const std::vector<std::string> pathColumns{"x_mm", "y_mm", "z_mm", "seconds", "a
 constexpr std::size_t seconds = 3, axis = 4;  // their places; positions come first
 const std::vector<std::string> pointColumns{"x_mm", "y_mm", "z_mm"};
 
+// What a cell holds, for a message: of a file that is no text at all, too. Other than ASCII letters become question marks.
+std::string cellInWords(std::string_view cell)
+{
+    constexpr std::size_t longest = 60;
+    std::string words(cell.substr(0, longest));
+    std::ranges::replace_if(
+        words, [](char c) { return c < ' ' || c > '~'; }, '?');
+    return cell.size() > longest ? words + "..." : words;
+}
+
 // A CSV file of numbers, row by row.
 class NumberFile {
 public:
@@ -81,7 +91,8 @@ public:
         const std::string_view cell = cells_[*place_[column]];
         const std::optional<double> value = base::numberIn(cell);
         if (!value || !std::isfinite(*value)) {
-            throw std::runtime_error(fmt::format("{}: {} = '{}': must be a number", where(), known_[column], cell));
+            throw std::runtime_error(
+                fmt::format("{}: {} = '{}': must be a number", where(), known_[column], cellInWords(cell)));
         }
         if (std::abs(*value) > most) {
             throw std::runtime_error(
@@ -120,8 +131,8 @@ private:
     {
         const auto at = std::ranges::find(known_, name);
         if (at == known_.end()) {
-            throw std::runtime_error(
-                fmt::format("{}: column '{}' is not known: the columns are {}", where(), name, fmt::join(known_, ", ")));
+            throw std::runtime_error(fmt::format("{}: column '{}' is not known: the columns are {}", where(),
+                                                 cellInWords(name), fmt::join(known_, ", ")));
         }
         auto& place = place_[static_cast<std::size_t>(at - known_.begin())];
         if (place) {

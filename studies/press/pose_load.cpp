@@ -14,7 +14,8 @@ using datasets::ToolKind;
 
 namespace {
 
-constexpr double loadTieSpacing = 4e-3;  // along a needle's shaft [m]
+constexpr double shaftPiece = 4e-3;      // of a needle that one tie stands for, about [m]
+constexpr double insertedStep = 0.1e-3;  // to which it is known how much of it is in the body [m]
 constexpr double touchStep = 0.25e-3;    // at most so deep a tool is found that comes to the surface [m]
 
 }  // namespace
@@ -31,28 +32,40 @@ PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec&
     tool_.length = tool.kind == ToolKind::sphere ? 0.0 : tool.length;
     if (!isNeedle()) {
         surface_.friction = model.scene.model.elastic.friction;
+        surface_.stiffest = chainmail::stiffnessUncapped(*model.elastic, tool.radius);
         load_.tools = {&surface_, 1};
         return;
     }
     if (model.surface.distance(first.position) < 0.0) {
-        hold(0.0);
-    }
-    for (double s = loadTieSpacing; holds() && s <= tool_.length && model.surface.distance(onShaft(first, s)) < 0.0;
-         s += loadTieSpacing) {
-        hold(s);
+        const double length = tool_.radius > 0.0 ? inserted() : 0.0;
+        const double pieces = std::max(1.0, std::round(length / shaftPiece));
+        for (double i = 0.5; i < pieces; ++i) {
+            hold(i * length / pieces,
+                 length > 0.0 ? chainmail::RodPiece{tool_.radius, length / pieces, length} : chainmail::RodPiece{});
+        }
     }
     load_.ties = ties_;
 }
 
+// How much of the shaft is in the body: from the tip to where it first comes out.
+double PoseLoad::inserted() const noexcept
+{
+    double length = 0.0;
+    while (length < tool_.length && model_.surface.distance(onShaft(first_, length)) < 0.0) {
+        length = std::min(length + insertedStep, tool_.length);
+    }
+    return length;
+}
+
 // Near the surface the cell around a point may be half empty: the tie holds the tissue just under it, as in a session.
-void PoseLoad::hold(double behind)
+void PoseLoad::hold(double behind, const chainmail::RodPiece& piece)
 {
     const double h = model_.elastic->levels.front().nodes.spacing;
     const Vec3 at = onShaft(first_, behind);
     const double under = std::max(0.0, 0.5 * h + model_.surface.distance(at));
     const Vec3 rest = at - under * model_.surface.normal(at);
     if (const double stiffness = chainmail::tieStiffnessAt(*model_.elastic, rest); stiffness > 0.0) {
-        ties_.push_back({rest, Vec3(0.0), first_.axis, stiffness, stiffness});
+        ties_.push_back({rest, Vec3(0.0), first_.axis, stiffness, stiffness, piece, first_.axis});
         behind_.push_back(behind);
     }
 }

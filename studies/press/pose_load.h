@@ -13,10 +13,10 @@ namespace palpate::studies {
 
 /// What a tool does to an elastic body as it goes from pose to pose. Sphere and capsule press with their surface, from
 /// where they first touch the surface at rest until their proxy is clear of them; a capsule's proxy is the whole capsule,
-/// which touches at the deepest place of its axis. A needle has hold of the tissue where it is at its first pose: the tip
-/// of the point that lies there, and its shaft, from the surface to the tip, of one point every 4 mm behind it. Later poses
-/// carry these points along as parts of one rigid needle, on springs of 8 E h (E of the cell that the point lies in).
-/// Points where there is no tissue are not held.
+/// which touches at the deepest place of its axis. A needle has hold of the tissue where it is at its first pose: it is a
+/// rigid rod, of the tool's radius, that the tissue sticks to from the tip to the surface, in pieces of some 4 mm
+/// (chainmail::ringOf). Without radius or length it is a point at the tip on springs of 8 E h (E of the cell that it lies
+/// in). Pieces where there is no tissue hold nothing.
 ///
 /// Not to be copied: the load refers to it. The model must outlive it.
 class PoseLoad {
@@ -42,7 +42,8 @@ public:
 
 private:
     bool isNeedle() const noexcept { return tool_.kind == datasets::ToolKind::needle; }
-    void hold(double behind);
+    double inserted() const noexcept;
+    void hold(double behind, const chainmail::RodPiece& piece);
     Vec3 onShaft(const ToolPose& pose, double behind) const noexcept { return pose.position - behind * pose.axis; }
     void moveProxy(const ToolPose& pose) noexcept;
     std::optional<Vec3> firstTouch(const haptics::ProxyTool& tool, Vec3 from, Vec3 to) const noexcept;

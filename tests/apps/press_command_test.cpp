@@ -107,6 +107,15 @@ TEST_F(PressCommand, AnotherToolIsTakenOnlyWithWhatTheSceneDoesNotSay)
     };
     EXPECT_EQ(tool({"--tool", "capsule", "--length-mm", "12"}).at("length_mm"), 12.0);
     EXPECT_EQ(tool({"--radius-mm", "4"}).at("radius_mm"), 4.0);
+    const std::string inside = folder / "inside.csv";
+    writeText(inside, "x_mm,y_mm,z_mm\n0,8,0\n0,8.1,0\n");
+    const auto needle = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"press", scene, "--path", inside, "--tool", "needle"});
+        return figures(more);
+    };
+    EXPECT_EQ(needle({}).at("tool").at("radius_mm"), 1.05);
+    EXPECT_EQ(needle({"--radius-mm", "0.6"}).at("tool").at("radius_mm"), 0.6);
+    EXPECT_GT(needle({}).at("peak_force_n"), needle({"--radius-mm", "0.6"}).at("peak_force_n"));
     expectRefusal({"press", scene, "--path", path, "--tool", "capsule"}, "how long this one is with --length-mm");
     expectRefusal({"press", "layered", "--path", path, "--tool", "sphere"}, "how thick this one is with --radius-mm");
     expectRefusal({"press", scene, "--path", path, "--length-mm", "3"}, "--length-mm: the tool is a sphere");

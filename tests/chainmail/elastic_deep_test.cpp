@@ -102,7 +102,7 @@ public:
     void tick(double depth, double along)
     {
         const Vec3 at = entry_ + Vec3(along, depth - radius_, 0.0);
-        ElasticTool tool = tests::ball(at, radius_);
+        ElasticTool tool = tests::ball(at, radius_, stiffest);
         tool.shape.b -= Vec3(0.0, length_, 0.0);
         tool.pushed = Vec3(0.0, std::max(depth, 0.0), 0.0);
         const Vec3 before = elastic_.toolForce(0);
@@ -119,10 +119,11 @@ public:
     double force() const { return -elastic_.toolForce(0).y; }
 
     ElasticResult last;
-    double pull = 0;   // largest force into the body [N]
-    double step = 0;   // largest change of the force in a tick [N]
-    double made = 0;   // work that the tissue did on the tool [J]
-    double moved = 0;  // and its size along the way [J]
+    double stiffest = 1e6;  // of the contact [N/m]
+    double pull = 0;        // largest force into the body [N]
+    double step = 0;        // largest change of the force in a tick [N]
+    double made = 0;        // work that the tissue did on the tool [J]
+    double moved = 0;       // and its size along the way [J]
 
 private:
     Vec3 entry_;
@@ -190,6 +191,27 @@ TEST(ElasticDeep, ForceGrowsWithDepth)
         }
         EXPECT_GT(way.last.behind, 4e-3);
         EXPECT_LE(way.pull, 0.0);
+    }
+}
+
+// Also in tissue that is stiffer than the contact may be: it sank into the tool until it slipped around it.
+TEST(ElasticDeep, StiffTissueDoesNotPassThroughTheTool)
+{
+    for (const double youngsModulus : {3e5, 3e6, 1e9}) {
+        auto block = tests::heldBlock({40, 21, 40}, 2e-3, youngsModulus, 0.47);
+        block.air = 2;
+        const ElasticBody body = tests::bodyOf(block);
+        Way way(body, middle, 10e-3, 0.0, asInASession);
+        way.stiffest = ElasticTool().stiffest;
+        double before = 0.0;
+        for (double depth = 0.5e-3; depth <= 30e-3; depth += 0.5e-3) {
+            way.to(depth);
+            EXPECT_GT(way.force(), 0.99 * before) << depth << " " << youngsModulus;
+            before = way.force();
+        }
+        way.to(-0.5e-3);
+        EXPECT_EQ(way.force(), 0.0);
+        EXPECT_LE(way.pull, 1e-9);
     }
 }
 
