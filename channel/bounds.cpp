@@ -100,8 +100,8 @@ std::uint64_t voxelsOf(const Grid& grid) noexcept
 bool sound(const Scenery& s) noexcept
 {
     if (!ended(s.scene) || !sound(s.labels) || !(s.lattice.size == noNodes || sound(s.lattice)) || s.tissues > maxTissues ||
-        s.structures > maxStructures || s.windows > maxWindows || s.tool > ToolKind::capsule || !ended(s.imageUnit) ||
-        !ended(s.who))
+        s.structures > maxStructures || s.windows > maxWindows || s.tool > ToolKind::capsule || s.task > Task::advance ||
+        !ended(s.imageUnit) || !ended(s.who))
         return false;
     for (std::size_t i = 0; i < s.tissues; ++i)
         if (!sound(s.tissue[i]))

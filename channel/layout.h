@@ -69,6 +69,8 @@ inline constexpr std::uint32_t handElsewhere = 0,  // viewers only look on
 
 enum class ToolKind : std::uint32_t { sphere, needle, capsule };
 enum class ProbeKind : std::uint32_t { none, linear, curved };
+/// What the trainee is asked for, see datasets::SessionTask.
+enum class Task : std::uint32_t { biopsy, find, touch, advance };
 
 /// What does not change during a session.
 struct Scenery {
@@ -105,7 +107,7 @@ struct Scenery {
     double holeRadius = 0;  // of State::hole [m]
     // Of a CT scan, which the scene has on demand; 0 slices: it has none.
     std::uint32_t ctSlices = 0;
-    std::uint32_t ctPadding = 0;
+    Task task = Task::biopsy;
     double ctWidth = 0;       // of a slice [m]
     double ctDoseIndex = 0;   // CTDIvol of a scan [mGy]
     double ctDoseLength = 0;  // of a scan [mGy cm]
@@ -152,9 +154,10 @@ struct State {
     double aheadTissueDistance = 0;                // tip to the next tissue on that line; infinite: nowhere near [m]
     double aheadSpeed = 0;                         // of the tip along it [m/s]
     std::uint32_t aheadTissue = 0;                 // row of the tissue table
-    std::uint32_t padding = 0;
-    double coreTarget = 0;  // fraction of target tissue in the last core
-    double coreLength = 0;  // length in the target of the last core [m]
+    std::uint16_t rested = 0;                      // on the skin so far, and not inside; 65535 stands for more [ms]
+    std::uint16_t reached = 0;                     // 1: the tip has been in the target
+    double coreTarget = 0;                         // fraction of target tissue in the last core
+    double coreLength = 0;                         // length in the target of the last core [m]
     ProbePose probe;
     std::uint32_t holes = 0;  // cores so far that are in `hole`: the last maxHoles
     Standing standing = Standing::no;

@@ -414,6 +414,46 @@ double firingDepth(const ToolSpec& tool, double length) noexcept
     return tool.kind == ToolKind::needle ? std::max(minInside, depth) : depth;
 }
 
+namespace {
+
+constexpr double touchDepth = 1.5e-3;  // that a touch pushes the skin in: a needle pierces it at some millimetres [m]
+constexpr double restTime = 3.5;       // three seconds, counted slowly [s]
+
+// From before the skin to what is asked for.
+std::vector<TraineeStep> stepsInside(const Scene& scene, const Approach& approach, double length, Vec3 inward)
+{
+    using Kind = TraineeStep::Kind;
+    const bool needle = scene.tool.kind == ToolKind::needle;
+    if (scene.task == SessionTask::touch) {
+        const double front = needle ? 0.0 : scene.tool.radius;
+        return {{.kind = Kind::press,
+                 .to = approach.entry + (touchDepth - front) * inward,
+                 .speed = 0.006,
+                 .seconds = 4,
+                 .tolerance = 1e-4},
+                {.kind = Kind::wait, .seconds = restTime}};
+    }
+    const bool advances = scene.task == SessionTask::advance;
+    const double depth = advances ? length : firingDepth(scene.tool, length);
+    std::vector<TraineeStep> steps;
+    if (needle) {
+        steps.push_back({.kind = Kind::pierce, .to = approach.aim, .speed = 0.012, .seconds = 15});
+    }
+    steps.push_back({.kind = Kind::press,
+                     .to = approach.entry + depth * inward,
+                     .speed = 0.012,
+                     .seconds = 15,
+                     .tolerance = 1e-3,
+                     .depth = needle ? depth : 0.0});
+    if (needle && !advances) {
+        steps.push_back({.kind = Kind::fire});
+    }
+    steps.push_back({.kind = Kind::wait, .seconds = 0.5});
+    return steps;
+}
+
+}  // namespace
+
 std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach)
 {
     if (!scene.script.empty()) {
@@ -422,25 +462,13 @@ std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& appro
     using Kind = TraineeStep::Kind;
     const double length = glm::length(approach.aim - approach.entry);
     const Vec3 inward = length > 0 ? (approach.aim - approach.entry) / length : Vec3(0, 1, 0);
-    const double depth = firingDepth(scene.tool, length);
     const Vec3 away = approach.entry - startDistance * inward;
-    const bool needle = scene.tool.kind == ToolKind::needle;
     std::vector<TraineeStep> script{
         {.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 4, .tolerance = 1e-3},
         {.kind = Kind::move, .to = approach.entry - 3e-3 * inward, .speed = 0.04, .seconds = 4, .tolerance = 1e-3}};
-    if (needle) {
-        script.push_back({.kind = Kind::pierce, .to = approach.aim, .speed = 0.012, .seconds = 15});
+    for (const TraineeStep& step : stepsInside(scene, approach, length, inward)) {
+        script.push_back(step);
     }
-    script.push_back({.kind = Kind::press,
-                      .to = approach.entry + depth * inward,
-                      .speed = 0.012,
-                      .seconds = 15,
-                      .tolerance = 1e-3,
-                      .depth = needle ? depth : 0.0});
-    if (needle) {
-        script.push_back({.kind = Kind::fire});
-    }
-    script.push_back({.kind = Kind::wait, .seconds = 0.5});
     script.push_back({.kind = Kind::move, .to = away, .speed = 0.04, .seconds = 10, .tolerance = 2e-3});
     return script;
 }

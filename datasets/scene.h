@@ -133,8 +133,9 @@ struct TissueChange {
     std::vector<std::pair<std::string, double>> values;  // e.g. youngs_kpa, 10
 };
 
-/// What the trainee is asked for: a core of the target, or where it is and how large (palpation).
-enum class SessionTask : std::uint8_t { biopsy, find };
+/// What the trainee is asked for: a core of the target; where it is and how large (palpation); to rest on the skin and not
+/// to pierce it; or to bring the needle's tip into the target, with no core.
+enum class SessionTask : std::uint8_t { biopsy, find, touch, advance };
 
 /// Everything that a session needs, checked. Lengths in the patient frame, SI.
 struct Scene {
@@ -165,6 +166,14 @@ Scene loadScene(const std::filesystem::path& file);
 /// As loadScene() from text; `origin` stands for the file in errors, and relative paths start at its folder.
 Scene parseScene(const std::string& text, const std::filesystem::path& origin);
 
+/// What a session is judged by: the task, and whether the tool can do a biopsy.
+struct SceneAim {
+    SessionTask task = SessionTask::biopsy;
+    ToolKind tool = ToolKind::needle;
+};
+/// Of the text of a scene, as a record keeps it. A text that is no scene asks for a biopsy.
+SceneAim aimOf(const std::string& sceneText);
+
 std::vector<std::string> builtInScenes();  // "breast", "layered", "block", "plate", "pair"
 std::optional<Scene> builtInScene(const std::string& name);
 /// The scene for a volume file alone: target = the first tumour (else the structure nearest the middle), vital = all of
@@ -188,7 +197,8 @@ Approach planApproach(const Scene& scene, const volume::Tissue& tissue);
 /// How deep the tip goes by hand, so that the fired notch's middle is at an aim `length` deep [m].
 double firingDepth(const ToolSpec& tool, double length) noexcept;
 
-/// The scene's script, or the standard biopsy: approach, press, puncture, advance short of the target, fire, withdraw.
+/// The scene's script, or the standard biopsy: approach, press, puncture, advance short of the target, fire, withdraw. Task
+/// `touch`: rest on the skin and lift off; `advance`: to the aim and back, without firing.
 std::vector<TraineeStep> traineeScript(const Scene& scene, const Approach& approach);
 
 }  // namespace palpate::datasets

@@ -15,7 +15,7 @@ namespace {
 using units::degree;
 constexpr std::size_t maxSteps = 1000;  // of a script
 
-constexpr std::array<std::string_view, 2> taskNames{"biopsy", "find"};
+constexpr std::array<std::string_view, 4> taskNames{"biopsy", "find", "touch", "advance"};
 constexpr std::size_t maxInserts = 32;
 constexpr std::array<std::string_view, 3> dffbModes{"off", "thesis", "field"};
 constexpr std::array<std::string_view, 2> strains{"small", "finite"};
@@ -427,6 +427,23 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
 Scene loadScene(const std::filesystem::path& file)
 {
     return parseScene(readText(file), file);
+}
+
+// Read by itself: the volume of a record's scene may be gone.
+SceneAim aimOf(const std::string& sceneText)
+{
+    SceneAim found;
+    try {
+        const toml::table root = parseToml(sceneText, "scene");
+        Section top(root, "scene", "");
+        readChoice(top, "task", taskNames, found.task);
+        if (std::optional<Section> tool = top.section("tool")) {
+            readChoice(*tool, "kind", toolKinds, found.tool);
+        }
+    } catch (const std::runtime_error&) {
+        return {};
+    }
+    return found;
 }
 
 std::vector<std::string> builtInScenes()

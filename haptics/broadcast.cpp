@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 namespace palpate::haptics {
 
@@ -50,6 +51,12 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
     state.tissue = r.tissue;
     state.inserted = r.inserted;
     state.distance = r.distance;
+    if (r.phase == Phase::contact && state.rested < std::numeric_limits<std::uint16_t>::max()) {
+        ++state.rested;
+    }
+    if (r.phase == Phase::inserted && r.distance[0] <= 0.0) {
+        state.reached = 1;
+    }
     state.warning = static_cast<channel::Warning>(r.warning);
     state.warned = r.warned != 0xFF ? r.warned : r.nearestVital != 0xFF ? r.nearestVital : 0;
     state.ahead = r.ahead.structure;

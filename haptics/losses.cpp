@@ -80,6 +80,7 @@ void LossWatch::add(const TickRecord& record) noexcept
     note(secondShot, now.passes == 2 && before_.passes == 1, seconds);
     note(secondContact, now.skinContacts == 2 && before_.skinContacts == 1, seconds);
     note(redirect, now.redirects == 1 && before_.redirects == 0, seconds);
+    note(pierced, now.deepest > 0 && before_.deepest <= 0, seconds);
     note(force, now.peakForce > before_.peakForce, seconds);
     note(blind, before_.blindAdvance < blindFrom && now.blindAdvance >= blindFrom, seconds);
     note(beyond, now.beyondTarget > before_.beyondTarget, seconds);
@@ -127,6 +128,37 @@ std::string LossWatch::miss(const Score& s, const std::string& target) const
     return words + (where.empty() ? "" : said(tr("; it lay {}"), where));
 }
 
+Loss LossWatch::ofContacts(const Score& s, double most) const
+{
+    return {"skin_contacts", points(most, sharesOf(s).contacts),
+            said(tr("The skin was touched {}"), timesInWords(s.skinContacts)), at(secondContact)};
+}
+
+Loss LossWatch::ofForce(const Score& s, double points) const
+{
+    return {"peak_force_n", points, said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)};
+}
+
+Loss LossWatch::ofRedirects(const Score& s, double most) const
+{
+    return {"redirects", points(most, sharesOf(s).redirects),
+            said(tr("The needle was drawn back and pushed on again {}"), timesInWords(s.redirects)), at(redirect)};
+}
+
+Loss LossWatch::ofPath(const Score& s, double most) const
+{
+    return {"inserted_path_mm", points(most, sharesOf(s).economy),
+            said(tr("The tip went {:.0f} mm inside the body, {:.0f} mm would have done"), 1e3 * s.insertedPath,
+                 2e3 * s.deepest),
+            std::nullopt};
+}
+
+Loss LossWatch::ofBeyond(const Score& s, double most, const std::string& target) const
+{
+    return {"beyond_target_mm", points(most, sharesOf(s).stays),
+            said(tr("The needle was pushed {:.1Lf} mm deeper than the {}"), 1e3 * s.beyondTarget, target), at(beyond)};
+}
+
 std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) const
 {
     const std::string target = info.structures.empty() ? tr("target") : base::spokenHere(info.structures[0]);
@@ -137,18 +169,12 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
     const double each = (s.hasProbe ? 25.0 / 6.0 : 5.0) * fraction.hit * fraction.stays;
     std::vector<Loss> all{
         {"best_target_pct", points(50, parts(s).core / 50) + points(25, fraction.hit), miss(s, target), at(shot)},
-        {"beyond_target_mm", 25 * fraction.hit * (1 - fraction.stays),
-         said(tr("The needle was pushed {:.1Lf} mm deeper than the {}"), 1e3 * s.beyondTarget, target), at(beyond)},
+        ofBeyond(s, 25 * fraction.hit, target),
         {"passes", points(each, fraction.passes), said(tr("{} cores were taken; one can do"), s.passes), at(secondShot)},
-        {"skin_contacts", points(each, fraction.contacts),
-         said(tr("The skin was touched {}"), timesInWords(s.skinContacts)), at(secondContact)},
-        {"redirects", points(each, fraction.redirects),
-         said(tr("The needle was drawn back and pushed on again {}"), timesInWords(s.redirects)), at(redirect)},
-        {"inserted_path_mm", points(each, fraction.economy),
-         said(tr("The tip went {:.0f} mm inside the body, {:.0f} mm would have done"), 1e3 * s.insertedPath,
-              2e3 * s.deepest),
-         std::nullopt},
-        {"peak_force_n", points(each, fraction.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
+        ofContacts(s, each),
+        ofRedirects(s, each),
+        ofPath(s, each),
+        ofForce(s, points(each, fraction.gentle))};
     if (s.hasProbe) {
         all.push_back({"blind_advance_mm", points(each, fraction.seen),
                        said(tr("The needle went on {:.0f} mm without its tip in the picture"), 1e3 * s.blindAdvance),
@@ -159,6 +185,9 @@ std::vector<Loss> LossWatch::ofBiopsy(const Score& s, const SessionInfo& info) c
 
 std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info) const
 {
+    if (s.marks == 0) {
+        return {{"marks", 75, tr("Nothing was marked"), std::nullopt}};
+    }
     const std::string target = info.structures.empty() ? tr("lump") : base::spokenHere(info.structures[0]);
     const ScoreShares fraction = sharesOf(s);
     std::string where = std::isfinite(s.markError)
@@ -174,7 +203,53 @@ std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info
          where, at(mark)},
         {"mark_size_error_mm", points(20, fraction.size),
          said(tr("The size was marked {:.1Lf} mm wrong"), 1e3 * s.markSizeError), at(mark)},
-        {"peak_force_n", points(25, fraction.gentle), said(tr("The force rose to {:.1Lf} N"), s.peakForce), at(force)}};
+        ofForce(s, points(25, fraction.gentle))};
+}
+
+std::vector<Loss> LossWatch::ofRest(const Score& s) const
+{
+    const ScoreShares fraction = sharesOf(s);
+    const double kept = fraction.whole * fraction.rested;
+    return {{"deepest_mm", points(75, fraction.whole),
+             said(tr("The skin was pierced, {:.1Lf} mm deep; it was only to be touched"), 1e3 * s.deepest), at(pierced)},
+            {"rest_s", fraction.whole * points(75, fraction.rested),
+             said(tr("The tip rested on the skin for {:.1Lf} s"), s.rest), std::nullopt},
+            ofContacts(s, 12.5 * kept),
+            ofForce(s, points(12.5 * kept, fraction.light))};
+}
+
+std::vector<Loss> LossWatch::ofWay(const Score& s, const SessionInfo& info) const
+{
+    const std::string target = info.structures.empty() ? tr("target") : base::spokenHere(info.structures[0]);
+    const ScoreShares fraction = sharesOf(s);
+    const double each = 6.25 * fraction.reached * fraction.stays;
+    return {{"tip_to_target_mm", points(75, fraction.reached),
+             std::isfinite(s.tipToTarget)
+                 ? said(tr("The tip came within {:.1Lf} mm of the {} and not into it"), 1e3 * s.tipToTarget, target)
+                 : tr("The needle did not go in"),
+             std::nullopt},
+            ofBeyond(s, 25 * fraction.reached, target),
+            ofContacts(s, each),
+            ofRedirects(s, each),
+            ofPath(s, each),
+            ofForce(s, points(each, fraction.gentle))};
+}
+
+std::vector<Loss> LossWatch::ofTask(const Score& s, const SessionInfo& info) const
+{
+    switch (judgedBy(s)) {
+        case Judged::marks:
+            return ofPalpation(s, info);
+        case Judged::rest:
+            return ofRest(s);
+        case Judged::way:
+            return ofWay(s, info);
+        case Judged::nothing:
+            return {ofForce(s, points(25, sharesOf(s).gentle))};
+        case Judged::core:
+            break;
+    }
+    return ofBiopsy(s, info);
 }
 
 std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
@@ -183,7 +258,7 @@ std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
     if (s.skinContacts == 0) {
         return {{"skin_contacts", 100, tr("The tool never touched the body"), std::nullopt}};
     }
-    std::vector<Loss> all = s.marks > 0 ? ofPalpation(s, info) : ofBiopsy(s, info);
+    std::vector<Loss> all = ofTask(s, info);
     const std::string structure =
         touched_ < info.structures.size() ? base::spokenHere(info.structures[touched_]) : tr("a vital structure");
     all.push_back({"vital_contacts", points(25, parts(s).vital / 25),

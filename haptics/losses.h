@@ -31,13 +31,33 @@ public:
 
 private:
     /// Moments that can be jumped to.
-    enum Moment : std::uint8_t { shot, secondShot, touch, secondContact, redirect, force, beyond, mark, blind, moments };
+    enum Moment : std::uint8_t {
+        shot,
+        secondShot,
+        touch,
+        secondContact,
+        redirect,
+        force,
+        beyond,
+        mark,
+        blind,
+        pierced,
+        moments
+    };
 
     void note(Moment moment, bool now, double seconds) noexcept;
     std::optional<double> at(Moment moment) const noexcept;
     std::string miss(const Score& score, const std::string& target) const;
     std::vector<Loss> ofBiopsy(const Score& score, const SessionInfo& info) const;
     std::vector<Loss> ofPalpation(const Score& score, const SessionInfo& info) const;
+    std::vector<Loss> ofRest(const Score& score) const;
+    std::vector<Loss> ofWay(const Score& score, const SessionInfo& info) const;
+    std::vector<Loss> ofTask(const Score& score, const SessionInfo& info) const;
+    Loss ofContacts(const Score& score, double most) const;
+    Loss ofForce(const Score& score, double points) const;
+    Loss ofRedirects(const Score& score, double most) const;
+    Loss ofPath(const Score& score, double most) const;
+    Loss ofBeyond(const Score& score, double most, const std::string& target) const;
 
     double rate_ = 1000;  // [Hz]
     Scorer scorer_;

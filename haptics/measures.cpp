@@ -24,7 +24,13 @@ double ofCt(const Score& s, double value)
     return s.scanDose > 0 ? value : std::numeric_limits<double>::infinity();
 }
 
-constexpr std::array<Measure, 34> all{{
+// Nothing where it asks for something else.
+double ofTask(const Score& s, datasets::SessionTask task, double value)
+{
+    return s.aim.task == task ? value : std::numeric_limits<double>::infinity();
+}
+
+constexpr std::array<Measure, 36> all{{
     {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
     {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
@@ -85,7 +91,47 @@ constexpr std::array<Measure, 34> all{{
      [](const Score& s) { return ofCt(s, static_cast<double>(s.scans)); }},
     {"ct_dose_mgy_cm", "mGy cm", "Dose of the CT scans", "mGy cm", 1, Listed::ifCt,
      [](const Score& s) { return ofCt(s, s.scans * s.scanDose); }},
+    {"rest_s", "rest s", "Rest on the skin", "s", 1, Listed::ifTouch,
+     [](const Score& s) { return ofTask(s, datasets::SessionTask::touch, s.rest); }},
+    {"tip_to_target_mm", "tip mm", "Tip's nearest to the target", "mm", 1, Listed::ifAdvance,
+     [](const Score& s) { return ofTask(s, datasets::SessionTask::advance, s.tipToTarget * 1e3); }},
 }};
+
+bool isListed(Listed listed, const Score& score)
+{
+    switch (listed) {
+        case Listed::never:
+            return false;
+        case Listed::ifFired:
+            return score.passes > 0 || judgedBy(score) == Judged::core;
+        case Listed::ifMarked:
+            return score.marks > 0;
+        case Listed::ifProbe:
+            return score.hasProbe;
+        case Listed::ifCt:
+            return score.scanDose > 0;
+        case Listed::ifTouch:
+            return score.aim.task == datasets::SessionTask::touch;
+        case Listed::ifAdvance:
+            return score.aim.task == datasets::SessionTask::advance;
+        default:
+            return true;
+    }
+}
+
+// What the part `core` of a total is for, where it is for no core.
+const char* labelOfCore(const Score& score)
+{
+    switch (judgedBy(score)) {
+        case Judged::rest:
+        case Judged::nothing:
+            return "Touch";
+        case Judged::way:
+            return "Way to the target";
+        default:
+            return "Core";
+    }
+}
 
 }  // namespace
 
@@ -99,7 +145,8 @@ LabelledValues describeTotal(const Score& score)
     LabelledValues lines{{"Total", fmt::format("{:.0f} of 100", score.total)}};
     const ScoreParts points = parts(score);
     for (const PartOfTotal& part : partsOfTotal) {
-        lines.emplace_back(part.label, fmt::format("{:.0f} of {:.0f}", points.*part.points, part.most));
+        lines.emplace_back(part.points == &ScoreParts::core ? labelOfCore(score) : part.label,
+                           fmt::format("{:.0f} of {:.0f}", points.*part.points, part.most));
     }
     return lines;
 }
@@ -108,8 +155,7 @@ LabelledValues describeMeasures(const Score& score)
 {
     LabelledValues lines;
     for (const Measure& m : all) {
-        if (m.listed == Listed::never || (m.listed == Listed::ifMarked && score.marks == 0) ||
-            (m.listed == Listed::ifProbe && !score.hasProbe) || (m.listed == Listed::ifCt && !(score.scanDose > 0))) {
+        if (!isListed(m.listed, score)) {
             continue;
         }
         const double value = m.value(score);

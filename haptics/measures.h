@@ -13,14 +13,14 @@ namespace palpate::haptics {
 
 /// One number of a score as figures, tables and lists give it, in the unit that its key names.
 struct Measure {
-    enum class Listed : std::uint8_t { always, ifFired, ifMarked, ifProbe, ifCt, never };
+    enum class Listed : std::uint8_t { always, ifFired, ifMarked, ifProbe, ifCt, ifTouch, ifAdvance, never };
 
     const char* key;    // in --json
     const char* title;  // in a table
     const char* label;  // in a list
     const char* unit;   // behind the value in a list
     int decimals;
-    Listed listed;  // ifFired: "-" when the gun was not fired
+    Listed listed;  // ifFired: "-" when the gun was not fired, and nothing where no core is asked for
     double (*value)(const Score&);
 };
 

@@ -80,6 +80,7 @@ channel::Scenery sceneryOf(const SessionModel& model, const volume::NodeGrid& la
     }
     const auto& tool = model.scene.tool;
     s.tool = shown(tool.kind);
+    s.task = static_cast<channel::Task>(model.scene.task);
     s.toolRadius = tool.radius;
     s.toolLength = tool.length;
     s.entry = triple(model.approach.entry);

@@ -96,8 +96,46 @@ ScoreShares sharesOf(const Score& s) noexcept
             .seen = ramp(s.blindAdvance, 3e-3, 20e-3),
             .place = ramp(s.markError, 2e-3, 20e-3),
             .near = ramp(s.markError, 10e-3, 20e-3),
-            .size = ramp(s.markSizeError, 2e-3, 15e-3)};
+            .size = ramp(s.markSizeError, 2e-3, 15e-3),
+            .light = ramp(s.peakForce, 2, 4),
+            .rested = ramp(s.rest, 3, 0),
+            .whole = ramp(s.deepest, 0, 3e-3),
+            .reached = ramp(s.tipToTarget, 0, 10e-3)};
 }
+
+// Marks say that a hand has palpated, whatever a scene asks for that knows no better.
+Judged judgedBy(const Score& s) noexcept
+{
+    using Task = datasets::SessionTask;
+    switch (s.aim.task) {
+        case Task::touch:
+            return Judged::rest;
+        case Task::advance:
+            return Judged::way;
+        case Task::find:
+            return Judged::marks;
+        case Task::biopsy:
+            break;
+    }
+    const bool needle = s.aim.tool == datasets::ToolKind::needle;
+    return s.marks > 0 ? Judged::marks : needle ? Judged::core : Judged::nothing;
+}
+
+namespace {
+
+// However well it was done: who missed has no technique to be praised for.
+void addCore(const Score& s, const ScoreShares& share, ScoreParts& p) noexcept
+{
+    if (s.passes == 0) {
+        return;
+    }
+    p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
+             10 * ramp(s.targetingError, 0, 10e-3);
+    const double done = share.passes + share.contacts + share.redirects + share.economy + share.gentle;
+    p.technique = share.hit * share.stays * (s.hasProbe ? 25.0 / 6.0 * (done + share.seen) : 5.0 * done);
+}
+
+}  // namespace
 
 ScoreParts parts(const Score& s) noexcept
 {
@@ -107,20 +145,29 @@ ScoreParts parts(const Score& s) noexcept
         return p;
     }
     p.vital = 25 * std::max(0.0, 1 - 0.4 * s.vitalContacts - 0.1 * s.vitalSeconds - 0.1 * s.vitalDepth * 1e3);
-    if (s.marks > 0) {
-        // Who marked another place has neither sized the target nor found it gently.
-        p.core = 30 * share.place + 20 * share.near * share.size;
-        p.technique = 25 * share.near * share.gentle;
-        return p;
+    switch (judgedBy(s)) {
+        case Judged::core:
+            addCore(s, share, p);
+            break;
+        case Judged::marks:
+            // Who marked another place has neither sized the target nor found it gently.
+            p.core = 30 * share.place + 20 * share.near * share.size;
+            p.technique = 25 * share.near * share.gentle;
+            break;
+        case Judged::rest:
+            p.core = 50 * share.whole * share.rested;
+            p.technique = share.whole * share.rested * 12.5 * (share.contacts + share.light);
+            break;
+        case Judged::way:
+            p.core = 50 * share.reached;
+            p.technique =
+                share.reached * share.stays * 6.25 * (share.contacts + share.redirects + share.economy + share.gentle);
+            break;
+        case Judged::nothing:
+            p.core = 50;
+            p.technique = 25 * share.gentle;
+            break;
     }
-    if (s.passes == 0) {
-        return p;
-    }
-    p.core = 30 * std::min(1.0, s.bestTargetFraction / 0.5) + 10 * std::min(1.0, s.bestTargetLength / 10e-3) +
-             10 * ramp(s.targetingError, 0, 10e-3);
-    // However well it was done: who missed has no technique to be praised for.
-    const double done = share.passes + share.contacts + share.redirects + share.economy + share.gentle;
-    p.technique = share.hit * share.stays * (s.hasProbe ? 25.0 / 6.0 * (done + share.seen) : 5.0 * done);
     return p;
 }
 
@@ -185,6 +232,7 @@ Scorer::Scorer(const SessionInfo& info)
       structures_(std::min<std::size_t>(info.structures.size(), maxStructures)),
       target_(targetShapeOf(info))
 {
+    score_.aim = datasets::aimOf(info.sceneText);
     score_.hasProbe = info.probe;
     score_.scanDose = scanDoseOf(info);
 }
@@ -204,6 +252,7 @@ void Scorer::add(const TickRecord& record) noexcept
     addMark(record);
     score_.peakForce = std::max(score_.peakForce, glm::length(record.total));
     addContact(record);
+    addTip(record);
     addDepth(record);
     addVital(record);
     if (record.fired) {
@@ -235,6 +284,14 @@ void Scorer::addContact(const TickRecord& record) noexcept
     lastTouch_ = record.tick;
     ++contactTicks_;
     forceSum_ += glm::length(record.total);
+}
+
+void Scorer::addTip(const TickRecord& record) noexcept
+{
+    restTicks_ += record.phase == Phase::contact ? 1 : 0;
+    if (record.phase == Phase::inserted) {
+        score_.tipToTarget = std::min(score_.tipToTarget, std::max(0.0, record.distance[0]));
+    }
 }
 
 void Scorer::addDepth(const TickRecord& record) noexcept
@@ -409,6 +466,7 @@ Score Scorer::score() const noexcept
 {
     Score s = score_;
     s.seconds = touched_ ? static_cast<double>(lastTick_ - firstContact_) / rate_ : 0;
+    s.rest = static_cast<double>(restTicks_) / rate_;
     s.pathLength = path_.length(tip_);
     s.insertedPath = insidePath_.length(tip_);
     s.meanForce = contactTicks_ > 0 ? forceSum_ / static_cast<double>(contactTicks_) : 0;

@@ -9,20 +9,30 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 namespace palpate::haptics {
 
+/// What the 50 points of part `core` are for: a core, marks of a palpation, resting on the skin, bringing the tip into the
+/// target; or for nothing, where the tool can do none of what the scene asks for.
+enum class Judged : std::uint8_t { core, marks, rest, way, nothing };
+inline constexpr std::array<std::string_view, 5> judgedNames{"core", "marks", "rest", "way", "nothing"};  // in --json
+
 /// What simulators of needle procedures score (Johnson 2012 and the list in docs/score.md), computed tick by tick.
 struct Score {
+    datasets::SceneAim aim;   // what the scene asks for
     double seconds = 0;       // first contact to the end
+    double rest = 0;          // on the skin, and not inside [s]
     double pathLength = 0;    // of the tip, in steps of 0.2 mm [m]
     double insertedPath = 0;  // of the tip while inside [m]
     double deepest = 0;       // largest length of the shaft inside [m]
     double beyondTarget = 0;  // how much deeper the shaft went in than where the tip was in, or nearest to, the target [m]
     double peakForce = 0;     // total [N]
     double meanForce = 0;     // total, while in contact [N]
+    /// Least distance from the tip to the target while inside, 0 in it [m]; infinite when never inside.
+    double tipToTarget = std::numeric_limits<double>::infinity();
     std::uint32_t skinContacts = 0;  // after at least 0.1 s off the body
     std::uint32_t redirects = 0;     // withdrawn by over 5 mm inside and pushed on again by over 5 mm
     std::uint32_t passes = 0;        // fired
@@ -60,9 +70,11 @@ struct Score {
     double total = 0;  // 0-100; the formula is in score.cpp and docs/score.md
 };
 
+Judged judgedBy(const Score& score) noexcept;
+
 /// Where the points of a total come from.
 struct ScoreParts {
-    double core = 0;       // of 50
+    double core = 0;       // of 50, see Judged
     double vital = 0;      // of 25
     double technique = 0;  // of 25
 };
@@ -82,6 +94,10 @@ struct ScoreShares {
     double place = 0;    // of the marks
     double near = 0;     // enough for their size and technique to count
     double size = 0;     // between the marks
+    double light = 0;    // of a touch: small forces
+    double rested = 0;   // for as long as was asked for
+    double whole = 0;    // the skin was not pierced
+    double reached = 0;  // the tip was in the target, or near it
 };
 ScoreShares sharesOf(const Score& score) noexcept;
 
@@ -141,6 +157,7 @@ public:
 
 private:
     void addContact(const TickRecord& record) noexcept;
+    void addTip(const TickRecord& record) noexcept;
     void addDepth(const TickRecord& record) noexcept;
     void addBeyond(const TickRecord& record) noexcept;
     void addFiring(const TickRecord& record) noexcept;
@@ -157,7 +174,7 @@ private:
     PathMeter path_, insidePath_;
     Vec3 tip_{0.0};  // of the last tick [m]
     std::uint64_t ticks_ = 0, lastTick_ = 0, firstContact_ = 0, lastTouch_ = 0;
-    std::uint64_t contactTicks_ = 0, vitalTicks_ = 0;
+    std::uint64_t contactTicks_ = 0, restTicks_ = 0, vitalTicks_ = 0;
     double forceSum_ = 0;                     // [N]
     double depthPeak_ = 0, depthValley_ = 0;  // of the shaft inside [m]
     bool withdrawing_ = false, touched_ = false;

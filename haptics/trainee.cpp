@@ -10,6 +10,8 @@
 
 namespace palpate::haptics {
 
+using datasets::SessionTask;
+
 namespace {
 
 constexpr std::array<Skill, 3> skills{{
@@ -28,6 +30,8 @@ constexpr double tooDeep = 4e-3;        // and back [m]; less, and the shaft onl
 constexpr double shallow = 4e-3;        // drawn back to so little inside before another line is taken [m]
 constexpr double safeAhead = 1e-3;      // a vital structure nearer to the fired tip is seen as in danger [m]
 constexpr double squeezeTime = 0.05;    // the fire button stays down [s]
+constexpr double touchSpeed = 5e-3;     // towards the skin that is not to be pierced; assumed [m/s]
+constexpr double timeOnSkin = 3.3;      // a rest of three seconds, counted slowly [s]
 constexpr double lookTime = 1.0;        // at a core [s]
 constexpr double patience = 10.0;       // with a movement that does not get there [s]
 constexpr double learnt = 0.5;          // fraction of an aim's error that stays when the trainee has seen where it went
@@ -94,9 +98,11 @@ Vec3 Trainee::inward() const noexcept
     return glm::normalize(aim_ - entry_);
 }
 
+// Or, where no core is asked for, to stop with the tip at the aim.
 double Trainee::depthToFire() const noexcept
 {
-    return datasets::firingDepth(model_.scene.tool, glm::distance(aim_, entry_));
+    return asks(SessionTask::advance) ? glm::distance(aim_, entry_)
+                                      : datasets::firingDepth(model_.scene.tool, glm::distance(aim_, entry_));
 }
 
 // A movement to `to` while the needle turns to `axis`.
@@ -107,7 +113,7 @@ void Trainee::go(Vec3 to, Vec3 axis) noexcept
     fromAxis_ = axis_;
     toAxis_ = axis;
     const bool inAir = act_ == Act::approach || act_ == Act::retreat;
-    const double speed = inAir ? inAirSpeed : skill_.speed;
+    const double speed = inAir ? inAirSpeed : act_ == Act::touch ? touchSpeed : skill_.speed;
     duration_ = std::max(glm::distance(from_, to_) / speed, 0.1);
 }
 
@@ -138,6 +144,7 @@ void Trainee::begin(Act act) noexcept
             go(entry_ - standOff * inward(), inward());
             break;
         }
+        case Act::touch:
         case Act::pierce:
             go(entry_ + furthestLead * inward(), inward());
             break;
@@ -213,6 +220,9 @@ void Trainee::takeAnotherLine() noexcept
 // The last look before the gun: does the line ahead meet the target, and nothing else?
 void Trainee::afterCheck() noexcept
 {
+    if (asks(SessionTask::advance)) {
+        return begin(Act::retreat);
+    }
     const bool wrong = ahead_.structure[0] > model_.scene.tool.throwLength || dangerAhead();
     const bool seen = wrong && random_.between(0.0, 1.0) < skill_.vigilance;
     if (seen && redirects_ < maxRedirects) {
@@ -226,7 +236,8 @@ void Trainee::afterCheck() noexcept
 
 void Trainee::afterCore() noexcept
 {
-    const bool enough = bestCore_ >= skill_.content || fired_ >= skill_.passes || entries_ >= maxEntries;
+    const bool enough =
+        !asks(SessionTask::biopsy) || bestCore_ >= skill_.content || fired_ >= skill_.passes || entries_ >= maxEntries;
     if (enough) {
         act_ = Act::done;
     } else {
@@ -240,7 +251,11 @@ void Trainee::advanceAct() noexcept
     const bool there = arrived() || inAct_ > duration_ + patience;
     switch (act_) {
         case Act::approach:
-            return there ? begin(Act::pierce) : void();
+            return there ? begin(asks(SessionTask::touch) ? Act::touch : Act::pierce) : void();
+        case Act::touch:
+            return touchingSince_ >= skill_.reaction ? begin(Act::rest) : there ? begin(Act::retreat) : void();
+        case Act::rest:
+            return inAct_ >= timeOnSkin || insideSince_ >= skill_.reaction ? begin(Act::retreat) : void();
         case Act::pierce:
             if (insideSince_ >= skill_.reaction || isDeepEnough()) {
                 begin(Act::look);
@@ -317,6 +332,7 @@ void Trainee::observe(const TickRecord& record) noexcept
     inserted_ = record.inserted;
     ahead_ = record.ahead;
     insideSince_ = since(record.phase == Phase::inserted, insideSince_);
+    touchingSince_ = since(record.phase == Phase::contact, touchingSince_);
     warnedSince_ = since(record.warning >= WarningLevel::veryNear, warnedSince_);
     if (record.fired) {
         ++fired_;

@@ -19,6 +19,7 @@ namespace palpate::haptics {
 /// movements (Flash and Hogan, "The coordination of arm movements", J. Neuroscience 5, 1985) with a look at the picture
 /// after each, looks once more, fires, draws back and judges the core; when that is too poor it goes again. When it sees
 /// that the needle's line misses, or a vital structure is very near, it draws back inside the body and takes another line.
+/// Where the scene asks to touch the skin or to advance, it does that and fires nothing.
 ///
 /// What it does follows from what it sees and feels, its skill and its seed: same seed, same session, bit for bit. In the
 /// loop it allocates nothing.
@@ -34,7 +35,20 @@ public:
     bool finished() const noexcept override { return act_ == Act::done; }
 
 private:
-    enum class Act : std::uint8_t { approach, pierce, advance, look, check, fire, drawBack, retreat, judge, done };
+    enum class Act : std::uint8_t {
+        approach,
+        touch,
+        rest,
+        pierce,
+        advance,
+        look,
+        check,
+        fire,
+        drawBack,
+        retreat,
+        judge,
+        done
+    };
 
     Vec3 scatter(double deviation) noexcept;
     void plan(double keep) noexcept;
@@ -51,6 +65,7 @@ private:
     bool dangerAhead() const noexcept;
     Vec3 inward() const noexcept;
     double depthToFire() const noexcept;
+    bool asks(datasets::SessionTask task) const noexcept { return model_.scene.task == task; }
     void storePicture() noexcept;
 
     const SessionModel& model_;
@@ -71,8 +86,8 @@ private:
     // What it has seen.
     double inserted_ = 0;  // [m]
     LookAhead ahead_;
-    double insideSince_ = -1, warnedSince_ = -1;  // for so long [s]; below 0: not
-    double bestCore_ = 0;                         // fraction of target
+    double insideSince_ = -1, touchingSince_ = -1, warnedSince_ = -1;  // for so long [s]; below 0: not
+    double bestCore_ = 0;                                              // fraction of target
     std::uint64_t ticks_ = 0;
     int fired_ = 0, entries_ = 0, redirects_ = 0, strokes_ = 0, looks_ = 0;
     double storing_ = 0;  // the button that stores a picture stays down so long yet [s]

@@ -17,9 +17,11 @@ namespace {
 using base::said;
 using base::tr;
 
-constexpr double atRim = 3e-3;    // from the target's surface: near enough to fire [m]
-constexpr double offLine = 3e-3;  // of tip from planned line that is told [m]
-constexpr double hit = 0.1;       // fraction of target in a core that is worth taking out
+constexpr double atRim = 3e-3;     // from the target's surface: near enough to fire [m]
+constexpr double offLine = 3e-3;   // of tip from planned line that is told [m]
+constexpr double restFor = 3.0;    // on the skin, where no more is asked for [s]
+constexpr double restForce = 2.0;  // force of such a rest [N]
+constexpr double hit = 0.1;        // fraction of target in a core that is worth taking out
 
 const char* directionInWords(glm::dvec3 way)
 {
@@ -81,24 +83,34 @@ std::string throwFault(const channel::Scenery& scenery, const channel::State& st
     return "";
 }
 
+// Of a needle that is not inside yet: to the skin, and on it.
+void coachToSkin(const channel::Scenery& scenery, const channel::State& state, const CoachView& view, Coaching& c)
+{
+    const bool told = view.planned && scenery.entry != scenery.aim;
+    c.wrong = told ? lineFault(scenery, state) : "";
+    if (state.phase == channel::Phase::contact) {
+        c.step = 2;
+        c.now = tr("Push along the needle until the skin gives way");
+        return;
+    }
+    c.step = 1;
+    c.now = told ? tr("Touch the skin at the mark, where the planned line begins") : tr("Touch the skin with the needle");
+}
+
+std::string toGo(const channel::State& state, const CoachView& view)
+{
+    const double left = std::isfinite(state.ahead[0]) ? state.ahead[0] : state.distance[0];
+    return view.planned ? said(tr(" ({:.0f} mm to go)"), millimetres(left)) : "";
+}
+
 Coaching approach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
 {
     Coaching c{0, 5, "", "", false};
-    const bool told = view.planned && scenery.entry != scenery.aim;
-    if (state.phase == channel::Phase::free) {
-        c.step = 1;
-        c.now =
-            told ? tr("Touch the skin at the mark, where the planned line begins") : tr("Touch the skin with the needle");
-        c.wrong = told ? lineFault(scenery, state) : "";
-    } else if (state.phase == channel::Phase::contact) {
-        c.step = 2;
-        c.now = tr("Push along the needle until the skin gives way");
-        c.wrong = told ? lineFault(scenery, state) : "";
+    if (state.phase != channel::Phase::inserted) {
+        coachToSkin(scenery, state, view, c);
     } else if (state.distance[0] > atRim) {
         c.step = 3;
-        const double left = std::isfinite(state.ahead[0]) ? state.ahead[0] : state.distance[0];
-        c.now = said(tr("Advance until the tip is at the {}'s rim{}"), target(scenery),
-                     view.planned ? said(tr(" ({:.0f} mm to go)"), millimetres(left)) : "");
+        c.now = said(tr("Advance until the tip is at the {}'s rim{}"), target(scenery), toGo(state, view));
         c.wrong = view.planned ? wayFault(scenery, state, view.aim) : "";
     } else {
         c.step = 4;
@@ -126,6 +138,55 @@ Coaching biopsy(const channel::Scenery& scenery, const channel::State& state, co
             "", view.handIsHere};
 }
 
+// No core: the tip into the target, and back.
+Coaching advance(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
+{
+    Coaching c{0, 4, "", "", false};
+    const bool inside = state.phase == channel::Phase::inserted;
+    if (state.reached != 0) {
+        c.step = 4;
+        c.now = inside            ? said(tr("The tip is in the {}: stop there, and draw the needle back"), target(scenery))
+                : view.handIsHere ? tr("Done: end the session (E, or click here)")
+                                  : tr("Done: the needle is out");
+        c.last = !inside && view.handIsHere;
+    } else if (!inside) {
+        coachToSkin(scenery, state, view, c);
+    } else {
+        c.step = 3;
+        c.now = said(tr("Advance until the tip is in the {}{}"), target(scenery), toGo(state, view));
+        c.wrong = view.planned ? wayFault(scenery, state, view.aim) : "";
+    }
+    return c;
+}
+
+// The skin is touched and not pierced.
+Coaching touch(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
+{
+    Coaching c{0, 3, "", "", false};
+    const double left = restFor - 1e-3 * state.rested;
+    if (state.phase == channel::Phase::inserted) {
+        c.step = 2;
+        c.now = tr("Draw the needle back until it is off the skin");
+        c.wrong = tr("The skin is pierced: it was only to be touched");
+    } else if (state.phase == channel::Phase::contact) {
+        c.step = left > 0 ? 2 : 3;
+        c.now = left > 0 ? said(tr("Rest here, {:.0f} s more: the skin gives way a little, and is not to be pierced"),
+                                std::ceil(left))
+                         : tr("Lift off");
+        c.wrong = glm::length(vec(state.total)) > restForce
+                      ? said(tr("You push with {:.1Lf} N: let the tool rest"), glm::length(vec(state.total)))
+                      : "";
+    } else if (left > 0) {
+        coachToSkin(scenery, state, view, c);
+    } else {
+        c.step = 3;
+        c.now =
+            view.handIsHere ? tr("Done: end the session (E, or click here)") : tr("Done: the tool has rested on the skin");
+        c.last = view.handIsHere;
+    }
+    return c;
+}
+
 Coaching palpation(const channel::State& state, const CoachView& view)
 {
     if (view.marks >= 2)
@@ -148,6 +209,10 @@ Coaching coach(const channel::Scenery& scenery, const channel::State& state, con
         return {};
     if (state.status == channel::Status::faulted)
         return {1, 1, tr("End the session"), tr("The forces are off"), view.handIsHere};
+    if (scenery.task == channel::Task::touch)
+        return touch(scenery, state, view);
+    if (scenery.task == channel::Task::advance)
+        return advance(scenery, state, view);
     const bool needle = scenery.tool == channel::ToolKind::needle;
     return needle && !view.targetHidden ? biopsy(scenery, state, view) : palpation(state, view);
 }

@@ -26,7 +26,8 @@ struct CoachView {
     bool handIsHere = false;    // the window is the hand: steps name the keys
 };
 
-/// The step of a biopsy (needle) or palpation (any other tool) that the session is at.
+/// The step that the session is at: of a touch or an advance where the scene asks for that, else of a biopsy (needle) or
+/// palpation (any other tool).
 ///
 /// A core without target begins the biopsy again. A length that is off is told with its direction in the patient: towards
 /// the head, feet, front, back, left or right.

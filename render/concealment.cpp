@@ -39,6 +39,7 @@ void conceal(const Concealment& what, channel::State& state)
         return;
     state.distance[0] = state.ahead[0] = std::numeric_limits<double>::infinity();
     state.aheadTissue = 0;
+    state.reached = 0;
     if (!what.tissues.empty())
         state.tissue = 0;
 }

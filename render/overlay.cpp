@@ -147,7 +147,7 @@ void drawProgress(Pen& pen, const channel::Scenery& scenery, const channel::Stat
     if (state.cores > 0)
         pen.pair(said(tr("core {}: {:.0f} % target"), state.cores, 100 * state.coreTarget),
                  said(tr("{:.1Lf} mm of it"), state.coreLength * 1e3), state.coreTarget > 0 ? good : amber);
-    else if (needle)
+    else if (needle && scenery.task == channel::Task::biopsy)
         pen.pair(tr("no core taken yet"), "", grey);
 }
 

@@ -64,6 +64,28 @@ std::string plural(std::uint32_t n, std::string_view one, std::string_view many)
     return n == 0 ? fmt::format("no {}", many) : n == 1 ? fmt::format("one {}", one) : fmt::format("{} {}", n, many);
 }
 
+// What came of a session that asks for no core.
+std::string withoutCore(const haptics::Score& s)
+{
+    if (haptics::judgedBy(s) == haptics::Judged::rest) {
+        return fmt::format("The needle rested on the skin for {:.1f} s{}.", s.rest,
+                           s.deepest > 0.0 ? ", and pierced it" : "");
+    }
+    if (haptics::judgedBy(s) != haptics::Judged::way) {
+        return "The scene asks for no core.";
+    }
+    return !std::isfinite(s.tipToTarget) ? "The needle never went in."
+           : s.tipToTarget > 0.0         ? fmt::format("The tip came to {:.1f} mm from the target.", s.tipToTarget * 1e3)
+                                         : "The tip was in the target.";
+}
+
+const char* nameOfCore(haptics::Judged judged)
+{
+    constexpr std::array names{"Core", "Place and size", "Rest on the skin", "Way to the target", "Core (not asked for)"};
+    static_assert(names.size() == haptics::judgedNames.size());
+    return names[static_cast<std::size_t>(judged)];
+}
+
 std::string outcome(const ReportData& d, const haptics::Record& record)
 {
     const haptics::Score& s = d.score;
@@ -74,6 +96,8 @@ std::string outcome(const ReportData& d, const haptics::Record& record)
         text = fmt::format(
             "The trainee made {}; their middle lies {:.1f} mm beside the target's, and the size is {:.1f} mm off.",
             plural(s.marks, "mark", "marks"), s.markError * 1e3, s.markSizeError * 1e3);
+    } else if (s.passes == 0 && haptics::judgedBy(s) != haptics::Judged::core) {
+        text = withoutCore(s);
     } else if (s.passes == 0) {
         text = "The gun was not fired, so there is no core to judge.";
     } else {
@@ -194,9 +218,11 @@ std::string scoreCard(const ReportData& d)
     const haptics::ScoreParts p = haptics::parts(d.score);
     std::string out = "<section class=\"card\"><h2>Score</h2><div class=\"parts\">";
     for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
+        const bool isCore = part.points == &haptics::ScoreParts::core;
         out += fmt::format(
             "<div><span>{} <b>{:.0f} of {:.0f}</b></span><div class=\"meter\"><i style=\"width:{:.1f}%\"></i></div></div>",
-            part.label, p.*part.points, part.most, 100 * p.*part.points / part.most);
+            isCore ? nameOfCore(haptics::judgedBy(d.score)) : part.label, p.*part.points, part.most,
+            100 * p.*part.points / part.most);
     }
     out += "</div>";
     if (!d.losses.empty()) {

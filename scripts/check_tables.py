@@ -11,7 +11,7 @@ import sys
 RULE = re.compile(r"^\s*\|[\s:|-]*-[\s:|-]*\|\s*$")  # the line under a header
 MEASURE = re.compile(r'^\s*\{"(\w+)", "', re.M)      # of haptics/measures.cpp: key and title
 MEANINGS = ["`--json` key", "meaning"]               # header of the tables that explain measures
-OTHER_KEYS = {"points", "losses"}                              # of the score, and no measure
+OTHER_KEYS = {"points", "losses", "judged"}                    # of the score, and no measure
 
 
 def cells(line):

@@ -113,6 +113,13 @@ void checkTool(const DeviceRequest& request, const datasets::Scene& scene)
         throw std::runtime_error(scene.name +
                                  ": task \"find\" with a needle: give [tool] kind = \"capsule\" or \"sphere\"");
     }
+    if (!needle && scene.task == datasets::SessionTask::advance) {
+        throw std::runtime_error(scene.name + ": task \"advance\" without a needle: give [tool] kind = \"needle\"");
+    }
+    if (!needle && scene.task == datasets::SessionTask::touch && !request.trainee.empty()) {
+        throw std::runtime_error(fmt::format("{}: --trainee {} holds a needle and the tool is none: leave --trainee away",
+                                             scene.name, request.trainee));
+    }
     if (!needle && scene.task == datasets::SessionTask::biopsy && !request.trainee.empty()) {
         throw std::runtime_error(
             fmt::format("{}: --trainee {} takes a biopsy and the tool is no needle: choose another scene, or add --palpate",

@@ -69,6 +69,7 @@ nlohmann::json scoreFigures(const haptics::Score& score, const std::vector<hapti
     for (const haptics::Measure& m : haptics::measures()) {
         out[m.key] = m.value(score);
     }
+    out["judged"] = haptics::judgedNames[static_cast<std::size_t>(haptics::judgedBy(score))];
     const haptics::ScoreParts points = haptics::parts(score);
     for (const haptics::PartOfTotal& part : haptics::partsOfTotal) {
         out["points"][part.key] = points.*part.points;

@@ -32,13 +32,16 @@ nlohmann::json parsed(const fs::path& file)
 }
 
 // Those that tell beginners from experts (docs/score.md), and the rest on request: palpate score.
-void addMeasures(const nlohmann::json& score, Result& result)
+void addMeasures(const nlohmann::json& score, const std::string& judged, Result& result)
 {
+    const bool noCore = judged == "rest" || judged == "way" || judged == "nothing";
     constexpr std::array shown{std::tuple{"targeting_error_mm", marked("Targeting error"), "mm", 1},
                                std::tuple{"best_target_pct", marked("Target in the best core"), "%", 0},
                                std::tuple{"best_target_length_mm", marked("Length in the target"), "mm", 1},
                                std::tuple{"mark_error_mm", marked("Error of the marks"), "mm", 1},
                                std::tuple{"mark_size_error_mm", marked("Error of the size"), "mm", 1},
+                               std::tuple{"rest_s", marked("Rest on the skin"), "s", 1},
+                               std::tuple{"tip_to_target_mm", marked("Tip's nearest to the target"), "mm", 1},
                                std::tuple{"vital_margin_mm", marked("Nearest to a vital structure"), "mm", 1},
                                std::tuple{"vital_contacts", marked("Touches of vital structures"), "", 0},
                                std::tuple{"passes", marked("Cores taken"), "", 0},
@@ -49,17 +52,30 @@ void addMeasures(const nlohmann::json& score, Result& result)
                                std::tuple{"seconds", marked("Time"), "s", 1}};
     for (const auto& [key, label, unit, decimals] : shown) {
         const auto value = score.find(key);
+        const bool ofCores = std::string_view(key).starts_with("best_target") || std::string_view(key) == "passes";
+        if (noCore && ofCores) {
+            continue;
+        }
         if (value != score.end() && value->is_number()) {
             result.measures.emplace_back(tr(label), said("{:.{}Lf} {}", value->get<double>(), decimals, unit));
         }
     }
 }
 
-// The score of somebody who had something to find.
-bool palpated(const nlohmann::json& score)
+// What the points of `core` are for. Figures of older programs do not say it.
+std::string judgedBy(const nlohmann::json& score)
 {
-    const auto found = score.find("mark_error_mm");
-    return found != score.end() && found->is_number();
+    const auto marks = score.find("mark_error_mm");
+    return score.value("judged", marks != score.end() && marks->is_number() ? "marks" : "core");
+}
+
+const char* nameOfPart(const std::string& judged)
+{
+    return judged == "marks"  ? marked("Place and size")
+           : judged == "rest" ? marked("Rest on the skin")
+           : judged == "way"  ? marked("Way to the target")
+           : judged == "core" ? marked("Core")
+                              : marked("Touch");
 }
 
 }  // namespace
@@ -71,10 +87,10 @@ Result readResult(const fs::path& figures)
     try {
         const auto& score = json.at("score");
         result.total = score.at("total").get<double>();
-        for (const auto& [key, name, most] :
-             {std::tuple{"core", palpated(score) ? marked("Place and size") : marked("Core"), 50.0},
-              {"vital", marked("Vital structures"), 25.0},
-              {"technique", marked("Technique"), 25.0}}) {
+        const std::string judged = judgedBy(score);
+        for (const auto& [key, name, most] : {std::tuple{"core", nameOfPart(judged), 50.0},
+                                              {"vital", marked("Vital structures"), 25.0},
+                                              {"technique", marked("Technique"), 25.0}}) {
             result.parts.push_back({tr(name), score.at("points").at(key).get<double>(), most});
         }
         for (const auto& loss : score.value("losses", nlohmann::json::array())) {
@@ -84,7 +100,7 @@ Result readResult(const fs::path& figures)
             }
             result.losses.push_back(std::move(lost));
         }
-        addMeasures(score, result);
+        addMeasures(score, judged, result);
     } catch (const nlohmann::json::exception&) {
         result = {};
         result.problem = figures.string() + tr(": has no score: the session did not come to its end");

@@ -196,6 +196,20 @@ bool isPng(const fs::path& file)
     return in && head == "\x89PNG\r\n\x1a\n";
 }
 
+const char* taskInWords(datasets::SessionTask task)
+{
+    switch (task) {
+        case datasets::SessionTask::find:
+            return "palpation";
+        case datasets::SessionTask::touch:
+            return "touch of the skin";
+        case datasets::SessionTask::advance:
+            return "way in without a core";
+        default:
+            return "biopsy";
+    }
+}
+
 }  // namespace
 
 std::vector<std::string> faultsOf(const Case& made)
@@ -217,17 +231,21 @@ std::vector<std::string> faultsOf(const Case& made)
     }
     try {
         const haptics::SessionModel model = session::openSession(made.scene, {});
-        const bool find = model.scene.task == datasets::SessionTask::find;
+        using Task = datasets::SessionTask;
+        const Task task = model.scene.task;
         if (made.picture.empty()) {
             add("picture: there is none; palpate case picture makes one");
         }
         for (const std::string& key : made.measures) {
             const auto measures = haptics::measures();
             const auto m = std::ranges::find(measures, key, &haptics::Measure::key);
+            using Listed = haptics::Measure::Listed;
             const bool ofMarks = key.starts_with("mark");
-            const bool ofCores = m->listed == haptics::Measure::Listed::ifFired || key == "passes";
-            if (find ? ofCores : ofMarks) {
-                add(fmt::format("measures: {} has no value in a {}", key, find ? "palpation" : "biopsy"));
+            const bool ofCores = m->listed == Listed::ifFired || key == "passes";
+            if ((ofMarks && task != Task::find) || (ofCores && task != Task::biopsy) ||
+                (m->listed == Listed::ifTouch && task != Task::touch) ||
+                (m->listed == Listed::ifAdvance && task != Task::advance)) {
+                add(fmt::format("measures: {} has no value in a {}", key, taskInWords(task)));
             }
         }
     } catch (const std::runtime_error& e) {

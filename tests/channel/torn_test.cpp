@@ -126,6 +126,15 @@ TEST(Bounds, AStateThatIsNoneIsNotShown)
     }
 }
 
+TEST(Bounds, ATaskThatIsNoneIsNoScenery)
+{
+    Scenery scenery = smallScenery();
+    scenery.task = Task::advance;
+    EXPECT_TRUE(sound(scenery));
+    scenery.task = static_cast<Task>(4);
+    EXPECT_FALSE(sound(scenery));
+}
+
 TEST(Bounds, AnUltrasoundThatIsNoneIsNoScenery)
 {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();

@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
+
 namespace palpate::datasets {
 namespace {
 
@@ -189,6 +191,25 @@ TEST(TraineeScript, TheFiredNotchIsCentredOnTheAim)
     EXPECT_NEAR(glm::dot(traineeScript(scene, shallow)[3].to - way.entry, inward), 3e-3, 1e-9);
     scene.script = {{.kind = TraineeStep::Kind::fire}};
     EXPECT_EQ(traineeScript(scene, way).size(), 1U);
+}
+
+TEST(TraineeScript, DoesWhatTheSceneAsksForAndFiresNothingElse)
+{
+    Scene scene = *builtInScene("breast");
+    const Approach way{Vec3(0, -0.05, 0), Vec3(0, -0.02, 0)};
+    const auto has = [](const std::vector<TraineeStep>& script, TraineeStep::Kind kind) {
+        return std::any_of(script.begin(), script.end(), [&](const TraineeStep& s) { return s.kind == kind; });
+    };
+    scene.task = SessionTask::touch;
+    const std::vector<TraineeStep> touch = traineeScript(scene, way);
+    EXPECT_FALSE(has(touch, TraineeStep::Kind::pierce) || has(touch, TraineeStep::Kind::fire));
+    EXPECT_LT(touch[2].to.y - way.entry.y, 3e-3);
+    EXPECT_GT(touch[3].seconds, 3);
+    scene.task = SessionTask::advance;
+    const std::vector<TraineeStep> advance = traineeScript(scene, way);
+    EXPECT_TRUE(has(advance, TraineeStep::Kind::pierce));
+    EXPECT_FALSE(has(advance, TraineeStep::Kind::fire));
+    EXPECT_EQ(advance[3].to, way.aim);
 }
 
 }  // namespace

@@ -117,6 +117,20 @@ TEST(Scene, TextOfAnySceneGivesTheSceneBack)
     }
 }
 
+TEST(Scene, WhatItAsksForIsReadFromItsTextAlone)
+{
+    Scene scene = *builtInScene("layered");
+    for (const SessionTask task : {SessionTask::biopsy, SessionTask::find, SessionTask::touch, SessionTask::advance}) {
+        scene.task = task;
+        EXPECT_EQ(parseScene(sceneText(scene), origin).task, task);
+        EXPECT_EQ(aimOf(sceneText(scene)).task, task);
+        EXPECT_EQ(aimOf(sceneText(scene)).tool, ToolKind::needle);
+    }
+    EXPECT_EQ(aimOf("task = \"find\"\n[volume]\nfile = \"gone.vdb\"\n[tool]\nkind = \"capsule\"\n").tool,
+              ToolKind::capsule);
+    EXPECT_EQ(aimOf("no scene").task, SessionTask::biopsy);
+}
+
 TEST(Scene, CtOfAnySceneComesBackAndADoseFollows)
 {
     Scene scene = parseScene(

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 
 #include <string>
+#include <utility>
 
 namespace palpate::haptics {
 namespace {
@@ -82,6 +83,24 @@ TEST(Gravity, ThePostureOfTheVolumeOrNoGravityChangesNoBit)
         EXPECT_FALSE(model.posture) << gravity;
         EXPECT_EQ(modelHash(model), plain) << gravity;
     }
+}
+
+// A ghost is shown beside a session in the same body, whatever either was set to and whatever is done in it.
+TEST(BodyHash, TellsBodiesApartAndNoSettings)
+{
+    const auto hashes = [](const std::string& target, const std::string& more) {
+        const auto model = modelOf(breast(target, more));
+        return std::pair(modelHash(model), bodyHash(model));
+    };
+    const auto plain = hashes(tumour, "[model]\nsetting = \"default\"\n");
+    for (const std::string setting : {"[model]\nsetting = \"fast\"\n", "[model]\nlevel = \"spring\"\nspacing_mm = 3\n"}) {
+        const auto other = hashes(tumour, setting);
+        EXPECT_NE(other.first, plain.first) << setting;
+        EXPECT_EQ(other.second, plain.second) << setting;
+    }
+    EXPECT_EQ(hashes(tumour, "[[vital]]\nname = \"muscle\"\nwarn_mm = 3\n").second, plain.second);
+    EXPECT_NE(hashes(tumour, toProne).second, plain.second);
+    EXPECT_NE(hashes(tumour, "[volume.parameters]\ntumour_diameter_mm = 9\n").second, plain.second);
 }
 
 TEST(Gravity, PlacesThatWouldNotMoveWithTheTissueAreRefused)

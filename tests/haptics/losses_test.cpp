@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <numeric>
 #include <random>
@@ -105,6 +106,130 @@ TEST(Losses, APalpationThatMissesKeepsNoMoreThanABiopsyThatMisses)
     EXPECT_EQ(parts(s).core + parts(s).technique, 0);
     s.markError = 9 * oneMillimetre;
     EXPECT_EQ(parts(s).technique, 25);
+}
+
+// Ticks at rest on the skin, or inside at a depth, between two seconds of air.
+struct Stay {
+    double seconds = 0, depth = 0;  // [s], [m]; 0: on the skin
+    double force = 1;               // [N]
+    double target = 1;              // distance of the tip [m]
+};
+
+LossWatch watched(const std::string& scene, const std::vector<Stay>& stays, bool fires = false)
+{
+    SessionInfo info = synthetic::info();
+    info.sceneText = scene;
+    LossWatch watch(info);
+    std::uint64_t n = 0;
+    const auto add = [&](const Stay& stay, Phase phase) {
+        for (int i = 0; i < static_cast<int>(1000 * stay.seconds); ++i) {
+            TickRecord tick;
+            tick.tick = n++;
+            tick.phase = phase;
+            tick.inserted = stay.depth;
+            tick.device.position = {0, stay.depth, 0};
+            tick.total = {0, phase == Phase::free ? 0 : -stay.force, 0};
+            tick.distance = {stay.target, 1, 1};
+            tick.fired = fires && phase == Phase::inserted && i == 10;
+            watch.add(tick);
+        }
+    };
+    add({1}, Phase::free);
+    for (const Stay& stay : stays) {
+        add(stay, stay.depth > 0 ? Phase::inserted : Phase::contact);
+    }
+    add({1}, Phase::free);
+    return watch;
+}
+
+std::vector<Loss> lossesIn(const std::string& scene, const LossWatch& watch)
+{
+    SessionInfo info = synthetic::info();
+    info.sceneText = scene;
+    return watch.losses(info);
+}
+
+const std::string touchScene = "task = \"touch\"\n", advanceScene = "task = \"advance\"\n",
+                  sphereScene = "[tool]\nkind = \"sphere\"\n";
+
+TEST(Losses, ATouchLosesNothingForACoreThatNobodyAskedFor)
+{
+    const LossWatch rested = watched(touchScene, {{3.1}});
+    EXPECT_EQ(rested.score().total, 100);
+    EXPECT_TRUE(lossesIn(touchScene, rested).empty());
+    EXPECT_NEAR(rested.score().rest, 3.1, 1e-9);
+
+    const LossWatch hasty = watched(touchScene, {{1.5}});
+    EXPECT_NEAR(hasty.score().total, 62.5, 1e-9);
+    ASSERT_EQ(lossesIn(touchScene, hasty).size(), 1U);
+    EXPECT_EQ(lossesIn(touchScene, hasty)[0].measure, "rest_s");
+
+    const LossWatch hard = watched(touchScene, {{3.1, 0, 3}});
+    ASSERT_EQ(lossesIn(touchScene, hard).size(), 1U);
+    EXPECT_EQ(inWords(lossesIn(touchScene, hard)[0]), "-6 points: The force rose to 3.0 N (at 1.0 s)");
+}
+
+TEST(Losses, ATouchThatPiercesKeepsThePointsForVitalStructuresAlone)
+{
+    const LossWatch pierced = watched(touchScene, {{3.1}, {1, 0.02}}, true);
+    EXPECT_EQ(pierced.score().total, 25);
+    const auto losses = lossesIn(touchScene, pierced);
+    ASSERT_EQ(losses.size(), 1U);
+    EXPECT_EQ(inWords(losses[0]), "-75 points: The skin was pierced, 20.0 mm deep; it was only to be touched (at 4.1 s)");
+}
+
+TEST(Losses, AnAdvanceIsJudgedByTheTipAndNotByACore)
+{
+    const LossWatch reached = watched(advanceScene, {{1}, {1, 0.02, 1, 0.005}, {1, 0.03, 1, -0.005}});
+    EXPECT_EQ(reached.score().total, 100);
+    EXPECT_TRUE(lossesIn(advanceScene, reached).empty());
+
+    const LossWatch shallow = watched(advanceScene, {{1}, {1, 0.02, 1, 0.004}});
+    const auto losses = lossesIn(advanceScene, shallow);
+    ASSERT_EQ(losses.size(), 1U);
+    EXPECT_EQ(inWords(losses[0]), "-30 points: The tip came within 4.0 mm of the tumour and not into it");
+    EXPECT_EQ(lossesIn(advanceScene, watched(advanceScene, {{1}}))[0].words, "The needle did not go in");
+}
+
+TEST(Losses, AToolThatTakesNoCoreLosesNothingForOne)
+{
+    const LossWatch pressed = watched(sphereScene, {{1}});
+    EXPECT_EQ(pressed.score().total, 100);
+    EXPECT_TRUE(lossesIn(sphereScene, pressed).empty());
+    const std::string finger = "task = \"find\"\n[tool]\nkind = \"capsule\"\n";
+    const LossWatch unmarked = watched(finger, {{1}});
+    EXPECT_EQ(unmarked.score().total, 25);
+    EXPECT_EQ(inWords(lossesIn(finger, unmarked)[0]), "-75 points: Nothing was marked");
+}
+
+// Records from before there were tasks, and scenes that say what they ask for, are scored as they were.
+TEST(Losses, ABiopsyWithoutAShotIsScoredAsBefore)
+{
+    for (const std::string scene : {"", "task = \"biopsy\"\n", "name = ", "task = \"dance\"\n"}) {
+        const LossWatch dry = watched(scene, {{1}, {1, 0.03}});
+        EXPECT_EQ(dry.score().total, 25) << scene;
+        EXPECT_EQ(lossesIn(scene, dry)[0].words, "The gun was not fired: there is no core") << scene;
+    }
+}
+
+TEST(Losses, OfEveryTaskAddUpToAHundredWithTheTotal)
+{
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int round = 0; round < 100; ++round) {
+        const std::string scene = std::array{touchScene, advanceScene, sphereScene}[static_cast<std::size_t>(round % 3)];
+        std::vector<Stay> stays{{3 * unit(random), 0, 6 * unit(random)}};
+        for (int i = 0; i < round % 5; ++i) {
+            const double depth = round % 2 == 0 ? 0.04 * unit(random) : 0.002 * unit(random);
+            stays.push_back({0.2, depth, 6 * unit(random), 0.015 * unit(random) - 0.001});
+        }
+        const LossWatch watch = watched(scene, stays);
+        double sum = watch.score().total;
+        for (const Loss& loss : lossesIn(scene, watch)) {
+            sum += loss.points;
+        }
+        EXPECT_NEAR(sum, 100, 0.05) << round;
+    }
 }
 
 }  // namespace

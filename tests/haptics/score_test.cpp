@@ -409,6 +409,39 @@ TEST(Score, WorseMeasuresNeverGiveMorePoints)
     }
 }
 
+// The same of what is asked for in place of a core.
+TEST(Score, WorseMeasuresOfATouchAndAnAdvanceNeverGiveMorePoints)
+{
+    std::mt19937 random(2);
+    std::uniform_real_distribution<double> unit(0, 1);
+    for (int round = 0; round < 2000; ++round) {
+        Score s;
+        s.aim.task = round % 2 == 0 ? datasets::SessionTask::touch : datasets::SessionTask::advance;
+        s.skinContacts = 1 + static_cast<std::uint32_t>(random() % 6);
+        s.redirects = static_cast<std::uint32_t>(random() % 6);
+        s.rest = 4 * unit(random);
+        s.deepest = 4 * millimetre * unit(random);
+        s.insertedPath = s.deepest * (1 + 4 * unit(random));
+        s.tipToTarget = 12 * millimetre * unit(random);
+        s.beyondTarget = 20 * millimetre * unit(random);
+        s.peakForce = 10 * unit(random);
+        const ScoreParts p = parts(s);
+        EXPECT_GE(p.core, 0);
+        EXPECT_LE(p.core, 50);
+        EXPECT_LE(p.technique, 25);
+        for (const auto& worsen : std::vector<std::function<void(Score&)>>{
+                 [](Score& w) { ++w.skinContacts; }, [](Score& w) { ++w.redirects; }, [](Score& w) { w.rest *= 0.8; },
+                 [](Score& w) { w.deepest += w.aim.task == datasets::SessionTask::touch ? millimetre : 0; },
+                 [](Score& w) { w.tipToTarget += millimetre; }, [](Score& w) { w.beyondTarget += millimetre; },
+                 [](Score& w) { w.peakForce += 1; }, [](Score& w) { w.insertedPath *= 1.3; }}) {
+            Score w = s;
+            worsen(w);
+            const ScoreParts q = parts(w);
+            EXPECT_LE(q.core + q.technique, p.core + p.technique + 1e-12);
+        }
+    }
+}
+
 // The score of the live session and that of its record are the same bits.
 TEST(Score, LiveAndRecordedAreTheSame)
 {

@@ -128,6 +128,49 @@ TEST(Coach, APalpationAsksForTwoMarksAndSaysNothingOfTheLump)
     }
 }
 
+TEST(Coach, ATouchIsRestedAndLiftedOffAndNeverPushedThrough)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.task = channel::Task::touch;
+    channel::State s = stateAt(0, -0.01, 0, channel::Phase::free);
+    EXPECT_EQ(coach(scenery, s, view).now, "Touch the skin at the mark, where the planned line begins");
+    EXPECT_EQ(coach(scenery, s, view).steps, 3);
+    s.phase = channel::Phase::contact;
+    s.rested = 600;
+    EXPECT_EQ(coach(scenery, s, view).step, 2);
+    EXPECT_EQ(coach(scenery, s, view).now, "Rest here, 3 s more: the skin gives way a little, and is not to be pierced");
+    EXPECT_EQ(coach(scenery, s, view).wrong, "");
+    s.total = {0, -2.5, 0};
+    EXPECT_EQ(coach(scenery, s, view).wrong, "You push with 2.5 N: let the tool rest");
+    s.total = {};
+    s.rested = 3000;
+    EXPECT_EQ(coach(scenery, s, view).now, "Lift off");
+    EXPECT_FALSE(coach(scenery, s, view).last);
+    s.phase = channel::Phase::free;
+    EXPECT_EQ(coach(scenery, s, view).now, "Done: end the session (E, or click here)");
+    EXPECT_TRUE(coach(scenery, s, view).last);
+    s.phase = channel::Phase::inserted;
+    EXPECT_EQ(coach(scenery, s, view).wrong, "The skin is pierced: it was only to be touched");
+}
+
+TEST(Coach, AnAdvanceStopsInTheTargetAndFiresNothing)
+{
+    channel::Scenery scenery = needleScenery();
+    scenery.task = channel::Task::advance;
+    channel::State s = stateAt(0, -0.01, 0, channel::Phase::contact);
+    EXPECT_EQ(coach(scenery, s, view).now, "Push along the needle until the skin gives way");
+    EXPECT_EQ(coach(scenery, s, view).steps, 4);
+    s.phase = channel::Phase::inserted;
+    s.distance[0] = s.ahead[0] = 1e-3;
+    EXPECT_EQ(coach(scenery, s, view).now, "Advance until the tip is in the tumour (1 mm to go)");
+    s.distance[0] = -1e-3;
+    s.reached = 1;
+    EXPECT_EQ(coach(scenery, s, view).now, "The tip is in the tumour: stop there, and draw the needle back");
+    s.phase = channel::Phase::free;
+    EXPECT_EQ(coach(scenery, s, view).step, 4);
+    EXPECT_EQ(coach(scenery, s, view).now, "Done: end the session (E, or click here)");
+}
+
 // A ball of tissue 2 in tissue 1 in air: after it there is as much tissue 1 as there was of both, and not one voxel else
 // changes.
 TEST(Concealment, TheHiddenTissueBecomesWhatLiesAroundIt)

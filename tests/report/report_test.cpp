@@ -1,3 +1,4 @@
+#include <base/png.h>
 #include <report/data.h>
 #include <report/html.h>
 #include <report/report.h>
@@ -6,9 +7,11 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <iterator>
@@ -166,6 +169,74 @@ TEST(Report, ChartsHoldTheRecord)
     EXPECT_TRUE(std::ranges::any_of(data["events"], [](const auto& e) { return e["kind"] == "fire"; }));
 }
 
+// A fast push leaves bins of the depth without a tick; the force of one between two such stands beside nothing that a line
+// could be drawn to, and is in the chart all the same.
+TEST(Report, ForcesBetweenGapsAreDrawn)
+{
+    const synthetic::Folder folder;
+    synthetic::record(folder / "a", synthetic::info(), synthetic::procedure(5, 0.5, 1));
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const auto data = nlohmann::json::parse(between(textOf(folder / "r.html"), "id=\"data\">", "</script>"));
+    for (const char* chart : {"depth", "nearest"}) {
+        for (const auto& series : data["charts"][chart]["series"]) {
+            EXPECT_EQ(series["gaps"], false) << chart << " " << series["label"];
+        }
+    }
+}
+
+// All pictures of events, some of the others, in the order of the times that the viewer wrote into them.
+TEST(Report, PicturesStandInTheOrderOfTheirTimes)
+{
+    const synthetic::Folder folder;
+    std::filesystem::create_directory(folder / "pictures");
+    const auto picture = [&](const std::string& name, const std::string& seconds) {
+        constexpr std::array<std::uint8_t, 1> grey{0};
+        std::ofstream(folder / ("pictures/" + name + ".png"), std::ios::binary)
+            << base::greyPng(1, 1, grey, seconds.empty() ? "other" : base::pngTimeKeyword, seconds);
+    };
+    for (int i = 0; i < 20; ++i) {
+        picture(fmt::format("frame_{:05}", i), fmt::format("{:.3f}", 0.5 * i));
+    }
+    const std::vector<std::string> events{"contact",          "inserted", "fired", "near_the_artery",
+                                          "very_near_artery", "out",      "fault"};
+    for (std::size_t i = 0; i < events.size(); ++i) {
+        picture(fmt::format("{:03}_{}", i, events[i]), fmt::format("{:.3f}", 1.26 * (1.0 + static_cast<double>(i))));
+    }
+    const auto captions = [&] {
+        synthetic::record(folder / "a", synthetic::info(), {});
+        writeReport(folder / "r.html", Record(folder / "a"), folder / "pictures");
+        std::filesystem::remove(folder / "a");
+        std::string html = textOf(folder / "r.html"), all;
+        for (std::string one; !(one = between(html, "<figcaption>", "</figcaption>")).empty();) {
+            html.erase(0, html.find("<figcaption>") + 12);
+            all += one + "|";
+        }
+        return all;
+    };
+    EXPECT_EQ(captions(),
+              "0.0 s|contact, 1.3 s|inserted, 2.5 s|fired, 3.8 s|near the artery, 5.0 s|very near artery, 6.3 s|out, 7.6 "
+              "s|fault, 8.8 s|9.5 s|");
+    // Of an older viewer, without times: events in their order, then the others.
+    picture("002_fired", "");
+    EXPECT_EQ(captions(),
+              "contact, 1.3 s|inserted, 2.5 s|fired|near the artery, 5.0 s|very near artery, 6.3 s|out, 7.6 "
+              "s|fault, 8.8 s|0.0 s|9.5 s|");
+}
+
+// On a narrow screen a table in a box of its own is scrolled: its words stay whole.
+TEST(Report, WordsOfTablesThatScrollAreNotBroken)
+{
+    const synthetic::Folder folder;
+    synthetic::record(folder / "a", synthetic::info(), synthetic::procedure(5, 0.5, 1));
+    writeReport(folder / "r.html", Record(folder / "a"));
+    const std::string html = textOf(folder / "r.html");
+    EXPECT_NE(html.find("<div class=\"scroll\"><table class=\"plain\"><thead><tr><th>Task"), std::string::npos);
+    const std::size_t everywhere = html.find("table.plain td { overflow-wrap: anywhere"),
+                      scrolled = html.find(".scroll table.plain:not(.facts) td { overflow-wrap: break-word");
+    ASSERT_NE(scrolled, std::string::npos);
+    EXPECT_LT(everywhere, scrolled) << "the later rule holds";
+}
+
 // Each task's row has its own time: task k takes k + 1 us.
 TEST(Report, TimesStandBesideTheirTasks)
 {
@@ -218,6 +289,18 @@ TEST(Report, SessionsWithoutAnythingToShowAreTold)
     writeReport(folder / "dry.html", Record(folder / "dry"));
     EXPECT_NE(textOf(folder / "dry.html").find("The gun was not fired"), std::string::npos);
     EXPECT_NE(textOf(folder / "dry.html").find("id=\"depth\""), std::string::npos);
+    // Where none is asked for, nothing is missing.
+    haptics::SessionInfo touch = synthetic::info();
+    touch.sceneText = R"(name = "touch"
+task = "touch"
+[tool]
+kind = "needle"
+)";
+    synthetic::record(folder / "touch", touch, ticks);
+    writeReport(folder / "touch.html", Record(folder / "touch"));
+    EXPECT_NE(textOf(folder / "touch.html").find("The needle rested on the skin for"), std::string::npos);
+    EXPECT_NE(textOf(folder / "touch.html").find("<span>Rest on the skin <b>"), std::string::npos);
+    EXPECT_EQ(textOf(folder / "touch.html").find("so there is no core to judge"), std::string::npos);
 }
 
 TEST(Report, RefusesAFolderThatIsNotThereOnOneLine)
