@@ -1,6 +1,7 @@
 #include <apps/parsed_program.h>
 #include <apps/replay_player.h>
 #include <base/words.h>
+#include <command/interrupted.h>
 #include <command/json.h>
 #include <render/keys.h>
 #include <render/viewer.h>
@@ -159,6 +160,10 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         writeFigures(words.json, figures);
     if (!words.timeline.empty())
         writeTimeline(words.timeline, figures.shown);
+    // Of a record every picture was asked for; a session that runs is watched for as long as one likes.
+    const bool pictures = !options.offscreen.empty() || !options.movie.empty();
+    if (player && pictures && figures.signal != 0)
+        throw palpate::command::Interrupted(figures.signal, "interrupted: the pictures end before the record does");
     if (player && !player->problem().empty())
         throw std::runtime_error(player->problem());
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <base/build.h>
+#include <command/interrupted.h>
 
 #include <CLI/CLI.hpp>
 
@@ -15,7 +16,7 @@ namespace palpate::apps {
 /// @param about  what --help says of it
 /// @param add    adds its options to the app that it gets
 /// @param run    does the work, and throws what is wrong
-/// Returns the exit status: 0, 1 for what was thrown, 2 for arguments.
+/// Returns the exit status: 0, 1 for what was thrown, 2 for arguments, 128 + signal for what a signal has ended.
 template <typename Add, typename Run>
 int runParsed(int argc, char** argv, const std::string& name, const std::string& about, const Add& add, const Run& run)
 {
@@ -32,6 +33,9 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
     } catch (const CLI::ParseError& e) {
         const int status = app.exit(e);
         return status == 0 ? 0 : 2;
+    } catch (const command::Interrupted& e) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), e.what());
+        return e.exitStatus();
     } catch (const std::exception& e) {
         std::fprintf(stderr, "%s: %s\n", name.c_str(), e.what());
         return 1;

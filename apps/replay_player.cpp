@@ -221,7 +221,9 @@ struct ReplayPlayer::Impl {
 render::Ghost ReplayPlayer::ghostOf(const std::string& file) const
 {
     const Record other(file);
-    if (other.info().volumeHash != impl_->record.info().volumeHash) {
+    // Sessions at two settings of the tissue model are in one body; only their models tell.
+    const bool alike = other.info().volumeHash == impl_->record.info().volumeHash;
+    if (!alike && bodyHash(session::reopenSession(file, other.info())) != bodyHash(impl_->model)) {
         throw std::runtime_error(
             fmt::format("--ghost {}: is a session in another body than {}: its tool would be in no "
                         "place of this one",

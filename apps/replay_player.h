@@ -22,7 +22,8 @@ public:
     /// The session's name, for the viewer.
     const std::string& session() const noexcept;
     render::Playback& playback() noexcept;
-    /// Where the tool of another record was. Throws std::runtime_error for one in another body.
+    /// Where the tool of another record was. Throws std::runtime_error for one in another body; how finely
+    /// the tissue model divided that body does not matter.
     render::Ghost ghostOf(const std::string& file) const;
     /// Shows this moment, as soon as it is computed, and stands there.
     void startAt(double seconds);

@@ -1,5 +1,6 @@
 #include <apps/train_profile.h>
 
+#include <base/outputs.h>
 #include <training/progress.h>
 
 #include <fmt/chrono.h>
@@ -82,8 +83,7 @@ fs::path Training::record() const
         return {};
     }
     const fs::path folder = store_->recordFolder();
-    if (!fs::exists(folder)) {
-        fs::create_directories(folder);
+    if (base::makeFolders(folder)) {
         fs::permissions(folder, fs::perms::owner_all);
     }
     return folder / fmt::format("{:%Y%m%d-%H%M%S}-{}-{}.db", fmt::gmtime(std::time(nullptr)), case_ ? case_->id : "session",

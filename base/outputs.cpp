@@ -53,6 +53,17 @@ void checkOutputFolder(const fs::path& folder)
     }
 }
 
+bool makeFolders(const fs::path& folder)
+{
+    std::error_code failed;
+    const bool made = fs::create_directories(folder, failed);
+    if (failed) {
+        throw std::runtime_error(
+            fmt::format("{}: this folder cannot be made ({}): choose another place", folder.string(), failed.message()));
+    }
+    return made;
+}
+
 namespace {
 
 // A device or a pipe: it takes what is written and is no place for another file.

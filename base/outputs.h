@@ -12,6 +12,9 @@ void checkOutput(const std::filesystem::path& file);
 /// As checkOutput() for a folder that is made, with those above it, when it is not there.
 void checkOutputFolder(const std::filesystem::path& folder);
 
+/// Makes a folder, with those above it, where it is not there. Returns whether it was made. Throws std::runtime_error.
+bool makeFolders(const std::filesystem::path& folder);
+
 /// What will be replaced when `file` is written whole and put in its place: itself, or what it links to.
 /// Throws std::runtime_error where that is no file: a device or a pipe would be gone.
 std::filesystem::path replaceable(const std::filesystem::path& file);

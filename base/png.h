@@ -10,6 +10,9 @@ namespace palpate::base {
 /// The first eight bytes of every PNG file.
 inline constexpr std::string_view pngSignature{"\x89PNG\r\n\x1a\n", 8};
 
+/// Of the text in a viewer's picture that says when in the session it was [s]: "2.8".
+inline constexpr const char* pngTimeKeyword = "palpate-seconds";
+
 /// A picture of greys as a PNG file, 8 bits a pixel. The same input gives the same bytes.
 /// @param width    of the picture [pixels]
 /// @param height   of the picture [pixels]

@@ -68,13 +68,30 @@ ReplayResult replay(const Record& record, const SessionModel& model)
     return result;
 }
 
+namespace {
+
+void addRow(volume::Fnv& hash, const volume::TissueRow& row)
+{
+    hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
+                        row.cuttingForce, row.frictionPerMetre, row.stictionPerMetre, row.frictionDamping,
+                        row.fixed ? 1.0 : 0.0, row.stiffening});
+}
+
+void addVoxels(volume::Fnv& hash, const volume::Tissue& tissue)
+{
+    hash.add(tissue.affine());
+    for (const auto& s : tissue.structures()) {
+        hash.add(std::array<std::uint64_t, 3>{s.value, s.tissue, s.voxels});
+    }
+}
+
+}  // namespace
+
 std::string modelHash(const SessionModel& model)
 {
     volume::Fnv hash;
     for (const auto& row : model.tissue->table().rows) {
-        hash.add(std::array{row.youngsModulus, row.poissonRatio, row.compress, row.stretch, row.shear, row.punctureForce,
-                            row.cuttingForce, row.frictionPerMetre, row.stictionPerMetre, row.frictionDamping,
-                            row.fixed ? 1.0 : 0.0, row.stiffening});
+        addRow(hash, row);
         if (model.scene.model.relaxation) {
             hash.add(row.relaxation().weights);
         }
@@ -82,10 +99,7 @@ std::string modelHash(const SessionModel& model)
             hash.add(std::array{row.wallSpacing, row.wallForce});
         }
     }
-    hash.add(model.tissue->affine());
-    for (const auto& s : model.tissue->structures()) {
-        hash.add(std::array<std::uint64_t, 3>{s.value, s.tissue, s.voxels});
-    }
+    addVoxels(hash, *model.tissue);
     hash.addAll(model.lattice.tissue);
     hash.add(model.lattice.grid.origin);
     hash.add(model.lattice.grid.spacing);
@@ -94,6 +108,19 @@ std::string modelHash(const SessionModel& model)
     for (const auto& s : model.structures) {
         hash.addAll(s.distance.values);
     }
+    return fmt::format("{:016x}", hash.value);
+}
+
+std::string bodyHash(const SessionModel& model)
+{
+    volume::Fnv hash;
+    for (const auto& row : model.tissue->table().rows) {
+        addRow(hash, row);
+    }
+    addVoxels(hash, *model.tissue);
+    // By the volume's voxels, not by the lattice: where the skin is, and what lies where below it.
+    hash.addAll(model.surface.values);
+    hash.addAll(model.youngsModulus.values);
     return fmt::format("{:016x}", hash.value);
 }
 

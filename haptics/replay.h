@@ -88,6 +88,9 @@ ReplayResult replay(const Record& record, const SessionModel& model);
 /// A hash of what forces depend on: tissue table, grids, labels' counts, lattice and fields (64-bit FNV-1a, in
 /// hexadecimal). A record keeps it, so that it is never replayed on another volume.
 std::string modelHash(const SessionModel& model);
+/// A hash of the body alone: tissue table, labels' counts, where the skin is and how stiff it is where. The same however
+/// finely the tissue model divides it, and whatever is done in it.
+std::string bodyHash(const SessionModel& model);
 /// What a record says of a session that only its model decides: all but where the scene came from, the device and the
 /// build.
 SessionInfo infoOf(const SessionModel& model);

@@ -10,6 +10,8 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <string>
+#include <vector>
 
 namespace palpate::render {
 namespace {
@@ -115,41 +117,77 @@ void CtPicture::paint()
     }
 }
 
+// What the scan is and the dose so far, in as many lines as the width makes of it.
+std::vector<std::string> CtPicture::caption(const Canvas& canvas, double wide, double font) const
+{
+    const ct::Window& window = ct::windows[window_];
+    const std::string all = base::said(tr("CT scan {} at {:.1Lf} s; dose so far {:.1Lf} mGy cm; {} ({:.0f} to {:.0f} HU)"),
+                                       taken_, 1e-3 * static_cast<double>(tick_), taken_ * scenery_.ctDoseLength,
+                                       tr(windowNames[window_]), window.low, window.high);
+    std::vector<std::string> lines;
+    for (std::size_t from = 0, end = 0; end != std::string::npos; from = end + 2) {
+        end = all.find("; ", from);
+        const std::string part = all.substr(from, end - from);
+        const std::string longer = lines.empty() ? part : lines.back() + "; " + part;
+        if (lines.empty() || canvas.widthOf(longer, font) > wide)
+            lines.push_back(part);
+        else
+            lines.back() = longer;
+    }
+    return lines;
+}
+
+// On tissue of any brightness.
+void CtPicture::label(Canvas& canvas, Point2 at, const std::string& words, double size, Align align)
+{
+    const double wide = canvas.widthOf(words, size, true), left = align == Align::right ? at[0] - wide : at[0];
+    canvas.rectangle({left - 0.3 * size, at[1] - 2}, {wide + 0.6 * size, 1.3 * size}, {0, 0, 0}, 0.55);
+    canvas.text(at, words, size, white, align, true);
+}
+
+void CtPicture::drawLabels(Canvas& canvas, double font) const
+{
+    for (std::size_t k = 0; k < scan_->hu.size(); ++k) {
+        const Area t = tile(k);
+        label(canvas, {t.x + 0.4 * font, t.y + 0.4 * font}, fmt::format("z {:.1f} mm", 1e3 * scan_->height[k]), 0.8 * font);
+    }
+    const Area large = tile(scan_->hu.size() / 2);
+    const double high = large.y + 0.5 * large.height;
+    label(canvas, {large.x + 0.4 * font, high}, tr("R"), font);
+    label(canvas, {large.x + large.width - 0.4 * font, high}, tr("L"), font, Align::right);
+    const double wide = scan_->pixel * scan_->side, bar = 0.05 / wide * large.width;
+    canvas.rectangle({large.x + 0.16 * font, large.y + 1.6 * font}, {std::max(bar, 2.2 * font) + 0.48 * font, 1.8 * font},
+                     {0, 0, 0}, 0.55);
+    canvas.rectangle({large.x + 0.4 * font, large.y + 1.9 * font}, {bar, 3}, white);
+    canvas.text({large.x + 0.4 * font, large.y + 2.3 * font}, "5 cm", 0.8 * font, white, Align::left, true);
+}
+
 void CtPicture::draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact)
 {
     take(exact);
-    const bool resized = area.width != area_.width || area.height != area_.height || around.width != around_.width ||
-                         around.height != around_.height;
-    area_ = area;
+    const double x = area.x + 0.5 * font, row = lineHeight * font;
+    const std::vector<std::string> words = scan_ ? caption(canvas, area.width - font, font) : std::vector<std::string>();
+    // The caption has the lower edge of the area to itself.
+    Area pictures = area;
+    pictures.y += static_cast<int>(row * static_cast<double>(words.size()));
+    pictures.height = std::max(1, area.height + area.y - pictures.y);
+    const bool resized = pictures.width != area_.width || pictures.height != area_.height || pictures.y != area_.y ||
+                         around.width != around_.width || around.height != around_.height;
+    area_ = pictures;
     around_ = around;
     if (resized || due_)
         paint();
     due_ = false;
     actor_->SetPosition(around.x, around.y);
     actor_->SetVisibility(1);
-    const double x = area.x + 0.5 * font, middle = area.x + 0.5 * area.width;
     if (!scan_) {
-        canvas.text({middle, area.y + 0.5 * area.height}, tr("P takes a CT scan"), font, grey, Align::centre);
+        canvas.text({area.x + 0.5 * area.width, area.y + 0.5 * area.height}, tr("P takes a CT scan"), font, grey,
+                    Align::centre);
         return;
     }
-    for (std::size_t k = 0; k < scan_->hu.size(); ++k) {
-        const Area t = tile(k);
-        canvas.text({t.x + 0.4 * font, t.y + 0.4 * font}, fmt::format("z {:.1f} mm", 1e3 * scan_->height[k]), 0.8 * font,
-                    grey);
-    }
-    const Area large = tile(scan_->hu.size() / 2);
-    const double high = large.y + 0.5 * large.height;
-    canvas.text({large.x + 0.4 * font, high}, tr("R"), font, grey);
-    canvas.text({large.x + large.width - 0.4 * font, high}, tr("L"), font, grey, Align::right);
-    const double wide = scan_->pixel * scan_->side, bar = 0.05 / wide * large.width;
-    canvas.rectangle({large.x + 0.4 * font, large.y + 1.9 * font}, {bar, 3}, grey);
-    canvas.text({large.x + 0.4 * font, large.y + 2.2 * font}, "5 cm", 0.8 * font, grey);
-    const ct::Window& window = ct::windows[window_];
-    canvas.text({x, area.y - lineHeight * font},
-                base::said(tr("CT scan {} at {:.1Lf} s; dose so far {:.1Lf} mGy cm; {} ({:.0f} to {:.0f} HU)"), taken_,
-                           1e-3 * static_cast<double>(tick_), taken_ * scenery_.ctDoseLength, tr(windowNames[window_]),
-                           window.low, window.high),
-                font, grey);
+    drawLabels(canvas, font);
+    for (std::size_t line = 0; line < words.size(); ++line)
+        canvas.text({x, area.y + row * (static_cast<double>(words.size() - line) - 0.85)}, words[line], font, grey);
 }
 
 void CtPicture::hide()

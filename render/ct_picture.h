@@ -16,6 +16,8 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 namespace palpate::render {
 
@@ -39,6 +41,9 @@ private:
     void take(bool wait);
     Area tile(std::size_t slice) const;
     void paint();
+    std::vector<std::string> caption(const Canvas& canvas, double wide, double font) const;
+    static void label(Canvas& canvas, Point2 at, const std::string& words, double size, Align align = Align::left);
+    void drawLabels(Canvas& canvas, double font) const;
 
     vtkNew<vtkImageData> image_;
     vtkNew<vtkActor2D> actor_;

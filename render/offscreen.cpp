@@ -1,3 +1,4 @@
+#include <base/png.h>
 #include <render/events.h>
 #include <render/follower.h>
 #include <render/hosts.h>
@@ -64,12 +65,12 @@ class PictureFiles {
 public:
     PictureFiles(std::filesystem::path folder, vtkRenderWindow& window) : folder_(std::move(folder)), window_(window) {}
 
-    void frame() { write(fmt::format("frame_{:05}.png", frames_++)); }
-    void event(const std::string& name) { write(fmt::format("{:03}_{}.png", events_++, name)); }
+    void frame(double time) { write(fmt::format("frame_{:05}.png", frames_++), time); }
+    void event(const std::string& name, double time) { write(fmt::format("{:03}_{}.png", events_++, name), time); }
     std::uint64_t written() const noexcept { return frames_ + events_; }
 
 private:
-    void write(const std::string& name)
+    void write(const std::string& name, double time)
     {
         const std::filesystem::path file = folder_ / name, partial = folder_ / (name + ".part");
         vtkNew<vtkWindowToImageFilter> grab;
@@ -80,6 +81,7 @@ private:
         vtkNew<vtkPNGWriter> writer;
         writer->SetInputConnection(grab->GetOutputPort());
         writer->SetCompressionLevel(2);
+        writer->AddText(base::pngTimeKeyword, fmt::format("{:.3f}", time).c_str());
         writer->SetFileName(partial.c_str());
         writer->Write();
         std::error_code error;
@@ -116,12 +118,12 @@ public:
     void write(double time, const std::vector<std::string>& events)
     {
         if (files_ && time >= fileDue_ - early) {
-            files_->frame();
+            files_->frame(time);
             fileDue_ = time + every_;
         }
         for (const std::string& event : events)
             if (files_)
-                files_->event(event);
+                files_->event(event, time);
         // A film keeps the session's time: what could not be drawn in time stands for longer.
         if (movie_ && time >= movieDue_ - early) {
             const int frames = 1 + static_cast<int>((time - movieDue_ + early) * MovieFile::rate);

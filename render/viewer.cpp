@@ -21,7 +21,14 @@ namespace {
 
 // A signal handler can reach nothing else.
 std::atomic<bool> interrupted{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
+std::atomic<int> interruptedBy{0};
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+
+void onInterrupt(int signal)
+{
+    interruptedBy = signal;
+    interrupted = true;
+}
 
 // The simulation comes first: a viewer that draws in software would take every core there is.
 void standBack()
@@ -71,8 +78,9 @@ ViewerFigures runViewer(const ViewerOptions& options)
 {
     check(options);
     interrupted = false;
-    std::signal(SIGINT, [](int) { interrupted = true; });
-    std::signal(SIGTERM, [](int) { interrupted = true; });
+    interruptedBy = 0;
+    std::signal(SIGINT, onInterrupt);
+    std::signal(SIGTERM, onInterrupt);
     standBack();
     const bool window = options.offscreen.empty() && options.movie.empty();
     if (window && !options.hidden && !displayWorks())
@@ -80,7 +88,9 @@ ViewerFigures runViewer(const ViewerOptions& options)
     std::optional<PrivateDisplay> display;
     if (options.hidden || !displayWorks())
         display.emplace();
-    return window ? showInWindow(options, interrupted) : writePictures(options, interrupted);
+    ViewerFigures figures = window ? showInWindow(options, interrupted) : writePictures(options, interrupted);
+    figures.signal = interruptedBy;
+    return figures;
 }
 
 }  // namespace palpate::render

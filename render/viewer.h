@@ -86,6 +86,7 @@ struct ViewerFigures {
     double scanP50 = 0, scanP90 = 0, firstScan = 0;
     std::vector<std::pair<std::string, double>> scanStages;
     std::vector<Shown> shown;  // each picture of a tick that was not shown before
+    int signal = 0;            // that has ended it; 0: none
 };
 
 /// Shows a session until it has ended, its window is closed, or SIGINT or SIGTERM comes. Attaches late, attaches again when

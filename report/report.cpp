@@ -5,19 +5,17 @@
 #include <report/data.h>
 #include <report/html.h>
 #include <report/path.h>
+#include <report/pictures.h>
 
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 namespace palpate::report {
@@ -26,7 +24,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t maxPictures = 8;
 constexpr std::size_t shownVitals = 7;  // at first; the legend switches the others on
 constexpr double thesisCap = 8.5;       // [N]
 
@@ -81,16 +78,26 @@ json forceChart(const ReportData& d, double cap)
               {{"label", "total"}, {"colour", "c0"}, {"width", 2}}}}};
 }
 
+// A fast push leaves bins of the depth out: the values beside them are joined.
+void bridgeGaps(json& chart)
+{
+    for (json& series : chart["series"]) {
+        series["gaps"] = false;
+    }
+}
+
 json depthChart(const ReportData& d, double cap)
 {
-    return {{"columns", columnsOf({d.profile.depth, d.profile.in, d.profile.peak, d.profile.out})},
-            {"x", axis("inserted", "mm")},
-            {"y", axis("total force", "N")},
-            {"lines", capLine(d, cap)},
-            {"series",
-             {{{"label", "going in, mean"}, {"colour", "c0"}, {"width", 2}},
-              {{"label", "going in, largest"}, {"colour", "c6"}},
-              {{"label", "coming out, mean"}, {"colour", "c1"}, {"width", 2}}}}};
+    json chart = {{"columns", columnsOf({d.profile.depth, d.profile.in, d.profile.peak, d.profile.out})},
+                  {"x", axis("inserted", "mm")},
+                  {"y", axis("total force", "N")},
+                  {"lines", capLine(d, cap)},
+                  {"series",
+                   {{{"label", "going in, mean"}, {"colour", "c0"}, {"width", 2}},
+                    {{"label", "going in, largest"}, {"colour", "c6"}},
+                    {{"label", "coming out, mean"}, {"colour", "c1"}, {"width", 2}}}}};
+    bridgeGaps(chart);
+    return chart;
 }
 
 json energyChart(const ReportData& d)
@@ -175,68 +182,8 @@ json nearestChart(const ReportData& d, const haptics::SessionInfo& info)
     chart.erase("sync");
     chart.erase("events");
     chart["series"].erase(0);
-    for (json& series : chart["series"]) {
-        series["gaps"] = false;  // a fast push leaves bins out
-    }
+    bridgeGaps(chart);
     return chart;
-}
-
-std::string base64(std::string_view bytes)
-{
-    constexpr std::string_view alphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    std::string out;
-    out.reserve((bytes.size() + 2) / 3 * 4);
-    for (std::size_t i = 0; i < bytes.size(); i += 3) {
-        std::uint32_t group = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            group = group << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-        }
-        for (std::size_t k = 0; k < 4; ++k) {
-            out += i + k <= bytes.size() ? alphabet[group >> (18 - 6 * k) & 63U] : '=';
-        }
-    }
-    return out;
-}
-
-// At most eight, evenly picked in the order of their names.
-std::vector<std::filesystem::path> picturesIn(const std::filesystem::path& folder)
-{
-    std::vector<std::filesystem::path> all;
-    std::error_code failed;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, failed)) {
-        if (entry.is_regular_file() && entry.path().extension() == ".png") {
-            all.push_back(entry.path());
-        }
-    }
-    if (failed) {
-        throw std::runtime_error(folder.string() + ": pictures cannot be read: " + failed.message());
-    }
-    std::ranges::sort(all);
-    if (all.size() <= maxPictures) {
-        return all;
-    }
-    std::vector<std::filesystem::path> some;
-    for (std::size_t i = 0; i < maxPictures; ++i) {
-        some.push_back(all[i * (all.size() - 1) / (maxPictures - 1)]);
-    }
-    return some;
-}
-
-std::string picturesCard(const std::filesystem::path& folder)
-{
-    const auto files = folder.empty() ? std::vector<std::filesystem::path>{} : picturesIn(folder);
-    if (files.empty()) {
-        return {};
-    }
-    std::string out = "<section class=\"card\"><h2>Pictures</h2><div class=\"pictures\">";
-    for (const std::filesystem::path& file : files) {
-        std::ifstream in(file, std::ios::binary);
-        const std::string bytes((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-        const std::string name = escape(file.stem().string());
-        out += "<figure><img alt=\"" + name + "\" src=\"data:image/png;base64," + base64(bytes) + "\"><figcaption>" + name +
-               "</figcaption></figure>";
-    }
-    return out + "</div></section>";
 }
 
 std::string sessionPage(const haptics::Record& record, const std::filesystem::path& pictures,

@@ -9,7 +9,7 @@ namespace palpate::report {
 /// Writes one HTML file about a session that needs nothing else and no network: outcome, score, cores, forces, distances,
 /// timing, scene and build.
 ///
-/// @param pictures  a folder of which up to eight PNG files are put in, or empty
+/// @param pictures  a folder of which the PNG files of events and some others are put in, in the order of time; or empty
 /// @param file      of the record, so that the page says how to play it again; may be empty
 ///
 /// The file appears whole or not at all; one that is there is replaced. Throws std::runtime_error.

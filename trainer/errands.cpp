@@ -1,5 +1,6 @@
 #include <trainer/errands.h>
 
+#include <base/outputs.h>
 #include <base/process.h>
 #include <base/temporary_folder.h>
 #include <base/words.h>
@@ -46,6 +47,7 @@ struct Errands::Impl {
         const auto arguments = debriefArguments(state);
         replay.emplace(programs / "palpate-view", arguments, scratch / "replay.log");
         state.command = asTyped("palpate-view", arguments);
+        state.notice.clear();
         state.replaying = true;
     }
     // What a short command writes as JSON; null where it fails, and the state says why.
@@ -116,7 +118,7 @@ struct Errands::Impl {
         std::string plain = name;
         std::ranges::replace_if(
             plain, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; }, '-');
-        fs::create_directories(sink.folder());
+        base::makeFolders(sink.folder());
         return sink.folder() / plain;
     }
     // With what the desktop opens pages with; where it has nothing, the notice says where the page is.
@@ -444,6 +446,9 @@ bool Errands::look(State& state)
     impl_->lookAtLive(state);
     impl_->lookAtGrip(state);
     if (impl_->replay && impl_->replay->ended()) {
+        if (impl_->replay->failed()) {
+            state.notice = impl_->replay->message();
+        }
         impl_->replay.reset();
         state.replaying = false;
         changed = true;

@@ -59,7 +59,7 @@ Case makeCase(const NewCase& wanted)
     scene.aim = ways.at(0).approach.aim;
     scene.source.file = "volume.vdb";
     scene.name = folder.filename().string();
-    fs::create_directories(part);
+    base::makeFolders(part);
     try {
         fs::copy_file(wanted.volume, part / "volume.vdb");
         base::writeWhole(part / "scene.toml", datasets::sceneText(scene));

@@ -1,6 +1,7 @@
 #include <training/store.h>
 
 #include <base/nearest.h>
+#include <base/outputs.h>
 #include <haptics/measures.h>
 #include <haptics/record_format.h>
 #include <training/folders.h>
@@ -61,8 +62,7 @@ std::string now()
 // SQLite makes its own files beside this one with this one's mode.
 void makePrivate(const fs::path& file)
 {
-    if (!file.parent_path().empty() && !fs::exists(file.parent_path())) {
-        fs::create_directories(file.parent_path());
+    if (!file.parent_path().empty() && base::makeFolders(file.parent_path())) {
         ::chmod(file.parent_path().c_str(), 0700);
     }
     const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);

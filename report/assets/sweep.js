@@ -125,7 +125,7 @@ function drawRank(o) {
   byId("indices").replaceChildren(...(list.length ? [line("th", ["axis", ...s.measures]), ...list.map((e) => line("td", [e.axis, ...e.values.map(short)]))] : []));
   const bars = list.slice().reverse();
   chart("rank", {
-    grid: { left: 150, right: 40, top: 6, bottom: 26 },
+    grid: { left: 8, right: 40, top: 6, bottom: 4, containLabel: true },
     tooltip: { ...tip(), formatter: (p) => `${p.name}: ${short(p.value)}` },
     xAxis: { ...axisStyle(), type: "value", min: 0 },
     yAxis: { ...axisStyle(), type: "category", data: bars.map((e) => e.axis) },

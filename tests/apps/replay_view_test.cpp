@@ -1,8 +1,10 @@
+#include <base/png.h>
 #include <tests/apps/desktop.h>
 
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -47,6 +49,7 @@ TEST(ReplayView, WritesAPictureOfEveryAskedTimeAndEveryEvent)
         fired += name.string().ends_with("_fired.png") ? 1 : 0;
         inserted += name.string().ends_with("_inserted.png") ? 1 : 0;
     }
+    EXPECT_EQ(base::textInPng(readText(folder / "pictures/frame_00002.png"), base::pngTimeKeyword), "2.000");
     EXPECT_EQ(counted, frames);
     EXPECT_EQ(fired, 1U);
     EXPECT_EQ(inserted, 1U);
@@ -158,6 +161,49 @@ TEST(ReplayView, SaysThatARecordHasLostItsBeginning)
     const Outcome window = Program("palpate-view", {"--replay", folder / "s.db", "--hidden"}).wait();
     EXPECT_EQ(window.status, 1);
     EXPECT_NE(window.err.find("tick 0 is missing"), std::string::npos) << window.err;
+}
+
+// An expert's record is made at another setting than a session that keeps the clock on a slow machine.
+TEST(ReplayView, AGhostMayBeOfAnotherSettingButNotOfAnotherBody)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    const auto record = [&](const std::string& name, const std::vector<std::string>& what) {
+        std::vector<std::string> words{"train", "--unpaced", "--no-view", "--seconds", "0.05", "--record", folder / name};
+        words.insert(words.end(), what.begin(), what.end());
+        figures(words);
+    };
+    record("fast.db", {"layered", "--model", "elastic", "--setting", "fast"});
+    record("default.db", {"layered", "--model", "elastic", "--setting", "default"});
+    record("other.db", {"block", "--model", "spring"});
+    const auto beside = [&](const std::string& ghost) {
+        return Program("palpate-view", {"--replay", folder / "fast.db", "--ghost", folder / ghost, "--offscreen",
+                                        folder / "pictures", "--size", "320x320", "--frames", "1"})
+            .wait();
+    };
+    const Outcome same = beside("default.db");
+    EXPECT_EQ(same.status, 0) << same.err;
+    const Outcome other = beside("other.db");
+    EXPECT_EQ(other.status, 1);
+    EXPECT_NE(other.err.find("is a session in another body than"), std::string::npos) << other.err;
+}
+
+TEST(ReplayView, PicturesThatASignalHasEndedAreSaidToBe)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
+    Program view("palpate-view",
+                 {"--replay", folder / "s.db", "--offscreen", folder / "pictures", "--every", "0", "--size", "320x320"});
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!fs::exists(folder / "pictures/frame_00001.png") && std::chrono::steady_clock::now() < end)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    view.send(SIGINT);
+    const Outcome outcome = view.wait();
+    EXPECT_EQ(outcome.status, 130);
+    EXPECT_EQ(outcome.err, "palpate-view: interrupted: the pictures end before the record does\n");
 }
 
 TEST(ReplayView, RefusesWhatCannotBePlayed)

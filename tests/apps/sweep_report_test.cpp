@@ -54,6 +54,10 @@ TEST(SweepReport, IsDrawnByABrowserFromOneFile)
     EXPECT_EQ(raw.find("src=\"http"), std::string::npos);
     EXPECT_EQ(raw.find("A </script>"), std::string::npos) << "text of a plan must not end a script";
 
+    const std::size_t ranked = raw.find("chart(\"rank\"");
+    ASSERT_NE(ranked, std::string::npos);
+    EXPECT_NE(raw.substr(ranked, 200).find("containLabel: true"), std::string::npos) << "a long name of an axis is cut off";
+
     const std::string page = documentOf("file://" + file, here / "profile");
     EXPECT_NE(page.find("data-drawn=\"force_n\""), std::string::npos) << "the script did not come to its end";
     EXPECT_NE(page.find("12 of 12 cases, 0 failed"), std::string::npos);

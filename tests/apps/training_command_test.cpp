@@ -39,17 +39,16 @@ TEST_F(TrainingCommands, SessionsOfATraineeOpenTheGateAndTheNextExercise)
     auto next = figures({"curriculum", "next", "breast-core-biopsy", "--profile", "anna"});
     EXPECT_EQ(next["next"][0]["exercise"], "touch");
 
-    // Touched and no more: each session ends before the skin is pierced.
+    // The scripted hand does what the briefing says: it rests on the skin and lifts off.
     for (int n = 0; n < 3; ++n) {
-        const Outcome done = session("touch", {"--seconds", "1.5"});
+        const Outcome done = session("touch");
         ASSERT_EQ(done.status, 0) << done.err;
+        EXPECT_NE(done.out.find("100 of 100"), std::string::npos) << done.out;
     }
     const auto progress = figures({"progress", "anna"});
     ASSERT_EQ(progress["sessions"].size(), 3U);
-    const auto& measures = progress["sessions"][0]["measures"];
-    const bool level = measures["skin_contacts"] >= 1 && measures["peak_force_n"] <= 2 && measures["deepest_mm"] <= 3;
     next = figures({"curriculum", "next", "--profile", "anna"});
-    EXPECT_EQ(next["next"][0]["exercise"], level ? "advance" : "touch") << measures;
+    EXPECT_EQ(next["next"][0]["exercise"], "advance") << progress["sessions"][0]["measures"];
     for (const auto& s : progress["sessions"]) {
         EXPECT_EQ(s["exercise"], "touch");
         EXPECT_EQ(s["mode"], "practice");
@@ -72,6 +71,15 @@ TEST_F(TrainingCommands, ARecordFromAnotherMachineCountsAsWhatItWas)
     ASSERT_EQ(palpate({"profile", "erase", "anna", "--yes"}).status, 0);
     EXPECT_TRUE(fs::exists(folder_ / "r.db")) << "a record that somebody put elsewhere stays";
     expectRefusal({"progress", "anna"}, "there is no such profile");
+}
+
+// As on a disk that is read-only: there is no place for the profiles.
+TEST_F(TrainingCommands, AFolderThatCannotBeMadeIsSaidInPlainWords)
+{
+    writeText(folder_ / "file", "no folder");
+    ::setenv("XDG_DATA_HOME", (folder_ / "file").c_str(), 1);
+    expectRefusal({"profile", "new", "anna"},
+                  (folder_ / "file").string() + "/palpate: this folder cannot be made (Not a directory)");
 }
 
 // An instructor sees who trains, and how it goes, while it goes; nothing of a session that was killed.

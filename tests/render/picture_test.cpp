@@ -136,6 +136,7 @@ public:
         return {view.GetDisplayPoint()[0], view.GetDisplayPoint()[1]};
     }
     Picture& picture() { return *picture_; }
+    void resize(int wide, int high) { window_->SetSize(wide, high); }
 
     const channel::Scenery scenery = bodyScenery();
     const std::vector<std::uint8_t> labels;
@@ -395,6 +396,43 @@ TEST_F(PictureTest, ShowsAnImageInTheSliceOnly)
     picture.nextWindow();
     EXPECT_EQ(grey.differing(pictureOf(SliceLook::image), all), 0) << "the first window again";
     picture.show(SliceLook::tinted);
+}
+
+// In a small window the caption of a scan has a place of its own, and the side letters are read on tissue that is white.
+TEST_F(PictureTest, WordsOfACtScanLieOnNothingElse)
+{
+    channel::Scenery scenery = studio->scenery;
+    scenery.ctSlices = 3;
+    scenery.ctWidth = 5e-3;
+    scenery.ctDoseIndex = 10;
+    scenery.ctDoseLength = 7.5;
+    for (channel::TissueSound& sound : scenery.sound)
+        sound.density = 3000;
+    constexpr int wide = 500, high = 400;
+    studio->resize(wide, high);
+    Picture& picture = studio->picture();
+    // A body without a border: fat all over.
+    const std::vector<std::uint8_t> labels(studio->labels.size(), 2);
+    picture.open(scenery, labels, "story");
+    picture.show(Layout::trainee);
+    channel::State state = storyState(scenery, 1.0);
+    const auto pictureOf = [&](std::uint32_t scans) {
+        state.pictures = scans;
+        picture.update(state, nullptr, {30, 0.02, 1000});
+        picture.render(Quality::still);
+        return studio->grab("ct-" + std::to_string(scans));
+    };
+    const Image before = pictureOf(0), scanned = pictureOf(1);
+    studio->resize(width, height);
+    const ScreenPlan plan(wide, high, Layout::trainee, 1, true);
+    EXPECT_EQ(scanned.differing(before, plan.health), 0) << "how viewer and simulation keep up";
+    EXPECT_EQ(scanned.differing(before, plan.panel), 0);
+    const Area& scan = plan.ultrasound;
+    EXPECT_GT(scanned.differing(before, scan), scan.width * scan.height / 4);
+    // The box of a side letter lets 45 % of the white through.
+    const Area left{scan.x, scan.y + scan.height / 4, 20, scan.height / 2};
+    EXPECT_GT(scanned.count(left, {115, 115, 115}, 8), 40);
+    EXPECT_GT(scanned.count(left, {255, 255, 255}, 4), left.width * left.height / 2);
 }
 
 // under() is the inverse of the projection.

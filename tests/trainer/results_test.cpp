@@ -84,5 +84,18 @@ TEST(Devices, AreToldWithWhatToDo)
     EXPECT_EQ(ready.remedy, "");
 }
 
+// Where no core was asked for, no line says that there is none.
+TEST(Results, NameWhatThePointsAreForWhereNoCoreWasAskedFor)
+{
+    const Folder folder;
+    write(folder / "a.json", R"({"score": {"total": 100, "judged": "rest", "passes": 0, "best_target_pct": 0,
+        "rest_s": 3.4, "points": {"core": 50, "vital": 25, "technique": 25}, "losses": []}})");
+    const Result r = readResult(folder / "a.json");
+    ASSERT_EQ(r.parts.size(), 3U);
+    EXPECT_EQ(r.parts[0].name, "Rest on the skin");
+    ASSERT_EQ(r.measures.size(), 1U);
+    EXPECT_EQ(r.measures[0].second, "3.4 s");
+}
+
 }  // namespace
 }  // namespace palpate::trainer
