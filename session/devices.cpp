@@ -108,6 +108,9 @@ constexpr std::array kinds{
 
 void checkTool(const DeviceRequest& request, const datasets::Scene& scene)
 {
+    if (!request.trainee.empty()) {
+        haptics::skillCalled(request.trainee);  // that there is such a one
+    }
     const bool needle = scene.tool.kind == datasets::ToolKind::needle;
     if (needle && scene.task == datasets::SessionTask::find) {
         throw std::runtime_error(scene.name +

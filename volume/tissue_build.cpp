@@ -174,6 +174,10 @@ std::uint8_t rowOf(const TissueTable& table, const LabelName& label)
     if (label.tissue.empty()) {
         throw std::runtime_error(fmt::format("label {} '{}' has no tissue: map it to one", label.value, label.name));
     }
+    if (label.tissue.starts_with('?')) {
+        throw std::runtime_error(fmt::format("label {} '{}': no tissue '{}': write in the label map which one it is",
+                                             label.value, label.name, label.tissue));
+    }
     const auto row = table.find(label.tissue);
     if (!row) {
         throw std::runtime_error(fmt::format("label {} '{}': no tissue '{}' in the tissue table '{}'", label.value,

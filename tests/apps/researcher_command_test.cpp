@@ -191,7 +191,7 @@ TEST_F(Researcher, ALabelMapIsBegunAndFilledIn)
 {
     const std::string map = folder / "map.toml";
     ASSERT_EQ(palpate({"import", bare, "--write-map", map}).status, 0);
-    expectRefusal({"import", bare, "--map", map, "-o", vdb}, "no tissue '?'");
+    expectRefusal({"import", bare, "--map", map, "-o", vdb}, "no tissue '?': write in the label map which one it is");
     std::string text = readText(map);
     for (std::size_t at = text.find("\"?\"", text.find("labels")); at != std::string::npos; at = text.find("\"?\"", at)) {
         text.replace(at, 3, "\"liver\"");

@@ -136,6 +136,11 @@ class Hands(InFolder):
         self.assertEqual(len(session.cores), len(figure["core"]))
         self.assertGreater(len(session.cores), 0)
 
+    def test_a_hand_that_there_is_not_is_named(self):
+        session = palpate.Session(palpate.Scene("block").changed({"model.level": "spring"}))
+        with self.assertRaisesRegex(RuntimeError, "trainee 'fool': there are "):
+            session.perform("fool")
+
 
 if __name__ == "__main__":
     unittest.main()
