@@ -242,6 +242,9 @@ std::string scoreCard(const ReportData& d)
 
 std::string coresCard(const ReportData& d, const haptics::SessionInfo& info)
 {
+    if (d.cores.empty() && haptics::judgedBy(d.score) != haptics::Judged::core) {
+        return {};
+    }
     std::string out = "<section class=\"card\"><h2>Cores</h2>";
     if (d.cores.empty()) {
         return out + "<p class=\"note\">The gun was not fired.</p></section>";
