@@ -119,21 +119,14 @@ bool isListed(Listed listed, const Score& score)
     }
 }
 
-// What the part `core` of a total is for, where it is for no core.
-const char* labelOfCore(const Score& score)
-{
-    switch (judgedBy(score)) {
-        case Judged::rest:
-        case Judged::nothing:
-            return "Touch";
-        case Judged::way:
-            return "Way to the target";
-        default:
-            return "Core";
-    }
-}
-
 }  // namespace
+
+const char* labelOfCore(const Score& score) noexcept
+{
+    constexpr std::array labels{"Core", "Place and size", "Rest on the skin", "Way to the target", "Touch"};
+    static_assert(labels.size() == judgedNames.size());
+    return labels[static_cast<std::size_t>(judgedBy(score))];
+}
 
 std::span<const Measure> measures() noexcept
 {

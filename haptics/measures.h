@@ -37,6 +37,8 @@ struct PartOfTotal {
 inline constexpr std::array<PartOfTotal, 3> partsOfTotal{{{"core", "Core", 50, &ScoreParts::core},
                                                           {"vital", "Vital structures", 25, &ScoreParts::vital},
                                                           {"technique", "Technique", 25, &ScoreParts::technique}}};
+/// What the part `core` is called in a list: by what it is for, see judgedBy().
+const char* labelOfCore(const Score& score) noexcept;
 
 using LabelledValues = std::vector<std::pair<std::string, std::string>>;
 /// The total and its parts, in points.

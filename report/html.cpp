@@ -79,13 +79,6 @@ std::string withoutCore(const haptics::Score& s)
                                          : "The tip was in the target.";
 }
 
-const char* nameOfCore(haptics::Judged judged)
-{
-    constexpr std::array names{"Core", "Place and size", "Rest on the skin", "Way to the target", "Core (not asked for)"};
-    static_assert(names.size() == haptics::judgedNames.size());
-    return names[static_cast<std::size_t>(judged)];
-}
-
 std::string outcome(const ReportData& d, const haptics::Record& record)
 {
     const haptics::Score& s = d.score;
@@ -221,7 +214,7 @@ std::string scoreCard(const ReportData& d)
         const bool isCore = part.points == &haptics::ScoreParts::core;
         out += fmt::format(
             "<div><span>{} <b>{:.0f} of {:.0f}</b></span><div class=\"meter\"><i style=\"width:{:.1f}%\"></i></div></div>",
-            isCore ? nameOfCore(haptics::judgedBy(d.score)) : part.label, p.*part.points, part.most,
+            isCore ? haptics::labelOfCore(d.score) : part.label, p.*part.points, part.most,
             100 * p.*part.points / part.most);
     }
     out += "</div>";
