@@ -56,6 +56,13 @@ inline double youngsModulusOf(float mu) noexcept
     return 2.9 * static_cast<double>(mu);
 }
 
+/// Shear modulus of the level's cell that a place lies in; 0 where it is empty, and outside of the grid [Pa].
+inline float muAt(const CellLevel& level, Vec3 at) noexcept
+{
+    const Index3 cell(glm::floor((at - level.nodes.origin) / level.nodes.spacing));
+    return level.nodes.contains(cell) ? level.mu[level.nodes.offset(cell)] : 0.0F;
+}
+
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
 /// before, and its nodes are every second node of it.
 struct ElasticBody {

@@ -74,7 +74,7 @@ public:
         site.stiffness = tie.along;
         site.across = tie.across;
         site.normal = tie.axis;
-        if (tie.piece.radius > 0.0) {
+        if (tie.piece.isRod()) {
             addRod(tie, site, index);
         } else {
             add(site);
@@ -106,7 +106,7 @@ private:
     // with the axis.
     void addRod(const Tie& tie, ContactSite site, std::size_t index) noexcept
     {
-        const double mu = finestMu(tie.rest);
+        const auto mu = static_cast<double>(muAt(body_.levels.front(), tie.rest));
         locate(body_, windows_, tie.rest, site);
         if (mu <= 0.0 || site.level >= windows_.size()) {
             return;
@@ -114,7 +114,7 @@ private:
         // Next to a window's border cells give way as little as those of the next coarser window, which hold it.
         const std::size_t level = std::min<std::size_t>(site.level + (atBorder(site) ? 1U : 0U), windows_.size() - 1);
         const double spacing = body_.levels[level].nodes.spacing;
-        const double rings = std::ceil(tie.piece.length / spacing - slightly);
+        const double rings = std::max(1.0, std::ceil(tie.piece.length / spacing - slightly));
         const RodRing ring = ringOf({tie.piece.radius, tie.piece.length / rings, tie.piece.rod}, mu, spacing);
         site.stiffness = ring.along / ring.points;
         site.across = ring.across / ring.points;
@@ -125,7 +125,7 @@ private:
                 // Pieces are turned against each other: where cells are long, there are several rings in each.
                 const double angle = 2.0 * std::numbers::pi * (i / ring.points + 0.125 * static_cast<double>(index));
                 site.rest = middle + ring.radius * (std::cos(angle) * one + std::sin(angle) * other);
-                site.anchor = finestMu(site.rest) > 0.0 ? site.rest : tie.rest;
+                site.anchor = hasTissue(site.rest) ? site.rest : tie.rest;
                 add(site);
             }
         }
@@ -206,14 +206,7 @@ private:
         }
     }
 
-    bool hasTissue(Vec3 at) const noexcept { return finestMu(at) > 0.0; }
-
-    double finestMu(Vec3 at) const noexcept
-    {
-        const CellLevel& finest = body_.levels.front();
-        const Index3 cell(glm::floor((at - finest.nodes.origin) / finest.nodes.spacing));
-        return finest.nodes.contains(cell) ? static_cast<double>(finest.mu[finest.nodes.offset(cell)]) : 0.0;
-    }
+    bool hasTissue(Vec3 at) const noexcept { return muAt(body_.levels.front(), at) > 0.0F; }
 
     bool addIfNear(const occupancy::ShapeDistance& shape, ContactSite& site) noexcept
     {
@@ -455,7 +448,7 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
 Vec3 Tie::pulled(Vec3 at) const noexcept
 {
     const Vec3 off = at - rest;
-    if (piece.radius <= 0.0 || axis == restAxis) {
+    if (!piece.isRod() || axis == restAxis) {
         return u;
     }
     // The least turn from restAxis to axis, see Rodrigues. Against each other they have none: then none is made.

@@ -28,7 +28,7 @@ struct Tie {
     double along = 0;    // stiffness of a point along the axis [N/m]
     double across = 0;   // and across it [N/m]
 
-    RodPiece piece{};        // radius 0: a point
+    RodPiece piece{};        // none: a point
     Vec3 restAxis{0, 0, 1};  // the rod's axis where it got hold of the tissue, unit vector
 
     /// The displacement that a point which was at `at` at rest is pulled to: the rod's, which has turned from restAxis to

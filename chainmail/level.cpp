@@ -131,9 +131,7 @@ ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
 double tieStiffnessAt(const ElasticBody& body, Vec3 rest) noexcept
 {
     const CellLevel& level = body.levels.front();
-    const Index3 cell(glm::floor((rest - level.nodes.origin) / level.nodes.spacing));
-    const float mu = level.nodes.contains(cell) ? level.mu[level.nodes.offset(cell)] : 0.0F;
-    return tieStiffness * youngsModulusOf(mu) * level.nodes.spacing;
+    return tieStiffness * youngsModulusOf(muAt(level, rest)) * level.nodes.spacing;
 }
 
 // The tip holds its point in all directions, and so does the shaft the tissue that it carries along.

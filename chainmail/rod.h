@@ -4,11 +4,16 @@ namespace palpate::chainmail {
 
 /// A piece of a rigid rod that tissue sticks to.
 struct RodPiece {
-    double radius = 0;  // [m]
-    double length = 0;  // of the piece [m]
-    double rod = 0;     // of the whole rod [m]
+    double radius = 0;                                    // [m]
+    double length = 0;                                    // of the piece [m]
+    double rod = 0;                                       // of the whole rod [m]
+    bool isRod() const noexcept { return length > 0.0; }  // 0: it stands for no piece
     bool operator==(const RodPiece&) const = default;
 };
+
+/// In how many pieces a rod is held, of some 4 mm each: a whole number, at least 1.
+/// @param length  of the rod [m]
+double piecesOfRod(double length) noexcept;
 
 /// Points evenly on a circle around a rod's axis, each on its spring, which stand for a piece of the rod.
 struct RodRing {

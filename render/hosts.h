@@ -6,13 +6,13 @@
 
 namespace palpate::render {
 
-/// Shows the session in a GLFW window until it is over, the window is closed or `stop` is set.
-ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>& stop);
+/// Shows the session in a GLFW window until it is over, the window is closed or `stop` is not 0.
+ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<int>& stop);
 
-/// Writes the session as PNG files until it has ended or `stop` is set:
+/// Writes the session as PNG files until it has ended or `stop` is not 0:
 ///
 ///     frame_00000.png ..      every `options.every` seconds of the session
 ///     000_contact.png ..      at events: contact, inserted, warning_STRUCTURE, touching_STRUCTURE, fired, fault, finished
-ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool>& stop);
+ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>& stop);
 
 }  // namespace palpate::render

@@ -169,7 +169,7 @@ bool askFor(Playback& playback, double time, const Follower& follower)
 }
 
 // Follows a session that runs, or asks for one picture of a record after the other, until there is no more.
-void writeAll(const ViewerOptions& options, const std::atomic<bool>& stop, Picture& picture, Follower& follower,
+void writeAll(const ViewerOptions& options, const std::atomic<int>& stop, Picture& picture, Follower& follower,
               Outputs& outputs)
 {
     constexpr double look = 1e-3 * channel::frameTicks;  // how far apart a record is searched for events [s]
@@ -215,7 +215,7 @@ void writeAll(const ViewerOptions& options, const std::atomic<bool>& stop, Pictu
 
 }  // namespace
 
-ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<bool>& stop)
+ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>& stop)
 {
     if (!options.offscreen.empty())
         makeFolder(options.offscreen);

@@ -20,14 +20,12 @@ namespace palpate::render {
 namespace {
 
 // A signal handler can reach nothing else.
-std::atomic<bool> interrupted{false};
-std::atomic<int> interruptedBy{0};
-static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<int>::is_always_lock_free);
+std::atomic<int> interruptedBy{0};  // a signal; 0: none
+static_assert(std::atomic<int>::is_always_lock_free);
 
 void onInterrupt(int signal)
 {
     interruptedBy = signal;
-    interrupted = true;
 }
 
 // The simulation comes first: a viewer that draws in software would take every core there is.
@@ -77,7 +75,6 @@ std::optional<double> Moments::from(double time, bool onwards) const
 ViewerFigures runViewer(const ViewerOptions& options)
 {
     check(options);
-    interrupted = false;
     interruptedBy = 0;
     std::signal(SIGINT, onInterrupt);
     std::signal(SIGTERM, onInterrupt);
@@ -88,7 +85,7 @@ ViewerFigures runViewer(const ViewerOptions& options)
     std::optional<PrivateDisplay> display;
     if (options.hidden || !displayWorks())
         display.emplace();
-    ViewerFigures figures = window ? showInWindow(options, interrupted) : writePictures(options, interrupted);
+    ViewerFigures figures = window ? showInWindow(options, interruptedBy) : writePictures(options, interruptedBy);
     figures.signal = interruptedBy;
     return figures;
 }

@@ -173,7 +173,7 @@ struct Finalizer {
 
 }  // namespace
 
-ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<bool>& stop)
+ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<int>& stop)
 {
     const Window window = openWindow(options);
     vtkNew<vtkGenericOpenGLRenderWindow> target;

@@ -19,7 +19,6 @@ constexpr double thickShare = 0.4;  // of the tissue's thickness
 constexpr double gap = 0.5e-3;      // between a sphere and the surface at the start [m]
 constexpr double tipDepth = 1e-3;   // of a needle's tip at the start [m]
 constexpr double shaftLength = 20e-3;
-constexpr double shaftPiece = 4e-3;      // that one tie stands for [m]
 constexpr double shaftRadius = 1.05e-3;  // of 14 G [m]
 constexpr double tieStiffness = 8.0;     // in E h
 constexpr int looks = 4;                 // in press and drag each
@@ -106,7 +105,7 @@ TrialPath trialPath(const volume::Tissue& tissue, const volume::DistanceField& s
         addTie(tissue, place.entry + std::min(tipDepth, 0.5 * place.shaft) * place.approach, spacing, {}, path);
     }
     const double length = shaft ? std::min(shaftLength, 0.8 * place.shaft) : 0.0;
-    const double pieces = std::max(1.0, std::round(length / shaftPiece));
+    const double pieces = chainmail::piecesOfRod(length);
     for (double i = 0.5; shaft && i < pieces; ++i) {
         addTie(tissue, place.entry + i * length / pieces * place.approach, spacing, {shaftRadius, length / pieces, length},
                path);

@@ -14,7 +14,6 @@ using datasets::ToolKind;
 
 namespace {
 
-constexpr double shaftPiece = 4e-3;      // of a needle that one tie stands for, about [m]
 constexpr double insertedStep = 0.1e-3;  // to which it is known how much of it is in the body [m]
 constexpr double touchStep = 0.25e-3;    // at most so deep a tool is found that comes to the surface [m]
 
@@ -38,10 +37,9 @@ PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec&
     }
     if (model.surface.distance(first.position) < 0.0) {
         const double length = tool_.radius > 0.0 ? inserted() : 0.0;
-        const double pieces = std::max(1.0, std::round(length / shaftPiece));
+        const double pieces = chainmail::piecesOfRod(length);
         for (double i = 0.5; i < pieces; ++i) {
-            hold(i * length / pieces,
-                 length > 0.0 ? chainmail::RodPiece{tool_.radius, length / pieces, length} : chainmail::RodPiece{});
+            hold(i * length / pieces, {tool_.radius, length / pieces, length});
         }
     }
     load_.ties = ties_;
