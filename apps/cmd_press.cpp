@@ -223,6 +223,17 @@ void write(const PressArguments& o, const Run& run)
     }
 }
 
+void warnOfSmall(const Run& run)
+{
+    const double spacing = run.model.lattice.grid.spacing, radius = run.press.tool.radius;
+    if (run.press.tool.kind != ToolKind::needle && radius < spacing) {
+        fmt::print(stderr,
+                   "palpate press: the tool's radius of {:g} mm is less than a cell ({:g} mm): forces are too low; a finer "
+                   "--setting or [model] spacing_mm resolves it\n",
+                   1e3 * radius, 1e3 * spacing);
+    }
+}
+
 void runPress(const PressArguments& o)
 {
     base::checkOutput(o.json);
@@ -234,12 +245,14 @@ void runPress(const PressArguments& o)
     progress.show(o.scene + ": volume");
     session::SceneChanges changes = o.changes;
     changes.model = o.level;
+    changes.tool = [&](const ToolSpec& scene) { return toolOf(o, scene); };
     Run run{session::openSession(o.scene, changes), {}, {}, {}, {}, {}};
-    run.press = {toolOf(o, run.model.scene.tool), o.every, o.converge};
+    run.press = {run.model.scene.tool, o.every, o.converge};
     run.path = studies::loadPosePath(o.path, studies::plannedAxis(run.model));
     if (!o.at.empty()) {
         run.points = studies::loadPoints(o.at);
     }
+    warnOfSmall(run);
     const auto ticks = static_cast<double>(run.path.ticks());
     try {
         run.summary = studies::press(run.model, run.path, run.points, run.press, [&](const PressSample& s) {

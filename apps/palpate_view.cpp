@@ -162,8 +162,11 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         writeTimeline(words.timeline, figures.shown);
     // Of a record every picture was asked for; a session that runs is watched for as long as one likes.
     const bool pictures = !options.offscreen.empty() || !options.movie.empty();
+    const std::string what = options.movie.empty() ? "the pictures end" : options.movie.string() + " ends";
     if (player && pictures && figures.signal != 0)
-        throw palpate::command::Interrupted(figures.signal, "interrupted: the pictures end before the record does");
+        throw palpate::command::Interrupted(figures.signal, "interrupted: " + what + " before the record does");
+    if (!options.movie.empty() && figures.signal != 0)
+        std::fprintf(stderr, "palpate-view: interrupted: %s before the session does\n", what.c_str());
     if (player && !player->problem().empty())
         throw std::runtime_error(player->problem());
 }

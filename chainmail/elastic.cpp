@@ -32,8 +32,8 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
     : options_(options),
       reach_(volume::reachOf(options.law)),
       stack_(body, options.window, focus, options.kernels != nullptr ? *options.kernels : kernels()),
-      multigrid_(stack_, 8 * options.maxSites),
-      sites_(options.maxSites)
+      multigrid_(stack_, 8 * sitesFor(body, options.touches, options.maxSites)),
+      sites_(sitesFor(body, options.touches, options.maxSites))
 {
     held_.reserve(maxTools);
     tools_.reserve(maxTools);
@@ -166,7 +166,8 @@ void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
     const auto& grid = body.levels.front().nodes;
-    std::array<double, maxTools> patch{}, across{};  // radius, in cells; where its middle is
+    std::array<double, maxTools> patch{};  // radius, in cells
+    std::array<Between, maxTools> across;  // where its middle is
     for (std::size_t i = 0; i < tools_.size(); ++i) {
         patch[i] = tools_[i].pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tools_[i]) / grid.spacing;
         across[i] = betweenNodes(grid, tools_[i]);
@@ -175,8 +176,7 @@ void Elastic::spreadPressure() noexcept
     for (ContactSite& s : active()) {
         if (!s.isTie) {
             // What moved last was measured then.
-            const bool isKnown = s.stretch > 0.0;
-            const double ratio = volume::isSmall(options_.law) ? 1.0 : isKnown ? s.stretch : areaRatio(s);
+            const double ratio = volume::isSmall(options_.law) ? 1.0 : s.stretch > 0.0 ? s.stretch : areaRatio(s);
             s.stiffness = resolvedShare(patch[s.owner], s.between, across[s.owner]) * ratio * s.atRest;
         }
     }

@@ -17,10 +17,11 @@ struct ElasticOptions {
     int cycles = 2;                           // per call of relax(); one more where that leaves much out of balance
     volume::Law law = volume::SmallStrain{};  // of all tissue
     double period = 1e-3;                     // of a tick [s]: what relaxes does so by the ticks that its loads name
-    std::size_t maxSites = 4096;
-    double tolerance = 0.01;           // no more once the forces out of balance are this fraction of the contacts' [-]
-    int heldPeriod = 3;                // of an ElasticLevel: see there
-    bool warmStart = true;             // begin with the last call's increment; without, a call begins where the tissue lies
+    std::size_t maxSites = 4096;              // surface points and ties that are held at once, at least
+    double touches = 0;       // surface of the tools that press: more sites where those need it, see sitesFor() [m^2]
+    double tolerance = 0.01;  // no more once the forces out of balance are this fraction of the contacts' [-]
+    int heldPeriod = 3;       // of an ElasticLevel: see there
+    bool warmStart = true;    // begin with the last call's increment; without, a call begins where the tissue lies
     const Kernels* kernels = nullptr;  // the arithmetic; null: the widest set of this machine. All have the same results
 };
 

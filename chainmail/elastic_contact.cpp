@@ -12,22 +12,27 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double penalty = 20.0;           // contact stiffness per area, in E / h
-constexpr double meanBetween = 1.0 / 3.0;  // of betweenNodes() over two edges
+constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
 
 // Compliance that cells lack under a patch, in h / E per area: its mean over places in the grid, and by how much it grows
 // with betweenNodes().
 struct Lacking {
     double radius = 0;  // of the patch, in cells
     double mean = 0;
-    double across = 0;
+    double between = 0;
+    double square = 0;
 };
-constexpr std::array<Lacking, 6> lacking{{{0.5, 0.185, 0.25},
-                                          {0.75, 0.13, 0.15},
-                                          {1.0, 0.083, -0.17},
-                                          {1.25, 0.056, -0.12},
-                                          {1.5, 0.035, 0.1},
-                                          {2.0, 0.0, 0.0}}};
+constexpr std::array<Lacking, 11> lacking{{{0.2, 0.265, 3.35, -12.6},
+                                           {0.3, 0.194, 0.88, -2.64},
+                                           {0.4, 0.186, -0.52, 3.37},
+                                           {0.5, 0.176, -0.61, 3.81},
+                                           {0.6, 0.160, -0.14, 1.94},
+                                           {0.75, 0.140, 0.15, 0.08},
+                                           {1.0, 0.087, -0.02, -0.63},
+                                           {1.1, 0.077, 0.12, -1.39},
+                                           {1.25, 0.066, 0.20, -1.34},
+                                           {1.5, 0.043, -0.07, 0.71},
+                                           {2.0, 0.0, 0.0, 0.0}}};
 constexpr double little = 1.25;  // radius of a patch, in cells, up to which surface points are quartered
 constexpr double coarse = 0.11;  // area of a surface point that is quartered, in that of a cell's face,
 constexpr double close = 0.3;    // and how far from the tool it may be [cells]
@@ -178,6 +183,7 @@ private:
             site.owner = static_cast<std::uint16_t>(index);
             site.point = i;
             site.atRest = site.stiffness = siteStiffness(point, spacing, tool);
+            site.area = point.area;
             const bool added = addIfNear(shape, site);
             if (added && touchesLittle(tool, spacing) && static_cast<double>(point.area) > coarse * spacing * spacing) {
                 quarterLast(shape);
@@ -202,6 +208,7 @@ private:
             site.rest += off;
             site.anchor += hasTissue(site.anchor + off) ? off : Vec3(0.0);
             site.atRest = site.stiffness = 0.25 * whole.atRest;
+            site.area = 0.25F * whole.area;
             addIfNear(shape, site);
         }
     }
@@ -219,7 +226,7 @@ private:
             return false;
         }
         const Vec3 normal(body_.points[added.point].normal);
-        added.between = static_cast<float>(betweenNodes(body_.levels.front().nodes, added.anchor, normal * normal));
+        added.between = static_cast<float>(betweenNodes(body_.levels.front().nodes, added.anchor, normal * normal).b);
         return true;
     }
 
@@ -259,6 +266,23 @@ double stiffnessUncapped(const ElasticBody& body, double radius) noexcept
         mu = isFixed ? mu : std::max(mu, p.mu);
     }
     return std::max(ElasticTool().stiffest, penalty * youngsModulusOf(mu) / finest.nodes.spacing * touchedAtFirst(radius));
+}
+
+double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept
+{
+    const double reach = shape.widest() + 3.0 * spacing;
+    return 2.0 * std::numbers::pi * reach * (2.0 * reach + glm::distance(shape.a, shape.b));
+}
+
+std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) noexcept
+{
+    constexpr double sides = 2.0, quarters = 1024.0;  // of points that are quartered: of a patch of two cells at most
+    double whole = 0.0;
+    for (const SurfacePoint& p : body.points) {
+        whole += static_cast<double>(p.area);
+    }
+    const double share = whole > 0.0 ? std::min(sides * area / whole, 1.0) : 0.0;
+    return std::max(least, static_cast<std::size_t>(share * static_cast<double>(body.points.size()) + quarters));
 }
 
 double radiusOfPatch(const ElasticTool& tool) noexcept
@@ -324,34 +348,41 @@ double AreaRatio::operator()(const ContactSite& site) noexcept
     return std::clamp(glm::length(area), minRatio, maxRatio);
 }
 
-double betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept
+Between betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept
 {
     const Vec3 place = glm::fract((at - grid.origin) / grid.spacing);
-    return glm::dot(weights, place * (1.0 - place));
+    const Vec3 b = place * (1.0 - place);
+    return {glm::dot(weights, b), glm::dot(weights, b * b)};
 }
 
-double betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept
+Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept
 {
+    const Between mean;
     const double depth = glm::length(tool.pushed);
     if (depth <= 0.0) {
-        return meanBetween;
+        return mean;
     }
     const Vec3 inward = tool.pushed / depth;
     const Vec3 a = tool.shape.a + tool.shape.radiusA * inward, b = tool.shape.b + tool.shape.radiusB * inward;
     const double ahead = glm::dot(a - b, inward);
-    const double place = betweenNodes(grid, (ahead < 0.0 ? b : a) - tool.pushed, 1.0 - inward * inward);
+    const Between place = betweenNodes(grid, (ahead < 0.0 ? b : a) - tool.pushed, 1.0 - inward * inward);
     const double isRound = tool.shape.a == tool.shape.b ? 1.0 : std::min(std::abs(ahead) / depth, 1.0);
-    return glm::mix(meanBetween, place, isRound);
+    return {glm::mix(mean.b, place.b, isRound), glm::mix(mean.square, place.square, isRound)};
 }
 
-double resolvedShare(double radiusInCells, double along, double across) noexcept
+double resolvedShare(double radiusInCells, double along, const Between& across) noexcept
 {
+    const Between mean;
     const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
                                         [](const Lacking& l, double t) { return l.radius < t; });
+    const auto lacksAt = [&](const Lacking& l) {
+        return l.mean + l.between * (across.b - mean.b) + l.square * (across.square - mean.square);
+    };
     const Lacking &to = *above, &from = *(above - 1);
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
-    const double lacks = glm::mix(from.mean, to.mean, t) + glm::mix(from.across, to.across, t) * (across - meanBetween) +
-                         0.3 * along * std::max(1.0 - radiusInCells * radiusInCells / 16.0, 0.0);
+    const double lacks =
+        glm::mix(lacksAt(from), lacksAt(to), t) +
+        0.3 * along * std::min(radiusInCells / 0.75, 1.0) * std::max(1.0 - radiusInCells * radiusInCells / 16.0, 0.0);
     return 1.0 / (1.0 + penalty * std::max(lacks, 0.0));
 }
 

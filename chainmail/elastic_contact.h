@@ -80,6 +80,7 @@ struct alignas(64) ContactSite {
     double stretch = 0;       // areaRatio() at the end of the last call; 0: not known
     std::uint32_t point = 0;  // index of the surface point
     float between = 0;        // of the surface point: betweenNodes() along its normal
+    float area = 0;           // of the surface that it stands for, at rest [m^2]
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
@@ -121,6 +122,12 @@ double radiusOfPatch(const ElasticTool& tool) noexcept;
 /// @param spacing  of the finest cells [m]
 bool touchesLittle(const ElasticTool& tool, double spacing) noexcept;
 
+/// How many surface points tools may touch at once whose surface, three cells around them included, is `area` [m^2]: of the
+/// body both sides, as densely as its points lie, and not more than it has. At least `least`.
+std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) noexcept;
+/// That surface of one tool [m^2].
+double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept;
+
 /// Fills `out` with the ties and with the surface points that a tool may touch: those within `near` [m] of it, as the
 /// tissue lies now or as it would lie at rest.
 /// @returns  how many; more than out holds are left out
@@ -143,26 +150,30 @@ private:
     std::array<Vec3, 3> cofactor_{};  // columns of cof(F)
 };
 
-/// How far between nodes a place is: sum over the edges of a cell of f (1 - f), f the place along one, 0 to 1, each edge
-/// with its weight.
-double betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept;
-/// The same of the middle of what a tool touches, over the edges across its way. 1/3, the mean, for a capsule that lies
-/// flat.
-double betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
+/// How far between nodes a place is: over the edges of a cell, each with its weight, sums of b = f (1 - f) and of b^2, f
+/// the place along one, 0 to 1. The defaults are their means over all places, for two edges of weight 1.
+struct Between {
+    double b = 1.0 / 3.0;
+    double square = 1.0 / 15.0;
+};
+Between betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept;
+/// The same of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat.
+Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
 
 /// Fraction of the contact's stiffness that a point has under a patch of radius a on cells of side h.
 ///
 /// Cells do not give way under a patch smaller than themselves as tissue does, least in the middle between nodes. What they
 /// lack there is a compliance c h / E per area:
 ///
-///     c = m(a / h) + g(a / h) (across - 1 / 3) + 0.3 along max(0, 1 - (a / 4 h)^2),    share = 1 / (1 + 20 c)
+///     c = m + g (b - 1/3) + q (b^2 - 1/15) + 0.3 along min(1, a / 0.75 h) max(0, 1 - (a / 4 h)^2)
+///     share = 1 / (1 + 20 c)
 ///
-/// m falls from 0.185 at 0.5 to 0 at 2; g is 0.25 at 0.5, changes its sign and ends there, too. They and the factor of
-/// `along` are what a ball on a half-space (Hertz 1882; nu 0.45 to 0.49) needs on grids shifted along and across the
-/// surface; `palpate accuracy --verify` has the errors that are left.
+/// m, g and q are functions of a / h; all end at 2. They and the factor of `along` are what a ball on a half-space (Hertz
+/// 1882; nu 0.45 to 0.49) needs on grids shifted along and across the surface; `palpate accuracy --verify` has the errors
+/// that are left.
 /// @param along   betweenNodes() of the point along the surface's normal
 /// @param across  and of the tool
-double resolvedShare(double radiusInCells, double along, double across) noexcept;
+double resolvedShare(double radiusInCells, double along, const Between& across) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

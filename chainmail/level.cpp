@@ -119,7 +119,8 @@ ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
         tool.shape = grip.shape;
         tool.pushed = grip.position - grip.proxy;
         tool.friction = grip.friction;
-        const Vec3 under = grip.proxy - surface_.distance(grip.proxy) * surface_.normal(grip.proxy);
+        const Vec3 at = grip.proxy + grip.deepest;
+        const Vec3 under = at - surface_.distance(at) * surface_.normal(at);
         load.focus = focusAt(surface_, under);
     } else if (grip.kind == Grip::Kind::point) {
         load = tie(grip);
@@ -185,6 +186,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     if (grip.kind == Grip::Kind::press) {
         reaction.force = elastic_.toolForce(others);
         reaction.behind = elastic_.behind(others);
+        reaction.depth = last_.depth;
     }
     for (std::size_t i = 0; i < others; ++i) {
         reaction.othersForce += elastic_.toolForce(i);

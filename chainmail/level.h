@@ -19,15 +19,16 @@ struct Grip {
         press,  // from outside, with its surface
         point,  // a tip has hold of the material point `proxy`, at the surface or inside
     } kind = Kind::none;
-    occupancy::RoundCone shape;           // of a tool that presses, where it is now [m]
-    Vec3 proxy{0.0};                      // what it holds, at rest: of a sphere its centre without penetration [m]
-    Vec3 position{0.0};                   // where the tool has it now [m]
-    double radius = 0;                    // of a tip that holds a point [m]
-    bool inside = false;                  // that point is inside the tissue
-    Vec3 entry{0.0};                      // where the shaft went in, at rest [m]
-    Vec3 axis{0, 1, 0};                   // along the tool, towards its tip
-    double drag = 0;                      // how far a shaft carries the tissue around it along `axis` [m]
-    double friction = 0;                  // of a tool that presses (Coulomb) [-]
+    occupancy::RoundCone shape;  // of a tool that presses, where it is now [m]
+    Vec3 proxy{0.0};             // what it holds, at rest: of a sphere its centre without penetration [m]
+    Vec3 deepest{0.0};           // of a tool that presses: from there to the place on its axis that lies deepest [m]
+    Vec3 position{0.0};          // where the tool has it now [m]
+    double radius = 0;           // of a tip that holds a point [m]
+    bool inside = false;         // that point is inside the tissue
+    Vec3 entry{0.0};             // where the shaft went in, at rest [m]
+    Vec3 axis{0, 1, 0};          // along the tool, towards its tip
+    double drag = 0;             // how far a shaft carries the tissue around it along `axis` [m]
+    double friction = 0;         // of a tool that presses (Coulomb) [-]
     std::span<const ElasticTool> others;  // tools that press besides, ElasticLevel::maxOthers at most; only level elastic
                                           // knows them. They must live until the next call
 };
@@ -36,6 +37,7 @@ struct Reaction {
     std::uint32_t moved = 0;    // nodes that are not at rest
     double residual = 0;        // of the level's own: largest violated link [m]
     std::optional<Vec3> force;  // of the tissue on the tool; none where the level does not know it [N]
+    double depth = 0;           // of the deepest point of tissue inside the tool, where the force is known [m]
     double behind = 0;          // by how much the level holds the tool back, see HeldTool [m]
     Vec3 othersForce{0.0};      // of the tissue on Grip::others together [N]
 };

@@ -7,7 +7,6 @@
 namespace palpate::channel {
 namespace {
 
-constexpr std::int32_t longestSide = 4096;
 constexpr double furthest = 100;   // of a place [m]
 constexpr double strongest = 1e4;  // force [N]
 constexpr double largestValue = 1e12;

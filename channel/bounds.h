@@ -7,7 +7,10 @@
 /// What a viewer takes from a segment: whoever owns it may have written anything. Not part of the interface.
 namespace palpate::channel {
 
-/// Voxels of a grid; 0 where a side has none or more than 4096.
+/// Voxels along a side of a grid, at most.
+inline constexpr std::int32_t longestSide = 4096;
+
+/// Voxels of a grid; 0 where a side has none or more than longestSide.
 std::uint64_t voxelsOf(const Grid& grid) noexcept;
 
 /// Grids, names, colours, numbers of tissues, structures and windows, tool, line, acoustics and probe as a session has

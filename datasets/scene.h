@@ -131,6 +131,9 @@ struct VolumeSource {
 struct TissueChange {
     std::string tissue;
     std::vector<std::pair<std::string, double>> values;  // e.g. youngs_kpa, 10
+    // For errors, "FILE:LINE": of the section and of each value; empty where no file says it.
+    std::string place{};
+    std::vector<std::string> places{};
 };
 
 /// What the trainee is asked for: a core of the target; where it is and how large (palpation); to rest on the skin and not

@@ -218,17 +218,15 @@ std::vector<TissueChange> readTissueChanges(Section& top)
     }
     for (const std::string& name : all->keys()) {
         Section section = *all->section(name);
-        TissueChange change{name, {}};
-        forNumbers([&](const Field<TissueRow>& f, double TissueRow::*) {
+        TissueChange change{name, {}, section.place(), {}};
+        const auto read = [&](const auto& f, auto) {
             if (const auto value = section.number(f.key, f.unit, f.low, f.high)) {
                 change.values.emplace_back(f.key, *value);
+                change.places.push_back(section.place(f.key));
             }
-        });
-        forAcoustics([&](const Field<Acoustics>& f, double Acoustics::*) {
-            if (const auto value = section.number(f.key, f.unit, f.low, f.high)) {
-                change.values.emplace_back(f.key, *value);
-            }
-        });
+        };
+        forNumbers(read);
+        forAcoustics(read);
         section.finish();
         changes.push_back(std::move(change));
     }
@@ -260,6 +258,24 @@ void changeAcoustics(TissueRow& row, const TissueChange& change)
     });
 }
 
+// "scene.toml:12: [tissue.fat] youngs_kpa = 0 kPa: "; without a value where the scene does not say that key.
+std::string placeOf(const TissueChange& change, std::string_view key)
+{
+    std::string place = change.place, value;
+    for (std::size_t i = 0; i < change.values.size(); ++i) {
+        if (change.values[i].first == key) {
+            place = i < change.places.size() ? change.places[i] : place;
+            value = fmt::format(" = {}", change.values[i].second);
+        }
+    }
+    forNumbers([&](const Field<TissueRow>& f, double TissueRow::*) {
+        if (f.key == key && !value.empty() && !std::string_view(f.unit).empty()) {
+            value += fmt::format(" {}", f.unit);
+        }
+    });
+    return fmt::format("{}{}[tissue.{}] {}{}: ", place, place.empty() ? "" : ": ", change.tissue, key, value);
+}
+
 TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes)
 {
     for (const TissueChange& change : changes) {
@@ -269,8 +285,9 @@ TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes
             for (const TissueRow& row : std::span(table.rows).subspan(1)) {
                 names.push_back(row.name);
             }
-            throw std::runtime_error(fmt::format("[tissue.{}]: is not in the volume's tissue table; it has: {}",
-                                                 change.tissue, fmt::join(names, ", ")));
+            throw std::runtime_error(fmt::format("{}{}[tissue.{}]: is not in the volume's tissue table; it has: {}",
+                                                 change.place, change.place.empty() ? "" : ": ", change.tissue,
+                                                 fmt::join(names, ", ")));
         }
         TissueRow& row = table.rows[*index];
         forNumbers([&](const Field<TissueRow>& f, double TissueRow::*member) {
@@ -282,7 +299,7 @@ TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes
         });
         changeAcoustics(row, change);
         if (const auto [key, why] = misfit(row); !key.empty()) {
-            throw std::runtime_error(fmt::format("[tissue.{}] {}: {}", change.tissue, key, why));
+            throw std::runtime_error(placeOf(change, key) + why);
         }
     }
     return table;

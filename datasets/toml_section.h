@@ -48,6 +48,9 @@ public:
     /// All keys of the table.
     std::vector<std::string> keys() const;
     bool has(std::string_view key) const { return table_->contains(key); }
+    /// "FILE:LINE" of a key, and of the section itself.
+    std::string place(std::string_view key) const;
+    std::string place() const;
     void setTitle(std::string title) { title_ = std::move(title); }
     /// Refuses the value of `key`.
     [[noreturn]] void refuse(std::string_view key, std::string_view what, std::string_view unit = {}) const;

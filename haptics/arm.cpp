@@ -47,10 +47,14 @@ Vec3 rounded(Vec3 v, double step) noexcept
 
 const DeviceParameters& deviceParameters(std::string_view name)
 {
+    static const DeviceParameters ideal;
+    if (name == ideal.name) {
+        return ideal;
+    }
     const auto* found = std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return d.name == name; });
     if (found == devices.end()) {
         throw std::runtime_error(
-            fmt::format("no device '{}' is known: take one of {}", name, fmt::join(deviceNames(), ", ")));
+            fmt::format("no device '{}' is known: take one of {}, {}", name, fmt::join(deviceNames(), ", "), ideal.name));
     }
     return *found;
 }

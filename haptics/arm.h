@@ -26,9 +26,10 @@ struct DeviceParameters {
     std::string_view source;  // of the numbers
 };
 
-/// "premium" (PHANToM Premium 1.0), "touch" (Touch, once Omni), "falcon" (Novint Falcon). Throws std::runtime_error for
-/// another name.
+/// "premium" (PHANToM Premium 1.0), "touch" (Touch, once Omni), "falcon" (Novint Falcon), or "ideal": the defaults, for
+/// positions that no encoder has read. Throws std::runtime_error for another name.
 const DeviceParameters& deviceParameters(std::string_view name);
+/// Those that exist: all but "ideal".
 std::vector<std::string> deviceNames();
 
 /// What the hand adds to the device: a mass that moves with it, damping against the room, a spring to the hand's goal.

@@ -1,5 +1,6 @@
 #include <haptics/scenery.h>
 
+#include <channel/bounds.h>
 #include <datasets/tables.h>
 #include <haptics/display_image.h>
 #include <volume/resample.h>
@@ -36,6 +37,14 @@ constexpr double aroundProcedure = 60e-3;    // to each side of the aim [m]
 channel::Grid gridOf(const volume::NodeGrid& g) noexcept
 {
     return {{g.size.x, g.size.y, g.size.z}, 0, triple(g.origin), g.spacing};
+}
+
+// With voxels of this size no side of the box has more of them than viewers take: a thin body of thin voxels may be long.
+double finestAlong(const volume::Box& box)
+{
+    constexpr int around = 8;  // of the box, at the most
+    const Vec3 extent = box.high - box.low;
+    return std::max({extent.x, extent.y, extent.z}) / (channel::longestSide - around);
 }
 
 channel::ToolKind shown(datasets::ToolKind kind)
@@ -140,7 +149,7 @@ std::optional<volume::NodeGrid> fineGrid(const SessionModel& model, const volume
         const Vec3 middle = model.approach.aim;
         box = {glm::max(box.low, middle - aroundProcedure), glm::min(box.high, middle + aroundProcedure)};
     }
-    const volume::NodeGrid grid = volume::affordableGrid(box, finest, fineNodes);
+    const volume::NodeGrid grid = volume::affordableGrid(box, std::max(finest, finestAlong(box)), fineNodes);
     constexpr double worth = 0.8;
     return grid.spacing < worth * display.spacing ? std::optional(grid) : std::nullopt;
 }
@@ -163,7 +172,7 @@ volume::NodeGrid displayGrid(const volume::Tissue& tissue)
 {
     const Vec3 voxel = tissue.affine().spacing();
     const double finest = std::min({voxel.x, voxel.y, voxel.z});
-    return volume::affordableGrid(tissue.box(), finest, displayNodes);
+    return volume::affordableGrid(tissue.box(), std::max(finest, finestAlong(tissue.box())), displayNodes);
 }
 
 channel::TissueSound soundOf(const volume::TissueRow& row)

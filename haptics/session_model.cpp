@@ -18,7 +18,6 @@ constexpr double finestField = 0.75e-3;
 constexpr std::size_t surfaceNodes = 4U << 20;
 constexpr std::size_t structureNodes = 1U << 20;
 constexpr std::size_t latticeNodes = 4U << 20;
-constexpr std::size_t maxSeeds = 1U << 16;  // nodes that a tool may hold: beyond, a tick has no time for them
 
 volume::NodeGrid fieldGrid(const volume::Tissue& tissue, std::size_t nodes)
 {
@@ -124,12 +123,6 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     const auto approach = approachOf(scene, posture, surface, structures);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
-    if (chainmail::maxPressSeeds(lattice, scene.tool.radius) > maxSeeds) {
-        throw std::runtime_error(
-            fmt::format("{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise "
-                        "[model] spacing_mm",
-                        scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing));
-    }
     auto elastic = elasticOf(scene, *tissue, lattice.grid, surface);
     return {std::move(scene),   std::move(tissue),     approach,
             std::move(surface), std::move(modulus),    std::move(lattice),

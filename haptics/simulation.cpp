@@ -2,7 +2,9 @@
 
 #include <haptics/biopsy.h>
 #include <haptics/events.h>
+#include <haptics/surface_proxy.h>
 
+#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -10,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 namespace palpate::haptics {
 
@@ -50,11 +53,41 @@ private:
     std::chrono::steady_clock::time_point last_;
 };
 
+// ChainMail, to which a session may step down, holds all nodes in the tool: beyond maxSeeds a tick has no time for them.
+const SessionModel& withToolThatFits(const SessionModel& model)
+{
+    constexpr std::size_t maxSeeds = 1U << 16;
+    const double radius = model.scene.tool.radius;
+    if (chainmail::maxPressSeeds(model.lattice, radius) > maxSeeds) {
+        throw std::runtime_error(
+            fmt::format("{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise [model] spacing_mm",
+                        model.scene.name, 1e3 * radius, 1e3 * model.lattice.grid.spacing));
+    }
+    return model;
+}
+
+// Surface of all that may press [m^2].
+double touchedByAll(const SessionModel& model, std::span<const chainmail::ElasticTool> probe)
+{
+    const auto& tool = model.scene.tool;
+    const double spacing = model.elastic->levels.front().nodes.spacing;
+    double sum = 0.0;
+    if (tool.kind != datasets::ToolKind::needle) {
+        const double length = tool.kind == datasets::ToolKind::capsule ? tool.length : 0.0;
+        sum += chainmail::touchedBy({Vec3(0.0), {0.0, length, 0.0}, tool.radius, tool.radius}, spacing);
+    }
+    for (const chainmail::ElasticTool& t : probe) {
+        sum += chainmail::touchedBy(t.shape, spacing);
+    }
+    return sum;
+}
+
 std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model, chainmail::DisplacedLattice& shape,
-                                                      int window, double period)
+                                                      int window, double period, double touched)
 {
     chainmail::ElasticOptions options = elasticOptions(model.scene.model.elastic, period);
     options.window = window;
+    options.touches = touched;
     return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
 }
 
@@ -85,7 +118,7 @@ chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settin
 }
 
 Simulation::Simulation(const SessionModel& model, const SimulationOptions& options)
-    : model_(model),
+    : model_(withToolThatFits(model)),
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
                    chainmail::maxPressSeeds(model.lattice, model.scene.tool.radius)),
@@ -99,8 +132,10 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
                          model.scene.forceCap}
 {
     if (level_ == datasets::ModelLevel::elastic) {
-        elastic_[0] = elasticLevel(model, deformation_.shape(), model.scene.model.elastic.window, options.period);
-        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, options.period);
+        placeProbe();
+        const double touched = touchedByAll(model, probe_.tools());
+        elastic_[0] = elasticLevel(model, deformation_.shape(), model.scene.model.elastic.window, options.period, touched);
+        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, options.period, touched);
     }
 }
 
@@ -233,6 +268,10 @@ chainmail::Grip Simulation::grip() const noexcept
     grip.axis = tool_.axis;
     const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * tool_.axis : tip;
     grip.shape = {tip, back, tool.radius, tool.radius};
+    if (tool.kind == datasets::ToolKind::capsule) {
+        grip.deepest =
+            deepestPlace(model_.surface, {tool.radius, tool.length, tool_.axis, 0.0}, tip_.proxy).at - tip_.proxy;
+    }
     return grip;
 }
 
@@ -252,6 +291,9 @@ chainmail::Reaction Simulation::deform() noexcept
     }
     record_.moved = reaction.moved;
     record_.residual = reaction.residual;
+    if (reaction.force) {
+        record_.penetration = reaction.depth;
+    }
     record_.probeForce = reaction.othersForce;
     return reaction;
 }

@@ -34,7 +34,8 @@ chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settin
 /// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
 class Simulation {
 public:
-    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known.
+    /// The model must outlive it. Throws std::runtime_error for a device that is not known and for a tool that holds more
+    /// nodes of the lattice than a tick has time for.
     explicit Simulation(const SessionModel& model, const SimulationOptions& options = {});
     Simulation(SessionModel&& model, const SimulationOptions& options = {}) = delete;  // a temporary would not outlive it
 

@@ -38,6 +38,7 @@ void Canvas::begin()
     points_->Reset();
     cells_->Reset();
     colours_->Reset();
+    written_.clear();
     used_ = 0;
 }
 
@@ -98,6 +99,10 @@ void Canvas::text(Point2 at, const std::string& words, double size, const Colour
     look.SetJustification(align == Align::left     ? VTK_TEXT_LEFT
                           : align == Align::centre ? VTK_TEXT_CENTERED
                                                    : VTK_TEXT_RIGHT);
+    const double wide = widthOf(words, size, bold), before = align == Align::left     ? 0
+                                                             : align == Align::centre ? wide / 2
+                                                                                      : wide;
+    written_.push_back({words, {at[0] - before, at[1]}, {at[0] - before + wide, at[1] + size}});
 }
 
 double Canvas::widthOf(const std::string& words, double size, bool bold) const
@@ -132,6 +137,23 @@ void Canvas::end()
     cells_->Modified();
     colours_->Modified();
     shapes_->Modified();
+}
+
+std::string shortened(const Canvas& canvas, const std::string& words, double size, bool bold, double width)
+{
+    if (canvas.widthOf(words, size, bold) <= width)
+        return words;
+    const std::string ellipsis = "...";
+    std::string kept = words;
+    do {
+        // The second and later bytes of a character begin with the bits 10.
+        while (kept.size() > 1 && (static_cast<unsigned char>(kept.back()) & 0xC0U) == 0x80U)
+            kept.pop_back();
+        kept.pop_back();
+        while (!kept.empty() && kept.back() == ' ')
+            kept.pop_back();
+    } while (!kept.empty() && canvas.widthOf(kept + ellipsis, size, bold) > width);
+    return kept.empty() ? kept : kept + ellipsis;
 }
 
 }  // namespace palpate::render

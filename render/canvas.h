@@ -22,6 +22,12 @@ namespace palpate::render {
 using Colour = std::array<double, 3>;
 using Point2 = std::array<double, 2>;  // [pixels], from the lower left
 
+/// Words that a canvas has written, and where their box is [pixels].
+struct Written {
+    std::string words;
+    Point2 low, high;
+};
+
 enum class Align { left, centre, right };
 
 /// Draws flat shapes and text over the picture, anew in every frame: begin(), what there is to see, end().
@@ -40,6 +46,8 @@ public:
     void end();
     /// How wide text() draws these words [pixels].
     double widthOf(const std::string& words, double size, bool bold = false) const;
+    /// All words since begin(), in their order.
+    const std::vector<Written>& written() const noexcept { return written_; }
 
 private:
     vtkRenderer& renderer_;
@@ -48,8 +56,12 @@ private:
     vtkNew<vtkUnsignedCharArray> colours_;
     vtkNew<vtkPolyData> shapes_;
     std::vector<vtkSmartPointer<vtkTextActor>> texts_;
+    std::vector<Written> written_;
     std::size_t used_ = 0;
     mutable std::map<std::pair<std::string, int>, double> widths_;  // of words already measured
 };
+
+/// The words where they are at most `width` pixels wide, else as many of them as are, with an ellipsis.
+std::string shortened(const Canvas& canvas, const std::string& words, double size, bool bold, double width);
 
 }  // namespace palpate::render

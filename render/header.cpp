@@ -16,7 +16,8 @@ using base::spokenHere;
 using base::tr;
 
 constexpr Colour cardColour{0.05, 0.06, 0.09};
-constexpr double edge = 0.8;  // of a text from its area, in fonts
+constexpr double edge = 0.8;    // of a text from its area, in fonts
+constexpr double boxGap = 0.3;  // between boxes, in fonts
 
 // Goes down an area, line by line.
 struct Column {
@@ -30,14 +31,18 @@ struct Column {
         canvas.text({left + 1, y - 1}, words, size, {0, 0, 0}, Align::left, bold);
         canvas.text({left, y}, words, size, colour, Align::left, bold);
     }
+    double heightOf(const std::string& words, double size) const
+    {
+        return 1.3 * size * static_cast<double>(wrapped(canvas, words, size, true, width - size).size()) + 0.4 * size;
+    }
     Area box(const std::string& words, double size, const Colour& back, double opacity, const Colour& colour)
     {
         const auto lines = wrapped(canvas, words, size, true, width - size);
         double widest = 0;
         for (const std::string& part : lines)
             widest = std::max(widest, canvas.widthOf(part, size, true));
-        const double high = 1.3 * size * static_cast<double>(lines.size()) + 0.4 * size;
-        y -= high + 0.3 * font;
+        const double high = heightOf(words, size);
+        y -= high + boxGap * font;
         canvas.rectangle({left - 0.4 * font, y}, {widest + size, high}, back, opacity);
         for (std::size_t i = 0; i < lines.size(); ++i)
             canvas.text({left - 0.4 * font + 0.5 * size, y + high - 0.1 * size - 1.3 * size * static_cast<double>(i + 1)},
@@ -50,7 +55,8 @@ struct Column {
 void drawTitle(Column& column, const channel::Scenery& scenery, const channel::State& state, const std::string& session)
 {
     const double size = 1.25 * column.font;
-    const std::string title = text(scenery.scene), time = said("{:.1Lf} s", state.time);
+    const std::string title = shortened(column.canvas, text(scenery.scene), size, true, column.width),
+                      time = said("{:.1Lf} s", state.time);
     const std::string all = said(tr("session {}   {}"), session, time);
     const double room = column.width - column.canvas.widthOf(title, size, true) - 2 * column.font;
     column.line(title, size, white, true);
@@ -76,16 +82,52 @@ std::string warningWords(const channel::Scenery& scenery, const channel::State& 
                 spokenHere(text(scenery.structure[s])), state.distance[s] * 1e3);
 }
 
-void drawCaption(Column& column, const Header& header)
+void drawTimeline(Column& column, double fraction)
 {
-    if (!header.caption.empty())
-        column.box(header.caption, column.font, cardColour, 0.75, amber);
-    if (header.timeline < 0)
-        return;
     column.y -= 0.7 * column.font;
     const double high = 0.3 * column.font;
     column.canvas.rectangle({column.left, column.y}, {column.width, high}, dark);
-    column.canvas.rectangle({column.left, column.y}, {column.width * std::min(header.timeline, 1.0), high}, amber);
+    column.canvas.rectangle({column.left, column.y}, {column.width * std::min(fraction, 1.0), high}, amber);
+}
+
+// A box of words below the title.
+struct Part {
+    std::string words;
+    double size;
+    Colour back;
+    double opacity;
+    Colour colour;
+    int rank;  // 0: the last to be left out
+};
+
+std::vector<Part> partsOf(const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
+                          const Header& header)
+{
+    const double font = plan.font;
+    const Coaching& c = header.coaching;
+    const std::string at = c.steps > 1 ? fmt::format("{}/{}  ", c.step, c.steps) : "";
+    const bool told = c.step > 0 && plan.events.empty();
+    const bool severe = state.status == channel::Status::faulted || state.warning == channel::Warning::touching;
+    return {{header.caption, font, cardColour, 0.75, amber, 3},
+            {told ? at + c.now : "", 1.1 * font, cardColour, 0.8, white, 1},
+            {told ? c.wrong : "", font, {0.35, 0.20, 0.02}, 0.9, {1.0, 0.88, 0.6}, 2},
+            {warningWords(scenery, state), 1.35 * font, severe ? red : amber, 1, {0.05, 0.05, 0.05}, 0}};
+}
+
+// Empties what has no room down to `floor`.
+void leaveOut(std::vector<Part>& parts, const Column& column, double floor)
+{
+    double room = column.y - floor;
+    for (int rank = 0; rank < static_cast<int>(parts.size()); ++rank)
+        for (Part& part : parts) {
+            if (part.rank != rank || part.words.empty())
+                continue;
+            const double high = column.heightOf(part.words, part.size) + boxGap * column.font;
+            if (high > room)
+                part.words.clear();
+            else
+                room -= high;
+        }
 }
 
 }  // namespace
@@ -104,11 +146,13 @@ std::vector<std::string> wrapped(const Canvas& canvas, const std::string& words,
     }
     if (!line.empty())
         lines.push_back(line);
+    for (std::string& part : lines)
+        part = shortened(canvas, part, size, bold, width);
     return lines;
 }
 
-Area drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
-                const Header& header)
+HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery,
+                        const channel::State& state, const Header& header)
 {
     const double font = plan.font, inset = edge * font;
     const auto columnOf = [&](const Area& area) {
@@ -119,20 +163,22 @@ Area drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     drawTitle(title, scenery, state, header.session);
     const bool apart = !plan.events.empty();  // the title has a place of its own
     Column column = apart ? columnOf({plan.banner.x, 0, plan.banner.width, plan.height}) : title;
-    drawCaption(column, header);
-    const Coaching& c = header.coaching;
-    Area step;
-    if (c.step > 0 && !apart) {
-        const std::string at = c.steps > 1 ? fmt::format("{}/{}  ", c.step, c.steps) : "";
-        step = column.box(at + c.now, 1.1 * font, cardColour, 0.8, white);
-        if (!c.wrong.empty())
-            column.box(c.wrong, font, {0.35, 0.20, 0.02}, 0.9, {1.0, 0.88, 0.6});
+    std::vector<Part> parts = partsOf(plan, scenery, state, header);
+    const double bar = header.timeline < 0 ? 0 : font;
+    leaveOut(parts, column, plan.health.height + bar);
+    HeaderPlaces places;
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        const Part& part = parts[i];
+        if (!part.words.empty()) {
+            const Area box = column.box(part.words, part.size, part.back, part.opacity, part.colour);
+            if (i == 1)
+                places.step = box;
+        }
+        if (i == 0 && header.timeline >= 0)
+            drawTimeline(column, header.timeline);
     }
-    const std::string warning = warningWords(scenery, state);
-    const bool severe = state.status == channel::Status::faulted || state.warning == channel::Warning::touching;
-    if (!warning.empty())
-        column.box(warning, 1.35 * font, severe ? red : amber, 1, {0.05, 0.05, 0.05});
-    return step;
+    places.bottom = column.y;
+    return places;
 }
 
 void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller)
@@ -165,22 +211,32 @@ void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result
         Colour colour;
         bool bold;
     };
-    const double font = plan.font, wide = 0.96 * plan.banner.width, room = wide - 2 * font;
+    const double wide = 0.96 * plan.banner.width;
+    double font = plan.font, high = 0;
     std::vector<Line> lines;
     const auto add = [&](const std::string& words, double size, const Colour& colour, bool bold) {
-        for (const std::string& part : wrapped(canvas, words, size, bold, room))
+        for (const std::string& part : wrapped(canvas, words, size, bold, wide - 2 * font)) {
             lines.push_back({part, size, colour, bold});
+            high += 1.45 * size;
+        }
     };
-    add(said(tr("{:.0f} of 100 points"), result.total), 1.8 * font, white, true);
-    for (const std::string& part : result.parts)
-        add(part, font, grey, false);
-    add(result.losses.empty() ? tr("Nothing was lost") : tr("Where the points went"), 1.1 * font, amber, true);
-    for (const std::string& loss : result.losses)
-        add(loss, 1.05 * font, white, false);
-    add(smaller, font, grey, false);
-    double high = font;
-    for (const Line& line : lines)
-        high += 1.45 * line.size;
+    // Smaller where the window is too low for all, and without the last lines where it is lower still.
+    for (const double scale : {1.0, 0.85, 0.7}) {
+        font = scale * plan.font;
+        lines.clear();
+        high = font;
+        add(said(tr("{:.0f} of 100 points"), result.total), 1.8 * font, white, true);
+        for (const std::string& part : result.parts)
+            add(part, font, grey, false);
+        add(result.losses.empty() ? tr("Nothing was lost") : tr("Where the points went"), 1.1 * font, amber, true);
+        for (const std::string& loss : result.losses)
+            add(loss, 1.05 * font, white, false);
+        add(smaller, font, grey, false);
+        if (high <= plan.height)
+            break;
+    }
+    for (; high > plan.height && lines.size() > 1; lines.pop_back())
+        high -= 1.45 * lines.back().size;
     const double x = plan.banner.x + 0.02 * plan.banner.width;
     double y = std::min(0.5 * plan.height + high / 2, static_cast<double>(plan.height));
     canvas.rectangle({x, y - high}, {wide, high}, cardColour, 0.94);

@@ -29,9 +29,14 @@ struct Header {
 /// Words broken into lines of at most `width` pixels.
 std::vector<std::string> wrapped(const Canvas& canvas, const std::string& words, double size, bool bold, double width);
 
-/// @returns  where the words of the step are; empty: there are none
-Area drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
-                const Header& header);
+struct HeaderPlaces {
+    Area step;          // where the words of the step are; empty: there are none
+    double bottom = 0;  // of all of it [pixels]
+};
+
+/// Where there is no room for all, it has first the warning, then the step, what is wrong, the caption.
+HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery,
+                        const channel::State& state, const Header& header);
 /// Words across the picture: "waiting for session x", "simulation ended".
 void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller);
 /// In the place of a notice when the session is over.

@@ -13,7 +13,6 @@
 #include <cmath>
 #include <numeric>
 #include <span>
-#include <utility>
 #include <vector>
 
 namespace palpate::render {
@@ -31,33 +30,51 @@ std::string millimetresText(double metres)
     return std::isfinite(metres) ? said("{:.1Lf} mm", metres * 1e3) : std::string("-");
 }
 
-// Writes lines from the top of an area downwards.
+// Writes lines from the top of an area downwards, and nothing below its floor.
 struct Pen {
     Canvas& canvas;
-    double left, right, y, font;
+    double left, right, y, font, floor;
 
     void down(double lines = 1) { y -= lines * lineHeight * font; }
-    void heading(const std::string& words)
+    int lines() const { return std::max(0, static_cast<int>((y - floor) / (lineHeight * font))); }
+    // `brief`: where there is no room for `words`.
+    void heading(const std::string& words, const std::string& brief = {})
     {
+        if (lines() < 2)  // alone it says nothing
+            y = floor;
         down();
-        canvas.text({left, y}, words, font, grey, Align::left, true);
+        if (y < floor)
+            return;
+        const bool fits = brief.empty() || canvas.widthOf(words, font, true) <= right - left;
+        canvas.text({left, y}, shortened(canvas, fits ? words : brief, font, true, right - left), font, grey, Align::left,
+                    true);
     }
     void pair(const std::string& name, const std::string& value, const Colour& colour)
     {
         down();
-        // Smaller where a narrow window has no room for both.
+        if (y < floor)
+            return;
+        // Smaller where a narrow window has no room for both, and then the name is cut.
         const double room = right - left - (value.empty() ? 0 : 0.6 * font);
-        const double both = canvas.widthOf(name, font) + canvas.widthOf(value, font);
-        const double size = font * std::clamp(room / std::max(both, 1.0), 0.6, 1.0);
-        canvas.text({left, y}, name, size, colour);
-        canvas.text({right, y}, value, size, colour, Align::right);
+        const auto both = [&](double size) { return canvas.widthOf(name, size) + canvas.widthOf(value, size); };
+        double size = font;
+        while (both(size) > room && size - 1 >= 0.6 * font)
+            --size;
+        const std::string shown = shortened(canvas, value, size, false, room);
+        canvas.text({left, y}, shortened(canvas, name, size, false, room - canvas.widthOf(shown, size)), size, colour);
+        if (!shown.empty())
+            canvas.text({right, y}, shown, size, colour, Align::right);
     }
 };
 
 void drawBar(Pen& pen, const std::string& name, double force, double cap, const Colour& colour)
 {
-    pen.down();
     const double from = pen.left + 5.6 * pen.font, to = pen.right - 4.2 * pen.font;
+    if (to - from < 2 * pen.font || pen.lines() < 1) {
+        pen.pair(name, said("{:.2Lf} N", force), white);
+        return;
+    }
+    pen.down();
     const double full = std::max(cap, 0.1), fraction = std::clamp(force / full, 0.0, 1.0);
     pen.canvas.text({pen.left, pen.y}, name, pen.font, white);
     pen.canvas.rectangle({from, pen.y}, {to - from, pen.font}, dark);
@@ -70,7 +87,8 @@ void drawForces(Pen& pen, const channel::Scenery& scenery, const channel::State&
 {
     const double total = glm::length(vec(state.total));
     const bool atCap = total > 0.95 * scenery.forceCap;
-    pen.heading(said(tr("FORCE ON THE HAND  (limit {:.1Lf} N)"), scenery.forceCap));
+    pen.heading(said(tr("FORCE ON THE HAND  (limit {:.1Lf} N)"), scenery.forceCap),
+                said(tr("FORCE  (limit {:.1Lf} N)"), scenery.forceCap));
     drawBar(pen, tr("basic"), glm::length(vec(state.basic)), scenery.forceCap, basicColour);
     drawBar(pen, tr("additional"), glm::length(vec(state.additional)), scenery.forceCap, additionalColour);
     drawBar(pen, atCap ? tr("total !") : tr("total"), total, scenery.forceCap, atCap ? red : good);
@@ -99,11 +117,13 @@ void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::Stat
         pen.pair(name + when, millimetresText(distance), white);
 }
 
-void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, int lines, bool targetHidden)
+void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::State& state, bool targetHidden)
 {
     pen.heading(tr("FROM THE TIP TO"));
+    constexpr int most = 7;
+    const int lines = std::min(most, pen.lines());
     const std::size_t count = std::min<std::size_t>(scenery.structures, channel::maxStructures);
-    if (count == 0)
+    if (count == 0 || lines == 0)
         return;
     std::vector<std::size_t> order(count);
     std::iota(order.begin(), order.end(), 0U);
@@ -114,7 +134,7 @@ void drawDistances(Pen& pen, const channel::Scenery& scenery, const channel::Sta
     if (targetHidden)
         pen.pair(spokenHere(text(scenery.structure[0])), tr("to be found"), good);
     for (std::size_t i = targetHidden ? 1 : 0; i < shown; ++i)
-        if (i + 1 == shown && shown < count)
+        if (i + 1 == shown && shown < count && i > 0)
             pen.pair(said(trn("and {} more", "and {} more", count - i), count - i),
                      said(tr("from {}"), millimetresText(state.distance[order[i]])), grey);
         else
@@ -186,24 +206,38 @@ std::vector<Entry> legendEntries(const channel::Scenery& scenery, const Legend& 
                                (chosen ? said("  x {:.2Lg}", static_cast<double>(legend.factor)) : std::string()),
                            patternOf(legend.palette, scenery.tissue[row].name)});
     }
+    if (entries.size() > room) {
+        entries.resize(room - 1);
+        entries.push_back({dark, tr("and more")});
+    }
     return entries;
 }
 
 void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& state, const Health& health)
 {
-    std::string simulation = said(trn("{} tick missed", "{} ticks missed", state.missed), state.missed), viewer;
+    const std::string brief = said(trn("{} tick missed", "{} ticks missed", state.missed), state.missed);
+    std::string simulation = brief, viewer;
     if (health.tickRate > 0 && state.tickP99 > 0)
         simulation = said(tr("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed"), health.tickRate, state.tickP99 * 1e6,
                           state.missed);
     if (health.framesPerSecond > 0)
         viewer = said(tr("{:.0f} frames/s, {:.0f} ms behind"), health.framesPerSecond, health.delay * 1e3);
     const double font = 0.9 * plan.font, x = plan.health.x + margin * plan.font;
-    const bool wide = 0.5 * font * static_cast<double>(simulation.size() + viewer.size() + 7) < plan.health.width;
-    if (wide && !viewer.empty())
-        simulation += "   |   " + std::exchange(viewer, {});
-    canvas.text({x, plan.health.y + 0.6 * font}, viewer.empty() ? simulation : viewer, font, grey);
-    if (!viewer.empty())
-        canvas.text({x, plan.health.y + 2.0 * font}, simulation, font, grey);
+    const double room = plan.health.width - 2 * margin * plan.font;
+    const auto fits = [&](const std::string& words) { return canvas.widthOf(words, font) <= room; };
+    if (const std::string both = simulation + "   |   " + viewer; !viewer.empty() && fits(both)) {
+        simulation = both;
+        viewer.clear();
+    }
+    if (!fits(simulation))
+        simulation = brief;
+    double y = plan.health.y + 0.6 * font;
+    for (const std::string& words : {viewer, simulation}) {
+        if (words.empty())
+            continue;
+        canvas.text({x, y}, shortened(canvas, words, font, false, room), font, grey);
+        y += 1.4 * font;
+    }
 }
 
 // As on the slices, in a square of the legend.
@@ -227,13 +261,19 @@ void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
 {
     const double font = 0.95 * plan.font, x = plan.legend.x + margin * plan.font, row = 1.35 * font;
     const double bottom = plan.legend.y + 0.6 * font;
-    const auto room = static_cast<std::size_t>(std::max(3.0, plan.legend.height / row - 1));
-    const std::vector<Entry> entries = legendEntries(scenery, legend, room);
-    std::size_t longest = 0;
-    for (const Entry& entry : entries)
-        longest = std::max(longest, entry.name.size());
-    const double high = row * static_cast<double>(entries.size()),
-                 wide = 0.6 * font * static_cast<double>(longest) + 2.2 * font;
+    const double top = std::min(legend.below - 0.4 * font, static_cast<double>(plan.legend.y + plan.legend.height));
+    const auto room = static_cast<int>((top - bottom) / row);
+    std::vector<Entry> entries;
+    if (room >= 2)
+        entries = legendEntries(scenery, legend, static_cast<std::size_t>(room));
+    double widest = 0;
+    for (Entry& entry : entries) {
+        entry.name = shortened(canvas, entry.name, font, false, plan.legend.width - 2 * margin * plan.font - 1.5 * font);
+        widest = std::max(widest, canvas.widthOf(entry.name, font));
+    }
+    const double high = row * static_cast<double>(entries.size()), wide = widest + 2.3 * font;
+    if (plan.events.empty() && entries.empty())
+        return;
     if (plan.events.empty())
         canvas.rectangle({x - 0.4 * font, bottom - 0.4 * font}, {wide, high + 0.4 * font}, panelColour, 0.6);
     else
@@ -255,13 +295,14 @@ void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
     canvas.rectangle({static_cast<double>(plan.panel.x), 0},
                      {static_cast<double>(plan.panel.width), static_cast<double>(plan.panel.height)}, panelColour);
     Pen pen{canvas, plan.panel.x + edge, plan.panel.x + plan.panel.width - edge,
-            static_cast<double>(plan.panel.height) - 0.2 * font, font};
+            static_cast<double>(plan.panel.height) - 0.2 * font, font,
+            // Where the panel has the line of the health as well, that is its lowest.
+            static_cast<double>(plan.health.x == plan.panel.x ? plan.health.height : plan.panel.y)};
     drawForces(pen, scenery, state);
     pen.down(0.3);
     drawProgress(pen, scenery, state);
     pen.down(0.3);
-    constexpr int distanceLines = 7;
-    drawDistances(pen, scenery, state, distanceLines, targetHidden);
+    drawDistances(pen, scenery, state, targetHidden);
 
     drawHealth(canvas, plan, state, health);
 }
@@ -273,10 +314,14 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     const double font = plan.font, edge = margin * font, top = plan.events.y + plan.events.height;
     canvas.rectangle({static_cast<double>(plan.events.x), static_cast<double>(plan.events.y)},
                      {static_cast<double>(plan.events.width), static_cast<double>(plan.events.height)}, panelColour);
-    Pen pen{canvas, plan.events.x + edge, plan.events.x + plan.events.width - edge, top - 0.2 * font, font};
+    Pen pen{canvas,
+            plan.events.x + edge,
+            plan.events.x + plan.events.width - edge,
+            top - 0.2 * font,
+            font,
+            static_cast<double>(plan.events.y)};
     pen.heading(tr("EVENTS"));
-    const double floor = plan.events.y + lineHeight * font;
-    for (auto event = events.rbegin(); event != events.rend() && pen.y > floor; ++event) {
+    for (auto event = events.rbegin(); event != events.rend() && pen.lines() > 0; ++event) {
         const bool bad = event->kind == EventKind::touching || event->kind == EventKind::fault;
         const bool warning = event->kind == EventKind::near || event->kind == EventKind::veryNear;
         const Colour colour = bad ? red : warning ? amber : event->kind == EventKind::fired ? good : white;

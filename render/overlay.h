@@ -32,6 +32,7 @@ struct Legend {
     float factor = 1;  // of its opacity
     Palette palette = Palette::standard;
     bool ghost = false;  // another session's tool is shown
+    double below = 1e9;  // of what stands above it [pixels from the lower edge]
 };
 
 /// A key and what it does.
@@ -39,8 +40,8 @@ struct KeyHelp {
     std::string key, what;
 };
 
-/// Forces, distances with times to contact, phase, core, health. `targetHidden`: nothing of the target, which is to be
-/// found.
+/// Forces, distances with times to contact, phase, core, health; what has no room is left out from the end. `targetHidden`:
+/// nothing of the target, which is to be found.
 void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const channel::State& state,
                  const Health& health, bool targetHidden);
 void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& scenery, const Legend& legend);

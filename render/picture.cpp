@@ -364,22 +364,29 @@ void Picture::drawFlat(const ScreenPlan& plan)
         drawForceTraces(canvas_, plan.forces, plan.font, s.scenery, s.history);
     if (!plan.distances.empty())
         drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
-    // Where the legend has a place of its own help does not cover it.
-    const bool covered = !words_.empty() && plan.events.empty();  // by a notice
-    if (!plan.legend.empty() && !covered && (help_.empty() || !plan.events.empty())) {
-        const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
-        drawLegend(canvas_, plan, s.scenery,
-                   {s.legend, row, row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1, palette_, !ghost_.empty()});
-    }
     if (!help_.empty())
         drawHelp(canvas_, plan, help_);
+    const bool apart = !plan.events.empty(), free = words_.empty() && help_.empty();
+    double below = plan.height;
     if (s.known) {
         // Help leaves room for title, caption and warning.
         Header words = header();
         if (!help_.empty())
             words.coaching = {};
         lastStep_ = words.coaching.last;
-        step_ = drawHeader(canvas_, plan, s.scenery, s.state, words);
+        const HeaderPlaces places = drawHeader(canvas_, plan, s.scenery, s.state, words);
+        step_ = places.step;
+        below = places.bottom;
+    }
+    const bool grey = look_ != SliceLook::tissue && hasImage();
+    for (const SlicePicture& slice : slices_)
+        slice.label(canvas_, grey ? &s.grey : nullptr, plan.font, !apart ? plan.height : free ? below : 0);
+    // Where the legend has a place of its own help and notices do not cover it.
+    if (!plan.legend.empty() && (apart || free)) {
+        const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
+        const float factor = row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1;
+        drawLegend(canvas_, plan, s.scenery,
+                   {s.legend, row, factor, palette_, !ghost_.empty(), apart ? plan.height : below});
     }
 }
 
@@ -437,11 +444,6 @@ void Picture::changeOpacity(double factor)
     float& now = session_->factor[session_->legend[session_->chosen - 1]];
     now = std::clamp(now * static_cast<float>(factor), least, most);
     session_->repaint();
-}
-
-void Picture::setCut(bool open)
-{
-    cut_ = open;
 }
 
 bool Picture::hasImage() const noexcept

@@ -77,7 +77,7 @@ public:
     /// Multiplies the chosen tissue's opacity.
     void changeOpacity(double factor);
     /// Cuts the body open towards the needle (the default), or shows it whole.
-    void setCut(bool open);
+    void setCut(bool open) noexcept { cut_ = open; }
     bool cut() const noexcept { return cut_; }
     /// How slices show a body that came with an image; tinted at first.
     void show(SliceLook look) noexcept { look_ = look; }
@@ -110,6 +110,8 @@ public:
     /// camera.
     glm::dvec3 under(Point2 pixel, glm::dvec3 point) const;
 
+    /// The words of the picture, and where they are.
+    const std::vector<Written>& written() const noexcept { return canvas_.written(); }
     /// The renderer's name, as the driver tells it.
     std::string display();
 

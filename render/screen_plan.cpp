@@ -19,7 +19,9 @@ void planTrainee(ScreenPlan& plan)
     if (plan.slices[0].height < 4 * lineHeight * plan.font)
         plan.slices[0] = {};
     plan.health = {0, 0, plan.view.width, static_cast<int>(3 * plan.font)};
-    plan.legend = {0, static_cast<int>(2.2 * plan.font), plan.view.width, static_cast<int>(0.5 * plan.height)};
+    // It lies over the body: in a narrow view over nearly all of its width.
+    const double high = plan.view.width < 20 * plan.font ? 0.3 : 0.5;
+    plan.legend = {0, static_cast<int>(2.8 * plan.font), plan.view.width, static_cast<int>(high * plan.height)};
     plan.banner = {0, plan.height - static_cast<int>(6.3 * plan.font), plan.view.width, 0};
 }
 

@@ -186,6 +186,7 @@ void SlicePicture::hide()
 {
     actor_->SetVisibility(0);
     step_ = 0;
+    area_ = {};
 }
 
 Point2 SlicePicture::pixel(glm::dvec3 p) const
@@ -250,28 +251,53 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
         }
     }
     drawTool(canvas, scenery, state);
+}
 
+void SlicePicture::label(Canvas& canvas, const GreyImage* grey, double font, double below) const
+{
+    constexpr double narrow = 6.5, low = 5.5;  // in fonts
+    if (area_.width < narrow * font || area_.height < low * font)
+        return;
     const double left = area_.x, bottom = area_.y, right = left + area_.width, top = bottom + area_.height;
     const double middleX = (left + right) / 2, middleY = (bottom + top) / 2;
+    const double highest = std::min(top, below) - 1.5 * font;
     const auto letter = [&](Point2 at, const std::string& words) {
+        if (at[1] > highest)
+            return;
         canvas.rectangle({at[0] - 0.8 * font, at[1] - 2}, {1.6 * font, 1.3 * font}, {0, 0, 0}, 0.55);
         canvas.text(at, words, font, pureWhite, Align::centre, true);
     };
     letter({right - font, middleY}, side(frame_.right));
     letter({left + font, middleY}, side(-frame_.right));
-    letter({left + 0.8 * area_.width, top - 2.0 * font}, side(frame_.up));  // beside the tool
+    if (const double y = std::min(top - 2.0 * font, highest); y > middleY + 1.3 * font)
+        letter({left + 0.8 * area_.width, y}, side(frame_.up));  // beside the tool
     letter({middleX, bottom + 4}, side(-frame_.up));
-    const double bar = 0.01 * pixelsPerMetre(frame_, area_);
-    canvas.rectangle({left + 0.5 * font, bottom + 2}, {std::max(bar, 3.2 * font) + font, 1.9 * font}, {0, 0, 0}, 0.55);
-    canvas.rectangle({left + font, bottom + 0.35 * font}, {bar, 3}, pureWhite);
-    canvas.text({left + font, bottom + 0.6 * font}, "10 mm", 0.9 * font, pureWhite);
-    if (anatomy.imageShown()) {
-        const std::string name = anatomy.grey.windowName(), range = anatomy.grey.windowRange();
-        const double wide = 0.46 * font * static_cast<double>(std::max(name.size(), range.size())) + font;
-        canvas.rectangle({right - wide - 0.2 * font, bottom + 2}, {wide, 2.5 * font}, {0, 0, 0}, 0.55);
-        canvas.text({right - 0.7 * font, bottom + 1.5 * font}, name, 0.9 * font, pureWhite, Align::right);
-        canvas.text({right - 0.7 * font, bottom + 0.4 * font}, range, 0.9 * font, pureWhite, Align::right);
+    // In a narrow slice scale bar and grey window stand above the letter, one above the other.
+    const double bar = 0.01 * pixelsPerMetre(frame_, area_), wide = std::max(bar, 3.2 * font) + font;
+    double y = bottom + (0.5 * font + wide < 0.5 * area_.width - font ? 0 : 1.6 * font);
+    if (y + 1.9 * font < std::min(middleY - 2, below)) {
+        canvas.rectangle({left + 0.5 * font, y + 2}, {wide, 1.9 * font}, {0, 0, 0}, 0.55);
+        canvas.rectangle({left + font, y + 0.35 * font}, {bar, 3}, pureWhite);
+        canvas.text({left + font, y + 0.6 * font}, "10 mm", 0.9 * font, pureWhite);
+        y += 2 * font;
     }
+    if (grey != nullptr)
+        drawWindow(canvas, *grey, font, y, std::min(middleY - 2, below));
+}
+
+// In the lower right corner where there is room beside the letter in the middle, else `above` what is there.
+void SlicePicture::drawWindow(Canvas& canvas, const GreyImage& grey, double font, double above, double below) const
+{
+    const std::string name = grey.windowName(), range = grey.windowRange();
+    const double right = area_.x + area_.width, size = 0.9 * font;
+    const double wide = std::max(canvas.widthOf(name, size), canvas.widthOf(range, size)) + font;
+    const bool beside = wide + 0.2 * font < 0.5 * area_.width - font;
+    const double low = beside ? area_.y : above;
+    if (low + 2.5 * font + 2 > below || wide + 0.4 * font > area_.width)
+        return;
+    canvas.rectangle({right - wide - 0.2 * font, low + 2}, {wide, 2.5 * font}, {0, 0, 0}, 0.55);
+    canvas.text({right - 0.7 * font, low + 1.5 * font}, name, size, pureWhite, Align::right);
+    canvas.text({right - 0.7 * font, low + 0.4 * font}, range, size, pureWhite, Align::right);
 }
 
 }  // namespace palpate::render

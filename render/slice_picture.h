@@ -39,14 +39,17 @@ public:
     bool update(const Anatomy& anatomy, const ViewFrame& frame, const Area& area, const VoxelBox& changed, int step);
     /// Computes it. Uses nothing of VTK's, so that it may run beside the drawing of what is not this slice.
     void paint(const Anatomy& anatomy);
-    /// Tool, planned line, `aim` where it lies now [m], scale bar, the sides of the patient and the image's window. What is
-    /// off the plane is drawn thinner and darker.
+    /// Tool, planned line, `aim` where it lies now [m]. What is off the plane is drawn thinner and darker.
     void annotate(Canvas& canvas, const Anatomy& anatomy, const channel::State& state, glm::dvec3 aim, double font) const;
+    /// The sides of the patient, scale bar and the window of the image (null: none is shown), as far as there is room, and
+    /// nothing above `below` [pixels from the lower edge of the window].
+    void label(Canvas& canvas, const GreyImage* grey, double font, double below) const;
     void hide();
 
 private:
     Point2 pixel(glm::dvec3 p) const;
     void drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const;
+    void drawWindow(Canvas& canvas, const GreyImage& grey, double font, double above, double below) const;
 
     vtkNew<vtkImageData> image_;
     vtkNew<vtkActor2D> actor_;

@@ -47,18 +47,20 @@ Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string
                     font,
                     now,
                     top};
-    canvas.text({area.x + 0.8 * font, area.y + area.height - 1.5 * font}, title, font, grey, Align::left, true);
-    constexpr int lines = 2;
-    for (int i = 0; i <= lines; ++i) {
+    canvas.text({area.x + 0.8 * font, area.y + area.height - 1.5 * font},
+                shortened(canvas, title, font, true, area.width - 1.6 * font), font, grey, Align::left, true);
+    const int lines = d.inner.height > 4 * font ? 2 : 1;
+    for (int i = 0; i <= lines && d.inner.height > 1.5 * font; ++i) {
         const double value = top * i / lines;
         canvas.rectangle({static_cast<double>(d.inner.x), d.y(value)}, {static_cast<double>(d.inner.width), 1}, dark);
         canvas.text({d.inner.x - 0.4 * font, d.y(value) - 0.5 * font}, fmt::format("{:g}", value), 0.85 * font, grey,
                     Align::right);
     }
-    canvas.text({static_cast<double>(d.inner.x), area.y + 0.3 * font}, fmt::format("-{:g} s", traceSeconds), 0.85 * font,
-                grey);
-    canvas.text({static_cast<double>(d.inner.x + d.inner.width), area.y + 0.3 * font}, base::tr("now"), 0.85 * font, grey,
-                Align::right);
+    const std::string begin = fmt::format("-{:g} s", traceSeconds), end = base::tr("now");
+    const double size = 0.85 * font;
+    if (canvas.widthOf(begin, size) + canvas.widthOf(end, size) + font <= d.inner.width)
+        canvas.text({static_cast<double>(d.inner.x), area.y + 0.3 * font}, begin, size, grey);
+    canvas.text({static_cast<double>(d.inner.x + d.inner.width), area.y + 0.3 * font}, end, size, grey, Align::right);
     canvas.text({d.inner.x - 0.4 * font, d.y(top) + 0.6 * font}, unit, 0.85 * font, grey, Align::right);
     return d;
 }
@@ -89,8 +91,8 @@ void drawAll(const Diagram& d, const Area& area, const History& history, const s
     const double y = area.y + area.height - 2.8 * d.font, size = 0.85 * d.font;
     for (const Curve& curve : curves) {
         draw(d, history, curve);
-        const double wide = (0.52 * static_cast<double>(curve.name.size()) + 2.4) * size;
-        if (x + wide > area.x + area.width)
+        const double wide = d.canvas.widthOf(curve.name, size) + 2.4 * size;
+        if (x + wide - size > area.x + area.width)
             continue;
         d.canvas.rectangle({x, y + 0.3 * size}, {size, 0.4 * size}, curve.colour);
         d.canvas.text({x + 1.3 * size, y}, curve.name, size, white);

@@ -110,7 +110,7 @@ std::string_view levelOf(const Scene& scene)
 bool anyOf(const SceneChanges& c)
 {
     return c.model || c.setting || c.arm || c.dffb || c.trial || c.target || c.seed || c.voxelsPerSide || c.palpate ||
-           !c.inserts.empty();
+           c.tool || !c.inserts.empty();
 }
 
 // The text must stay the scene: a replay is built from it.
@@ -133,7 +133,12 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
         throw std::runtime_error(fmt::format("{}: the tissue model is {}: --setting changes nothing; add --model elastic",
                                              origin, levelOf(scene)));
     }
-    return datasets::parseScene(datasets::sceneText(scene), origin);
+    Scene again = datasets::parseScene(datasets::sceneText(scene), origin);
+    again.tissueChanges = scene.tissueChanges;  // the same, with their lines in the file
+    if (changes.tool) {
+        again.tool = changes.tool(again.tool);
+    }
+    return again;
 }
 
 Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissue, const SceneChanges& changes)

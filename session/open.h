@@ -33,8 +33,10 @@ struct SceneChanges {
     /// Names the setting where level is `elastic` and neither scene nor `setting` says one; empty: the scene's standard.
     /// `probe`: the scene has an ultrasound probe.
     std::function<std::string(bool probe)> fit;
-    std::optional<std::string> dffb;        // one of dffbChoices
-    std::optional<std::string> trial;       // with "fade": "K/N"
+    std::optional<std::string> dffb;   // one of dffbChoices
+    std::optional<std::string> trial;  // with "fade": "K/N"
+    /// Another tool in place of the scene's.
+    std::function<datasets::ToolSpec(const datasets::ToolSpec&)> tool;
     std::optional<std::string> arm;         // haptic device: one of haptics::deviceNames()
     std::optional<std::string> target;      // structure
     std::optional<std::uint64_t> seed;      // of a phantom

@@ -84,7 +84,7 @@ void drawKeptChoice(State& state)
     const auto& all = i.everybody.sessions;
     const auto nameOf = [&](const KeptSession& s) { return said("{}: {}", s.name, titleOf(state, s)); };
     ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
-    if (!ImGui::BeginCombo("##kept", (nameOf(all[i.chosen]) + ", " + factsOf(all[i.chosen])).c_str())) {
+    if (!ImGui::BeginCombo("##kept", preview(nameOf(all[i.chosen]) + ", " + factsOf(all[i.chosen])).c_str())) {
         return;
     }
     for (std::size_t n = 0; n < all.size(); ++n) {
@@ -154,7 +154,7 @@ Errand drawKept(State& state)
     ImGui::InputTextMultiline("##note", &i.note, {ImGui::GetContentRegionAvail().x, 6 * ImGui::GetFontSize()});
     const bool changed = i.note != s.note || i.rating != s.rating;
     ImGui::BeginDisabled(!changed);
-    if (ImGui::Button(tr("Keep note and rating"))) {
+    if (ImGui::Button(fitted(tr("Keep note and rating")).c_str())) {
         errand = Errand::keepNote;
     }
     ImGui::EndDisabled();
@@ -171,16 +171,16 @@ Errand drawSessions(State& state)
         return Errand::none;
     }
     if (roomForTwo()) {
-        ImGui::BeginChild("sessions", {0.45F * ImGui::GetContentRegionAvail().x, 0}, false, ImGuiWindowFlags_NavFlattened);
+        beginPart("sessions", 0.45F * ImGui::GetContentRegionAvail().x, 0);
         drawKeptList(state);
-        ImGui::EndChild();
+        endPart();
         ImGui::SameLine();
     } else {
         drawKeptChoice(state);
     }
-    ImGui::BeginChild("kept", {0, 0}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("kept", 0, 0);
     const Errand errand = drawKept(state);
-    ImGui::EndChild();
+    endPart();
     return errand;
 }
 
@@ -190,15 +190,19 @@ void drawMembers(State& state)
     i.groupOf.resize(state.people.size(), 0);
     for (std::size_t n = 0; n < state.people.size(); ++n) {
         ImGui::PushID(static_cast<int>(n));
+        rollsAsOne() ? words(state.people[n].name) : void();
         ImGui::RadioButton(tr("in none"), &i.groupOf[n], 0);
         for (int group = 1; group <= 2; ++group) {
-            ImGui::SameLine();
+            const std::string label = said(tr("group {}"), group);
+            besideIfRoom(label + "    ");
             ImGui::PushStyleColor(ImGuiCol_CheckMark, vec(groupColour(static_cast<std::size_t>(group - 1))));
-            ImGui::RadioButton(said(tr("group {}"), group).c_str(), &i.groupOf[n], group);
+            ImGui::RadioButton(label.c_str(), &i.groupOf[n], group);
             ImGui::PopStyleColor();
         }
-        ImGui::SameLine();
-        ImGui::TextUnformatted(state.people[n].name.c_str());
+        if (!rollsAsOne()) {
+            ImGui::SameLine();
+            ImGui::TextUnformatted(state.people[n].name.c_str());
+        }
         ImGui::PopID();
     }
 }
@@ -208,8 +212,8 @@ Errand drawChoiceOfGroups(State& state)
     Instructor& i = state.instructor;
     drawMembers(state);
     const auto at = std::ranges::find(state.cases, i.caseId, &CaseEntry::id);
-    ImGui::SetNextItemWidth(17 * ImGui::GetFontSize());
-    if (ImGui::BeginCombo(tr("Sessions"), at == state.cases.end() ? tr("of all cases") : at->title.c_str())) {
+    const std::string label = fieldLabel(tr("Sessions"), 17 * ImGui::GetFontSize());  // sets the width
+    if (ImGui::BeginCombo(label.c_str(), preview(at == state.cases.end() ? tr("of all cases") : at->title).c_str())) {
         if (ImGui::Selectable(tr("of all cases"), i.caseId.empty())) {
             i.caseId.clear();
         }
@@ -223,7 +227,7 @@ Errand drawChoiceOfGroups(State& state)
     besideIfRoom(tr("Compare"));
     const bool compare = ImGui::Button(tr("Compare"));
     besideIfRoom(tr("Compare, as a page too"));
-    i.asPage = ImGui::Button(tr("Compare, as a page too"));
+    i.asPage = ImGui::Button(fitted(tr("Compare, as a page too")).c_str());
     return compare || i.asPage ? Errand::compareGroups : Errand::none;
 }
 
@@ -236,7 +240,11 @@ std::string spreadInWords(const Spread& s, int decimals)
 void drawComparison(const Comparison& c)
 {
     const float em = ImGui::GetFontSize();
-    if (!ImGui::BeginTable("compared", 5, ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp)) {
+    // In a small window the table rolls by itself.
+    const bool one = rollsAsOne();
+    const ImGuiTableFlags flags = ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp |
+                                  (one ? ImGuiTableFlags_ScrollX | ImGuiTableFlags_ScrollY : 0);
+    if (!ImGui::BeginTable("compared", 5, flags, {0, one ? 9 * em : 0}, one ? 40 * em : 0)) {
         return;
     }
     ImGui::TableSetupColumn(tr("Measure"));
@@ -292,11 +300,13 @@ Errand drawInstructor(State& state)
     for (const auto& [label, which] : pages) {
         first ? void() : besideIfRoom(std::string(label) + "    ");
         first = false;
-        ImGui::RadioButton(label, &page, static_cast<int>(which));
+        if (radio(label, page == static_cast<int>(which))) {
+            page = static_cast<int>(which);
+        }
     }
     const bool turned = page != static_cast<int>(state.instructor.page);
     state.instructor.page = static_cast<InstructorPage>(page);
-    ImGui::BeginChild("page", {0, -3.4F * ImGui::GetFontSize()}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("page", 0, -3.4F * ImGui::GetFontSize());
     Errand errand = Errand::none;
     switch (state.instructor.page) {
         case InstructorPage::live:
@@ -309,7 +319,7 @@ Errand drawInstructor(State& state)
             errand = drawGroups(state);
             break;
     }
-    ImGui::EndChild();
+    endPart();
     return errand == Errand::none && turned ? Errand::loadEverybody : errand;
 }
 

@@ -89,7 +89,7 @@ void chooseExercise(State& state)
     };
     const std::size_t shown = std::min(state.exerciseShown, all.size() - 1);
     ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
-    if (!ImGui::BeginCombo("##exercises", titleOf(shown).c_str(), ImGuiComboFlags_HeightLargest)) {
+    if (!ImGui::BeginCombo("##exercises", preview(titleOf(shown)).c_str(), ImGuiComboFlags_HeightLargest)) {
         return;
     }
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -112,7 +112,7 @@ void drawCurvesOf(State& state, const ExerciseEntry& e, float wide, float high)
     const std::size_t shown = std::min(state.curveShown, e.curves.size() - 1);
     const auto labelOf = [](const Curve& c) { return c.unit.empty() ? c.label : c.label + " [" + c.unit + "]"; };
     ImGui::SetNextItemWidth(std::min(20 * ImGui::GetFontSize(), wide));
-    if (ImGui::BeginCombo("##measure", labelOf(e.curves[shown]).c_str())) {
+    if (ImGui::BeginCombo("##measure", preview(labelOf(e.curves[shown])).c_str())) {
         for (std::size_t i = 0; i < e.curves.size(); ++i) {
             if (ImGui::Selectable(labelOf(e.curves[i]).c_str(), i == shown)) {
                 state.curveShown = i;
@@ -155,7 +155,7 @@ Errand drawProgress(State& state, bool entered)
     Errand errand = Errand::none;
     const char* const write = tr("Page, table and xAPI");
     besideIfRoom(write);
-    if (ImGui::Button(write)) {
+    if (ImGui::Button(fitted(write).c_str())) {
         errand = Errand::writeProgress;
     }
     if (state.progress.exercises.empty()) {
@@ -164,16 +164,16 @@ Errand drawProgress(State& state, bool entered)
     }
     Errand begun = Errand::none;
     if (roomForTwo()) {
-        ImGui::BeginChild("exercises", {0.34F * wide, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
+        beginPart("exercises", 0.34F * wide, -3.4F * em);
         begun = drawExercises(state, entered);
-        ImGui::EndChild();
+        endPart();
         ImGui::SameLine();
     } else {
         chooseExercise(state);
     }
-    ImGui::BeginChild("exercise", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("exercise", 0, -3.4F * em);
     drawExercise(state);
-    ImGui::EndChild();
+    endPart();
     return begun != Errand::none ? begun : errand;
 }
 

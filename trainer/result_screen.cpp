@@ -15,10 +15,14 @@ void drawParts(const Result& result)
 {
     for (const PartOfScore& part : result.parts) {
         const float fraction = part.most > 0 ? static_cast<float>(part.points / part.most) : 0.0F;
-        ImGui::ProgressBar(fraction, {12 * ImGui::GetFontSize(), 0},
+        const bool above = rollsAsOne();
+        above ? words(part.name) : void();
+        ImGui::ProgressBar(fraction, {above ? ImGui::GetContentRegionAvail().x : 12 * ImGui::GetFontSize(), 0},
                            said(tr("{:.0f} of {:.0f}"), part.points, part.most).c_str());
-        ImGui::SameLine();
-        ImGui::TextUnformatted(part.name.c_str());
+        if (!above) {
+            ImGui::SameLine();
+            ImGui::TextUnformatted(part.name.c_str());
+        }
     }
 }
 
@@ -30,9 +34,9 @@ void drawMeasures(const Result& result)
     for (const auto& [label, value] : result.measures) {
         ImGui::TableNextRow();
         ImGui::TableNextColumn();
-        ImGui::TextUnformatted(label.c_str());
+        words(label);
         ImGui::TableNextColumn();
-        ImGui::TextUnformatted(value.c_str());
+        words(value);
     }
     ImGui::EndTable();
 }
@@ -50,7 +54,7 @@ Errand drawLosses(State& state)
         words(said("-{:.0f}   {}", loss.points, loss.words));
         if (loss.at) {
             ImGui::BeginDisabled(state.replaying);
-            const bool clicked = ImGui::Button(said(tr("See it, at {:.1Lf} s ({})"), *loss.at, i + 1).c_str());
+            const bool clicked = ImGui::Button(fitted(said(tr("See it, at {:.1Lf} s ({})"), *loss.at, i + 1)).c_str());
             if (clicked || (!state.replaying && ImGui::IsKeyPressed('1' + static_cast<int>(i), false))) {
                 errand = debrief(state, loss.at);
             }
@@ -71,7 +75,7 @@ Errand drawChoices(State& state)
         first ? void() : besideIfRoom(label);
         first = false;
         ImGui::BeginDisabled(!now);
-        const bool pressed = ImGui::Button(label.c_str()) || (now && ImGui::IsKeyPressed(key, false));
+        const bool pressed = ImGui::Button(fitted(label).c_str()) || (now && ImGui::IsKeyPressed(key, false));
         ImGui::EndDisabled();
         return pressed && now;
     };
@@ -103,7 +107,7 @@ Errand drawResult(State& state)
     }
     // Where texts are large, all of it rolls, and what can be done comes before the figures.
     const bool two = roomForTwo();
-    ImGui::BeginChild("result", {0, -(two ? 6.6F : 3.4F) * em}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("result", 0, -(two ? 6.6F : 3.4F) * em);
     heading(said(tr("{:.0f} of 100 points"), result.total), two ? 1.9F : 1.45F);
     words(chosenCase(state).title, quiet);
     ImGui::Columns(two ? 2 : 1, "halves", false);
@@ -114,10 +118,10 @@ Errand drawResult(State& state)
     ImGui::NextColumn();
     drawMeasures(result);
     ImGui::Columns(1);
-    two ? ImGui::EndChild() : void();
+    two ? endPart() : void();
     words(said(tr("Record: {}"), state.files.record.string()), quiet);
     chosen = two ? drawChoices(state) : chosen;
-    two ? void() : ImGui::EndChild();
+    two ? void() : endPart();
     return moment != Errand::none ? moment : chosen;
 }
 

@@ -18,15 +18,30 @@ namespace {
 using base::said;
 using base::tr;
 
+constexpr float titleScale = 1.15F;
+
+std::string factsOf(const CaseEntry& c)
+{
+    return said(tr("{}, difficulty {} of 5 ({});  {}"), c.palpation ? tr("Palpation") : tr("Core biopsy"), c.difficulty,
+                difficultyInWords(c.difficulty),
+                c.best ? said(tr("best so far {:.0f} of 100"), *c.best) : tr("not done yet"));
+}
+
 // What a case is, beside its picture.
 void drawCaseFacts(const CaseEntry& c, Rgb facts = skyBlue)
 {
-    heading(c.title, 1.15F);
-    words(
-        said(tr("{}, difficulty {} of 5 ({});  {}"), c.palpation ? tr("Palpation") : tr("Core biopsy"), c.difficulty,
-             difficultyInWords(c.difficulty), c.best ? said(tr("best so far {:.0f} of 100"), *c.best) : tr("not done yet")),
-        facts);
+    heading(c.title, titleScale);
+    words(factsOf(c), facts);
     words(c.trains);
+}
+
+// Of drawCaseFacts().
+float heightOfFacts(const CaseEntry& c, float wide)
+{
+    const auto high = [&](const std::string& text, float scale) {
+        return scale * ImGui::CalcTextSize(text.c_str(), nullptr, false, wide / scale).y + ImGui::GetStyle().ItemSpacing.y;
+    };
+    return high(c.title, titleScale) + high(factsOf(c), 1) + high(c.trains, 1);
 }
 
 // Whose session it will be: one of the profiles, a new one, or nobody's.
@@ -34,9 +49,9 @@ Errand drawPeople(State& state)
 {
     const float em = ImGui::GetFontSize();
     Errand errand = Errand::none;
-    ImGui::SetNextItemWidth((roomForTwo() ? 17 : 11) * em);
     const std::string nobody = tr("nobody: no progress is kept");
-    if (ImGui::BeginCombo(tr("Who trains"), state.person.empty() ? nobody.c_str() : state.person.c_str())) {
+    const std::string label = fieldLabel(tr("Who trains"), (roomForTwo() ? 17 : 11) * em);
+    if (ImGui::BeginCombo(label.c_str(), preview(state.person.empty() ? nobody : state.person).c_str())) {
         if (ImGui::Selectable(nobody.c_str(), state.person.empty())) {
             state.person.clear();
             errand = Errand::choosePerson;
@@ -82,13 +97,16 @@ Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
 {
     // Large letters need the room for the list, and break its lines.
     roomForTwo() ? heading(tr("Choose a case")) : void();
-    const float em = ImGui::GetFontSize(), high = (roomForTwo() ? 5.4F : 6.6F) * em;
+    const float em = ImGui::GetFontSize(), least = rollsAsOne() ? 0 : (roomForTwo() ? 5.4F : 6.6F) * em;
+    const float beside = rollsAsOne() ? 0.4F * em : 7.2F * em;  // a picture, where there is room for one
     Errand errand = drawPeople(state);
-    ImGui::BeginChild("list", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("list", 0, -3.4F * em);
+    const float wide = ImGui::GetContentRegionAvail().x - beside;
     for (std::size_t i = 0; i < state.cases.size(); ++i) {
         const CaseEntry& c = state.cases[i];
         ImGui::PushID(c.id.c_str());
         const ImVec2 at = ImGui::GetCursorPos();
+        const float high = std::max(least, heightOfFacts(c, wide) + 0.3F * em);
         if (ImGui::Selectable("##choose", state.chosen == i, ImGuiSelectableFlags_AllowDoubleClick, {0, high})) {
             state.chosen = i;
             if (ImGui::IsMouseDoubleClicked(ImGuiMouseButton_Left) || enterPressed()) {
@@ -103,15 +121,15 @@ Errand drawCases(State& state, const TextureOf& textureOf, bool entered)
         }
         const ImVec2 next = ImGui::GetCursorPos();
         ImGui::SetCursorPos({at.x + 0.4F * em, at.y + 0.3F * em});
-        drawPicture(textureOf(c.picture), 6.6F * em, high - 0.6F * em);
-        ImGui::SetCursorPos({at.x + 7.2F * em, at.y + 0.3F * em});
+        rollsAsOne() ? void() : drawPicture(textureOf(c.picture), 6.6F * em, high - 0.6F * em);
+        ImGui::SetCursorPos({at.x + beside, at.y + 0.3F * em});
         ImGui::BeginGroup();
         drawCaseFacts(c, state.chosen == i ? Rgb{1, 1, 1} : skyBlue);
         ImGui::EndGroup();
         ImGui::SetCursorPos(next);
         ImGui::PopID();
     }
-    ImGui::EndChild();
+    endPart();
     return errand;
 }
 
@@ -124,7 +142,7 @@ Errand drawDeviceTests(State& state)
     }
     besideIfRoom(tr("Try the hand for 30 s"));
     ImGui::BeginDisabled(state.trying || state.pushing);
-    if (ImGui::Button(tr("Try the hand for 30 s"))) {
+    if (ImGui::Button(fitted(tr("Try the hand for 30 s")).c_str())) {
         errand = Errand::tryHand;
     }
     if (state.useFalcon) {
@@ -153,7 +171,7 @@ Errand drawDeviceTests(State& state)
 Errand drawDevices(State& state)
 {
     heading(tr("What will you hold?"));
-    ImGui::BeginChild("device", {0, -3.4F * ImGui::GetFontSize()}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("device", 0, -3.4F * ImGui::GetFontSize());
     const DeviceCheck& check = state.devices;
     if (!check.done) {
         words(tr("Looking for devices ..."), quiet);
@@ -164,16 +182,17 @@ Errand drawDevices(State& state)
         }
     }
     ImGui::Spacing();
-    if (ImGui::RadioButton(tr("Mouse or keys: no force in the hand, the picture shows it"), !state.useFalcon)) {
+    if (radio(tr("Mouse or keys: no force in the hand, the picture shows it"), !state.useFalcon)) {
         state.useFalcon = false;
     }
     ImGui::BeginDisabled(!check.falconReady);
-    if (ImGui::RadioButton(tr("Novint Falcon: you feel the tissue"), state.useFalcon)) {
+    if (radio(tr("Novint Falcon: you feel the tissue"), state.useFalcon)) {
         state.useFalcon = true;
     }
     ImGui::EndDisabled();
     if (state.useFalcon) {
-        ImGui::InputTextWithHint(tr("Firmware file"), tr("not needed while it runs"), &state.firmware);
+        const std::string label = fieldLabel(tr("Firmware file"), 0.65F * ImGui::GetContentRegionAvail().x);
+        ImGui::InputTextWithHint(label.c_str(), tr("not needed while it runs"), &state.firmware);
         words(tr("Begin with the grip in the middle of its reach, and hold it loosely. The first force comes up slowly."));
     } else {
         ImGui::Spacing();
@@ -191,7 +210,7 @@ Errand drawDevices(State& state)
     }
     ImGui::Spacing();
     const Errand errand = drawDeviceTests(state);
-    ImGui::EndChild();
+    endPart();
     return errand;
 }
 
@@ -209,7 +228,7 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     const CaseEntry& c = chosenCase(state);
     heading(c.title);
     const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
-    ImGui::BeginChild("briefing", {0, -3.4F * em}, false, ImGuiWindowFlags_NavFlattened);
+    beginPart("briefing", 0, -3.4F * em);
     words(c.trains, skyBlue);
     const Texture texture = textureOf(c.picture);
     const bool beside = wide > 40 * em && texture.id != 0;
@@ -220,16 +239,18 @@ void drawBriefing(State& state, const TextureOf& textureOf)
         ImGui::SameLine(0.45F * wide);
     }
     drawSteps(c);
-    int mode = state.test ? 1 : 0;
-    ImGui::RadioButton(tr("Practise: steps and faults in words, planned line"), &mode, 0);
+    if (radio(tr("Practise: steps and faults in words, planned line"), !state.test)) {
+        state.test = false;
+    }
     besideIfRoom(std::string(tr("Test: without hints")) + "    ");
-    ImGui::RadioButton(tr("Test: without hints"), &mode, 1);
-    state.test = mode == 1;
+    if (radio(tr("Test: without hints"), state.test)) {
+        state.test = true;
+    }
     words(said(tr("As a command: {}"), asTyped("palpate", trainArguments(state, {"SESSION.db", "SESSION.json"}))), quiet);
     if (!beside && texture.id != 0) {
         drawPicture(texture, wide, 17 * em);
     }
-    ImGui::EndChild();
+    endPart();
 }
 
 void drawSession(const State& state)
@@ -242,24 +263,59 @@ void drawSession(const State& state)
     words(state.command, quiet);
 }
 
-// The way through the screens, and the buttons for going on and back.
+// What the buttons for going on and back say: without their keys where there is no room for them, and one below the other
+// where there is no room beside each other.
+struct Foot {
+    std::string back, main;
+    bool stacked = false;
+};
+
+Foot footOf(const State& state)
+{
+    const bool first = state.screen == Screen::cases, running = state.screen == Screen::session;
+    Foot foot{running ? ""
+              : first ? tr("Quit (Esc)")
+                      : tr("Back (Esc)"),
+              running ? std::string(mainButton(state)) : said(tr("{} (Enter)"), mainButton(state))};
+    const ImGuiStyle& style = ImGui::GetStyle();
+    const auto fits = [&] {
+        const float both = ImGui::CalcTextSize(foot.back.c_str()).x + ImGui::CalcTextSize(foot.main.c_str()).x;
+        return both + 4 * style.FramePadding.x + style.ItemSpacing.x <=
+               ImGui::GetIO().DisplaySize.x - 2 * style.WindowPadding.x;
+    };
+    if (!fits()) {
+        foot.back = withoutKey(foot.back);
+        foot.main = running ? foot.main : withoutKey(foot.main);
+    }
+    foot.stacked = !running && !fits();
+    return foot;
+}
+
+float heightOf(const Foot& foot)
+{
+    return (foot.stacked ? 2.0F : 1.0F) * ImGui::GetFrameHeightWithSpacing();
+}
+
+// The buttons for going on and back.
 Errand drawFoot(State& state, bool entered)
 {
     const ImGuiIO& io = ImGui::GetIO();
     const float em = ImGui::GetFontSize();
-    ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY(), ImGui::GetWindowHeight() - 3.0F * em));
+    const Foot foot = footOf(state);
+    const float high = rollsAsOne() ? heightOf(foot) + ImGui::GetStyle().WindowPadding.y : 3.0F * em;
+    ImGui::SetCursorPosY(std::max(ImGui::GetCursorPosY(), ImGui::GetWindowHeight() - high));
     const bool first = state.screen == Screen::cases, running = state.screen == Screen::session;
     // Esc that closes a popup closes it before it is seen here.
     const bool typing = io.WantTextInput || state.popup || ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
     Errand errand = Errand::none;
     if (!running) {
-        const bool pressed = ImGui::Button(first ? tr("Quit (Esc)") : tr("Back (Esc)"));
+        const bool pressed = ImGui::Button(foot.back.c_str());
         if (pressed || (!typing && ImGui::IsKeyPressed(io.KeyMap[ImGuiKey_Escape], false))) {
             return goBack(state);
         }
-        ImGui::SameLine();
+        foot.stacked ? void() : ImGui::SameLine();
     }
-    const std::string label = running ? std::string(mainButton(state)) : said(tr("{} (Enter)"), mainButton(state));
+    const std::string label = fitted(foot.main);
     const float wide = ImGui::CalcTextSize(label.c_str()).x + 2 * ImGui::GetStyle().FramePadding.x;
     ImGui::SetCursorPosX(
         std::max(ImGui::GetCursorPosX(), ImGui::GetWindowWidth() - wide - ImGui::GetStyle().WindowPadding.x));
@@ -285,6 +341,19 @@ void drawWay(const State& state)
         ImGui::Separator();
         return;
     }
+    constexpr std::size_t last = static_cast<std::size_t>(Screen::result);
+    std::string all;
+    for (std::size_t i = 0; i <= last; ++i) {
+        all += nameOf(static_cast<Screen>(i));
+    }
+    const float between = ImGui::CalcTextSize(">").x + 2 * ImGui::GetStyle().ItemSpacing.x;
+    if (ImGui::CalcTextSize(all.c_str()).x + static_cast<float>(last) * between > ImGui::GetContentRegionAvail().x) {
+        const std::string here =
+            said("{} / {}  {}", static_cast<std::size_t>(state.screen) + 1, last + 1, nameOf(state.screen));
+        ImGui::TextColored(vec(orange), "%s", here.c_str());
+        ImGui::Separator();
+        return;
+    }
     for (std::size_t i = 0; i <= static_cast<std::size_t>(Screen::result); ++i) {
         if (i > 0) {
             ImGui::SameLine();
@@ -303,11 +372,25 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
 {
     ImGui::SetNextWindowPos({0, 0});
     ImGui::SetNextWindowSize({width, height});
+    // Where letters are large for the window its edges are narrow, and all but the foot rolls.
+    const bool one = rollsAsOne();
+    const float em = ImGui::GetFontSize(), narrow = 0.4F * em;
+    if (one) {
+        for (const ImGuiStyleVar which :
+             {ImGuiStyleVar_WindowPadding, ImGuiStyleVar_FramePadding, ImGuiStyleVar_ItemSpacing}) {
+            ImGui::PushStyleVar(which, {narrow, narrow});
+        }
+    }
     ImGui::Begin("Palpate", nullptr,
                  ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoSavedSettings |
                      ImGuiWindowFlags_NoBringToFrontOnFocus);
     ImGui::PushItemFlag(ImGuiItemFlags_Inputable, true);  // Tab goes to all, not to text alone
     drawWay(state);
+    if (one) {
+        const float foot = heightOf(footOf(state)) + ImGui::GetStyle().ItemSpacing.y;
+        ImGui::BeginChild("all", {0, -foot}, false, ImGuiWindowFlags_NavFlattened);
+        entered ? ImGui::SetScrollY(0) : void();
+    }
     if (!state.notice.empty()) {
         words(state.notice, orange);
     }
@@ -337,12 +420,14 @@ Errand drawScreen(State& state, const TextureOf& textureOf, float width, float h
             errand = drawInstructor(state);
             break;
     }
+    one ? ImGui::EndChild() : void();
     if (errand == Errand::none && state.screen == before) {
         errand = drawFoot(state, entered);
     }
     state.popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
     ImGui::PopItemFlag();
     ImGui::End();
+    one ? ImGui::PopStyleVar(3) : void();
     return errand;
 }
 

@@ -2,8 +2,11 @@
 
 #include <base/words.h>
 
+#include <imgui_internal.h>
+
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 
@@ -39,8 +42,9 @@ void drawPicture(const Texture& texture, float wide, float high)
         return;
     }
     const float scale = std::min(wide / static_cast<float>(texture.width), high / static_cast<float>(texture.height));
-    ImGui::Image(reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(texture.id)),
-                 {scale * static_cast<float>(texture.width), scale * static_cast<float>(texture.height)});
+    ImGui::Image(
+        reinterpret_cast<ImTextureID>(static_cast<std::uintptr_t>(texture.id)),
+        {std::floor(scale * static_cast<float>(texture.width)), std::floor(scale * static_cast<float>(texture.height))});
 }
 
 bool enterPressed()
@@ -52,9 +56,9 @@ void besideIfRoom(const std::string& label)
 {
     const ImGuiStyle& style = ImGui::GetStyle();
     const float wide = ImGui::CalcTextSize(label.c_str()).x + 2 * style.FramePadding.x + style.ItemSpacing.x;
-    ImGui::SameLine();
-    if (ImGui::GetContentRegionAvail().x < wide) {
-        ImGui::NewLine();
+    const float from = ImGui::GetCurrentWindow()->DC.CursorPosPrevLine.x + style.ItemSpacing.x;
+    if (ImGui::GetCursorScreenPos().x + ImGui::GetContentRegionAvail().x - from >= wide) {
+        ImGui::SameLine();
     }
 }
 
@@ -76,6 +80,64 @@ bool roomForTwo()
     return ImGui::GetIO().DisplaySize.x > 52 * ImGui::GetFontSize();
 }
 
+bool rollsAsOne()
+{
+    constexpr float narrow = 26, low = 18;  // in fonts
+    const ImVec2 size = ImGui::GetIO().DisplaySize;
+    return size.x < narrow * ImGui::GetFontSize() || (!roomForTwo() && size.y < low * ImGui::GetFontSize());
+}
+
+void beginPart(const char* name, float wide, float high)
+{
+    ImGui::PushID(name);
+    rollsAsOne() ? ImGui::BeginGroup() : void(ImGui::BeginChild(name, {wide, high}, false, ImGuiWindowFlags_NavFlattened));
+}
+
+void endPart()
+{
+    rollsAsOne() ? ImGui::EndGroup() : ImGui::EndChild();
+    ImGui::PopID();
+}
+
+std::string withoutKey(const std::string& label)
+{
+    return label.ends_with(')') ? label.substr(0, label.rfind(" (")) : label;
+}
+
+std::string fitted(const std::string& label)
+{
+    const float room = ImGui::GetContentRegionAvail().x - 2 * ImGui::GetStyle().FramePadding.x;
+    return ImGui::CalcTextSize(label.c_str()).x <= room ? label : shortened(withoutKey(label), room);
+}
+
+std::string preview(const std::string& chosen)
+{
+    return shortened(chosen, ImGui::CalcItemWidth() - ImGui::GetFrameHeight() - 2 * ImGui::GetStyle().FramePadding.x);
+}
+
+bool radio(const std::string& label, bool active)
+{
+    const float circle = ImGui::GetFrameHeight() + ImGui::GetStyle().ItemInnerSpacing.x;
+    if (circle + ImGui::CalcTextSize(label.c_str()).x <= ImGui::GetContentRegionAvail().x) {
+        return ImGui::RadioButton(label.c_str(), active);
+    }
+    const bool pressed = ImGui::RadioButton(("##" + label).c_str(), active);
+    ImGui::SameLine(0, ImGui::GetStyle().ItemInnerSpacing.x);
+    words(label);
+    return pressed || ImGui::IsItemClicked();
+}
+
+std::string fieldLabel(const std::string& label, float wide)
+{
+    if (!rollsAsOne()) {
+        ImGui::SetNextItemWidth(wide);
+        return label;
+    }
+    words(label);
+    ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
+    return "##" + label;
+}
+
 Errand drawSettings(State& state)
 {
     const std::string title = std::string(tr("Settings")) + "###settings";
@@ -83,13 +145,20 @@ Errand drawSettings(State& state)
         ImGui::OpenPopup(title.c_str());
     }
     ImGui::SetNextWindowPos(ImGui::GetMainViewport()->GetCenter(), ImGuiCond_Always, {0.5F, 0.5F});
-    if (!ImGui::BeginPopupModal(title.c_str(), nullptr, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove)) {
+    const bool one = rollsAsOne();
+    if (one) {
+        const ImVec2 all = ImGui::GetIO().DisplaySize;
+        ImGui::SetNextWindowSize({0.96F * all.x, 0.96F * all.y});
+    }
+    const ImGuiWindowFlags fits = one ? ImGuiWindowFlags_NoResize : ImGuiWindowFlags_AlwaysAutoResize;
+    if (!ImGui::BeginPopupModal(title.c_str(), nullptr, fits | ImGuiWindowFlags_NoMove)) {
         return Errand::none;
     }
+    const auto beside = [one](const char* label) { one ? besideIfRoom(std::string(label) + "     ") : ImGui::SameLine(); };
     Settings& s = state.settings;
     bool changed = false;
-    const auto choice = [&changed](const char* label, std::string& value, const char* key) {
-        if (ImGui::RadioButton(label, value == key)) {
+    const auto choice = [&changed, one](const char* label, std::string& value, const char* key) {
+        if (one ? radio(label, value == key) : ImGui::RadioButton(label, value == key)) {
             value = key;
             changed = true;
         }
@@ -100,11 +169,11 @@ Errand drawSettings(State& state)
         s.language = base::language() == "de" ? "de" : "en";
     }
     choice("English", s.language, "en");
-    ImGui::SameLine();
+    beside("Deutsch");
     choice("Deutsch", s.language, "de");
     ImGui::TextUnformatted(tr("Colours of tissues"));
     choice(tr("as in the body"), s.palette, "standard");
-    ImGui::SameLine();
+    one ? void() : ImGui::SameLine();
     choice(tr("safe for colour blindness, with patterns in slices"), s.palette, "colour-blind");
     changed = ImGui::Checkbox(tr("Sounds for warnings"), &s.sounds) || changed;
     ImGui::TextUnformatted(tr("Size of texts"));
@@ -113,7 +182,7 @@ Errand drawSettings(State& state)
             s.textScale = scale;
             changed = true;
         }
-        ImGui::SameLine();
+        beside("200 %");
     }
     ImGui::NewLine();
     if (ImGui::Button(tr("Close")) || ImGui::IsKeyPressed(ImGui::GetIO().KeyMap[ImGuiKey_Escape], false)) {

@@ -29,6 +29,22 @@ void besideIfRoom(const std::string& label);
 std::string shortened(const std::string& text, float wide);
 /// Whether a list and what is chosen of it have room side by side in the window.
 bool roomForTwo();
+/// Whether letters are so large for the window that its parts do not roll by themselves: all between the way and the foot
+/// rolls as one.
+bool rollsAsOne();
+/// A part of the window: a child that rolls, or where rollsAsOne() a group.
+void beginPart(const char* name, float wide, float high);
+void endPart();
+/// "Back" of "Back (Esc)".
+std::string withoutKey(const std::string& label);
+/// The label of a button as it has room in this row: without its key, or with its end left out.
+std::string fitted(const std::string& label);
+/// A radio button whose label is broken into lines where it is too long for one.
+bool radio(const std::string& label, bool active);
+/// What a combo box shows of its choice, as it has room in the next field.
+std::string preview(const std::string& chosen);
+/// Sets the width of the next field. Returns its label; where rollsAsOne() that is above it instead.
+std::string fieldLabel(const std::string& label, float wide);
 
 /// Where somebody stands: exercises, learning curves, CUSUM.
 Errand drawProgress(State& state, bool entered);

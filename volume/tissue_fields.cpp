@@ -21,6 +21,8 @@ namespace palpate::volume {
 
 namespace {
 
+constexpr double coarse = 2.0;  // edge of a voxel, in cells, from which on samples are tissue or not
+
 // Reads the voxels that fill a node's cell, by s^3 samples of the cell. Along voxel axes that are about as coarse as the
 // samples it interpolates: the nearest voxel alone would shift everything by up to half a voxel where samples fall on the
 // faces between voxels.
@@ -35,7 +37,8 @@ public:
         const Mat3 toIndex = glm::inverse(tissue.affine.linear);
         const Vec3 voxel = tissue.affine.spacing();
         const double finest = std::min({voxel.x, voxel.y, voxel.z});
-        const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), 1, 4);
+        isCoarse_ = std::max({voxel.x, voxel.y, voxel.z}) > coarse * grid.spacing;
+        const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), isCoarse_ ? 3 : 1, 4);
         for (int i = 0; i < s * s * s; ++i) {
             const Vec3 at = (Vec3(i % s, i / s % s, i / s / s) + 0.5) / static_cast<double>(s) - 0.5;
             places_.push_back(2.0 * at);
@@ -63,6 +66,28 @@ public:
                 visitAround(at, fraction, places_[i], visit);
             } else {
                 read(Index3(glm::floor(at + 0.5)), fraction, places_[i], visit);
+            }
+        }
+    }
+
+    // The same for material alone, labels of which isTissue(label) is true: between voxels far larger than a cell, a sample
+    // with less than half of it is outside of the body, and any other is full. Else cells up to half a voxel outside of the
+    // surface would be partly tissue.
+    template <typename IsTissue, typename Visit>
+    void visitMaterial(Index3 n, const IsTissue& isTissue, const Visit& visit) const
+    {
+        if (!isCoarse_) {
+            this->visit(n, visit);
+            return;
+        }
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const double fraction = 1.0 / static_cast<double>(offsets_.size());
+        for (std::size_t i = 0; i < offsets_.size(); ++i) {
+            double tissue = 0.0;
+            visitAround(centre + offsets_[i], 1.0, places_[i],
+                        [&](std::uint16_t label, double weight) { tissue += isTissue(label) ? weight : 0.0; });
+            if (tissue >= 0.5) {
+                visitAround(centre + offsets_[i], fraction / tissue, places_[i], visit);
             }
         }
     }
@@ -119,6 +144,7 @@ private:
     Mat3 step_{1.0};              // node steps in voxels
     Vec3 start_{0.0};             // node (0, 0, 0) in voxels
     glm::bvec3 interpolate_{false};
+    bool isCoarse_ = false;  // voxels, beside the cells
 };
 
 // Nodes, both ends included.
@@ -145,7 +171,8 @@ CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, 
                           const std::vector<const TissueRow*>& rows)
 {
     CellMixture mixture;
-    sampler.visit(n, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel, Vec3 at) {
+    const auto isTissue = [&](std::uint16_t label) { return rows[label] != nullptr; };
+    sampler.visitMaterial(n, isTissue, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel, Vec3 at) {
         if (const TissueRow* row = rows[label]) {
             const Vec3 place = tissue.affine.toPatient({voxel.x(), voxel.y(), voxel.z()});
             const bool held = row->fixed || (tissue.support && tissue.support->height(place) < 0.0);

@@ -32,7 +32,6 @@ function write(ctx, text, x, y) {
 
 function horizontal(u, lines) {
   const { ctx, bbox } = u;
-  const taken = [];
   for (const line of lines) {
     const y = u.valToPos(line.at, "y", true);
     if (y < bbox.top || y > bbox.top + bbox.height) continue;
@@ -44,14 +43,22 @@ function horizontal(u, lines) {
     ctx.moveTo(bbox.left, y);
     ctx.lineTo(bbox.left + bbox.width, y);
     ctx.stroke();
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    ctx.textAlign = "right";
-    ctx.textBaseline = "bottom";
-    const right = Math.min(bbox.left + bbox.width, ...taken.filter((t) => Math.abs(t.y - y) < 14 * devicePixelRatio).map((t) => t.left));
-    write(ctx, line.label, right - 4 * devicePixelRatio, y - 2 * devicePixelRatio);
-    taken.push({ y, left: right - ctx.measureText(line.label).width - 12 * devicePixelRatio });
     ctx.restore();
   }
+}
+
+// What the horizontal lines are, below the legend: names in the chart would lie on its curves.
+function nameLines(place, chart) {
+  if (!(chart.lines || []).length) return;
+  const names = document.createElement("div");
+  names.className = "lines";
+  for (const line of chart.lines) {
+    const name = document.createElement("span");
+    name.textContent = chart.y.unit ? `${line.label}, ${+line.at.toFixed(2)} ${chart.y.unit}` : line.label;
+    name.style.setProperty("--of", colour(line.colour));
+    names.append(name);
+  }
+  place.append(names);
 }
 
 function vertical(u, events) {
@@ -92,6 +99,7 @@ function draw(id, chart) {
   if (!place) return;
   if (chart.scatter) {
     charts.push({ plot: scatter(place, chart, axis), place });
+    nameLines(place, chart);
     return;
   }
   if (chart.columns[0].length < (chart.points ? 1 : 2)) {
@@ -123,10 +131,14 @@ function draw(id, chart) {
   };
   const plot = new uPlot(options, chart.columns, place);
   charts.push({ plot, place });
+  nameLines(place, chart);
 }
 
 function drawAll() {
-  for (const { plot } of charts.splice(0)) plot.destroy();
+  for (const { plot, place } of charts.splice(0)) {
+    plot.destroy();
+    place.querySelector(".lines")?.remove();
+  }
   for (const id of Object.keys(data.charts)) draw(id, data.charts[id]);
 }
 

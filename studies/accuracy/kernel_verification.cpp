@@ -191,7 +191,7 @@ struct FirstTouch {
     double cells = 0;                // its radius by Hertz
     double mean = 0.0, worst = 0.0;  // bounds of the error [%]
 };
-constexpr FirstTouch firstTouches[]{{0.5, 4.0, 13.0}, {0.75, 3.0, 4.0}, {1.0, 2.0, 2.5}, {1.5, 2.0, 2.5}, {2.0, 1.5, 2.5}};
+constexpr FirstTouch firstTouches[]{{0.5, 2.5, 4.0}, {0.75, 2.0, 2.5}, {1.0, 2.0, 2.0}, {1.5, 2.0, 2.0}, {2.0, 1.5, 2.5}};
 
 // Two rows per size: the mean over the places of a cell, and the worst of them.
 std::vector<KernelVerification> touchRows(const std::function<void(const std::string&)>& progress)

@@ -39,6 +39,17 @@ std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const 
     return anchors;
 }
 
+chainmail::ElasticOptions elasticOptions(const haptics::SessionModel& model, const datasets::ToolSpec& tool)
+{
+    chainmail::ElasticOptions options = haptics::elasticOptions(model.scene.model.elastic);
+    if (tool.kind != datasets::ToolKind::needle) {
+        const Vec3 end(0.0, tool.kind == datasets::ToolKind::capsule ? tool.length : 0.0, 0.0);
+        options.touches =
+            chainmail::touchedBy({Vec3(0.0), end, tool.radius, tool.radius}, model.elastic->levels.front().nodes.spacing);
+    }
+    return options;
+}
+
 // Which way is in, for the windows, is decided where the tool first touches, or where it comes nearest to the body.
 chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& model, const PressOptions& options)
 {
@@ -66,7 +77,7 @@ public:
           path_(path),
           anchors_(anchorsOf(model, asked)),
           load_(model, options.tool, path.poses.front()),
-          elastic_(*model.elastic, haptics::elasticOptions(model.scene.model.elastic), startOf(path, model, options))
+          elastic_(*model.elastic, elasticOptions(model, options.tool), startOf(path, model, options))
     {
     }
 
@@ -76,6 +87,7 @@ public:
         for (std::size_t tick = 0; tick < summary_.ticks; ++tick) {
             const bool wanted = tick % options_.every == 0 || tick + 1 == summary_.ticks;
             PressSample s = solve(path_.at(tick), wanted && options_.converge);
+            count(s, wanted || !options_.converge);
             if (wanted) {
                 for (const Vec3& anchor : anchors_) {
                     s.displacement.push_back(elastic_.displacement(anchor));
@@ -109,20 +121,24 @@ private:
                             pose.seconds));
         }
         summary_.notConverged += converge && s.residual > pressTolerance ? 1 : 0;
-        count(s, result);
+        moved_ = result.moved;
         return s;
     }
 
-    void count(const PressSample& s, const ElasticResult& result)
+    // Of a path that is solved to convergence only those samples are `given`: between them the solution is on its way.
+    void count(const PressSample& s, bool given)
     {
-        if (s.behind > 0.0 && !summary_.heldFrom) {
+        if (s.behind > 0.0 && given && !summary_.heldFrom) {
             summary_.heldFrom = s.pose.seconds;
         }
         if (elastic_.atRest()) {
             return;
         }
         ++summary_.inContact;
-        summary_.windowMoves += result.moved ? 1 : 0;
+        summary_.windowMoves += moved_ ? 1 : 0;
+        if (!given) {
+            return;
+        }
         seconds_.push_back(s.took);
         if (const double force = glm::length(s.force); force > summary_.peakForce) {
             summary_.peakForce = force;
@@ -136,6 +152,7 @@ private:
     PoseLoad load_;
     Elastic elastic_;
     PressSummary summary_;
+    bool moved_ = false;           // windows, for the last pose
     std::vector<double> seconds_;  // of ticks in contact
 };
 
@@ -147,7 +164,7 @@ double contactArea(const Elastic& elastic) noexcept
     chainmail::AreaRatio ratio(elastic.body(), elastic.stack().windows());
     for (const chainmail::ContactSite& site : elastic.sites()) {
         if (!site.isTie && site.active()) {
-            area += ratio(site) * static_cast<double>(elastic.body().points[site.point].area);
+            area += ratio(site) * static_cast<double>(site.area);
         }
     }
     return area;

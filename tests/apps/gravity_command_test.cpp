@@ -24,7 +24,7 @@ TEST(Train, GravitySaysWhatItMovedAndTheReplayIsTheSession)
     EXPECT_EQ(replayed.at("identical"), true) << replayed.dump(2);
 }
 
-TEST(Train, GravityThatCannotBeIsRefusedOnOneLine)
+TEST(Train, WhatCannotBeInASceneIsRefusedWithItsLine)
 {
     const Folder folder;
     const std::string scene = folder / "prone.toml";
@@ -33,6 +33,9 @@ TEST(Train, GravityThatCannotBeIsRefusedOnOneLine)
         expectRefusal({"train", scene, "--headless"}, says);
     };
     refusal("posture = \"prone\"\n", "prone.toml:6: [gravity] shape is missing");
+    // Also where this machine or the command line changes the scene: the line is that of the file.
+    refusal("posture = \"prone\"\nshape = \"supine\"\n[tissue.fat]\nyoungs_kpa = 0\n",
+            "prone.toml:10: [tissue.fat] youngs_kpa = 0 kPa: must be 0.01");
     refusal("posture = \"prone\"\nshape = \"supine\"\n[[script]]\nkind = \"move\"\nto_mm = [0, 0, 0]\n", "[[script]]");
 }
 

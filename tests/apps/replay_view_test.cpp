@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <chrono>
 #include <csignal>
 #include <cstdint>
@@ -204,6 +206,36 @@ TEST(ReplayView, PicturesThatASignalHasEndedAreSaidToBe)
     const Outcome outcome = view.wait();
     EXPECT_EQ(outcome.status, 130);
     EXPECT_EQ(outcome.err, "palpate-view: interrupted: the pictures end before the record does\n");
+}
+
+// Of a record and of a session that runs: the film that is kept is shorter than either.
+TEST(ReplayView, AFilmThatASignalHasEndedIsSaidToBe)
+{
+    if (!canDraw() || !installed("ffmpeg"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and ffmpeg (packages xvfb and ffmpeg)";
+    const Folder folder;
+    const std::string film = folder / "s.mp4", session = "film-" + std::to_string(::getpid());
+    figures({"train", "layered", "--unpaced", "--no-view", "--seconds", "3", "--record", folder / "s.db"});
+    Program running("palpate", {"train", "layered", "--setting", "fast", "--no-view", "--device", "mouse", "--session",
+                                session, "--seconds", "120", "--anyway"});
+    const auto interrupted = [&](const std::vector<std::string>& what) {
+        std::vector<std::string> words{"--movie", film, "--size", "320x320"};
+        words.insert(words.end(), what.begin(), what.end());
+        Program view("palpate-view", words);
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+        while (!fs::exists(film + ".part") && std::chrono::steady_clock::now() < end)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        std::this_thread::sleep_for(std::chrono::milliseconds(500));
+        view.send(SIGINT);
+        return view.wait();
+    };
+    const Outcome record = interrupted({"--replay", folder / "s.db"});
+    EXPECT_EQ(record.status, 130);
+    EXPECT_EQ(record.err, "palpate-view: interrupted: " + film + " ends before the record does\n");
+    const Outcome live = interrupted({"--session", session});
+    EXPECT_EQ(live.status, 0);
+    EXPECT_EQ(live.err, "palpate-view: interrupted: " + film + " ends before the session does\n");
+    EXPECT_TRUE(fs::exists(film));
 }
 
 TEST(ReplayView, RefusesWhatCannotBePlayed)

@@ -37,6 +37,22 @@ std::size_t countOf(const std::string& text, const std::string& what)
     return count;
 }
 
+// What the dashed lines of a chart are stands below its legend, where it lies on no curve.
+TEST(SessionReport, NamesTheLinesOfAChartBelowIt)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    figures({"train", "near-vessel", "--headless", "--unpaced", "--setting", "fast", "--report", here / "r.html"});
+    const std::string page = documentOf("file://" + std::string(here / "r.html"), here / "profile");
+    const std::string distances = partOf(page, "distances");
+    const auto legend = distances.find("u-legend"), lines = distances.find("class=\"lines\"");
+    ASSERT_NE(lines, std::string::npos);
+    EXPECT_LT(legend, lines);
+    EXPECT_NE(distances.find("warning: vein, 5 mm", lines), std::string::npos);
+}
+
 // Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.
 TEST(SweepReport, IsDrawnByABrowserFromOneFile)
 {

@@ -2,6 +2,7 @@
 
 #include <haptics/broadcast.h>
 #include <haptics/display_image.h>
+#include <haptics/scenery.h>
 
 #include <gtest/gtest.h>
 #include <glm/common.hpp>
@@ -183,6 +184,22 @@ TEST(DisplayImage, OfOneValueIsInTheMiddleOfItsWindow)
     EXPECT_EQ(plan.scenery.imageLow, 7);
     EXPECT_EQ(plan.scenery.window[0].low + plan.scenery.window[0].high, 14);
     EXPECT_LT(plan.scenery.window[0].low, plan.scenery.window[0].high);
+}
+
+// A body 0.4 mm thick and 300 mm long, of voxels of 0.01 x 0.01 x 30 mm: in cubes of 0.01 mm it would have 30 000 along.
+TEST(DisplayGrid, OfALongThinBodyIsOneThatViewersTake)
+{
+    const volume::Tissue block = datasets::sceneVolume(datasets::parseScene(tests::blockScene, "test.toml"));
+    volume::LabelImage thin = block.labels();
+    thin.size = {40, 40, 10};
+    thin.affine = {Mat3(Vec3(1e-5, 0, 0), Vec3(0, 1e-5, 0), Vec3(0, 0, 30e-3)), Vec3(0)};
+    const std::uint16_t value = block.structures().back().value;
+    thin.values.assign(40U * 40U * 10U, value);
+    const std::vector<volume::LabelName> names{{value, "all", block.table().rows.back().name}};
+    const volume::Tissue tissue = volume::Tissue::fromLabels(thin, block.table(), names, block.provenance());
+    const volume::NodeGrid grid = displayGrid(tissue);
+    EXPECT_LE(std::max({grid.size.x, grid.size.y, grid.size.z}), 4096);
+    EXPECT_GT(grid.size.z, 3000) << "as fine as it may be";
 }
 
 // A ramp in the volume is the same ramp at the viewer, wherever a display voxel and those around it are all tissue: the

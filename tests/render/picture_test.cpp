@@ -435,6 +435,42 @@ TEST_F(PictureTest, WordsOfACtScanLieOnNothingElse)
     EXPECT_GT(scanned.count(left, {255, 255, 255}, 4), left.width * left.height / 2);
 }
 
+// In every window and with everything that there may be to say: words lie inside the window and on no other words.
+TEST_F(PictureTest, WordsLieInTheWindowAndNotOnEachOther)
+{
+    Picture& picture = studio->picture();
+    picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
+    picture.setSteps(true, 0, true);
+    constexpr std::array<std::pair<int, int>, 5> sizes{{{320, 320}, {420, 700}, {700, 320}, {500, 400}, {1280, 960}}};
+    for (const auto& [wide, high] : sizes)
+        for (const auto& [layout, layoutName] : layouts)
+            for (const double scale : {1.0, 2.0}) {
+                const std::string name = std::to_string(wide) + "x" + std::to_string(high) + "-" + layoutName + "-" +
+                                         std::to_string(static_cast<int>(scale));
+                studio->resize(wide, high);
+                picture.setDisplayScale(scale);
+                studio->take(2.9, layout, true, "words-" + name);
+                const std::vector<Written>& all = picture.written();
+                EXPECT_GT(all.size(), 12U) << name;
+                for (std::size_t a = 0; a < all.size(); ++a) {
+                    const Written& p = all[a];
+                    EXPECT_TRUE(p.low[0] >= 0 && p.high[0] <= wide + 1 && p.low[1] >= 0 && p.high[1] <= high)
+                        << name << ": '" << p.words << "' is cut off";
+                    for (std::size_t b = 0; b < a; ++b) {
+                        const Written& q = all[b];
+                        const bool shadow = q.words == p.words && std::abs(q.low[0] - p.low[0]) < 2;
+                        EXPECT_TRUE(shadow || p.high[0] <= q.low[0] + 1 || q.high[0] <= p.low[0] + 1 ||
+                                    p.high[1] <= q.low[1] + 1 || q.high[1] <= p.low[1] + 1)
+                            << name << ": '" << p.words << "' lies on '" << q.words << "'";
+                    }
+                }
+            }
+    picture.setCaption("");
+    picture.setSteps(false, 0, false);
+    picture.setDisplayScale(1);
+    studio->resize(width, height);
+}
+
 // under() is the inverse of the projection.
 TEST_F(PictureTest, FindsThePointUnderAPixel)
 {

@@ -16,17 +16,21 @@
 namespace palpate::trainer {
 namespace {
 
-constexpr float width = 1280, height = 720;
+// Size of texts in per cent, in a window of so many pixels.
+struct Look {
+    int scale;
+    float width, height;
+};
 
-class Screens : public testing::TestWithParam<std::tuple<std::string, int>> {
+class Screens : public testing::TestWithParam<std::tuple<std::string, Look>> {
 protected:
-    Screens()
+    Screens() : width(std::get<1>(GetParam()).width), height(std::get<1>(GetParam()).height)
     {
         ImGui::CreateContext();
         ImGui::GetIO().IniFilename = nullptr;
         ImGui::GetIO().DisplaySize = {width, height};
         base::useLanguage(std::get<0>(GetParam()));
-        setLook(0.01F * static_cast<float>(std::get<1>(GetParam())));
+        setLook(0.01F * static_cast<float>(std::get<1>(GetParam()).scale));
         unsigned char* pixels = nullptr;
         int wide = 0, high = 0;
         ImGui::GetIO().Fonts->GetTexDataAsRGBA32(&pixels, &wide, &high);
@@ -37,7 +41,7 @@ protected:
         ImGui::DestroyContext();
     }
 
-    static void draw(State& state)
+    void draw(State& state) const
     {
         constexpr int untilAllHasItsPlace = 4;
         for (int i = 0; i < untilAllHasItsPlace; ++i) {
@@ -79,6 +83,8 @@ protected:
         }
         return state;
     }
+
+    const float width, height;
 };
 
 // Nothing lies over the window's side; what is too long has a bar to roll it by.
@@ -93,6 +99,7 @@ TEST_P(Screens, NothingIsCutOff)
             const bool rolls = (w->Flags & ImGuiWindowFlags_NoScrollbar) == 0;
             EXPECT_TRUE(rolls || w->WindowPadding.y + w->ContentSize.y <= w->InnerRect.GetHeight() + 1)
                 << w->Name << ": " << w->ContentSize.y;
+            EXPECT_TRUE(w->Scroll.y <= 0 || state.screen == Screen::cases) << w->Name << " does not begin at its top";
         }
     }
 }
@@ -111,10 +118,15 @@ TEST_P(Screens, WhatRollsIsNoSlit)
     }
 }
 
-// Language, and size of texts in per cent.
-INSTANTIATE_TEST_SUITE_P(At, Screens, testing::Combine(testing::Values("en", "de"), testing::Values(100, 150, 200)),
+INSTANTIATE_TEST_SUITE_P(At, Screens,
+                         testing::Combine(testing::Values("en", "de"),
+                                          testing::Values(Look{100, 1280, 720}, Look{150, 1280, 720}, Look{200, 1280, 720},
+                                                          Look{125, 320, 320}, Look{125, 420, 700}, Look{100, 700, 320})),
                          [](const auto& test) {
-                             return std::get<0>(test.param) + std::to_string(std::get<1>(test.param));
+                             const Look& look = std::get<1>(test.param);
+                             return std::get<0>(test.param) + std::to_string(look.scale) + "In" +
+                                    std::to_string(static_cast<int>(look.width)) + "x" +
+                                    std::to_string(static_cast<int>(look.height));
                          });
 
 }  // namespace

@@ -79,6 +79,15 @@ TEST(FirstTouch, RestedOnTheSkinIsAllPointsAndTheLevel)
     EXPECT_EQ(rested.score.passes, 0U);
 }
 
+// The briefing asks for three seconds.
+TEST(FirstTouch, AShortRestIsNotTheLevel)
+{
+    haptics::Score score = doneByScript(modelOfCase("first-touch")).score;
+    ASSERT_TRUE(reachesLevel("touch", score));
+    score.rest = 2.9;
+    EXPECT_FALSE(reachesLevel("touch", score));
+}
+
 TEST(FirstTouch, PiercedIsNeither)
 {
     haptics::SessionModel model = modelOfCase("first-touch");

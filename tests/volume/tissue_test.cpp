@@ -230,6 +230,31 @@ TEST(TissueCells, AreAsFullAsTheBodyIsInThem)
     }
 }
 
+// Of voxels far larger than cells, too, the face is in the middle between the last full and the first empty one: a cell
+// beyond it has nothing. Interpolated as they are, cells were partly full up to half a voxel outside.
+TEST(TissueCells, NothingLiesOutsideOfCoarseVoxels)
+{
+    constexpr double voxel = 5e-3;
+    const Index3 size(8, 8, 8);
+    LabelImage image{size, {Mat3(voxel), Vec3(0.0)}, {}};
+    image.values.assign(image.offset({0, 0, size.z}), 0);
+    forEachIndex({0, 4, 0}, {7, 7, 7}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
+    const auto tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+    const double whole = tissue.table().rows[1].youngsModulus, face = 3.5 * voxel;
+    for (const double spacing : {0.8e-3, 1.5e-3, 2e-3}) {
+        for (double shift = 0.0; shift < spacing; shift += 0.125e-3) {
+            const NodeGrid cells{{2, 13, 2}, {15e-3, face - 6.0 * spacing + shift, 15e-3}, spacing};
+            const auto material = tissue.materialOn(cells);
+            for (int j = 0; j < cells.size.y; ++j) {
+                const double low = cells.position({0, j, 0}).y - 0.5 * spacing;
+                const double full = std::clamp((low + spacing - face) / spacing, 0.0, 1.0);
+                const double found = static_cast<double>(material[cells.offset({0, j, 0})].youngsModulus) / whole;
+                EXPECT_NEAR(found, full, 0.17) << spacing << " " << shift << " " << j;
+            }
+        }
+    }
+}
+
 // Nothing fixed: the rear 5 % in whole layers, at least one, of the voxel axis that is nearest to y, on whichever side of
 // it the back is. What is behind the plane is held in cells of any size. A bone holds the body, and there is no plane.
 TEST(TissueSupport, ABodyThatNothingHoldsLiesOnItsBack)
