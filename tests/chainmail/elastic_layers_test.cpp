@@ -194,9 +194,10 @@ ElasticBody skinOnFat(double skin, double full)
     return tests::bodyOf(block);
 }
 
-// Force of a ball of 10 mm, 1 and 2 mm deep, beside axisymmetric finite elements (scripts/skin-on-fat, small strain): the
-// mean over places between nodes. One material per cell had -3 to +19 % where the surface lies between cells; membranes in
-// cells that count only what fills them had +5 to +26 % where it cuts them.
+// Force of a ball of 10 mm, 1 and 2 mm deep, at small strain beside axisymmetric finite elements (those of
+// scripts/skin-on-fat, linear; a cylinder of 30 mm radius for the square block costs them up to 2 %): the mean over places
+// between nodes. One material per cell had -3 to +19 % where the surface lies between cells; membranes in cells that count
+// only what fills them had +5 to +26 % where it cuts them.
 TEST(ElasticLayers, SkinOnFatIsAsStiffAsFiniteElementsSay)
 {
     struct Case {
