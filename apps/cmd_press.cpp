@@ -229,7 +229,7 @@ void warnOfSmall(const Run& run)
     if (run.press.tool.kind != ToolKind::needle && radius < spacing) {
         fmt::print(stderr,
                    "palpate press: the tool's radius of {:g} mm is less than a cell ({:g} mm): forces are too low; a finer "
-                   "--setting or [model] spacing_mm resolves it\n",
+                   "--setting or [model.elastic] spacing_mm resolves it\n",
                    1e3 * radius, 1e3 * spacing);
     }
 }
