@@ -195,6 +195,10 @@ void printPress(const PressArguments& o, const Run& run)
         fmt::print("{} ticks; the tool never touches the tissue's surface\n", s.ticks);
         return;
     }
+    if (s.peakForce == 0.0) {
+        fmt::print("{} ticks, {} in contact, but no sample is: take a smaller --every\n", s.ticks, s.inContact);
+        return;
+    }
     const Vec3 p = 1e3 * s.peakAt.position;
     fmt::print("peak force {:.3f} N after {:.3f} s at {:.2f}, {:.2f}, {:.2f} mm\n", s.peakForce, s.peakAt.seconds, p.x, p.y,
                p.z);
@@ -228,8 +232,8 @@ void warnOfSmall(const Run& run)
     const double spacing = run.model.lattice.grid.spacing, radius = run.press.tool.radius;
     if (run.press.tool.kind != ToolKind::needle && radius < spacing) {
         fmt::print(stderr,
-                   "palpate press: the tool's radius of {:g} mm is less than a cell ({:g} mm): forces are too low; a finer "
-                   "--setting or [model.elastic] spacing_mm resolves it\n",
+                   "palpate press: the tool's radius of {:g} mm is less than a cell ({:g} mm): forces are too low; a "
+                   "smaller [model.elastic] spacing_mm resolves it\n",
                    1e3 * radius, 1e3 * spacing);
     }
 }
@@ -252,6 +256,7 @@ void runPress(const PressArguments& o)
     if (!o.at.empty()) {
         run.points = studies::loadPoints(o.at);
     }
+    progress.clear();
     warnOfSmall(run);
     const auto ticks = static_cast<double>(run.path.ticks());
     try {

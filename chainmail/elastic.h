@@ -94,6 +94,8 @@ public:
     Vec3 tieForce(std::size_t i) const noexcept { return force(i, true); }
     /// By how much tool `i` of the last load is held back, see HeldTool [m].
     double behind(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].behind; }
+    /// How deep the surface is in tool `i` of the last load, as deep as that is held back [m].
+    double depth(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].depth; }
     /// Displacement of the material that is at `rest` [m].
     Vec3 displacement(Vec3 rest) const noexcept;
     /// The same at the middle of a cell of the finest level.

@@ -15,7 +15,7 @@ namespace {
 constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
 
 // Compliance that cells lack under a patch, in h / E per area: its mean over places in the grid, and by how much it grows
-// with betweenNodes().
+// with both sums of betweenNodes(). Smaller patches count as the first.
 struct Lacking {
     double radius = 0;  // of the patch, in cells
     double mean = 0;
@@ -276,7 +276,7 @@ double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept
 
 std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) noexcept
 {
-    constexpr double sides = 2.0, quarters = 1024.0;  // of points that are quartered: of a patch of two cells at most
+    constexpr double sides = 2.0, quarters = 1024.0;  // what few points near a small patch are more, as four each
     double whole = 0.0;
     for (const SurfacePoint& p : body.points) {
         whole += static_cast<double>(p.area);

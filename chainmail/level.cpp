@@ -186,7 +186,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     if (grip.kind == Grip::Kind::press) {
         reaction.force = elastic_.toolForce(others);
         reaction.behind = elastic_.behind(others);
-        reaction.depth = last_.depth;
+        reaction.depth = elastic_.depth(others);
     }
     for (std::size_t i = 0; i < others; ++i) {
         reaction.othersForce += elastic_.toolForce(i);

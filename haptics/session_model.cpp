@@ -78,6 +78,17 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     return s;
 }
 
+void checkToolFits(const datasets::Scene& scene, const chainmail::Lattice& lattice)
+{
+    constexpr std::size_t maxSeeds = 1U << 16;  // nodes that a tool may hold: beyond, a tick has no time for them
+    if (chainmail::maxPressSeeds(lattice, scene.tool.radius) > maxSeeds) {
+        throw std::runtime_error(
+            fmt::format("{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise [model{}] spacing_mm",
+                        scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing,
+                        scene.model.level == datasets::ModelLevel::elastic ? ".elastic" : ""));
+    }
+}
+
 // The planned line. A probe that is to lie over the target gets its place. The scene keeps the places of its text.
 datasets::Approach approachOf(datasets::Scene& scene, const Posed& posture, const volume::DistanceField& surface,
                               const std::vector<GuardedStructure>& structures)
@@ -97,7 +108,7 @@ datasets::Approach approachOf(datasets::Scene& scene, const Posed& posture, cons
 
 }  // namespace
 
-SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue)
+SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isStepped)
 {
     if (tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures) {
         throw std::runtime_error(fmt::format("{}: at most {} tissues and {} vital structures are supported", scene.name,
@@ -123,6 +134,9 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     const auto approach = approachOf(scene, posture, surface, structures);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
+    if (isStepped) {
+        checkToolFits(scene, lattice);
+    }
     auto elastic = elasticOf(scene, *tissue, lattice.grid, surface);
     return {std::move(scene),   std::move(tissue),     approach,
             std::move(surface), std::move(modulus),    std::move(lattice),

@@ -4,7 +4,6 @@
 #include <haptics/events.h>
 #include <haptics/surface_proxy.h>
 
-#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -12,7 +11,6 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 namespace palpate::haptics {
 
@@ -53,31 +51,12 @@ private:
     std::chrono::steady_clock::time_point last_;
 };
 
-// ChainMail, to which a session may step down, holds all nodes in the tool: beyond maxSeeds a tick has no time for them.
-const SessionModel& withToolThatFits(const SessionModel& model)
-{
-    constexpr std::size_t maxSeeds = 1U << 16;
-    const double radius = model.scene.tool.radius;
-    if (chainmail::maxPressSeeds(model.lattice, radius) > maxSeeds) {
-        throw std::runtime_error(
-            fmt::format("{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise [model] spacing_mm",
-                        model.scene.name, 1e3 * radius, 1e3 * model.lattice.grid.spacing));
-    }
-    return model;
-}
-
 // Surface of all that may press [m^2].
 double touchedByAll(const SessionModel& model, std::span<const chainmail::ElasticTool> probe)
 {
-    const auto& tool = model.scene.tool;
-    const double spacing = model.elastic->levels.front().nodes.spacing;
-    double sum = 0.0;
-    if (tool.kind != datasets::ToolKind::needle) {
-        const double length = tool.kind == datasets::ToolKind::capsule ? tool.length : 0.0;
-        sum += chainmail::touchedBy({Vec3(0.0), {0.0, length, 0.0}, tool.radius, tool.radius}, spacing);
-    }
+    double sum = touchedBy(model.scene.tool, *model.elastic);
     for (const chainmail::ElasticTool& t : probe) {
-        sum += chainmail::touchedBy(t.shape, spacing);
+        sum += chainmail::touchedBy(t.shape, model.elastic->levels.front().nodes.spacing);
     }
     return sum;
 }
@@ -117,8 +96,17 @@ chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settin
     return options;
 }
 
+double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& body) noexcept
+{
+    if (tool.kind == datasets::ToolKind::needle) {
+        return 0.0;
+    }
+    const Vec3 end(0.0, tool.kind == datasets::ToolKind::capsule ? tool.length : 0.0, 0.0);
+    return chainmail::touchedBy({Vec3(0.0), end, tool.radius, tool.radius}, body.levels.front().nodes.spacing);
+}
+
 Simulation::Simulation(const SessionModel& model, const SimulationOptions& options)
-    : model_(withToolThatFits(model)),
+    : model_(model),
       reader_(*model.tissue),
       deformation_(model.lattice, model.scene.model.maxMoves,
                    chainmail::maxPressSeeds(model.lattice, model.scene.tool.radius)),
@@ -268,7 +256,7 @@ chainmail::Grip Simulation::grip() const noexcept
     grip.axis = tool_.axis;
     const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * tool_.axis : tip;
     grip.shape = {tip, back, tool.radius, tool.radius};
-    if (tool.kind == datasets::ToolKind::capsule) {
+    if (tool.kind == datasets::ToolKind::capsule && level_ == datasets::ModelLevel::elastic) {
         grip.deepest =
             deepestPlace(model_.surface, {tool.radius, tool.length, tool_.axis, 0.0}, tip_.proxy).at - tip_.proxy;
     }

@@ -29,13 +29,14 @@ struct SimulationOptions {
 /// @param settings  of the scene
 /// @param period  of a tick [s]; longer than the usual one it has time for more cycles
 chainmail::ElasticOptions elasticOptions(const datasets::ElasticSettings& settings, double period = tickSeconds) noexcept;
+/// ElasticOptions::touches of a tool; 0 for a needle.
+double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& body) noexcept;
 
 /// The mutable half of a session. tick() is a pure function of the model and of the samples so far: the same samples give
 /// the same forces, bit for bit, however late they come. It allocates nothing, locks nothing and does no I/O.
 class Simulation {
 public:
-    /// The model must outlive it. Throws std::runtime_error for a device that is not known and for a tool that holds more
-    /// nodes of the lattice than a tick has time for.
+    /// The model must outlive it. Throws std::runtime_error for a scene with a device that is not known.
     explicit Simulation(const SessionModel& model, const SimulationOptions& options = {});
     Simulation(SessionModel&& model, const SimulationOptions& options = {}) = delete;  // a temporary would not outlive it
 

@@ -133,7 +133,7 @@ struct TickRecord {
     std::array<double, maxStructures> distance{};  // tip to each structure, in the deformed tissue [m]
     LookAhead ahead;                               // in front of the tip
     std::uint32_t contacts = 0;                    // elements of tissue that the tool touches
-    double penetration = 0;      // of the tool below the surface as deformed so far: 0 when the shape follows the tool [m]
+    double penetration = 0;      // of the tool below the deformed surface, at level elastic without `behind` (HeldTool) [m]
     std::uint32_t moved = 0;     // nodes that the deformation moved
     double residual = 0;         // largest violated link that the work cap left over [m]
     CoreSample core;             // when fired

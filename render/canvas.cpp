@@ -141,7 +141,7 @@ void Canvas::end()
 
 std::string shortened(const Canvas& canvas, const std::string& words, double size, bool bold, double width)
 {
-    if (canvas.widthOf(words, size, bold) <= width)
+    if (words.empty() || canvas.widthOf(words, size, bold) <= width)
         return words;
     const std::string ellipsis = "...";
     std::string kept = words;

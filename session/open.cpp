@@ -178,7 +178,7 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
         auto alone = loadVolume(path);
         auto tissue = std::make_shared<const volume::Tissue>(withLesion(std::move(alone), changes));
         auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
-        return haptics::buildModel(std::move(scene), std::move(tissue));
+        return haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
     }
     if (changes.lesion) {
         throw std::runtime_error(
@@ -196,7 +196,7 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     auto scene = changed(builtIn ? *builtIn : datasets::loadScene(path), changes, what);
     scene.source.phantom.memory = changes.memory;
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
-    return haptics::buildModel(std::move(scene), std::move(tissue));
+    return haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
 }
 
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info)

@@ -35,7 +35,7 @@ struct SceneChanges {
     std::function<std::string(bool probe)> fit;
     std::optional<std::string> dffb;   // one of dffbChoices
     std::optional<std::string> trial;  // with "fade": "K/N"
-    /// Another tool in place of the scene's.
+    /// Another tool in place of the scene's, for what is no session: the scene's text does not have it.
     std::function<datasets::ToolSpec(const datasets::ToolSpec&)> tool;
     std::optional<std::string> arm;         // haptic device: one of haptics::deviceNames()
     std::optional<std::string> target;      // structure

@@ -28,7 +28,8 @@ constexpr double coarse = 2.0;  // edge of a voxel, in cells, from which on samp
 // faces between voxels.
 class CellSampler {
 public:
-    CellSampler(const TissueData& tissue, const NodeGrid& grid)
+    // `forMaterial`: for visitMaterial(), which samples cells far smaller than the voxels more finely.
+    CellSampler(const TissueData& tissue, const NodeGrid& grid, bool forMaterial)
         : size_(tissue.size),
           label_(tissue.label->getConstUnsafeAccessor()),
           stiffness_(tissue.stiffness->getConstUnsafeAccessor()),
@@ -37,7 +38,7 @@ public:
         const Mat3 toIndex = glm::inverse(tissue.affine.linear);
         const Vec3 voxel = tissue.affine.spacing();
         const double finest = std::min({voxel.x, voxel.y, voxel.z});
-        isCoarse_ = std::max({voxel.x, voxel.y, voxel.z}) > coarse * grid.spacing;
+        isCoarse_ = forMaterial && std::max({voxel.x, voxel.y, voxel.z}) > coarse * grid.spacing;
         const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), isCoarse_ ? 3 : 1, 4);
         for (int i = 0; i < s * s * s; ++i) {
             const Vec3 at = (Vec3(i % s, i / s % s, i / s / s) + 0.5) / static_cast<double>(s) - 0.5;
@@ -152,13 +153,14 @@ using NodeRange = IndexBox;
 
 // Calls visit(sampler, row of nodes) for rows along x of the range, on all cores with a sampler each.
 template <typename Visit>
-void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange& range, const Visit& visit)
+void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange& range, const Visit& visit,
+                bool forMaterial = false)
 {
     if (range.empty()) {
         return;
     }
     tbb::parallel_for(tbb::blocked_range<int>(range.low.z, range.high.z + 1), [&](const tbb::blocked_range<int>& slices) {
-        const CellSampler sampler(tissue, grid);
+        const CellSampler sampler(tissue, grid, forMaterial);
         for (int z = slices.begin(); z != slices.end(); ++z) {
             for (int y = range.low.y; y <= range.high.y; ++y) {
                 visit(sampler, Index3(range.low.x, y, z));
@@ -444,11 +446,14 @@ std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
     }
     std::vector<CellMaterial> cells(grid.count());
     const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
-    forEachRow(tissue, grid, range, [&](const CellSampler& sampler, Index3 n) {
-        for (; n.x <= range.high.x; ++n.x) {
-            cells[grid.offset(n)] = cellMaterial(tissue, sampler, n, rows);
-        }
-    });
+    forEachRow(
+        tissue, grid, range,
+        [&](const CellSampler& sampler, Index3 n) {
+            for (; n.x <= range.high.x; ++n.x) {
+                cells[grid.offset(n)] = cellMaterial(tissue, sampler, n, rows);
+            }
+        },
+        true);
     return cells;
 }
 

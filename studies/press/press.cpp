@@ -39,14 +39,10 @@ std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const 
     return anchors;
 }
 
-chainmail::ElasticOptions elasticOptions(const haptics::SessionModel& model, const datasets::ToolSpec& tool)
+chainmail::ElasticOptions optionsFor(const haptics::SessionModel& model, const datasets::ToolSpec& tool)
 {
     chainmail::ElasticOptions options = haptics::elasticOptions(model.scene.model.elastic);
-    if (tool.kind != datasets::ToolKind::needle) {
-        const Vec3 end(0.0, tool.kind == datasets::ToolKind::capsule ? tool.length : 0.0, 0.0);
-        options.touches =
-            chainmail::touchedBy({Vec3(0.0), end, tool.radius, tool.radius}, model.elastic->levels.front().nodes.spacing);
-    }
+    options.touches = haptics::touchedBy(tool, *model.elastic);
     return options;
 }
 
@@ -77,7 +73,7 @@ public:
           path_(path),
           anchors_(anchorsOf(model, asked)),
           load_(model, options.tool, path.poses.front()),
-          elastic_(*model.elastic, elasticOptions(model, options.tool), startOf(path, model, options))
+          elastic_(*model.elastic, optionsFor(model, options.tool), startOf(path, model, options))
     {
     }
 

@@ -55,6 +55,14 @@ TEST_F(PressCommand, FiguresHaveTheTissuesForceAndTheWayOfThePoints)
     EXPECT_EQ(j.at("displacement").at(1).at("by_mm"), nlohmann::json({0.0, 0.0, 0.0}));
 }
 
+TEST_F(PressCommand, AToolSmallerThanACellIsSaidToBe)
+{
+    const Outcome small = palpate({"press", scene, "--path", path, "--radius-mm", "1"});
+    EXPECT_EQ(small.status, 0) << small.err;
+    EXPECT_NE(small.err.find("less than a cell (2 mm): forces are too low"), std::string::npos) << small.err;
+    EXPECT_EQ(palpate({"press", scene, "--path", path, "--radius-mm", "3"}).err, "");
+}
+
 TEST_F(PressCommand, AToolThatIsHeldBackIsSaidToBe)
 {
     writeText(path, "x_mm,y_mm,z_mm\n0,0,0\n0,0,0\n");

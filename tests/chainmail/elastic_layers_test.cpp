@@ -195,9 +195,9 @@ ElasticBody skinOnFat(double skin, double full)
 }
 
 // Force of a ball of 10 mm, 1 and 2 mm deep, at small strain beside axisymmetric finite elements (those of
-// scripts/skin-on-fat, linear; a cylinder of 30 mm radius for the square block costs them up to 2 %): the mean over places
-// between nodes. One material per cell had -3 to +19 % where the surface lies between cells; membranes in cells that count
-// only what fills them had +5 to +26 % where it cuts them.
+// scripts/skin-on-fat before they were neo-Hookean; a cylinder of 30 mm radius for the square block costs them up to 2 %):
+// the mean over places between nodes. One material per cell had -3 to +19 % where the surface lies between cells; membranes
+// in cells that count only what fills them had +5 to +26 % where it cuts them.
 TEST(ElasticLayers, SkinOnFatIsAsStiffAsFiniteElementsSay)
 {
     struct Case {
