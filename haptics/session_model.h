@@ -38,9 +38,9 @@ struct SessionModel {
 
 /// Builds fields and lattice; puts the volume into the scene's posture first, which takes seconds. Throws
 /// std::runtime_error for structures that the volume does not have, and more of them than maxStructures.
-/// @param isStepped  sessions run with it, which may step down to ChainMail: a tool that holds more nodes of the lattice
-/// than
-///                   a tick has time for is refused
+/// @param scene      what to build
+/// @param tissue     its volume
+/// @param isStepped  for sessions, which may step down to ChainMail: a tool that holds too many nodes for a tick is refused
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isStepped = true);
 
 }  // namespace palpate::haptics
