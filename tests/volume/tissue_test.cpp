@@ -205,16 +205,21 @@ TEST(Tissue, ANamedZeroIsTissue)
     EXPECT_EQ(reader.youngsModulus(image.affine.toPatient(Vec3(-1, 0, 0))), 0.0);
 }
 
+// Tissue 1 of a whole grid of cubic voxels from y = `from` on.
+Tissue behindFace(double voxel, Index3 size, int from)
+{
+    LabelImage image{size, {Mat3(voxel), Vec3(0.0)}, {}};
+    image.values.assign(image.offset({0, 0, size.z}), 0);
+    forEachIndex({0, from, 0}, size - 1, [&](Index3 n) { image.values[image.offset(n)] = 1; });
+    return Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+}
+
 // A cell that the body's face cuts has the share of the modulus that lies behind the face, wherever samples fall among the
 // voxels: exactly, but for the half voxel at the cell's own ends. By the nearest voxel half a voxel was missing on ties.
 TEST(TissueCells, AreAsFullAsTheBodyIsInThem)
 {
     constexpr double voxel = 1e-3;
-    const Index3 size(30, 30, 30);
-    LabelImage image{size, {Mat3(voxel), Vec3(0.0)}, {}};
-    image.values.assign(image.offset({0, 0, size.z}), 0);
-    forEachIndex({0, 10, 0}, {29, 29, 29}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
-    const auto tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+    const Tissue tissue = behindFace(voxel, Index3(30), 10);
     const double whole = tissue.table().rows[1].youngsModulus, face = 9.5 * voxel;
     for (const double spacing : {1.5e-3, 2e-3, 3e-3, 4e-3}) {
         for (double shift = 0.0; shift < spacing; shift += 0.125e-3) {
@@ -235,11 +240,7 @@ TEST(TissueCells, AreAsFullAsTheBodyIsInThem)
 TEST(TissueCells, NothingLiesOutsideOfCoarseVoxels)
 {
     constexpr double voxel = 5e-3;
-    const Index3 size(8, 8, 8);
-    LabelImage image{size, {Mat3(voxel), Vec3(0.0)}, {}};
-    image.values.assign(image.offset({0, 0, size.z}), 0);
-    forEachIndex({0, 4, 0}, {7, 7, 7}, [&](Index3 n) { image.values[image.offset(n)] = 1; });
-    const auto tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+    const Tissue tissue = behindFace(voxel, Index3(8), 4);
     const double whole = tissue.table().rows[1].youngsModulus, face = 3.5 * voxel;
     for (const double spacing : {0.8e-3, 1.5e-3, 2e-3}) {
         for (double shift = 0.0; shift < spacing; shift += 0.125e-3) {
