@@ -170,7 +170,8 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
     const ultrasound::Settings& s = image.settings;
     const double x = area_.x + 0.5 * font, row = lineHeight * font;
     double y = area_.y + 0.4 * font;
-    const auto words = [&](const std::string& what, const Colour& colour, bool bold = false) {
+    const auto words = [&](const std::string& all, const Colour& colour, bool bold = false) {
+        const std::string what = shortened(canvas, all, 0.9 * font, bold, area_.width - font);
         canvas.text({x + 1, y - 1}, what, 0.9 * font, {0, 0, 0}, Align::left, bold);
         canvas.text({x, y}, what, 0.9 * font, colour, Align::left, bold);
         y += row;
