@@ -38,7 +38,7 @@ void Canvas::begin()
     points_->Reset();
     cells_->Reset();
     colours_->Reset();
-    written_.clear();
+    put_.clear();
     used_ = 0;
 }
 
@@ -99,10 +99,18 @@ void Canvas::text(Point2 at, const std::string& words, double size, const Colour
     look.SetJustification(align == Align::left     ? VTK_TEXT_LEFT
                           : align == Align::centre ? VTK_TEXT_CENTERED
                                                    : VTK_TEXT_RIGHT);
-    const double wide = widthOf(words, size, bold), before = align == Align::left     ? 0
-                                                             : align == Align::centre ? wide / 2
-                                                                                      : wide;
-    written_.push_back({words, {at[0] - before, at[1]}, {at[0] - before + wide, at[1] + size}});
+    put_.push_back({words, at, size, align, bold});
+}
+
+std::vector<Written> Canvas::written() const
+{
+    std::vector<Written> all;
+    for (const Put& p : put_) {
+        const double wide = widthOf(p.words, p.size, p.bold);
+        const double left = p.at[0] - (p.align == Align::left ? 0 : p.align == Align::centre ? wide / 2 : wide);
+        all.push_back({p.words, {left, p.at[1]}, {left + wide, p.at[1] + p.size}});
+    }
+    return all;
 }
 
 double Canvas::widthOf(const std::string& words, double size, bool bold) const

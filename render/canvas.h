@@ -47,16 +47,24 @@ public:
     /// How wide text() draws these words [pixels].
     double widthOf(const std::string& words, double size, bool bold = false) const;
     /// All words since begin(), in their order.
-    const std::vector<Written>& written() const noexcept { return written_; }
+    std::vector<Written> written() const;
 
 private:
+    // Words of text(), which are measured only where somebody asks.
+    struct Put {
+        std::string words;
+        Point2 at;
+        double size;
+        Align align;
+        bool bold;
+    };
     vtkRenderer& renderer_;
     vtkNew<vtkPoints> points_;
     vtkNew<vtkCellArray> cells_;
     vtkNew<vtkUnsignedCharArray> colours_;
     vtkNew<vtkPolyData> shapes_;
     std::vector<vtkSmartPointer<vtkTextActor>> texts_;
-    std::vector<Written> written_;
+    std::vector<Put> put_;
     std::size_t used_ = 0;
     mutable std::map<std::pair<std::string, int>, double> widths_;  // of words already measured
 };

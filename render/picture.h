@@ -111,7 +111,7 @@ public:
     glm::dvec3 under(Point2 pixel, glm::dvec3 point) const;
 
     /// The words of the picture, and where they are.
-    const std::vector<Written>& written() const noexcept { return canvas_.written(); }
+    std::vector<Written> written() const { return canvas_.written(); }
     /// The renderer's name, as the driver tells it.
     std::string display();
 

@@ -117,7 +117,7 @@ private:
                             pose.seconds));
         }
         summary_.notConverged += converge && s.residual > pressTolerance ? 1 : 0;
-        moved_ = result.moved;
+        summary_.windowMoves += result.moved && !elastic_.atRest() ? 1 : 0;
         return s;
     }
 
@@ -131,7 +131,6 @@ private:
             return;
         }
         ++summary_.inContact;
-        summary_.windowMoves += moved_ ? 1 : 0;
         if (!given) {
             return;
         }
@@ -148,7 +147,6 @@ private:
     PoseLoad load_;
     Elastic elastic_;
     PressSummary summary_;
-    bool moved_ = false;           // windows, for the last pose
     std::vector<double> seconds_;  // of ticks in contact
 };
 
