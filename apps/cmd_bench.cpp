@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <command/json.h>
+#include <command/options.h>
 
 #include <base/outputs.h>
 #include <planner/costs.h>
@@ -163,7 +164,8 @@ void benchQuery(const QueryOptions& o)
 void addBenchQuery(CLI::App& bench)
 {
     auto o = std::make_shared<QueryOptions>();
-    auto* query = bench.add_subcommand("query", "Time per question what a tool touches, for bodies of growing size");
+    auto* query =
+        bench.add_subcommand("query", "Measure the time to find the tissue that a tool touches, for growing bodies");
     query->add_option("--elements", o->sides, "Elements along each side of the body")
         ->delimiter(',')
         ->check(CLI::Range(32, 384))
@@ -176,15 +178,15 @@ void addBenchQuery(CLI::App& bench)
 
 void addBench(CLI::App& app)
 {
-    auto* bench = app.add_subcommand("bench", "Measure");
+    auto* bench = app.add_subcommand("bench", "Measure times and errors");
     bench->require_subcommand(1);
 
     auto o = std::make_shared<BenchArguments>();
-    auto* tick = bench->add_subcommand("tick", "Time per tick and task, for phantoms of growing resolution");
+    auto* tick = bench->add_subcommand("tick", "Measure the time per tick and task, for phantoms of growing resolution");
     tick->add_option("SCENE", o->scene, "Scene with a phantom")->capture_default_str();
     tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")->delimiter(',')->capture_default_str();
-    tick->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
-    tick->add_flag("--paced", o->paced, "One tick per millisecond instead of one after the other");
+    command::addModel(*tick, o->changes);
+    tick->add_flag("--paced", o->paced, "Run one tick per millisecond (default: as fast as possible)");
     tick->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     tick->final_callback([o] { benchTick(*o); });
     addBenchQuery(*bench);

@@ -181,34 +181,34 @@ void draw(const CaseArguments& o)
 void addCase(CLI::App& app)
 {
     auto o = std::make_shared<CaseArguments>();
-    CLI::App* const c = app.add_subcommand("case", "What trainees are given: list, show, make and check cases");
+    CLI::App* const c = app.add_subcommand("case", "List, show, make and check cases for trainees");
     c->require_subcommand(1);
-    CLI::App* const all = c->add_subcommand("list", "The cases that there are");
-    all->add_option("--json", o->json, "write them here (- for standard output)");
+    CLI::App* const all = c->add_subcommand("list", "List cases");
+    all->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     all->final_callback([o] { list(*o); });
 
     const auto one = [&](const char* name, const char* what) {
         CLI::App* const sub = c->add_subcommand(name, what);
-        sub->add_option("CASE", o->id, "a case's name, or its folder")->required();
+        sub->add_option("CASE", o->id, "Name or folder of the case")->required();
         return sub;
     };
-    CLI::App* const shown = one("show", "Briefing, picture and scene of a case");
-    shown->add_option("--json", o->json, "write it here (- for standard output)");
+    CLI::App* const shown = one("show", "Show briefing, picture and scene of a case");
+    shown->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     shown->final_callback([o] { show(*o); });
-    one("check", "What is wrong with a case; exit status 1 where something is")->final_callback([o] { check(*o); });
-    CLI::App* const picture = one("picture", "Draw a case's picture: the body and the needle before it");
-    picture->add_option("-o,--output", o->picture, "file (.png; the case's picture.png where it is left out)");
+    one("check", "Check a case and list its faults; exit status 1 if there are any")->final_callback([o] { check(*o); });
+    CLI::App* const picture = one("picture", "Draw the picture of a case, the body with the needle in front of it");
+    picture->add_option("-o,--output", o->picture, "File to write (.png; default: picture.png in the case's folder)");
     picture->final_callback([o] { draw(*o); });
 
-    CLI::App* const made = c->add_subcommand("new", "Make a case of a volume");
-    made->add_option("VOLUME", o->made.volume, "a volume (.vdb)")->required();
-    made->add_option("-o,--output", o->made.folder, "folder of the case; must not be there")->required();
-    made->add_option("--title", o->made.title, "a few words");
-    made->add_option("--target", o->made.target, "structure to sample");
-    made->add_option("--difficulty", o->made.difficulty, "1 to 5")
+    CLI::App* const made = c->add_subcommand("new", "Make a case from a volume");
+    made->add_option("VOLUME", o->made.volume, "Volume (.vdb)")->required();
+    made->add_option("-o,--output", o->made.folder, "Folder of the case; must not exist")->required();
+    made->add_option("--title", o->made.title, "Title, a few words");
+    made->add_option("--target", o->made.target, "Structure to sample (default: the first tumour)");
+    made->add_option("--difficulty", o->made.difficulty, "Difficulty, 1 to 5")
         ->check(CLI::Range(1, training::hardest))
         ->capture_default_str();
-    made->add_option("--licence", o->made.licence, "who may use the volume");
+    made->add_option("--licence", o->made.licence, "Licence of the volume");
     made->final_callback([o] { make(*o); });
 }
 

@@ -244,47 +244,52 @@ void verify(const CurriculumArguments& o)
 void addCurriculum(CLI::App& app)
 {
     auto o = std::make_shared<CurriculumArguments>();
-    CLI::App* const c =
-        app.add_subcommand("curriculum", "Ways from the first touch to proficiency: list, check, what is next");
+    CLI::App* const c = app.add_subcommand("curriculum", "List, check and simulate curricula, and show the next exercise");
     c->require_subcommand(1);
-    const auto json = [&](CLI::App* sub) { sub->add_option("--json", o->json, "write it here (- for standard output)"); };
-    CLI::App* const all = c->add_subcommand("list", "The curricula that there are");
+    const auto json = [&](CLI::App* sub) {
+        sub->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    };
+    CLI::App* const all = c->add_subcommand("list", "List curricula");
     json(all);
     all->final_callback([o] { listCurricula(*o); });
 
-    CLI::App* const checked = c->add_subcommand("check", "What is wrong with a curriculum, or what it asks for");
-    checked->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
+    CLI::App* const checked = c->add_subcommand("check", "Check a curriculum, and show its exercises and gates");
+    checked->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum")->required();
     checked->final_callback([o] { checkCurriculum(*o); });
 
-    CLI::App* const after = c->add_subcommand("next", "What somebody should train next, and why");
-    after->add_option("CURRICULUM", o->id, "a curriculum's name or file (that of the last session)");
-    after->add_option("--profile", o->profile, "whose progress")->required();
-    after->add_option("--profiles", o->profiles, "file of the profiles");
+    CLI::App* const after = c->add_subcommand("next", "Show the next exercise of a trainee, and why");
+    after->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum (default: that of the last session)");
+    after->add_option("--profile", o->profile, "Profile of the trainee")->required();
+    after->add_option("--profiles", o->profiles, "File of profiles (default: ~/.local/share/palpate/profiles.db)");
     json(after);
     after->final_callback([o] { next(*o); });
 
     CLI::App* const tried =
-        c->add_subcommand("simulate", "How many sessions simulated people of three skills need: for choosing gates");
-    tried->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
-    tried->add_option("--people", o->people, "of each skill")->check(CLI::Range(1, 100000))->capture_default_str();
-    tried->add_option("--sessions", o->most, "of each of them, at most")
+        c->add_subcommand("simulate", "Count the sessions that simulated people of three skills need, to choose gates");
+    tried->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum")->required();
+    tried->add_option("--people", o->people, "Simulated people per skill")
         ->check(CLI::Range(1, 100000))
         ->capture_default_str();
-    tried->add_option("--seed", o->seed, "of all chances")->capture_default_str();
+    tried->add_option("--sessions", o->most, "Maximum number of sessions per person")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    tried->add_option("--seed", o->seed, "Seed of all random choices")->capture_default_str();
     json(tried);
     tried->final_callback([o] { simulate(*o); });
 
-    CLI::App* const verified = c->add_subcommand(
-        "verify", "Sends simulated people through a curriculum: do its gates open, its charts signal as they should?");
-    verified->add_option("CURRICULUM", o->id, "a curriculum's name, or its file (.toml)")->required();
-    verified->add_option("--people", o->people, "of each skill")->check(CLI::Range(1, 100000))->capture_default_str();
-    verified->add_option("--sessions", o->most, "of each of them, at most")
+    CLI::App* const verified =
+        c->add_subcommand("verify", "Test a curriculum with simulated people: gates, CUSUM charts, storage of sessions");
+    verified->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum")->required();
+    verified->add_option("--people", o->people, "Simulated people per skill")
         ->check(CLI::Range(1, 100000))
         ->capture_default_str();
-    verified->add_option("--kills", o->kills, "how often a process that stores sessions is killed")
+    verified->add_option("--sessions", o->most, "Maximum number of sessions per person")
+        ->check(CLI::Range(1, 100000))
+        ->capture_default_str();
+    verified->add_option("--kills", o->kills, "How many times a process that stores sessions is killed")
         ->check(CLI::Range(0, 10000))
         ->capture_default_str();
-    verified->add_option("--seed", o->seed, "of all chances")->capture_default_str();
+    verified->add_option("--seed", o->seed, "Seed of all random choices")->capture_default_str();
     json(verified);
     verified->final_callback([o] { verify(*o); });
 }

@@ -185,7 +185,7 @@ void printExchanges(const Exchanges& e)
     fmt::print("  {} were not answered, {} not plausible, {} bytes belonged to none\n", e.counts.unanswered,
                e.counts.implausible, e.counts.lostBytes);
     if (rate < slow || 100 * (e.counts.unanswered + e.counts.implausible) > e.counts.exchanges) {
-        fmt::print("  this is too slow or too unsure to feel tissue: plug the Falcon straight into the computer\n");
+        fmt::print("  this is too slow or too unreliable to feel tissue: plug the Falcon directly into the computer\n");
     }
 }
 
@@ -231,7 +231,7 @@ nlohmann::json list(const DevicesArguments& o)
         say(fmt::format("firmware          {}: {} bytes", firmware.file, firmware.image.size()));
         all["firmware"] = {{"file", firmware.file}, {"bytes", firmware.image.size()}};
     }
-    say("without a Falcon: --device hand (a scripted trainee), --device mouse (of the viewer's window)");
+    say("without a Falcon: --device hand (a scripted trainee), --device mouse (in the viewer's window)");
     return all;
 }
 
@@ -266,19 +266,19 @@ void devices(const DevicesArguments& o)
 void addDevices(CLI::App& app)
 {
     const auto o = std::make_shared<DevicesArguments>();
-    CLI::App* c = app.add_subcommand("devices", "List haptic devices: what is there, what is missing");
-    c->add_option("--falcon-firmware", o->falcon.firmware, "Firmware of the Novint Falcon (a file of its maker's)");
+    CLI::App* c = app.add_subcommand("devices", "List haptic devices, and what is missing to use them");
+    c->add_option("--falcon-firmware", o->falcon.firmware, "Firmware file of the Novint Falcon, from its maker");
     c->add_option("--exchanges", o->exchanges,
-                  "Make the Falcon ready and exchange so many packets without force: how fast, how surely")
+                  "Exchange this many packets with the Falcon, without force, and print rate and losses")
         ->check(CLI::Range(1, 10000000));
-    auto* const buttons = c->add_flag("--buttons", o->buttons,
-                                      "Print a line for each button that is pressed at the Falcon's grip, without force, "
-                                      "until it is ended (Ctrl-C); where there is no Falcon, wait for one");
-    c->add_flag("--force-test", o->forceTest, "Make the Falcon ready and push its grip with 1 N, to be felt")
-        ->excludes(buttons);
-    auto* install = c->add_flag("--install-udev", o->installUdev, "Write the rule that lets you open the Falcon (as root)");
-    c->add_option("--udev-folder", o->rules, "Where udev's rules are")->capture_default_str();
-    c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)")
+    auto* const buttons = c->add_flag(
+        "--buttons", o->buttons,
+        "Print a line for each button pressed at the Falcon's grip, until Ctrl-C; no force; waits for a Falcon");
+    c->add_flag("--force-test", o->forceTest, "Push the Falcon's grip with 1 N, to be felt")->excludes(buttons);
+    auto* install = c->add_flag("--install-udev", o->installUdev,
+                                "Write the udev rule that permits access to the Falcon (run as root)");
+    c->add_option("--udev-folder", o->rules, "Folder of udev's rules")->capture_default_str();
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)")
         ->excludes(install)
         ->excludes(buttons);
     c->final_callback([o] { devices(*o); });

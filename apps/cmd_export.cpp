@@ -64,21 +64,23 @@ void checkOptions(ExportArguments& o)
     }
     if ((o.what == "ultrasound" || o.what == "ct") != isPng(o.output)) {
         throw std::runtime_error(
-            fmt::format("{}: an ultrasound picture or a CT scan is a .png, and nothing else is", o.output.string()));
+            fmt::format("{}: ultrasound and ct are written as .png, all else is not: change the file's name or --what",
+                        o.output.string()));
     }
     if (!o.like.empty() && (o.what != "ultrasound" || !o.at.empty())) {
-        throw std::runtime_error("--like: goes with --record FILE -o FILE.png, and says the time itself: leave out --at");
+        throw std::runtime_error(
+            "--like: needs --record FILE and -o FILE.png, and takes the time from the picture: leave out --at");
     }
     if (o.like.empty() && o.record.empty() != o.at.empty()) {
         throw std::runtime_error(o.at.empty() ? "--record: needs a time of the session: add --at 3.2s"
-                                              : "--at: is a time of a record: add --record FILE");
+                                              : "--at: needs a record: add --record FILE");
     }
     if (o.record.empty() && ofRecordOnly(o.what)) {
         throw std::runtime_error(
-            fmt::format("{}: {} is of a session: give --record FILE --at TIME", o.output.string(), o.what));
+            fmt::format("{}: {} needs a session: give --record FILE --at TIME", o.output.string(), o.what));
     }
     if (!o.record.empty() && !ofRecordOnly(o.what) && o.what != "labels") {
-        throw std::runtime_error(fmt::format("--what {}: does not change in a session: export it of the volume", o.what));
+        throw std::runtime_error(fmt::format("--what {}: does not change in a session: export it from the volume", o.what));
     }
     if (isVtu(o.output) && o.what != "displacement") {
         throw std::runtime_error(
@@ -87,7 +89,7 @@ void checkOptions(ExportArguments& o)
                         o.output.string(), o.what));
     }
     if (!o.map.empty() && o.what != "labels") {
-        throw std::runtime_error("--write-map: goes with labels");
+        throw std::runtime_error("--write-map: needs --what labels");
     }
     if (!isVtu(o.output) && !isPng(o.output)) {
         volume::checkExportName(o.output);
@@ -225,34 +227,35 @@ void addExport(CLI::App& app)
 {
     const auto o = std::make_shared<ExportArguments>();
     CLI::App* command = app.add_subcommand(
-        "export", "Write a volume, or the deformed state of a record, as NIfTI, NRRD, MetaImage or .vtu");
+        "export", "Write a volume, or the state of a record at one time, as NIfTI, NRRD, MetaImage, .vtu or .png");
     command->add_option("volume", o->volume, "Volume (.vdb)")->type_name("V.vdb");
     command
         ->add_option("-o,--output", o->output, "File to write: .nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd, .vtu or .png")
         ->type_name("FILE")
         ->required();
-    command->add_option("--record", o->record, "Record of a session (train --record), in place of a volume")
+    command->add_option("--record", o->record, "Record of a session (train --record), instead of a volume")
         ->type_name("FILE");
-    command->add_option("--at", o->at, "Time of the session, 3.2s")->type_name("TIME");
+    command->add_option("--at", o->at, "Session time of the state, e.g. 3.2s or 3200ms")->type_name("TIME");
     command
-        ->add_option(
-            "--what", o->what,
-            "labels (default), image, stiffness [kPa]; of a record labels, displacement or its inverse [mm, LPS], the "
-            "ultrasound picture (default of .png), or a CT scan (.png) of a scene with CT")
+        ->add_option("--what", o->what,
+                     "Of a volume: labels (default), image, stiffness [kPa]; of a record: labels, displacement (default "
+                     "for .vtu), inverse displacement [mm, LPS], ultrasound (default for .png), ct")
         ->check(CLI::IsMember(whatChoices));
-    command->add_flag("--nifti2", o->nifti2, "NIfTI-2: positions as doubles");
-    command->add_option("--write-map", o->map, "Write names and tissues too, as a label map for import --map")
+    command->add_flag("--nifti2", o->nifti2, "Write NIfTI-2, with positions in double precision");
+    command->add_option("--write-map", o->map, "Also write names and tissues as a label map, for import --map")
         ->type_name("FILE");
-    command->add_option("--like", o->like, "A stored ultrasound picture: the same moment, probe, settings and size again")
+    command->add_option("--like", o->like, "Stored ultrasound picture: repeat its time, probe, settings and size")
         ->type_name("FILE.png");
-    command->add_option("--width", o->width, "Of an ultrasound picture [pixels]")
+    command->add_option("--width", o->width, "Width of an ultrasound picture [pixels]")
         ->check(CLI::Range(100, 8192))
         ->capture_default_str();
-    command->add_option("--window", o->window, "Of a CT scan")->check(CLI::IsMember(windowChoices))->capture_default_str();
-    command->add_option("--height", o->height, "Of an ultrasound picture or a slice of a CT scan [pixels]")
+    command->add_option("--window", o->window, "Grey-level window of a CT scan")
+        ->check(CLI::IsMember(windowChoices))
+        ->capture_default_str();
+    command->add_option("--height", o->height, "Height of an ultrasound picture, or of a slice of a CT scan [pixels]")
         ->check(CLI::Range(100, 8192))
         ->capture_default_str();
-    command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([o] { runExport(*o); });
 }
 

@@ -102,40 +102,40 @@ void addReading(CLI::App& command, ImportArguments& o)
 {
     command
         .add_option("--overlap", o.reading.overlap,
-                    "Segment that a voxel of several belongs to: smallest (default), first, last, or names, later ones win")
+                    "Segment of a voxel in several segments: smallest (default), first, last, or names; later names win")
         ->type_name("RULE|NAMES")
         ->delimiter(',')
         ->group("Reading");
-    command.add_option("--series", o.reading.series, "SeriesInstanceUID to take of a folder of several")
+    command.add_option("--series", o.reading.series, "SeriesInstanceUID to read from a folder with several series")
         ->type_name("UID")
         ->group("Reading");
     command
         .add_option("--threshold", o.reading.fractionalThreshold,
-                    "From which a probability of a fractional DICOM SEG is tissue (default 0.5)")
+                    "Lowest probability of tissue in a fractional DICOM SEG (default: 0.5)")
         ->check(CLI::Range(0.0, 1.0))
         ->group("Reading");
-    command.add_option("--volume", o.reading.volume, "Which volume of a file with several (4D), from 1")
+    command.add_option("--volume", o.reading.volume, "Number of the volume in a 4D file, from 1")
         ->check(CLI::Range(1, 1 << 30))
         ->type_name("N")
         ->group("Reading");
-    command.add_flag("--renumber", o.reading.renumber, "Give values that are negative or over 65535 free label values")
+    command.add_flag("--renumber", o.reading.renumber, "Replace values below 0 or above 65535 by free label values")
         ->group("Reading");
-    command.add_flag("--round", o.reading.round, "Take values within 0.001 of a whole number as that")->group("Reading");
+    command.add_flag("--round", o.reading.round, "Round values that are within 0.001 of a whole number")->group("Reading");
     command
         .add_option("--axes", o.reading.axes,
-                    "Sides to which the voxel axes run, where the file does not say it: LPS, RAS, LAS, ...")
+                    "Directions of the voxel axes, if the file does not define them: LPS, RAS, LAS, ...")
         ->type_name("XYZ")
         ->group("Reading");
-    command.add_flag("--dicom-labels", o.reading.dicomLabels, "Take the values of a DICOM series of CT, MR, ... as labels")
+    command.add_flag("--dicom-labels", o.reading.dicomLabels, "Read the values of a DICOM series (CT, MR, ...) as labels")
         ->group("Reading");
-    command.add_option("--image-volume", o.imageVolume, "Which volume of an image with several (4D), from 1")
+    command.add_option("--image-volume", o.imageVolume, "Number of the volume in a 4D image, from 1")
         ->check(CLI::Range(1, 1 << 30))
         ->type_name("N")
         ->group("Reading");
     command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
         ->type_name("FILE")
         ->group("Reading");
-    command.add_option("--image-unit", o.imageUnit, "HU: the image is CT in Hounsfield units; only DICOM says so itself")
+    command.add_option("--image-unit", o.imageUnit, "HU: the image is CT in Hounsfield units; not needed for DICOM")
         ->check(CLI::IsMember({"HU"}))
         ->group("Reading");
     command
@@ -147,7 +147,9 @@ void addReading(CLI::App& command, ImportArguments& o)
 
 void addMapping(CLI::App& command, ImportArguments& o)
 {
-    command.add_option("--map,--labels", o.mapping.map, "What the labels are: a built-in label map's name, or a TOML file")
+    command
+        .add_option("--map,--labels", o.mapping.map,
+                    "Label map that assigns tissues to labels: a built-in name, or a TOML file")
         ->type_name("NAME|FILE")
         ->group("Tissue");
     command
@@ -164,36 +166,36 @@ void addMapping(CLI::App& command, ImportArguments& o)
                 }
                 throw CLI::Success();
             },
-            "List the built-in label maps with their sources, and stop")
+            "List the built-in label maps with their sources, and exit")
         ->trigger_on_parse()
         ->group("Tissue");
-    command.add_flag("--verbose", o.mapping.verbose, "A warning for each label and each overlap, not one for all")
+    command.add_flag("--verbose", o.mapping.verbose, "Print a warning for each label and each overlap, not one for all")
         ->group("Tissue");
     command.add_option("--set", o.mapping.set, "Tissue of one label, by its name or value; may be repeated")
         ->type_name("LABEL=TISSUE")
         ->group("Tissue");
-    command.add_option("--default-tissue", o.mapping.defaultTissue, "Tissue of labels that nothing else names")
+    command.add_option("--default-tissue", o.mapping.defaultTissue, "Tissue of labels that are not assigned otherwise")
         ->type_name("NAME")
         ->group("Tissue");
-    command
-        .add_option("--write-map", o.mapping.writeMap,
-                    "Write a label map to edit, with what is known of the labels, and stop")
+    command.add_option("--write-map", o.mapping.writeMap, "Write a label map to edit, filled in as far as known, and exit")
         ->type_name("FILE")
         ->group("Tissue");
     CLI::Option* const fromImage =
         command
             .add_option_function<std::vector<std::string>>(
                 "--body-from-image", [&o](const std::vector<std::string>&) { o.bodyFromImage = true; },
-                "Find skin, fat, muscle, bone, lung and vessels around the labels in the image, which is CT")
+                "Segment skin, fat, muscle, bone, lung and vessels around the labels in the CT image")
             ->expected(0, 1)
             ->check(CLI::IsMember({"ct"}))
             ->type_name("[ct]")
             ->group("Tissue");
-    command.add_option("--body-from-hull", o.bodyFromHull, "Invent so much soft tissue and skin around the labels")
+    command
+        .add_option("--body-from-hull", o.bodyFromHull,
+                    "Add this thickness of invented soft tissue and skin around the labels [mm]")
         ->type_name("MM")
         ->excludes(fromImage)
         ->group("Tissue");
-    command.add_option("--tissues", o.tissues, "Tissue table in place of the built-in one")
+    command.add_option("--tissues", o.tissues, "Tissue table instead of the built-in one")
         ->type_name("FILE")
         ->group("Tissue");
 }
@@ -207,11 +209,13 @@ void addSteps(CLI::App& command, ImportArguments& o)
                         "Keep a box around all tissue, around a structure, or x0,x1,y0,y1,z0,z1 in LPS")
             ->type_name("tissue|NAME|BOX")
             ->group(group);
-    command.add_option("--crop-margin", o.cropMargin, "Around the structure (default 10)")
+    command.add_option("--crop-margin", o.cropMargin, "Margin around the structure or tissue (default: 10)")
         ->type_name("MM")
         ->needs(crop)
         ->group(group);
-    command.add_option("--voxel", o.voxel, "Resample to cubes; straightens sheared grids")->type_name("MM")->group(group);
+    command.add_option("--voxel", o.voxel, "Resample to cubes of this edge length; straightens sheared grids")
+        ->type_name("MM")
+        ->group(group);
     command
         .add_option_function<std::vector<std::string>>(
             "--largest-component",
@@ -235,12 +239,14 @@ void addSteps(CLI::App& command, ImportArguments& o)
                 o.steps.closeSkinHoles = 10e-3;
                 o.closeSkinHoles = size.empty() ? "" : size[0];
             },
-            "Close holes in the skin up to this size (10)")
+            "Close holes in the skin up to this size (default: 10)")
         ->expected(0, 1)
         ->type_name("[MM]")
         ->group(group);
-    command.add_option("--add-skin", o.addSkin, "Make the outermost layer of tissue skin")->type_name("MM")->group(group);
-    command.add_option("--pad", o.pad, "Add outside on all sides")->type_name("MM")->group(group);
+    command.add_option("--add-skin", o.addSkin, "Turn the outermost layer of tissue, of this thickness, into skin")
+        ->type_name("MM")
+        ->group(group);
+    command.add_option("--pad", o.pad, "Add air of this width on all sides")->type_name("MM")->group(group);
 }
 
 }  // namespace
@@ -254,7 +260,7 @@ void addImport(CLI::App& app)
         ->type_name("LABELS")
         ->required();
     command->add_option("-o,--output", o->output, "Volume to write")->type_name("V.vdb");
-    command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     addReading(*command, *o);
     addMapping(*command, *o);
     addSteps(*command, *o);
@@ -263,7 +269,7 @@ void addImport(CLI::App& app)
             runImport(*o);
         } catch (const std::bad_alloc&) {
             throw std::runtime_error(o->input.string() +
-                                     ": needs more memory than there is: crop it, or resample it to larger voxels");
+                                     ": needs more memory than this machine has: crop it, or resample it to larger voxels");
         }
     });
 }

@@ -34,9 +34,9 @@ void runInfo(const InfoArguments& options)
 void addInfo(CLI::App& app)
 {
     const auto options = std::make_shared<InfoArguments>();
-    CLI::App* command = app.add_subcommand("info", "Show what a volume holds: size, tissues, memory, where it comes from");
+    CLI::App* command = app.add_subcommand("info", "Show size, tissues, memory and origin of a volume");
     command->add_option("volume", options->file, "Volume (.vdb)")->type_name("V.vdb")->required();
-    command->add_option("--json", options->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->add_option("--json", options->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([options] { runInfo(*options); });
 }
 

@@ -106,8 +106,9 @@ void runPhantom(PhantomArguments& options)
         return;
     }
     if (options.spec.name.empty() || options.output.empty()) {
-        throw std::runtime_error(fmt::format("phantom: say which ({}) and where to, -o V.vdb; --list shows the parameters",
-                                             fmt::join(datasets::phantomNames(), ", ")));
+        throw std::runtime_error(
+            fmt::format("phantom: give a phantom ({}) and a file, -o V.vdb; --list shows the parameters",
+                        fmt::join(datasets::phantomNames(), ", ")));
     }
     options.spec.voxel = options.voxel * 1e-3;
     if (!options.anyway) {
@@ -137,15 +138,15 @@ void addPhantom(CLI::App& app)
     const auto options = std::make_shared<PhantomArguments>();
     options->spec.name.clear();
     CLI::App* command = app.add_subcommand("phantom", "Make a phantom: breast, layered or block");
-    command->add_option("name", options->spec.name, "Which phantom")->type_name("NAME");
+    command->add_option("name", options->spec.name, "Phantom to make (--list shows all)")->type_name("NAME");
     command->add_option("-o,--output", options->output, "Volume to write (.vdb)")->type_name("V.vdb");
-    command->add_option("--seed", options->spec.seed, "Of every random choice")->capture_default_str();
-    command->add_option("--voxel", options->voxel, "Edge of a voxel [mm]")->type_name("MM")->capture_default_str();
-    command->add_option("--set", options->settings, "Parameters, see --list")->type_name("KEY=VALUE");
-    command->add_flag("--list", options->list, "Show the parameters with units, ranges and standard values");
-    command->add_flag("--anyway", options->anyway, "Also one that takes more memory than is free");
-    command->add_option("--tissues", options->tissues, "Tissue table in place of the built-in one")->type_name("FILE");
-    command->add_option("--json", options->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->add_option("--seed", options->spec.seed, "Seed of all random choices")->capture_default_str();
+    command->add_option("--voxel", options->voxel, "Edge length of a voxel [mm]")->type_name("MM")->capture_default_str();
+    command->add_option("--set", options->settings, "Set parameters (--list shows them)")->type_name("KEY=VALUE");
+    command->add_flag("--list", options->list, "List parameters with units, ranges and defaults");
+    command->add_flag("--anyway", options->anyway, "Make the phantom even if it needs more than the free memory");
+    command->add_option("--tissues", options->tissues, "Tissue table instead of the built-in one")->type_name("FILE");
+    command->add_option("--json", options->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([options] { runPhantom(*options); });
 }
 

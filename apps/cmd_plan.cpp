@@ -167,19 +167,19 @@ void planScene(const PlanArguments& o)
 void addPlan(CLI::App& app)
 {
     auto o = std::make_shared<PlanArguments>();
-    auto* command = app.add_subcommand("plan", "Pick the cheapest tissue model that holds an error and a time per tick");
+    auto* command = app.add_subcommand("plan", "Choose the cheapest tissue model within an error and a time per tick");
     command->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
-    command
-        ->add_option("--error", o->error,
-                     "Error of the shape within 30 mm of the tool (rms) that may not be passed: 3% or 0.03")
+    command->add_option("--error", o->error, "Maximum error of the shape within 30 mm of the tool (rms), e.g. 3% or 0.03")
         ->capture_default_str();
-    command->add_option("--force-error", o->forceError, "Error of the force that may not be passed either: 5% or 0.05");
-    command->add_option("--budget", o->budget, "Time per tick: 400us or 0.4ms")->capture_default_str();
+    command->add_option("--force-error", o->forceError, "Maximum error of the force, e.g. 5% or 0.05 (default: no limit)");
+    command->add_option("--budget", o->budget, "Maximum time per tick, e.g. 400us or 0.4ms")->capture_default_str();
     command->add_option("--speed", o->speed, "Speed of the test push [mm/s]")
         ->check(CLI::Range(1.0, 1000.0))
         ->capture_default_str();
     command->add_flag("--all", o->all, "Try every model within the budget, to see how much a better one costs");
-    command->add_option("--costs", o->costs, "Costs of a tick on this machine: a file of palpate bench costs --json")
+    command
+        ->add_option("--costs", o->costs,
+                     "Costs of a tick on this machine, a file from palpate bench costs --json (default: built-in costs)")
         ->check(CLI::ExistingFile);
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     command->final_callback([o] { planScene(*o); });

@@ -81,16 +81,15 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
     }
     const bool needle = tool.kind == ToolKind::needle, other = tool.kind != scene.kind;
     if (tool.kind == ToolKind::sphere && o.length) {
-        throw std::runtime_error("--length-mm: the tool is a sphere: this changes nothing");
+        throw std::runtime_error("--length-mm: the tool is a sphere, which has no length: leave it out");
     }
     if (!needle && scene.kind == ToolKind::needle && !o.radius) {
-        throw std::runtime_error(fmt::format(
-            "--tool {}: {}'s own tool is a needle: say how thick this one is with --radius-mm", *o.tool, o.scene));
+        throw std::runtime_error(
+            fmt::format("--tool {}: the tool of {} is a needle: add --radius-mm for this one", *o.tool, o.scene));
     }
     if (other && tool.kind == ToolKind::capsule && !o.length) {
-        throw std::runtime_error(
-            fmt::format("--tool capsule: {}'s own tool is a {}: say how long this one is with --length-mm", o.scene,
-                        kindName(scene.kind)));
+        throw std::runtime_error(fmt::format("--tool capsule: the tool of {} is a {}: add --length-mm for this one",
+                                             o.scene, kindName(scene.kind)));
     }
     tool.length = needle && other ? ToolSpec{}.length : tool.length;
     tool.radius = needle && other ? ToolSpec{}.radius : tool.radius;
@@ -282,23 +281,25 @@ void runPress(const PressArguments& o)
 void addPress(CLI::App& app)
 {
     auto o = std::make_shared<PressArguments>();
-    CLI::App* c = app.add_subcommand("press", "Lead a tool along a path from a file, and give the tissue's raw force");
+    CLI::App* c = app.add_subcommand("press", "Move a tool along a path from a file, and write the tissue's raw force");
     c->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->required();
-    c->add_option("--path", o->path, "Poses of the tool: CSV with x_mm,y_mm,z_mm and perhaps seconds, axis_x,axis_y,axis_z")
+    c->add_option("--path", o->path, "Poses of the tool: CSV with x_mm,y_mm,z_mm; optional: seconds, axis_x,axis_y,axis_z")
         ->type_name("FILE")
         ->required();
     command::addSetting(*c, o->changes);
     c->add_option("--model", o->level, "Tissue model; only elastic has forces of its own")
         ->check(CLI::IsMember({"elastic"}))
         ->capture_default_str();
-    c->add_option("--at", o->at, "Points whose displacement is wanted: CSV with x_mm,y_mm,z_mm")->type_name("FILE");
-    c->add_option("--tool", o->tool, "Another tool than the scene's")->check(CLI::IsMember(toolKinds));
-    c->add_option("--radius-mm", o->radius, "Its radius");
-    c->add_option("--length-mm", o->length, "Its length (capsule: between the middles of its ends; needle)");
-    c->add_option("--every", o->every, "A sample every so many milliseconds, and at the end")
+    c->add_option("--at", o->at, "Points at rest whose displacement is written: CSV with x_mm,y_mm,z_mm")
+        ->type_name("FILE");
+    c->add_option("--tool", o->tool, "Kind of tool (default: as in the scene)")->check(CLI::IsMember(toolKinds));
+    c->add_option("--radius-mm", o->radius, "Radius of the tool [mm] (default: as in the scene)");
+    c->add_option("--length-mm", o->length,
+                  "Length of a needle, or between the end centres of a capsule [mm] (default: as in the scene)");
+    c->add_option("--every", o->every, "Interval between samples [ms]; the last tick is always a sample")
         ->check(CLI::Range(std::size_t{1}, std::size_t{10'000'000}))
         ->capture_default_str();
-    c->add_flag("--converge", o->converge, "Solve each sample to convergence instead of as far as a millisecond goes");
+    c->add_flag("--converge", o->converge, "Solve each sample to convergence, instead of the few cycles of a tick");
     c->add_option("--json", o->json, "Write samples and figures to this file (- = standard output)");
     c->add_option("--csv", o->csv, "Write samples to this file, one per line (- = standard output)");
     c->final_callback([o] { runPress(*o); });

@@ -98,7 +98,7 @@ void erase(const ProfileArguments& o)
     const auto stay = store.erase(person);
     fmt::print("{}: erased\n", person.name);
     for (const fs::path& file : stay) {
-        fmt::print("this record was kept elsewhere and stays: {}\n", file.string());
+        fmt::print("this record is in another folder and was not erased: {}\n", file.string());
     }
 }
 
@@ -155,53 +155,53 @@ void note(const ProfileArguments& o)
 void addProfile(CLI::App& app)
 {
     auto o = std::make_shared<ProfileArguments>();
-    CLI::App* const c = app.add_subcommand("profile", "Who trains: make, list, export, erase and back up profiles");
+    CLI::App* const c = app.add_subcommand("profile", "Make, list, export, erase and back up profiles of trainees");
     c->require_subcommand(1);
     const auto sub = [&](const char* name, const char* what, bool person) {
         CLI::App* const s = c->add_subcommand(name, what);
-        s->add_option("--profiles", o->profiles, "file of the profiles (~/.local/share/palpate/profiles.db)");
+        s->add_option("--profiles", o->profiles, "File of profiles (default: ~/.local/share/palpate/profiles.db)");
         if (person) {
-            s->add_option("NAME", o->name, "whose; may be a pseudonym")->required();
+            s->add_option("NAME", o->name, "Name of the profile; may be a pseudonym")->required();
         }
         return s;
     };
     CLI::App* const made = sub("new", "Make a profile", true);
-    made->add_option("--hand", o->hand, "that holds the needle")
+    made->add_option("--hand", o->hand, "Hand that holds the needle")
         ->check(CLI::IsMember({"right", "left"}))
         ->capture_default_str();
     made->final_callback([o] { make(*o); });
 
-    CLI::App* const changed = sub("hand", "Say which hand holds the needle", true);
-    changed->add_option("HAND", o->hand, "right or left")->check(CLI::IsMember({"right", "left"}))->required();
+    CLI::App* const changed = sub("hand", "Change the hand that holds the needle", true);
+    changed->add_option("HAND", o->hand, "Hand that holds the needle")->check(CLI::IsMember({"right", "left"}))->required();
     changed->final_callback([o] { changeHand(*o); });
 
-    CLI::App* const all = sub("list", "The profiles that there are", false);
-    all->add_option("--json", o->json, "write them here (- for standard output)");
+    CLI::App* const all = sub("list", "List profiles", false);
+    all->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     all->final_callback([o] { list(*o); });
 
-    CLI::App* const exported = sub("export", "Everything that is known of a person, as JSON", true);
-    exported->add_option("-o,--output", o->output, "file (standard output where it is left out)");
+    CLI::App* const exported = sub("export", "Write all data of a person, as JSON", true);
+    exported->add_option("-o,--output", o->output, "File to write (default: standard output)");
     exported->final_callback([o] { exportOne(*o); });
 
-    CLI::App* const erased = sub("erase", "Remove a person, all sessions and their records", true);
-    erased->add_flag("--yes", o->yes, "it cannot be undone");
+    CLI::App* const erased = sub("erase", "Erase a person with all sessions and their records", true);
+    erased->add_flag("--yes", o->yes, "Confirm; erasing cannot be undone");
     erased->final_callback([o] { erase(*o); });
 
     CLI::App* const copied = sub("backup", "Copy the file of all profiles", false);
-    copied->add_option("FILE", o->output, "where to; must not be there")->required();
+    copied->add_option("FILE", o->output, "File to write; must not exist")->required();
     copied->final_callback([o] { backup(*o); });
 
-    CLI::App* const taken = sub("add-record", "Take in sessions from their records, e.g. from another machine", true);
-    taken->add_option("RECORD", o->records, "records (.db)")->required();
-    taken->add_option("--case", o->caseId, "the case, where the record does not say it");
-    taken->add_option("--exercise", o->exercise, "CURRICULUM/EXERCISE, where the record does not say it");
-    taken->add_flag("--test", o->test, "they were tests");
+    CLI::App* const taken = sub("add-record", "Add sessions from their records, e.g. from another machine", true);
+    taken->add_option("RECORD", o->records, "Records (.db)")->required();
+    taken->add_option("--case", o->caseId, "Case (default: as in the record)");
+    taken->add_option("--exercise", o->exercise, "CURRICULUM/EXERCISE (default: as in the record)");
+    taken->add_flag("--test", o->test, "Count the sessions as tests");
     taken->final_callback([o] { addRecords(*o); });
 
-    CLI::App* const noted = sub("note", "An instructor's words and global rating of a session", true);
-    noted->add_option("SESSION", o->session, "its number (palpate progress NAME --json -)")->required();
-    noted->add_option("--text", o->note, "words");
-    noted->add_option("--rating", o->rating, "global rating, 1 to 5")->check(CLI::Range(0, 5));
+    CLI::App* const noted = sub("note", "Set an instructor's note and global rating of a session", true);
+    noted->add_option("SESSION", o->session, "Number of the session (palpate progress NAME --json -)")->required();
+    noted->add_option("--text", o->note, "Text of the note (default: empty)");
+    noted->add_option("--rating", o->rating, "Global rating, 1 to 5 (default: 0, none)")->check(CLI::Range(0, 5));
     noted->final_callback([o] { note(*o); });
 }
 

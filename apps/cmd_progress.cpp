@@ -50,7 +50,7 @@ public:
         try {
             made = training::findCurriculum(id);
         } catch (const std::runtime_error& e) {
-            fmt::print(stderr, "palpate: warning: its sessions count for no curriculum: {}\n", e.what());
+            fmt::print(stderr, "palpate: warning: sessions of a missing curriculum are not counted: {}\n", e.what());
         }
         return made ? &*made : nullptr;
     }
@@ -173,20 +173,20 @@ void addProgress(CLI::App& app)
 {
     auto o = std::make_shared<ProgressArguments>();
     CLI::App* const c =
-        app.add_subcommand("progress", "Learning curves, what is reached, what to train next; groups compared");
-    c->add_option("NAME", o->names, "profiles");
-    c->add_flag("--all", o->all, "of everybody")->excludes("NAME");
-    c->add_option("--group", o->groups, "a group to compare: NAME=PROFILE,PROFILE; give the option once per group")
+        app.add_subcommand("progress", "Show learning curves, exercises reached and the next exercise; compare groups");
+    c->add_option("NAME", o->names, "Profiles to show");
+    c->add_flag("--all", o->all, "Show all profiles")->excludes("NAME");
+    c->add_option("--group", o->groups, "Group to compare, as NAME=PROFILE,PROFILE; repeat the option for each group")
         ->allow_extra_args(false);
-    c->add_option("--curriculum", o->curricula, "a curriculum, also where it was not begun; may be given again")
+    c->add_option("--curriculum", o->curricula, "Show this curriculum also if it was not begun; may be repeated")
         ->allow_extra_args(false);
-    c->add_option("--case", o->caseId, "groups: only sessions of this case");
-    c->add_option("--exercise", o->exercise, "groups: only sessions of this CURRICULUM/EXERCISE");
-    c->add_option("--html", o->html, "write a page here");
-    c->add_option("--csv", o->csv, "write a table here, one line per session");
-    c->add_option("--xapi", o->xapi, "write xAPI statements here");
-    c->add_option("--json", o->json, "write the figures here (- for standard output)");
-    c->add_option("--profiles", o->profiles, "file of the profiles");
+    c->add_option("--case", o->caseId, "With --group: only sessions of this case");
+    c->add_option("--exercise", o->exercise, "With --group: only sessions of this CURRICULUM/EXERCISE");
+    c->add_option("--html", o->html, "Write a page (HTML) to this file");
+    c->add_option("--csv", o->csv, "Write a table (CSV) to this file, one row per session");
+    c->add_option("--xapi", o->xapi, "Write xAPI statements to this file");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    c->add_option("--profiles", o->profiles, "File of profiles (default: ~/.local/share/palpate/profiles.db)");
     c->final_callback([o] { run(*o); });
 }
 

@@ -55,8 +55,8 @@ std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult&
     }
     for (const auto& [key, value] : record.results()) {
         if (key == "force_hash" && value != session::hexadecimal(result.forceHash)) {
-            faults.push_back(fmt::format("its session's end says that its forces have the hash {}, and they have {}", value,
-                                         session::hexadecimal(result.forceHash)));
+            faults.push_back(fmt::format("the end of the record says that its forces have the hash {}, but they have {}",
+                                         value, session::hexadecimal(result.forceHash)));
         }
     }
     return haptics::someOf(faults, faults.size());
@@ -108,7 +108,7 @@ void replayRecord(const ReplayArguments& o)
 void addReplay(CLI::App& app)
 {
     auto o = std::make_shared<ReplayArguments>();
-    auto* command = app.add_subcommand("replay", "Recompute all of a record, compare all bits, and check its seal");
+    auto* command = app.add_subcommand("replay", "Recompute a record, compare it bit for bit, and check its seal");
     command->add_option("FILE", o->file, "Record of a session (train --record)")->required();
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     command->final_callback([o] { replayRecord(*o); });

@@ -62,7 +62,7 @@ void checkStructure(const volume::Tissue& tissue, const std::string& option, con
             names.push_back(s.name);
         }
     }
-    throw std::runtime_error(fmt::format("{} {}: no structure or tissue of the volume is called so; there are {}", option,
+    throw std::runtime_error(fmt::format("{} {}: the volume has no structure or tissue of this name; it has {}", option,
                                          name, fmt::join(names, ", ")));
 }
 
@@ -79,7 +79,7 @@ Scene sceneOf(const SceneArguments& o, const volume::Tissue& tissue, const std::
         }
         if (scene.vital.size() > datasets::maxVital) {
             throw std::runtime_error(
-                fmt::format("--vital: {} names; {} are the most", scene.vital.size(), datasets::maxVital));
+                fmt::format("--vital: {} names: give {} at most", scene.vital.size(), datasets::maxVital));
         }
     }
     if (lesion) {
@@ -303,25 +303,30 @@ void addScene(CLI::App& app)
     command->add_option("-o,--output", o->output, "Scene to write")->type_name("S.toml")->required();
     auto* target =
         command->add_option("--target", o->target, "Structure to sample; default: the first tumour")->type_name("NAME");
-    command->add_option("--vital", o->vital, "What must not be touched, as a,b,c; default: all tissue of role vital")
+    command
+        ->add_option("--vital", o->vital,
+                     "Structures that must not be touched, as a,b,c; default: all tissue of role vital")
         ->type_name("NAMES")
         ->delimiter(',');
     command
         ->add_option("--margin", o->margin,
-                     "Least distance from needle to those, and to bone; default: what there is room for")
+                     "Smallest distance of the needle to vital structures and bone [mm]; default: the largest possible of "
+                     "4, 2.5 and 1.5")
         ->type_name("MM");
-    command->add_flag("--strict", o->strict, "Write no scene that there is a warning about");
-    command->add_option("--proposals", o->proposals, "Ways that are shown, at most (5)")->check(CLI::Range(1, 50));
-    command->add_option("--choose", o->choose, "Which of them is written (1, the best)")->check(CLI::Range(1, 50));
+    command->add_flag("--strict", o->strict, "Fail, instead of writing a scene with warnings");
+    command->add_option("--proposals", o->proposals, "Maximum number of ways to show (default: 5)")
+        ->check(CLI::Range(1, 50));
+    command->add_option("--choose", o->choose, "Number of the way to write (default: 1, the best)")
+        ->check(CLI::Range(1, 50));
     auto* in = command->add_option("--lesion-in", o->lesionIn, "Put a lesion into this structure, as the target")
                    ->type_name("NAME")
                    ->excludes(target);
-    command->add_option("--lesion", o->lesionSize, "Its diameter (15)")->type_name("MM")->needs(in);
-    command->add_option("--lesion-tissue", o->lesionTissue, "What it is made of (idc_high_grade)")
+    command->add_option("--lesion", o->lesionSize, "Diameter of the lesion [mm] (default: 15)")->type_name("MM")->needs(in);
+    command->add_option("--lesion-tissue", o->lesionTissue, "Tissue of the lesion (default: idc_high_grade)")
         ->type_name("NAME")
         ->needs(in);
-    command->add_option("--seed", o->seed, "Where in the structure it lies (1)")->needs(in);
-    command->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
+    command->add_option("--seed", o->seed, "Seed of the lesion's position and shape (default: 1)")->needs(in);
+    command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([o] { runScene(*o); });
 }
 

@@ -295,13 +295,13 @@ void scoreRecord(const ScoreArguments& options)
 void addScore(CLI::App& app)
 {
     auto options = std::make_shared<ScoreArguments>();
-    CLI::App* score = app.add_subcommand("score", "Score one record or several, and compare groups");
-    score->add_option("FILE", options->files, "records of sessions");
-    score->add_option("--group", options->groups, "a group to compare: NAME=FILE,FILE; give the option once per group")
+    CLI::App* score = app.add_subcommand("score", "Score one or more records, and compare groups");
+    score->add_option("FILE", options->files, "Records of sessions (.db)");
+    score->add_option("--group", options->groups, "Group to compare, as NAME=FILE,FILE; repeat the option for each group")
         ->allow_extra_args(false);
-    score->add_option("--json", options->json, "write the figures here (- for standard output)");
-    score->add_option("--report", options->report, "write an HTML report of the one record, or of the groups, here");
-    score->add_option("--pictures", options->pictures, "put the PNG files of this folder into the report");
+    score->add_option("--json", options->json, "Write figures to this file (- = standard output)");
+    score->add_option("--report", options->report, "Write a report (HTML) of the record, or of the groups, to this file");
+    score->add_option("--pictures", options->pictures, "Include the PNG files of this folder in the report");
     score->callback([options] { scoreRecord(*options); });
 }
 

@@ -163,10 +163,10 @@ void listSessions(const SessionsArguments& o)
 void addSessions(CLI::App& app)
 {
     auto o = std::make_shared<SessionsArguments>();
-    CLI::App* const c = app.add_subcommand("sessions", "Sessions of this user that run here now, with their figures");
-    c->add_option("--every", o->every, "Again and again, every so many seconds, until it is ended (Ctrl-C)")
+    CLI::App* const c = app.add_subcommand("sessions", "List your running sessions on this machine, with their figures");
+    c->add_option("--every", o->every, "Repeat the list at this interval, until Ctrl-C [s] (default: list once)")
         ->check(CLI::Range(0.05, 3600.0));
-    c->add_option("--json", o->json, "write them here (- for standard output)");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o] { listSessions(*o); });
 }
 

@@ -121,10 +121,10 @@ void checkFaults(const TrainArguments& o)
         }
     };
     need({session::FaultKind::gap, session::FaultKind::late}, !o.unpaced,
-         "gap and late strike the clock: leave out --unpaced");
+         "gap and late need a paced session: leave out --unpaced");
     need({session::FaultKind::stallViewer}, wantsWindow(o) || (!o.pictures.empty() && !o.unpaced),
          "stall-viewer stops the viewers that the session starts: add --view or --pictures");
-    need({session::FaultKind::diskFull}, !recordFile(o).empty(), "disk-full strikes the record: add --record");
+    need({session::FaultKind::diskFull}, !recordFile(o).empty(), "disk-full needs a record: add --record");
 }
 
 void checkDevice(const TrainArguments& o)
@@ -135,7 +135,7 @@ void checkDevice(const TrainArguments& o)
                                  ": needs --device hand; mouse, falcon and record bring their own hand");
     }
     if (device.somebodyHolds && o.unpaced) {
-        throw std::runtime_error("--device " + o.device + ": somebody holds it: leave out --unpaced");
+        throw std::runtime_error("--device " + o.device + ": a person holds it, at real-time pace: leave out --unpaced");
     }
     if (device.needsViewer && !wantsWindow(o) && o.session.empty()) {
         throw std::runtime_error(fmt::format(
@@ -184,7 +184,7 @@ void checkOutputs(const TrainArguments& o)
                                  (o.record.empty() ? " (the record beside the report)" : ""));
     }
     if (!o.report.empty() && record == fs::path(o.report)) {
-        throw std::runtime_error(o.report + ": would be record and report in one: call the report .html");
+        throw std::runtime_error(o.report + ": is the name of the record too: call the report .html");
     }
 }
 
@@ -209,7 +209,7 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const TrainArgumen
     std::vector<std::pair<const char*, std::string>> there;
     const bool wanted = o.view || session::deviceKind(o.device).needsViewer;
     if (wanted && viewers.window && viewers.window->wait(0) > 0) {
-        blame("the window has failed, its message is above: check the display (DISPLAY), or do without by --headless");
+        blame("the window failed, see its message above: check the display (DISPLAY), or add --headless");
     }
     if (viewers.camera && viewers.camera->wait(picturesTimeout) != 0) {
         blame(o.pictures + ": the pictures are not complete: the viewer failed or took too long");
@@ -269,7 +269,7 @@ void tell(const std::string& fitted, const std::vector<std::pair<const char*, st
           const std::vector<std::string>& kept)
 {
     if (!fitted.empty()) {
-        fmt::print("{} (--setting says otherwise)\n", fitted);
+        fmt::print("{} (--setting changes it)\n", fitted);
     }
     for (const auto& [name, file] : written) {
         fmt::print("{}: {}\n", name, file);
@@ -313,7 +313,7 @@ void applyTryout(TrainArguments& o)
         return;
     }
     if (!session::deviceKind(o.device).somebodyHolds) {
-        throw std::runtime_error("--tryout: somebody has to hold the tool: add --device mouse or --device falcon");
+        throw std::runtime_error("--tryout: a person must hold the tool: add --device mouse or --device falcon");
     }
     o.scene = o.sceneGiven ? o.scene : "layered";
     o.seconds = o.seconds > 0 ? o.seconds : tryoutSeconds;
@@ -444,68 +444,68 @@ std::string seedFault(const std::string& text)
 void addTrain(CLI::App& app)
 {
     auto o = std::make_shared<TrainArguments>();
-    auto* c = app.add_subcommand("train", "Perform a procedure: a built-in scene, a scene file or a volume");
-    auto* scene =
-        c->add_option("SCENE", o->scene,
-                      fmt::format("{}; a scene (.toml) or a volume (.vdb)", fmt::join(datasets::builtInScenes(), ", ")))
-            ->capture_default_str();
+    auto* c = app.add_subcommand("train", "Perform a procedure in a built-in scene, a scene file or a volume");
+    auto* scene = c->add_option("SCENE", o->scene,
+                                fmt::format("{}; a scene (.toml), a volume (.vdb) or a case's folder",
+                                            fmt::join(datasets::builtInScenes(), ", ")))
+                      ->capture_default_str();
     addTrainingOptions(*c, o->training);
     c->add_option("--task", o->task,
                   "core-biopsy: of the scene's target; us-core-biopsy, ct-core-biopsy, near-vessel, behind-rib: biopsies "
-                  "with scenes of their own; find-lump: palpation, where is it and how large")
+                  "with their own scenes; find-lump: palpate for position and size")
         ->check(CLI::IsMember(tasks));
     c->add_flag("--palpate", o->changes.palpate, "Find the scene's target with a fingertip");
     c->add_option("--lesion-from", o->lesionFrom,
-                  "Put a lesion into the volume at one of the places of this file (.loc of a VICTRE phantom), by --seed");
-    c->add_option("--lesion-mm", o->lesionDiameter, "Its diameter [mm]")
+                  "Put a lesion into the volume, at a position from this file (.loc of a VICTRE phantom) chosen by --seed");
+    c->add_option("--lesion-mm", o->lesionDiameter, "Diameter of the lesion [mm]")
         ->check(CLI::Range(2.0, 50.0))
         ->capture_default_str();
-    c->add_flag("--lesion-sphere", o->sphere, "A ball instead of lobes and spikes");
+    c->add_flag("--lesion-sphere", o->sphere, "Make the lesion a sphere, without lobes and spikes");
     c->add_option("--device", o->device, session::devicesInWords())->capture_default_str();
     command::addFalconOptions(*c, o->falcon);
-    c->add_option("--trainee", o->trainee, "Whose hand it is: errors, tremor and decisions of this skill, by --seed")
+    c->add_option("--trainee", o->trainee, "Skill of the simulated hand (errors, tremor, decisions), varied by --seed")
         ->check(CLI::IsMember(haptics::skillNames()));
-    c->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
+    command::addModel(*c, o->changes);
     command::addSetting(*c, o->changes);
-    c->add_option("--arm", o->changes.arm, "Haptic device that the stabiliser reckons with and the hand holds")
+    c->add_option("--arm", o->changes.arm,
+                  "Haptic device of stabiliser and simulated hand (default: the scene's; falcon with --device falcon)")
         ->check(CLI::IsMember(haptics::deviceNames()));
-    c->add_option("--dffb", o->changes.dffb, "Differential force feedback; fade: its gain falls over the session or trials")
+    c->add_option("--dffb", o->changes.dffb,
+                  "Differential force feedback (default: as in the scene); fade: its gain falls over the session or trials")
         ->check(CLI::IsMember(session::dffbChoices));
-    c->add_option("--trial", o->changes.trial,
-                  "With --dffb fade: K/N, trial K of N; all guidance in the first, none in the last");
-    c->add_option("--target", o->changes.target, "Structure to sample");
-    c->add_option("--seed", o->changes.seed, "Every random choice: of a phantom, and of a --trainee")
+    c->add_option("--trial", o->changes.trial, "With --dffb fade: trial K/N; all guidance in the first, none in the last");
+    c->add_option("--target", o->changes.target, "Structure to sample (default: as in the scene)");
+    c->add_option("--seed", o->changes.seed, "Seed of random choices (default: the scene's; 1 for --trainee and lesion)")
         ->check(seedFault, "a whole number");
-    c->add_option("--seconds", o->seconds, "End after this much session time [s]")->check(secondsFault, "0 to 86400");
-    auto* unpaced = c->add_flag("--unpaced", o->unpaced, "As fast as it goes instead of one tick per millisecond");
-    c->add_flag("--view", o->view, "Open a window (default where there is a display)")->excludes(unpaced);
-    c->add_option("--layout", o->layout, "Of the window: trainee or instructor")
+    c->add_option("--seconds", o->seconds, "Maximum session time [s] (0: no limit)")->check(secondsFault, "0 to 86400");
+    auto* unpaced = c->add_flag("--unpaced", o->unpaced, "Run as fast as possible, instead of one tick per millisecond");
+    c->add_flag("--view", o->view, "Open a window (default if there is a display)")->excludes(unpaced);
+    c->add_option("--layout", o->layout, "Layout of the window")
         ->check(CLI::IsMember({"trainee", "instructor"}))
         ->capture_default_str();
-    c->add_option("--palette", o->palette, "Of the window: standard, or colour-blind, with patterns in slices")
+    c->add_option("--palette", o->palette, "Colours of the window: standard, or colour-blind (with patterns in slices)")
         ->check(CLI::IsMember({"standard", "colour-blind"}))
         ->capture_default_str();
-    c->add_flag("--sounds", o->sounds, "Of the window: sounds for warnings");
-    c->add_flag("--tryout", o->tryout, "30 s to learn what the hand does, told step by step: no record, no score")
+    c->add_flag("--sounds", o->sounds, "Play sounds for warnings (in the window)");
+    c->add_flag("--tryout", o->tryout, "Learn the controls in 30 s, step by step; no record, no score")
         ->excludes("--case", "--exercise", "--profile", "--test", unpaced);
-    c->add_flag("--no-view,--headless", o->noView, "No window")->excludes("--view");
+    c->add_flag("--no-view,--headless", o->noView, "Open no window")->excludes("--view");
     c->add_flag("--show-target", o->showTarget, "Show the target of a palpation, which the window hides");
     c->add_flag("--close-at-end", o->closeAtEnd,
-                "With mouse or falcon: close the window when the session has ended, instead of showing its result");
-    c->add_option("--session", o->session, "Name under which viewers find the session");
-    c->add_option("--operator", o->operatorName, "Who holds the device, or a pseudonym: for the record")
+                "With mouse or falcon: close the window at the end of the session, instead of showing its result");
+    c->add_option("--session", o->session, "Name under which viewers find the session (default: train-PID)");
+    c->add_option("--operator", o->operatorName, "Person at the device, or a pseudonym (default: name of the profile)")
         ->check(operatorFault, "up to 200 bytes of text");
     c->add_option("--record", o->record, "Record every tick to this file (SQLite)")->excludes("--tryout");
-    c->add_option("--report", o->report, "Write a report (HTML) to this file")->excludes("--tryout");
+    c->add_option("--report", o->report, "Write a report (HTML) here, and a record (.db) beside it")->excludes("--tryout");
     c->add_option("--pictures", o->pictures,
-                  "Write pictures (PNG) to this folder; without a window of the record, after its end");
-    c->add_flag("--anyway", o->anyway,
-                "Start also where a tick takes far too long here, or a phantom more memory than is free");
+                  "Write pictures (PNG) to this folder; without a window they are drawn from the record, at the end");
+    c->add_flag("--anyway", o->anyway, "Start even if ticks are far too slow or a phantom needs more than the free memory");
     c->add_option("--inject", o->inject,
-                  "Let something go wrong at a session time: gap=50ms@2s, late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, "
+                  "Inject faults at session times: gap=50ms@2s, late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, "
                   "unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s; several separated by commas")
         ->take_all();
-    c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o, scene, c] {
         command::checkFalconOptions(*c, o->device == "falcon");
         o->sceneGiven = scene->count() > 0;

@@ -17,7 +17,7 @@ namespace palpate::apps {
 std::string exportCt(const CtExport& o, const std::function<void(double)>& progress)
 {
     if (const haptics::Record record(o.record); !(haptics::scanDoseOf(record.info()) > 0)) {
-        throw std::runtime_error(o.record + ": its scene has no CT: a section [ct] says what a scan is");
+        throw std::runtime_error(o.record + ": its scene has no CT: take a record of a scene with a section [ct]");
     }
     const session::ShownState shown = session::shownState(o.record, o.at, std::nullopt, progress);
     const haptics::Showing& s = shown.showing;

@@ -420,7 +420,7 @@ int main(int argc, char** argv)
     CLI::App app("An emulated Novint Falcon for QEMU's usb-redir", "falcon-emulator");
     std::string socket, firmware;
     app.add_option("--socket", socket, "Unix socket of QEMU's chardev")->required();
-    app.add_option("--firmware", firmware, "The only image that it runs")->required();
+    app.add_option("--firmware", firmware, "Firmware that the emulated Falcon accepts")->required();
     CLI11_PARSE(app, argc, argv);
     try {
         run(socket, firmware);

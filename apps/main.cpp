@@ -87,7 +87,7 @@ int main(int argc, char** argv)
             what = unknown[0] + ": there is no such command or option" +
                    (meant.empty() ? "" : "; did you mean " + meant + "?");
         }
-        return "palpate: " + what + " (palpate --help lists what there is)\n";
+        return "palpate: " + what + " (see palpate --help)\n";
     });
 
     using namespace palpate;

@@ -46,7 +46,8 @@ volume::Tissue openVolume(const std::string& what)
     if (file.extension() == ".toml") {
         const datasets::Scene scene = datasets::loadScene(file);
         if (scene.gravity.given) {
-            throw std::runtime_error(what + ": [gravity]: a mesh is of the volume as it was taken: leave it out");
+            throw std::runtime_error(what +
+                                     ": [gravity]: only the volume without gravity is meshed: leave this section out");
         }
         return datasets::sceneVolume(scene);
     }
@@ -152,14 +153,14 @@ void addOptions(CLI::App& app, MeshArguments& o)
 {
     app.add_option("volume", o.volume, "Volume (.vdb), scene (.toml), or a built-in phantom by its name");
     app.add_option("-o,--output", o.output, "Mesh to write: " + reference::meshFileEndings())->type_name("FILE");
-    app.add_option("--size", o.size, "Edges on the surfaces of tissues [mm]; shorter where a tissue is thin")
+    app.add_option("--size", o.size, "Edge length on tissue surfaces [mm]; shorter where a tissue is thin")
         ->check(CLI::Range(0.2, 50.0))
         ->type_name("MM")
         ->capture_default_str();
-    app.add_option("--largest", o.largest, "Edges away from surfaces [mm] (default: two and a half times --size)")
+    app.add_option("--largest", o.largest, "Edge length away from surfaces [mm] (default: 2.5 times --size)")
         ->check(CLI::Range(0.2, 200.0))
         ->type_name("MM");
-    app.add_option("--surface", o.surface, "Who finds the surfaces: cgal, or nets (surface nets on voxels of --size)")
+    app.add_option("--surface", o.surface, "Method for the surfaces: cgal, or nets (surface nets on voxels of --size)")
         ->check(CLI::IsMember({"cgal", "nets"}))
         ->capture_default_str();
     app.add_option("--json", o.json, "Write figures to this file (- = standard output)")->type_name("FILE");
@@ -178,6 +179,6 @@ int main(int argc, char** argv)
     palpate::command::endOnSignals();
     palpate::apps::MeshArguments options;
     return palpate::apps::runParsed(
-        argc, argv, "palpate-mesh", "A volume as conforming tetrahedra, one region per tissue",
+        argc, argv, "palpate-mesh", "Meshes a volume with conforming tetrahedra, one region per tissue",
         [&](CLI::App& app) { palpate::apps::addOptions(app, options); }, [&] { palpate::apps::run(options); });
 }

@@ -259,7 +259,7 @@ void run(const ReferenceArguments& o)
         return;
     }
     if (o.scene.empty()) {
-        throw std::runtime_error("no scene: name one, or --verify");
+        throw std::runtime_error("no scene: give one, or --verify");
     }
     base::checkOutput(o.vtu);
     base::checkOutput(o.json);
@@ -269,12 +269,11 @@ void run(const ReferenceArguments& o)
         throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
     }
     if (!o.save.empty() && o.mesher != "cgal") {
-        throw std::runtime_error("--save: what `palpate accuracy` reads is of CGAL's mesh: leave --mesher out");
+        throw std::runtime_error("--save: `palpate accuracy` needs references on CGAL's mesh: leave out --mesher");
     }
     if (!o.save.empty() && (!o.looks.empty() || !o.mirrored.empty())) {
         throw std::runtime_error(
-            "--save: what `palpate accuracy` reads has all looks of the trial, in the whole body: "
-            "leave --looks and --mirrored out");
+            "--save: `palpate accuracy` needs all looks of the trial, in the whole body: leave out --looks and --mirrored");
     }
     const auto tool = toolOf(o);
     session::SceneChanges changes;
@@ -325,42 +324,42 @@ void addOptions(CLI::App& app, ReferenceArguments& o)
 {
     app.add_option("scene", o.scene, "Scene: a built-in name, a file (.toml), or a volume (.vdb)");
     app.add_option("-o,--output", o.vtu, "Write the last state for ParaView (.vtu)");
-    app.add_flag("--all", o.all, "A .vtu for every look, numbered");
-    app.add_option("--tool", o.tool, "Sphere that presses")->capture_default_str();
-    app.add_option("--law", o.law, "linear: small strain; the others as in scenes")
+    app.add_flag("--all", o.all, "With -o: write a numbered .vtu for every look");
+    app.add_option("--tool", o.tool, "Sphere that presses: sphere_5mm or sphere_10mm")->capture_default_str();
+    app.add_option("--law", o.law, "Material law: linear (small strain), or a law of finite strain, as in scenes")
         ->check(CLI::IsMember(std::vector<std::string>(volume::lawNames.begin(), volume::lawNames.end())))
         ->capture_default_str();
     app.add_option("--elements", o.elements,
-                   "P2, or P2/P1 (Taylor-Hood): right with fewer tetrahedra where tissue hardly changes its volume")
+                   "P2, or P2/P1 (Taylor-Hood), which needs fewer tetrahedra in nearly incompressible tissue")
         ->check(CLI::IsMember({"P2", "P2/P1"}))
         ->capture_default_str();
     app.add_option("--mesher", o.mesher,
-                   "Who makes the tetrahedra between surfaces that both share: cgal, or tetgen (by palpate-mesh)")
+                   "Mesher of the tetrahedra between the same surfaces: cgal, or tetgen (runs palpate-mesh)")
         ->check(CLI::IsMember({"cgal", "tetgen"}))
         ->capture_default_str();
-    app.add_option("--speed", o.speed, "Speed whose looks are solved [mm/s]")
+    app.add_option("--speed", o.speed, "Speed of the trial, which defines the looks [mm/s]")
         ->check(CLI::Range(1.0, 1000.0))
         ->capture_default_str();
-    app.add_option("--size", o.size, "Edges of tetrahedra at the contact [mm]")
+    app.add_option("--size", o.size, "Edge length of tetrahedra at the contact [mm]")
         ->check(CLI::Range(0.3, 10.0))
         ->capture_default_str();
-    app.add_option("--press", o.press, "How deep the sphere presses [mm] (default: as the trial)")
-        ->check(CLI::Range(0.1, 50.0));
-    app.add_option("--radius-mm", o.radius, "Another radius than the tool's [mm]")->check(CLI::Range(0.5, 100.0));
-    app.add_option("--length-mm", o.length,
-                   "Makes the sphere a capsule, pressed end on: so far between its ends' middles [mm]")
+    app.add_option("--press", o.press, "Depth of the press [mm] (default: as in the trial)")->check(CLI::Range(0.1, 50.0));
+    app.add_option("--radius-mm", o.radius, "Radius of the sphere, instead of that of --tool [mm]")
+        ->check(CLI::Range(0.5, 100.0));
+    app.add_option("--length-mm", o.length, "Press a capsule end on, of this length between its end centres [mm]")
         ->check(CLI::Range(0.1, 300.0));
-    app.add_option("--looks", o.looks, "Solve at these depths under the first touch, straight in: 0.5,1,2 [mm]")
+    app.add_option("--looks", o.looks,
+                   "Press straight in, and solve at these depths below the first touch, e.g. 0.5,1,2 [mm]")
         ->delimiter(',')
         ->check(CLI::Range(0.001, 100.0))
         ->excludes("--press");
-    app.add_flag("--retreat", o.retreat, "And on the way out, at the same looks")->needs("--looks");
+    app.add_flag("--retreat", o.retreat, "Also solve the way out, at the same looks")->needs("--looks");
     app.add_option("--mirrored", o.mirrored,
-                   "Planes of symmetry of scene and press (x, z or xz: x = 0, z = 0): solves one side, reports the whole")
+                   "Planes of symmetry of scene and press (xz: x = 0 and z = 0): solve one side, report the whole")
         ->check(CLI::IsMember({"x", "y", "z", "xy", "xz", "yz"}))
         ->needs("--looks");
-    app.add_flag("--progress", o.progress, "A line per load step on standard error");
-    app.add_flag("--verify", o.verify, "No scene: solve problems that have a closed form (minutes)");
+    app.add_flag("--progress", o.progress, "Print a line per load step to standard error");
+    app.add_flag("--verify", o.verify, "Solve problems with closed forms instead of a scene (minutes)");
     app.add_option("--json", o.json, "Write figures to this file (- = standard output)");
     app.add_option("--export-ccx", o.ccx, "Write the last state as input of CalculiX (.inp)");
     app.add_option("--save", o.save, "Write the reference that `palpate accuracy` reads (.ref)");
@@ -374,6 +373,6 @@ int main(int argc, char** argv)
 {
     palpate::apps::ReferenceArguments options;
     return palpate::apps::runParsed(
-        argc, argv, "palpate-reference", "The finite-element reference of a scene: mesh, solution, and files of both",
+        argc, argv, "palpate-reference", "Meshes a scene, solves it with finite elements, and writes both",
         [&](CLI::App& app) { palpate::apps::addOptions(app, options); }, [&] { palpate::apps::run(options); });
 }

@@ -55,18 +55,18 @@ struct Words {
 
 void addOptions(CLI::App& app, Words& w)
 {
-    app.add_option("--size", w.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    app.add_option("--text-scale", w.options.textScale, "Of all texts; in the window Ctrl with + or -")
+    app.add_option("--size", w.size, "Size of the window, WIDTHxHEIGHT [pixels]")->capture_default_str();
+    app.add_option("--text-scale", w.options.textScale,
+                   "Scale of all texts, 0.5 to 3 (default: as last set in the window with Ctrl and + or -)")
         ->check(CLI::Range(0.5, 3.0));
-    app.add_option("--case", w.options.caseId, "The case that is chosen at first (palpate case list)");
+    app.add_option("--case", w.options.caseId, "Case that is selected at the start (palpate case list)");
     app.add_option("--sessions", w.sessions, "Folder for records and figures of sessions")->capture_default_str();
     auto* const frames =
-        app.add_option("--frames", w.options.frames, "To measure: end after so many pictures (0: no limit)")
+        app.add_option("--frames", w.options.frames, "To measure: end after this many pictures (0: no limit)")
             ->capture_default_str();
-    app.add_flag("--screens", w.screens,
-                 "To measure: draw each screen so many times (--frames), with made-up sessions on it")
+    app.add_flag("--screens", w.screens, "To measure: draw each screen --frames times, with made-up sessions")
         ->needs(frames);
-    app.add_option("--json", w.json, "Write frame times to this file (-: standard output)");
+    app.add_option("--json", w.json, "Write frame times to this file (- = standard output)");
 }
 
 void run(Words& w)
@@ -98,6 +98,7 @@ int main(int argc, char** argv)
     Words words;
     return palpate::apps::runParsed(
         argc, argv, "palpate-trainer",
-        "Choose a case, do it, see how it went: one window for training. palpate without arguments opens it.",
+        "Opens the window for training: choose a case, perform it, see the result. palpate without arguments does the "
+        "same.",
         [&](CLI::App& app) { addOptions(app, words); }, [&] { run(words); });
 }

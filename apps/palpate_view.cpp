@@ -73,55 +73,56 @@ struct Words {
 void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
 {
     app.add_flag_callback(
-        "--keys", [] { throw CLI::CallForVersion(palpate::render::keysInWords(), 0); }, "List what keys and mouse do");
-    app.add_option("--session", options.session, "Name of the session (default: the only one that runs)");
+        "--keys", [] { throw CLI::CallForVersion(palpate::render::keysInWords(), 0); },
+        "List keys and mouse actions, and exit");
+    app.add_option("--session", options.session, "Name of the session (default: the only running one)");
     app.add_option("--offscreen", options.offscreen, "Write PNG files to this folder instead of opening a window");
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");
-    app.add_option("--replay", words.replay, "Show a record (train --record) instead of a session that runs")
+    app.add_option("--replay", words.replay, "Show a record (train --record) instead of a running session")
         ->excludes("--session");
-    app.add_option("--at", words.at, "With --replay: begin at this second of the session, and stand there")
+    app.add_option("--at", words.at, "With --replay: start at this session time, paused [s]")
         ->check(CLI::Range(0.0, 86400.0));
     app.add_option("--ghost", words.ghost,
-                   "With --replay: the tool of another record in the same body, such as an expert's");
+                   "With --replay: also show the tool of this record in the same body, e.g. an expert's");
     app.add_option("--palette", words.palette,
-                   "Colours of tissues: standard, as in the body, or colour-blind, with patterns in slices")
+                   "Colours of tissues: standard (as in the body), or colour-blind (with patterns in slices)")
         ->check(CLI::IsMember({"standard", "colour-blind"}))
         ->capture_default_str();
-    app.add_flag("--sounds", options.sounds, "Sounds for warnings, in windows");
-    app.add_option("--hand", words.hand, "That holds the mouse; left: its buttons change places")
+    app.add_flag("--sounds", options.sounds, "Play sounds for warnings (in a window)");
+    app.add_option("--hand", words.hand, "Hand that holds the mouse; left swaps its buttons")
         ->check(CLI::IsMember({"right", "left"}))
         ->capture_default_str();
 }
 
 void addLookOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& words)
 {
-    app.add_option("--layout", words.layout, "trainee, instructor or body (nothing else, and no words)")
+    app.add_option("--layout", words.layout, "Layout: trainee, instructor, or body (the body alone, without text)")
         ->check(CLI::IsMember({"trainee", "instructor", "body"}))
         ->capture_default_str();
     app.add_option("--slices", words.slices,
-                   "Of a body with an image: tissue, tinted (the image in the tissues' colours) or image")
+                   "Slices of a body with an image: tissue, tinted (image in the tissues' colours) or image")
         ->check(CLI::IsMember({"tissue", "tinted", "image"}))
         ->capture_default_str();
-    app.add_flag("--ultrasound", options.ultrasound, "Begin with the ultrasound picture (key U)");
-    app.add_option("--images", options.images, "Folder for ultrasound pictures that are stored (key P)")
-        ->capture_default_str();
+    app.add_flag("--ultrasound", options.ultrasound, "Start with the ultrasound picture (key U)");
+    app.add_option("--images", options.images, "Folder for stored ultrasound pictures (key P)")->capture_default_str();
     app.add_option("--hide", options.concealed.tissues,
-                   "Show this tissue as what lies around it, and not where the target is: for a test");
-    app.add_flag("--no-plan", options.concealed.plan, "Without planned line and distance to the target: for a test");
-    app.add_flag("!--no-steps", options.steps, "Without the steps in words, which a window shows");
-    app.add_option("--result", options.result, "Figures of the session (train --json), shown when it has ended");
-    app.add_option("--tryout", options.tryout, "Of so many seconds: tell what the hand does, one thing after the other")
+                   "For a test: draw this tissue like its surroundings, and hide the target; may be repeated");
+    app.add_flag("--no-plan", options.concealed.plan, "For a test: hide the planned line and the distance to the target");
+    app.add_flag("!--no-steps", options.steps, "Hide the steps that a window shows as text");
+    app.add_option("--result", options.result, "Figures of the session (train --json), shown at its end");
+    app.add_option("--tryout", options.tryout,
+                   "Explain the controls step by step, in a tryout of this length [s] (default: no tryout)")
         ->check(CLI::Range(0.0, 3600.0));
-    app.add_flag("--hidden", options.hidden, "Draw as in a window, on a display that nobody sees (Xvfb): to measure");
+    app.add_flag("--hidden", options.hidden, "To measure: draw as in a window, on an invisible display (Xvfb)");
     app.add_option("--timeline", words.timeline,
-                   "Write when which tick was shown to this file (CSV, clock CLOCK_MONOTONIC)");
-    app.add_option("--size", words.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    app.add_option("--every", options.every, "With --offscreen: seconds of the session from one picture to the next")
+                   "Write the time at which each tick was shown to this file (CSV, CLOCK_MONOTONIC)");
+    app.add_option("--size", words.size, "Size of the picture, WIDTHxHEIGHT [pixels]")->capture_default_str();
+    app.add_option("--every", options.every, "With --offscreen: session time between two pictures [s]")
         ->capture_default_str();
-    app.add_option("--wait", options.wait, "Seconds without a session before giving up, and to stay when it has ended")
+    app.add_option("--wait", options.wait, "Time to wait for a session, and to stay open after its end [s]")
         ->capture_default_str();
-    app.add_option("--frames", options.frames, "End after so many pictures (0: no limit)")->capture_default_str();
-    app.add_option("--json", words.json, "Write frame times to this file (-: standard output)");
+    app.add_option("--frames", options.frames, "End after this many pictures (0: no limit)")->capture_default_str();
+    app.add_option("--json", words.json, "Write frame times to this file (- = standard output)");
 }
 
 void applyLook(const Words& words, palpate::render::ViewerOptions& options)
@@ -153,7 +154,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         if (!words.ghost.empty())
             options.ghost = player->ghostOf(words.ghost);
     } else if (words.at >= 0 || !words.ghost.empty()) {
-        throw std::runtime_error("--at and --ghost go with --replay RECORD");
+        throw std::runtime_error("--at, --ghost: need a record: add --replay RECORD");
     }
     const auto figures = palpate::render::runViewer(options);
     if (!words.json.empty())
@@ -180,8 +181,7 @@ int main(int argc, char** argv)
     palpate::base::useLanguage();
     return palpate::apps::runParsed(
         argc, argv, "palpate-view",
-        "Shows a Palpate session that runs in another process. --keys lists what keys and mouse do, as does the "
-        "key ?.",
+        "Shows a running Palpate session. --keys lists keys and mouse actions, as does the key ?.",
         [&](CLI::App& app) {
             addOptions(app, options, words);
             addLookOptions(app, options, words);

@@ -22,9 +22,8 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
 {
     CLI::App app(about, name);
     app.set_version_flag("--version", std::string(base::build()));
-    app.failure_message([&](const CLI::App*, const CLI::Error& e) {
-        return name + ": " + e.what() + " (" + name + " --help lists what there is)\n";
-    });
+    app.failure_message(
+        [&](const CLI::App*, const CLI::Error& e) { return name + ": " + e.what() + " (see " + name + " --help)\n"; });
     add(app);
     try {
         app.parse(argc, argv);

@@ -225,8 +225,7 @@ render::Ghost ReplayPlayer::ghostOf(const std::string& file) const
     const bool alike = other.info().volumeHash == impl_->record.info().volumeHash;
     if (!alike && bodyHash(session::reopenSession(file, other.info())) != bodyHash(impl_->model)) {
         throw std::runtime_error(
-            fmt::format("--ghost {}: is a session in another body than {}: its tool would be in no "
-                        "place of this one",
+            fmt::format("--ghost {}: is a session in another body than {}: take a record of a session in the same body",
                         file, impl_->file));
     }
     constexpr std::uint64_t every = 10;  // ticks

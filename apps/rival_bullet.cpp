@@ -324,6 +324,7 @@ RivalResults solve(const RivalPush& whole)
 int main(int argc, char** argv)
 {
     using namespace palpate::apps;
-    return rivalMain(argc, argv, "palpate-rival-bullet", "Bullet's deformable bodies on a push of `palpate accuracy`",
+    return rivalMain(argc, argv, "palpate-rival-bullet",
+                     "Solves a push of `palpate accuracy` with Bullet's deformable bodies",
                      [](const RivalPush& push, const std::filesystem::path&) { return solve(push); });
 }

@@ -53,7 +53,7 @@ reference::TetMesh meshOf(const RivalPush& push)
 {
     constexpr std::size_t maxMaterials = std::numeric_limits<std::uint8_t>::max();
     if (push.materials.size() > maxMaterials) {
-        throw std::runtime_error(fmt::format("{} materials: {} are the most; take another --rival-mesh-mm",
+        throw std::runtime_error(fmt::format("{} materials: the maximum is {}; take another --rival-mesh-mm",
                                              push.materials.size(), maxMaterials));
     }
     reference::TetMesh mesh;
@@ -98,6 +98,6 @@ RivalResults solve(const RivalPush& push, const std::filesystem::path& folder)
 
 int main(int argc, char** argv)
 {
-    return palpate::apps::rivalMain(argc, argv, "palpate-rival-calculix", "CalculiX on a push of `palpate accuracy`",
-                                    palpate::apps::solve);
+    return palpate::apps::rivalMain(argc, argv, "palpate-rival-calculix",
+                                    "Solves a push of `palpate accuracy` with CalculiX", palpate::apps::solve);
 }

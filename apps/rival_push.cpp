@@ -69,7 +69,8 @@ RivalPush readRivalPush(const std::filesystem::path& folder)
         push.at("look_ticks").get_to(out.looks);
         return out;
     } catch (const json::exception& e) {
-        throw std::runtime_error(fmt::format("{}: is no push that this program reads: {}", file.string(), e.what()));
+        throw std::runtime_error(
+            fmt::format("{}: cannot be read as a push of palpate accuracy --rival: {}", file.string(), e.what()));
     }
 }
 
@@ -93,7 +94,7 @@ int rivalMain(int argc, char** argv, const std::string& name, const std::string&
     CLI::App app(about, name);
     app.set_version_flag("--version", std::string(base::build()));
     std::string folder;
-    app.add_option("folder", folder, "Where push.json is, and the answer goes")->required();
+    app.add_option("folder", folder, "Folder with push.json, to which the results are written")->required();
     app.failure_message([&](const CLI::App*, const CLI::Error& e) { return fmt::format("{}: {}\n", name, e.what()); });
     try {
         app.parse(argc, argv);

@@ -21,7 +21,7 @@ session::TrainResult runToItsEnd(const haptics::SessionModel& model, const hapti
                 fs::remove(options.record.string() + part);
             }
         }
-        fmt::print(stderr, "palpate: begun anew\n");
+        fmt::print(stderr, "palpate: the session starts again\n");
     }
 }
 

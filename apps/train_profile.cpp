@@ -22,7 +22,7 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         store_.emplace(options_.profiles.empty() ? training::ProfileStore::standardFile() : options_.profiles);
         person_ = store_->find(options_.profile);
     } else if (!options_.profiles.empty()) {
-        throw std::runtime_error("--profiles: says where profiles are: add --profile NAME");
+        throw std::runtime_error("--profiles: needs a profile: add --profile NAME");
     }
     if (!options_.exercise.empty()) {
         const std::size_t slash = options_.exercise.find('/');
@@ -33,7 +33,7 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
                                                  options_.exercise, curriculum_->id, curriculum_->id));
         }
         if (!options_.caseId.empty()) {
-            throw std::runtime_error("--case: the exercise says its case: leave one of them out");
+            throw std::runtime_error("--case: --exercise has a case of its own: leave out one of them");
         }
         case_ = training::findCase(exercise_->caseId);
     } else if (!options_.caseId.empty()) {
@@ -44,7 +44,7 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         const auto here = std::ranges::find(progress.exercises, exercise_, &training::ExerciseProgress::exercise);
         if (!here->available) {
             const auto* const next = progress.next();
-            throw std::runtime_error(fmt::format("--exercise {}: its gate is shut for {}{}", options_.exercise,
+            throw std::runtime_error(fmt::format("--exercise {}: is still locked for {}{}", options_.exercise,
                                                  person_->name,
                                                  next ? "; next is " + curriculum_->id + "/" + next->exercise->id : ""));
         }
@@ -155,14 +155,16 @@ std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const 
 
 void addTrainingOptions(CLI::App& command, TrainingOptions& o)
 {
-    command.add_option("--case", o.caseId, "A case by its name or folder (palpate case list)");
+    command.add_option("--case", o.caseId, "Case to train, by name or folder (palpate case list)");
     command.add_option("--exercise", o.exercise,
-                       "CURRICULUM/EXERCISE: its case, with as much guidance as this trial has (palpate curriculum list)");
-    command.add_option("--profile", o.profile, "Whose progress it counts for (palpate profile new)");
-    command.add_option("--profiles", o.profiles, "File of the profiles");
-    command.add_option("--hand", o.hand, "That holds the mouse (as the profile says it); left: its buttons change places")
+                       "Exercise as CURRICULUM/EXERCISE; it sets case and guidance (palpate curriculum list)");
+    command.add_option("--profile", o.profile, "Profile in which the session counts (palpate profile new)");
+    command.add_option("--profiles", o.profiles, "File of profiles (default: ~/.local/share/palpate/profiles.db)");
+    command
+        .add_option("--hand", o.hand,
+                    "Hand that holds the mouse; left swaps its buttons (default: as in the profile, or right)")
         ->check(CLI::IsMember({"right", "left"}));
-    command.add_flag("--test", o.test, "A test: no guidance, and it counts for gates that ask for tests");
+    command.add_flag("--test", o.test, "Test: no guidance; counts for gates that require tests");
 }
 
 }  // namespace palpate::apps

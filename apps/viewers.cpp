@@ -115,7 +115,7 @@ void checkViewer()
 {
     const auto viewer = base::programFolder() / "palpate-view";
     if (!std::filesystem::exists(viewer)) {
-        throw std::runtime_error(viewer.string() + ": cannot be started: there is none; " + howToDraw);
+        throw std::runtime_error(viewer.string() + ": cannot be started: it is missing; " + howToDraw);
     }
 }
 

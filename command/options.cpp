@@ -7,20 +7,28 @@
 
 namespace palpate::command {
 
+void addModel(CLI::App& command, session::SceneChanges& changes)
+{
+    command.add_option("--model", changes.model, "Level of the tissue model (default: as in the scene)")
+        ->check(CLI::IsMember(datasets::modelLevels));
+}
+
 void addSetting(CLI::App& command, session::SceneChanges& changes)
 {
-    command.add_option("--setting", changes.setting, "How fine level elastic is")
+    command
+        .add_option("--setting", changes.setting,
+                    "Resolution of level elastic (default: as in the scene; if it has none, train fits it to the machine)")
         ->check(CLI::IsMember(datasets::elasticSettings()));
 }
 
 void addFalconOptions(CLI::App& command, session::FalconOptions& options)
 {
     command.add_option("--falcon-firmware", options.firmware,
-                       "Firmware of the Novint Falcon, which it loses with its power supply (a file of its maker's)");
-    command.add_option("--falcon-grip-g", options.grip, "Mass of the Falcon's grip, which its motors carry [g]")
+                       "Firmware file of the Novint Falcon, from its maker; the Falcon loses it without power");
+    command.add_option("--falcon-grip-g", options.grip, "Mass of the Falcon's grip, compensated by its motors [g]")
         ->check(CLI::Range(0.0, 300.0))
         ->capture_default_str();
-    command.add_option("--on-unplug", options.onUnplug, "When the Falcon is unplugged: exit, or wait for it")
+    command.add_option("--on-unplug", options.onUnplug, "If the Falcon is unplugged: exit, or wait until it is back")
         ->check(CLI::IsMember({"exit", "wait"}))
         ->capture_default_str();
 }
@@ -29,7 +37,7 @@ void checkFalconOptions(const CLI::App& command, bool falcon)
 {
     for (const char* name : {"--falcon-firmware", "--falcon-grip-g", "--on-unplug"}) {
         if (!falcon && command.count(name) > 0) {
-            throw std::runtime_error(fmt::format("{}: goes with --device falcon", name));
+            throw std::runtime_error(fmt::format("{}: needs --device falcon", name));
         }
     }
 }

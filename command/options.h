@@ -7,6 +7,8 @@
 
 namespace palpate::command {
 
+/// The option --model of a command.
+void addModel(CLI::App& command, session::SceneChanges& changes);
 /// The option --setting of a command.
 void addSetting(CLI::App& command, session::SceneChanges& changes);
 

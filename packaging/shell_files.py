@@ -132,10 +132,10 @@ def man_page(command, version, top):
         lines.append(f".SH {title}\n" if title else f".SS {roff(heading)}\n")
         lines += [tagged(entry, entry.names[0].startswith("-")) for entry in entries]
     if command.commands:
-        lines.append(".SH COMMANDS\nEach has a manual page of its own.\n")
+        lines.append(".SH COMMANDS\nEach command has its own manual page.\n")
         lines += [f".TP\n\\fB{roff(' '.join(c.words))}\\fR\n{roff(c.about)}\n" for c in command.commands]
-    lines.append(".SH EXIT STATUS\n0 where what was asked for was done, 1 where it could not be, 2 where the command line is wrong;\n"
-                 "after a signal 128 and its number.\n")
+    lines.append(".SH EXIT STATUS\n0 if everything was done, 1 if not, 2 if the command line is wrong;\n"
+                 "128 plus the signal's number after a signal.\n")
     also = [f"{'-'.join(command.words[:-1])}"] if len(command.words) > 1 else []
     also += [c.name for c in command.commands] or ([] if also else [n for n in top if n != command.name])
     if also:

@@ -138,10 +138,11 @@ PlanCosts loadCosts(const std::filesystem::path& file)
 void addBenchCosts(CLI::App& bench)
 {
     auto o = std::make_shared<CostsArguments>();
-    auto* costs = bench.add_subcommand("costs", "What a tick of level elastic costs here, per node, contact and cycle");
+    auto* costs = bench.add_subcommand(
+        "costs", "Measure the cost of a tick of level elastic on this machine, per node, contact and cycle");
     costs->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->capture_default_str();
-    costs->add_flag("--quick", o->quick, "Few models: some seconds");
-    costs->add_option("--json", o->json, "Write figures to this file (- = standard output): for palpate plan --costs");
+    costs->add_flag("--quick", o->quick, "Measure few models only: seconds");
+    costs->add_option("--json", o->json, "Write figures to this file (- = standard output), for palpate plan --costs");
     costs->final_callback([o] { benchCosts(*o); });
 }
 

@@ -79,7 +79,7 @@ void checkOneBody(const TetMesh& mesh)
     }
     if (apart > 0) {
         throw std::runtime_error(fmt::format(
-            "mesh: {} of {} tetrahedra do not hang together with the first one: keep one body", apart, mesh.tets.size()));
+            "mesh: {} of {} tetrahedra are not connected with the first one: keep one body", apart, mesh.tets.size()));
     }
 }
 

@@ -46,8 +46,7 @@ TetGenResult run(const TetGenJob& job, const TetGenOptions& options)
     const auto program = options.program.empty() ? base::programFolder() / "palpate-mesh" : options.program;
     base::ChildProcess child(program, {"--tetgen-job", in.string(), out.string()}, "it is what runs TetGen: build it too");
     if (child.wait(options.seconds) < 0) {
-        throw std::runtime_error(child.killed() ? "it broke down on them"
-                                                : fmt::format("it took over {:g} s", options.seconds));
+        throw std::runtime_error(child.killed() ? "it crashed" : fmt::format("it took over {:g} s", options.seconds));
     }
     TetGenResult result = readResult(out);
     if (!result.error.empty()) {

@@ -101,9 +101,9 @@ std::unique_ptr<Device> openRecord(const SessionModel&, const DeviceRequest& req
 // A new device is a line here. The last stands for all other names.
 constexpr std::array kinds{
     DeviceKind{"hand", "hand (a scripted trainee)", "", false, false, openHand},
-    DeviceKind{"mouse", "mouse (of the viewer's window)", "", true, true, openMouse},
+    DeviceKind{"mouse", "mouse (in the viewer's window)", "", true, true, openMouse},
     DeviceKind{"falcon", "falcon (Novint Falcon)", "falcon", true, false, openFalcon},
-    DeviceKind{"", "a record (.db) whose poses are played", "", false, false, openRecord},
+    DeviceKind{"", "a record (.db) to play back", "", false, false, openRecord},
 };
 
 void checkTool(const DeviceRequest& request, const datasets::Scene& scene)

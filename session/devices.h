@@ -35,7 +35,7 @@ struct DeviceKind {
 
 std::span<const DeviceKind> deviceKinds() noexcept;
 
-/// "hand (a scripted trainee), mouse (of the viewer's window), ... or a record (.db) whose poses are played"
+/// "hand (a scripted trainee), mouse (in the viewer's window), ... or a record (.db) to play back"
 std::string devicesInWords();
 
 /// The kind called `name`; that of records for any other name.

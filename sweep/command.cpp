@@ -201,7 +201,7 @@ PoolResult runCases(const SweepArguments& o, SweepFolder& folder, const std::vec
     }
     const auto told = [&](std::size_t done, std::size_t running) {
         folder.lock().check();
-        progress.show(interrupts > 0 ? fmt::format("finishing {}; Ctrl-C again leaves them", plural(running, "case"))
+        progress.show(interrupts > 0 ? fmt::format("finishing {}; Ctrl-C again aborts them", plural(running, "case"))
                                      : bar(before, done, all, begin));
         return interrupts == 0;
     };
@@ -256,7 +256,7 @@ void run(const SweepArguments& o)
     const PoolResult result = cases.empty() ? PoolResult() : runCases(o, folder, cases, wanted.cases.size());
     const auto missing = conclude(o, folder, result, cases.size(), wanted.cases);
     if (!missing.empty()) {
-        throw std::runtime_error(fmt::format("stopped: {} of {} cases are done; the same command goes on with the others",
+        throw std::runtime_error(fmt::format("interrupted: {} of {} cases are done; the same command resumes",
                                              wanted.cases.size() - missing.size(), wanted.cases.size()));
     }
     if (isPart(o) && o.json != "-") {
@@ -309,10 +309,10 @@ void sweepCommand(const SweepArguments& o)
     } else if (!o.report.empty()) {
         report(o);
     } else if (o.folder.empty() && !o.dry) {
-        throw std::runtime_error("sweep: where to? add -o DIR");
+        throw std::runtime_error("sweep: no folder: add -o DIR");
     } else if (o.dry) {
         if (o.plan.empty() && o.folder.empty()) {
-            throw std::runtime_error("sweep --dry-run: of what? give a plan, or -o DIR");
+            throw std::runtime_error("sweep --dry-run: no plan: give a plan, or -o DIR");
         }
         dryRun(o);
     } else if (o.merge) {
@@ -324,9 +324,8 @@ void sweepCommand(const SweepArguments& o)
 
 void addParts(CLI::App& c, SweepArguments& o)
 {
-    auto* shard = c.add_option("--shard", o.shard, "Run part K of N, in DIR/shards/K-of-N, whoever runs the others")
-                      ->type_name("K/N");
-    auto* cases = c.add_option("--cases", o.cases, "Run these cases alone, as in 0-9,12, in a folder below DIR/shards")
+    auto* shard = c.add_option("--shard", o.shard, "Run only part K of N, in DIR/shards/K-of-N")->type_name("K/N");
+    auto* cases = c.add_option("--cases", o.cases, "Run only these cases, e.g. 0-9,12, in a folder below DIR/shards")
                       ->type_name("LIST")
                       ->excludes(shard);
     auto* merge = c.add_option_function<std::vector<std::string>>(
@@ -339,7 +338,7 @@ void addParts(CLI::App& c, SweepArguments& o)
                 }
             }
         },
-        "Take what shards have done, in DIR/shards and in these folders, into one table");
+        "Merge the results of shards, in DIR/shards and in these folders, into one table");
     merge->expected(0, CLI::detail::expected_max_vector_size)->type_name("[DIR..]")->excludes(shard)->excludes(cases);
 }
 
@@ -348,38 +347,40 @@ void addParts(CLI::App& c, SweepArguments& o)
 void addSweep(CLI::App& app)
 {
     auto o = std::make_shared<SweepArguments>();
-    auto* c = app.add_subcommand("sweep", "Many cases of a scene, on all cores or a cluster: a table, and a report");
+    auto* c =
+        app.add_subcommand("sweep", "Run many cases of a scene on all cores or a cluster, and write a table and a report");
     c->add_option(
         "PLAN", o->plan,
-        fmt::format("What varies and what is measured (.toml, docs/sweeps.md); ready: {}; without it, that of the "
-                    "folder",
+        fmt::format("Plan with parameters and outputs (.toml, docs/sweeps.md); ready: {}; default: the plan of the folder",
                     fmt::join(builtInPlans(), ", ")));
-    c->add_option("-o,--output", o->folder, "Folder of the sweep; one that was stopped goes on");
-    c->add_flag("--dry-run", o->dry, "Say how many cases, how long and how much disk; run three of them to know");
-    c->add_option("--jobs", o->jobs, "Processes, one core each; the table does not depend on it")
+    c->add_option("-o,--output", o->folder, "Folder of the sweep; an interrupted sweep is resumed");
+    c->add_flag("--dry-run", o->dry, "Run three cases, and print the number of cases and the expected time and disk space");
+    c->add_option("--jobs", o->jobs,
+                  "Number of processes, one core each (default: all cores); the table does not depend on it")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
     addParts(*c, *o);
-    auto* slurm = c->add_flag("--slurm", o->onSlurm, "As a Slurm job array: submit, watch, submit again what was lost");
-    c->add_option("--partition", o->slurm.partition, "Of the cluster")->needs(slurm);
-    c->add_option("--time", o->slurm.time, "Limit of a task, as sbatch takes it")->needs(slurm);
-    c->add_option("--account", o->slurm.account, "To be charged")->needs(slurm);
-    c->add_option("--memory", o->slurm.memory, "Of a task, such as 2G")->needs(slurm);
-    c->add_option("--chunk", o->slurm.chunk, "Cases per task (default: about a hundred tasks)")
+    auto* slurm = c->add_flag("--slurm", o->onSlurm, "Run as a Slurm job array: submit, watch, submit lost tasks again");
+    c->add_option("--partition", o->slurm.partition, "Partition of the cluster (default: as in the plan)")->needs(slurm);
+    c->add_option("--time", o->slurm.time, "Time limit of a task, in a format of sbatch (default: as in the plan)")
+        ->needs(slurm);
+    c->add_option("--account", o->slurm.account, "Account to charge (default: as in the plan)")->needs(slurm);
+    c->add_option("--memory", o->slurm.memory, "Memory of a task, e.g. 2G (default: as in the plan)")->needs(slurm);
+    c->add_option("--chunk", o->slurm.chunk, "Cases per task (default: as in the plan, or for about 100 tasks)")
         ->needs(slurm)
         ->check(CLI::PositiveNumber);
-    c->add_option("--sbatch", o->slurm.options, "Another option for sbatch, such as --sbatch=--qos=long")
+    c->add_option("--sbatch", o->slurm.options, "Further option for sbatch, e.g. --sbatch=--qos=long; may be repeated")
         ->needs(slurm)
         ->allow_extra_args(false);
     for (const char* const part : {"--shard", "--cases", "--merge"}) {
         c->get_option(part)->excludes(slurm);
     }
-    c->add_flag("--retry", o->retry, "Run cases that failed again");
-    c->add_flag("--any-build", o->anyBuild, "Go on with a sweep that another build began");
-    c->add_option("--report", o->report, "Write report.html in this folder of a sweep");
-    c->add_flag("--list", o->list, "Ready plans, and outputs of each procedure");
-    c->add_option("--work", o->work, "What a task of a job array does")->group("");
-    c->add_option("--json", o->json, "Write figures to this file (- = standard output, and nothing else there)");
+    c->add_flag("--retry", o->retry, "Run failed cases again");
+    c->add_flag("--any-build", o->anyBuild, "Resume a sweep of another build");
+    c->add_option("--report", o->report, "Write report.html into this folder of a sweep");
+    c->add_flag("--list", o->list, "List ready plans, and outputs of each procedure");
+    c->add_option("--work", o->work, "Work of a task of a job array")->group("");
+    c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o] { sweepCommand(*o); });
 }
 

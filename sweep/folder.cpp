@@ -123,7 +123,7 @@ SweepRow parseRow(const std::string& text, std::size_t index, const SweepPlan& p
         row.outputs.push_back(value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN());
     }
     if (valueOf<std::string>(entry, "checksum", &json::is_string, "text") != checksumOf(entry)) {
-        throw std::runtime_error("key checksum is that of another text");
+        throw std::runtime_error("key checksum does not match");
     }
     return row;
 }
@@ -188,10 +188,9 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
     }
     plan_ = parsePlan(textOf(file), file, sceneOfFolder);
     if (!given.empty() && text.first != plan_.text) {
-        throw std::runtime_error(
-            fmt::format("{}: holds another plan than {}: choose another folder, or leave the plan out to go on with the "
-                        "folder's own",
-                        folder_.string(), given));
+        throw std::runtime_error(fmt::format(
+            "{}: holds another plan than {}: choose another folder, or leave out the plan to resume that of the folder",
+            folder_.string(), given));
     }
     const json about = json::parse(textOf(folder_ / "sweep.json"), nullptr, false);
     if (!about.is_object()) {

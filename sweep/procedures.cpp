@@ -230,29 +230,29 @@ ProcedureResult wholeSession(const Run& run, const Procedure& p, std::uint64_t s
 std::vector<OutputInfo> outputsOf(ProcedureKind kind)
 {
     if (kind == ProcedureKind::press) {
-        return {{"force_n", "of the tissue, mean over the last 20 ms of the hold"},
-                {"peak_force_n", "on the hand, largest on the way in"},
+        return {{"force_n", "force of the tissue, mean over the last 20 ms of the hold"},
+                {"peak_force_n", "largest force on the hand on the way in"},
                 {"stiffness_n_m", "force_n over the depth"},
-                {"work_mj", "that the hand did"},
+                {"work_mj", "work of the hand"},
                 {"contacts", "elements of tissue that the tool touched at the end"}};
     }
     if (kind == ProcedureKind::needle) {
-        return {{"puncture_force_n", "at which the first tissue gave way"},
+        return {{"puncture_force_n", "force at which the first tissue gave way"},
                 {"punctures", "tissues that gave way"},
-                {"peak_force_n", "on the hand, largest against the way in"},
-                {"force_n", "of the tissue at the depth, mean over the last 20 ms of the hold"},
-                {"pull_n", "largest on the way out"},
-                {"work_mj", "that the hand did, in and out"}};
+                {"peak_force_n", "largest force on the hand against the way in"},
+                {"force_n", "force of the tissue at the depth, mean over the last 20 ms of the hold"},
+                {"pull_n", "largest force on the way out"},
+                {"work_mj", "work of the hand, in and out"}};
     }
     std::vector<OutputInfo> out;
     for (const haptics::Measure& m : haptics::measures()) {
-        out.push_back({m.key, "of the score, docs/score.md"});
+        out.push_back({m.key, "measure of the score, docs/score.md"});
     }
     out.insert(out.end(), {{"peak_basic_n", "largest force of the tissue"},
                            {"peak_additional_n", "largest additional force (DFFB)"},
-                           {"energy_made_mj", "most that the hand was given net"},
+                           {"energy_made_mj", "largest net energy given to the hand"},
                            {"punctures", "tissues that gave way"},
-                           {"finished", "1: the hand came to its end; 0: the time was over"}});
+                           {"finished", "1: the hand finished its script; 0: the time ran out"}});
     return out;
 }
 

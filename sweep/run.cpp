@@ -85,8 +85,8 @@ std::vector<std::size_t> remainingCases(const SweepFolder& folder, const CasesWa
     }
     if (!others.empty() && !cases.empty() && !wanted.anyBuild) {
         throw std::runtime_error(
-            fmt::format("{}: holds cases of {} and this is {}: go on with that, or add --any-build (the table says which "
-                        "case is whose)",
+            fmt::format("{}: holds cases of build {}, and this is build {}: use that build, or add --any-build (the table "
+                        "names the build of each case)",
                         folder.path().string(), fmt::join(others, ", "), std::string(base::build())));
     }
     return cases;
@@ -180,7 +180,7 @@ std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& fro
     }
     std::sort(parts.begin(), parts.end());
     if (parts.empty()) {
-        throw std::runtime_error(folder.string() + ": has no shards to merge: give their folders behind --merge");
+        throw std::runtime_error(folder.string() + ": has no shards to merge: give their folders after --merge");
     }
     if (!fs::exists(folder / "plan.toml")) {
         const SweepFolder first(parts.front(), "", false);

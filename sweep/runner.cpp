@@ -89,7 +89,7 @@ CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Pro
     const auto watch = [&](const haptics::TickRecord&, const haptics::ServoTiming&) {
         if (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > plan_.caseLimit) {
             throw std::runtime_error(
-                fmt::format("took over {:g} s by the clock and was given up (case_limit_s in the plan)", plan_.caseLimit));
+                fmt::format("took over {:g} s and was aborted (case_limit_s in the plan)", plan_.caseLimit));
         }
     };
     auto result = carryOut(modelled->model, info, procedure, seed, recorder ? &*recorder : nullptr, watch);

@@ -276,7 +276,7 @@ void workOnChunk(const fs::path& file, int jobs, const std::string& build)
     }
     const auto told = [&](std::size_t, std::size_t) {
         if (FolderLock::holder(folder.path()) != lock) {
-            throw std::runtime_error(folder.path().string() + ": the run that asked for this task is over: it ends");
+            throw std::runtime_error(folder.path().string() + ": the run that submitted this task is over: the task ends");
         }
         return true;
     };

@@ -114,7 +114,7 @@ std::vector<Baseline> chosen(std::vector<Baseline> all, const AccuracyArguments&
     for (const std::string& name : o.methods) {
         if (!names.contains(name)) {
             throw std::runtime_error(
-                fmt::format("--methods {}: there is none; there are {}", name, fmt::join(names, ", ")));
+                fmt::format("--methods {}: there is no such method; there are {}", name, fmt::join(names, ", ")));
         }
     }
     std::erase_if(all, [&](const Baseline& b) {
@@ -345,7 +345,7 @@ void checkLaws(const AccuracyArguments& o)
     for (const std::string& law : o.laws) {
         if (!volume::lawNamed(law)) {
             throw std::runtime_error(
-                fmt::format("--law {}: there is none; there are {}", law, fmt::join(volume::lawNames, ", ")));
+                fmt::format("--law {}: there is no such law; there are {}", law, fmt::join(volume::lawNames, ", ")));
         }
     }
 }
@@ -395,43 +395,48 @@ void addAccuracy(CLI::App& app)
 {
     auto o = std::make_shared<AccuracyArguments>();
     auto* accuracy = app.add_subcommand(
-        "accuracy", "Charts error against time per tick: Palpate, and what others would use, against finite elements");
+        "accuracy", "Compare error and time per tick of Palpate and of other methods with finite elements, in charts");
     accuracy->add_option("-o,--output", o->folder,
-                         "Folder for charts (PNG, HTML), CSV and JSON; a run that was stopped goes on there");
-    accuracy->add_option("--scenes", o->scenes, "Scenes: built-in names or files (default: all built-in)")->delimiter(',');
+                         "Folder for charts (PNG, HTML), CSV and JSON; an interrupted run resumes there");
+    accuracy
+        ->add_option(
+            "--scenes", o->scenes,
+            "Scenes: built-in names or files (default: block, layered, plate, pair, breast; with --depth all stored)")
+        ->delimiter(',');
     accuracy->add_option("--volume", o->volumes, "Volumes (.vdb)")->delimiter(',');
     accuracy->add_option("--methods", o->methods, "Methods by name, e.g. elastic,xpbd,bullet (default: all)")
         ->delimiter(',');
-    accuracy->add_option("--references", o->references,
-                         "Folder of solved references, and for new ones (default: ~/.cache/palpate/references)");
-    accuracy->add_option("--law", o->laws, "Laws of the references")->delimiter(',')->capture_default_str();
-    accuracy->add_option("--limit", o->maxSeconds, "Most seconds for a method's ticks in one scene; beyond, it is left out")
+    accuracy->add_option(
+        "--references", o->references,
+        "Folder of references, searched first, where new ones are stored (default: ~/.cache/palpate/references)");
+    accuracy->add_option("--law", o->laws, "Material laws of the references")->delimiter(',')->capture_default_str();
+    accuracy->add_option("--limit", o->maxSeconds, "Maximum time of a method in one scene [s]; a slower method is left out")
         ->check(CLI::Range(1.0, 1e6))
         ->capture_default_str();
     auto* rival = accuracy->add_option(
         "--rival", o->rivals,
-        "COMMAND or NAME=COMMAND, which solves the same push by files; again for another (docs/accuracy.md)");
+        "External solver of the same push, as COMMAND or NAME=COMMAND; may be repeated (docs/accuracy.md)");
     rival->allow_extra_args(false);
-    accuracy->add_option("--rival-mesh-mm", o->rivalSpacings, "Spacings of the meshes that --rival gets")
+    accuracy->add_option("--rival-mesh-mm", o->rivalSpacings, "Spacings of the meshes for --rival [mm]")
         ->delimiter(',')
         ->check(CLI::Range(1.0, 50.0))
         ->capture_default_str()
         ->needs(rival);
-    accuracy->add_option("--rival-limit", o->rivalSeconds, "Most seconds for a rival in one scene on one mesh")
+    accuracy->add_option("--rival-limit", o->rivalSeconds, "Maximum time of a rival in one scene on one mesh [s]")
         ->check(CLI::Range(1.0, 1e6))
         ->capture_default_str();
     accuracy->add_option("--json", o->json, "Write figures to this file (- = standard output)");
-    accuracy->add_flag("--quick", o->quick, "Few methods, scenes block and plate: a minute");
-    accuracy->add_flag("--verify", o->verify, "No charts: our kernel and the reference against closed forms")
-        ->excludes(rival);
+    accuracy->add_flag("--quick", o->quick, "Only few methods, scenes block and plate: a minute");
+    accuracy->add_flag("--verify", o->verify, "No charts: compare kernel and reference with closed forms")->excludes(rival);
     auto* depth = accuracy->add_flag(
-        "--depth", o->depth, "The force alone: first touch, two radii deep and back, against stored finite elements");
+        "--depth", o->depth,
+        "Compare the force alone, from first touch to two radii deep and back, with stored finite elements");
     depth->excludes(rival);
     accuracy->add_option("--settings", o->settings, "With --depth: settings of level elastic")
         ->delimiter(',')
         ->capture_default_str()
         ->needs(depth);
-    accuracy->add_option("--speed", o->speed, "With --depth: of the tool [mm/s]")
+    accuracy->add_option("--speed", o->speed, "With --depth: speed of the tool [mm/s]")
         ->check(CLI::Range(1.0, 1000.0))
         ->capture_default_str()
         ->needs(depth);

@@ -182,8 +182,8 @@ std::vector<DeepCase> chosen(const DeepCommand& c)
     }
     for (const std::string& scene : c.scenes) {
         if (!scenes.contains(scene)) {
-            throw std::runtime_error(
-                fmt::format("--scenes {}: there are no forces of it; there are of {}", scene, fmt::join(scenes, ", ")));
+            throw std::runtime_error(fmt::format("--scenes {}: has no stored forces; scenes with stored forces are {}",
+                                                 scene, fmt::join(scenes, ", ")));
         }
     }
     const std::vector<std::string> wanted = c.scenes.empty() && c.quick ? std::vector<std::string>{"block"} : c.scenes;

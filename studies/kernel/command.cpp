@@ -128,7 +128,8 @@ void checkNames(const KernelArguments& o)
     const auto known = toolNames();
     for (const std::string& tool : o.tools) {
         if (std::ranges::find(known, tool) == known.end()) {
-            throw std::runtime_error(fmt::format("--tools {}: there is none; there are {}", tool, fmt::join(known, ", ")));
+            throw std::runtime_error(
+                fmt::format("--tools {}: there is no such tool; there are {}", tool, fmt::join(known, ", ")));
         }
     }
     for (const std::string& setting : o.settings) {
@@ -240,16 +241,20 @@ void benchKernelCommand(KernelArguments o)
 void addBenchKernel(CLI::App& bench)
 {
     auto o = std::make_shared<KernelArguments>();
-    auto* kernel = bench.add_subcommand("kernel", "Error and time of level elastic, against the whole grid solved");
-    kernel->add_option("--scenes", o->scenes, "Scenes: built-in names or files (default: all built-in)")->delimiter(',');
+    auto* kernel = bench.add_subcommand(
+        "kernel", "Measure error and time of level elastic, compared with the complete grid solved to convergence");
+    kernel
+        ->add_option("--scenes", o->scenes,
+                     "Scenes: built-in names or files (default: block, layered, plate, pair, breast)")
+        ->delimiter(',');
     kernel->add_option("--volume", o->volumes, "Volumes (.vdb)")->delimiter(',');
     kernel->add_option("--settings", o->settings, "Settings of level elastic")->delimiter(',')->capture_default_str();
-    kernel->add_option("--tools", o->tools, fmt::format("Of {} (default: all)", fmt::join(toolNames(), ", ")))
+    kernel->add_option("--tools", o->tools, fmt::format("Tools: {} (default: all)", fmt::join(toolNames(), ", ")))
         ->delimiter(',');
     kernel->add_option("--speeds", o->speeds, "Speeds of the tool [mm/s]")->delimiter(',')->capture_default_str();
     kernel->add_option("-o,--output", o->folder, "Folder for kernel.json and the chart (PNG, HTML)");
     kernel->add_option("--json", o->json, "Write figures to this file (- = standard output)");
-    kernel->add_flag("--quick", o->quick, "One scene, tool and speed, without setting fine: seconds");
+    kernel->add_flag("--quick", o->quick, "Only one scene, tool and speed, without setting fine: seconds");
     kernel->final_callback([o] { benchKernelCommand(*o); });
 }
 

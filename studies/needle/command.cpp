@@ -274,7 +274,8 @@ void addBenchNeedle(CLI::App& bench)
 {
     auto o = std::make_shared<NeedleArguments>();
     auto* c = bench.add_subcommand(
-        "needle", "Force against depth: through layers, beside the thesis's model; in liver; and where warnings begin");
+        "needle",
+        "Compute a needle's force against depth in layers and in liver, and where warnings begin beside a vessel");
     c->add_option("-o,--output", o->folder, "Folder for needle.html, .json and charts (PNG)");
     c->add_flag("--quick", o->quick, "Faster hand, level chainmail for the needle: seconds");
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");

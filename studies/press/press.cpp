@@ -51,8 +51,8 @@ chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& mode
 {
     PoseLoad load(model, options.tool, path.poses.front());
     if (!load.holds()) {
-        throw std::runtime_error(
-            path.origin + ": the needle's tip is not in tissue at the first pose: begin where it has hold of the tissue");
+        throw std::runtime_error(path.origin +
+                                 ": the needle's tip is not in tissue at the first pose: begin the path inside the tissue");
     }
     const bool presses = options.tool.kind != datasets::ToolKind::needle;
     for (std::size_t tick = 0; presses && tick < path.ticks(); ++tick) {
@@ -113,7 +113,7 @@ private:
         s.behind = result.behind;
         if (!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy)) {
             throw std::runtime_error(
-                fmt::format("{}: {:.3f} s: the force is no number: lead the tool less deep or more slowly", path_.origin,
+                fmt::format("{}: {:.3f} s: the force is not a number: move the tool less deep or more slowly", path_.origin,
                             pose.seconds));
         }
         summary_.notConverged += converge && s.residual > pressTolerance ? 1 : 0;

@@ -37,7 +37,9 @@ json runCells(const StabilityArguments& o, StabilityModels& models, command::Pro
 {
     const auto cells = matrixCells(models, o.choice);
     if (cells.empty()) {
-        throw std::runtime_error("no cell is left: those scenes ask for a method that a needle can pierce");
+        throw std::runtime_error(
+            "no cell is left: the needle pierces tissue in these scenes, and none of these methods supports that: choose "
+            "others");
     }
     progress.show("models of the scenes");
     models.prepare(cells);
@@ -104,7 +106,7 @@ void stabilityCommand(const StabilityArguments& o)
     base::checkOutput(o.json);
     base::checkOutputFolder(o.folder);
     if (o.cell.empty() && !o.record.empty()) {
-        throw std::runtime_error("--record: which cell? add --case SCENE/METHOD/DEVICE/GRIP/RATE");
+        throw std::runtime_error("--record: needs a cell: add --case SCENE/METHOD/DEVICE/GRIP/RATE");
     }
     StabilityModels models;
     if (!o.cell.empty()) {
@@ -146,8 +148,8 @@ void stabilityCommand(const StabilityArguments& o)
 void addStability(CLI::App& app)
 {
     auto o = std::make_shared<StabilityArguments>();
-    auto* c = app.add_subcommand("stability",
-                                 "Where haptic methods fail: scenes, methods, devices, grips and rates, against bounds");
+    auto* c = app.add_subcommand(
+        "stability", "Find where haptic methods fail: scenes, methods, devices, grips and rates, compared with bounds");
     c->add_option("-o,--output", o->folder, "Folder for stability.html, .json, .csv and charts (PNG)");
     c->add_option("--scenes", o->choice.scenes, "Scenes or kinds of scenes by name, e.g. plate,slide (default: all)")
         ->delimiter(',');
@@ -160,12 +162,12 @@ void addStability(CLI::App& app)
                       ->check(CLI::Range(100, 20000))
                       ->capture_default_str();
     c->add_flag("--quick", o->choice.quick, "Some scenes, one device, 1 kHz: under a minute");
-    auto* fuzzed = c->add_option("--fuzz", o->fuzz, "So many hostile sessions of Palpate's own levels");
-    c->add_flag("--fuzz-only", o->fuzzOnly, "Only those")->needs(fuzzed);
-    c->add_option("--seed", o->seed, "Of the hostile sessions")->capture_default_str();
-    c->add_option("--case", o->cell, "One cell again, by its id");
+    auto* fuzzed = c->add_option("--fuzz", o->fuzz, "Also run this many hostile sessions of Palpate's own levels");
+    c->add_flag("--fuzz-only", o->fuzzOnly, "Run only the hostile sessions")->needs(fuzzed);
+    c->add_option("--seed", o->seed, "Seed of the hostile sessions")->capture_default_str();
+    c->add_option("--case", o->cell, "Run one cell, by its id");
     c->add_option("--record", o->record, "With --case: record it as a session (.db), its volume beside it (.vdb)");
-    c->add_option("--jobs", o->jobs, "Threads; the figures do not depend on it")
+    c->add_option("--jobs", o->jobs, "Number of threads (default: all cores); the figures do not depend on it")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");

@@ -28,7 +28,8 @@ std::vector<std::string> chosen(const std::vector<std::string>& all, const std::
 {
     for (const auto& name : asked) {
         if (std::ranges::find(all, name) == all.end()) {
-            throw std::runtime_error(fmt::format("--{} {}: there is none; there are {}", what, name, fmt::join(all, ", ")));
+            throw std::runtime_error(
+                fmt::format("--{} {}: there is no such name; there are {}", what, name, fmt::join(all, ", ")));
         }
     }
     if (asked.empty()) {

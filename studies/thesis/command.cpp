@@ -147,7 +147,7 @@ void benchTasks(const ThesisArguments& o)
     std::ranges::sort(objects);
     objects.erase(std::ranges::unique(objects).begin(), objects.end());
     if (objects.size() < 3) {
-        throw std::runtime_error("--objects: a line with its errors needs three different numbers or more");
+        throw std::runtime_error("--objects: give three different numbers or more, for a line fit");
     }
     if (const int least = voxelsFor(objects.back()); o.voxels != 0 && o.voxels < least) {
         throw std::runtime_error(fmt::format("--voxels {}: {} objects need {} or more", o.voxels, objects.back(), least));
@@ -185,28 +185,28 @@ void addBenchTasks(CLI::App& bench)
     auto o = std::make_shared<ThesisArguments>();
     o->objects = standardObjects();
     auto* c = bench.add_subcommand("tasks",
-                                   "Time of the thesis's tasks and events against the number of objects, beside its own "
-                                   "figures and a loop over objects as it had");
+                                   "Measure the thesis's tasks and events for growing numbers of objects, and compare them "
+                                   "with its figures and with a loop over objects");
     c->add_option("--objects", o->objects,
-                  "Numbers of objects, three or more (default: 25 to 600 as in its Table 2, and on to 10^6)")
+                  "Numbers of objects, three or more (default: 25 to 600 as in Table 2 of the thesis, and on to 10^6)")
         ->delimiter(',')
         ->check(CLI::Range(1, 8'000'000));
     c->add_option("--voxels", o->voxels,
-                  "Along a side of the block, whatever the objects (0: as few as tell them apart, 64 at least)")
+                  "Voxels along a side of the block (0: as few as separate the objects, at least 64)")
         ->check(CLI::Range(0, 800))
         ->capture_default_str();
     c->add_option("--model", o->level, "Level of the tissue model")
         ->check(CLI::IsMember(datasets::modelLevels))
         ->capture_default_str();
-    c->add_option("--setting", o->setting, "Of level elastic")
+    c->add_option("--setting", o->setting, "Resolution of level elastic")
         ->check(CLI::IsMember(datasets::elasticSettings()))
         ->capture_default_str();
-    c->add_option("--frames", o->frames, "Of 33 ticks, for each event and number of objects")
+    c->add_option("--frames", o->frames, "Frames of 33 ticks, for each event and number of objects")
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
-    c->add_option("--seed", o->seed, "Of the objects' places, and of the order in which their numbers are measured")
+    c->add_option("--seed", o->seed, "Seed of the objects' positions and of the order of measurement")
         ->capture_default_str();
-    c->add_flag("--no-view", o->noView, "Without a viewer, and so without the events that have graphics on");
+    c->add_flag("--no-view", o->noView, "Start no viewer, and leave out the events with graphics");
     c->add_option("-o,--output", o->folder, "Folder for tasks.json, tasks.html and tasks.png");
     c->add_option("--chart", o->chart, "Write the chart to this file (PNG)");
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");

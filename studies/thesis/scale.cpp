@@ -310,14 +310,15 @@ void benchScale(const ScaleArguments& o)
 void addBenchScale(CLI::App& bench)
 {
     auto o = std::make_shared<ScaleArguments>();
-    auto* c =
-        bench.add_subcommand("scale",
-                             "The largest scene (objects, voxels, active nodes) that holds 1 kHz with the haptic part "
-                             "under 0.08 ms and under 0.5 ms, and what limits it");
-    c->add_option("--memory-gb", o->memoryGb, "No scene that needs more is made [GB]")
+    auto* c = bench.add_subcommand("scale",
+                                   "Find the largest scene (objects, voxels, active nodes) that runs at 1 kHz with a "
+                                   "haptic part under 0.08 ms and under 0.5 ms, and what limits it");
+    c->add_option("--memory-gb", o->memoryGb, "Maximum memory of a scene [GB]")
         ->check(CLI::Range(0.1, 1000.0))
         ->capture_default_str();
-    c->add_option("--frames", o->frames, "Of 33 ticks, for each scene")->check(CLI::Range(1, 1000))->capture_default_str();
+    c->add_option("--frames", o->frames, "Frames of 33 ticks, for each scene")
+        ->check(CLI::Range(1, 1000))
+        ->capture_default_str();
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     c->final_callback([o] { benchScale(*o); });
 }

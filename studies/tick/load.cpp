@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/outputs.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <session/figures.h>
 #include <session/open.h>
 #include <studies/tick/bench_tick.h>
@@ -114,13 +115,12 @@ void benchLoad(const LoadArguments& o)
 void addBenchLoad(CLI::App& bench)
 {
     auto o = std::make_shared<LoadArguments>();
-    auto* load = bench.add_subcommand("load",
-                                      "Lateness of ticks while stress-ng keeps every core busy, with real-time "
-                                      "priority and without");
-    load->add_option("SCENE", o->scene, "Scene")->capture_default_str();
-    load->add_option("--model", o->changes.model, "Level of the tissue model")->check(CLI::IsMember(datasets::modelLevels));
+    auto* load = bench.add_subcommand(
+        "load", "Measure the lateness of ticks while stress-ng loads every core, with and without real-time priority");
+    load->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->capture_default_str();
+    command::addModel(*load, o->changes);
     load->add_option("--runs", o->runs, "Sessions of each kind")->check(CLI::Range(1, 20))->capture_default_str();
-    load->add_flag("--idle", o->idle, "Without load, to compare");
+    load->add_flag("--idle", o->idle, "Run without load, for comparison");
     load->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     load->final_callback([o] { benchLoad(*o); });
 }

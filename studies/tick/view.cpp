@@ -166,7 +166,7 @@ nlohmann::json readFigures(const fs::path& file)
     auto figures = nlohmann::json::parse(in, nullptr, false);
     fs::remove(file);
     if (figures.is_discarded()) {
-        throw std::runtime_error("palpate-view has measured nothing: is it installed beside palpate, and xvfb?");
+        throw std::runtime_error("palpate-view wrote no figures: install it beside palpate, and install xvfb");
     }
     return figures;
 }
@@ -293,24 +293,24 @@ void addBenchView(CLI::App& bench)
 {
     auto o = std::make_shared<ViewArguments>();
     auto* view = bench.add_subcommand("view",
-                                      "Time of a viewer's picture (on a hidden display) while everything deforms, and the "
-                                      "lateness of the servo loop beside it");
-    view->add_option("SCENE", o->scene, "Scene")->capture_default_str();
-    view->add_option("--voxels", o->sides, "Sides of the display volumes")
+                                      "Measure the time per picture of a viewer (on a hidden display) while all tissue "
+                                      "deforms, and the lateness of a servo loop beside it");
+    view->add_option("SCENE", o->scene, "Built-in scene, scene file (.toml) or volume (.vdb)")->capture_default_str();
+    view->add_option("--voxels", o->sides, "Voxels along each side of the display volume")
         ->delimiter(',')
         ->check(CLI::Range(16, 512))
         ->capture_default_str();
-    view->add_option("--layout", o->layouts, "trainee, instructor or both")
+    view->add_option("--layout", o->layouts, "Layouts: trainee, instructor or both")
         ->delimiter(',')
         ->check(CLI::IsMember({"trainee", "instructor"}))
         ->capture_default_str();
     view->add_option("--width", o->width, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
     view->add_option("--height", o->height, "Of the picture [pixels]")->check(CLI::Range(320, 8192))->capture_default_str();
-    view->add_option("--frames", o->frames, "Pictures of each case")->check(CLI::Range(10, 100000))->capture_default_str();
+    view->add_option("--frames", o->frames, "Pictures per case")->check(CLI::Range(10, 100000))->capture_default_str();
     command::addSetting(*view, o->changes);
-    view->add_flag("--alone", o->alone, "Without a servo loop beside it, to compare");
+    view->add_flag("--alone", o->alone, "Run without a servo loop, for comparison");
     view->add_flag("--ultrasound", o->ultrasound,
-                   "With the ultrasound picture: processor time of each and of its stages too");
+                   "Show the ultrasound picture, and measure its processor time and that of its stages");
     view->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     view->final_callback([o] { benchView(*o); });
 }

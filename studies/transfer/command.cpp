@@ -211,10 +211,11 @@ void benchSync(const SyncOptions& o)
 void addBenchIpc(CLI::App& bench)
 {
     auto o = std::make_shared<IpcOptions>();
-    auto* ipc = bench.add_subcommand(
-        "ipc", "How long a position takes to a viewer's process: shared memory, and named pipes as the thesis had them");
+    auto* ipc = bench.add_subcommand("ipc",
+                                     "Measure the time until a position reaches a viewer's process, through shared memory "
+                                     "and through named pipes as in the thesis");
     ipc->add_option("SCENE", o->scene, "Scene of the session")->capture_default_str();
-    ipc->add_option("--seconds", o->seconds, "Of each measurement [s]")
+    ipc->add_option("--seconds", o->seconds, "Duration of each measurement [s]")
         ->check(CLI::Range(0.1, 60.0))
         ->capture_default_str();
     ipc->add_option("--json", o->json, "Write figures to this file (- = standard output)");
@@ -224,11 +225,13 @@ void addBenchIpc(CLI::App& bench)
 void addBenchSync(CLI::App& bench)
 {
     auto o = std::make_shared<SyncOptions>();
-    auto* sync = bench.add_subcommand("sync", "How far apart in time two viewers show the same tick");
+    auto* sync = bench.add_subcommand("sync", "Measure the time between two viewers that show the same tick");
     sync->add_option("SCENE", o->scene, "Scene of the session")->capture_default_str();
     command::addSetting(*sync, o->changes);
-    sync->add_option("--seconds", o->seconds, "Of the session [s]")->check(CLI::Range(1.0, 600.0))->capture_default_str();
-    sync->add_option("--size", o->size, "Of the viewers' windows, WIDTHxHEIGHT in pixels")->capture_default_str();
+    sync->add_option("--seconds", o->seconds, "Duration of the session [s]")
+        ->check(CLI::Range(1.0, 600.0))
+        ->capture_default_str();
+    sync->add_option("--size", o->size, "Size of the viewers' windows, WIDTHxHEIGHT [pixels]")->capture_default_str();
     sync->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     sync->final_callback([o] { benchSync(*o); });
 }

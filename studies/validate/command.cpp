@@ -151,7 +151,8 @@ void checkVerdicts(const std::vector<Experiment>& experiments)
         what = fmt::format("{} of {} experiments fail: {}", failed.size(), experiments.size(), fmt::join(failed, ", "));
     }
     if (!missing.empty()) {
-        what += fmt::format("{}not run, name those that you want: {}", what.empty() ? "" : "; ", fmt::join(missing, ", "));
+        what += fmt::format("{}not run (name the experiments that you want): {}", what.empty() ? "" : "; ",
+                            fmt::join(missing, ", "));
     }
     if (!what.empty()) {
         throw std::runtime_error("validate: " + what);
@@ -209,23 +210,22 @@ void validateCommand(const ValidateArguments& o)
 void addValidate(CLI::App& app)
 {
     const auto o = std::make_shared<ValidateArguments>();
-    auto* validate = app.add_subcommand(
-        "validate",
-        "Compares what is simulated with measurements, published figures and closed forms; exit status 1 when "
-        "one does not hold or could not be run");
-    validate->add_option("experiments", o->names, "Which (default: all)")
+    auto* validate = app.add_subcommand("validate",
+                                        "Compare simulations with measurements, published figures and closed forms; exit "
+                                        "status 1 if one fails or cannot be run");
+    validate->add_option("experiments", o->names, "Experiments to run (default: all)")
         ->check(CLI::IsMember(std::vector<std::string>(allNames.begin(), allNames.end())));
     validate
-        ->add_option("--data", o->data,
-                     "Folder of measurements, looked at before $PALPATE_MEASURED and those that come with it")
+        ->add_option("--data", o->data, "Folder of measurements, searched before $PALPATE_MEASURED and the included ones")
         ->type_name("FOLDER");
     validate->add_option("-o,--output", o->folder, "Folder for validation.html, .json, .csv and pictures (PNG)")
         ->type_name("FOLDER");
-    validate->add_option("--json", o->json, "Write the figures here, - for standard output")->type_name("FILE");
-    validate->add_option("--csv", o->csv, "Write a row per experiment here, - for standard output")->type_name("FILE");
+    validate->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
+    validate->add_option("--csv", o->csv, "Write a row per experiment to this file (- = standard output)")
+        ->type_name("FILE");
     validate->add_option("--tissues", o->tissues, "ultrasound: tissue table to check with (default: the built-in one)")
         ->type_name("FILE");
-    validate->add_flag("--quick", o->quick, "Larger cells: for a look, not for figures");
+    validate->add_flag("--quick", o->quick, "Larger cells: a quick preview, not for final figures");
     validate->final_callback([o] { validateCommand(*o); });
 }
 

@@ -35,7 +35,8 @@ TEST(Ct, ATraineeScansAndTheRecordGivesTheScansAgain)
     EXPECT_NE(make("c.png", "2s", "lung"), first);
     EXPECT_NE(make("d.png", "0.1s", "soft-tissue"), first);
     EXPECT_EQ(palpate({"replay", record}).status, 0);
-    expectRefusal({"export", "--record", record, "--at", "2s", "--what", "ct", "-o", folder / "e.nrrd"}, "is a .png");
+    expectRefusal({"export", "--record", record, "--at", "2s", "--what", "ct", "-o", folder / "e.nrrd"},
+                  "are written as .png");
     figures(
         {"train", "layered", "--model", "spring", "--unpaced", "--no-view", "--seconds", "1", "--record", folder / "s.db"});
     expectRefusal({"export", "--record", folder / "s.db", "--at", "0.5s", "--what", "ct", "-o", folder / "f.png"},

@@ -38,8 +38,8 @@ TEST(DevicesCommand, RefusesWhatIsNoFirmware)
 
 TEST(DevicesCommand, OptionsOfTheFalconNeedTheFalcon)
 {
-    expectRefusal({"train", "block", "--no-view", "--on-unplug", "wait"}, "goes with --device falcon");
-    expectRefusal({"train", "block", "--device", "falcon", "--unpaced"}, "somebody holds it");
+    expectRefusal({"train", "block", "--no-view", "--on-unplug", "wait"}, "needs --device falcon");
+    expectRefusal({"train", "block", "--device", "falcon", "--unpaced"}, "a person holds it");
     expectRefusal({"devices", "--buttons", "--force-test"}, "--buttons");
     expectRefusal({"train", "block", "--device", "falcon", "--trainee", "expert"}, "needs --device hand");
 }

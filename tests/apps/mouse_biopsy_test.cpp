@@ -266,7 +266,7 @@ TEST(Desktop, ATryoutEndsByItselfAndLeavesNothing)
     const Outcome outcome = train->wait();
     EXPECT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.out.find("points"), std::string::npos) << outcome.out;
-    expectRefusal({"train", "--tryout"}, "somebody has to hold the tool");
+    expectRefusal({"train", "--tryout"}, "a person must hold the tool");
     expectRefusal({"train", "--tryout", "--device", "mouse", "--record", "x.db"}, "--tryout");
 }
 

@@ -124,8 +124,8 @@ TEST_F(PressCommand, AnotherToolIsTakenOnlyWithWhatTheSceneDoesNotSay)
     EXPECT_EQ(needle({}).at("tool").at("radius_mm"), 1.05);
     EXPECT_EQ(needle({"--radius-mm", "0.6"}).at("tool").at("radius_mm"), 0.6);
     EXPECT_GT(needle({}).at("peak_force_n"), needle({"--radius-mm", "0.6"}).at("peak_force_n"));
-    expectRefusal({"press", scene, "--path", path, "--tool", "capsule"}, "how long this one is with --length-mm");
-    expectRefusal({"press", "layered", "--path", path, "--tool", "sphere"}, "how thick this one is with --radius-mm");
+    expectRefusal({"press", scene, "--path", path, "--tool", "capsule"}, "add --length-mm for this one");
+    expectRefusal({"press", "layered", "--path", path, "--tool", "sphere"}, "add --radius-mm for this one");
     expectRefusal({"press", scene, "--path", path, "--length-mm", "3"}, "--length-mm: the tool is a sphere");
     for (const std::string radius : {"0", "-1", "1000", "nan"}) {
         expectRefusal({"press", scene, "--path", path, "--radius-mm", radius},

@@ -280,8 +280,8 @@ TEST_F(Researcher, AnExportIsImportedAgainAsItWas)
         EXPECT_EQ(after.at("provenance").at("label hash"), before.at("provenance").at("label hash"));
     }
     expectRefusal({"export", vdb, "-o", folder / "e.jpg"}, "is no format that is written");
-    expectRefusal({"export", vdb, "-o", folder / "e.png"}, "is of a session");
-    expectRefusal({"export", vdb, "-o", folder / "e.vtu"}, "is of a session");
+    expectRefusal({"export", vdb, "-o", folder / "e.png"}, "needs a session");
+    expectRefusal({"export", vdb, "-o", folder / "e.vtu"}, "needs a session");
     expectRefusal({"export", vdb, "-o", folder / "e.nrrd", "--what", "image"}, "holds no image");
 }
 
@@ -330,7 +330,8 @@ TEST_F(Researcher, ASceneIsProposedRunsAndItsStatesAreExported)
     const std::string vtu = readText(folder / "u.vtu");
     EXPECT_NE(vtu.find("displacement_mm"), std::string::npos);
     expectRefusal({"export", "--record", record, "--at", "900s", "-o", field}, "the record runs from 0 s to");
-    expectRefusal({"scene", vdb, "--target", "spleen", "-o", scene}, "--target spleen: no structure or tissue");
+    expectRefusal({"scene", vdb, "--target", "spleen", "-o", scene},
+                  "--target spleen: the volume has no structure or tissue");
     expectRefusal({"scene", vdb, "--lesion-in", "Aorta", "--lesion", "30mm", "-o", scene}, "has no room");
 }
 

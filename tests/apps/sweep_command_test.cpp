@@ -104,7 +104,7 @@ TEST_F(Sweep, CtrlCFinishesWhatRunsAndGoesOnLater)
     sweep.send(SIGINT);
     const Outcome outcome = sweep.wait();
     EXPECT_EQ(outcome.status, 1);
-    EXPECT_NE(outcome.err.find("palpate: stopped: "), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find("palpate: interrupted: "), std::string::npos) << outcome.err;
     const std::size_t there = csvRows(std::filesystem::path(folder("s")) / "table.csv").size() - 1;
     EXPECT_EQ(there, casesIn(folder("s")));
     EXPECT_LT(there, 240U);

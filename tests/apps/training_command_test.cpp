@@ -35,7 +35,7 @@ TEST_F(TrainingCommands, SessionsOfATraineeOpenTheGateAndTheNextExercise)
 {
     ASSERT_EQ(palpate({"profile", "new", "anna", "--hand", "left"}).status, 0);
     expectRefusal({"train", "--profile", "anna", "--exercise", "breast-core-biopsy/first-core", "--headless", "--unpaced"},
-                  "its gate is shut for anna; next is breast-core-biopsy/touch");
+                  "is still locked for anna; next is breast-core-biopsy/touch");
     auto next = figures({"curriculum", "next", "breast-core-biopsy", "--profile", "anna"});
     EXPECT_EQ(next["next"][0]["exercise"], "touch");
 

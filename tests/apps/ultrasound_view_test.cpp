@@ -41,7 +41,7 @@ TEST(Ultrasound, ARecordsPictureComesAgainBitForBit)
     expectRefusal({"export", "--record", folder / "s.db", "-o", folder / "e.png", "--like", folder / "s.db"},
                   "is no ultrasound image");
     expectRefusal({"export", "--record", folder / "s.db", "-o", folder / "e.nrrd", "--what", "ultrasound", "--at", "1s"},
-                  "is a .png");
+                  "are written as .png");
 }
 
 // Keys turn the console and store a picture; the record gives that picture again, byte by byte.

@@ -52,7 +52,7 @@ TEST(ValidateCommand, WhatIsNotThereIsNotRun)
     ::unsetenv("PALPATE_MEASURED");
     const Outcome o = palpate({"validate", "needle", "beam", "--quick", "--csv", folder / "v.csv"});
     EXPECT_EQ(o.status, 1);
-    EXPECT_NE(o.err.find("not run, name those that you want: needle"), std::string::npos) << o.err;
+    EXPECT_NE(o.err.find("not run (name the experiments that you want): needle"), std::string::npos) << o.err;
     const std::string csv = readText(folder / "v.csv");
     EXPECT_NE(csv.find("\nneedle,not run,"), std::string::npos) << csv;
     EXPECT_NE(csv.find("\nbeam,"), std::string::npos) << csv;

@@ -392,7 +392,7 @@ TEST(Solve, WhatCannotBeSolvedIsRefused)
             p += count;
         }
     }
-    EXPECT_THAT(messageOf([&] { Solver(two, tissue, {}); }), HasSubstr("6 of 12 tetrahedra do not hang together"));
+    EXPECT_THAT(messageOf([&] { Solver(two, tissue, {}); }), HasSubstr("6 of 12 tetrahedra are not connected"));
 }
 
 // A solver that gave up is where it was, and goes on from there.

@@ -206,7 +206,7 @@ TEST(TetGen, BreakdownOfItsProcessIsAnError)
         }
         return std::string("no error");
     };
-    EXPECT_NE(run("kill -SEGV $$", 60).find("broke down"), std::string::npos);
+    EXPECT_NE(run("kill -SEGV $$", 60).find("crashed"), std::string::npos);
     EXPECT_NE(run("exec sleep 60", 0.2).find("took over 0.2 s"), std::string::npos);
     EXPECT_NE(run("exit 0", 60).find("no whole job"), std::string::npos);
 }
