@@ -8,7 +8,8 @@
 #
 # gives palpate::chainmail with its headers as <chainmail/lattice.h>, <palpate/chainmail/lattice.h> where it is installed, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
-# UNINSTALLED: for a program of ours only.
+# UNINSTALLED: for a program of ours only: commands, pages and windows, in which no tick runs.
+
 function(palpate_library name)
   cmake_parse_arguments(arg "UNINSTALLED" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
   set(target palpate_${name})
@@ -26,7 +27,9 @@ function(palpate_library name)
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
     VERIFY_INTERFACE_HEADER_SETS ${PALPATE_VERIFY_HEADERS})
-  if(NOT arg_UNINSTALLED)
+  if(arg_UNINSTALLED)
+    target_compile_options(${target} PRIVATE ${PALPATE_COLD_OPTIONS})
+  else()
     set_property(GLOBAL APPEND PROPERTY PALPATE_INSTALLED ${name})
     install(TARGETS ${target} EXPORT palpateTargets
       FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/palpate)
@@ -39,6 +42,7 @@ function(palpate_program name)
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:palpate_flags> ${arg_PRIVATE})
+  target_compile_options(${name} PRIVATE ${PALPATE_COLD_OPTIONS})
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
   install(TARGETS ${name})
 endfunction()

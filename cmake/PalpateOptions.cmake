@@ -28,6 +28,9 @@ if(PALPATE_SANITIZE)
   # What the undefined-behaviour sanitizer finds ends the program: a line on a terminal would fail no test.
   add_compile_options(-fsanitize=${PALPATE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${PALPATE_SANITIZE})
+  if(PALPATE_SANITIZE_NOT)
+    add_compile_options(-fno-sanitize=${PALPATE_SANITIZE_NOT})
+  endif()
 else()
   # GCC's -Wconversion fires under -fsanitize on code that is clean without it.
   target_compile_options(palpate_flags INTERFACE -Wconversion)

@@ -100,35 +100,52 @@ private:
 constexpr std::array<Index3, 6> faceNeighbours = {Index3(-1, 0, 0), Index3(1, 0, 0),  Index3(0, -1, 0),
                                                   Index3(0, 1, 0),  Index3(0, 0, -1), Index3(0, 0, 1)};
 
+// Calls visit(node, its offset) for every node, on all cores.
+template <typename Visit>
+void forEachNode(const NodeGrid& grid, const Visit& visit)
+{
+    tbb::parallel_for(0, grid.size.z, [&](int z) {
+        std::size_t i = grid.offset({0, 0, z});
+        for (int y = 0; y < grid.size.y; ++y) {
+            for (int x = 0; x < grid.size.x; ++x) {
+                visit(Index3(x, y, z), i++);
+            }
+        }
+    });
+}
+
 // The nearer of two answers at every node, then compared with the answers of the six neighbours.
 std::vector<std::int32_t> join(const NodeGrid& grid, std::span<const SurfacePoint> points,
                                const std::vector<std::int32_t>& up, const std::vector<std::int32_t>& down)
 {
-    std::vector<std::int32_t> best(up.size());
-    tbb::parallel_for(0, grid.size.z, [&](int z) {
-        for (std::size_t i = grid.offset({0, 0, z}); i < grid.offset({0, 0, z + 1}); ++i) {
-            const Index3 n = grid.node(i);
-            float least = std::numeric_limits<float>::max();
-            const auto consider = [&](std::int32_t point) {
-                if (point < 0 || point == best[i]) {
-                    return;
-                }
-                const float d = squaredDistance(n, points[static_cast<std::size_t>(point)]);
-                if (d < least) {
-                    least = d;
-                    best[i] = point;
-                }
-            };
-            best[i] = -1;
-            consider(up[i]);
-            consider(down[i]);
-            for (const Index3& step : faceNeighbours) {
-                if (grid.contains(n + step)) {
-                    consider(up[grid.offset(n + step)]);
-                    consider(down[grid.offset(n + step)]);
-                }
+    std::vector<std::int32_t> best(up.size(), -1);
+    const std::ptrdiff_t row = grid.size.x;
+    const std::ptrdiff_t slice = row * grid.size.y;
+    forEachNode(grid, [&](Index3 n, std::size_t i) {
+        float least = std::numeric_limits<float>::max();
+        const auto consider = [&](std::int32_t point) {
+            if (point < 0 || point == best[i]) {
+                return;
             }
-        }
+            const float d = squaredDistance(n, points[static_cast<std::size_t>(point)]);
+            if (d < least) {
+                least = d;
+                best[i] = point;
+            }
+        };
+        const auto considerBoth = [&](bool there, std::ptrdiff_t step) {
+            if (there) {
+                consider(up[i + static_cast<std::size_t>(step)]);
+                consider(down[i + static_cast<std::size_t>(step)]);
+            }
+        };
+        considerBoth(true, 0);
+        considerBoth(n.x > 0, -1);
+        considerBoth(n.x + 1 < grid.size.x, 1);
+        considerBoth(n.y > 0, -row);
+        considerBoth(n.y + 1 < grid.size.y, row);
+        considerBoth(n.z > 0, -slice);
+        considerBoth(n.z + 1 < grid.size.z, slice);
     });
     return best;
 }
@@ -273,12 +290,10 @@ std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> f
     const auto diagonal = static_cast<float>(glm::length(Vec3(grid.size)));
     const auto spacing = static_cast<float>(grid.spacing);
     std::vector<float> distance(grid.count());
-    tbb::parallel_for(0, grid.size.z, [&](int z) {
-        for (std::size_t i = grid.offset({0, 0, z}); i < grid.offset({0, 0, z + 1}); ++i) {
-            const std::int32_t point = nearest[i];
-            const float d = point < 0 ? diagonal : distanceTo(grid.node(i), points[static_cast<std::size_t>(point)]);
-            distance[i] = (fraction[i] > iso ? -d : d) * spacing;
-        }
+    forEachNode(grid, [&](Index3 n, std::size_t i) {
+        const std::int32_t point = nearest[i];
+        const float d = point < 0 ? diagonal : distanceTo(n, points[static_cast<std::size_t>(point)]);
+        distance[i] = (fraction[i] > iso ? -d : d) * spacing;
     });
     return distance;
 }
@@ -334,18 +349,16 @@ struct Histogram {
     }
 };
 
-// Adds the cell whose lowest corner is `n`: side^3 samples where its values lie between the limits, else all of it at once.
-void addCell(const Samples& f, Index3 n, int side, Histogram& histogram)
+// Values at the corners of a cell, x fastest.
+using Corners = std::array<float, 8>;
+
+// Adds a cell: side^3 samples where its values lie between the limits, else all of it at once.
+void addCell(const Corners& corners, int side, Histogram& histogram)
 {
-    const std::size_t base = f.grid.offset(n);
-    std::array<float, 8> corners{};
-    for (std::size_t corner = 0; corner < 8; ++corner) {
-        const int c = static_cast<int>(corner);
-        corners[corner] = f.values[base + f.grid.offset({c & 1, (c >> 1) & 1, (c >> 2) & 1})];
-    }
-    const auto [low, high] = std::minmax_element(corners.begin(), corners.end());
-    if (*low >= histogram.high || *high <= histogram.low) {
-        histogram.add(*low, 1.0);
+    const auto [low, high] =
+        std::minmax({corners[0], corners[1], corners[2], corners[3], corners[4], corners[5], corners[6], corners[7]});
+    if (low >= histogram.high || high <= histogram.low) {
+        histogram.cells[high <= histogram.low ? 0 : bins - 1] += 1.0;
         return;
     }
     const int count = side * side * side;
@@ -360,12 +373,14 @@ void addCell(const Samples& f, Index3 n, int side, Histogram& histogram)
 
 Histogram histogramOf(const NodeGrid& grid, std::span<const float> values, float low, float high, int side)
 {
-    const Samples samples{grid, values};
     std::vector<Histogram> slices(static_cast<std::size_t>(std::max(0, grid.size.z - 1)), Histogram{low, high, {}});
-    tbb::parallel_for(std::size_t{0}, slices.size(), [&](std::size_t z) {
-        for (int y = 0; y + 1 < grid.size.y; ++y) {
-            for (int x = 0; x + 1 < grid.size.x; ++x) {
-                addCell(samples, {x, y, static_cast<int>(z)}, side, slices[z]);
+    const std::size_t y = grid.offset({0, 1, 0});
+    const std::size_t z = grid.offset({0, 0, 1});
+    tbb::parallel_for(std::size_t{0}, slices.size(), [&](std::size_t slice) {
+        for (int row = 0; row + 1 < grid.size.y; ++row) {
+            const float* at = values.data() + grid.offset({0, row, static_cast<int>(slice)});
+            for (int x = 0; x + 1 < grid.size.x; ++x, ++at) {
+                addCell({at[0], at[1], at[y], at[y + 1], at[z], at[z + 1], at[z + y], at[z + y + 1]}, side, slices[slice]);
             }
         }
     });

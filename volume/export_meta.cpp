@@ -11,7 +11,7 @@ std::string_view metaType(Component component)
     return component == Component::u8 ? "MET_UCHAR" : component == Component::u16 ? "MET_USHORT" : "MET_FLOAT";
 }
 
-std::string numbers(Vec3 v)
+std::string textOf(Vec3 v)
 {
     return fmt::format("{:.17g} {:.17g} {:.17g}", v.x, v.y, v.z);
 }
@@ -29,10 +29,10 @@ void writeMeta(const std::filesystem::path& file, const VoxelStream& voxels, con
     std::string header =
         "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\n"
         "CompressedData = False\n";
-    header += fmt::format("TransformMatrix = {} {} {}\n", numbers(m[0] / spacing.x), numbers(m[1] / spacing.y),
-                          numbers(m[2] / spacing.z));
-    header += fmt::format("Offset = {}\nCenterOfRotation = 0 0 0\n", numbers(1e3 * grid.affine.origin));
-    header += fmt::format("ElementSpacing = {}\nDimSize = {} {} {}\n", numbers(1e3 * spacing), grid.size.x, grid.size.y,
+    header += fmt::format("TransformMatrix = {} {} {}\n", textOf(m[0] / spacing.x), textOf(m[1] / spacing.y),
+                          textOf(m[2] / spacing.z));
+    header += fmt::format("Offset = {}\nCenterOfRotation = 0 0 0\n", textOf(1e3 * grid.affine.origin));
+    header += fmt::format("ElementSpacing = {}\nDimSize = {} {} {}\n", textOf(1e3 * spacing), grid.size.x, grid.size.y,
                           grid.size.z);
     header += voxels.components > 1 ? fmt::format("ElementNumberOfChannels = {}\n", voxels.components) : "";
     header += fmt::format("ElementType = {}\nElementDataFile = {}\n", metaType(voxels.component),

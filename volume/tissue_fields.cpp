@@ -1,4 +1,5 @@
 #include <volume/cell_mixture.h>
+#include <volume/cell_sampler.h>
 #include <volume/distance.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
@@ -8,148 +9,36 @@
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <type_traits>
 
 namespace palpate::volume {
 
 namespace {
 
-constexpr double coarse = 2.0;  // edge of a voxel, in cells, from which on samples are tissue or not
-
-// Reads the voxels that fill a node's cell, by s^3 samples of the cell. Along voxel axes that are about as coarse as the
-// samples it interpolates: the nearest voxel alone would shift everything by up to half a voxel where samples fall on the
-// faces between voxels.
-class CellSampler {
-public:
-    // `forMaterial`: for visitMaterial(), which samples cells far smaller than the voxels more finely.
-    CellSampler(const TissueData& tissue, const NodeGrid& grid, bool forMaterial)
-        : size_(tissue.size),
-          label_(tissue.label->getConstUnsafeAccessor()),
-          stiffness_(tissue.stiffness->getConstUnsafeAccessor()),
-          scaledBy_(tissue.stiffnessMap.points.empty() ? nullptr : &tissue)
-    {
-        const Mat3 toIndex = glm::inverse(tissue.affine.linear);
-        const Vec3 voxel = tissue.affine.spacing();
-        const double finest = std::min({voxel.x, voxel.y, voxel.z});
-        isCoarse_ = forMaterial && std::max({voxel.x, voxel.y, voxel.z}) > coarse * grid.spacing;
-        const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), isCoarse_ ? 3 : 1, 4);
-        for (int i = 0; i < s * s * s; ++i) {
-            const Vec3 at = (Vec3(i % s, i / s % s, i / s / s) + 0.5) / static_cast<double>(s) - 0.5;
-            places_.push_back(2.0 * at);
-            offsets_.push_back(toIndex * (at * grid.spacing));
-        }
-        step_ = toIndex * grid.spacing;
-        start_ = toIndex * (grid.origin - tissue.affine.origin);
-        for (int k = 0; k < 3; ++k) {
-            interpolate_[k] = voxel[k] > 0.8 * grid.spacing / s;
-        }
-    }
-
-    std::size_t samples() const { return offsets_.size(); }
-
-    // Calls visit(label, weight), or visit(label, weight, voxel), for the voxels at node n; the weights add up to 1, less
-    // what lies outside the volume. Or visit(label, weight, voxel, place), with the sample's place in the cell, -1 to 1.
-    template <typename Visit>
-    void visit(Index3 n, const Visit& visit) const
-    {
-        const Vec3 centre = start_ + step_ * Vec3(n);
-        const double fraction = 1.0 / static_cast<double>(offsets_.size());
-        for (std::size_t i = 0; i < offsets_.size(); ++i) {
-            const Vec3 at = centre + offsets_[i];
-            if (glm::any(interpolate_)) {
-                visitAround(at, fraction, places_[i], visit);
-            } else {
-                read(Index3(glm::floor(at + 0.5)), fraction, places_[i], visit);
-            }
-        }
-    }
-
-    // The same for material alone, labels of which isTissue(label) is true: between voxels far larger than a cell, a sample
-    // with less than half of it is outside of the body, and any other is full. Else cells up to half a voxel outside of the
-    // surface would be partly tissue.
-    template <typename IsTissue, typename Visit>
-    void visitMaterial(Index3 n, const IsTissue& isTissue, const Visit& visit) const
-    {
-        if (!isCoarse_) {
-            this->visit(n, visit);
-            return;
-        }
-        const Vec3 centre = start_ + step_ * Vec3(n);
-        const double fraction = 1.0 / static_cast<double>(offsets_.size());
-        for (std::size_t i = 0; i < offsets_.size(); ++i) {
-            double tissue = 0.0;
-            visitAround(centre + offsets_[i], 1.0, places_[i],
-                        [&](std::uint16_t label, double weight) { tissue += isTissue(label) ? weight : 0.0; });
-            if (tissue >= 0.5) {
-                visitAround(centre + offsets_[i], fraction / tissue, places_[i], visit);
-            }
-        }
-    }
-
-    // What the image makes of the modulus of a voxel's tissue.
-    double factor(std::uint16_t label, const openvdb::Coord& voxel) const
-    {
-        if (scaledBy_ == nullptr) {
-            return 1.0;
-        }
-        const double own = scaledBy_->table.rows[scaledBy_->lookup.row[label]].youngsModulus;
-        const double here = 1e3 * static_cast<double>(stiffness_.getValue(voxel));
-        return own > 0 && here > 0 ? here / own : 1.0;
-    }
-
-private:
-    template <typename Visit>
-    void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
-    {
-        const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
-        const Vec3 t = (at - low) * Vec3(interpolate_);
-        for (int corner = 0; corner < 8; ++corner) {
-            const Index3 step(corner & 1, (corner >> 1) & 1, (corner >> 2) & 1);
-            const Vec3 w = glm::mix(1.0 - t, t, Vec3(step));
-            const double weight = w.x * w.y * w.z;
-            if (weight > 0) {
-                read(Index3(low) + step, fraction * weight, place, visit);
-            }
-        }
-    }
-
-    template <typename Visit>
-    void read(Index3 n, double weight, Vec3 place, const Visit& visit) const
-    {
-        if (n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size_.x && n.y < size_.y && n.z < size_.z) {
-            const openvdb::Coord ijk(n.x, n.y, n.z);
-            const auto label = static_cast<std::uint16_t>(label_.getValue(ijk));
-            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&, Vec3>) {
-                visit(label, weight, ijk, place);
-            } else if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
-                visit(label, weight, ijk);
-            } else {
-                visit(label, weight);
-            }
-        }
-    }
-
-    Index3 size_;
-    openvdb::Int32Grid::ConstUnsafeAccessor label_;
-    openvdb::FloatGrid::ConstUnsafeAccessor stiffness_;
-    const TissueData* scaledBy_;  // null where no image scales the stiffness
-    std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
-    std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
-    Mat3 step_{1.0};              // node steps in voxels
-    Vec3 start_{0.0};             // node (0, 0, 0) in voxels
-    glm::bvec3 interpolate_{false};
-    bool isCoarse_ = false;  // voxels, beside the cells
-};
-
 // Nodes, both ends included.
 using NodeRange = IndexBox;
+
+// The voxels of the volume that may lie in cells of the range.
+IndexBox voxelsAround(const TissueData& tissue, const NodeGrid& grid, const NodeRange& range)
+{
+    const Mat3 toIndex = glm::inverse(tissue.affine.linear);
+    Vec3 low(std::numeric_limits<double>::infinity());
+    Vec3 high = -low;
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::bvec3 far((corner & 1) != 0, (corner & 2) != 0, (corner & 4) != 0);
+        const Vec3 node = glm::mix(Vec3(range.low) - 1.0, Vec3(range.high) + 1.0, Vec3(far));
+        const Vec3 at = toIndex * (grid.origin + grid.spacing * node - tissue.affine.origin);
+        low = glm::min(low, at);
+        high = glm::max(high, at);
+    }
+    const Vec3 last(tissue.size - 1);
+    return {Index3(glm::clamp(low - 1.0, Vec3(0.0), last)), Index3(glm::clamp(high + 2.0, Vec3(0.0), last))};
+}
 
 // Calls visit(sampler, row of nodes) for rows along x of the range, on all cores with a sampler each.
 template <typename Visit>
@@ -159,8 +48,9 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
     if (range.empty()) {
         return;
     }
+    const LabelBlocks blocks(tissue, voxelsAround(tissue, grid, range));
     tbb::parallel_for(tbb::blocked_range<int>(range.low.z, range.high.z + 1), [&](const tbb::blocked_range<int>& slices) {
-        const CellSampler sampler(tissue, grid, forMaterial);
+        const CellSampler sampler(tissue, grid, blocks, forMaterial);
         for (int z = slices.begin(); z != slices.end(); ++z) {
             for (int y = range.low.y; y <= range.high.y; ++y) {
                 visit(sampler, Index3(range.low.x, y, z));
@@ -169,16 +59,26 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
     });
 }
 
-CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, Index3 n,
+// Of the cell of node n, which is at `at`.
+CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, Index3 n, Vec3 at,
                           const std::vector<const TissueRow*>& rows)
 {
     CellMixture mixture;
+    const int only = sampler.isScaled() ? LabelBlocks::several : sampler.onlyLabel(n);
+    const double height = tissue.support ? tissue.support->height(at) : std::numeric_limits<double>::infinity();
+    if (only != LabelBlocks::several && std::abs(height) > sampler.farthest()) {
+        const TissueRow* row = rows[static_cast<std::size_t>(only)];
+        if (row != nullptr) {
+            mixture.add(*row, 1.0, 1.0, row->fixed || height < 0.0);
+        }
+        return mixture.material();
+    }
     const auto isTissue = [&](std::uint16_t label) { return rows[label] != nullptr; };
-    sampler.visitMaterial(n, isTissue, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel, Vec3 at) {
+    sampler.visitMaterial(n, isTissue, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel, Vec3 part) {
         if (const TissueRow* row = rows[label]) {
             const Vec3 place = tissue.affine.toPatient({voxel.x(), voxel.y(), voxel.z()});
             const bool held = row->fixed || (tissue.support && tissue.support->height(place) < 0.0);
-            mixture.add(*row, weight, sampler.factor(label, voxel), held, at);
+            mixture.add(*row, weight, sampler.factor(label, voxel), held, part);
         }
     });
     return mixture.material();
@@ -209,7 +109,7 @@ std::vector<float> fractionOf(const TissueData& tissue, const NodeGrid& grid, co
     forEachRow(tissue, grid, range, [&](const CellSampler& sampler, Index3 n) {
         for (; n.x <= range.high.x; ++n.x) {
             double sum = 0;
-            sampler.visit(n, [&](std::uint16_t label, double weight) { sum += wanted[label] != 0 ? weight : 0.0; });
+            sampler.visitLabels(n, [&](std::uint16_t label, double weight) { sum += wanted[label] != 0 ? weight : 0.0; });
             fraction[grid.offset(n)] = static_cast<float>(sum);
         }
     });
@@ -324,14 +224,20 @@ double cellModulus(const CellSampler& sampler, Index3 n, const std::vector<doubl
     double weight = 0;
     double sum = 0;
     double inverse = 0;
-    sampler.visit(n, [&](std::uint16_t label, double w, const openvdb::Coord& voxel) {
-        const double e = modulus[label] * sampler.factor(label, voxel);
+    const auto add = [&](double e, double w) {
         if (e > 0) {
             weight += w;
             sum += w * e;
             inverse += w / e;
         }
-    });
+    };
+    if (sampler.isScaled()) {
+        sampler.visit(n, [&](std::uint16_t label, double w, const openvdb::Coord& voxel) {
+            add(modulus[label] * sampler.factor(label, voxel), w);
+        });
+    } else {
+        sampler.visitLabels(n, [&](std::uint16_t label, double w) { add(modulus[label], w); });
+    }
     return weight > 0 ? std::sqrt(sum / inverse) : 0.0;
 }
 
@@ -369,7 +275,7 @@ std::uint8_t cellRow(const CellSampler& sampler, Index3 n, const LabelLookup& lo
     std::array<std::pair<std::uint8_t, double>, 64> rows;
     std::size_t count = 0;
     double solid = 0;
-    sampler.visit(n, [&](std::uint16_t label, double weight) {
+    sampler.visitLabels(n, [&](std::uint16_t label, double weight) {
         if (lookup.solid[label] == 0) {
             return;
         }
@@ -450,7 +356,7 @@ std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
         tissue, grid, range,
         [&](const CellSampler& sampler, Index3 n) {
             for (; n.x <= range.high.x; ++n.x) {
-                cells[grid.offset(n)] = cellMaterial(tissue, sampler, n, rows);
+                cells[grid.offset(n)] = cellMaterial(tissue, sampler, n, grid.position(n), rows);
             }
         },
         true);

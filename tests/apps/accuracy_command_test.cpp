@@ -260,7 +260,8 @@ TEST(AccuracyCommand, DepthComparesForcesOnTheWayInAndOut)
 
 TEST(AccuracyCommand, DepthRefusesWhatThereIsNot)
 {
-    expectRefusal({"accuracy", "--depth", "--scenes", "breast"}, "there are of block, find-lump, pair, plate");
+    expectRefusal({"accuracy", "--depth", "--scenes", "breast"},
+                  "has no stored forces; scenes with stored forces are block, find-lump, pair, plate");
     expectRefusal({"accuracy", "--depth", "--settings", "finest"}, "there are fast, default, fine");
 }
 

@@ -1,6 +1,7 @@
 #include <haptics/recorder.h>
 
 #include <tests/allocations.h>
+#include <tests/error_of.h>
 #include <tests/haptics/synthetic_session.h>
 #include <tests/sqlite_edit.h>
 
@@ -78,16 +79,6 @@ void expectSame(const TickRecord& a, const TickRecord& b, std::size_t structures
     EXPECT_EQ(bits(a.core.targetLength), bits(b.core.targetLength));
     expectSameBits(a.core.notchStart, b.core.notchStart);
     expectSameBits(a.core.notchEnd, b.core.notchEnd);
-}
-
-std::string errorOf(const std::function<void()>& work)
-{
-    try {
-        work();
-    } catch (const std::runtime_error& e) {
-        return e.what();
-    }
-    return "no error";
 }
 
 void expectOneLineAbout(const std::filesystem::path& file, const std::string& words, const std::string& error)
@@ -203,7 +194,7 @@ TEST(Recorder, RefusesAFileThatExists)
     const auto file = folder / "a.palpate";
     std::ofstream(file) << "mine";
     expectOneLineAbout(file, "exists already; choose another name or remove it",
-                       errorOf([&] { Recorder(file, synthetic::info()); }));
+                       tests::errorOf([&] { Recorder(file, synthetic::info()); }));
     std::string text;
     std::ifstream(file) >> text;
     EXPECT_EQ(text, "mine");
@@ -213,7 +204,7 @@ TEST(Recorder, SaysWhenTheFileCannotBeMade)
 {
     const synthetic::Folder folder;
     expectOneLineAbout(folder / "no/a", "cannot be made: unable to open database file",
-                       errorOf([&] { Recorder(folder / "no/a", synthetic::info()); }));
+                       tests::errorOf([&] { Recorder(folder / "no/a", synthetic::info()); }));
 }
 
 TEST(Recorder, PushAllocatesNothing)
@@ -328,7 +319,7 @@ TEST(Recorder, KilledWhileStartingLeavesAWholeRecordOrNone)
         std::this_thread::sleep_for(std::chrono::microseconds(random() % 8000));
         kill(child, SIGKILL);
         waitpid(child, nullptr, 0);
-        const std::string error = errorOf([&] { EXPECT_EQ(Record(file).ticks(), 0U); });
+        const std::string error = tests::errorOf([&] { EXPECT_EQ(Record(file).ticks(), 0U); });
         EXPECT_TRUE(error == "no error" || error.find("no such file") != std::string::npos) << error;
     }
 }
@@ -391,7 +382,7 @@ TEST(Record, RefusesWhatIsNoRecordOnOneLine)
 {
     const synthetic::Folder folder;
     const auto refuse = [&](const std::filesystem::path& file, const std::string& words) {
-        expectOneLineAbout(file, words, errorOf([&] { synthetic::read(Record(file)); }));
+        expectOneLineAbout(file, words, tests::errorOf([&] { synthetic::read(Record(file)); }));
     };
     refuse(folder / "none", "no such file");
     refuse(folder.path(), "is not a file");
@@ -440,7 +431,7 @@ TEST(Record, TruncatedFilesAreRefusedOnOneLine)
         const auto cut = folder / ("cut-" + std::to_string(keep));
         std::filesystem::copy_file(whole, cut);
         std::filesystem::resize_file(cut, keep);
-        const std::string error = errorOf([&] { synthetic::read(Record(cut)); });
+        const std::string error = tests::errorOf([&] { synthetic::read(Record(cut)); });
         expectOneLineAbout(cut, "", error);
     }
 }
@@ -461,7 +452,7 @@ TEST(Record, DamagedFilesNeverCrash)
         }
         const auto file = folder / ("damaged-" + std::to_string(round));
         std::ofstream(file, std::ios::binary) << changed;
-        const std::string error = errorOf([&] { synthetic::read(Record(file)); });
+        const std::string error = tests::errorOf([&] { synthetic::read(Record(file)); });
         EXPECT_TRUE(error == "no error" || error.starts_with(file.string() + ": ")) << error;
         EXPECT_EQ(error.find('\n'), std::string::npos);
     }
@@ -473,7 +464,7 @@ TEST(Record, StructuresBeyondTheLimitAreRefused)
     SessionInfo info = synthetic::info();
     info.structures.assign(maxStructures + 1, "vessel");
     expectOneLineAbout(folder / "a", "17 structures and 5 tissues: at most 16 structures",
-                       errorOf([&] { Recorder(folder / "a", info); }));
+                       tests::errorOf([&] { Recorder(folder / "a", info); }));
     EXPECT_FALSE(std::filesystem::exists(folder / "a"));
 }
 

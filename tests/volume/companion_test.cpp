@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <random>
 #include <vector>
 
 namespace palpate::volume {
@@ -47,6 +49,43 @@ TEST(Companion, IsKeptInTheFile)
         ASSERT_EQ(back->values[i], companion.values[i]);
     }
     EXPECT_FALSE(Tissue::fromLabels(image, table(), names(), {}).hasImage());
+}
+
+// An image whose factor is 1 makes every voxel be read for itself; without one, cells that a single label fills are not
+// read: the same materials, in volumes turned and not, held behind a plane and by bone, whatever the grid.
+TEST(Companion, AFactorOfOneIsNone)
+{
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> anywhere(-20e-3, 20e-3);
+    for (int trial = 0; trial < 12; ++trial) {
+        std::array<Vec3, 6> lumps;
+        std::generate(lumps.begin(), lumps.end(),
+                      [&] { return Vec3(anywhere(random), anywhere(random), anywhere(random)); });
+        const Vec3 voxel(trial % 3 == 0 ? Vec3(1e-3) : Vec3(0.8e-3, 1.1e-3, 2.3e-3));
+        const Affine affine = trial % 2 == 0 ? Affine{glm::dmat3(voxel.x, 0, 0, 0, -voxel.y, 0, 0, 0, voxel.z), Vec3(0.0)}
+                                             : oblique(voxel, Vec3(0.0), trial % 4 == 1);
+        const Index3 size(Vec3(46e-3) / voxel);
+        const int hard = trial % 4 < 2 ? 300 : 7;
+        const LabelImage image = voxelise(size, centred(affine, size), [&](Vec3 p) {
+            const auto near = [&](Vec3 lump) { return glm::length(p - lump) < 6e-3; };
+            return std::any_of(lumps.begin(), lumps.end(), near) ? hard : glm::length(p) < 21e-3 ? 1 : 0;
+        });
+        const CompanionImage same = ramp(image, {{{0, 1.0}}, {}});
+        const Tissue plain = Tissue::fromLabels(image, table(), names(), {});
+        const Tissue scaled = Tissue::fromLabels(image, table(), names(), {}, &same);
+        for (const double spacing : {0.9e-3, 2e-3, 4.1e-3}) {
+            const NodeGrid grid = coveringGrid(plain.box(), spacing, 2);
+            const auto materials = plain.materialOn(grid), read = scaled.materialOn(grid);
+            const ScalarField modulus = plain.youngsModulusOn(grid), modulusRead = scaled.youngsModulusOn(grid);
+            for (std::size_t i = 0; i < grid.count(); ++i) {
+                ASSERT_NEAR(materials[i].youngsModulus, read[i].youngsModulus, 1e-5F * read[i].youngsModulus);
+                ASSERT_NEAR(materials[i].fixed, read[i].fixed, 1e-6F);
+                ASSERT_NEAR(materials[i].along, read[i].along, 1e-4F);
+                ASSERT_NEAR(materials[i].share, read[i].share, 1e-4F);
+                ASSERT_NEAR(modulus.values[i], modulusRead.values[i], 1e-5F * modulusRead.values[i]);
+            }
+        }
+    }
 }
 
 // A factor of 2 for one tissue doubles what is made of it alone, and leaves the other as it was.

@@ -1,0 +1,193 @@
+#pragma once
+
+#include <volume/label_blocks.h>
+#include <volume/tissue_impl.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+// Inside volume/ only.
+namespace palpate::volume {
+
+// Reads the voxels that fill a node's cell, by s^3 samples of the cell. Along voxel axes that are about as coarse as the
+// samples it interpolates: the nearest voxel alone would shift everything by up to half a voxel where samples fall on the
+// faces between voxels.
+class CellSampler {
+public:
+    // `blocks` must outlive it. `forMaterial`: for visitMaterial(), which samples cells far smaller than the voxels more
+    // finely.
+    CellSampler(const TissueData& tissue, const NodeGrid& grid, const LabelBlocks& blocks, bool forMaterial)
+        : size_(tissue.size),
+          blocks_(blocks),
+          label_(tissue.label->getConstUnsafeAccessor()),
+          stiffness_(tissue.stiffness->getConstUnsafeAccessor()),
+          scaledBy_(tissue.stiffnessMap.points.empty() ? nullptr : &tissue)
+    {
+        const Mat3 toIndex = glm::inverse(tissue.affine.linear);
+        const Vec3 voxel = tissue.affine.spacing();
+        const double finest = std::min({voxel.x, voxel.y, voxel.z});
+        isCoarse_ = forMaterial && std::max({voxel.x, voxel.y, voxel.z}) > coarseVoxel * grid.spacing;
+        const int s = std::clamp(static_cast<int>(std::ceil(grid.spacing / finest - 1e-6)), isCoarse_ ? 3 : 1, 4);
+        for (int i = 0; i < s * s * s; ++i) {
+            const Vec3 at = (Vec3(i % s, i / s % s, i / s / s) + 0.5) / static_cast<double>(s) - 0.5;
+            places_.push_back(2.0 * at);
+            offsets_.push_back(toIndex * (at * grid.spacing));
+            reach_ = glm::max(reach_, glm::abs(offsets_.back()));
+        }
+        farthest_ = std::sqrt(3.0) * (0.5 * grid.spacing + std::max({voxel.x, voxel.y, voxel.z}));
+        step_ = toIndex * grid.spacing;
+        start_ = toIndex * (grid.origin - tissue.affine.origin);
+        for (int k = 0; k < 3; ++k) {
+            interpolate_[k] = voxel[k] > 0.8 * grid.spacing / s;
+        }
+    }
+
+    std::size_t samples() const { return offsets_.size(); }
+
+    // The label of all voxels that visit() reads at node n; LabelBlocks::several where they have several, or some are
+    // outside.
+    int onlyLabel(Index3 n) const noexcept
+    {
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        return blocks_.labelOf({Index3(glm::floor(centre - reach_)), Index3(glm::floor(centre + reach_)) + 1});
+    }
+
+    // No voxel that visit() reads has its centre farther from the node [m].
+    double farthest() const noexcept { return farthest_; }
+
+    // Whether factor() may be other than 1.
+    bool isScaled() const noexcept { return scaledBy_ != nullptr; }
+
+    // As visit(), in one call where a single label fills the cell.
+    template <typename Visit>
+    void visitLabels(Index3 n, const Visit& visit) const
+    {
+        if (const int label = onlyLabel(n); label != LabelBlocks::several) {
+            visit(static_cast<std::uint16_t>(label), 1.0);
+        } else {
+            this->visit(n, visit);
+        }
+    }
+
+    // Calls visit(label, weight), or visit(label, weight, voxel), for the voxels at node n; the weights add up to 1, less
+    // what lies outside the volume. Or visit(label, weight, voxel, place), with the sample's place in the cell, -1 to 1.
+    template <typename Visit>
+    void visit(Index3 n, const Visit& visit) const
+    {
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const double fraction = 1.0 / static_cast<double>(offsets_.size());
+        for (std::size_t i = 0; i < offsets_.size(); ++i) {
+            const Vec3 at = centre + offsets_[i];
+            if (glm::any(interpolate_)) {
+                visitAround(at, fraction, places_[i], visit);
+            } else {
+                read(Index3(glm::floor(at + 0.5)), fraction, places_[i], visit);
+            }
+        }
+    }
+
+    // The same for material alone, labels of which isTissue(label) is true: between voxels far larger than a cell, a sample
+    // with less than half of it is outside of the body, and any other is full. Else cells up to half a voxel outside of the
+    // surface would be partly tissue.
+    template <typename IsTissue, typename Visit>
+    void visitMaterial(Index3 n, const IsTissue& isTissue, const Visit& visit) const
+    {
+        if (!isCoarse_) {
+            this->visit(n, visit);
+            return;
+        }
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const double fraction = 1.0 / static_cast<double>(offsets_.size());
+        for (std::size_t i = 0; i < offsets_.size(); ++i) {
+            double tissue = 0.0;
+            visitAround(centre + offsets_[i], 1.0, places_[i],
+                        [&](std::uint16_t label, double weight) { tissue += isTissue(label) ? weight : 0.0; });
+            if (tissue >= 0.5) {
+                visitAround(centre + offsets_[i], fraction / tissue, places_[i], visit);
+            }
+        }
+    }
+
+    // What the image makes of the modulus of a voxel's tissue.
+    double factor(std::uint16_t label, const openvdb::Coord& voxel) const
+    {
+        if (scaledBy_ == nullptr) {
+            return 1.0;
+        }
+        const double own = scaledBy_->table.rows[scaledBy_->lookup.row[label]].youngsModulus;
+        const double here = 1e3 * static_cast<double>(stiffness_.getValue(voxel));
+        return own > 0 && here > 0 ? here / own : 1.0;
+    }
+
+private:
+    template <typename Visit>
+    void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
+    {
+        const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
+        const Vec3 t = (at - low) * Vec3(interpolate_);
+        const std::array<Vec3, 2> w{1.0 - t, t};
+        for (std::size_t corner = 0; corner < 8; ++corner) {
+            const std::array<std::size_t, 3> far{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
+            const double weight = w[far[0]].x * w[far[1]].y * w[far[2]].z;
+            if (weight > 0) {
+                read(Index3(low) + Index3(far[0], far[1], far[2]), fraction * weight, place, visit);
+            }
+        }
+    }
+
+    template <typename Visit>
+    void read(Index3 n, double weight, Vec3 place, const Visit& visit) const
+    {
+        if (n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < size_.x && n.y < size_.y && n.z < size_.z) {
+            const openvdb::Coord ijk(n.x, n.y, n.z);
+            const std::uint16_t label = labelAt(ijk);
+            if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&, Vec3>) {
+                visit(label, weight, ijk, place);
+            } else if constexpr (std::is_invocable_v<Visit, std::uint16_t, double, const openvdb::Coord&>) {
+                visit(label, weight, ijk);
+            } else {
+                visit(label, weight);
+            }
+        }
+    }
+
+    std::uint16_t labelAt(const openvdb::Coord& ijk) const
+    {
+        constexpr openvdb::Int32 inLeaf = Leaf::DIM - 1;
+        if (const openvdb::Coord corner = ijk & ~inLeaf; corner != leafCorner_) {
+            leafCorner_ = corner;
+            const Leaf* leaf = label_.probeConstLeaf(ijk);
+            leaf_ = leaf != nullptr ? leaf->buffer().data() : nullptr;
+            tile_ = leaf == nullptr ? label_.getValue(ijk) : 0;
+        }
+        return static_cast<std::uint16_t>(leaf_ != nullptr ? leaf_[Leaf::coordToOffset(ijk)] : tile_);
+    }
+
+    using Leaf = openvdb::Int32Grid::TreeType::LeafNodeType;
+    static constexpr double coarseVoxel = 2.0;  // edge of a voxel, in cells, from which on samples are tissue or not
+
+    Index3 size_;
+    const LabelBlocks& blocks_;
+    openvdb::Int32Grid::ConstUnsafeAccessor label_;
+    mutable openvdb::Coord leafCorner_ = openvdb::Coord::max();  // labelAt()'s last leaf, or tile
+    mutable const openvdb::Int32* leaf_ = nullptr;
+    mutable openvdb::Int32 tile_ = 0;
+    openvdb::FloatGrid::ConstUnsafeAccessor stiffness_;
+    const TissueData* scaledBy_;  // null where no image scales the stiffness
+    Vec3 reach_{0.0};             // of the samples along each axis [voxels]
+    std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
+    std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
+    double farthest_ = 0.0;
+    Mat3 step_{1.0};   // node steps in voxels
+    Vec3 start_{0.0};  // node (0, 0, 0) in voxels
+    glm::bvec3 interpolate_{false};
+    bool isCoarse_ = false;  // voxels, beside the cells
+};
+
+}  // namespace palpate::volume
