@@ -48,8 +48,6 @@ public:
         }
     }
 
-    std::size_t samples() const { return offsets_.size(); }
-
     // The label of all voxels that visit() reads at node n; LabelBlocks::several where they have several, or some are
     // outside.
     int onlyLabel(Index3 n) const noexcept
@@ -80,16 +78,13 @@ public:
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
-        const Vec3 centre = start_ + step_ * Vec3(n);
-        const double fraction = 1.0 / static_cast<double>(offsets_.size());
-        for (std::size_t i = 0; i < offsets_.size(); ++i) {
-            const Vec3 at = centre + offsets_[i];
+        forEachSample(n, [&](Vec3 at, double fraction, Vec3 place) {
             if (glm::any(interpolate_)) {
-                visitAround(at, fraction, places_[i], visit);
+                visitAround(at, fraction, place, visit);
             } else {
-                read(Index3(glm::floor(at + 0.5)), fraction, places_[i], visit);
+                read(Index3(glm::floor(at + 0.5)), fraction, place, visit);
             }
-        }
+        });
     }
 
     // The same for material alone, labels of which isTissue(label) is true: between voxels far larger than a cell, a sample
@@ -102,16 +97,14 @@ public:
             this->visit(n, visit);
             return;
         }
-        const Vec3 centre = start_ + step_ * Vec3(n);
-        const double fraction = 1.0 / static_cast<double>(offsets_.size());
-        for (std::size_t i = 0; i < offsets_.size(); ++i) {
+        forEachSample(n, [&](Vec3 at, double fraction, Vec3 place) {
             double tissue = 0.0;
-            visitAround(centre + offsets_[i], 1.0, places_[i],
+            visitAround(at, 1.0, place,
                         [&](std::uint16_t label, double weight) { tissue += isTissue(label) ? weight : 0.0; });
             if (tissue >= 0.5) {
-                visitAround(centre + offsets_[i], fraction / tissue, places_[i], visit);
+                visitAround(at, fraction / tissue, place, visit);
             }
-        }
+        });
     }
 
     // What the image makes of the modulus of a voxel's tissue.
@@ -126,6 +119,17 @@ public:
     }
 
 private:
+    // Calls visit(voxel coordinates, fraction of the cell, place in the cell) for each sample of node n's cell.
+    template <typename Visit>
+    void forEachSample(Index3 n, const Visit& visit) const
+    {
+        const Vec3 centre = start_ + step_ * Vec3(n);
+        const double fraction = 1.0 / static_cast<double>(offsets_.size());
+        for (std::size_t i = 0; i < offsets_.size(); ++i) {
+            visit(centre + offsets_[i], fraction, places_[i]);
+        }
+    }
+
     template <typename Visit>
     void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
     {

@@ -453,7 +453,7 @@ TEST(Record, DamagedFilesNeverCrash)
         const auto file = folder / ("damaged-" + std::to_string(round));
         std::ofstream(file, std::ios::binary) << changed;
         const std::string error = tests::errorOf([&] { synthetic::read(Record(file)); });
-        EXPECT_TRUE(error == "no error" || error.starts_with(file.string() + ": ")) << error;
+        EXPECT_TRUE(error.empty() || error.starts_with(file.string() + ": ")) << error;
         EXPECT_EQ(error.find('\n'), std::string::npos);
     }
 }
