@@ -74,7 +74,7 @@ TEST(Companion, AFactorOfOneIsNone)
         const Tissue plain = Tissue::fromLabels(image, table(), names(), {});
         const Tissue scaled = Tissue::fromLabels(image, table(), names(), {}, &same);
         for (const double spacing : {0.9e-3, 2e-3, 4.1e-3}) {
-            const NodeGrid grid = coveringGrid(plain.box(), spacing, 2);
+            const NodeGrid grid = coveringGrid(plain.box(), spacing, 2 * spacing);
             const auto materials = plain.materialOn(grid), read = scaled.materialOn(grid);
             const ScalarField modulus = plain.youngsModulusOn(grid), modulusRead = scaled.youngsModulusOn(grid);
             for (std::size_t i = 0; i < grid.count(); ++i) {
