@@ -57,7 +57,7 @@ TEST(Companion, AFactorOfOneIsNone)
 {
     std::mt19937 random(11);
     std::uniform_real_distribution<double> anywhere(-20e-3, 20e-3);
-    for (int trial = 0; trial < 12; ++trial) {
+    for (std::size_t trial = 0; trial < 8; ++trial) {
         std::array<Vec3, 6> lumps;
         std::generate(lumps.begin(), lumps.end(),
                       [&] { return Vec3(anywhere(random), anywhere(random), anywhere(random)); });
@@ -73,17 +73,16 @@ TEST(Companion, AFactorOfOneIsNone)
         const CompanionImage same = ramp(image, {{{0, 1.0}}, {}});
         const Tissue plain = Tissue::fromLabels(image, table(), names(), {});
         const Tissue scaled = Tissue::fromLabels(image, table(), names(), {}, &same);
-        for (const double spacing : {0.9e-3, 2e-3, 4.1e-3}) {
-            const NodeGrid grid = coveringGrid(plain.box(), spacing, 2 * spacing);
-            const auto materials = plain.materialOn(grid), read = scaled.materialOn(grid);
-            const ScalarField modulus = plain.youngsModulusOn(grid), modulusRead = scaled.youngsModulusOn(grid);
-            for (std::size_t i = 0; i < grid.count(); ++i) {
-                ASSERT_NEAR(materials[i].youngsModulus, read[i].youngsModulus, 1e-5F * read[i].youngsModulus);
-                ASSERT_NEAR(materials[i].fixed, read[i].fixed, 1e-6F);
-                ASSERT_NEAR(materials[i].along, read[i].along, 1e-4F);
-                ASSERT_NEAR(materials[i].share, read[i].share, 1e-4F);
-                ASSERT_NEAR(modulus.values[i], modulusRead.values[i], 1e-5F * modulusRead.values[i]);
-            }
+        const double spacing = std::array{1.6e-3, 2e-3, 4.1e-3}[trial % 3];
+        const NodeGrid grid = coveringGrid(plain.box(), spacing, 2 * spacing);
+        const auto materials = plain.materialOn(grid), read = scaled.materialOn(grid);
+        const ScalarField modulus = plain.youngsModulusOn(grid), modulusRead = scaled.youngsModulusOn(grid);
+        for (std::size_t i = 0; i < grid.count(); ++i) {
+            ASSERT_NEAR(materials[i].youngsModulus, read[i].youngsModulus, 1e-5F * read[i].youngsModulus);
+            ASSERT_NEAR(materials[i].fixed, read[i].fixed, 1e-6F);
+            ASSERT_NEAR(materials[i].along, read[i].along, 1e-4F);
+            ASSERT_NEAR(materials[i].share, read[i].share, 1e-4F);
+            ASSERT_NEAR(modulus.values[i], modulusRead.values[i], 1e-5F * modulusRead.values[i]);
         }
     }
 }
