@@ -66,10 +66,10 @@ CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, 
     CellMixture mixture;
     const int only = sampler.isScaled() ? LabelBlocks::several : sampler.onlyLabel(n);
     const double height = tissue.support ? tissue.support->height(at) : std::numeric_limits<double>::infinity();
-    if (only != LabelBlocks::several && std::abs(height) > sampler.farthest()) {
+    if (only != LabelBlocks::several && height > sampler.farthest()) {
         const TissueRow* row = rows[static_cast<std::size_t>(only)];
         if (row != nullptr) {
-            mixture.add(*row, 1.0, 1.0, row->fixed || height < 0.0);
+            mixture.add(*row, 1.0, 1.0, row->fixed);
         }
         return mixture.material();
     }
