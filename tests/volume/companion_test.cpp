@@ -64,11 +64,17 @@ TEST(Companion, AFactorOfOneIsNone)
         const Vec3 voxel(trial % 3 == 0 ? Vec3(1e-3) : Vec3(0.8e-3, 1.1e-3, 2.3e-3));
         const Affine affine = trial % 2 == 0 ? Affine{glm::dmat3(voxel.x, 0, 0, 0, -voxel.y, 0, 0, 0, voxel.z), Vec3(0.0)}
                                              : oblique(voxel, Vec3(0.0), trial % 4 == 1);
-        const Index3 size(Vec3(46e-3) / voxel);
+        // A ball, or a column so long that what its back holds is deeper than a block of voxels.
+        const bool isColumn = trial >= 4;
+        const Index3 size((isColumn ? Vec3(70e-3, 140e-3, 70e-3) : Vec3(46e-3)) / voxel);
+        const auto isBody = [&](Vec3 p) {
+            return isColumn ? std::max(std::abs(p.x), std::abs(p.z)) < 10e-3 && std::abs(p.y) < 60e-3
+                            : glm::length(p) < 21e-3;
+        };
         const int hard = trial % 4 < 2 ? 300 : 7;
         const LabelImage image = voxelise(size, centred(affine, size), [&](Vec3 p) {
             const auto near = [&](Vec3 lump) { return glm::length(p - lump) < 6e-3; };
-            return std::any_of(lumps.begin(), lumps.end(), near) ? hard : glm::length(p) < 21e-3 ? 1 : 0;
+            return std::any_of(lumps.begin(), lumps.end(), near) ? hard : isBody(p) ? 1 : 0;
         });
         const CompanionImage same = ramp(image, {{{0, 1.0}}, {}});
         const Tissue plain = Tissue::fromLabels(image, table(), names(), {});
