@@ -9,6 +9,7 @@
 #include <session/open.h>
 #include <session/session.h>
 #include <training/case.h>
+#include <training/folders.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -57,6 +58,9 @@ void list(const CaseArguments& o)
     const auto all = training::allCases(&faults);
     for (const std::string& fault : faults) {
         fmt::print(stderr, "palpate: warning: {}\n", fault);
+    }
+    if (all.empty()) {
+        throw std::runtime_error(training::nothingThere("cases"));
     }
     if (!o.json.empty()) {
         auto cases = nlohmann::json::array();

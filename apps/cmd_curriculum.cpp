@@ -3,6 +3,7 @@
 #include <command/json.h>
 #include <command/progress.h>
 #include <training/course_check.h>
+#include <training/folders.h>
 #include <training/progress.h>
 #include <training/simulate.h>
 #include <training/store.h>
@@ -45,6 +46,9 @@ void listCurricula(const CurriculumArguments& o)
     const auto all = training::allCurricula(&faults);
     for (const std::string& fault : faults) {
         fmt::print(stderr, "palpate: warning: {}\n", fault);
+    }
+    if (all.empty()) {
+        throw std::runtime_error(training::nothingThere("curricula"));
     }
     auto figures = nlohmann::json::array();
     for (const Curriculum& c : all) {
@@ -108,6 +112,9 @@ void next(const CurriculumArguments& o)
         curricula.push_back(training::findCurriculum(o.id.empty() ? last->curriculum : o.id));
     } else {
         curricula = training::allCurricula();
+        if (curricula.empty()) {
+            throw std::runtime_error(training::nothingThere("curricula"));
+        }
     }
     auto figures = nlohmann::json::array();
     for (const Curriculum& c : curricula) {
@@ -264,32 +271,27 @@ void addCurriculum(CLI::App& app)
     json(after);
     after->final_callback([o] { next(*o); });
 
+    const auto simulated = [&](CLI::App* sub) {
+        sub->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum")->required();
+        for (const auto& [name, value, what] :
+             {std::tuple("--people", &o->people, "Simulated people per skill"),
+              std::tuple("--sessions", &o->most, "Maximum number of sessions per person")}) {
+            sub->add_option(name, *value, what)->check(CLI::Range(1, 100000))->capture_default_str();
+        }
+        sub->add_option("--seed", o->seed, "Seed of all random choices")->capture_default_str();
+    };
     CLI::App* const tried =
         c->add_subcommand("simulate", "Count the sessions that simulated people of three skills need, to choose gates");
-    tried->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum")->required();
-    tried->add_option("--people", o->people, "Simulated people per skill")
-        ->check(CLI::Range(1, 100000))
-        ->capture_default_str();
-    tried->add_option("--sessions", o->most, "Maximum number of sessions per person")
-        ->check(CLI::Range(1, 100000))
-        ->capture_default_str();
-    tried->add_option("--seed", o->seed, "Seed of all random choices")->capture_default_str();
+    simulated(tried);
     json(tried);
     tried->final_callback([o] { simulate(*o); });
 
     CLI::App* const verified =
         c->add_subcommand("verify", "Test a curriculum with simulated people: gates, CUSUM charts, storage of sessions");
-    verified->add_option("CURRICULUM", o->id, "Name or file (.toml) of the curriculum")->required();
-    verified->add_option("--people", o->people, "Simulated people per skill")
-        ->check(CLI::Range(1, 100000))
-        ->capture_default_str();
-    verified->add_option("--sessions", o->most, "Maximum number of sessions per person")
-        ->check(CLI::Range(1, 100000))
-        ->capture_default_str();
+    simulated(verified);
     verified->add_option("--kills", o->kills, "How many times a process that stores sessions is killed")
         ->check(CLI::Range(0, 10000))
         ->capture_default_str();
-    verified->add_option("--seed", o->seed, "Seed of all random choices")->capture_default_str();
     json(verified);
     verified->final_callback([o] { verify(*o); });
 }

@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <base/counted.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <training/case.h>
@@ -73,8 +74,8 @@ void list(const ProfileArguments& o)
         fmt::print("no profiles yet: palpate profile new NAME\n");
     }
     for (const Person& p : people) {
-        fmt::print("{:<24} {:<6} {:>5} sessions, since {}\n", p.name, handInWords(p.hand), p.sessions,
-                   p.created.substr(0, 10));
+        fmt::print("{:<24} {:<6} {:>14}, since {}\n", p.name, handInWords(p.hand),
+                   base::counted(static_cast<std::size_t>(p.sessions), "session"), p.created.substr(0, 10));
     }
 }
 
@@ -91,14 +92,29 @@ void erase(const ProfileArguments& o)
     ProfileStore store = open(o);
     const Person person = store.find(o.name);
     if (!o.yes) {
-        throw std::runtime_error(fmt::format(
-            "{}: erasing cannot be undone: {} sessions and their records; add --yes (palpate profile export keeps a copy)",
-            person.name, person.sessions));
+        throw std::runtime_error(
+            fmt::format("{}: erasing cannot be undone: {} and all records; add --yes (palpate profile export keeps a copy)",
+                        person.name, base::counted(static_cast<std::size_t>(person.sessions), "session")));
     }
-    const auto stay = store.erase(person);
+    const training::Erased erased = store.erase(person);
+    // The window has the people of the standard file.
+    std::error_code none;
+    if (o.profiles.empty() || fs::equivalent(store.file(), ProfileStore::standardFile(), none)) {
+        training::forgetLastPerson(training::trainerSettings(), person.name);
+    }
     fmt::print("{}: erased\n", person.name);
-    for (const fs::path& file : stay) {
-        fmt::print("this record is in another folder and was not erased: {}\n", file.string());
+    const auto tell = [](const std::vector<fs::path>& files, const std::string& what) {
+        for (const fs::path& file : files) {
+            fmt::print("{}: {}\n", what, file.string());
+        }
+    };
+    tell(erased.elsewhere, "this record is in another folder and was not erased");
+    tell(erased.shared, "this file is of another person too and was not erased");
+    tell(erased.unclear, "this file cannot be read and was not erased; look whether it is of " + person.name);
+    tell(erased.stuck, "this file is still there: remove it");
+    if (!erased.stuck.empty()) {
+        throw std::runtime_error(
+            fmt::format("{}: not all files of {} could be removed", erased.stuck.front().string(), person.name));
     }
 }
 
@@ -199,7 +215,7 @@ void addProfile(CLI::App& app)
     taken->final_callback([o] { addRecords(*o); });
 
     CLI::App* const noted = sub("note", "Set an instructor's note and global rating of a session", true);
-    noted->add_option("SESSION", o->session, "Number of the session (palpate progress NAME --json -)")->required();
+    noted->add_option("SESSION", o->session, "Number of the session (palpate progress NAME)")->required();
     noted->add_option("--text", o->note, "Text of the note (default: empty)");
     noted->add_option("--rating", o->rating, "Global rating, 1 to 5 (default: 0, none)")->check(CLI::Range(0, 5));
     noted->final_callback([o] { note(*o); });

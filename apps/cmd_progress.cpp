@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <apps/progress_figures.h>
+#include <base/counted.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <training/progress_page.h>
@@ -12,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 namespace palpate::apps {
 
@@ -103,7 +105,7 @@ report::ScoredGroup groupOf(const ProgressArguments& o, const std::string& text,
 
 void printPerson(const PersonProgress& p)
 {
-    fmt::print("{} ({} sessions)\n", p.person.name, p.sessions.size());
+    fmt::print("{} ({})\n", p.person.name, base::counted(p.sessions.size(), "session"));
     for (const CurriculumProgress& c : p.curricula) {
         fmt::print("  {}\n", c.curriculum->title);
         const auto* const next = c.next();
@@ -113,11 +115,28 @@ void printPerson(const PersonProgress& p)
                                       : &e == next  ? "next"
                                       : e.available ? "open"
                                                     : "locked";
-            fmt::print("    {:<40} {:<15} {:>3} sessions, {} of the last {} at the level\n", e.exercise->title, state,
-                       e.sessions.size(), e.gate.recentMet, e.gate.recentTried);
+            fmt::print("    {:<40} {:<15} {:>12}, {} of the last {} at the level\n", e.exercise->title, state,
+                       base::counted(e.sessions.size(), "session"), e.gate.recentMet, e.gate.recentTried);
         }
         fmt::print("  {}\n", next == nullptr ? "all exercises are reached"
                                              : fmt::format("{} {}", next->exercise->title, training::reasonFor(*next)));
+    }
+}
+
+// With the numbers that palpate profile note asks for.
+void printSessionsOf(const PersonProgress& p)
+{
+    if (p.sessions.empty()) {
+        return;
+    }
+    fmt::print("  {:>7}  {:<20}  {:<22}  {:>5}  {}\n", "session", "started (UTC)", "case", "total", "kept under");
+    for (const training::StoredSession& s : p.sessions) {
+        std::string started = s.started.substr(0, 16);
+        std::ranges::replace(started, 'T', ' ');
+        const auto total = s.values.find("total");
+        fmt::print("  {:>7}  {:<20}  {:<22}  {:>5}  {}{}\n", s.id, started, s.caseId.empty() ? s.scene : s.caseId,
+                   total == s.values.end() ? "-" : fmt::format("{:.0f}", total->second),
+                   s.exercise.empty() ? "free practice" : s.curriculum + "/" + s.exercise, s.test ? " (test)" : "");
     }
 }
 
@@ -163,6 +182,14 @@ void run(const ProgressArguments& o)
     if (o.json != "-") {
         for (const PersonProgress& p : people) {
             printPerson(p);
+            if (!o.all) {
+                printSessionsOf(p);
+            }
+        }
+        for (const auto& [what, file] : {std::pair{"page", o.html}, {"table", o.csv}, {"statements", o.xapi}}) {
+            if (!file.empty() && file != "-") {
+                fmt::print("{}: {}\n", what, file.string());
+            }
         }
     }
 }

@@ -135,7 +135,8 @@ fs::path fileFor(const fs::path& volume, const fs::path& scene)
 
 std::string pointText(Vec3 p)
 {
-    return fmt::format("{:.1f} {:.1f} {:.1f}", 1e3 * p.x, 1e3 * p.y, 1e3 * p.z);
+    const auto tenth = [](double metres) { return std::round(1e4 * metres) / 10 + 0.0; };  // no negative zero
+    return fmt::format("{:.1f} {:.1f} {:.1f}", tenth(p.x), tenth(p.y), tenth(p.z));
 }
 
 double degrees(double angle)
@@ -145,8 +146,9 @@ double degrees(double angle)
 
 std::string clearanceText(const Proposal& way)
 {
-    constexpr double seen = 6.5e-3;  // what proposeApproaches() can tell apart
-    return way.clearance >= seen ? fmt::format("> {:.1f}", 1e3 * seen) : fmt::format("{:.1f}", 1e3 * way.clearance);
+    constexpr double seen = datasets::comfort - 0.05e-3;
+    return way.clearance >= seen ? fmt::format("> {:g}", 1e3 * datasets::comfort)
+                                 : fmt::format("{:.1f}", 1e3 * way.clearance);
 }
 
 void writeScene(Scene scene, const SceneArguments& o, const FoundWays& found, const Proposal& way,

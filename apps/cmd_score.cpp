@@ -103,7 +103,8 @@ json effectSize(const Group& a, const Group& b, const std::vector<Session>& sess
 {
     json out = {{"kind", "cliffs_delta"}, {"of", a.name}, {"over", b.name}};
     for (const haptics::Measure& m : haptics::measures()) {
-        out[m.key] = report::cliffsDelta(valuesOf(a, sessions, m), valuesOf(b, sessions, m));
+        const auto delta = report::effectSize(scored(a, sessions), scored(b, sessions), m);
+        out[m.key] = delta ? json(*delta) : json();
     }
     return out;
 }
@@ -229,10 +230,10 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
         columns.emplace_back();
         for (const haptics::Measure& m : haptics::measures()) {
             const auto values = valuesOf(g, sessions, m);
-            const int decimals = m.decimals + (m.decimals == 0 ? 1 : 0);
-            columns.back().push_back(fmt::format("{} ({} to {})", cell(report::quantile(values, 0.5), decimals),
-                                                 cell(report::quantile(values, 0.25), decimals),
-                                                 cell(report::quantile(values, 0.75), decimals)));
+            const int decimals = report::decimalsOf(m);
+            const auto at = [&](double fraction) { return cell(report::quantile(values, fraction), decimals); };
+            const bool any = std::ranges::any_of(values, [](double v) { return std::isfinite(v); });
+            columns.back().push_back(any ? fmt::format("{} ({} to {})", at(0.5), at(0.25), at(0.75)) : "-");
         }
     }
     std::printf("\nMedians (quartiles)%s\n",
@@ -242,9 +243,8 @@ void printGroups(const std::vector<Group>& groups, const std::vector<Session>& s
             heads.push_back(groups[a].name + " over " + groups[b].name);
             columns.emplace_back();
             for (const haptics::Measure& m : haptics::measures()) {
-                const double delta =
-                    report::cliffsDelta(valuesOf(groups[a], sessions, m), valuesOf(groups[b], sessions, m));
-                columns.back().push_back(fmt::format("{:+.2f}", delta));
+                const auto delta = report::effectSize(scored(groups[a], sessions), scored(groups[b], sessions), m);
+                columns.back().push_back(delta ? fmt::format("{:+.2f}", *delta) : "-");
             }
         }
     }

@@ -392,7 +392,7 @@ void train(TrainArguments o)
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     const auto written = writeOutputs(o, info, model, viewers, took, result);
     const bool counts = result.signal == 0 && !result.faulted;
-    const auto kept = counts ? training.keep(info, result, record) : std::vector<std::string>{};
+    const auto kept = counts ? training.keep(info, result, record) : training.notKept(result, record);
 
     if (o.json != "-" && !o.tryout) {
         summarise(result, info, model);

@@ -209,7 +209,8 @@ json progressFigures(const std::vector<PersonProgress>& people, const std::vecto
                 {"sessions", sessions}, {"groups", compared},     {"measures", measures}};
     if (groups.size() >= 2) {
         for (const haptics::Measure& m : haptics::measures()) {
-            out["effect_size"][m.key] = report::cliffsDelta(report::valuesOf(groups[0], m), report::valuesOf(groups[1], m));
+            const auto delta = report::effectSize(groups[0], groups[1], m);
+            out["effect_size"][m.key] = delta ? json(*delta) : json();
         }
     }
     return out;

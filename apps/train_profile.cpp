@@ -1,5 +1,6 @@
 #include <apps/train_profile.h>
 
+#include <base/counted.h>
 #include <base/outputs.h>
 #include <training/progress.h>
 
@@ -114,10 +115,17 @@ void Training::describe(haptics::SessionInfo& info) const
 std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
                                         const fs::path& record)
 {
+    // Somebody who looked and left has not tried.
+    if (figures.contacts == 0) {
+        return {fmt::format("the tool never touched the body: this session does not count{}",
+                            person_ ? " and is not kept" : "")};
+    }
     constexpr std::size_t shown = 3;
     std::vector<std::string> lines;
     for (std::size_t i = 0; i < std::min(shown, figures.losses.size()); ++i) {
-        lines.push_back(haptics::inWords(figures.losses[i]));
+        if (figures.losses[i].points > haptics::toldPoints) {
+            lines.push_back(haptics::inWords(figures.losses[i]));
+        }
     }
     const training::Values values = training::valuesOf(figures.score);
     if (exercise_ != nullptr) {
@@ -143,7 +151,8 @@ std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const 
         s.recordSha256 = haptics::Record(record).seal().sha256;
     }
     const auto id = store_->store(*person_, s);
-    lines.push_back(fmt::format("kept as session {} of {}", id, person_->name));
+    lines.push_back(fmt::format("kept for {} as session {} ({} so far)", person_->name, id,
+                                base::counted(store_->sessions(*person_).size(), "session")));
     if (curriculum_) {
         const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), training::utcNow());
         const auto* const next = progress.next();
@@ -151,6 +160,16 @@ std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const 
                                         : fmt::format("{} {}", next->exercise->title, training::reasonFor(*next)));
     }
     return lines;
+}
+
+std::vector<std::string> Training::notKept(const session::TrainResult& result, const fs::path& record) const
+{
+    if (!person_) {
+        return {};
+    }
+    return {fmt::format("not kept for {}: the session {}{}", person_->name,
+                        result.signal != 0 ? "was interrupted" : "ended with a fault",
+                        record.empty() ? "" : "; palpate profile add-record adds its record")};
 }
 
 void addTrainingOptions(CLI::App& command, TrainingOptions& o)

@@ -41,6 +41,8 @@ public:
     /// Keeps the session in the profile. @returns  what there is to say, a line each: the largest losses of points first
     std::vector<std::string> keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
                                   const std::filesystem::path& record);
+    /// What there is to say where a session does not count.
+    std::vector<std::string> notKept(const session::TrainResult& result, const std::filesystem::path& record) const;
     /// Whether who trains holds needle and mouse in the left hand.
     bool leftHanded() const noexcept;
     const std::string& profile() const noexcept { return options_.profile; }

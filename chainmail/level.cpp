@@ -78,7 +78,7 @@ Reaction ChainMailLevel::deform(const Grip& grip) noexcept
     std::size_t count = 0;
     Yield yield(0.0F);
     if (grip.kind == Grip::Kind::press) {
-        count = pressSeeds(lattice, grip.proxy, grip.position, grip.shape.radiusA, seeds_);
+        count = pressSeeds(lattice, grip.proxy + grip.deepest, grip.position + grip.deepest, grip.shape.radiusA, seeds_);
         yield = Yield(glm::normalize(pushed));
     } else if (grip.kind == Grip::Kind::point && grip.inside) {
         count = dragSeeds(lattice, grip.proxy, pushed, seeds_);

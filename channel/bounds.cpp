@@ -86,6 +86,12 @@ bool sound(const Hole& h) noexcept
     return std::all_of(h.from.begin(), h.from.end(), place) && std::all_of(h.to.begin(), h.to.end(), place);
 }
 
+bool sound(const Mark& m) noexcept
+{
+    const auto place = [](float v) { return upTo(static_cast<double>(v), furthest); };
+    return std::all_of(m.place.begin(), m.place.end(), place) && std::all_of(m.axis.begin(), m.axis.end(), place);
+}
+
 }  // namespace
 
 std::uint64_t voxelsOf(const Grid& grid) noexcept
@@ -127,7 +133,8 @@ bool sound(const State& s, const Scenery& scenery) noexcept
                       s.warned < std::max<std::uint32_t>(scenery.structures, 1);
     const bool probe = sound(s.probe) && s.holes <= maxHoles &&
                        std::all_of(s.hole.begin(), s.hole.end(), [](const Hole& h) { return sound(h); });
-    return places && forces && rows && probe && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
+    const bool marks = std::all_of(s.mark.begin(), s.mark.end(), [](const Mark& m) { return sound(m); });
+    return places && forces && rows && probe && marks && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
            upTo(s.coreTarget, furthest) && upTo(s.coreLength, furthest) && number(s.aheadTissueDistance) &&
            std::all_of(s.distance.begin(), s.distance.end(), number) && std::all_of(s.ahead.begin(), s.ahead.end(), number);
 }

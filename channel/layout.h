@@ -19,13 +19,14 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 6;
+inline constexpr std::uint32_t version = 7;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
 inline constexpr std::size_t maxWindows = 4;
 inline constexpr std::size_t maxDisplaced = 1U << 16;
 inline constexpr std::size_t maxHoles = 8;
+inline constexpr std::size_t maxMarks = 8;
 inline constexpr std::size_t nameLength = 32;
 /// Of a display voxel: the row of its tissue, and whether it lies on the border of a vital structure's warning distance.
 inline constexpr std::uint8_t rowBits = maxTissues - 1, shellBit = 0x80;
@@ -125,6 +126,12 @@ struct Hole {
     std::array<float, 3> from{}, to{};
 };
 
+/// A place that the trainee marked.
+struct Mark {
+    std::array<float, 3> place{};        // of the tool, on what it touched [m]
+    std::array<float, 3> axis{0, 1, 0};  // of the tool, unit vector from its shaft to its tip
+};
+
 /// Where the ultrasound probe is; of a scene that holds one.
 struct ProbePose {
     Triple face{};            // middle of its face [m]
@@ -164,6 +171,9 @@ struct State {
     std::uint32_t pictures = 0;     // that the hand asked for so far: stored ultrasound pictures, or CT scans
     std::uint32_t pictureHeld = 0;  // 1: its button is down
     std::array<Hole, maxHoles> hole{};
+    std::uint32_t marks = 0;     // places marked so far; `mark` has the last maxMarks, number n at n modulo maxMarks
+    std::uint32_t markHeld = 0;  // 1: its button is down
+    std::array<Mark, maxMarks> mark{};
     std::uint64_t missed = 0;     // ticks
     double tickP99 = 0;           // [s]
     std::uint64_t published = 0;  // CLOCK_MONOTONIC when written [ns]

@@ -9,7 +9,6 @@
 # gives palpate::chainmail with its headers as <chainmail/lattice.h>, <palpate/chainmail/lattice.h> where it is installed, warnings, install rule, and
 # (-DPALPATE_VERIFY_HEADERS=ON, target all_verify_interface_header_sets) a compile of each header on its own.
 # UNINSTALLED: for a program of ours only: commands, pages and windows, in which no tick runs.
-
 function(palpate_library name)
   cmake_parse_arguments(arg "UNINSTALLED" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;INCLUDES" ${ARGN})
   set(target palpate_${name})

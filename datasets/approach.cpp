@@ -1,5 +1,6 @@
 #include <datasets/approach.h>
 #include <datasets/scene.h>
+#include <datasets/voxel_obstacles.h>
 
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
@@ -31,8 +32,6 @@ constexpr std::size_t maxFieldNodes = 300'000;  // of a distance field
 constexpr int directionCount = 600;
 constexpr int borderVoxels = 3;          // the body's surface so near to the image's border is a cut, not skin
 constexpr double freeOutside = 0.06;     // length of needle that must be in air before it enters [m]
-constexpr double comfort = 7e-3;         // clearance beyond which more is no better [m]
-constexpr double discSpacing = 0.7e-3;   // of the samples around a line [m]
 constexpr double beyondTip = 3e-3;       // a line must also be clear so far beyond the fired tip [m]
 constexpr double startDistance = 0.03;   // of the tip from the skin, before and after [m]
 constexpr double minInside = 3e-3;       // the tip is so deep before the gun fires [m]
@@ -156,45 +155,32 @@ std::vector<Vec3> aims(const Scene& scene, const Tissue& tissue)
 /// What the search for a line asks of the volume.
 struct Surroundings {
     const Tissue& tissue;
-    std::vector<char> forbidden;  // by label: vital, bone and fixed tissue
-    std::vector<Vec3> disc;       // around a line: two offsets and their length [m], shortest first
+    VoxelObstacles obstacles;  // vital, bone and fixed tissue
     WayJudge judge;
     bool hasSkin = false;
     double step = 0;   // along a line [m]
     double reach = 0;  // no line inside the body is longer [m]
 };
 
-// Samples over a disc of radius `radius`, ring by ring.
-std::vector<Vec3> discSamples(double radius)
-{
-    std::vector<Vec3> samples{Vec3(0.0)};
-    for (double r = discSpacing; r < radius; r += discSpacing) {
-        const int count = static_cast<int>(std::ceil(2 * std::numbers::pi * r / discSpacing));
-        for (int n = 0; n < count; ++n) {
-            const double angle = 2 * std::numbers::pi * n / count;
-            samples.emplace_back(r * std::cos(angle), r * std::sin(angle), r);
-        }
-    }
-    return samples;
-}
-
 Surroundings surroundings(const Scene& scene, const Tissue& tissue)
 {
     const volume::TissueTable& table = tissue.table();
-    Surroundings s{tissue, std::vector<char>(65536, 0), discSamples(comfort + scene.tool.radius), WayJudge(scene, tissue)};
+    std::vector<char> forbidden(65536, 0);
+    bool hasSkin = false;
     for (const Structure& structure : tissue.structures()) {
         const volume::TissueRow& row = table.rows[structure.tissue];
-        s.hasSkin = s.hasSkin || row.role == Role::skin;
-        s.forbidden[structure.value] = row.role == Role::vital || row.role == Role::bone || row.fixed ? 1 : 0;
+        hasSkin = hasSkin || row.role == Role::skin;
+        forbidden[structure.value] = row.role == Role::vital || row.role == Role::bone || row.fixed ? 1 : 0;
     }
     for (const VitalStructure& vital : scene.vital) {
         for (const std::uint16_t label : tissue.labelsNamed(vital.name)) {
-            s.forbidden[label] = 1;
+            forbidden[label] = 1;
         }
     }
     for (const std::uint16_t label : scene.target.empty() ? Labels{} : tissue.labelsNamed(scene.target)) {
-        s.forbidden[label] = 0;
+        forbidden[label] = 0;
     }
+    Surroundings s{tissue, VoxelObstacles(tissue, forbidden), WayJudge(scene, tissue), hasSkin};
     const Box body = tissue.box();
     const Vec3 voxel = tissue.affine().spacing();
     s.step = std::clamp(std::min({voxel.x, voxel.y, voxel.z}) / 2, 0.2e-3, 1e-3);
@@ -255,28 +241,6 @@ Vec3 skinNormal(const Surroundings& s, const Tissue::Reader& reader, Vec3 p)
     return length > 0 ? sum / length : Vec3(0.0);
 }
 
-// Distance from the line to what is forbidden, up to the radius of the disc.
-double clearance(const Surroundings& s, const Tissue::Reader& reader, Vec3 from, Vec3 to)
-{
-    const double length = glm::length(to - from);
-    const Vec3 along = (to - from) / length;
-    const Vec3 side = glm::normalize(glm::cross(along, std::abs(along.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0)));
-    const Vec3 up = glm::cross(along, side);
-    double least = s.disc.back().z;
-    for (double t = 0; t <= length; t += discSpacing) {
-        const Vec3 middle = from + t * along;
-        for (const Vec3& sample : s.disc) {
-            if (sample.z >= least) {
-                break;
-            }
-            if (s.forbidden[reader.label(middle + sample.x * side + sample.y * up)] != 0) {
-                least = sample.z;
-            }
-        }
-    }
-    return least;
-}
-
 struct Line {
     Proposal way;
     double cost = 0;
@@ -305,7 +269,8 @@ std::optional<Line> lineAlong(const Scene& scene, const Surroundings& s, const T
     }
     const double length = glm::length(*entry - aim);
     const double fired = firingDepth(scene.tool, length) + throwOf(scene.tool);
-    const double room = clearance(s, reader, *entry, *entry - (fired + beyondTip) * direction) - scene.tool.radius;
+    const Vec3 end = *entry - (fired + beyondTip) * direction;
+    const double room = s.obstacles.distance(*entry, end, comfort + scene.tool.radius) - scene.tool.radius;
     const double offCentre = std::max(0.0, fired - (length + halfNotch(scene.tool)));
     const WayVerdict verdict = s.judge.judge(reader, *entry, aim, *entry - fired * direction);
     const Proposal way{{*entry, aim}, length, room, std::acos(std::min(1.0, upright)), verdict, offCentre};

@@ -10,12 +10,14 @@
 
 namespace palpate::datasets {
 
+inline constexpr double comfort = 7e-3;  // clearance beyond which more is no better, and is not looked for [m]
+
 /// A way to the target, and what speaks for it.
 struct Proposal {
     Approach approach;
     double length = 0;     // from the skin to the aim [m]
-    double clearance = 0;  // between needle and the nearest vital structure, bone or fixed tissue, as far as it is looked
-                           // for: 7 mm [m]
+    double clearance = 0;  // between needle and the nearest voxel of a vital structure, bone or fixed tissue, `comfort` at
+                           // most [m]
     double angle = 0;      // between needle and the skin's normal [rad]
     WayVerdict verdict;
     double offCentre = 0;  // of the fired notch's middle beyond the aim: the line is too short for the throw [m]

@@ -35,6 +35,10 @@ struct ToolSpec {
     double tipLength = 4e-3;      // of the needle's conical tip [m]
     double bevel = 0;             // angle of a bevelled tip that bends the needle [rad]; 0 = symmetric, stays straight
     double bevelTurn = 0;         // about the needle: which way it bends [rad]
+
+    /// Of the segment that its pressing surface goes around: 0 of a sphere and of a needle, which begins with its point
+    /// [m].
+    double pressedLength() const noexcept { return kind == ToolKind::capsule ? length : 0.0; }
 };
 
 /// A mass, damper and spring with a magnitude: one term of equation 3 of the thesis and its fraction of equations 6-8.

@@ -107,7 +107,8 @@ glm::vec3 readColour(Section& section)
 std::pair<std::string_view, std::string> misfit(const TissueRow& row)
 {
     if (row.role != Role::air && row.youngsModulus < softest * 1e3) {
-        return {"youngs_kpa", fmt::format("must be {:g} kPa or more; only air has no stiffness", softest)};
+        return {"youngs_kpa",
+                fmt::format("must be {:g} to {:g} kPa; only air has no stiffness", softest, tissueFields[0].high)};
     }
     if (row.relaxingFast + row.relaxingSlow > maxRelaxing) {
         return {"relaxing_slow", fmt::format("must not be over {:g} together with relaxing_fast: a solid keeps some of its "

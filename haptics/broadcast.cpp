@@ -67,6 +67,14 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
     const std::uint32_t held = (r.device.buttons & buttonPicture) != 0 ? 1 : 0;
     state.pictures += held != 0 && state.pictureHeld == 0 ? 1 : 0;
     state.pictureHeld = held;
+    const std::uint32_t marking = (r.device.buttons & buttonMark) != 0 ? 1 : 0;
+    if (marking != 0 && state.markHeld == 0) {
+        // On the surface, where there is one: the tool itself is pressed into it.
+        const Vec3 place = r.phase == Phase::contact ? r.proxy : r.device.position + r.deflection;
+        state.mark[state.marks % channel::maxMarks] = {floats(place), floats(r.device.axis)};
+        ++state.marks;
+    }
+    state.markHeld = marking;
     if (r.fired) {
         state.hole[state.cores % channel::maxHoles] = {floats(r.core.restStart), floats(r.core.restEnd)};
         ++state.cores;

@@ -274,8 +274,9 @@ std::vector<Loss> LossWatch::losses(const SessionInfo& info) const
 
 std::string inWords(const Loss& loss)
 {
-    return fmt::format("-{:.0f} {}: {}{}", std::max(1.0, loss.points), loss.points < 1.5 ? "point" : "points", loss.words,
-                       loss.at ? fmt::format(" (at {:.1f} s)", *loss.at) : "");
+    const double points = std::round(std::max(1.0, loss.points));
+    return said(base::trn("-{:.0f} point: {}{}", "-{:.0f} points: {}{}", static_cast<unsigned long>(points)), points,
+                loss.words, loss.at ? said(tr(" (at {:.1Lf} s)"), *loss.at) : "");
 }
 
 std::vector<Loss> lossesOf(const Record& record)

@@ -12,22 +12,31 @@ namespace {
 
 using Listed = Measure::Listed;
 
+// What a session cannot have; infinite is what it did not reach.
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+
+// Nothing where no core is asked for, and none was taken.
+double ofCores(const Score& s, double value)
+{
+    return s.passes > 0 || judgedBy(s) == Judged::core ? value : none;
+}
+
 // Nothing where the scene holds no probe.
 double ofProbe(const Score& s, double value)
 {
-    return s.hasProbe ? value : std::numeric_limits<double>::infinity();
+    return s.hasProbe ? value : none;
 }
 
 // Nothing where it has no CT.
 double ofCt(const Score& s, double value)
 {
-    return s.scanDose > 0 ? value : std::numeric_limits<double>::infinity();
+    return s.scanDose > 0 ? value : none;
 }
 
 // Nothing where it asks for something else.
 double ofTask(const Score& s, datasets::SessionTask task, double value)
 {
-    return s.aim.task == task ? value : std::numeric_limits<double>::infinity();
+    return s.aim.task == task ? value : none;
 }
 
 constexpr std::array<Measure, 36> all{{
@@ -36,9 +45,9 @@ constexpr std::array<Measure, 36> all{{
     {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
      [](const Score& s) { return s.targetingError * 1e3; }},
     {"best_target_pct", "core %", "Target in best core", "%", 0, Listed::ifFired,
-     [](const Score& s) { return s.bestTargetFraction * 100; }},
+     [](const Score& s) { return ofCores(s, s.bestTargetFraction * 100); }},
     {"best_target_length_mm", "core mm", "Length in target", "mm", 1, Listed::ifFired,
-     [](const Score& s) { return s.bestTargetLength * 1e3; }},
+     [](const Score& s) { return ofCores(s, s.bestTargetLength * 1e3); }},
     {"vital_contacts", "vital", "Vital contacts", "", 0, Listed::always,
      [](const Score& s) { return static_cast<double>(s.vitalContacts); }},
     {"vital_s", "vital s", "Time in vital structures", "s", 2, Listed::always,
@@ -152,9 +161,9 @@ LabelledValues describeMeasures(const Score& score)
             continue;
         }
         const double value = m.value(score);
-        const bool none = !std::isfinite(value) || (m.listed == Listed::ifFired && score.passes == 0);
+        const bool missing = !std::isfinite(value) || (m.listed == Listed::ifFired && score.passes == 0);
         const char* const space = *m.unit == 0 ? "" : " ";
-        lines.emplace_back(m.label, none ? "-" : fmt::format("{:.{}f}{}{}", value, m.decimals, space, m.unit));
+        lines.emplace_back(m.label, missing ? "-" : fmt::format("{:.{}f}{}{}", value, m.decimals, space, m.unit));
     }
     return lines;
 }

@@ -20,8 +20,8 @@ struct Measure {
     const char* label;  // in a list
     const char* unit;   // behind the value in a list
     int decimals;
-    Listed listed;  // ifFired: "-" when the gun was not fired, and nothing where no core is asked for
-    double (*value)(const Score&);
+    Listed listed;                  // ifFired: "-" when the gun was not fired, and nothing where no core is asked for
+    double (*value)(const Score&);  // infinite: never reached, worse than any; not a number: no session of its kind has it
 };
 
 /// All measures, in the order of docs/score.md.

@@ -47,6 +47,29 @@ double finestAlong(const volume::Box& box)
     return std::max({extent.x, extent.y, extent.z}) / (channel::longestSide - around);
 }
 
+// The grid with its nodes where each has a voxel around it, or each voxel as many nodes as the next, along the axes that
+// volume and patient share. Between two voxels a node would belong to both, and the first would have it: the whole body
+// would be shown half a voxel beside its place. The nodes move by less than one spacing towards the lower end, of two that
+// the grid has beyond the box.
+volume::NodeGrid onVoxels(volume::NodeGrid grid, const volume::Affine& voxels)
+{
+    constexpr double same = 1e-6;  // of a spacing
+    for (int axis = 0; axis < 3; ++axis) {
+        for (const Vec3& step : {voxels.linear[0], voxels.linear[1], voxels.linear[2]}) {
+            const double voxel = glm::length(step);
+            if (std::abs(std::abs(step[axis]) - voxel) > same * voxel) {
+                continue;
+            }
+            const double larger = std::max(voxel, grid.spacing), smaller = std::min(voxel, grid.spacing);
+            const bool isEven = std::lround(larger / smaller) % 2 == 0;
+            const double node = voxels.origin[axis] + (isEven ? 0.5 * smaller : 0.0);
+            const double off = (grid.origin[axis] - node) / grid.spacing;
+            grid.origin[axis] -= grid.spacing * std::max(0.0, off - std::floor(off + same));
+        }
+    }
+    return grid;
+}
+
 channel::ToolKind shown(datasets::ToolKind kind)
 {
     switch (kind) {
@@ -149,7 +172,8 @@ std::optional<volume::NodeGrid> fineGrid(const SessionModel& model, const volume
         const Vec3 middle = model.approach.aim;
         box = {glm::max(box.low, middle - aroundProcedure), glm::min(box.high, middle + aroundProcedure)};
     }
-    const volume::NodeGrid grid = volume::affordableGrid(box, std::max(finest, finestAlong(box)), fineNodes);
+    const volume::NodeGrid grid =
+        onVoxels(volume::affordableGrid(box, std::max(finest, finestAlong(box)), fineNodes), model.tissue->affine());
     constexpr double worth = 0.8;
     return grid.spacing < worth * display.spacing ? std::optional(grid) : std::nullopt;
 }
@@ -172,7 +196,8 @@ volume::NodeGrid displayGrid(const volume::Tissue& tissue)
 {
     const Vec3 voxel = tissue.affine().spacing();
     const double finest = std::min({voxel.x, voxel.y, voxel.z});
-    return volume::affordableGrid(tissue.box(), std::max(finest, finestAlong(tissue.box())), displayNodes);
+    return onVoxels(volume::affordableGrid(tissue.box(), std::max(finest, finestAlong(tissue.box())), displayNodes),
+                    tissue.affine());
 }
 
 channel::TissueSound soundOf(const volume::TissueRow& row)

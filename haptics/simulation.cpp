@@ -23,14 +23,7 @@ constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
 // How much of the tool behind its tip collision looks at [m].
 double queriedLength(const datasets::ToolSpec& tool) noexcept
 {
-    switch (tool.kind) {
-        case datasets::ToolKind::needle:
-            return shaftQueried;
-        case datasets::ToolKind::capsule:
-            return tool.length;
-        default:
-            return 0.0;
-    }
+    return tool.kind == datasets::ToolKind::needle ? shaftQueried : tool.pressedLength();
 }
 
 // Stops the time of one task after the other.
@@ -101,7 +94,7 @@ double touchedBy(const datasets::ToolSpec& tool, const chainmail::ElasticBody& b
     if (tool.kind == datasets::ToolKind::needle) {
         return 0.0;
     }
-    const Vec3 end(0.0, tool.kind == datasets::ToolKind::capsule ? tool.length : 0.0, 0.0);
+    const Vec3 end(0.0, tool.pressedLength(), 0.0);
     return chainmail::touchedBy({Vec3(0.0), end, tool.radius, tool.radius}, body.levels.front().nodes.spacing);
 }
 
@@ -173,6 +166,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     clock.done(Task::h7);
     ++ticks_;
     last_ = position;
+    lastAxis_ = tool_.axis;
     return record_;
 }
 
@@ -195,6 +189,7 @@ void Simulation::accept(const DeviceSample& device) noexcept
         betweenSteps(record_.device.position, stabiliserOptions_.device.encoder, stabiliserOptions_.period, encoder_);
     if (ticks_ == 0) {
         last_ = hand_.position;
+        lastAxis_ = hand_.axis;
     }
 }
 
@@ -229,9 +224,10 @@ occupancy::Sweep Simulation::collide() noexcept
     if (tip_.phase != Phase::free) {
         return {};
     }
-    // The force laws know one proxy, that of the tip: a capsule's is the middle of its front end.
-    const double radius = needle ? 0.0 : tool.radius;
-    return occupancy::sweep(body_, {last_, last_, radius}, {tool_.position, tool_.position, radius});
+    const auto pressing = [&](Vec3 tip, Vec3 axis) -> occupancy::Capsule {
+        return {tip - tool.pressedLength() * axis, tip, needle ? 0.0 : tool.radius};
+    };
+    return occupancy::sweep(body_, pressing(last_, lastAxis_), pressing(tool_.position, tool_.axis));
 }
 
 chainmail::Grip Simulation::grip() const noexcept
@@ -254,12 +250,8 @@ chainmail::Grip Simulation::grip() const noexcept
     grip.entry = tip_.needle.entry;
     grip.drag = tip_.phase == Phase::inserted ? tip_.needle.drag() : 0.0;
     grip.axis = tool_.axis;
-    const Vec3 back = tool.kind == datasets::ToolKind::capsule ? tip - tool.length * tool_.axis : tip;
-    grip.shape = {tip, back, tool.radius, tool.radius};
-    if (tool.kind == datasets::ToolKind::capsule && level_ == datasets::ModelLevel::elastic) {
-        grip.deepest =
-            deepestPlace(model_.surface, {tool.radius, tool.length, tool_.axis, 0.0}, tip_.proxy).at - tip_.proxy;
-    }
+    grip.shape = {tip, tip - tool.pressedLength() * tool_.axis, tool.radius, tool.radius};
+    grip.deepest = tip_.place - tip_.proxy;
     return grip;
 }
 

@@ -13,7 +13,7 @@ namespace {
 constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
 constexpr int slipSteps = 8;
 constexpr double axisStep = 1e-3;   // along the segment, where its deepest place is looked for [m]
-constexpr double asDeep = 0.25e-3;  // places that are less apart in depth count as one [m]
+constexpr double asDeep = 0.25e-3;  // places less high over the deepest count, by how much less [m]
 
 }  // namespace
 
@@ -28,15 +28,16 @@ DeepestPlace deepestPlace(const volume::DistanceField& surface, const ProxyTool&
     for (int i = 0; i <= steps; ++i) {
         least = std::min(least, surface.distance(placeAt(i)));
     }
+    // With weights that begin at 0 the place does not jump as the tool turns.
     Vec3 sum(0.0);
-    int count = 0;
+    double weights = 0.0;
     for (int i = 0; i <= steps; ++i) {
-        if (const Vec3 place = placeAt(i); surface.distance(place) <= least + asDeep) {
-            sum += place;
-            ++count;
-        }
+        const Vec3 place = placeAt(i);
+        const double weight = std::max(least + asDeep - surface.distance(place), 0.0);
+        sum += weight * place;
+        weights += weight;
     }
-    return {sum / static_cast<double>(count), least};
+    return {sum / weights, least};
 }
 
 SurfaceProxy touching(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front) noexcept
@@ -45,11 +46,16 @@ SurfaceProxy touching(const volume::DistanceField& surface, const ProxyTool& too
         const DeepestPlace place = deepestPlace(surface, tool, front);
         front += (tool.radius - place.distance) * surface.normal(place.at);
     }
-    return {front, surface.normal(deepestPlace(surface, tool, front).at)};
+    const Vec3 place = deepestPlace(surface, tool, front).at;
+    return {front, surface.normal(place), place};
 }
 
 void slip(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front, SurfaceProxy& proxy) noexcept
 {
+    if (tool.length > 0.0) {
+        // It may have turned.
+        proxy = touching(surface, tool, proxy.front);
+    }
     for (int i = 0; i < slipSteps; ++i) {
         const Vec3 away = front - proxy.front;
         const double depth = -glm::dot(away, proxy.normal);

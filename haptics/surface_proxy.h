@@ -20,9 +20,10 @@ struct ProxyTool {
 struct SurfaceProxy {
     Vec3 front{0.0};   // of the tool [m]
     Vec3 normal{0.0};  // out of the body, where it touches
+    Vec3 place{0.0};   // of the tool's segment that is one radius off the surface [m]
 };
 
-/// The deepest place of the tool's segment; the middle of several.
+/// The deepest place of the tool's segment; the weighted middle of several that are about as deep.
 struct DeepestPlace {
     Vec3 at{0.0};         // [m]
     double distance = 0;  // from the surface at rest, negative inside [m]
@@ -32,8 +33,8 @@ DeepestPlace deepestPlace(const volume::DistanceField& surface, const ProxyTool&
 /// The tool with its front at `front`, moved along the normals until it touches the surface.
 SurfaceProxy touching(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front) noexcept;
 
-/// Lets the proxy slip over the surface towards the tool, until the way between them is inside the cone of friction: at
-/// most 8 steps of 1 mm.
+/// Turns the proxy with the tool, and lets it slip over the surface towards it, until the way between them is inside the
+/// cone of friction: at most 8 steps of 1 mm.
 /// Source: Zilles and Salisbury, "A constraint-based god-object method for haptic display", IROS 1995.
 void slip(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front, SurfaceProxy& proxy) noexcept;
 

@@ -47,23 +47,28 @@ struct Tip {
             return;
         }
         state.phase = Phase::contact;
-        take(touching(model.surface, proxyTool(), occupancy::restPoint(body, way.point)));
-        const auto touched = reader.tissue(state.proxy - (offset() + 0.5e-3) * state.normal);
-        addEvent(record, {EventKind::contact, 0xFF, touched, glm::distance(way.point, device.position)});
+        const Vec3 front = occupancy::restPoint(body, way.point) + (way.front - way.point);
+        take(touching(model.surface, proxyTool(), front));
+        const auto touched = reader.tissue(state.place - (offset() + 0.5e-3) * state.normal);
+        addEvent(record, {EventKind::contact, 0xFF, touched, glm::distance(way.front, device.position)});
     }
 
-    // The force laws know one proxy, that of the tip: a capsule is its front end. A sphere slips without friction.
-    ProxyTool proxyTool() const noexcept { return {offset(), 0.0, device.axis, needle() ? tipFriction : 0.0}; }
+    // Only the tip of a needle does not slip by itself.
+    ProxyTool proxyTool() const noexcept
+    {
+        return {offset(), model.scene.tool.pressedLength(), device.axis, needle() ? tipFriction : 0.0};
+    }
 
     void take(const SurfaceProxy& proxy) noexcept
     {
         state.proxy = proxy.front;
+        state.place = proxy.place;
         state.normal = proxy.normal;
     }
 
     Vec3 press() noexcept
     {
-        SurfaceProxy proxy{state.proxy, state.normal};
+        SurfaceProxy proxy{state.proxy, state.normal, state.place};
         slip(model.surface, proxyTool(), device.position, proxy);
         take(proxy);
         if (depthUnder(proxy, device.position) <= 0.0) {
@@ -71,7 +76,7 @@ struct Tip {
             return Vec3(0.0);
         }
         const Vec3 away = device.position - state.proxy;
-        const Vec3 under = state.proxy - offset() * state.normal;
+        const Vec3 under = state.place - offset() * state.normal;
         const auto local = tissueUnder(model, reader, under, -state.normal, model.scene.tool.radius);
         const double way = glm::length(away);
         const double law = needle() ? needleLaw(model, local).force(way) : sphereForce(model, local, way);

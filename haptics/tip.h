@@ -13,8 +13,9 @@ namespace palpate::haptics {
 /// pierced, is cut), so that it only ever takes energy out.
 struct TipState {
     Phase phase = Phase::free;
-    Vec3 proxy{0.0};          // at rest; while free: the tip itself [m]
-    Vec3 normal{0.0};         // out of the body at the proxy, while in contact
+    Vec3 proxy{0.0};   // at rest; while free: the tip itself [m]
+    Vec3 place{0.0};   // at rest, of the tool's axis: over what it touches, while in contact; a point's the proxy [m]
+    Vec3 normal{0.0};  // out of the body there, while in contact
     std::uint8_t tissue = 0;  // row at the proxy
     RelaxingForce lost;       // of the force while in contact
     NeedleState needle;       // while inserted; its cuts stay

@@ -12,18 +12,12 @@ namespace {
 
 constexpr int axisSamplesAtMost = 32;
 
-// Points along the tool's axis, no further apart than its radius or half an element.
+// Points along the tool's axis, no further apart than its radius or half an element. One means the tip, b.
 int axisSamples(const Body& body, const Capsule& tool) noexcept
 {
     const double step = std::max(tool.radius, 0.5 * body.grid.spacing);
     const double length = glm::distance(tool.a, tool.b);
     return std::clamp(static_cast<int>(std::ceil(length / step)) + 1, 1, axisSamplesAtMost);
-}
-
-Vec3 axisPoint(const Capsule& tool, int i, int samples) noexcept
-{
-    // From b, the tip: one sample means the tip.
-    return samples == 1 ? tool.b : glm::mix(tool.b, tool.a, static_cast<double>(i) / (samples - 1));
 }
 
 // The segment in the middle of a tool.
@@ -98,18 +92,28 @@ struct Gap {
     Vec3 point{0.0};
 };
 
-// At rest the distance field answers for the axis itself.
+// At rest the distance field answers for the axis itself: at the samples, then to a thousandth of the axis around the best.
 Gap gapAtRest(const Body& body, const Capsule& tool) noexcept
 {
     const int samples = axisSamples(body, tool);
     Gap gap;
-    for (int i = 0; i < samples; ++i) {
-        const Vec3 p = axisPoint(tool, i, samples);
+    double best = 0.0;
+    const auto see = [&](double t, bool first) {
+        const Vec3 p = glm::mix(tool.b, tool.a, t);
         const double d = body.surface.distance(p) - tool.radius;
-        if (i == 0 || d < gap.clear) {
-            gap.clear = d;
-            gap.point = p;
+        if (first || d < gap.clear) {
+            gap = {d, p};
+            best = t;
         }
+    };
+    see(0.0, true);
+    for (int i = 1; i < samples; ++i) {
+        see(static_cast<double>(i) / (samples - 1), false);
+    }
+    for (double step = 0.5 / (samples - 1); samples > 1 && step > 1e-3; step *= 0.5) {
+        const double middle = best;
+        see(std::max(0.0, middle - step), false);
+        see(std::min(1.0, middle + step), false);
     }
     return gap;
 }
@@ -164,6 +168,7 @@ Sweep sweep(const Body& body, const Capsule& from, const Capsule& to) noexcept
         const Gap gap = gapOf(body, now, look(body, now, now.radius + reach, [](Element) {}));
         const double clear = gap.clear;
         result.point = gap.point;
+        result.front = now.b;
         if (clear <= 0.0) {
             result.hit = true;
             return result;

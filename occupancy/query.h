@@ -25,6 +25,7 @@ struct Sweep {
     double fraction = 1;  // of the way, up to the first touch or to the end
     bool hit = false;
     Vec3 point{0.0};  // of the tool's axis that touches [m]
+    Vec3 front{0.0};  // where the tool's end b is then [m]
 };
 
 /// Moves the tool from `from` to `to` and stops at the first touch, however fast it goes: steps are never longer than half

@@ -20,6 +20,16 @@ unsigned char byte(double value)
     return static_cast<unsigned char>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
 }
 
+constexpr int screenDpi = 72;  // of all text actors: a font's size is in pixels
+
+void dress(vtkTextProperty& look, double size, const Colour& colour, bool bold)
+{
+    look.SetFontFamilyToArial();
+    look.SetFontSize(static_cast<int>(std::lround(size)));
+    look.SetColor(colour[0], colour[1], colour[2]);
+    look.SetBold(bold ? 1 : 0);
+}
+
 }  // namespace
 
 Canvas::Canvas(vtkRenderer& renderer) : renderer_(renderer)
@@ -91,15 +101,27 @@ void Canvas::text(Point2 at, const std::string& words, double size, const Colour
     actor.SetInput(words.c_str());
     actor.SetDisplayPosition(static_cast<int>(std::lround(at[0])), static_cast<int>(std::lround(at[1])));
     vtkTextProperty& look = *actor.GetTextProperty();
-    look.SetFontFamilyToArial();
-    look.SetFontSize(static_cast<int>(std::lround(size)));
-    look.SetColor(colour[0], colour[1], colour[2]);
-    look.SetBold(bold ? 1 : 0);
+    dress(look, size, colour, bold);
+    introduce(size, colour, bold);
     look.SetVerticalJustificationToBottom();
     look.SetJustification(align == Align::left     ? VTK_TEXT_LEFT
                           : align == Align::centre ? VTK_TEXT_CENTERED
                                                    : VTK_TEXT_RIGHT);
     put_.push_back({words, at, size, align, bold});
+}
+
+// VTK keeps the faces of thirty looks (a look is font, size and colour), and for each the object that was first drawn with
+// it, to load the face again. Actors are used again for other words: the face of a bold look would come back thin, or the
+// other way round, in those letters that had not been drawn before. So the first object with a look is one that stays.
+void Canvas::introduce(double size, const Colour& colour, bool bold)
+{
+    if (!looks_.emplace(bold, std::lround(size), colour).second)
+        return;
+    vtkNew<vtkTextProperty> look;
+    dress(*look, size, colour, bold);
+    std::array<int, 4> box{};
+    if (vtkTextRenderer* const renderer = vtkTextRenderer::GetInstance())
+        renderer->GetBoundingBox(look, "x", box.data(), screenDpi);
 }
 
 std::vector<Written> Canvas::written() const
@@ -115,7 +137,6 @@ std::vector<Written> Canvas::written() const
 
 double Canvas::widthOf(const std::string& words, double size, bool bold) const
 {
-    constexpr int screenDpi = 72;  // of all text actors: a font's size is in pixels
     constexpr std::size_t most = 4096;
     const int pixels = static_cast<int>(std::lround(size));
     const auto key = std::make_pair(words, bold ? -pixels : pixels);

@@ -12,8 +12,10 @@
 
 #include <array>
 #include <map>
+#include <set>
 #include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -58,6 +60,8 @@ private:
         Align align;
         bool bold;
     };
+    void introduce(double size, const Colour& colour, bool bold);
+
     vtkRenderer& renderer_;
     vtkNew<vtkPoints> points_;
     vtkNew<vtkCellArray> cells_;
@@ -66,6 +70,7 @@ private:
     std::vector<vtkSmartPointer<vtkTextActor>> texts_;
     std::vector<Put> put_;
     std::size_t used_ = 0;
+    std::set<std::tuple<bool, long, Colour>> looks_;                // that text() has drawn: bold, size, colour
     mutable std::map<std::pair<std::string, int>, double> widths_;  // of words already measured
 };
 

@@ -99,7 +99,8 @@ void coachToSkin(const channel::Scenery& scenery, const channel::State& state, c
 
 std::string toGo(const channel::State& state, const CoachView& view)
 {
-    const double left = std::isfinite(state.ahead[0]) ? state.ahead[0] : state.distance[0];
+    // The way on the needle's line is no shorter than the distance that stands beside.
+    const double left = std::isfinite(state.ahead[0]) ? std::max(state.ahead[0], state.distance[0]) : state.distance[0];
     return view.planned ? said(tr(" ({:.0f} mm to go)"), millimetres(left)) : "";
 }
 
@@ -201,6 +202,27 @@ Coaching palpation(const channel::State& state, const CoachView& view)
     return {2, 3, now + (view.handIsHere ? " (M)" : ""), "", false};
 }
 
+// Where the tool has gone to, and which keys bring it back.
+std::string lostTool(const channel::State& state, const CoachView& view)
+{
+    const glm::dvec3 way = view.aim - vec(state.tip), axis = vec(state.axis);
+    const double along = glm::dot(way, axis);
+    if (std::abs(along) < glm::length(way - along * axis))
+        return tr("The tool is outside the picture: the arrow keys bring it back");
+    return along > 0 ? tr("The tool is outside the picture: the wheel forward, or Page down, brings it back")
+                     : tr("The tool is outside the picture: the wheel back, or Page up, brings it back");
+}
+
+Coaching coachTask(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
+{
+    if (scenery.task == channel::Task::touch)
+        return touch(scenery, state, view);
+    if (scenery.task == channel::Task::advance)
+        return advance(scenery, state, view);
+    const bool needle = scenery.tool == channel::ToolKind::needle;
+    return needle && !view.targetHidden ? biopsy(scenery, state, view) : palpation(state, view);
+}
+
 }  // namespace
 
 Coaching coach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view)
@@ -209,12 +231,10 @@ Coaching coach(const channel::Scenery& scenery, const channel::State& state, con
         return {};
     if (state.status == channel::Status::faulted)
         return {1, 1, tr("End the session"), tr("The forces are off"), view.handIsHere};
-    if (scenery.task == channel::Task::touch)
-        return touch(scenery, state, view);
-    if (scenery.task == channel::Task::advance)
-        return advance(scenery, state, view);
-    const bool needle = scenery.tool == channel::ToolKind::needle;
-    return needle && !view.targetHidden ? biopsy(scenery, state, view) : palpation(state, view);
+    Coaching c = coachTask(scenery, state, view);
+    if (view.outOfSight && view.handIsHere && state.phase == channel::Phase::free && !c.last)
+        c.wrong = lostTool(state, view);
+    return c;
 }
 
 }  // namespace palpate::render

@@ -24,13 +24,15 @@ struct CoachView {
     bool planned = true;        // the planned line is shown
     bool targetHidden = false;  // it is to be found
     bool handIsHere = false;    // the window is the hand: steps name the keys
+    bool outOfSight = false;    // the tip is outside the picture
 };
 
 /// The step that the session is at: of a touch or an advance where the scene asks for that, else of a biopsy (needle) or
 /// palpation (any other tool).
 ///
-/// A core without target begins the biopsy again. A length that is off is told with its direction in the patient: towards
-/// the head, feet, front, back, left or right.
+/// A tool in the air that is outside the picture is what is wrong, whatever else is. A core without target begins the
+/// biopsy again. A length that is off is told with its direction in the patient: towards the head, feet, front, back, left
+/// or right.
 Coaching coach(const channel::Scenery& scenery, const channel::State& state, const CoachView& view);
 
 }  // namespace palpate::render

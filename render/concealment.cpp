@@ -29,7 +29,8 @@ std::array<bool, channel::maxTissues> concealedRows(const Concealment& what, con
 
 void conceal(const Concealment& what, channel::Scenery& scenery)
 {
-    if (what.any())
+    // What is to be found lies anywhere: the line of the scene leads past it.
+    if (what.any() || scenery.task == channel::Task::find)
         scenery.entry = scenery.aim;
 }
 

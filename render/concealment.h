@@ -17,7 +17,7 @@ struct Concealment {
     bool any() const noexcept { return plan || !tissues.empty(); }
 };
 
-/// Takes the planned line and the warning distances' names out of a scenery.
+/// Takes the planned line out of a scenery; always out of one whose target is to be found.
 void conceal(const Concealment& what, channel::Scenery& scenery);
 /// Takes distances to the target, and what lies ahead, out of a state.
 void conceal(const Concealment& what, channel::State& state);

@@ -18,9 +18,10 @@ namespace {
 using base::said;
 using base::tr;
 
-constexpr double depthStep = 1e-3;    // of a notch of the wheel, or a key [m]
-constexpr double fineShare = 0.2;     // with Shift
-constexpr double pressStep = 0.5e-3;  // of the probe into the body, by a notch of the wheel [m]
+constexpr double depthStep = 1e-3;                 // of a notch of the wheel, or a key [m]
+constexpr double fineShare = 0.2;                  // with Shift
+constexpr auto toThink = std::chrono::seconds(5);  // whether the session is to end
+constexpr double pressStep = 0.5e-3;               // of the probe into the body, by a notch of the wheel [m]
 
 Controls& controlsOf(GLFWwindow* window)
 {
@@ -252,8 +253,26 @@ void Controls::showHelp()
     picture_.setHelp(helping_ ? help() : std::vector<KeyHelp>());
 }
 
+bool Controls::asksToClose() const
+{
+    return closing_ && Clock::now() - *closing_ < toThink;
+}
+
+// The window that holds the tool ends the session as it goes, and the key is "back" elsewhere: it asks.
+void Controls::close()
+{
+    const bool ends = hand_.is() && !tryout_ && follower_.state().status == channel::Status::running;
+    if (!ends || asksToClose()) {
+        glfwSetWindowShouldClose(window_, GLFW_TRUE);
+        return;
+    }
+    closing_ = Clock::now();
+}
+
 std::string Controls::caption() const
 {
+    if (asksToClose())
+        return tr("Q or Esc again ends the session");
     if (playback_ != nullptr) {
         const Playback& p = *playback_;
         const std::string how = p.paused ? tr("PAUSED") : said(tr("REPLAY x {:Lg}"), p.speed.load());

@@ -93,6 +93,8 @@ private:
     bool onUltrasound() const;
     void camera(unsigned long event);
     void showHelp();
+    void close();
+    bool asksToClose() const;
     std::string caption() const;
 
     GLFWwindow* window_;
@@ -107,6 +109,8 @@ private:
     bool steps_ = true;       // are told in words
     bool leftHanded_ = false;
     std::optional<Tryout> tryout_;
+    std::optional<Clock::time_point>
+        closing_;  // when the key that closes was pressed, and ended a session if pressed again
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture
 };

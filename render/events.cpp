@@ -28,6 +28,8 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
                                                : EventKind::touching);
     if (now.cores > before.cores)
         add(EventKind::fired);
+    if (now.marks > before.marks)
+        events.push_back({now.time, EventKind::marked, now.marks, 0});
     if (now.status != before.status && now.status != Status::running)
         add(now.status == Status::faulted ? EventKind::fault : EventKind::finished);
     return events;
@@ -42,7 +44,7 @@ std::string words(const Event& event, const channel::Scenery& scenery)
         base::spokenHere(text(scenery.structure[std::min<std::size_t>(event.structure, channel::maxStructures - 1)]));
     switch (event.kind) {
         case EventKind::contact:
-            return tr("touches the skin");
+            return tr("touches the body");
         case EventKind::inserted:
             return tr("goes in");
         case EventKind::out:
@@ -55,6 +57,8 @@ std::string words(const Event& event, const channel::Scenery& scenery)
             return said(tr("touching {}"), structure);
         case EventKind::fired:
             return said(tr("core: {:.0f} % target"), 100 * event.target);
+        case EventKind::marked:
+            return said(tr("mark {}"), event.structure);
         case EventKind::fault:
             return tr("FAULT: forces off");
         case EventKind::finished:

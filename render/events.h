@@ -8,13 +8,13 @@
 
 namespace palpate::render {
 
-enum class EventKind : std::uint8_t { contact, inserted, out, near, veryNear, touching, fired, fault, finished };
+enum class EventKind : std::uint8_t { contact, inserted, out, near, veryNear, touching, fired, marked, fault, finished };
 
 /// Something that a trainee or an instructor wants to find again.
 struct Event {
     double time = 0;  // of the session [s]
     EventKind kind = EventKind::contact;
-    std::uint32_t structure = 0;  // that a warning is about
+    std::uint32_t structure = 0;  // that a warning is about; marked: number of the mark
     double target = 0;            // fired: fraction of target tissue
 };
 

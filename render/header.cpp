@@ -15,6 +15,8 @@ using base::said;
 using base::spokenHere;
 using base::tr;
 
+constexpr double helpBelow = 0.84;  // of the height: title, caption and warning stand above
+constexpr double helpLine = 1.27;   // height of a line, in fonts
 constexpr Colour cardColour{0.05, 0.06, 0.09};
 constexpr double edge = 0.8;    // of a text from its area, in fonts
 constexpr double boxGap = 0.3;  // between boxes, in fonts
@@ -128,6 +130,43 @@ void leaveOut(std::vector<Part>& parts, const Column& column, double floor)
             else
                 room -= high;
         }
+}
+
+// Where the keys are listed, and how.
+struct HelpTable {
+    double font = 0, from = 0, width = 0;  // width: of a column
+    double keys = 0;                       // width of the keys' names
+    double low = 0, room = 0;              // upright
+    std::size_t columns = 1;
+    bool inBody = true;  // else over the whole window
+};
+
+// In the body's part of the window, else over all of it, else there in two columns; smaller where none has room.
+HelpTable helpTable(const Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys)
+{
+    constexpr double smallest = 4;  // [pixels]
+    HelpTable table;
+    for (table.font = std::round(plan.font); table.font > smallest; table.font -= 1) {
+        table.keys = 0;
+        for (const KeyHelp& key : keys)
+            table.keys = std::max(table.keys, canvas.widthOf(key.key, table.font, true));
+        for (const auto& [inBody, columns] : {std::pair{true, 1U}, {false, 1U}, {false, 2U}}) {
+            table.inBody = inBody;
+            table.columns = columns;
+            table.from = inBody ? plan.banner.x : 0;
+            table.width = (inBody ? plan.banner.width : plan.width) / static_cast<double>(columns);
+            table.low = inBody && plan.health.x == plan.banner.x ? plan.health.height : 0;
+            table.room = helpBelow * plan.height - table.low;
+            const double text = table.width - table.keys - 2.5 * table.font;
+            double lines = columns;
+            for (const KeyHelp& key : keys)
+                lines += text > 8 * table.font ? std::ceil(1.1 * canvas.widthOf(key.what, table.font, false) / text)
+                                               : plan.height;
+            if ((std::ceil(lines / columns) + 2) * helpLine * table.font <= table.room)
+                return table;
+        }
+    }
+    return table;
 }
 
 }  // namespace
@@ -245,28 +284,36 @@ void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result
         canvas.text({x + font, y -= 1.45 * line.size}, line.words, line.size, line.colour, Align::left, line.bold);
 }
 
-void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys)
+bool drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys)
 {
-    constexpr double below = 0.84;  // of the height: title, caption and warning stand above
-    double font = plan.font, widestKey = 0, widest = 0;
+    const HelpTable table = helpTable(canvas, plan, keys);
+    const double font = table.font, row = helpLine * font, text = table.width - table.keys - 2.5 * font;
+    std::vector<std::vector<std::string>> words;
+    std::size_t lines = 0;
     for (const KeyHelp& key : keys) {
-        widestKey = std::max(widestKey, canvas.widthOf(key.key, font, true));
-        widest = std::max(widest, canvas.widthOf(key.what, font, false));
+        words.push_back(wrapped(canvas, key.what, font, false, text));
+        lines += words.back().size();
     }
-    // Over the whole window where the body's part of it is too narrow, and smaller where that is too.
-    const double all = widestKey + widest + 3.5 * font, rows = static_cast<double>(keys.size()) + 1;
-    const bool inBody = all < 0.98 * plan.banner.width;
-    const double from = inBody ? plan.banner.x : 0, room = 0.98 * (inBody ? plan.banner.width : plan.width);
-    const double scale = std::min({1.0, room / all, below * plan.height / (rows * lineHeight * font)});
-    font *= scale;
-    const double row = lineHeight * font, high = row * rows, y = 0.5 * (below * plan.height - high);
-    canvas.rectangle({from + 0.5 * font, y}, {all * scale, high}, cardColour, 0.95);
-    double line = y + high - 0.5 * font;
-    for (const KeyHelp& key : keys) {
-        line -= row;
-        canvas.text({from + 1.5 * font, line + 0.2 * font}, key.key, font, amber, Align::left, true);
-        canvas.text({from + 2.5 * font + widestKey * scale, line + 0.2 * font}, key.what, font, white);
+    // A key and its words stay together.
+    const std::size_t high = (lines + table.columns - 1) / table.columns + (table.columns > 1 ? 1 : 0);
+    const double top = table.low + 0.5 * (table.room + row * (static_cast<double>(high) + 1));
+    canvas.rectangle({table.from, top - row * (static_cast<double>(high) + 1)},
+                     {table.width * static_cast<double>(table.columns), row * (static_cast<double>(high) + 1)}, cardColour,
+                     0.95);
+    double x = table.from + font, y = top - 0.5 * font;
+    std::size_t used = 0;
+    for (std::size_t k = 0; k < keys.size(); ++k) {
+        if (used + words[k].size() > high) {
+            x += table.width;
+            y = top - 0.5 * font;
+            used = 0;
+        }
+        used += words[k].size();
+        canvas.text({x, y - row + 0.2 * font}, keys[k].key, font, amber, Align::left, true);
+        for (const std::string& line : words[k])
+            canvas.text({x + table.keys + 0.8 * font, (y -= row) + 0.2 * font}, line, font, white);
     }
+    return !table.inBody;
 }
 
 }  // namespace palpate::render

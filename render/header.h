@@ -41,6 +41,7 @@ HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::S
 void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words, const std::string& smaller);
 /// In the place of a notice when the session is over.
 void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result, const std::string& smaller);
-void drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys);
+/// Lists keys. Returns whether that takes the whole window, below title, caption and warning: nothing else has room there.
+bool drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> keys);
 
 }  // namespace palpate::render

@@ -46,6 +46,8 @@ std::string fileWords(const Event& event, const channel::Name& structure)
                 return "touching" + about;
             case EventKind::fired:
                 return "fired";
+            case EventKind::marked:
+                return "mark";
             case EventKind::fault:
                 return "fault";
             case EventKind::finished:

@@ -145,7 +145,7 @@ std::string phaseWords(const channel::State& state)
 {
     switch (state.phase) {
         case channel::Phase::contact:
-            return tr("touching the skin");
+            return tr("touching the body");
         case channel::Phase::inserted:
             return said(tr("inserted {:.1Lf} mm"), state.inserted * 1e3);
         case channel::Phase::free:
@@ -187,6 +187,8 @@ std::vector<Entry> legendEntries(const channel::Scenery& scenery, const Legend& 
         entries.push_back({trailColour, tr("way of the tip")});
         entries.push_back({coreColour, tr("core taken")});
     }
+    if (legend.marks)
+        entries.push_back({markColour, tr("place marked")});
     if (legend.ghost)
         entries.push_back({ghostColour, tr("the expert's")});
     for (std::size_t s = 1; s < std::min<std::size_t>(scenery.structures, channel::maxStructures); ++s)

@@ -32,6 +32,7 @@ struct Legend {
     float factor = 1;  // of its opacity
     Palette palette = Palette::standard;
     bool ghost = false;  // another session's tool is shown
+    bool marks = false;  // places are marked
     double below = 1e9;  // of what stands above it [pixels from the lower edge]
 };
 

@@ -264,10 +264,10 @@ void Picture::render(Quality quality)
         session_->volume.prepare(quality, software_.value_or(true), static_cast<double>(view.width) * view.height);
         drawSlices(plan, quality == Quality::moving && software_.value_or(true) ? 2 : 1);
         const Area& around = layout_ == Layout::trainee ? plan.title : plan.ultrasound;
-        if (!plan.ultrasound.empty() && ctShown())
+        if (!plan.ultrasound.empty() && ctShown() && help_.empty())
             ct_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still);
-        else if (!plan.ultrasound.empty())
-            ultrasound_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still);
+        else if (!plan.ultrasound.empty() && !ctShown())
+            ultrasound_.draw(canvas_, plan.ultrasound, around, plan.font, quality == Quality::still, help_.empty());
         drawFlat(plan);
     }
     if (result_ && session_)
@@ -358,14 +358,15 @@ void Picture::drawFlat(const ScreenPlan& plan)
     step_ = {};
     if (layout_ == Layout::body)
         return;
-    drawFigures(canvas_, plan, s.scenery, s.state, s.health, !concealed_.tissues.empty());
-    drawEvents(canvas_, plan, s.scenery, s.history.events);
-    if (!plan.forces.empty())
+    const bool covered = !help_.empty() && drawHelp(canvas_, plan, help_);
+    if (!covered) {
+        drawFigures(canvas_, plan, s.scenery, s.state, s.health, !concealed_.tissues.empty());
+        drawEvents(canvas_, plan, s.scenery, s.history.events);
+    }
+    if (!plan.forces.empty() && help_.empty())
         drawForceTraces(canvas_, plan.forces, plan.font, s.scenery, s.history);
-    if (!plan.distances.empty())
+    if (!plan.distances.empty() && help_.empty())
         drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
-    if (!help_.empty())
-        drawHelp(canvas_, plan, help_);
     const bool apart = !plan.events.empty(), free = words_.empty() && help_.empty();
     double below = plan.height;
     if (s.known) {
@@ -379,14 +380,14 @@ void Picture::drawFlat(const ScreenPlan& plan)
         below = places.bottom;
     }
     const bool grey = look_ != SliceLook::tissue && hasImage();
-    for (const SlicePicture& slice : slices_)
+    for (const SlicePicture& slice : covered ? std::span<const SlicePicture>() : std::span<const SlicePicture>(slices_))
         slice.label(canvas_, grey ? &s.grey : nullptr, plan.font, !apart ? plan.height : free ? below : 0);
     // Where the legend has a place of its own help and notices do not cover it.
-    if (!plan.legend.empty() && (apart || free)) {
+    if (!plan.legend.empty() && (apart || free) && !covered) {
         const int row = s.chosen > 0 ? s.legend[s.chosen - 1] : -1;
         const float factor = row > 0 ? s.factor[static_cast<std::size_t>(row)] : 1;
         drawLegend(canvas_, plan, s.scenery,
-                   {s.legend, row, factor, palette_, !ghost_.empty(), apart ? plan.height : below});
+                   {s.legend, row, factor, palette_, !ghost_.empty(), s.state.marks > 0, apart ? plan.height : below});
     }
 }
 
@@ -403,6 +404,8 @@ Header Picture::header() const
     CoachView view = coached_;
     view.aim = s.aim();
     view.planned = !concealed_.any();
+    view.marks = std::max(view.marks, s.state.marks);  // of a device and a record as well
+    view.outOfSight = !shows(vec(s.state.tip));
     view.targetHidden = !concealed_.tissues.empty();
     header.coaching = coach(s.scenery, s.state, view);
     return header;
@@ -485,22 +488,6 @@ void Picture::setTimeline(double fraction)
 void Picture::setDisplayScale(double scale)
 {
     scale_ = std::max(scale, 1.0);
-}
-
-glm::dvec3 Picture::under(Point2 pixel, glm::dvec3 point) const
-{
-    vtkCamera& camera = *view_->GetActiveCamera();
-    const auto triple = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
-    const glm::dvec3 eye = triple(camera.GetPosition()), ahead = triple(camera.GetDirectionOfProjection());
-    const glm::dvec3 right = glm::normalize(glm::cross(ahead, triple(camera.GetViewUp()))), up = glm::cross(right, ahead);
-    const double* port = view_->GetViewport();
-    const int* size = window_.GetSize();
-    const double left = port[0] * size[0], bottom = port[1] * size[1];
-    const double width = std::max(port[2] * size[0] - left, 1.0), height = std::max(port[3] * size[1] - bottom, 1.0);
-    const double slope = std::tan(0.5 * camera.GetViewAngle() / 180.0 * std::acos(-1.0)) / (0.5 * height);
-    const glm::dvec3 ray =
-        ahead + slope * ((pixel[0] - left - 0.5 * width) * right + (pixel[1] - bottom - 0.5 * height) * up);
-    return (eye + glm::dot(point * mm - eye, ahead) * ray) / mm;
 }
 
 std::string Picture::display()

@@ -110,6 +110,9 @@ public:
     /// camera.
     glm::dvec3 under(Point2 pixel, glm::dvec3 point) const;
 
+    /// Whether the 3-D view has `point` [m] in it, hidden by the body or not.
+    bool shows(glm::dvec3 point) const;
+
     /// The words of the picture, and where they are.
     std::vector<Written> written() const { return canvas_.written(); }
     /// The renderer's name, as the driver tells it.

@@ -31,6 +31,7 @@ std::optional<ResultCard> readResult(const std::filesystem::path& file)
         return std::nullopt;
     try {
         constexpr std::size_t most = 3;
+        constexpr double least = 0.5;  // as haptics::toldPoints: less would contradict a total without decimals
         const auto& score = figures.at("score");
         ResultCard card;
         card.total = score.at("total").get<double>();
@@ -39,8 +40,10 @@ std::optional<ResultCard> readResult(const std::filesystem::path& file)
               {"vital", marked("Vital structures"), 25},
               {"technique", marked("Technique"), 25}})
             card.parts.push_back(said(tr("{} {:.0f} of {}"), tr(name), score.at("points").at(key).get<double>(), points));
+        if (figures.value("contacts", 1) == 0)
+            card.losses.emplace_back(tr("The tool never touched the body: this session does not count."));
         for (const auto& loss : score.value("losses", nlohmann::json::array()))
-            if (card.losses.size() < most)
+            if (card.losses.size() < most && loss.at("points").get<double>() > least)
                 card.losses.push_back(
                     fmt::format("-{:.0f}   {}", loss.at("points").get<double>(), loss.at("words").get<std::string>()));
         return card;

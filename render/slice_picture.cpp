@@ -250,7 +250,22 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
             canvas.line(core->first, core->second, 0.4 * font, coreColour);
         }
     }
+    drawMarks(canvas, scenery, state, font);
     drawTool(canvas, scenery, state);
+}
+
+// Those near the slice.
+void SlicePicture::drawMarks(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state,
+                             double font) const
+{
+    constexpr double near = 5e-3;  // [m]
+    for (std::size_t i = 0; i < std::min<std::size_t>(state.marks, channel::maxMarks); ++i) {
+        const glm::dvec3 place = markedPlace(scenery, state.mark[i]);
+        if (std::abs(glm::dot(place - frame_.centre, frame_.towards)) > near || !inside(pixel(place), area_))
+            continue;
+        canvas.ring(pixel(place), 0.4 * font, 0.36 * font, {0, 0, 0});
+        canvas.ring(pixel(place), 0.4 * font, 0.2 * font, markColour);
+    }
 }
 
 void SlicePicture::label(Canvas& canvas, const GreyImage* grey, double font, double below) const

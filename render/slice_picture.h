@@ -48,6 +48,7 @@ public:
 
 private:
     Point2 pixel(glm::dvec3 p) const;
+    void drawMarks(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const;
     void drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const;
     void drawWindow(Canvas& canvas, const GreyImage& grey, double font, double above, double below) const;
 

@@ -26,6 +26,7 @@ namespace {
 
 using units::mm;
 constexpr int facets = 24;
+constexpr double pinLength = 9e-3;  // of a mark, out of the body [m]
 
 void paint(vtkActor& actor, const std::array<double, 3>& colour)
 {
@@ -154,6 +155,14 @@ void showTube(vtkRenderer& renderer, vtkPolyData& line, double radius, int sides
 
 }  // namespace
 
+// A fingertip's pose is that of the middle of its round end.
+glm::dvec3 markedPlace(const channel::Scenery& scenery, const channel::Mark& mark)
+{
+    const double front = scenery.tool == channel::ToolKind::needle ? 0 : scenery.toolRadius;
+    return glm::dvec3(mark.place[0], mark.place[1], mark.place[2]) +
+           front * glm::dvec3(mark.axis[0], mark.axis[1], mark.axis[2]);
+}
+
 ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
     : turns_(scenery.tool != channel::ToolKind::sphere)
 {
@@ -171,6 +180,12 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
         }
         setLine(*thrown_, {});
         showTube(renderer, *thrown_, 0.7 * radius, facets, toolColour);
+    }
+    for (std::size_t i = 0; i < marks_.size(); ++i) {
+        setLine(*pins_[i], {});
+        showTube(renderer, *pins_[i], 0.4, 8, markColour);
+        show(renderer, *marks_[i], ball(1.5), markColour);
+        marks_[i]->SetVisibility(0);
     }
     constexpr double trail = 0.3;  // [mm]
     setLine(*trail_, {});
@@ -261,6 +276,21 @@ void ToolPicture::showCores(const channel::State& state, const Deformation& defo
     setLine(*thrown_, inner);
 }
 
+// A pin stands where the tool was: its point stays at the place when the tissue has come back, its head is seen.
+void ToolPicture::showMarks(const channel::Scenery& scenery, const channel::State& state)
+{
+    const auto count = std::min<std::size_t>(state.marks, channel::maxMarks);
+    for (std::size_t i = 0; i < marks_.size(); ++i) {
+        const auto& axis = state.mark[i].axis;
+        const glm::dvec3 place = markedPlace(scenery, state.mark[i]),
+                         head = place - pinLength * glm::dvec3(axis[0], axis[1], axis[2]);
+        const std::array pin{place, head};
+        setLine(*pins_[i], i < count ? std::span<const glm::dvec3>(pin) : std::span<const glm::dvec3>());
+        marks_[i]->SetVisibility(i < count ? 1 : 0);
+        marks_[i]->SetPosition(head.x * mm, head.y * mm, head.z * mm);
+    }
+}
+
 void ToolPicture::showGhost(const channel::Scenery& scenery, const Ghost& ghost, double time)
 {
     if (ghost.empty())
@@ -295,6 +325,7 @@ void ToolPicture::update(const channel::Scenery& scenery, const channel::State& 
 {
     const glm::dvec3 aim = deformation.seen(vec(scenery.aim));
     showCores(state, deformation);
+    showMarks(scenery, state);
     const glm::dvec3 tip = vec(state.tip) * mm, proxy = vec(state.proxy) * mm;
     aim_->SetPosition(aim.x * mm, aim.y * mm, aim.z * mm);
     leaveTrail(state);

@@ -20,7 +20,7 @@ constexpr double across = 5e-3, along = 8e-3;  // of the tip, that were meant [m
 constexpr std::array<const char*, steps> byMouse{
     marked("Hold the mouse button of your index finger, or press Enter: you hold the tool"),
     marked("Move the mouse, or press the arrows: the tip goes along in the plane of the picture"),
-    marked("Turn the wheel, or press Page down: the tool goes along itself. With Shift finer"),
+    marked("Turn the wheel forward, or press Page down: the tool goes along itself. With Shift finer"),
     marked("Go on until it touches the skin: your hand goes on, the tissue holds the tool back"),
     marked("Let go (Enter, where you took it by Enter): the force fades, the tool stays"),
     marked("Space or the other mouse button fires, S pauses, E ends, ? lists all keys. Try what you like")};

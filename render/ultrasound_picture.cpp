@@ -28,7 +28,7 @@ constexpr Colour caliperColour{0.2, 0.9, 1.0}, guideColour{0.3, 0.95, 0.4};
 
 const char* nameOf(const ultrasound::Transducer& t)
 {
-    return t.shape == ultrasound::ProbeShape::curved ? "curved" : "linear";
+    return t.shape == ultrasound::ProbeShape::curved ? base::tr("curved") : base::tr("linear");
 }
 
 }  // namespace
@@ -96,7 +96,7 @@ void UltrasoundPicture::convert(const ultrasound::BeamImage* image)
                     &pixels_.grey[static_cast<std::size_t>(y) * row], row);
 }
 
-void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact)
+void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact, bool told)
 {
     if (!scan_)
         return;
@@ -119,6 +119,8 @@ void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& aroun
                     font, grey, Align::centre);
         return;
     }
+    if (!told)
+        return;
     drawScale(canvas, *image, font);
     drawConsole(canvas, *image, font);
     if (guide_)
@@ -181,9 +183,9 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
         sliders += fmt::format(" {:+.0f}", slider);
     words("TGC" + sliders, grey);
     words(base::said(base::tr("gain {:+.0f} dB   range {:.0f} dB"), s.gain, s.dynamicRange), white);
-    words(fmt::format("{} {:.1f} MHz   {:.0f} mm   focus {:.0f} mm", nameOf(image.transducer),
-                      1e-6 * static_cast<double>(s.frequency), mm * static_cast<double>(s.depth),
-                      mm * static_cast<double>(s.focus)),
+    words(base::said(base::tr("{} {:.1Lf} MHz   {:.0f} mm   focus {:.0f} mm"), nameOf(image.transducer),
+                     1e-6 * static_cast<double>(s.frequency), mm * static_cast<double>(s.depth),
+                     mm * static_cast<double>(s.focus)),
           white);
     if (frozen_)
         words(base::said(base::tr("FROZEN   {} of {}   {:.2Lf} s"), cineAt_ + 1, cine_.size(),
@@ -232,7 +234,7 @@ void UltrasoundPicture::drawCalipers(Canvas& canvas, const ultrasound::BeamImage
         canvas.line(a, b, 1, caliperColour);
         const double length = mm * static_cast<double>(glm::distance(calipers_[i][0], calipers_[i][1]));
         const double y = area_.y + area_.height - (2.0 + static_cast<double>(i)) * lineHeight * font;
-        canvas.text({area_.x + 0.5 * font, y}, fmt::format("{}  {:.1f} mm", i + 1, length), font, caliperColour,
+        canvas.text({area_.x + 0.5 * font, y}, base::said("{}  {:.1Lf} mm", i + 1, length), font, caliperColour,
                     Align::left, true);
         canvas.text({b[0] + 6, b[1] + 4}, fmt::format("{}", i + 1), 0.9 * font, caliperColour);
     }

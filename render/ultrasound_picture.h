@@ -37,7 +37,8 @@ public:
     /// What there is to see now; `shape` is null when it is as before.
     void see(const channel::State& state, const channel::Displaced* shape);
     /// In `area`, and black in all of `around`, which holds it. `exact`: waits for the picture of what was seen last.
-    void draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact);
+    /// `told`: with its scale, settings and measures.
+    void draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact, bool told = true);
     void hide();
 
     /// `slider`: of Knob::tgc, from 0.

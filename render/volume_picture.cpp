@@ -3,11 +3,13 @@
 #include <base/units.h>
 #include <render/ray_shader.h>
 
+#include <GL/glew.h>
 #include <vtkCallbackCommand.h>
 #include <vtkCamera.h>
 #include <vtkCommand.h>
 #include <vtkMatrix4x4.h>
 #include <vtkOpenGLRenderWindow.h>
+#include <vtkOpenGLState.h>
 #include <vtkPiecewiseFunction.h>
 #include <vtkShaderProgram.h>
 #include <vtkShaderProperty.h>
@@ -110,6 +112,7 @@ VolumePicture::VolumePicture(const channel::Scenery& scenery, const Deformation&
     mapper_->SetAutoAdjustSampleDistances(0);
     volume_->SetMapper(mapper_);
     teachShader();
+    leaveWhole();
     renderer.AddVolume(volume_);
 }
 
@@ -181,6 +184,25 @@ void VolumePicture::teachShader()
         static_cast<VolumePicture*>(self)->setUniforms(*static_cast<vtkShaderProgram*>(program));
     });
     mapper_->AddObserver(vtkCommand::UpdateShaderEvent, tell);
+}
+
+// Where there are fewer rays than pixels, VTK draws them into a smaller picture that begins at its own corner, but lets the
+// window's scissors cut it where the view lies in the window: of a view that does not begin in the lower left corner hardly
+// a ray would be left. The view itself needs no scissors, since its viewport bounds it.
+void VolumePicture::leaveWhole()
+{
+    vtkNew<vtkCallbackCommand> cut;
+    cut->SetClientData(&renderer_);
+    cut->SetCallback([](vtkObject*, unsigned long event, void* renderer, void*) {
+        auto* window = vtkOpenGLRenderWindow::SafeDownCast(static_cast<vtkRenderer*>(renderer)->GetRenderWindow());
+        vtkOpenGLState& state = *window->GetState();
+        if (event == vtkCommand::VolumeMapperRenderStartEvent)
+            state.vtkglDisable(GL_SCISSOR_TEST);
+        else
+            state.vtkglEnable(GL_SCISSOR_TEST);
+    });
+    mapper_->AddObserver(vtkCommand::VolumeMapperRenderStartEvent, cut);
+    mapper_->AddObserver(vtkCommand::VolumeMapperRenderEndEvent, cut);
 }
 
 void VolumePicture::setUniforms(vtkShaderProgram& program)

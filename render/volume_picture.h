@@ -63,6 +63,7 @@ public:
 private:
     void computeLight(const channel::Scenery& scenery, const Deformation& deformation);
     void teachShader();
+    void leaveWhole();
     /// Rays so many pixels apart, with steps of so many millimetres.
     void setSteps(double pixels, double length);
     void setUniforms(vtkShaderProgram& program);

@@ -15,7 +15,7 @@ constexpr double depthBin = 0.5;          // [mm]
 constexpr double directionLength = 0.25;  // a change of direction shorter than this is noise [mm]
 constexpr double pathStep = 0.5;          // [mm]
 constexpr std::size_t markedEvents = 200;
-constexpr std::size_t maxEntries = 20;
+constexpr std::size_t maxEntries = 500;
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 TaskTime percentiles(std::vector<float>& seconds)
@@ -159,7 +159,7 @@ struct Collector {
             glm::distance(data.path.back().tip, point.tip) > pathStep) {
             data.path.push_back(point);
         }
-        if (r.phase != haptics::Phase::free && outside && data.entries.size() < maxEntries) {
+        if (r.phase != haptics::Phase::free && outside && ++data.entryCount <= maxEntries) {
             data.entries.push_back(point.tip);
         }
         outside = r.phase == haptics::Phase::free;

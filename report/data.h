@@ -75,8 +75,9 @@ struct ReportData {
     DepthProfile profile;
     std::vector<std::vector<double>>
         nearest;  // by bin of the profile: its depth, then the least distance to each structure, going in [mm]
-    std::vector<PathPoint> path;      // thinned out to steps of half a millimetre
-    std::vector<Vec3> entries;        // where the tip first touched the body on each way in [mm]
+    std::vector<PathPoint> path;  // thinned out to steps of half a millimetre
+    std::vector<Vec3> entries;    // where the tip first touched the body on each way in; the first 500 [mm]
+    std::uint64_t entryCount = 0;
     std::vector<Vec3> marks;          // where the trainee marked something [mm]
     std::vector<MarkedEvent> events;  // the first 200
     std::uint64_t eventCount = 0;

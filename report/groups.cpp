@@ -1,5 +1,6 @@
 #include <report/groups.h>
 
+#include <base/counted.h>
 #include <base/outputs.h>
 #include <report/html.h>
 
@@ -27,6 +28,21 @@ std::string colourOf(std::size_t group)
     return fmt::format("var(--c{})", group % 7);
 }
 
+// As printed; infinite stays so.
+std::vector<double> rounded(std::vector<double> values, const haptics::Measure& measure)
+{
+    const double unit = std::pow(10.0, decimalsOf(measure));
+    for (double& v : values) {
+        v = std::round(v * unit) / unit + 0.0;  // no negative zero
+    }
+    return values;
+}
+
+bool without(const std::vector<double>& values)
+{
+    return std::ranges::none_of(values, [](double v) { return std::isfinite(v); });
+}
+
 struct Range {
     double low = INFINITY, high = -INFINITY;
 };
@@ -35,7 +51,7 @@ Range rangeOf(const std::vector<ScoredGroup>& groups, const haptics::Measure& me
 {
     Range range;
     for (const ScoredGroup& g : groups) {
-        for (const double v : valuesOf(g, measure)) {
+        for (const double v : rounded(valuesOf(g, measure), measure)) {
             range.low = std::isfinite(v) ? std::min(range.low, v) : range.low;
             range.high = std::isfinite(v) ? std::max(range.high, v) : range.high;
         }
@@ -43,15 +59,18 @@ Range rangeOf(const std::vector<ScoredGroup>& groups, const haptics::Measure& me
     return range;
 }
 
-// Whether no session differs from another: also not in having no value.
+// Whether no session differs from another, as printed: also not in having no value.
 bool constant(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
 {
     std::vector<double> all;
+    std::size_t sessions = 0;
     for (const ScoredGroup& g : groups) {
-        const auto values = valuesOf(g, measure);
+        const auto values = rounded(valuesOf(g, measure), measure);
         all.insert(all.end(), values.begin(), values.end());
+        sessions += g.sessions.size();
     }
-    return std::ranges::all_of(all, [&](double v) { return v == all.front(); });
+    const bool same = std::ranges::all_of(all, [&](double v) { return v == all.front(); });
+    return same && (all.size() == sessions || all.empty() || std::isinf(all.front()));
 }
 
 // 1, 2 or 5 times a power of ten, so that a range has two to five steps.
@@ -62,9 +81,10 @@ double stepOf(double span)
     return part >= 4 ? ten : part >= 2 ? ten / 2 : ten / 5;
 }
 
-std::string axisBelow(const Range& range, double y, const auto& x)
+// @param finest  what the last printed digit stands for
+std::string axisBelow(const Range& range, double finest, double y, const auto& x)
 {
-    const double step = stepOf(std::max(range.high - range.low, 1e-9));
+    const double step = stepOf(std::max(range.high - range.low, finest));
     const int decimals = std::max(0, static_cast<int>(-std::floor(std::log10(step) + 1e-9)));
     std::string out = fmt::format("<line x1=\"{:.0f}\" y1=\"{:.1f}\" x2=\"{:.0f}\" y2=\"{:.1f}\" class=\"axis\"/>",
                                   nameWidth, y, plotWidth - right, y);
@@ -93,11 +113,15 @@ std::string strip(const std::vector<ScoredGroup>& groups, const haptics::Measure
                                   plotWidth, height + axisHeight, measure.label);
     double y = rowHeight / 2;
     for (std::size_t i = 0; i < groups.size(); ++i) {
-        const auto values = valuesOf(groups[i], measure);
-        const double first = x(quantile(values, 0.25)), last = x(quantile(values, 0.75)), middle = x(quantile(values, 0.5));
+        const auto values = rounded(valuesOf(groups[i], measure), measure);
         const std::string name = groups[i].name.size() > 14 ? groups[i].name.substr(0, 13) + "." : groups[i].name;
         out += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", nameWidth - 6, y + 4,
                            escape(name));
+        if (values.empty()) {
+            y += rowHeight;
+            continue;
+        }
+        const double first = x(quantile(values, 0.25)), last = x(quantile(values, 0.75)), middle = x(quantile(values, 0.5));
         out += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"12\" fill=\"{}\" opacity=\"0.25\"/>",
                            first, y - 6, std::max(1.0, last - first), colourOf(i));
         for (const double v : values) {
@@ -108,7 +132,7 @@ std::string strip(const std::vector<ScoredGroup>& groups, const haptics::Measure
                            y - 7);
         y += rowHeight;
     }
-    return out + axisBelow(range, height, x) + "</svg>";
+    return out + axisBelow(range, std::pow(10.0, -decimalsOf(measure)), height, x) + "</svg>";
 }
 
 std::string titleOf(const haptics::Measure& measure)
@@ -119,17 +143,18 @@ std::string titleOf(const haptics::Measure& measure)
 
 std::string row(const std::vector<ScoredGroup>& groups, const haptics::Measure& measure)
 {
-    const int decimals = measure.decimals + (measure.decimals == 0 ? 1 : 0);
+    const int decimals = decimalsOf(measure);
     std::string medians, deltas;
     for (std::size_t i = 0; i < groups.size(); ++i) {
         const auto values = valuesOf(groups[i], measure);
-        medians += fmt::format("<div><i style=\"background:{}\"></i>{}: {} ({} to {})</div>", colourOf(i),
-                               escape(groups[i].name), number(quantile(values, 0.5), decimals),
-                               number(quantile(values, 0.25), decimals), number(quantile(values, 0.75), decimals));
+        const auto at = [&](double fraction) { return number(quantile(values, fraction), decimals); };
+        medians += fmt::format("<div><i style=\"background:{}\"></i>{}: {}</div>", colourOf(i), escape(groups[i].name),
+                               without(values) ? "-" : fmt::format("{} ({} to {})", at(0.5), at(0.25), at(0.75)));
     }
     for (std::size_t b = 1; b < groups.size(); ++b) {
-        deltas += fmt::format("<div>over {}: {:+.2f}</div>", escape(groups[b].name),
-                              cliffsDelta(valuesOf(groups[0], measure), valuesOf(groups[b], measure)));
+        const auto delta = effectSize(groups[0], groups[b], measure);
+        deltas +=
+            fmt::format("<div>over {}: {}</div>", escape(groups[b].name), delta ? fmt::format("{:+.2f}", *delta) : "-");
     }
     return fmt::format("<tr><th>{}</th><td class=\"key\">{}</td><td>{}</td><td class=\"n\">{}</td></tr>", titleOf(measure),
                        medians, strip(groups, measure), deltas);
@@ -142,9 +167,16 @@ std::vector<double> valuesOf(const ScoredGroup& group, const haptics::Measure& m
     const auto column = static_cast<std::size_t>(&measure - haptics::measures().data());
     std::vector<double> values;
     for (const std::vector<double>& session : group.sessions) {
-        values.push_back(session[column]);
+        if (!std::isnan(session[column])) {
+            values.push_back(session[column]);
+        }
     }
     return values;
+}
+
+int decimalsOf(const haptics::Measure& measure) noexcept
+{
+    return std::max(measure.decimals, 1);
 }
 
 std::vector<double> rowOf(const haptics::Score& score)
@@ -158,6 +190,9 @@ std::vector<double> rowOf(const haptics::Score& score)
 
 double quantile(std::vector<double> values, double fraction)
 {
+    if (values.empty()) {
+        return NAN;
+    }
     std::ranges::sort(values);
     const double place = fraction * static_cast<double>(values.size() - 1);
     const auto below = static_cast<std::size_t>(place);
@@ -178,12 +213,19 @@ double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b)
     return above / static_cast<double>(a.size() * b.size());
 }
 
+std::optional<double> effectSize(const ScoredGroup& a, const ScoredGroup& b, const haptics::Measure& measure)
+{
+    const auto first = rounded(valuesOf(a, measure), measure), second = rounded(valuesOf(b, measure), measure);
+    const bool few = std::min(first.size(), second.size()) < 2;
+    return few || (without(first) && without(second)) ? std::nullopt : std::optional(cliffsDelta(first, second));
+}
+
 std::string groupsPart(const std::vector<ScoredGroup>& groups)
 {
     std::string names, same;
     for (std::size_t i = 0; i < groups.size(); ++i) {
-        names += fmt::format("<span><i style=\"background:{}\"></i>{} ({} sessions)</span>", colourOf(i),
-                             escape(groups[i].name), groups[i].sessions.size());
+        names += fmt::format("<span><i style=\"background:{}\"></i>{} ({})</span>", colourOf(i), escape(groups[i].name),
+                             base::counted(groups[i].sessions.size(), "session"));
     }
     std::string rows;
     for (const haptics::Measure& m : haptics::measures()) {
@@ -191,22 +233,24 @@ std::string groupsPart(const std::vector<ScoredGroup>& groups)
             rows += row(groups, m);
             continue;
         }
-        const double value = groups[0].sessions.empty() ? INFINITY : valuesOf(groups[0], m)[0];
+        const auto values = valuesOf(groups[0], m);
+        const double value = values.empty() ? INFINITY : values[0];
         same += fmt::format("{}{} {}", same.empty() ? "" : ", ", titleOf(m),
                             std::isfinite(value) ? number(value, m.decimals) : "without a value");
     }
-    std::string body = "<header><div><h1>Groups compared</h1><p class=\"key\">" + names +
-                       "</p><p>A dot is a session, the bar goes from the lower to the upper quartile, the line is the "
-                       "median; a dot beyond the "
-                       "axis has no value. Cliff's delta says how much more often a value of " +
-                       escape(groups[0].name) +
-                       " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 "
-                       "are small, medium and "
-                       "large.</p></div></header><section class=\"card\"><div class=\"scroll\"><table "
-                       "class=\"plain progress\"><thead><tr><th>Measure</th>"
-                       "<th>Median (quartiles)</th><th>Sessions</th><th class=\"n\">" +
-                       (groups.size() > 1 ? "Cliff's delta of " + escape(groups[0].name) : "") +
-                       "</th></tr></thead><tbody>" + rows + "</tbody></table></div>";
+    std::string body =
+        "<header><div><h1>Groups compared</h1><p class=\"key\">" + names +
+        "</p><p>A dot is a session, the bar goes from the lower to the upper quartile, the line is the "
+        "median; a dot beyond the "
+        "axis has no value. Cliff's delta says how much more often a value of " +
+        escape(groups[0].name) +
+        " lies above one of the other group than below it, from -1 to 1; by convention 0.15, 0.33 and 0.47 "
+        "are small, medium and large. It needs two sessions with a value in each group; values that are the "
+        "same as printed count as equal.</p></div></header><section class=\"card\"><div class=\"scroll\"><table "
+        "class=\"plain progress\"><thead><tr><th>Measure</th>"
+        "<th>Median (quartiles)</th><th>Sessions</th><th class=\"n\">" +
+        (groups.size() > 1 ? "Cliff's delta of " + escape(groups[0].name) : "") + "</th></tr></thead><tbody>" + rows +
+        "</tbody></table></div>";
     if (!same.empty()) {
         body += "<p class=\"note\">The same in all sessions: " + same + ".</p>";
     }

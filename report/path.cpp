@@ -148,11 +148,14 @@ std::string pathCard(const ReportData& d, const haptics::SessionInfo& info)
     const Frame frame = frameOf(d, target);
     std::string colour = info.structures.empty() ? "" : tissueColour(info.structures[0]);
     colour = colour.empty() ? tissueColour("idc_high_grade") : colour;
+    const std::string dots =
+        d.entryCount > d.entries.size() ? fmt::format(" (the first {} of {})", d.entries.size(), d.entryCount) : "";
     std::string out =
         "<section class=\"card\"><h2>Path of the tip</h2><p class=\"note\">Grey and dashed outside the body, red "
-        "inside; brown dots where the tip met the skin, the blue dashed line along the planned direction through the "
-        "target's "
-        "middle; dark bars are the notches at firing, dark dots the trainee's marks. The disc is a ball of the target's "
+        "inside; brown dots where the tip met the skin" +
+        dots +
+        ", the blue dashed line along the planned direction through the target's middle; dark bars are the notches at "
+        "firing, dark dots the trainee's marks. The disc is a ball of the target's "
         "volume "
         "where it lies at rest, in the viewer's colour.</p><div "
         "class=\"pictures\" style=\"grid-template-columns:repeat(auto-fit,minmax(220px,1fr))\">";

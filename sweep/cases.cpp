@@ -151,13 +151,6 @@ Procedure readProcedure(toml::table& root)
     return procedure;
 }
 
-// Errors of a text that nobody wrote have no place in a file.
-std::string withoutPlace(const std::string& error)
-{
-    const auto colon = error.find(": ");
-    return error.starts_with(':') && colon != std::string::npos ? error.substr(colon + 2) : error;
-}
-
 std::pair<datasets::Scene, Procedure> readCase(toml::table root)
 {
     try {
@@ -172,6 +165,12 @@ std::pair<datasets::Scene, Procedure> readCase(toml::table root)
 }
 
 }  // namespace
+
+std::string withoutPlace(const std::string& error)
+{
+    const auto colon = error.find(": ");
+    return error.starts_with(':') && colon != std::string::npos ? error.substr(colon + 2) : error;
+}
 
 std::string columnOf(std::string key)
 {

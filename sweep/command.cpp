@@ -67,7 +67,8 @@ void heedSignals()
 std::string duration(double seconds)
 {
     const auto s = static_cast<long>(seconds + 0.5);
-    return s < 120    ? fmt::format("{} s", s)
+    return s < 1      ? fmt::format("{:.1g} s", seconds)
+           : s < 120  ? fmt::format("{} s", s)
            : s < 7200 ? fmt::format("{} min", s / 60)
                       : fmt::format("{:.1f} h", seconds / 3600);
 }

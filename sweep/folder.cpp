@@ -177,7 +177,7 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         }
         plan_ = parsePlan(text.first, text.second, namedScene);
         base::checkOutputFolder(folder_);
-        fs::create_directories(folder_);
+        base::makeFolders(folder_);
     }
     if (hold) {
         lock_.emplace(folder_);
@@ -306,7 +306,7 @@ SweepRow runCase(CaseRunner& runner, const SweepFolder& folder, std::size_t inde
     } catch (const RecordFailed&) {
         throw;
     } catch (const std::exception& e) {
-        row.error = e.what();
+        row.error = withoutPlace(e.what());
         std::replace(row.error.begin(), row.error.end(), '\n', ' ');
     }
     row.seconds = cpuSeconds() - before;

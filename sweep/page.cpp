@@ -112,9 +112,9 @@ std::string body(const SweepPlan& plan, const std::vector<std::optional<SweepRow
            fmt::format(
                "<section class=\"card\"><h2>Response</h2><div class=\"choices\">{}{}{}</div><div id=\"curve\" "
                "class=\"chart\">"
-               "</div><p class=\"note\">Medians; the band holds the middle half of the cases at each value, over repeats "
-               "and "
-               "all other axes. Drag on the strip to look closer; a name in the legend hides its curve.</p></section>"
+               "</div><p class=\"note\">Medians; the band holds the middle half of the cases at each point, over repeats "
+               "and all other axes.<span id=\"bins\"></span> Drag on the strip to look closer; a name in the legend hides "
+               "its curve.</p></section>"
                "<section class=\"card\"><h2>Map</h2><div class=\"choices\">{}{}</div><div id=\"map\" class=\"chart\"></div>"
                "<p class=\"note\">Mean of the cases in each field, of the output chosen above; an axis "
                "with over twelve values is put into bins.</p></section>"

@@ -385,7 +385,7 @@ void probe(const SweepPlan& plan, const std::string& file)
                                       c.scene.tissueChanges);
             }
         } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("{}: case {}: {}", file, index, e.what()));
+            throw std::runtime_error(fmt::format("{}: case {}: {}", file, index, withoutPlace(e.what())));
         }
     }
 }

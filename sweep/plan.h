@@ -20,6 +20,8 @@ using KeyValue = std::variant<double, std::int64_t, bool, std::string>;
 std::string toText(const KeyValue& value);
 /// `key` as a column and a formula name it: letters, digits and _.
 std::string columnOf(std::string key);
+/// An error of a text that nobody wrote, without its place (":63: ") in a file.
+std::string withoutPlace(const std::string& error);
 
 /// What a sweep varies: one key of the scene, or a name for formulas alone.
 struct Axis {

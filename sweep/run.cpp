@@ -184,7 +184,7 @@ std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& fro
     }
     if (!fs::exists(folder / "plan.toml")) {
         const SweepFolder first(parts.front(), "", false);
-        fs::create_directories(folder / "cases");
+        base::makeFolders(folder / "cases");
         for (const char* const file : planFiles) {
             fs::copy_file(first.path() / file, folder / file, fs::copy_options::overwrite_existing);
         }

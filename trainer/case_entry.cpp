@@ -30,12 +30,15 @@ CaseEntry entryOf(const json& one)
     c.trains = fmt::format("{}", fmt::join(trains, ", "));
     const auto measures = one.at("measures").get<std::vector<std::string>>();
     c.palpation = std::ranges::find(measures, "mark_error_mm") != measures.end();
+    c.core = !c.palpation && std::ranges::none_of(measures, [](const std::string& measure) {
+        return measure == "rest_s" || measure == "tip_to_target_mm";
+    });
     c.steps.push_back(c.palpation ? tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
-                                       "hold the fingertip. The wheel, "
-                                       "or Page down, presses.")
+                                       "hold the fingertip. The wheel "
+                                       "forward, or Page down, presses.")
                                   : tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
-                                       "hold the needle. The wheel, "
-                                       "or Page down, moves it along itself by 1 mm; Space fires."));
+                                       "hold the needle. The wheel "
+                                       "forward, or Page down, pushes it in by 1 mm; Space fires."));
     for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
         c.steps.push_back(tr(step));
     }

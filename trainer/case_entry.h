@@ -17,6 +17,7 @@ struct CaseEntry {
     std::string trains;              // what it is good for, in a line
     std::vector<std::string> steps;  // of the briefing
     bool palpation = false;          // with a fingertip
+    bool core = true;                // else, and where it is no palpation, no core is asked for
     std::optional<double> best;      // points of the best session so far; nothing: not done yet
 };
 

@@ -434,7 +434,7 @@ bool Errands::look(State& state)
         Result result = readResult(state.files.figures);
         if (!result.problem.empty()) {
             const std::string said = impl_->session->message();
-            result.problem = said.empty() ? result.problem : said;
+            result.problem = said.empty() || result.untouched ? result.problem : said;
         } else {
             impl_->sink.keep(chosenCase(state), state.files, result);
         }

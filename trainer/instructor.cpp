@@ -90,6 +90,15 @@ bool differs(const ComparedMeasure& m)
     return false;
 }
 
+// Medians of counts lie between them: half a pass is not none.
+bool liesBetween(const Spread& s)
+{
+    constexpr double few = 10, near = 0.05;
+    return std::ranges::any_of(std::array{s.median, s.lower, s.upper}, [](double v) {
+        return std::isfinite(v) && std::abs(v) < few && std::abs(v - std::round(v)) > near;
+    });
+}
+
 }  // namespace
 
 std::vector<LiveSession> liveIn(const json& figures)
@@ -120,6 +129,9 @@ Comparison comparisonIn(const json& figures)
                           std::nullopt};
         for (const json& group : groups) {
             m.groups.push_back(spreadOf(group, key));
+        }
+        if (m.decimals == 0 && std::ranges::any_of(m.groups, liesBetween)) {
+            m.decimals = 1;
         }
         if (const auto effects = figures.find("effect_size"); effects != figures.end()) {
             m.effect = numberAt(*effects, key.c_str());

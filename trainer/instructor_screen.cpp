@@ -69,11 +69,12 @@ std::string titleOf(const State& state, const KeptSession& s)
 }
 
 // When it was, what it came to.
-std::string factsOf(const KeptSession& s)
+std::string factsOf(const Instructor& i, const KeptSession& s)
 {
     std::string line = s.started.substr(0, 10) + " " + s.started.substr(11, 5) + " UTC";
     line += s.total ? said(tr(", {:.0f} points"), *s.total) : "";
     line += s.rating > 0 ? said(tr(", rated {} of 5"), s.rating) : "";
+    line += hasDraft(i, s) ? tr(", note not kept yet") : "";
     return line;
 }
 
@@ -84,12 +85,12 @@ void drawKeptChoice(State& state)
     const auto& all = i.everybody.sessions;
     const auto nameOf = [&](const KeptSession& s) { return said("{}: {}", s.name, titleOf(state, s)); };
     ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
-    if (!ImGui::BeginCombo("##kept", preview(nameOf(all[i.chosen]) + ", " + factsOf(all[i.chosen])).c_str())) {
+    if (!ImGui::BeginCombo("##kept", preview(nameOf(all[i.chosen]) + ", " + factsOf(i, all[i.chosen])).c_str())) {
         return;
     }
     for (std::size_t n = 0; n < all.size(); ++n) {
         ImGui::PushID(static_cast<int>(n));
-        if (ImGui::Selectable((nameOf(all[n]) + ", " + factsOf(all[n])).c_str(), n == i.chosen)) {
+        if (ImGui::Selectable((nameOf(all[n]) + ", " + factsOf(i, all[n])).c_str(), n == i.chosen)) {
             chooseKept(state, n);
         }
         ImGui::PopID();
@@ -119,7 +120,7 @@ void drawKeptList(State& state)
         ImGui::BeginGroup();
         const float wide = ImGui::GetContentRegionAvail().x;
         ImGui::TextUnformatted(shortened(said("{}: {}", s.name, titleOf(state, s)), wide).c_str());
-        ImGui::TextColored(vec(i.chosen == n ? Rgb{1, 1, 1} : quiet), "%s", shortened(factsOf(s), wide).c_str());
+        ImGui::TextColored(vec(i.chosen == n ? Rgb{1, 1, 1} : quiet), "%s", shortened(factsOf(i, s), wide).c_str());
         ImGui::EndGroup();
         ImGui::SetCursorPos(next);
         ImGui::PopID();
@@ -152,7 +153,8 @@ Errand drawKept(State& state)
     ImGui::NewLine();
     words(tr("Note"));
     ImGui::InputTextMultiline("##note", &i.note, {ImGui::GetContentRegionAvail().x, 6 * ImGui::GetFontSize()});
-    const bool changed = i.note != s.note || i.rating != s.rating;
+    noteTyped(state);
+    const bool changed = hasDraft(i, s);
     ImGui::BeginDisabled(!changed);
     if (ImGui::Button(fitted(tr("Keep note and rating")).c_str())) {
         errand = Errand::keepNote;
@@ -240,8 +242,8 @@ std::string spreadInWords(const Spread& s, int decimals)
 void drawComparison(const Comparison& c)
 {
     const float em = ImGui::GetFontSize();
-    // In a small window the table rolls by itself.
-    const bool one = rollsAsOne();
+    // In a narrow window the table rolls by itself.
+    const bool one = rollsAsOne() || !roomForTwo();
     const ImGuiTableFlags flags = ImGuiTableFlags_RowBg | ImGuiTableFlags_SizingStretchProp |
                                   (one ? ImGuiTableFlags_ScrollX | ImGuiTableFlags_ScrollY : 0);
     if (!ImGui::BeginTable("compared", 5, flags, {0, one ? 9 * em : 0}, one ? 40 * em : 0)) {

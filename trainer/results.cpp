@@ -1,6 +1,7 @@
 #include <trainer/results.h>
 
 #include <base/said.h>
+#include <trainer/state.h>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -34,7 +35,7 @@ nlohmann::json parsed(const fs::path& file)
 // Those that tell beginners from experts (docs/score.md), and the rest on request: palpate score.
 void addMeasures(const nlohmann::json& score, const std::string& judged, Result& result)
 {
-    const bool noCore = judged == "rest" || judged == "way" || judged == "nothing";
+    const bool noCore = judged != "core" && score.value("passes", 0.0) == 0;
     constexpr std::array shown{std::tuple{"targeting_error_mm", marked("Targeting error"), "mm", 1},
                                std::tuple{"best_target_pct", marked("Target in the best core"), "%", 0},
                                std::tuple{"best_target_length_mm", marked("Length in the target"), "mm", 1},
@@ -78,6 +79,17 @@ const char* nameOfPart(const std::string& judged)
                               : marked("Touch");
 }
 
+// Where a session left no figures, its record may be there: also of one that was killed.
+std::string whyNoScore(const fs::path& figures)
+{
+    const std::string record = fs::path(figures).replace_extension(".db").string();
+    if (std::error_code none; fs::exists(figures, none) || !fs::exists(record, none)) {
+        return figures.string() + tr(": has no score: the session did not come to its end");
+    }
+    return said(tr("The session was cut off. Its record is kept: '{}' shows it, and '{}' gives its score."),
+                asTyped("palpate-view", {"--replay", record}), asTyped("palpate", {"score", record}));
+}
+
 }  // namespace
 
 Result readResult(const fs::path& figures)
@@ -94,6 +106,10 @@ Result readResult(const fs::path& figures)
             result.parts.push_back({tr(name), score.at("points").at(key).get<double>(), most});
         }
         for (const auto& loss : score.value("losses", nlohmann::json::array())) {
+            // As haptics::toldPoints: less would contradict a total without decimals.
+            if (loss.at("points").get<double>() <= 0.5) {
+                continue;
+            }
             LossOfPoints lost{loss.at("points").get<double>(), loss.at("words").get<std::string>(), std::nullopt};
             if (const auto at = loss.find("at_s"); at != loss.end() && at->is_number()) {
                 lost.at = at->get<double>();
@@ -101,9 +117,14 @@ Result readResult(const fs::path& figures)
             result.losses.push_back(std::move(lost));
         }
         addMeasures(score, judged, result);
+        if (json.value("contacts", 1) == 0) {
+            result = {};
+            result.untouched = true;
+            result.problem = tr("The tool never touched the body: this session does not count.");
+        }
     } catch (const nlohmann::json::exception&) {
         result = {};
-        result.problem = figures.string() + tr(": has no score: the session did not come to its end");
+        result.problem = whyNoScore(figures);
     }
     return result;
 }

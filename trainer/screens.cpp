@@ -22,8 +22,8 @@ constexpr float titleScale = 1.15F;
 
 std::string factsOf(const CaseEntry& c)
 {
-    return said(tr("{}, difficulty {} of 5 ({});  {}"), c.palpation ? tr("Palpation") : tr("Core biopsy"), c.difficulty,
-                difficultyInWords(c.difficulty),
+    const char* const kind = c.palpation ? tr("Palpation") : c.core ? tr("Core biopsy") : tr("Guiding the needle");
+    return said(tr("{}, difficulty {} of 5 ({});  {}"), kind, c.difficulty, difficultyInWords(c.difficulty),
                 c.best ? said(tr("best so far {:.0f} of 100"), *c.best) : tr("not done yet"));
 }
 
@@ -199,7 +199,8 @@ Errand drawDevices(State& state)
         words(
             tr("With the mouse: hold the button of your index finger to take the tool; moving the mouse moves it in the "
                "plane of the picture, "
-               "the wheel along itself. By keys: Enter takes it and lets it go, arrows and pages move it. Let go, and the "
+               "the wheel along itself: forward pushes it in. By keys: Enter takes it and lets it go, arrows move it, Page "
+               "down pushes it in. Let go, and the "
                "force fades. Every key is listed by ? in the session."));
     }
     if (check.falconReady && state.gripReady) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <tuple>
 #include <utility>
 
 namespace palpate::trainer {
@@ -208,7 +209,30 @@ void chooseKept(State& state, std::size_t session)
         i.chosen = session;
         i.note = i.everybody.sessions[session].note;
         i.rating = i.everybody.sessions[session].rating;
+        const KeptSession& s = i.everybody.sessions[session];
+        if (const auto draft = i.drafts.find({s.name, s.number}); draft != i.drafts.end()) {
+            std::tie(i.note, i.rating) = draft->second;
+        }
     }
+}
+
+void noteTyped(State& state)
+{
+    Instructor& i = state.instructor;
+    if (i.chosen >= i.everybody.sessions.size()) {
+        return;
+    }
+    const KeptSession& s = i.everybody.sessions[i.chosen];
+    if (i.note != s.note || i.rating != s.rating) {
+        i.drafts[{s.name, s.number}] = {i.note, i.rating};
+    } else {
+        i.drafts.erase({s.name, s.number});
+    }
+}
+
+bool hasDraft(const Instructor& instructor, const KeptSession& session)
+{
+    return instructor.drafts.contains({session.name, session.number});
 }
 
 void sessionStarted(State& state, SessionFiles files, std::string command)

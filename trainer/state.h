@@ -6,7 +6,9 @@
 #include <trainer/settings.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -42,8 +44,9 @@ struct LossOfPoints {
 
 /// What a session came to, or why it did not.
 struct Result {
-    std::string problem;  // not empty: the session failed, and there is no score
-    double total = 0;     // of 100
+    std::string problem;     // not empty: the session failed, and there is no score
+    bool untouched = false;  // and that is why: the tool never touched the body
+    double total = 0;        // of 100
     std::vector<PartOfScore> parts;
     std::vector<LossOfPoints> losses;                           // the largest first
     std::vector<std::pair<std::string, std::string>> measures;  // label, value with unit
@@ -60,11 +63,13 @@ enum class InstructorPage { live, sessions, groups };
 struct Instructor {
     InstructorPage page = InstructorPage::live;
     std::vector<LiveSession> live;
-    std::string watched;       // a session that a viewer is to be opened on
-    Progress everybody;        // sessions of all profiles
-    std::size_t chosen = 0;    // of everybody.sessions
-    std::string note;          // of the chosen one, as it is typed
-    int rating = 0;            // 1 to 5; 0: none
+    std::string watched;     // a session that a viewer is to be opened on
+    Progress everybody;      // sessions of all profiles
+    std::size_t chosen = 0;  // of everybody.sessions
+    std::string note;        // of the chosen one, as it is typed
+    int rating = 0;          // 1 to 5; 0: none
+    // Notes and ratings that were typed and not kept yet, by name and number of their session.
+    std::map<std::pair<std::string, std::int64_t>, std::pair<std::string, int>> drafts;
     std::vector<int> groupOf;  // by profile, as in State::people: 0 in none, 1 or 2
     std::string caseId;        // only sessions of this case are compared; empty: all
     bool asPage = false;       // the comparison is wanted as a page, too
@@ -148,8 +153,13 @@ Errand showProgress(State& state);
 /// Progress screen: an exercise, with its case, begins. Nothing for one whose gate is shut.
 Errand trainExercise(State& state, std::size_t exercise);
 Errand showInstructor(State& state);
-/// Instructor's screen: a session that was kept, its note and rating.
+/// Instructor's screen: a session that was kept, its note and rating, or what was typed in their place and not kept yet.
 void chooseKept(State& state, std::size_t session);
+/// Instructor's screen: note or rating of the chosen session may have changed. Until it is kept it stays, whatever else is
+/// chosen.
+void noteTyped(State& state);
+/// Whether something that was typed for this session is not kept yet.
+bool hasDraft(const Instructor& instructor, const KeptSession& session);
 /// What `palpate progress` has learnt of the person.
 void progressLoaded(State& state, Progress progress);
 /// Null where nobody is chosen.

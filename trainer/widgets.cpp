@@ -173,7 +173,7 @@ Errand drawSettings(State& state)
     choice("Deutsch", s.language, "de");
     ImGui::TextUnformatted(tr("Colours of tissues"));
     choice(tr("as in the body"), s.palette, "standard");
-    one ? void() : ImGui::SameLine();
+    one ? void() : besideIfRoom(std::string(tr("safe for colour blindness, with patterns in slices")) + "     ");
     choice(tr("safe for colour blindness, with patterns in slices"), s.palette, "colour-blind");
     changed = ImGui::Checkbox(tr("Sounds for warnings"), &s.sounds) || changed;
     ImGui::TextUnformatted(tr("Size of texts"));

@@ -59,4 +59,11 @@ std::vector<fs::path> entriesOf(const char* kind, const std::function<bool(const
     return all;
 }
 
+std::string nothingThere(const char* kind)
+{
+    const char* const named = std::getenv("PALPATE_DATA");
+    return (installedData() / kind).string() + ": there are no " + kind + " here: install the package palpate-data" +
+           (named != nullptr && *named != 0 ? ", or correct PALPATE_DATA, which names this folder" : "");
+}
+
 }  // namespace palpate::training

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <vector>
 
 namespace palpate::training {
@@ -19,5 +20,8 @@ std::vector<std::filesystem::path> dataFolders(const char* kind);
 /// What lies in these folders and is wanted, one of each name: the user's hides one of the same name that came along.
 std::vector<std::filesystem::path> entriesOf(const char* kind,
                                              const std::function<bool(const std::filesystem::path&)>& wanted);
+
+/// What to say where a list of them is empty: where was looked, and which package has them.
+std::string nothingThere(const char* kind);
 
 }  // namespace palpate::training

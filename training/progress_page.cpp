@@ -1,5 +1,6 @@
 #include <training/progress_page.h>
 
+#include <base/counted.h>
 #include <base/outputs.h>
 #include <haptics/measures.h>
 #include <report/html.h>
@@ -195,9 +196,9 @@ std::string exerciseCard(const ExerciseProgress& e, const CusumPlan& plan, json&
         }
     }
     std::string out = fmt::format(
-        "<section class=\"card\"><h2>{}</h2><p class=\"note\">{} sessions, {} at the level.</p>"
+        "<section class=\"card\"><h2>{}</h2><p class=\"note\">{}, {} at the level.</p>"
         "<div class=\"charts\">",
-        escape(e.exercise->title), e.sessions.size(), std::ranges::count(e.met, true));
+        escape(e.exercise->title), base::counted(e.sessions.size(), "session"), std::ranges::count(e.met, true));
     const auto place = [&](json chart, std::string_view title) {
         const std::string id = fmt::format("chart{}", charts.size());
         charts[id] = std::move(chart);
@@ -247,9 +248,9 @@ std::string freeCard(const PersonProgress& p)
 std::string personPart(const PersonProgress& p, json& charts)
 {
     std::string out =
-        fmt::format("<header><div><p class=\"eyebrow\">{} hand &middot; {} sessions since {}</p><h1>{}</h1></div></header>",
-                    p.person.hand == Hand::left ? "left" : "right", p.sessions.size(), p.person.created.substr(0, 10),
-                    escape(p.person.name));
+        fmt::format("<header><div><p class=\"eyebrow\">{} hand &middot; {} since {}</p><h1>{}</h1></div></header>",
+                    p.person.hand == Hand::left ? "left" : "right", base::counted(p.sessions.size(), "session"),
+                    p.person.created.substr(0, 10), escape(p.person.name));
     if (p.sessions.empty()) {
         out += "<section class=\"card\"><p>No sessions yet.</p></section>";
     }
@@ -270,7 +271,7 @@ std::vector<double> rowOf(const StoredSession& session)
     std::vector<double> row;
     for (const haptics::Measure& m : haptics::measures()) {
         const auto at = session.values.find(m.key);
-        row.push_back(at == session.values.end() ? std::numeric_limits<double>::infinity() : at->second);
+        row.push_back(at == session.values.end() ? std::numeric_limits<double>::quiet_NaN() : at->second);
     }
     return row;
 }

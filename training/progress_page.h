@@ -30,7 +30,8 @@ void writeProgressCsv(const std::filesystem::path& file, const std::vector<Perso
 /// Throws std::runtime_error.
 void writeXapi(const std::filesystem::path& file, const std::vector<PersonProgress>& people);
 
-/// A session's measures in the order of haptics::measures(), as groups compare them. What is missing is infinite.
+/// A session's measures in the order of haptics::measures(), as groups compare them. What is missing is not a
+/// number.
 std::vector<double> rowOf(const StoredSession& session);
 
 }  // namespace palpate::training

@@ -4,6 +4,7 @@
 #include <base/outputs.h>
 #include <haptics/measures.h>
 #include <haptics/record_format.h>
+#include <training/belongings.h>
 #include <training/folders.h>
 
 #include <fmt/chrono.h>
@@ -154,12 +155,6 @@ void checkLine(const std::string& what, const std::string& text, std::size_t mos
     }
 }
 
-bool isIn(const fs::path& file, const fs::path& folder)
-{
-    const fs::path relative = file.lexically_normal().lexically_relative(folder.lexically_normal());
-    return !relative.empty() && *relative.begin() != ".." && *relative.begin() != ".";
-}
-
 }  // namespace
 
 namespace {
@@ -214,9 +209,17 @@ fs::path ProfileStore::recordFolder() const
     return impl_->file.parent_path() / "records";
 }
 
+fs::path ProfileStore::windowFolder() const
+{
+    return impl_->file.parent_path() / "sessions";
+}
+
 Person ProfileStore::add(const std::string& name, Hand hand)
 {
     checkLine("profile '" + name + "'", name, 100);
+    if (name.front() == ' ' || name.back() == ' ') {
+        throw std::runtime_error("profile '" + name + "': must not begin or end with a blank");
+    }
     for (const Person& one : people()) {
         if (one.name == name) {
             throw std::runtime_error(name + ": there is a profile of this name already");
@@ -336,6 +339,22 @@ std::vector<StoredSession> ProfileStore::sessions(const Person& person) const
     });
 }
 
+std::set<fs::path> ProfileStore::recordsOf(const Person& person) const
+{
+    return guarded(impl_->file, [&] {
+        std::set<fs::path> files;
+        Statement select(*impl_->database, "SELECT DISTINCT record FROM session WHERE person = ? AND record != ''");
+        select.bind(1, person.id);
+        while (select.step()) {
+            std::error_code none;
+            const fs::path file(select.text(0));
+            const fs::path canonical = fs::weakly_canonical(file, none);
+            files.insert(none ? file : canonical);
+        }
+        return files;
+    });
+}
+
 void ProfileStore::annotate(const Person& person, std::int64_t session, const std::string& note, int rating)
 {
     guarded(impl_->file, [&] {
@@ -350,7 +369,7 @@ void ProfileStore::annotate(const Person& person, std::int64_t session, const st
         update.run();
         if (sqlite3_changes(impl_->database->get()) == 0) {
             throw std::runtime_error(
-                fmt::format("{} has no session {}: palpate progress lists them", person.name, session));
+                fmt::format("{} has no session {}: palpate progress '{}' lists them", person.name, session, person.name));
         }
     });
 }
@@ -387,10 +406,17 @@ nlohmann::json ProfileStore::exported(const Person& person) const
     return out;
 }
 
-std::vector<fs::path> ProfileStore::erase(const Person& person)
+Erased ProfileStore::erase(const Person& person)
 {
-    std::vector<fs::path> stay;
-    const auto known = sessions(person);
+    Belongings of{person.name, {recordFolder(), windowFolder()}, recordsOf(person), {}, {}};
+    for (const Person& other : people()) {
+        if (other.id != person.id) {
+            of.otherNames.insert(other.name);
+            of.ofOthers.merge(recordsOf(other));
+        }
+    }
+    // The files first: while the person is known, erasing can be done again.
+    Erased erased = removeBelongings(of);
     guarded(impl_->file, [&] {
         Transaction all(*impl_->database);
         Statement remove(*impl_->database, "DELETE FROM person WHERE id = ?");
@@ -400,15 +426,7 @@ std::vector<fs::path> ProfileStore::erase(const Person& person)
         // Overwritten in the file by secure_delete; now also out of the write-ahead log and the free pages.
         impl_->database->execute("PRAGMA wal_checkpoint(TRUNCATE); VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
     });
-    for (const StoredSession& s : known) {
-        std::error_code none;
-        if (!s.record.empty() && isIn(s.record, recordFolder())) {
-            fs::remove(s.record, none);
-        } else if (!s.record.empty() && fs::exists(s.record, none)) {
-            stay.emplace_back(s.record);
-        }
-    }
-    return stay;
+    return erased;
 }
 
 void ProfileStore::backup(const fs::path& to) const

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,14 @@ struct StoredSession {
     int rating = 0;            // global rating, 1 to 5; 0: none
 };
 
+/// What is left of somebody who was erased.
+struct Erased {
+    std::vector<std::filesystem::path> elsewhere;  // records in other folders
+    std::vector<std::filesystem::path> shared;     // of other people too
+    std::vector<std::filesystem::path> unclear;    // cannot be read: whose they are is not known
+    std::vector<std::filesystem::path> stuck;      // could not be removed
+};
+
 /// All measures of a score, as a store keeps them. Infinite ones stay; what is not a number is left out.
 Values valuesOf(const haptics::Score& score);
 
@@ -69,6 +78,8 @@ public:
     const std::filesystem::path& file() const noexcept;
     /// The folder "records" beside the file, where sessions of profiles keep their records.
     std::filesystem::path recordFolder() const;
+    /// The folder "sessions" beside the file, where the trainer's window keeps records and figures.
+    std::filesystem::path windowFolder() const;
 
     /// @param name  1 to 100 bytes of text in one line; none that is there
     Person add(const std::string& name, Hand hand);
@@ -87,17 +98,25 @@ public:
 
     /// Everything that is known of a person.
     nlohmann::json exported(const Person& person) const;
-    /// Removes a person, all sessions and notes, so that nothing of it is left in the file, and the records in
-    /// recordFolder(). @returns  records elsewhere, which stay
-    std::vector<std::filesystem::path> erase(const Person& person);
+    /// Removes a person, all sessions and notes, so that nothing of it is left in the file, and what recordFolder() and
+    /// windowFolder() hold of the person: records of its sessions and those whose operator it is, also of sessions that
+    /// were cut off, with their logs and figures.
+    Erased erase(const Person& person);
     /// A copy of the whole file as it is at one moment, also while sessions are stored. Appears whole, mode 0600; refuses a
     /// file that is there.
     void backup(const std::filesystem::path& to) const;
 
 private:
+    std::set<std::filesystem::path> recordsOf(const Person& person) const;
+
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
+
+/// Where the trainer's window keeps its settings, and who trained last.
+std::filesystem::path trainerSettings();
+/// Clears who trained last, where it is this person. Throws std::runtime_error.
+void forgetLastPerson(const std::filesystem::path& settings, const std::string& name);
 
 /// Takes in a session from its record, e.g. from another machine: measures computed from the ticks, what it was trained for
 /// from the record. Throws std::runtime_error where the person has it already, and for a record that was changed or not

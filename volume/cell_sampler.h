@@ -73,6 +73,19 @@ public:
         }
     }
 
+    // Calls visit(label, weight, factor()) as visit() does, in one call where a single label fills the cell.
+    template <typename Visit>
+    void visitScaled(Index3 n, const Visit& visit) const
+    {
+        if (!isScaled()) {
+            visitLabels(n, [&](std::uint16_t label, double weight) { visit(label, weight, 1.0); });
+            return;
+        }
+        this->visit(n, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel) {
+            visit(label, weight, factor(label, voxel));
+        });
+    }
+
     // Calls visit(label, weight), or visit(label, weight, voxel), for the voxels at node n; the weights add up to 1, less
     // what lies outside the volume. Or visit(label, weight, voxel, place), with the sample's place in the cell, -1 to 1.
     template <typename Visit>

@@ -49,9 +49,9 @@ struct Qform {
     double qfac = 1;
     glm::dquat rotation{1, 0, 0, 0};
 
-    explicit Qform(const RasAffine& affine, Vec3 spacing)
+    explicit Qform(const RasAffine& affine)
     {
-        Mat3 axes(affine.linear[0] / spacing.x, affine.linear[1] / spacing.y, affine.linear[2] / spacing.z);
+        Mat3 axes(glm::normalize(affine.linear[0]), glm::normalize(affine.linear[1]), glm::normalize(affine.linear[2]));
         const double skew = std::max({std::abs(glm::dot(axes[0], axes[1])), std::abs(glm::dot(axes[1], axes[2])),
                                       std::abs(glm::dot(axes[0], axes[2]))});
         fits = skew < 1e-6;
@@ -109,7 +109,7 @@ Bytes headerOf(const VoxelStream& voxels, int intent, std::size_t voxelStart)
     const Index3 size = voxels.grid.size;
     const Vec3 spacing = voxels.grid.affine.spacing();
     const RasAffine affine(voxels.grid.affine);
-    const Qform q(affine, spacing);
+    const Qform q(affine);
     const bool vectors = voxels.components > 1;
 
     Bytes h(V::bytes);

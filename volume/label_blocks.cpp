@@ -35,20 +35,13 @@ std::int32_t labelOfBlock(const openvdb::Int32Grid::ConstUnsafeAccessor& labels,
 }  // namespace
 
 LabelBlocks::LabelBlocks(const TissueData& tissue, const IndexBox& box)
-    : box_(box), first_(box.low / side), size_(box.high / side - first_ + 1)
+    : box_(box), first_(box.low / side), blocks_{box.high / side - first_ + 1, Vec3(0.0), 1.0}, labels_(blocks_.count())
 {
-    const auto row = static_cast<std::size_t>(size_.x);
-    const std::size_t rows = static_cast<std::size_t>(size_.y) * static_cast<std::size_t>(size_.z);
-    labels_.resize(row * rows);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rows), [&](const tbb::blocked_range<std::size_t>& some) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, labels_.size()), [&](const tbb::blocked_range<std::size_t>& some) {
         const auto labels = tissue.label->getConstUnsafeAccessor();
         for (std::size_t i = some.begin(); i != some.end(); ++i) {
-            const int y = static_cast<int>(i) % size_.y;
-            const int z = static_cast<int>(i) / size_.y;
-            for (int x = 0; x < size_.x; ++x) {
-                const Index3 low = side * (first_ + Index3(x, y, z));
-                labels_[row * i + static_cast<std::size_t>(x)] = labelOfBlock(labels, {low.x, low.y, low.z});
-            }
+            const Index3 low = side * (first_ + blocks_.node(i));
+            labels_[i] = labelOfBlock(labels, {low.x, low.y, low.z});
         }
     });
 }
@@ -59,16 +52,10 @@ int LabelBlocks::labelOf(const IndexBox& box) const noexcept
         return several;
     }
     const Index3 low = box.low / side - first_;
-    const Index3 high = box.high / side - first_;
-    const auto at = [this](int x, int y, int z) {
-        return labels_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(y)) *
-                           static_cast<std::size_t>(size_.x) +
-                       static_cast<std::size_t>(x)];
-    };
-    const Index3 count = high - low + 1;
-    const std::int32_t label = at(low.x, low.y, low.z);
-    for (int i = 1; i < count.x * count.y * count.z; ++i) {
-        if (at(low.x + i % count.x, low.y + i / count.x % count.y, low.z + i / count.x / count.y) != label) {
+    const NodeGrid around{box.high / side - first_ - low + 1, Vec3(0.0), 1.0};
+    const std::int32_t label = labels_[blocks_.offset(low)];
+    for (std::size_t i = 1; i < around.count(); ++i) {
+        if (labels_[blocks_.offset(low + around.node(i))] != label) {
             return several;
         }
     }

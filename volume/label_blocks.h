@@ -23,8 +23,8 @@ public:
 private:
     IndexBox box_;                      // voxels
     Index3 first_;                      // block
-    Index3 size_;                       // blocks
-    std::vector<std::int32_t> labels_;  // of each block, x fastest (blocks x 1)
+    NodeGrid blocks_;                   // from the first one on, in steps of one
+    std::vector<std::int32_t> labels_;  // of each block (blocks x 1)
 };
 
 }  // namespace palpate::volume

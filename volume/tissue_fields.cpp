@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <array>
@@ -224,20 +225,14 @@ double cellModulus(const CellSampler& sampler, Index3 n, const std::vector<doubl
     double weight = 0;
     double sum = 0;
     double inverse = 0;
-    const auto add = [&](double e, double w) {
+    sampler.visitScaled(n, [&](std::uint16_t label, double w, double factor) {
+        const double e = modulus[label] * factor;
         if (e > 0) {
             weight += w;
             sum += w * e;
             inverse += w / e;
         }
-    };
-    if (sampler.isScaled()) {
-        sampler.visit(n, [&](std::uint16_t label, double w, const openvdb::Coord& voxel) {
-            add(modulus[label] * sampler.factor(label, voxel), w);
-        });
-    } else {
-        sampler.visitLabels(n, [&](std::uint16_t label, double w) { add(modulus[label], w); });
-    }
+    });
     return weight > 0 ? std::sqrt(sum / inverse) : 0.0;
 }
 

@@ -19,11 +19,12 @@ function levels(a, most = mostValues, bins = most) {
   if (values.length <= most) return values.map((v) => ({ label: text(v), middle: v, holds: (x) => x === v }));
   const low = values[0], high = values[values.length - 1];
   const place = (t) => (axis.log ? low * (high / low) ** t : low + t * (high - low));
-  return Array.from({ length: bins }, (_, i) => {
+  const all = Array.from({ length: bins }, (_, i) => {
     const from = place(i / bins), to = place((i + 1) / bins), last = i + 1 === bins;
     const middle = place((i + 0.5) / bins);
     return { label: bins < most ? `${Number(from.toPrecision(3))} to ${Number(to.toPrecision(3))}` : text(middle), middle, holds: (x) => x >= from && (last || x < to) };
   });
+  return Object.assign(all, { binned: values.length });
 }
 
 function quantile(sorted, share) {
@@ -57,6 +58,27 @@ function curveOf(rows, a, o, steps) {
   }).filter(Boolean);
 }
 
+// How many rows a legend of these names takes in a chart of this width, as ECharts sets them.
+const mark = 30, gap = 10, edge = 10, row = 24, font = "12px system-ui, sans-serif"; // [px]
+const pen = document.createElement("canvas").getContext("2d");
+const legend = { names: [], rows: 1 };
+function rowsOfLegend(names, width) {
+  pen.font = font;
+  let rows = 1, x = edge;
+  for (const name of names) {
+    const wide = mark + Math.ceil(1.05 * pen.measureText(name).width) + gap; // 5 %: a font is not the same everywhere
+    if (x > edge && x + wide > width) [rows, x] = [rows + 1, edge];
+    x += wide;
+  }
+  return rows;
+}
+
+// What the points of the curves stand for where an axis has too many values.
+function binsInWords(steps, a, groups, b) {
+  const points = steps.binned ? ` ${names[a]} has ${steps.binned} values: they are put into ${steps.length} bins, and a point stands in the middle of its bin.` : "";
+  return points + (groups.binned ? ` ${names[b]} has ${groups.binned} values: a curve is of a range of them.` : "");
+}
+
 function drawCurve(o, a, b) {
   const steps = levels(a), axis = data.axes[a];
   const groups = b === null ? [{ label: data.outputs[o], holds: () => true, whole: true }] : levels(b, mostCurves, 4);
@@ -83,18 +105,22 @@ function drawCurve(o, a, b) {
       },
     });
   });
+  byId("bins").textContent = binsInWords(steps, a, groups, b);
+  legend.names = [...new Set(series.map((s) => s.name))];
+  legend.rows = rowsOfLegend(legend.names, byId("curve").clientWidth);
+  const top = 20 + row * legend.rows;
   const x = axis.words
     ? { type: "category", data: steps.map((s) => s.label) }
     : { type: axis.log ? "log" : "value", scale: true, min: "dataMin", max: "dataMax", axisLabel: { color: colour("soft"), formatter: short } };
   chart("curve", {
-    grid: { left: 74, right: 24, top: groups.length > 5 ? 62 : 44, bottom: 92 },
-    legend: { type: "plain", top: 4, textStyle: { color: colour("soft") }, data: [...new Set(series.map((s) => s.name))] },
+    grid: { left: 74, right: 24, top, bottom: 92 },
+    legend: { type: "plain", top: 4, textStyle: { color: colour("soft") }, data: legend.names },
     tooltip: { trigger: "item", ...tip(), formatter: (p) => `${p.marker}${p.seriesName}<br>${names[a]}: ${axis.words ? steps[p.value[0]]?.label ?? p.name : short(p.value[0])}<br>median ${short(p.value[1])}, middle half ${short(p.data.low)} to ${short(p.data.high)}, ${p.data.n} cases` },
     xAxis: { ...axisStyle(), name: names[a], nameGap: 28, ...x },
     yAxis: { ...axisStyle(), name: data.outputs[o], nameGap: 54, type: "value", scale: true },
     dataZoom: axis.words ? [] : [{ type: "slider", height: 18, bottom: 12, textStyle: { color: colour("soft") }, labelFormatter: (v) => short(v) }, { type: "inside" }],
     series,
-  });
+  }, 376 + top);
 }
 
 function drawMap(o, a, b) {
@@ -162,4 +188,7 @@ for (const id of ["output", "x", "by", "mapx", "mapy"]) {
 }
 draw();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-addEventListener("resize", () => Object.values(charts).forEach((c) => c.resize()));
+addEventListener("resize", () => {
+  Object.values(charts).forEach((c) => c.resize());
+  if (rowsOfLegend(legend.names, byId("curve").clientWidth) !== legend.rows) draw();
+});

@@ -1,5 +1,6 @@
 #include <studies/press/path_file.h>
 
+#include <base/inputs.h>
 #include <base/split.h>
 #include <haptics/tick.h>
 
@@ -159,7 +160,8 @@ std::ifstream opened(const std::filesystem::path& file, const char* what)
     }
     std::ifstream in(file);
     if (!in) {
-        throw std::runtime_error(fmt::format("{}: cannot be read: give {}", file.string(), what));
+        const std::string why = base::whyNoFile(file);
+        throw std::runtime_error(fmt::format("{}: {}; give {}", file.string(), why.empty() ? "cannot be read" : why, what));
     }
     return in;
 }

@@ -28,7 +28,7 @@ Vec3 plannedAxis(const haptics::SessionModel& model) noexcept
 PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec& tool, const ToolPose& first)
     : model_(model), tool_(tool), first_(first)
 {
-    tool_.length = tool.kind == ToolKind::sphere ? 0.0 : tool.length;
+    tool_.length = isNeedle() ? tool.length : tool.pressedLength();
     if (!isNeedle()) {
         surface_.friction = model.scene.model.elastic.friction;
         surface_.stiffest = chainmail::stiffnessUncapped(*model.elastic, tool.radius);
@@ -92,9 +92,6 @@ void PoseLoad::moveProxy(const ToolPose& pose) noexcept
         if (const auto touched = firstTouch(tool, last_.value_or(pose.position), pose.position)) {
             proxy_ = haptics::touching(model_.surface, tool, *touched);
         }
-    } else if (tool.length > 0.0) {
-        // It may have turned.
-        proxy_ = haptics::touching(model_.surface, tool, proxy_->front);
     }
     if (proxy_) {
         haptics::slip(model_.surface, tool, pose.position, *proxy_);
@@ -105,12 +102,11 @@ void PoseLoad::moveProxy(const ToolPose& pose) noexcept
     last_ = pose.position;
 }
 
-// Around the point of the surface under the tool.
-chainmail::Focus PoseLoad::focusOf(const haptics::ProxyTool& tool, Vec3 front) const noexcept
+// Around the point of the surface under a place of the tool's axis.
+chainmail::Focus PoseLoad::focusUnder(Vec3 deepest) const noexcept
 {
     const volume::DistanceField& surface = model_.surface;
     const volume::NodeGrid& grid = surface.grid;
-    const Vec3 deepest = haptics::deepestPlace(surface, tool, front).at;
     const Vec3 at = glm::clamp(deepest, grid.position(Index3(0)), grid.position(grid.size - 1));
     return chainmail::focusAt(surface, at - surface.distance(at) * surface.normal(at));
 }
@@ -120,7 +116,7 @@ chainmail::Focus PoseLoad::focusAt(const ToolPose& pose) const noexcept
     if (isNeedle()) {
         return chainmail::focusAt(model_.surface, 0.5 * (ties_.front().rest + ties_.back().rest));
     }
-    return focusOf(proxyTool(pose), proxy_ ? proxy_->front : pose.position);
+    return focusUnder(proxy_ ? proxy_->place : haptics::deepestPlace(model_.surface, proxyTool(pose), pose.position).at);
 }
 
 void PoseLoad::set(const ToolPose& pose) noexcept

@@ -47,7 +47,7 @@ private:
     Vec3 onShaft(const ToolPose& pose, double behind) const noexcept { return pose.position - behind * pose.axis; }
     void moveProxy(const ToolPose& pose) noexcept;
     std::optional<Vec3> firstTouch(const haptics::ProxyTool& tool, Vec3 from, Vec3 to) const noexcept;
-    chainmail::Focus focusOf(const haptics::ProxyTool& tool, Vec3 front) const noexcept;
+    chainmail::Focus focusUnder(Vec3 deepest) const noexcept;
     haptics::ProxyTool proxyTool(const ToolPose& pose) const noexcept { return {tool_.radius, tool_.length, pose.axis}; }
 
     const haptics::SessionModel& model_;

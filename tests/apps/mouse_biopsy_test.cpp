@@ -189,6 +189,9 @@ TEST(Desktop, ASessionEndsWithTheWindowThatIsItsHand)
     desktop.xdotool({"key", "space"});  // fires only while the dead-man switch is held
     wait(0.5);
     EXPECT_EQ(eyes->state()->cores, 0U);
+    desktop.xdotool({"key", "q"});  // asks
+    wait(0.5);
+    EXPECT_EQ(eyes->ending(), channel::Ending::none);
     desktop.xdotool({"key", "q"});
     const Outcome outcome = train->wait();
     EXPECT_EQ(outcome.status, 0) << outcome.err;

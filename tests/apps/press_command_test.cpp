@@ -138,7 +138,7 @@ TEST_F(PressCommand, WhatIsWrongIsSaidOnOneLine)
     const std::string bad = folder / "bad.csv", none = folder / "none.csv";
     writeText(bad, "x_mm,y_mm,z_mm\n0,0,0\n0,0,fifteen\n");
     expectRefusal({"press", scene}, "--path");
-    expectRefusal({"press", scene, "--path", none}, none + ": cannot be read");
+    expectRefusal({"press", scene, "--path", none}, none + ": there is no such file: check the name; give a path");
     expectRefusal({"press", scene, "--path", bad}, bad + ":3: z_mm = 'fifteen': must be a number");
     expectRefusal({"press", "nosuch", "--path", path}, "layered, block, plate, pair");
     expectRefusal({"press", scene, "--path", path, "--model", "chainmail"}, "chainmail");

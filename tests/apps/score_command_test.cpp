@@ -16,8 +16,8 @@ namespace {
 
 namespace synthetic = haptics::synthetic;
 
-// What `palpate score ARGUMENTS` does, without its printing.
-void score(std::vector<std::string> arguments)
+// What `palpate score ARGUMENTS` prints.
+std::string score(std::vector<std::string> arguments)
 {
     CLI::App app;
     addScore(app);
@@ -30,7 +30,7 @@ void score(std::vector<std::string> arguments)
         ::testing::internal::GetCapturedStdout();
         throw;
     }
-    ::testing::internal::GetCapturedStdout();
+    return ::testing::internal::GetCapturedStdout();
 }
 
 nlohmann::json readJson(const std::filesystem::path& file)
@@ -104,6 +104,58 @@ TEST(ScoreCommand, ComparesGroupsByMedianAndCliffsDelta)
     EXPECT_EQ(f["effect_size"]["kind"], "cliffs_delta");
     EXPECT_NEAR(f["effect_size"]["deepest_mm"].get<double>(), -1.0 / 3, 1e-12);
     EXPECT_EQ(f["effect_size"]["peak_force_n"], 0);
+}
+
+std::string fileText(const std::filesystem::path& file)
+{
+    std::ifstream in(file);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// Nobody fired, and the scene has neither probe nor CT: no figure is made of what was not measured.
+TEST(ScoreCommand, GroupsWithoutAValueHaveNoEffectSize)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.010, 1), b = session(folder, "b", 0.020, 1),
+                      c = session(folder, "c", 0.030, 1), d = session(folder, "d", 0.040, 1);
+    const std::string text = score({"--group", "new=" + a + "," + b, "--group", "old=" + c + "," + d, "--json",
+                                    (folder / "f.json").string(), "--report", (folder / "f.html").string()});
+    const auto f = readJson(folder / "f.json");
+    for (const char* const key : {"targeting_error_mm", "mark_error_mm", "probe_s", "ct_scans", "rest_s"}) {
+        EXPECT_TRUE(f["effect_size"][key].is_null()) << key;
+        EXPECT_TRUE(f["groups"][0]["median"][key].is_null()) << key;
+    }
+    EXPECT_EQ(f["effect_size"]["deepest_mm"], -1);
+    for (const std::string& shown : {text, fileText(folder / "f.html")}) {
+        EXPECT_EQ(shown.find("- (- to -)"), std::string::npos) << shown;
+    }
+    EXPECT_EQ(text.find("probe s"), std::string::npos) << text;
+    EXPECT_NE(text.find("deepest mm"), std::string::npos) << text;
+}
+
+TEST(ScoreCommand, OneSessionIsNoGroup)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.010, 1), b = session(folder, "b", 0.020, 2);
+    const std::string text = score({"--group", "new=" + a, "--group", "old=" + b, "--json", (folder / "f.json").string(),
+                                    "--report", (folder / "f.html").string()});
+    EXPECT_TRUE(readJson(folder / "f.json")["effect_size"]["deepest_mm"].is_null());
+    EXPECT_EQ(text.find("+1.00") + text.find("-1.00"), 2 * std::string::npos) << text;
+    EXPECT_NE(fileText(folder / "f.html").find("over old: -"), std::string::npos);
+}
+
+// 20.01 and 20.02 mm are both printed as 20.0.
+TEST(ScoreCommand, ValuesThatArePrintedTheSameAreTies)
+{
+    const synthetic::Folder folder;
+    const std::string a = session(folder, "a", 0.02001, 1), b = session(folder, "b", 0.02001, 1),
+                      c = session(folder, "c", 0.02002, 1), d = session(folder, "d", 0.02002, 1);
+    score({"--group", "new=" + a + "," + b, "--group", "old=" + c + "," + d, "--json", (folder / "f.json").string(),
+           "--report", (folder / "f.html").string()});
+    EXPECT_EQ(readJson(folder / "f.json")["effect_size"]["deepest_mm"], 0);
+    const std::string page = fileText(folder / "f.html");
+    EXPECT_NE(page.find("Deepest insertion [mm] 20.0"), std::string::npos) << "it is the same in all sessions";
+    EXPECT_EQ(page.find("aria-label=\"Deepest insertion\""), std::string::npos);
 }
 
 TEST(ScoreCommand, WrongRequestsAreToldOnOneLine)

@@ -194,6 +194,9 @@ TEST_F(Sweep, DryRunSaysWhatItTakesAndLeavesNothing)
     EXPECT_NEAR(dry["estimated_s"].get<double>(), 30 * dry["case_s"].get<double>(), 1e-9);
     EXPECT_NEAR(dry["disk_mb"].get<double>(), 60 * 4096e-6, 1e-9);
     expectRefusal({"sweep", "-o", folder("s")}, "holds no sweep");
+    const std::string said = palpate({"sweep", file, "--dry-run", "--jobs", "1000"}).out;
+    EXPECT_NE(said.find(" s on 1000 processes"), std::string::npos) << said;
+    EXPECT_EQ(said.find(": 0 s on"), std::string::npos) << said;
 }
 
 TEST_F(Sweep, RecordsReplay)
@@ -219,6 +222,11 @@ TEST_F(Sweep, RefusesWhatCannotBe)
     expectRefusal({"sweep", other, "-o", folder("s")}, "holds another plan");
     expectRefusal({"sweep", file, "-o", folder("s"), "--time", "10"}, "--slurm");
     expectRefusal({"sweep", "--report", folder("none")}, "holds no sweep");
+    expectRefusal({"sweep", file, "-o", "/proc/x"}, "choose another place");
+    std::string air = shortPlan(1);
+    air.replace(air.find("log_range = [1, 9]\nsteps = 3"), 28, "values = [0, 5]");
+    expectRefusal({"sweep", plan("air.toml", air), "--dry-run"},
+                  "air.toml: case 0: [tissue.fat] youngs_kpa = 0 kPa: must be 0.01 to 2e+07 kPa");
 }
 
 TEST_F(Sweep, TheExampleOfTheDocumentIsAPlan)

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -13,10 +14,11 @@ namespace {
 using nlohmann::json;
 
 // What a browser makes of a page: its document once the scripts have run.
-std::string documentOf(const std::string& address, const std::string& profile)
+std::string documentOf(const std::string& address, const std::string& profile, const std::string& size = "1200,900")
 {
     return Program("/usr/bin/chromium", {"--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-                                         "--user-data-dir=" + profile, "--virtual-time-budget=5000", "--dump-dom", address})
+                                         "--user-data-dir=" + profile, "--window-size=" + size,
+                                         "--virtual-time-budget=5000", "--dump-dom", address})
         .wait()
         .out;
 }
@@ -51,6 +53,43 @@ TEST(SessionReport, NamesTheLinesOfAChartBelowIt)
     ASSERT_NE(lines, std::string::npos);
     EXPECT_LT(legend, lines);
     EXPECT_NE(distances.find("warning: vein, 5 mm", lines), std::string::npos);
+}
+
+// How far down a chart the text stands: "translate(26 81)" before it [px].
+double placeOf(const std::string& chart, const std::string& text)
+{
+    const auto at = chart.find(">" + text + "<");
+    const auto place = chart.rfind("translate(", at);
+    return at == std::string::npos || place == std::string::npos ? -1 : std::stod(chart.substr(chart.find(' ', place)));
+}
+
+// On a telephone each name of the legend has a row of its own, above the curves. Values that are put into bins are said to
+// be so below them.
+TEST(SweepReport, TheLegendLiesAboveTheCurvesAndBinsAreNamed)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    std::string text = shortPlan(1);
+    text.replace(text.find("steps = 3"), 9, "steps = 14");
+    text.replace(text.find("name = \"depth_mm\""), 17, "name = \"depth_of_the_finger_in_the_tissue_mm\"");
+    writeText(here / "p.toml", text);
+    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
+    figures({"sweep", "--report", here / "s"});
+    const std::string page = documentOf("file://" + std::string(here / "s" / "report.html"), here / "profile", "420,1400");
+    const std::string curve = partOf(page, "curve");
+    // The highest line of the grid: "M74 116.5L423 116.5".
+    double top = 1e9;
+    for (auto at = curve.find("d=\"M74 "); at != std::string::npos; at = curve.find("d=\"M74 ", at + 1)) {
+        top = std::min(top, std::stod(curve.substr(at + 7)));
+    }
+    for (const char* const depth : {"1", "2", "3", "4"}) {
+        const double y = placeOf(curve, "depth_of_the_finger_in_the_tissue_mm = " + std::string(depth));
+        EXPECT_GT(y, 0) << depth;
+        EXPECT_LT(y + 14, top) << depth;
+    }
+    EXPECT_NE(page.find("youngs_kpa has 14 values: they are put into 12 bins"), std::string::npos);
 }
 
 // Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.

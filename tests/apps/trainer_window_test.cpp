@@ -228,6 +228,34 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByKeysAlone)
     EXPECT_EQ(t.program->wait().status, 0);
 }
 
+// Esc is "back" on every other screen: in a session it asks first, and who touched nothing has no result.
+TEST(TrainerWindow, EscapeAsksBeforeItEndsASession)
+{
+    if (!can())
+        GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
+    const Trainer t;
+    ASSERT_TRUE(t.isAt("Case"));
+    wait(1);
+    for (const char* next : {"Device", "Briefing", "Session"}) {
+        t.key("Return");
+        ASSERT_TRUE(t.isAt(next));
+        wait(1);
+    }
+    const auto eyes = t.session();
+    ASSERT_TRUE(eyes);
+    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
+    wait(2);
+    t.key("Escape");
+    wait(1);
+    EXPECT_EQ(eyes->ending(), channel::Ending::none);
+    t.key("Escape");
+    EXPECT_EQ(t.result()["contacts"], 0);
+    ASSERT_TRUE(t.isAt("Result"));
+    wait(1);
+    t.key("d");  // nothing to see again
+    EXPECT_FALSE(t.windowIsThere("^Palpate$"));
+}
+
 TEST(TrainerWindow, PalpateAloneOpensItOnADesktopAndItsHelpElsewhere)
 {
     if (!can())

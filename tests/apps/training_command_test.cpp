@@ -15,8 +15,16 @@ namespace fs = std::filesystem;
 // The commands with a home of their own.
 class TrainingCommands : public ::testing::Test {
 protected:
-    TrainingCommands() { ::setenv("XDG_DATA_HOME", folder_.path().c_str(), 1); }
-    ~TrainingCommands() override { ::unsetenv("XDG_DATA_HOME"); }
+    TrainingCommands()
+    {
+        ::setenv("XDG_DATA_HOME", folder_.path().c_str(), 1);
+        ::setenv("XDG_CONFIG_HOME", (folder_ / "config").c_str(), 1);
+    }
+    ~TrainingCommands() override
+    {
+        ::unsetenv("XDG_DATA_HOME");
+        ::unsetenv("XDG_CONFIG_HOME");
+    }
 
     // What somebody does in one session of an exercise.
     static Outcome session(const std::string& exercise, const std::vector<std::string>& more = {})
@@ -60,7 +68,7 @@ TEST_F(TrainingCommands, ARecordFromAnotherMachineCountsAsWhatItWas)
 {
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
     ASSERT_EQ(palpate({"profile", "new", "bert"}).status, 0);
-    ASSERT_EQ(session("touch", {"--seconds", "1", "--test", "--record", folder_ / "r.db"}).status, 0);
+    ASSERT_EQ(session("touch", {"--seconds", "2", "--test", "--record", folder_ / "r.db"}).status, 0);
     ASSERT_EQ(palpate({"profile", "add-record", "bert", folder_ / "r.db"}).status, 0);
     expectRefusal({"profile", "add-record", "bert", folder_ / "r.db"}, "bert has this session already");
     const auto one = figures({"progress", "anna"})["sessions"][0], other = figures({"progress", "bert"})["sessions"][0];
@@ -71,6 +79,105 @@ TEST_F(TrainingCommands, ARecordFromAnotherMachineCountsAsWhatItWas)
     ASSERT_EQ(palpate({"profile", "erase", "anna", "--yes"}).status, 0);
     EXPECT_TRUE(fs::exists(folder_ / "r.db")) << "a record that somebody put elsewhere stays";
     expectRefusal({"progress", "anna"}, "there is no such profile");
+}
+
+// What the note asks for: the numbers are the file's, so that of a person's first session need not be 1.
+TEST_F(TrainingCommands, ProgressListsTheSessionsThatANoteCanBeOf)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    ASSERT_EQ(palpate({"profile", "new", "bert"}).status, 0);
+    ASSERT_EQ(session("touch", {"--seconds", "2"}).status, 0);
+    const Outcome first =
+        palpate({"train", "--profile", "bert", "--case", "layered", "--headless", "--unpaced", "--seconds", "2"});
+    EXPECT_NE(first.out.find("kept for bert as session 2 (1 session so far)"), std::string::npos) << first.out;
+    ASSERT_EQ(session("touch", {"--seconds", "2", "--test"}).status, 0);
+
+    const Outcome anna = palpate({"progress", "anna"}), bert = palpate({"progress", "bert", "--html", folder_ / "b.html"});
+    EXPECT_NE(anna.out.find("breast-core-biopsy/touch (test)"), std::string::npos) << anna.out;
+    const auto all = figures({"progress", "anna"})["sessions"];
+    ASSERT_EQ(all.size(), 2U);
+    for (const auto& one : all) {
+        const std::string number = one["session"].dump(), day = one["started"].get<std::string>().substr(0, 10);
+        EXPECT_NE(anna.out.find("  " + number + "  " + day), std::string::npos) << anna.out;
+        EXPECT_EQ(palpate({"profile", "note", "anna", number, "--rating", "3"}).status, 0);
+    }
+    EXPECT_NE(bert.out.find("bert (1 session)\n"), std::string::npos) << bert.out;
+    EXPECT_NE(bert.out.find("free practice"), std::string::npos) << bert.out;
+    EXPECT_NE(bert.out.find("page: " + std::string(folder_ / "b.html")), std::string::npos) << bert.out;
+    expectRefusal({"profile", "note", "bert", "1"}, "bert has no session 1: palpate progress 'bert' lists them");
+    EXPECT_EQ(palpate({"progress", "--all"}).out.find("started (UTC)"), std::string::npos) << "that would be too much";
+}
+
+// Without the package of the cases a list that is empty would look like a programme without any.
+TEST_F(TrainingCommands, SayWhereTheyLookedWhereThereAreNoCases)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    ::setenv("PALPATE_DATA", "/nonexistent", 1);
+    expectRefusal({"case", "list"}, "/nonexistent/cases: there are no cases here: install the package palpate-data");
+    expectRefusal({"curriculum", "list"}, "/nonexistent/curricula: there are no curricula here: install the package");
+    expectRefusal({"curriculum", "next", "--profile", "anna"}, "/nonexistent/curricula: there are no curricula here");
+    ::unsetenv("PALPATE_DATA");
+}
+
+TEST_F(TrainingCommands, AnInterruptedSessionSaysThatItIsNotKept)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    const std::string record = folder_ / "cut.db";
+    Program running("palpate",
+                    {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast", "--record", record});
+    for (int i = 0; i < 300 && !fs::exists(record); ++i) {
+        ::usleep(100000);
+    }
+    ::usleep(500000);
+    running.send(SIGINT);
+    const Outcome cut = running.wait();
+    EXPECT_EQ(cut.status, 128 + SIGINT);
+    EXPECT_NE(cut.out.find("not kept for anna: the session was interrupted; palpate profile add-record adds its record"),
+              std::string::npos)
+        << cut.out << cut.err;
+    EXPECT_TRUE(figures({"progress", "anna"})["sessions"].empty());
+    EXPECT_EQ(palpate({"profile", "add-record", "anna", record}).status, 0);
+}
+
+// Of the window too, and of a session that was interrupted: its record names who trained, and no profile names it.
+TEST_F(TrainingCommands, ErasingRemovesRecordsOfTheWindowAndOfInterruptedSessions)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    fs::create_directories(folder_ / "palpate/sessions");
+    fs::create_directories(folder_ / "config/palpate");
+    writeText(folder_ / "config/palpate/trainer.json", R"({"person": "anna", "sounds": true})");
+    const std::string window = folder_ / "palpate/sessions/touch.db", figures = folder_ / "palpate/sessions/touch.json";
+    ASSERT_EQ(session("touch", {"--seconds", "2", "--record", window, "--json", figures}).status, 0);
+    {
+        Program running("palpate", {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast"});
+        const auto recorded = [&] {
+            std::error_code none;
+            return !fs::is_empty(folder_ / "palpate/records", none) && !none;
+        };
+        for (int i = 0; i < 300 && !recorded(); ++i) {
+            ::usleep(100000);
+        }
+        running.send(SIGKILL);
+    }
+    ASSERT_FALSE(fs::is_empty(folder_ / "palpate/records"));
+    const Outcome erased = palpate({"profile", "erase", "anna", "--yes"});
+    EXPECT_EQ(erased.status, 0) << erased.err;
+    EXPECT_EQ(erased.out, "anna: erased\n");
+    EXPECT_TRUE(fs::is_empty(folder_ / "palpate/records"));
+    EXPECT_TRUE(fs::is_empty(folder_ / "palpate/sessions"));
+    EXPECT_EQ(readText(folder_ / "config/palpate/trainer.json").find("anna"), std::string::npos);
+}
+
+// Who begins and leaves has not tried: it is no attempt of the exercise.
+TEST_F(TrainingCommands, ASessionThatTouchedNothingIsNotKept)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    const Outcome looked = palpate({"train", "--profile", "anna", "--exercise", "breast-core-biopsy/touch", "--headless",
+                                    "--unpaced", "--seconds", "0.01", "--setting", "fast"});
+    ASSERT_EQ(looked.status, 0) << looked.err;
+    EXPECT_NE(looked.out.find("never touched the body"), std::string::npos) << looked.out;
+    EXPECT_EQ(looked.out.find("kept for anna"), std::string::npos) << looked.out;
+    EXPECT_EQ(figures({"progress", "anna"})["sessions"].size(), 0U);
 }
 
 // As on a disk that is read-only: there is no place for the profiles.

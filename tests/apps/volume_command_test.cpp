@@ -56,6 +56,17 @@ TEST(VolumeCommands, APhantomsVolumeSaysWhatThePhantomSaid)
 }
 
 // Cut anywhere, a volume is refused; what is left of it never becomes tissue.
+// The skin of "layered" is the plane y = 0: entries lie within a thousandth of a millimetre of it, on both sides.
+TEST(VolumeCommands, ATableOfWaysHasNoNegativeZero)
+{
+    const Folder folder;
+    const std::string volume = folder / "layered.vdb";
+    ASSERT_EQ(palpate({"phantom", "layered", "-o", volume}).status, 0);
+    const Outcome ways = palpate({"scene", volume, "-o", folder / "s.toml"});
+    EXPECT_NE(ways.out.find(" 0.0 "), std::string::npos) << ways.out;
+    EXPECT_EQ(ways.out.find("-0.0 "), std::string::npos) << ways.out;
+}
+
 TEST(VolumeCommands, ATruncatedVolumeIsRefusedOnOneLine)
 {
     const Folder folder;

@@ -99,23 +99,25 @@ TEST(Bounds, AStateThatIsNoneIsNotShown)
     Publisher publisher(session, smallScenery(), smallLabels());
     const auto subscriber = Subscriber::attach(session);
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    const std::vector<void (*)(State&)> faults{[](State& s) { s.tip[1] = nan; },
-                                               [](State& s) { s.axis[0] = std::numeric_limits<double>::infinity(); },
-                                               [](State& s) { s.total[2] = -1e300; },
-                                               [](State& s) { s.phase = static_cast<Phase>(7); },
-                                               [](State& s) { s.warning = static_cast<Warning>(9); },
-                                               [](State& s) { s.warned = 1; },
-                                               [](State& s) { s.tissue = 64; },
-                                               [](State& s) { s.aheadTissue = 0xFFFFFFFF; },
-                                               [](State& s) { s.distance[3] = nan; },
-                                               [](State& s) { s.probe.face[0] = nan; },
-                                               [](State& s) {
-                                                   s.probe.axial = {0, 0, 0};
-                                               },
-                                               [](State& s) { s.probe.lateral = s.probe.axial; },
-                                               [](State& s) { s.probe.force = 1e9; },
-                                               [](State& s) { s.holes = maxHoles + 1; },
-                                               [](State& s) { s.hole[2].to[1] = std::numeric_limits<float>::infinity(); }};
+    const std::vector<void (*)(State&)> faults{
+        [](State& s) { s.tip[1] = nan; },
+        [](State& s) { s.axis[0] = std::numeric_limits<double>::infinity(); },
+        [](State& s) { s.total[2] = -1e300; },
+        [](State& s) { s.phase = static_cast<Phase>(7); },
+        [](State& s) { s.warning = static_cast<Warning>(9); },
+        [](State& s) { s.warned = 1; },
+        [](State& s) { s.tissue = 64; },
+        [](State& s) { s.aheadTissue = 0xFFFFFFFF; },
+        [](State& s) { s.distance[3] = nan; },
+        [](State& s) { s.probe.face[0] = nan; },
+        [](State& s) {
+            s.probe.axial = {0, 0, 0};
+        },
+        [](State& s) { s.probe.lateral = s.probe.axial; },
+        [](State& s) { s.probe.force = 1e9; },
+        [](State& s) { s.holes = maxHoles + 1; },
+        [](State& s) { s.hole[2].to[1] = std::numeric_limits<float>::infinity(); },
+        [](State& s) { s.mark[1].place[0] = std::numeric_limits<float>::infinity(); }};
     for (const auto& fault : faults) {
         State state = stateOf(4);
         publisher.setState(state);

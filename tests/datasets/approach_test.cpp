@@ -20,24 +20,32 @@ std::uint16_t labelOf(const Tissue& tissue, const char* name)
     return structureNamed(tissue, name)->value;
 }
 
-// Voxel by voxel: is anything vital, of bone or fixed within `distance` of the segment?
-bool touchesForbidden(const Tissue& tissue, const Voxels& voxels, Vec3 from, Vec3 to, double distance)
+// Places every 0.1 mm along the segment, voxel by voxel: the distance to the nearest box of anything vital, of bone or
+// fixed [m].
+double distanceToForbidden(const Tissue& tissue, const Voxels& voxels, Vec3 from, Vec3 to)
 {
     std::vector<char> forbidden(65536, 0);
     for (const volume::Structure& s : tissue.structures()) {
         const volume::TissueRow& row = tissue.table().rows[s.tissue];
         forbidden[s.value] = row.role == Role::vital || row.role == Role::bone || row.fixed ? 1 : 0;
     }
-    bool touches = false;
+    double least = 1.0;
     const Vec3 along = to - from;
     voxels.forEach([&](Index3 n, std::uint16_t value) {
-        if (forbidden[value] != 0) {
-            const Vec3 p = tissue.affine().toPatient(Vec3(n));
-            const double t = glm::clamp(glm::dot(p - from, along) / glm::dot(along, along), 0.0, 1.0);
-            touches = touches || glm::length(p - from - t * along) < distance;
+        if (forbidden[value] == 0) {
+            return;
+        }
+        const Vec3 p = tissue.affine().toPatient(Vec3(n));
+        const double near = glm::clamp(glm::dot(p - from, along) / glm::dot(along, along), 0.0, 1.0);
+        if (glm::length(p - from - near * along) > 12e-3) {
+            return;
+        }
+        for (double t = 0.0; t <= glm::length(along); t += 0.1e-3) {
+            const Vec3 away = glm::abs(p - from - t * glm::normalize(along)) - 0.5 * voxels.edge;
+            least = std::min(least, glm::length(glm::max(away, Vec3(0.0))));
         }
     });
-    return touches;
+    return least;
 }
 
 TEST(PlanApproach, KeepsOffVitalStructuresAndStartsOnSkin)
@@ -55,7 +63,7 @@ TEST(PlanApproach, KeepsOffVitalStructuresAndStartsOnSkin)
         EXPECT_EQ(reader.label(way.entry - 30e-3 * inward), 0);
         EXPECT_EQ(reader.label(way.aim), labelOf(tissue, "tumour"));
         const Vec3 fired = way.aim + scene.tool.notchLength / 2 * inward;
-        EXPECT_FALSE(touchesForbidden(tissue, Voxels(tissue), way.entry, fired, scene.tool.radius + 1e-3));
+        EXPECT_GE(distanceToForbidden(tissue, Voxels(tissue), way.entry, fired), scene.tool.radius + 1.5e-3);
         const Approach again = planApproach(scene, tissue);
         EXPECT_EQ(again.entry, way.entry);
         EXPECT_EQ(again.aim, way.aim);
@@ -93,7 +101,8 @@ TEST(ProposeApproaches, WaysDifferAndKeepTheirMargin)
         EXPECT_DOUBLE_EQ(ways[i].length, glm::length(way.aim - way.entry));
         EXPECT_GE(ways[i].clearance, 3e-3);
         const Vec3 fired = way.aim + scene.tool.notchLength / 2 * inward;
-        EXPECT_FALSE(touchesForbidden(tissue, voxels, way.entry, fired, scene.tool.radius + 3e-3 - 1e-3));
+        const double room = distanceToForbidden(tissue, voxels, way.entry, fired + 3e-3 * inward) - scene.tool.radius;
+        EXPECT_NEAR(ways[i].clearance, std::min(room, 7e-3), 0.1e-3);
         EXPECT_LE(ways[i].angle, std::acos(0.5));
         for (std::size_t j = 0; j < i; ++j) {
             const Vec3 other = glm::normalize(ways[j].approach.aim - ways[j].approach.entry);

@@ -38,6 +38,24 @@ TEST(Ct, EachPressIsAScanAndItsDose)
     EXPECT_EQ(without.score().scans, 0U);
 }
 
+// The viewers show a pin where the tool was, on the surface that it pressed in.
+TEST(Marks, AreSeenWhereTheToolWasWhenItsButtonWentDown)
+{
+    channel::State state;
+    TickRecord r;
+    r.phase = Phase::contact;
+    for (const bool down : {false, true, true, false, false, true}) {
+        r.device.buttons = down ? buttonMark : 0U;
+        r.proxy = {1e-3 * static_cast<double>(r.tick), 0, 0};
+        showTick(r, {}, state);
+        ++r.tick;
+    }
+    ASSERT_EQ(state.marks, 2U);
+    EXPECT_FLOAT_EQ(state.mark[0].place[0], 1e-3F);
+    EXPECT_FLOAT_EQ(state.mark[1].place[0], 5e-3F);
+    EXPECT_FLOAT_EQ(state.mark[1].axis[1], 1.0F);
+}
+
 TEST(Ct, ADoseThatIsNoneCountsNothing)
 {
     for (const char* text : {"", "much", "nan", "-3", "inf"}) {

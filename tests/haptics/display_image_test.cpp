@@ -202,6 +202,43 @@ TEST(DisplayGrid, OfALongThinBodyIsOneThatViewersTake)
     EXPECT_GT(grid.size.z, 3000) << "as fine as it may be";
 }
 
+// A lump shown has its place and its size, wherever the volume begins and whichever way its axes go. Ties between two
+// voxels went to the lower one, and the lump was half a voxel off along each axis, or a voxel smaller.
+TEST(DisplayGrid, ShowsALumpWhereItIs)
+{
+    const volume::Tissue block = datasets::sceneVolume(datasets::parseScene(tests::blockScene, "test.toml"));
+    const std::vector<volume::LabelName> names{{1, "fat", "fat"}, {2, "lump", "tumour"}};
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> any(-1, 1);
+    for (const Vec3 spacing :
+         {Vec3(1e-3), Vec3(2e-3), Vec3(3e-3), Vec3(0.8e-3, 0.8e-3, 1.6e-3), Vec3(0.5e-3, 1.5e-3, 2e-3)}) {
+        for (int trial = 0; trial < 4; ++trial) {
+            volume::LabelImage image{{24, 25, 26}, {Mat3(0.0), Vec3(any(random), any(random), any(random)) * 0.1}, {}};
+            for (int k = 0; k < 3; ++k) {
+                image.affine.linear[k][(k + trial) % 3] = (random() % 2 == 0 ? 1 : -1) * spacing[k];
+            }
+            image.values.assign(image.offset(image.size - 1) + 1, 1);
+            const Index3 low(8, 7, 9), high(13, 15, 12);
+            volume::forEachIndex(low, high, [&](Index3 n) { image.values[image.offset(n)] = 2; });
+            const auto tissue = volume::Tissue::fromLabels(image, block.table(), names, block.provenance());
+            const volume::NodeGrid grid = displayGrid(tissue);
+            const auto rows = tissue.tissueOn(grid);
+            Vec3 sum(0.0);
+            double count = 0.0;
+            for (std::size_t i = 0; i < rows.size(); ++i) {
+                if (rows[i] == *block.table().find("tumour")) {
+                    sum += grid.position(grid.node(i));
+                    ++count;
+                }
+            }
+            const Vec3 middle = image.affine.toPatient(0.5 * Vec3(low + high));
+            const double volume = 6.0 * 9.0 * 4.0 * image.affine.voxelVolume();
+            EXPECT_LT(glm::distance(sum / count, middle), 1e-6) << spacing.x << " " << trial;
+            EXPECT_NEAR(count * std::pow(grid.spacing, 3), volume, 1e-2 * volume) << spacing.x << " " << trial;
+        }
+    }
+}
+
 // A ramp in the volume is the same ramp at the viewer, wherever a display voxel and those around it are all tissue: the
 // mean of a ramp over a voxel is its value in the middle.
 TEST(DisplayImage, OfTheVolumeReachesTheViewer)

@@ -1,5 +1,7 @@
 #include <haptics/losses.h>
 
+#include <base/words.h>
+
 #include <tests/haptics/synthetic_session.h>
 
 #include <gtest/gtest.h>
@@ -230,6 +232,16 @@ TEST(Losses, OfEveryTaskAddUpToAHundredWithTheTotal)
         }
         EXPECT_NEAR(sum, 100, 0.05) << round;
     }
+}
+
+// The words are in the language of who reads them, and so is what stands around them.
+TEST(Losses, ALineIsInOneLanguage)
+{
+    const Loss loss{"", 75, "Es wurde nicht ausgelöst", 1.5};
+    base::useLanguage("de");
+    const std::string line = inWords(loss);
+    base::useLanguage("en");
+    EXPECT_EQ(line, "-75 Punkte: Es wurde nicht ausgelöst (bei 1,5 s)");
 }
 
 }  // namespace

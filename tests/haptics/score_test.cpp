@@ -6,7 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
+#include <string_view>
 
 namespace palpate::haptics {
 namespace {
@@ -248,6 +250,29 @@ TEST(Score, WithoutAFiringThereAreOnlyPointsForTheVitalStructures)
     EXPECT_EQ(parts(s).technique, 0);
     EXPECT_EQ(s.total, 25);
     EXPECT_EQ(scoreTicks(along({{0, -0.03}, {1, -0.01}})).total, 0);
+}
+
+double measured(const Score& s, std::string_view key)
+{
+    const auto at = std::ranges::find(measures(), key, [](const Measure& m) { return std::string_view(m.key); });
+    return at->value(s);
+}
+
+// No core is a core without target only where one was asked for: "not a number" is left out of groups.
+TEST(Score, ASessionHasOnlyMeasuresOfWhatItIsFor)
+{
+    Score s;
+    s.aim.tool = datasets::ToolKind::needle;
+    EXPECT_EQ(measured(s, "best_target_pct"), 0);
+    EXPECT_TRUE(std::isinf(measured(s, "targeting_error_mm"))) << "worse than any";
+    for (const auto task : {datasets::SessionTask::touch, datasets::SessionTask::advance, datasets::SessionTask::find}) {
+        s.aim.task = task;
+        EXPECT_TRUE(std::isnan(measured(s, "best_target_pct")) && std::isnan(measured(s, "best_target_length_mm")));
+        EXPECT_EQ(std::isnan(measured(s, "rest_s")), task != datasets::SessionTask::touch);
+    }
+    s.passes = 1;
+    EXPECT_EQ(measured(s, "best_target_pct"), 0) << "a core that was taken is judged";
+    EXPECT_TRUE(std::isnan(measured(s, "probe_s")) && std::isnan(measured(s, "ct_scans")));
 }
 
 // Half the target fraction of a full mark, half its length, half its error: 15 + 5 + 5. Two touches, 1 s and 0.5 mm: 25 (1

@@ -6,6 +6,7 @@
 #include <haptics/hand.h>
 #include <haptics/replay.h>
 #include <haptics/simulation.h>
+#include <haptics/surface_proxy.h>
 
 #include <gtest/gtest.h>
 
@@ -100,6 +101,22 @@ TEST(Simulation, CapsuleOnItsSideTouchesAsManyElementsAsItIsLong)
     }
     EXPECT_EQ(touched[2] - touched[1], touched[1] - touched[0]);
     EXPECT_GT(touched[2] - touched[1], 10 * 2 * std::sqrt(2 * radius * deep - deep * deep) / h);
+}
+
+// A capsule that rolls over from its front to its back touches at places between them: none is left out.
+TEST(SurfaceProxy, ThePlaceOfACapsuleDoesNotJumpAsItTurns)
+{
+    const auto& surface = tests::blockSphere().surface;
+    ProxyTool tool{10e-3, 20e-3, Vec3(1, 0, 0), 0.0};
+    Vec3 last(10e-3, -9e-3, 0);
+    for (int i = -2000; i <= 2000; ++i) {
+        const double tilt = -1e-3 * 0.02 * i;
+        tool.axis = Vec3(std::cos(tilt), std::sin(tilt), 0);
+        const DeepestPlace place = deepestPlace(surface, tool, 10e-3 * tool.axis + Vec3(0, -9e-3, 0));
+        EXPECT_LT(glm::distance(place.at, last), 0.2e-3) << i;
+        last = place.at;
+    }
+    EXPECT_LT(last.x, -9.5e-3);
 }
 
 // Level 1 deforms: the tissue under the sphere is where the sphere's lowest point is, level 0 leaves it.

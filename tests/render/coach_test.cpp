@@ -43,6 +43,23 @@ channel::State stateAt(double x, double y, double z, channel::Phase phase)
 
 const CoachView view{{0, 20e-3, 0}, 0, true, false, true};
 
+// A needle that was turned out of the picture by the wheel looks like one that is gone.
+TEST(Coach, NamesTheKeysThatBringAToolBackIntoThePicture)
+{
+    const channel::Scenery scenery = needleScenery();
+    CoachView lost = view;
+    lost.outOfSight = true;
+    const auto wrongAt = [&](double x, double y) {
+        return coach(scenery, stateAt(x, y, 0, channel::Phase::free), lost).wrong;
+    };
+    EXPECT_NE(wrongAt(0, -0.3).find("the wheel forward, or Page down"), std::string::npos) << wrongAt(0, -0.3);
+    EXPECT_NE(wrongAt(0, 0.3).find("Page up"), std::string::npos) << wrongAt(0, 0.3);
+    EXPECT_NE(wrongAt(0.3, -0.03).find("arrow keys"), std::string::npos) << wrongAt(0.3, -0.03);
+    EXPECT_EQ(coach(scenery, stateAt(0, -0.3, 0, channel::Phase::free), view).wrong, "");
+    lost.handIsHere = false;
+    EXPECT_EQ(wrongAt(0, -0.3), "") << "who looks on has no keys for it";
+}
+
 TEST(Coach, LeadsThroughABiopsyStepByStep)
 {
     const channel::Scenery scenery = needleScenery();
@@ -163,6 +180,9 @@ TEST(Coach, AnAdvanceStopsInTheTargetAndFiresNothing)
     s.phase = channel::Phase::inserted;
     s.distance[0] = s.ahead[0] = 1e-3;
     EXPECT_EQ(coach(scenery, s, view).now, "Advance until the tip is in the tumour (1 mm to go)");
+    s.distance[0] = 6.3e-3;
+    s.ahead[0] = 5e-3;  // of another surface of the target
+    EXPECT_EQ(coach(scenery, s, view).now, "Advance until the tip is in the tumour (6 mm to go)");
     s.distance[0] = -1e-3;
     s.reached = 1;
     EXPECT_EQ(coach(scenery, s, view).now, "The tip is in the tumour: stop there, and draw the needle back");

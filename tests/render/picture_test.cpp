@@ -2,7 +2,7 @@
 
 #include <channel/needle_shape.h>
 #include <render/display.h>
-#include <tests/render/body.h>
+#include <tests/render/studio.h>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
@@ -15,6 +15,7 @@
 #include <vtkRendererCollection.h>
 #include <vtkWindowToImageFilter.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -28,124 +29,6 @@
 
 namespace palpate::render {
 namespace {
-
-constexpr int width = 960, height = 720;
-
-using Pixel = std::array<int, 3>;
-
-bool near(const Pixel& a, const Pixel& b, int tolerance)
-{
-    return std::abs(a[0] - b[0]) <= tolerance && std::abs(a[1] - b[1]) <= tolerance && std::abs(a[2] - b[2]) <= tolerance;
-}
-
-Pixel pixelOf(const Colour& colour)
-{
-    const auto byte = [](double c) { return static_cast<int>(std::lround(255 * c)); };
-    return {byte(colour[0]), byte(colour[1]), byte(colour[2])};
-}
-
-struct Image {
-    int wide = 0, high = 0;
-    std::vector<std::uint8_t> bytes;
-
-    Pixel at(int x, int y) const
-    {
-        const std::size_t i =
-            3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(wide) + static_cast<std::size_t>(x));
-        return {bytes[i], bytes[i + 1], bytes[i + 2]};
-    }
-    int count(const Area& area, const Pixel& colour, int tolerance) const
-    {
-        int found = 0;
-        for (int y = area.y; y < area.y + area.height; ++y)
-            for (int x = area.x; x < area.x + area.width; ++x)
-                found += near(at(x, y), colour, tolerance) ? 1 : 0;
-        return found;
-    }
-    int differing(const Image& other, const Area& area) const
-    {
-        int found = 0;
-        for (int y = area.y; y < area.y + area.height; ++y)
-            for (int x = area.x; x < area.x + area.width; ++x)
-                found += near(at(x, y), other.at(x, y), 12) ? 0 : 1;
-        return found;
-    }
-};
-
-// One body and one window for all tests: both are slow to make.
-class Studio {
-public:
-    Studio() : labels(bodyLabels(scenery))
-    {
-        if (!displayWorks())
-            display_.emplace();
-        window_->SetShowWindow(false);
-        window_->SetOffScreenRendering(1);
-        window_->SetMultiSamples(0);
-        window_->SetSize(width, height);
-        picture_ = std::make_unique<Picture>(*window_);
-    }
-    ~Studio()
-    {
-        picture_.reset();
-        window_->Finalize();
-    }
-
-    // The story at `t`, told from its beginning; without the body's deformation where `rigid`.
-    Image take(double t, Layout layout, bool rigid = false, const std::string& file = {})
-    {
-        picture_->open(scenery, labels, "story");
-        picture_->show(layout);
-        picture_->resetView();
-        constexpr double step = 0.05;
-        for (double then = 0; then < t; then += step)
-            picture_->note(storyState(scenery, then));
-        auto displaced = std::make_unique<channel::Displaced>();
-        storyDisplaced(scenery, t, *displaced);
-        picture_->update(storyState(scenery, t), rigid ? nullptr : displaced.get(), {30, 0.02, 1000});
-        picture_->render(Quality::still);
-        return grab(file);
-    }
-    Image grab(const std::string& file = {})
-    {
-        vtkNew<vtkWindowToImageFilter> grab;
-        grab->SetInput(window_);
-        grab->SetInputBufferTypeToRGB();
-        grab->ReadFrontBufferOff();
-        grab->ShouldRerenderOff();
-        grab->Update();
-        // PALPATE_PICTURES: a folder to keep the pictures in, to look at them.
-        if (const char* folder = std::getenv("PALPATE_PICTURES"); folder != nullptr && !file.empty()) {
-            vtkNew<vtkPNGWriter> writer;
-            writer->SetInputConnection(grab->GetOutputPort());
-            writer->SetFileName((std::filesystem::path(folder) / (file + ".png")).c_str());
-            writer->Write();
-        }
-        vtkImageData& data = *grab->GetOutput();
-        Image image{data.GetDimensions()[0], data.GetDimensions()[1], {}};
-        const auto* first = static_cast<const std::uint8_t*>(data.GetScalarPointer());
-        image.bytes.assign(first, first + 3 * static_cast<std::size_t>(image.wide) * static_cast<std::size_t>(image.high));
-        return image;
-    }
-    // Where the 3-D view shows `p` [m].
-    glm::dvec2 project(glm::dvec3 p) const
-    {
-        vtkRenderer& view = *window_->GetRenderers()->GetFirstRenderer();
-        view.SetWorldPoint(1e3 * p.x, 1e3 * p.y, 1e3 * p.z, 1);
-        view.WorldToDisplay();
-        return {view.GetDisplayPoint()[0], view.GetDisplayPoint()[1]};
-    }
-    Picture& picture() { return *picture_; }
-    void resize(int wide, int high) { window_->SetSize(wide, high); }
-
-    const channel::Scenery scenery = bodyScenery();
-    const std::vector<std::uint8_t> labels;
-
-private:
-    std::optional<PrivateDisplay> display_;
-    vtkNew<vtkRenderWindow> window_;
-    std::unique_ptr<Picture> picture_;
-};
 
 class PictureTest : public testing::Test {
 protected:
@@ -172,9 +55,6 @@ struct Moment {
 };
 constexpr std::array<Moment, 5> moments{
     {{"rest", 0.6}, {"pressed", 1.99}, {"pierced", 2.15}, {"warned", 2.9}, {"fired", 4.2}}};
-constexpr std::array<std::pair<Layout, const char*>, 2> layouts{
-    {{Layout::trainee, "trainee"}, {Layout::instructor, "instructor"}}};
-
 // Of points along the needle's middle line the 3-D view shows the needle's colour, lit, at all but a few (the aim's ball
 // and texts may lie over it); before it has moved there it does not.
 TEST_F(PictureTest, ShowsTheBentNeedleWhereThePoseProjects)
@@ -272,6 +152,23 @@ TEST_F(PictureTest, TellsTheCoreAfterFiring)
     }
 }
 
+TEST_F(PictureTest, ShowsWhatWasMarkedInBodyAndSlice)
+{
+    const ScreenPlan plan(width, height);
+    const Pixel colour = pixelOf({markColour[0], markColour[1], markColour[2]});
+    const Image before = studio->take(0.05, Layout::trainee);
+    channel::State state = storyState(studio->scenery, 0.1);
+    const auto entry = studio->scenery.entry;
+    state.marks = 1;
+    for (std::size_t k = 0; k < 3; ++k)
+        state.mark[0].place[k] = static_cast<float>(entry[k]);
+    studio->picture().update(state, nullptr, {30, 0.02, 1000});
+    studio->picture().render(Quality::still);
+    const Image after = studio->grab("marked");
+    for (const Area& area : {plan.view, plan.slices[0]})
+        EXPECT_GT(after.count(area, colour, 60), before.count(area, colour, 60) + 15);
+}
+
 TEST_F(PictureTest, EveryPartOfTheInstructorsLayoutHasItsText)
 {
     const Image image = studio->take(4.2, Layout::instructor);
@@ -311,23 +208,29 @@ TEST_F(PictureTest, TheChosenTissueBecomesClearAndComesBack)
     EXPECT_EQ(before.differing(studio->grab(), view), 0);
 }
 
-// Whatever the number of rays was before: a picture without the body stays on the screen while the next is computed.
+// Whatever the number of rays was before, and wherever in the window the view is: a picture without the body stays on the
+// screen while the next is computed.
 TEST_F(PictureTest, TheBodyIsInEveryPictureWhenMotionBeginsAndStops)
 {
-    const Image whole = studio->take(0.05, Layout::trainee);
-    const Area view = ScreenPlan(width, height).view;
-    constexpr Pixel background{15, 18, 26};
-    const int body = view.width * view.height - whole.count(view, background, 6);
-    ASSERT_GT(body, view.width * view.height / 10);
-    Picture& picture = studio->picture();
-    int number = 0;
-    for (const Quality quality :
-         {Quality::moving, Quality::moving, Quality::still, Quality::still, Quality::moving, Quality::still}) {
-        picture.render(quality);
-        const Image now = studio->grab();
-        picture.finish(std::chrono::steady_clock::now() - std::chrono::milliseconds(quality == Quality::moving ? 60 : 0));
-        EXPECT_GT(view.width * view.height - now.count(view, background, 6), 0.9 * body) << "picture " << number;
-        ++number;
+    for (const auto& [layout, layoutName] : layouts) {
+        const Image whole = studio->take(0.05, layout);
+        const Area view = ScreenPlan(width, height, layout).view;
+        constexpr Pixel background{15, 18, 26};
+        const int body = view.width * view.height - whole.count(view, background, 6);
+        ASSERT_GT(body, view.width * view.height / 10);
+        Picture& picture = studio->picture();
+        int number = 0;
+        for (const Quality quality :
+             {Quality::moving, Quality::moving, Quality::still, Quality::still, Quality::moving, Quality::still}) {
+            picture.render(quality);
+            const Image now = studio->grab(layoutName + std::to_string(number));
+            const auto late = std::chrono::milliseconds(quality == Quality::moving ? 60 : 0);
+            picture.finish(std::chrono::steady_clock::now() - late);
+            const int seen = view.width * view.height - now.count(view, background, 6);
+            EXPECT_GT(seen, 0.9 * body) << layoutName << " " << number;
+            EXPECT_LT(now.differing(whole, view), body / 2) << layoutName << " " << number;
+            ++number;
+        }
     }
 }
 
@@ -435,42 +338,6 @@ TEST_F(PictureTest, WordsOfACtScanLieOnNothingElse)
     EXPECT_GT(scanned.count(left, {255, 255, 255}, 4), left.width * left.height / 2);
 }
 
-// In every window and with everything that there may be to say: words lie inside the window and on no other words.
-TEST_F(PictureTest, WordsLieInTheWindowAndNotOnEachOther)
-{
-    Picture& picture = studio->picture();
-    picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
-    picture.setSteps(true, 0, true);
-    constexpr std::array<std::pair<int, int>, 5> sizes{{{320, 320}, {420, 700}, {700, 320}, {500, 400}, {1280, 960}}};
-    for (const auto& [wide, high] : sizes)
-        for (const auto& [layout, layoutName] : layouts)
-            for (const double scale : {1.0, 2.0}) {
-                const std::string name = std::to_string(wide) + "x" + std::to_string(high) + "-" + layoutName + "-" +
-                                         std::to_string(static_cast<int>(scale));
-                studio->resize(wide, high);
-                picture.setDisplayScale(scale);
-                studio->take(2.9, layout, true, "words-" + name);
-                const std::vector<Written>& all = picture.written();
-                EXPECT_GT(all.size(), 12U) << name;
-                for (std::size_t a = 0; a < all.size(); ++a) {
-                    const Written& p = all[a];
-                    EXPECT_TRUE(p.low[0] >= 0 && p.high[0] <= wide + 1 && p.low[1] >= 0 && p.high[1] <= high)
-                        << name << ": '" << p.words << "' is cut off";
-                    for (std::size_t b = 0; b < a; ++b) {
-                        const Written& q = all[b];
-                        const bool shadow = q.words == p.words && std::abs(q.low[0] - p.low[0]) < 2;
-                        EXPECT_TRUE(shadow || p.high[0] <= q.low[0] + 1 || q.high[0] <= p.low[0] + 1 ||
-                                    p.high[1] <= q.low[1] + 1 || q.high[1] <= p.low[1] + 1)
-                            << name << ": '" << p.words << "' lies on '" << q.words << "'";
-                    }
-                }
-            }
-    picture.setCaption("");
-    picture.setSteps(false, 0, false);
-    picture.setDisplayScale(1);
-    studio->resize(width, height);
-}
-
 // under() is the inverse of the projection.
 TEST_F(PictureTest, FindsThePointUnderAPixel)
 {
@@ -478,6 +345,9 @@ TEST_F(PictureTest, FindsThePointUnderAPixel)
     for (const glm::dvec3 p : {glm::dvec3(0.0), glm::dvec3(0.01, -0.02, 0.005), vec(studio->scenery.entry)}) {
         const glm::dvec2 pixel = studio->project(p);
         EXPECT_LT(glm::distance(studio->picture().under({pixel.x, pixel.y}, p), p), 1e-6);
+        EXPECT_TRUE(studio->picture().shows(p));
+        for (const double past : {-0.1, 1.1})
+            EXPECT_FALSE(studio->picture().shows(studio->picture().under({past * width, pixel.y}, p)));
     }
 }
 

@@ -1,7 +1,9 @@
 #include <channel/needle_shape.h>
+#include <render/concealment.h>
 #include <render/events.h>
 #include <render/screen_plan.h>
 #include <render/shift_field.h>
+#include <render/tool_picture.h>
 #include <render/traces.h>
 #include <tests/render/body.h>
 
@@ -131,6 +133,39 @@ TEST(Events, TellTheStoryInOrder)
                                   EventKind::finished}));
     EXPECT_EQ(words(history.events[2], scenery), "near artery");
     EXPECT_EQ(words(history.events[3], scenery), "core: 83 % target");
+}
+
+TEST(Events, AMarkIsOneOfThem)
+{
+    channel::State before, now;
+    now.marks = 2;
+    const auto events = eventsBetween(before, now);
+    ASSERT_EQ(events.size(), 1U);
+    EXPECT_EQ(words(events[0], bodyScenery()), "mark 2");
+}
+
+// On the body, not at the middle of the fingertip's round end, which is a radius above it.
+TEST(Marks, AreWhereTheFrontOfTheFingertipWas)
+{
+    channel::Scenery scenery;
+    scenery.toolRadius = 6e-3;
+    channel::Mark mark;
+    mark.place = {0, -6e-3F, 0};
+    scenery.tool = channel::ToolKind::capsule;
+    EXPECT_LT(glm::length(markedPlace(scenery, mark)), 1e-9);
+    scenery.tool = channel::ToolKind::needle;
+    EXPECT_NEAR(markedPlace(scenery, mark).y, -6e-3, 1e-9);
+}
+
+// The planned line of a scene whose lump lies anywhere leads past it.
+TEST(Concealment, TakesTheLineOutOfAPalpationWhereverItIsShown)
+{
+    channel::Scenery scenery = bodyScenery();
+    conceal({}, scenery);
+    EXPECT_NE(scenery.entry, scenery.aim);
+    scenery.task = channel::Task::find;
+    conceal({}, scenery);
+    EXPECT_EQ(scenery.entry, scenery.aim);
 }
 
 TEST(History, KeepsPeaksThatNoPictureShows)

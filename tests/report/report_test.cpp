@@ -118,6 +118,43 @@ TEST(ReportData, TaskTimesArePercentiles)
 }
 
 // Nothing is loaded: no address of a network, no link, no source but data in the page. Text of the record stays text.
+// A finger that presses `times` times, each 2 mm beside the last.
+std::vector<haptics::TickRecord> presses(std::size_t times)
+{
+    std::vector<haptics::TickRecord> ticks(4 * times);
+    for (std::size_t n = 0; n < ticks.size(); ++n) {
+        const bool down = n % 4 == 2;
+        ticks[n].tick = n;
+        ticks[n].phase = down ? haptics::Phase::contact : haptics::Phase::free;
+        ticks[n].device.position = {2e-3 * static_cast<double>(n / 4 % 10), down ? 0.0 : -0.01, 0.0};
+    }
+    return ticks;
+}
+
+// Of a palpation with a lot of presses: a dot for each in each of the three views, or it is said how many are drawn.
+TEST(Report, EveryContactIsDrawnOrCounted)
+{
+    const synthetic::Folder folder;
+    const auto pathOf = [&](std::size_t times) {
+        const auto file = folder / std::to_string(times);
+        synthetic::record(file, synthetic::info(), presses(times));
+        writeReport(folder / "r.html", Record(file), {}, file);
+        return between(textOf(folder / "r.html"), "<h2>Path of the tip</h2>", "</section>");
+    };
+    const auto dots = [](const std::string& text) {
+        std::size_t count = 0;
+        for (auto at = text.find("fill=\"#b07040\""); at != std::string::npos; at = text.find("fill=\"#b07040\"", at + 1)) {
+            ++count;
+        }
+        return count;
+    };
+    const std::string all = pathOf(67), some = pathOf(700);
+    EXPECT_EQ(dots(all), 3 * 67U);
+    EXPECT_EQ(all.find("the first"), std::string::npos);
+    EXPECT_EQ(dots(some), 3 * 500U);
+    EXPECT_NE(some.find("where the tip met the skin (the first 500 of 700)"), std::string::npos);
+}
+
 TEST(Report, IsOneFileAndEscapesTheRecord)
 {
     const synthetic::Folder folder;

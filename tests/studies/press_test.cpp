@@ -160,13 +160,22 @@ TEST(Press, ForcesAreThoseOfATrial)
 }
 
 // A session with device "ideal" takes positions as they are: no encoder's half step lies between its force and that of the
-// path (15 um of a Premium's are 5 % at a depth of half a millimetre). A capsule lies flat, its windows under its middle.
+// path (15 um of a Premium's are 5 % at a depth of half a millimetre). A capsule lies flat, its windows under its middle;
+// touches with its back alone; with its middle alone, over the block's edge; and turns about its front.
 TEST(Press, ForcesAreThoseOfASessionWithoutEncoder)
 {
     const PosePath down = read("seconds,x_mm,y_mm,z_mm\n0,0,-5.5,0\n0.05,0,-4.5,0\n0.1,0,-4.5,0\n");
     const PosePath flat =
         read("seconds,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n0,10,-5.5,0,1,0,0\n0.1,10,-3,0,1,0,0\n0.2,10,-3,0,1,0,0\n");
-    for (const auto& [tool, path] : {std::pair{ball, down}, std::pair{toolOf(ToolKind::capsule, 5e-3, 20e-3), flat}}) {
+    const PosePath back =
+        read("seconds,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n0,16,-17.5,0,16,-12,0\n0.1,16,-15,0,16,-12,0\n");
+    const PosePath middle =
+        read("seconds,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n0,26,3,0,1,1,0\n0.1,24,5,0,1,1,0\n0.2,24,5,0,1,1,0\n");
+    const PosePath turning = read(
+        "seconds,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n0,10,-6.5,0,1,1,0\n0.2,10,-6.5,0,4,-1,0\n0.4,10,-6.5,0,4,-1,0\n");
+    const ToolSpec finger = toolOf(ToolKind::capsule, 5e-3, 20e-3);
+    for (const auto& [tool, path] : {std::pair{ball, down}, std::pair{finger, flat}, std::pair{finger, back},
+                                     std::pair{finger, middle}, std::pair{finger, turning}}) {
         haptics::SessionModel small = smallBlock("[safety]\ndevice = \"ideal\"\n");
         small.scene.model.level = datasets::ModelLevel::elastic;
         small.scene.tool = tool;
@@ -181,6 +190,7 @@ TEST(Press, ForcesAreThoseOfASessionWithoutEncoder)
             tick = session.tick(sample);
         }
         const PressSample own = pressed(model, path, {tool}).samples.back();
+        EXPECT_GT(glm::length(own.force), 0.004);
         EXPECT_LT(glm::distance(own.force, tick.tissueForce), 3e-3 * glm::length(own.force));
         EXPECT_NEAR(own.depth, tick.penetration, 2e-6);
     }

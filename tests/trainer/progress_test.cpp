@@ -85,6 +85,20 @@ TEST(Instructor, SessionsThatRunAreReadAsTheCommandWritesThem)
     EXPECT_FALSE(all[1].stuck) << "who pauses is not stuck";
 }
 
+// "0 (0 to 1)" with its bar in the middle: the median is a half.
+TEST(Instructor, MediansBetweenCountsAreNotRounded)
+{
+    const auto decimals = [](double median) {
+        json figures = json::parse(R"({"measures": [{"key": "passes", "label": "Passes", "unit": "", "decimals": 0}],
+            "groups": [{"name": "a", "n": 2, "median": {"passes": 0}, "lower_quartile": {"passes": 0},
+                        "upper_quartile": {"passes": 1}, "values": {"passes": [0, 1]}}]})");
+        figures["groups"][0]["median"]["passes"] = median;
+        return comparisonIn(figures).measures.at(0).decimals;
+    };
+    EXPECT_EQ(decimals(0.5), 1);
+    EXPECT_EQ(decimals(1), 0);
+}
+
 TEST(Instructor, MeasuresThatDoNotDifferAreNotCompared)
 {
     const Comparison c = comparisonIn(json::parse(R"({

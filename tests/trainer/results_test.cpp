@@ -35,6 +35,31 @@ TEST(Results, AreReadAsTheCommandWroteThem)
     EXPECT_EQ(r.measures[1].second, "2.04 N");
 }
 
+// Somebody who only looked has no score, and no best one.
+TEST(Results, ASessionThatTouchedNothingHasNone)
+{
+    const Folder folder;
+    std::string text = figures;
+    write(folder / "near-vessel-20260728-101500.json", text.replace(0, 1, R"({"contacts": 0, )"));
+    const Result r = readResult(folder / "near-vessel-20260728-101500.json");
+    EXPECT_TRUE(r.untouched);
+    EXPECT_NE(r.problem.find("never touched"), std::string::npos) << r.problem;
+    CaseEntry entry;
+    entry.id = "near-vessel";
+    EXPECT_FALSE(SessionFolder(folder / ".").best(entry));
+    write(folder / "a.json", std::string(figures).replace(0, 1, R"({"contacts": 1, )"));
+    EXPECT_EQ(readResult(folder / "a.json").problem, "");
+}
+
+// "100 of 100 points" and a loss of one contradict each other.
+TEST(Results, ALossThatTheTotalDoesNotShowIsNotTold)
+{
+    const Folder folder;
+    std::string text = figures;
+    write(folder / "a.json", text.replace(text.find("\"points\": 12"), 12, "\"points\": 0.4"));
+    EXPECT_TRUE(readResult(folder / "a.json").losses.empty());
+}
+
 TEST(Results, ABrokenFileIsAProblemAndNoCrash)
 {
     const Folder folder;
@@ -45,6 +70,17 @@ TEST(Results, ABrokenFileIsAProblemAndNoCrash)
         EXPECT_NE(readResult(folder / "b.json").problem, "") << text;
         EXPECT_TRUE(readDevices(folder / "b.json").done) << text;
     }
+}
+
+// A session that was killed leaves no figures, and its record is whole.
+TEST(Results, ASessionThatWasCutOffNamesItsRecordAndWhatReadsIt)
+{
+    const Folder folder;
+    write(folder / "killed.db", "a record");
+    const std::string record = (folder / "killed.db").string(), problem = readResult(folder / "killed.json").problem;
+    EXPECT_NE(problem.find("palpate-view --replay " + record), std::string::npos) << problem;
+    EXPECT_NE(problem.find("palpate score " + record), std::string::npos) << problem;
+    EXPECT_EQ(problem.find(".json"), std::string::npos) << problem;
 }
 
 TEST(Results, TheBestOfACaseIsThatOfItsOwnFiles)
@@ -95,6 +131,17 @@ TEST(Results, NameWhatThePointsAreForWhereNoCoreWasAskedFor)
     EXPECT_EQ(r.parts[0].name, "Rest on the skin");
     ASSERT_EQ(r.measures.size(), 1U);
     EXPECT_EQ(r.measures[0].second, "3.4 s");
+
+    // Of a palpation, whether the program says what it judged or is older.
+    for (const char* const judged : {R"("judged": "marks", )", ""}) {
+        write(folder / "b.json", std::string(R"({"score": {"total": 90, )") + judged +
+                                     R"("passes": 0, "best_target_pct": 0, "best_target_length_mm": 0, "mark_error_mm": 2.5,
+            "points": {"core": 40, "vital": 25, "technique": 25}, "losses": []}})");
+        const Result lump = readResult(folder / "b.json");
+        EXPECT_EQ(lump.parts.at(0).name, "Place and size");
+        ASSERT_EQ(lump.measures.size(), 1U);
+        EXPECT_EQ(lump.measures[0].second, "2.5 mm");
+    }
 }
 
 }  // namespace

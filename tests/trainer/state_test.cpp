@@ -68,6 +68,30 @@ TEST(State, TheBestScoreNeverFallsAndAFailedSessionIsNone)
     EXPECT_EQ(debrief(state), Errand::none) << "there is nothing to see again";
 }
 
+// Whatever else is looked at in between.
+TEST(State, ANoteThatIsNotKeptYetIsThereWhenItsSessionIsChosenAgain)
+{
+    State state = firstState();
+    Instructor& i = state.instructor;
+    i.everybody.sessions = {{"ada", 1, "", "", "", false, "", "calm", 3, {}}, {"ada", 2, "", "", "", false, "", "", 0, {}}};
+    chooseKept(state, 1);
+    i.note = "look at the probe";
+    i.rating = 4;
+    noteTyped(state);
+    EXPECT_TRUE(hasDraft(i, i.everybody.sessions[1]));
+    chooseKept(state, 0);
+    noteTyped(state);
+    EXPECT_EQ(i.note, "calm");
+    EXPECT_FALSE(hasDraft(i, i.everybody.sessions[0]));
+    chooseKept(state, 1);
+    EXPECT_EQ(i.note, "look at the probe");
+    EXPECT_EQ(i.rating, 4);
+    i.everybody.sessions[1].note = i.note;  // kept
+    i.everybody.sessions[1].rating = i.rating;
+    noteTyped(state);
+    EXPECT_FALSE(hasDraft(i, i.everybody.sessions[1]));
+}
+
 TEST(State, WhatIsSaidOnAScreenIsNotSaidOnTheNext)
 {
     State state = firstState();
@@ -211,9 +235,12 @@ TEST(Cases, AreReadAsTheCommandListsThem)
          "briefing": ["Reach it."]},
         {"id": "torn", "title": 3},
         {"id": "lump", "title": "Lump", "picture": "l.png", "difficulty": 1, "trains": [], "measures": ["mark_error_mm"],
-         "briefing": ["Feel.", "Mark."]}]})");
+         "briefing": ["Feel.", "Mark."]},
+        {"id": "touch", "title": "Touch", "picture": "l.png", "difficulty": 5, "trains": [], "measures": ["rest_s"],
+         "briefing": ["Rest."]}]})");
     const auto cases = casesOf(list);
-    ASSERT_EQ(cases.size(), 2U);
+    ASSERT_EQ(cases.size(), 3U);
+    EXPECT_TRUE(cases[1].core && !cases[2].core) << "where no core is asked for it is no core biopsy";
     EXPECT_EQ(cases[0].id, "lump");
     EXPECT_TRUE(cases[0].palpation && !cases[1].palpation);
     EXPECT_EQ(cases[0].steps.size(), 4U);

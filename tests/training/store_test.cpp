@@ -95,6 +95,10 @@ TEST(ProfileStore, RefusesNamesThatAreNone)
     EXPECT_NE(errorOf([&] { store.add("anna", Hand::right); }).find("already"), std::string::npos);
     EXPECT_NE(errorOf([&] { store.add("", Hand::right); }).find("1 to 100 bytes"), std::string::npos);
     EXPECT_NE(errorOf([&] { store.add("a\nb", Hand::right); }).find("one line"), std::string::npos);
+    for (const char* const name : {"  ", " bert", "bert "}) {
+        EXPECT_NE(errorOf([&] { store.add(name, Hand::right); }).find("begin or end with a blank"), std::string::npos)
+            << name;
+    }
     EXPECT_NE(errorOf([&] { store.find("ana"); }).find("did you mean anna?"), std::string::npos);
 }
 
@@ -157,14 +161,112 @@ TEST(ProfileStore, ErasedIsGoneFromTheBytesToo)
     store.store(anna, own);
     store.annotate(anna, store.store(anna, other), "a note on Annabella", 2);
     store.store(bert, sessionWith(3));
-    const auto stay = store.erase(anna);
-    ASSERT_EQ(stay.size(), 1U);
-    EXPECT_EQ(stay[0], folder / "elsewhere.db");
+    const Erased erased = store.erase(anna);
+    ASSERT_EQ(erased.elsewhere.size(), 1U);
+    EXPECT_EQ(erased.elsewhere[0], folder / "elsewhere.db");
     EXPECT_FALSE(fs::exists(store.recordFolder() / "own.db"));
     for (const char* file : {"p.db", "p.db-wal"}) {
         EXPECT_EQ(bytesOf(folder / file).find("Annabella"), std::string::npos) << file;
     }
     EXPECT_EQ(store.sessions(store.find("bert")).size(), 1U);
+}
+
+// A record as a session leaves it that is killed: a file and its log.
+void recordOfKilled(const fs::path& file, const std::string& operatorName)
+{
+    haptics::SessionInfo info = synthetic::info();
+    info.operatorName = operatorName;
+    fs::create_directories(file.parent_path());
+    const fs::path whole = file.string() + ".whole";
+    {
+        haptics::Recorder recorder(whole, info);
+        recorder.flush();
+        for (const char* suffix : {"", "-wal", "-shm"}) {
+            fs::copy_file(whole.string() + suffix, file.string() + suffix);
+        }
+    }
+    fs::remove(whole);
+}
+
+// Sessions of the window (folder "sessions") and of a terminal ("records"), kept or cut off, with logs, figures and pages.
+TEST(ProfileStore, ErasingLeavesNoFileOfThePersonAndAllOfOthers)
+{
+    const Folder folder;
+    ProfileStore store(folder / "p.db");
+    const Person anna = store.add("anna", Hand::right), bert = store.add("bert", Hand::right);
+    store.add("anna-2", Hand::right);
+    const fs::path window = folder / "sessions", records = folder / "records";
+    std::vector<fs::path> gone, stay;
+    const auto kept = [&](const Person& person, const fs::path& file, const std::string& operatorName) {
+        recordOfKilled(file, operatorName);
+        StoredSession s = sessionWith(1);
+        s.record = file.string();
+        store.store(person, s);
+    };
+    kept(anna, window / "kept.db", "anna");
+    kept(anna, window / "pseudonym.db", "P-07");
+    kept(bert, window / "of-bert.db", "bert");
+    kept(bert, records / "shared.db", "anna");
+    for (const char* const name : {"sessions/killed.db", "records/killed.db"}) {
+        recordOfKilled(folder / name, "anna");
+    }
+    for (const char* const name : {"sessions/anna-2.db", "records/berts.db", "sessions/nobodys.db"}) {
+        recordOfKilled(folder / name, std::string(name).find("anna") < 20 ? "anna-2" : name[0] == 'r' ? "bert" : "");
+    }
+    for (const char* const name : {"kept", "pseudonym", "killed", "progress-anna", "of-bert", "anna-2", "nobodys"}) {
+        std::ofstream(window / (std::string(name) + ".json")) << "{}";
+    }
+    for (const char* const name : {"progress-anna.html", "progress-anna-2.html", "groups.html", "damaged.db"}) {
+        std::ofstream(window / name) << std::string(5000, 'x');
+    }
+    for (const auto& entry : fs::recursive_directory_iterator(folder.path())) {
+        const std::string name = entry.path().filename().string();
+        const bool hers = name.starts_with("kept.") || name.starts_with("pseudonym.") || name.starts_with("killed.") ||
+                          name == "progress-anna.html";
+        (hers ? gone : stay).push_back(entry.path());
+    }
+    ASSERT_EQ(gone.size(), 4 * 3 + 3 + 1U);
+
+    const Erased erased = store.erase(anna);
+    for (const fs::path& file : gone) {
+        EXPECT_FALSE(fs::exists(file)) << file;
+    }
+    for (const fs::path& file : stay) {
+        EXPECT_TRUE(fs::exists(file)) << file;
+    }
+    EXPECT_EQ(erased.shared, std::vector<fs::path>{records / "shared.db"});
+    EXPECT_EQ(erased.unclear, std::vector<fs::path>{window / "damaged.db"});
+    EXPECT_TRUE(erased.elsewhere.empty() && erased.stuck.empty());
+    EXPECT_EQ(store.sessions(bert).size(), 2U);
+}
+
+// Names that differ in signs only have the same pages, which then tell of somebody who stays.
+TEST(ProfileStore, ErasingKeepsPagesThatTwoPeopleShare)
+{
+    const Folder folder;
+    ProfileStore store(folder / "p.db");
+    const Person one = store.add("anna 2", Hand::right);
+    store.add("anna-2", Hand::right);
+    fs::create_directories(folder / "sessions");
+    std::ofstream(folder / "sessions/progress-anna-2.html") << "x";
+    EXPECT_EQ(store.erase(one).shared, std::vector<fs::path>{folder / "sessions/progress-anna-2.html"});
+    EXPECT_TRUE(fs::exists(folder / "sessions/progress-anna-2.html"));
+    EXPECT_TRUE(store.erase(store.find("anna-2")).shared.empty());
+    EXPECT_FALSE(fs::exists(folder / "sessions/progress-anna-2.html"));
+}
+
+TEST(ProfileStore, TheWindowForgetsOnlyWhoIsErased)
+{
+    const Folder folder;
+    const fs::path settings = folder / "trainer.json";
+    std::ofstream(settings) << R"({"person": "anna", "text_scale": 1.5, "later": [1]})";
+    forgetLastPerson(settings, "bert");
+    EXPECT_NE(bytesOf(settings).find("anna"), std::string::npos);
+    forgetLastPerson(settings, "anna");
+    const auto left = nlohmann::json::parse(bytesOf(settings));
+    EXPECT_EQ(left, (nlohmann::json{{"person", ""}, {"text_scale", 1.5}, {"later", {1}}}));
+    forgetLastPerson(folder / "none.json", "anna");
+    EXPECT_FALSE(fs::exists(folder / "none.json"));
 }
 
 TEST(ProfileStore, ABackupIsTheWholeFile)

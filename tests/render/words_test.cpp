@@ -1,0 +1,85 @@
+#include <tests/render/studio.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace palpate::render {
+namespace {
+
+// One window for its tests, as it is slow to make.
+class WordsTest : public testing::Test {
+protected:
+    static void SetUpTestSuite() { studio = std::make_unique<Studio>(); }
+    static void TearDownTestSuite() { studio.reset(); }
+
+    static std::unique_ptr<Studio> studio;
+};
+std::unique_ptr<Studio> WordsTest::studio;
+
+void expectApart(const std::vector<Written>& all, int wide, int high, const std::string& name)
+{
+    for (std::size_t a = 0; a < all.size(); ++a) {
+        const Written& p = all[a];
+        EXPECT_TRUE(p.low[0] >= 0 && p.high[0] <= wide + 1 && p.low[1] >= 0 && p.high[1] <= high)
+            << name << ": '" << p.words << "' is cut off";
+        for (std::size_t b = 0; b < a; ++b) {
+            const Written& q = all[b];
+            const bool shadow = q.words == p.words && std::abs(q.low[0] - p.low[0]) < 2;
+            EXPECT_TRUE(shadow || p.high[0] <= q.low[0] + 1 || q.high[0] <= p.low[0] + 1 || p.high[1] <= q.low[1] + 1 ||
+                        q.high[1] <= p.low[1] + 1)
+                << name << ": '" << p.words << "' lies on '" << q.words << "'";
+        }
+    }
+}
+
+// All keys of the ultrasound window, in German the longest, can be read in a small one.
+TEST_F(WordsTest, AllKeysCanBeReadInASmallWindow)
+{
+    Picture& picture = studio->picture();
+    std::vector<KeyHelp> keys(46, {"Alt rechts links", "ihn um 1 mm quer bewegen; mit Umschalt um 2 Grad drehen"});
+    for (std::size_t i = 0; i < keys.size(); ++i)
+        keys[i].what = std::to_string(i) + " " + (i % 2 == 0 ? keys[i].what : "Ultraschallbild, Körper");
+    picture.setHelp(keys);
+    for (const auto& [wide, high] : {std::pair{640, 480}, {1280, 800}}) {
+        const std::string name = "help-" + std::to_string(wide);
+        studio->resize(wide, high);
+        studio->take(0.05, Layout::trainee, true, name);
+        const std::vector<Written> all = picture.written();
+        expectApart(all, wide, high, name);
+        const auto named = [](const Written& w) { return w.words == "Alt rechts links"; };
+        EXPECT_EQ(std::count_if(all.begin(), all.end(), named), 46) << name;
+        const auto row = std::find_if(all.begin(), all.end(), named);
+        EXPECT_GE(row->high[1] - row->low[1], 8) << name;
+    }
+    picture.setHelp({});
+    studio->resize(width, height);
+}
+
+// In every window and with everything that there may be to say: words lie inside the window and on no other words.
+TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
+{
+    Picture& picture = studio->picture();
+    picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
+    picture.setSteps(true, 0, true);
+    constexpr std::array<std::pair<int, int>, 5> sizes{{{320, 320}, {420, 700}, {700, 320}, {500, 400}, {1280, 960}}};
+    for (const auto& [wide, high] : sizes)
+        for (const auto& [layout, layoutName] : layouts)
+            for (const double scale : {1.0, 2.0}) {
+                const std::string name = std::to_string(wide) + "x" + std::to_string(high) + "-" + layoutName + "-" +
+                                         std::to_string(static_cast<int>(scale));
+                studio->resize(wide, high);
+                picture.setDisplayScale(scale);
+                studio->take(2.9, layout, true, "words-" + name);
+                const std::vector<Written>& all = picture.written();
+                EXPECT_GT(all.size(), 12U) << name;
+                expectApart(all, wide, high, name);
+            }
+    picture.setCaption("");
+    picture.setSteps(false, 0, false);
+    picture.setDisplayScale(1);
+    studio->resize(width, height);
+}
+
+}  // namespace
+}  // namespace palpate::render

@@ -1,0 +1,170 @@
+#include <training/belongings.h>
+
+#include <base/outputs.h>
+#include <haptics/record_format.h>
+
+#include <nlohmann/json.hpp>
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+#include <fstream>
+#include <optional>
+#include <system_error>
+
+namespace palpate::training {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+bool liesIn(const fs::path& file, const fs::path& folder)
+{
+    const fs::path relative = file.lexically_relative(fs::weakly_canonical(folder));
+    return !relative.empty() && *relative.begin() != ".." && *relative.begin() != ".";
+}
+
+// Whose session a record is, also of a writer that was killed; empty: nobody's, or no record. Nothing: cannot be read.
+std::optional<std::string> operatorOf(const fs::path& file)
+{
+    try {
+        const haptics::format::Database record(file.string(), SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX);
+        sqlite3_db_config(record.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+        sqlite3_db_config(record.get(), SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+        haptics::format::Statement tables(record, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'session'");
+        if (!tables.step()) {
+            return "";
+        }
+        haptics::format::Statement ask(record, "SELECT value FROM session WHERE key = 'operator'");
+        return ask.step() ? std::string(ask.text(0)) : "";
+    } catch (const std::runtime_error&) {
+        return std::nullopt;
+    }
+}
+
+// A record, or one that was being made.
+bool maybeRecord(const fs::path& file)
+{
+    return file.extension() == ".db" || file.extension() == ".part";
+}
+
+void removeOne(const fs::path& file, Erased& erased)
+{
+    std::error_code failed;
+    fs::remove(file, failed);
+    if (failed) {
+        erased.stuck.push_back(file);
+    }
+}
+
+// The record last: until it is gone it says whose the other files are.
+void removeRecord(const fs::path& file, Erased& erased)
+{
+    for (const char* suffix : {"-wal", "-shm", "-journal"}) {
+        removeOne(file.string() + suffix, erased);
+    }
+    if (file.extension() == ".db") {
+        removeOne(fs::path(file).replace_extension(".json"), erased);
+    }
+    removeOne(file, erased);
+}
+
+// What the trainer's window calls the pages of somebody's progress.
+std::string nameOfPages(std::string person)
+{
+    std::ranges::replace_if(
+        person, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; }, '-');
+    return "progress-" + person;
+}
+
+// People whose names differ in signs only share their pages, which then stay.
+void removePages(const Belongings& of, Erased& erased)
+{
+    const std::string pages = nameOfPages(of.name);
+    const bool shared =
+        std::ranges::any_of(of.otherNames, [&](const std::string& other) { return nameOfPages(other) == pages; });
+    for (const fs::path& folder : of.folders) {
+        for (const char* suffix : {".html", ".csv", ".xapi.json"}) {
+            const fs::path file = folder / (pages + suffix);
+            std::error_code none;
+            if (!shared) {
+                removeOne(file, erased);
+            } else if (fs::exists(file, none)) {
+                erased.shared.push_back(file);
+            }
+        }
+    }
+}
+
+bool isOfOthers(const fs::path& file, const Belongings& of)
+{
+    std::error_code none;
+    return of.ofOthers.contains(fs::weakly_canonical(file, none));
+}
+
+void removeUnlessShared(const fs::path& file, const Belongings& of, Erased& erased)
+{
+    if (!isOfOthers(file, of)) {
+        removeRecord(file, erased);
+    } else if (std::error_code none; fs::exists(file, none)) {
+        erased.shared.push_back(file);
+    }
+}
+
+}  // namespace
+
+Erased removeBelongings(const Belongings& of)
+{
+    Erased erased;
+    for (const fs::path& file : of.known) {
+        std::error_code none;
+        if (std::ranges::any_of(of.folders, [&](const fs::path& folder) { return liesIn(file, folder); })) {
+            removeUnlessShared(file, of, erased);
+        } else if (fs::exists(file, none)) {
+            erased.elsewhere.push_back(file);
+        }
+    }
+    std::vector<fs::path> found;
+    for (const fs::path& folder : of.folders) {
+        std::error_code none;
+        for (const auto& entry : fs::directory_iterator(folder, none)) {
+            if (maybeRecord(entry.path()) && !of.known.contains(fs::weakly_canonical(entry.path(), none))) {
+                found.push_back(entry.path());
+            }
+        }
+    }
+    std::ranges::sort(found);
+    for (const fs::path& file : found) {
+        const auto whose = operatorOf(file);
+        if (whose == of.name) {
+            removeUnlessShared(file, of, erased);
+        } else if (!whose && !isOfOthers(file, of)) {
+            erased.unclear.push_back(file);
+        }
+    }
+    removePages(of, erased);
+    return erased;
+}
+
+fs::path trainerSettings()
+{
+    if (const char* const config = std::getenv("XDG_CONFIG_HOME"); config != nullptr && *config == '/') {
+        return fs::path(config) / "palpate" / "trainer.json";
+    }
+    const char* const home = std::getenv("HOME");
+    return fs::path(home != nullptr ? home : "/tmp") / ".config" / "palpate" / "trainer.json";
+}
+
+void forgetLastPerson(const fs::path& settings, const std::string& name)
+{
+    std::ifstream in(settings);
+    auto json = nlohmann::json::parse(in, nullptr, false);
+    if (json.is_object() && json.contains("person") && json["person"] == name) {
+        json["person"] = "";
+        base::writeWhole(settings, json.dump(2) + "\n");
+    }
+}
+
+}  // namespace palpate::training
