@@ -420,7 +420,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     for (int i = 0; i < most + (isTouched && effort.far > 0.0 ? 1 : 0); ++i) {
         const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
         result.residual = refreshResidual(hasGone);
-        if (tolerance > 0.0 && result.residual <= tolerance * loadForce()) {
+        if (tolerance > 0.0 && result.residual <= std::max(tolerance * loadForce(), i < most ? 0.0 : options_.unfelt)) {
             if (!isOpen || effort.isTick) {
                 break;
             }

@@ -20,6 +20,7 @@ struct ElasticOptions {
     std::size_t maxSites = 4096;              // surface points and ties that are held at once, at least
     double touches = 0;       // surface of the tools that press: more sites where those need it, see sitesFor() [m^2]
     double tolerance = 0.01;  // no more once the forces out of balance are this fraction of the contacts' [-]
+    double unfelt = 0.0;      // and none beyond `cycles` while they are less than this [N]
     int heldPeriod = 3;       // of an ElasticLevel: see there
     bool warmStart = true;    // begin with the last call's increment; without, a call begins where the tissue lies
     const Kernels* kernels = nullptr;  // the arithmetic; null: the widest set of this machine. All have the same results

@@ -19,6 +19,9 @@ namespace {
 // The part of a needle's shaft that collision looks at, from the tip [m].
 constexpr double shaftQueried = 6e-3;
 constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
+// Out of balance by less, a tick has no cycle beyond those of its setting. A three hundredth of what a hand notices
+// (HandParameters::minFelt): it decides at the first and the last touch alone [N].
+constexpr double unfeltForce = 1e-3;
 
 // How much of the tool behind its tip collision looks at [m].
 double queriedLength(const datasets::ToolSpec& tool) noexcept
@@ -60,6 +63,7 @@ std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model,
     chainmail::ElasticOptions options = elasticOptions(model.scene.model.elastic, period);
     options.window = window;
     options.touches = touched;
+    options.unfelt = unfeltForce;
     return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
 }
 

@@ -3,6 +3,9 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include <algorithm>
+#include <limits>
+
 namespace palpate::volume {
 
 double ScalarField::at(Vec3 p) const noexcept
@@ -35,18 +38,50 @@ Vec3 ScalarField::gradient(Vec3 p) const noexcept
            grid.spacing;
 }
 
+// gradient() has no values on the outer side of the border.
+Vec3 DistanceField::slopeAt(Vec3 p) const noexcept
+{
+    const double h = 0.5 * grid.spacing;
+    const Box box = grid.box();
+    return gradient(glm::clamp(p, box.low + h, box.high - h));
+}
+
+// The point of the structure that is nearest to the border's point `c` lies at c - d n. The next `c` is where the way to it
+// enters the grid. Where the structure itself reaches the border, that is as near as is known.
+Vec3 DistanceField::fromNearest(Vec3 p, Vec3 c) const noexcept
+{
+    constexpr int rounds = 3;
+    const Box box = grid.box();
+    Vec3 way(std::numeric_limits<double>::max());
+    for (int i = 0; i < rounds; ++i) {
+        const Vec3 slope = slopeAt(c);
+        const double steepness = glm::length(slope);
+        // The grid holds the nearest point, so that the slope leads outwards; one that does not is not the structure's.
+        const Vec3 n = steepness > 1e-9 && glm::dot(slope, p - c) > 0.0 ? slope / steepness : glm::normalize(p - c);
+        const Vec3 found = p - c + std::max(at(c), 0.0) * n;
+        way = glm::length(found) < glm::length(way) ? found : way;
+        const Vec3 outside = p - glm::clamp(p, box.low, box.high);
+        double entry = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+            entry = std::max(entry, outside[axis] != 0.0 ? outside[axis] / way[axis] : 0.0);
+        }
+        c = glm::clamp(p - std::min(entry, 1.0) * way, box.low, box.high);
+    }
+    return way;
+}
+
 double DistanceField::distance(Vec3 p) const noexcept
 {
     const Box box = grid.box();
     const Vec3 inside = glm::clamp(p, box.low, box.high);
-    return at(inside) + glm::length(p - inside);
+    return inside == p ? at(p) : std::min(at(inside), 0.0) + glm::length(fromNearest(p, inside));
 }
 
 Vec3 DistanceField::normal(Vec3 p) const noexcept
 {
     const Box box = grid.box();
     const Vec3 inside = glm::clamp(p, box.low, box.high);
-    const Vec3 g = gradient(inside) + (p - inside) / grid.spacing;
+    const Vec3 g = inside == p ? slopeAt(p) : fromNearest(p, inside);
     const double length = glm::length(g);
     return length > 1e-9 ? g / length : Vec3(0, 0, 1);
 }

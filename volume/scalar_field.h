@@ -20,11 +20,17 @@ struct ScalarField {
 
 /// A signed distance [m], negative inside.
 struct DistanceField : ScalarField {
-    /// As ScalarField::at(), but outside the grid the way to the border is added, so that the result keeps growing.
+    /// As ScalarField::at(). Outside of the grid it is the distance to the structure's nearest point, which follows from
+    /// the border's values; where the structure reaches the border, to there.
     double distance(Vec3 p) const noexcept;
 
     /// Unit vector away from the structure; +z where the field is flat.
     Vec3 normal(Vec3 p) const noexcept;
+
+private:
+    Vec3 slopeAt(Vec3 p) const noexcept;
+    // To `p` outside of the grid, from the structure's nearest point; `c` is the border's point that is nearest to `p`.
+    Vec3 fromNearest(Vec3 p, Vec3 c) const noexcept;
 };
 
 }  // namespace palpate::volume

@@ -166,6 +166,28 @@ TEST(Elastic, ForceOfAFewCyclesIsNearTheConverged)
     EXPECT_GT(sum, 1.0);
 }
 
+// A ball that touches quickly: with forces that nobody feels left out of balance, ticks have fewer cycles beyond those of
+// the setting, and no force differs by more than that.
+TEST(Elastic, UnfeltForcesCostNoFurtherCycle)
+{
+    const ElasticBody block = body();
+    Elastic balanced(block, {}, tests::focusUnder(top));
+    Elastic felt(block, {.unfelt = 1e-3}, tests::focusUnder(top));
+    const auto most = static_cast<std::uint32_t>(ElasticOptions{}.cycles);
+    int longer = 0, longerFelt = 0;
+    for (int i = -10; i <= 50; ++i) {
+        const std::array tools{pressed(50e-6 * (i <= 20 ? i : 40 - i))};
+        const auto load = tests::loadOf(tools, {}, tools[0].shape.a);
+        longer += balanced.relax(load).cycles > most;
+        const ElasticResult result = felt.relax(load);
+        longerFelt += result.cycles > most;
+        EXPECT_LT(glm::distance(felt.toolForce(0), balanced.toolForce(0)), 1e-3) << i;
+        EXPECT_TRUE(result.cycles <= most || result.moved || result.residual > 1e-3) << i;
+    }
+    EXPECT_GE(longer, 4);
+    EXPECT_LE(longerFelt, longer / 2) << longer;
+}
+
 // What tools and ties push in, the fixed nodes hold.
 TEST(Elastic, ActionEqualsReaction)
 {

@@ -109,6 +109,25 @@ TEST(Distance, GradientIsTheUnitNormalAwayFromTheSphere)
 }
 
 // Volume where the trilinear field is negative, by `s`^3 samples of every cell.
+// A grid ends a few millimetres beside its structure, and a needle comes from further away.
+TEST(Distance, BeyondTheGridIsThatOfTheNearestPoint)
+{
+    for (const SphereCase& c : sphereCases()) {
+        const NodeGrid grid = coveringGrid({centre - radius, centre + radius}, c.spacing, 5e-3);
+        const DistanceField field = sphereField(c, grid);
+        std::mt19937 random(12);
+        std::uniform_real_distribution<double> within(-0.08, 0.08);
+        for (int i = 0; i < 5000; ++i) {
+            const Vec3 p = centre + Vec3(within(random), within(random), within(random));
+            const double d = glm::length(p - centre) - radius;
+            if (d > 5e-3) {
+                EXPECT_NEAR(field.distance(p), d, 0.6 * std::max(c.voxel, c.spacing)) << c.name;
+                EXPECT_GT(glm::dot(field.normal(p), glm::normalize(p - centre)), 0.97) << c.name;
+            }
+        }
+    }
+}
+
 double enclosedVolume(const DistanceField& field, int s)
 {
     const NodeGrid& grid = field.grid;
