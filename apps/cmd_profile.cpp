@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <base/counted.h>
 #include <base/outputs.h>
+#include <base/trainer_files.h>
 #include <command/json.h>
 #include <training/case.h>
 #include <training/curriculum.h>
@@ -100,7 +101,7 @@ void erase(const ProfileArguments& o)
     // The window has the people of the standard file.
     std::error_code none;
     if (o.profiles.empty() || fs::equivalent(store.file(), ProfileStore::standardFile(), none)) {
-        training::forgetLastPerson(training::trainerSettings(), person.name);
+        training::forgetLastPerson(base::trainerSettings(), person.name);
     }
     fmt::print("{}: erased\n", person.name);
     const auto tell = [](const std::vector<fs::path>& files, const std::string& what) {

@@ -113,7 +113,9 @@ LookAhead lookAhead(const SessionModel& model, const volume::Tissue::Reader& rea
     constexpr double reach = lookAheadSteps * lookAheadStep;
     const HolesNear holes(tip.needle.cuts, tip.proxy + 0.5 * reach * tool.axis, reach);
     const auto distanceTo = [&](std::size_t i, Vec3 p, bool hole) {
-        return hole ? farAway : model.structures[i].distance.distance(p);
+        const volume::DistanceField& field = model.structures[i].distance;
+        // All of a structure lies in its field's grid: from so far beside it no step of the line gets there.
+        return hole || field.besideGrid(p) > radius + 2.0 * lookAheadStep ? farAway : field.distance(p);
     };
     std::array<double, maxStructures> before{};
     Vec3 rest = tip.proxy;

@@ -19,8 +19,8 @@ namespace {
 // The part of a needle's shaft that collision looks at, from the tip [m].
 constexpr double shaftQueried = 6e-3;
 constexpr int smallWindow = 9;  // nodes deep: of the elastic level's step down
-// Out of balance by less, a tick has no cycle beyond those of its setting. A three hundredth of what a hand notices
-// (HandParameters::minFelt): it decides at the first and the last touch alone [N].
+// Out of balance by less, a tick has no cycle beyond those of its setting: a three hundredth of what a hand notices
+// (HandParameters::minFelt), and less than a step of any device's force [N].
 constexpr double unfeltForce = 1e-3;
 
 // How much of the tool behind its tip collision looks at [m].
@@ -58,12 +58,12 @@ double touchedByAll(const SessionModel& model, std::span<const chainmail::Elasti
 }
 
 std::unique_ptr<chainmail::ElasticLevel> elasticLevel(const SessionModel& model, chainmail::DisplacedLattice& shape,
-                                                      int window, double period, double touched)
+                                                      int window, const StabiliserOptions& of, double touched)
 {
-    chainmail::ElasticOptions options = elasticOptions(model.scene.model.elastic, period);
+    chainmail::ElasticOptions options = elasticOptions(model.scene.model.elastic, of.period);
     options.window = window;
     options.touches = touched;
-    options.unfelt = unfeltForce;
+    options.unfelt = std::min(unfeltForce, of.device.forceStep);
     return std::make_unique<chainmail::ElasticLevel>(shape, *model.elastic, model.surface, options, model.approach.entry);
 }
 
@@ -119,8 +119,9 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
     if (level_ == datasets::ModelLevel::elastic) {
         placeProbe();
         const double touched = touchedByAll(model, probe_.tools());
-        elastic_[0] = elasticLevel(model, deformation_.shape(), model.scene.model.elastic.window, options.period, touched);
-        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, options.period, touched);
+        const int window = model.scene.model.elastic.window;
+        elastic_[0] = elasticLevel(model, deformation_.shape(), window, stabiliserOptions_, touched);
+        elastic_[1] = elasticLevel(model, deformation_.shape(), smallWindow, stabiliserOptions_, touched);
     }
 }
 

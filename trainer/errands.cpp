@@ -3,6 +3,7 @@
 #include <base/outputs.h>
 #include <base/process.h>
 #include <base/temporary_folder.h>
+#include <base/trainer_files.h>
 #include <base/words.h>
 #include <trainer/lists.h>
 #include <trainer/running.h>
@@ -10,7 +11,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <functional>
 #include <list>
@@ -100,7 +100,7 @@ struct Errands::Impl {
         progressLoaded(state, state.person.empty() ? Progress() : progressIn(answerOf(state, progressWords(state.person))));
         if (state.settings.person != state.person) {
             state.settings.person = state.person;
-            state.notice = writeSettings(settingsFile(), state.settings);
+            state.notice = writeSettings(base::trainerSettings(), state.settings);
         }
         for (CaseEntry& c : state.cases) {
             c.best = state.person.empty() ? sink.best(c) : state.progress.best(c.id);
@@ -115,11 +115,8 @@ struct Errands::Impl {
     }
     fs::path output(const std::string& name)
     {
-        std::string plain = name;
-        std::ranges::replace_if(
-            plain, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; }, '-');
         base::makeFolders(sink.folder());
-        return sink.folder() / plain;
+        return sink.folder() / base::plainName(name);
     }
     // With what the desktop opens pages with; where it has nothing, the notice says where the page is.
     static void open(const fs::path& page)
@@ -130,7 +127,7 @@ struct Errands::Impl {
     }
     void writeProgress(State& state)
     {
-        const fs::path base = output("progress-" + state.person);
+        const fs::path base = output(base::progressPages(state.person));
         std::vector<std::string> words = progressWords(state.person);
         words.insert(words.end(), {"--html", base.string() + ".html", "--csv", base.string() + ".csv", "--xapi",
                                    base.string() + ".xapi.json"});
@@ -271,7 +268,7 @@ struct Errands::Impl {
     void keepSettings(State& state)
     {
         base::useLanguage(state.settings.language);
-        state.notice = writeSettings(settingsFile(), state.settings);
+        state.notice = writeSettings(base::trainerSettings(), state.settings);
     }
 
     // Hears a device's buttons as long as they work the window. The file of a firmware is taken once it is typed.

@@ -4,22 +4,12 @@
 
 #include <nlohmann/json.hpp>
 
-#include <cstdlib>
 #include <fstream>
 #include <system_error>
 
 namespace palpate::trainer {
 
 namespace fs = std::filesystem;
-
-fs::path settingsFile()
-{
-    if (const char* config = std::getenv("XDG_CONFIG_HOME"); config != nullptr && *config == '/') {
-        return fs::path(config) / "palpate" / "trainer.json";
-    }
-    const char* home = std::getenv("HOME");
-    return fs::path(home != nullptr ? home : "/tmp") / ".config" / "palpate" / "trainer.json";
-}
 
 Settings readSettings(const fs::path& file)
 {

@@ -14,8 +14,6 @@ struct Settings {
     std::string person;                // who trained last; empty: nobody
 };
 
-/// $XDG_CONFIG_HOME/palpate/trainer.json, or ~/.config/palpate/trainer.json.
-std::filesystem::path settingsFile();
 /// What is not there, or not as it should be, is as at first.
 Settings readSettings(const std::filesystem::path& file);
 /// @returns  what is wrong, for the user; empty: it is written

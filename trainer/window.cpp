@@ -1,5 +1,6 @@
 #include <trainer/window.h>
 
+#include <base/trainer_files.h>
 #include <base/words.h>
 #include <trainer/errands.h>
 #include <trainer/example.h>
@@ -33,7 +34,7 @@ ScreenFigures figuresOf(std::string screen, std::vector<double> seconds)
 State stateOf(const WindowOptions& options, Errands& errands)
 {
     State state;
-    state.settings = readSettings(settingsFile());
+    state.settings = readSettings(base::trainerSettings());
     base::useLanguage(state.settings.language);
     state.settings.textScale = options.textScale > 0 ? options.textScale : state.settings.textScale;
     errands.list(state);

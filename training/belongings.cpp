@@ -1,6 +1,7 @@
 #include <training/belongings.h>
 
 #include <base/outputs.h>
+#include <base/trainer_files.h>
 #include <haptics/record_format.h>
 
 #include <nlohmann/json.hpp>
@@ -8,8 +9,6 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cstdlib>
 #include <fstream>
 #include <optional>
 #include <system_error>
@@ -71,20 +70,12 @@ void removeRecord(const fs::path& file, Erased& erased)
     removeOne(file, erased);
 }
 
-// What the trainer's window calls the pages of somebody's progress.
-std::string nameOfPages(std::string person)
-{
-    std::ranges::replace_if(
-        person, [](unsigned char c) { return c < 0x80 && std::isalnum(c) == 0; }, '-');
-    return "progress-" + person;
-}
-
 // People whose names differ in signs only share their pages, which then stay.
 void removePages(const Belongings& of, Erased& erased)
 {
-    const std::string pages = nameOfPages(of.name);
+    const std::string pages = base::progressPages(of.name);
     const bool shared =
-        std::ranges::any_of(of.otherNames, [&](const std::string& other) { return nameOfPages(other) == pages; });
+        std::ranges::any_of(of.otherNames, [&](const std::string& other) { return base::progressPages(other) == pages; });
     for (const fs::path& folder : of.folders) {
         for (const char* suffix : {".html", ".csv", ".xapi.json"}) {
             const fs::path file = folder / (pages + suffix);
@@ -146,15 +137,6 @@ Erased removeBelongings(const Belongings& of)
     }
     removePages(of, erased);
     return erased;
-}
-
-fs::path trainerSettings()
-{
-    if (const char* const config = std::getenv("XDG_CONFIG_HOME"); config != nullptr && *config == '/') {
-        return fs::path(config) / "palpate" / "trainer.json";
-    }
-    const char* const home = std::getenv("HOME");
-    return fs::path(home != nullptr ? home : "/tmp") / ".config" / "palpate" / "trainer.json";
 }
 
 void forgetLastPerson(const fs::path& settings, const std::string& name)

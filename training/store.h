@@ -113,9 +113,7 @@ private:
     std::unique_ptr<Impl> impl_;
 };
 
-/// Where the trainer's window keeps its settings, and who trained last.
-std::filesystem::path trainerSettings();
-/// Clears who trained last, where it is this person. Throws std::runtime_error.
+/// Clears who trained last in the settings of the trainer's window, where it is this person. Throws std::runtime_error.
 void forgetLastPerson(const std::filesystem::path& settings, const std::string& name);
 
 /// Takes in a session from its record, e.g. from another machine: measures computed from the ticks, what it was trained for

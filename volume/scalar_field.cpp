@@ -77,6 +77,12 @@ double DistanceField::distance(Vec3 p) const noexcept
     return inside == p ? at(p) : std::min(at(inside), 0.0) + glm::length(fromNearest(p, inside));
 }
 
+double DistanceField::besideGrid(Vec3 p) const noexcept
+{
+    const Box box = grid.box();
+    return glm::distance(p, glm::clamp(p, box.low, box.high));
+}
+
 Vec3 DistanceField::normal(Vec3 p) const noexcept
 {
     const Box box = grid.box();

@@ -24,6 +24,10 @@ struct DistanceField : ScalarField {
     /// the border's values; where the structure reaches the border, to there.
     double distance(Vec3 p) const noexcept;
 
+    /// From `p` to the grid, 0 inside [m]. Where the structure lies in the grid, no more than distance(), in a
+    /// twentieth of its time there.
+    double besideGrid(Vec3 p) const noexcept;
+
     /// Unit vector away from the structure; +z where the field is flat.
     Vec3 normal(Vec3 p) const noexcept;
 

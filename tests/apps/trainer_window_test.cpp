@@ -101,6 +101,24 @@ struct Trainer {
         return {};
     }
     bool windowIsThere(const std::string& name) const { return !desktop.window(name).empty(); }
+    // From the list of cases to a session with its window, by `next` on each screen; nothing where one does not come.
+    std::optional<channel::Subscriber> sessionBy(const auto& next) const
+    {
+        for (const std::string screen : {"Case", "Device", "Briefing", "Session"}) {
+            if (!isAt(screen)) {
+                ADD_FAILURE() << "not at " << screen;
+                return std::nullopt;
+            }
+            wait(1);
+            if (screen != "Session")
+                next();
+        }
+        auto found = session();
+        if (found && windowIsThere("^Palpate$"))
+            return found;
+        ADD_FAILURE() << "no session with a window";
+        return std::nullopt;
+    }
 };
 
 TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
@@ -109,16 +127,8 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByMouseAlone)
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Trainer t;
     ASSERT_TRUE(t.open);
-    ASSERT_TRUE(t.isAt("Case"));
-    wait(1);
-    for (const char* next : {"Device", "Briefing", "Session"}) {
-        t.mainButton();
-        ASSERT_TRUE(t.isAt(next));
-        wait(1);
-    }
-    const auto eyes = t.session();
+    const auto eyes = t.sessionBy([&] { t.mainButton(); });
     ASSERT_TRUE(eyes);
-    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
     wait(1);
     // The needle waits on the planned line: the wheel alone goes along it.
     t.desktop.xdotool({"mousemove", "250", "400", "mousedown", "1"});
@@ -188,16 +198,8 @@ TEST(TrainerWindow, ABiopsyFromTheStartToTheDebriefByKeysAlone)
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Trainer t;
     ASSERT_TRUE(t.open);
-    ASSERT_TRUE(t.isAt("Case"));
-    wait(1);
-    for (const char* next : {"Device", "Briefing", "Session"}) {
-        t.key("Return");
-        ASSERT_TRUE(t.isAt(next));
-        wait(1);
-    }
-    const auto eyes = t.session();
+    const auto eyes = t.sessionBy([&] { t.key("Return"); });
     ASSERT_TRUE(eyes);
-    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
     wait(2);
     expectKeysMoveTheTool(t, *eyes);
     const auto go = [&](const char* key, auto until) {
@@ -234,16 +236,8 @@ TEST(TrainerWindow, EscapeAsksBeforeItEndsASession)
     if (!can())
         GTEST_SKIP() << "needs palpate-trainer, palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";
     const Trainer t;
-    ASSERT_TRUE(t.isAt("Case"));
-    wait(1);
-    for (const char* next : {"Device", "Briefing", "Session"}) {
-        t.key("Return");
-        ASSERT_TRUE(t.isAt(next));
-        wait(1);
-    }
-    const auto eyes = t.session();
+    const auto eyes = t.sessionBy([&] { t.key("Return"); });
     ASSERT_TRUE(eyes);
-    ASSERT_TRUE(t.windowIsThere("^Palpate$"));
     wait(2);
     t.key("Escape");
     wait(1);

@@ -49,6 +49,12 @@ Body bodyOf(std::mt19937& random, bool skewed)
     return {image, std::move(tissue), std::move(obstacles)};
 }
 
+Vec3 anyPlace(std::mt19937& random, const Body& body)
+{
+    std::uniform_real_distribution<double> any(-1, 1);
+    return body.image.affine.toPatient(Vec3(20, 13, 7) * (1.0 + Vec3(any(random), any(random), any(random))));
+}
+
 // By all voxels and 400 places along the segment: never less than the distance, and at most half a step more.
 double bySamples(const LabelImage& image, Vec3 from, Vec3 to)
 {
@@ -74,14 +80,10 @@ double bySamples(const LabelImage& image, Vec3 from, Vec3 to)
 TEST(VoxelObstacles, ADistanceIsThatOfTheNearestBox)
 {
     std::mt19937 random(3);
-    std::uniform_real_distribution<double> any(-1, 1);
     for (int trial = 0; trial < 6; ++trial) {
         const Body body = bodyOf(random, false);
         for (int line = 0; line < 8; ++line) {
-            const auto place = [&] {
-                return body.image.affine.toPatient(Vec3(20, 13, 7) * (1.0 + Vec3(any(random), any(random), any(random))));
-            };
-            const Vec3 from = place(), to = place();
+            const Vec3 from = anyPlace(random, body), to = anyPlace(random, body);
             const double sampled = bySamples(body.image, from, to);
             const double found = body.obstacles.distance(from, to, 1.0);
             EXPECT_LE(found, sampled + 2e-6);
@@ -96,14 +98,10 @@ TEST(VoxelObstacles, ADistanceIsThatOfTheNearestBox)
 TEST(VoxelObstacles, LeaningVoxelsAreNeverFurtherThanTheyAre)
 {
     std::mt19937 random(4);
-    std::uniform_real_distribution<double> any(-1, 1);
     for (int trial = 0; trial < 3; ++trial) {
         const Body body = bodyOf(random, true);
         for (int line = 0; line < 8; ++line) {
-            const auto place = [&] {
-                return body.image.affine.toPatient(Vec3(20, 13, 7) * (1.0 + Vec3(any(random), any(random), any(random))));
-            };
-            const Vec3 from = place(), to = place();
+            const Vec3 from = anyPlace(random, body), to = anyPlace(random, body);
             EXPECT_LE(body.obstacles.distance(from, to, 1.0), bySamples(body.image, from, to) + 2e-6);
         }
     }
