@@ -29,7 +29,7 @@ constexpr double margin = 1.2;            // of damping over the leak
 constexpr double frictionShare = 0.5;     // of the device's Coulomb friction is counted on
 constexpr double catchUpTime = 0.1;       // of the coupling, standing still [s]
 constexpr double restTime = 0.03;         // after which the hand stands still [s]
-constexpr double maxTissue = 100.0;       // of the cap: larger forces of tissue are that large
+constexpr double lateFall = 2e-3;         // way out of tissue that asks for more than the cap, before the cap falls [m]
 constexpr double noForce = 1e-9;          // what rounding leaves [N]
 constexpr double energyAllowed = 0.4e-3;  // that tissue may give beyond what it got [J]
 constexpr double energyRounding = 1e-9;   // of positions [m]
@@ -98,9 +98,23 @@ void watchRest(Vec3 position, const StabiliserOptions& o, StabiliserState& s) no
     s.resting = rests ? s.resting : position;
 }
 
+// Of a force above the cap, as much as tissue as stiff as this one has on `lateFall`. It is what the force falls by before
+// the tissue is back at the cap: a hand that is let go at full load would gain energy without it, and with all of what is
+// above the cap, the force would be gone long before the hand is out.
+Vec3 beyondCap(Vec3 basic, Vec3 position, double cap, StabiliserState& s) noexcept
+{
+    const double size = glm::length(basic);
+    if (size <= cap) {
+        s.atCap = position;
+        return basic;
+    }
+    const double deeper = -glm::dot(position - s.atCap, basic) / size;
+    return bounded(basic, cap + (size - cap) * (deeper > lateFall ? lateFall / deeper : 1.0));
+}
+
 // `limit` is the stable stiffness, `rise` how much the force may grow in this tick: pressed faster than that it falls
 // behind here, and not in a limit behind, so that on the way out it is already on its way down. The tissue's own change is
-// that without the cap, for the same reason.
+// that beyond the cap, for the same reason; see beyondCap().
 Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const StabiliserOptions& o,
             StabiliserState& s) noexcept
 {
@@ -127,12 +141,17 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
 }
 
 // How much the force may change where it falls with the motion: that which was estimated, and no more than was read. In
-// periods under a millisecond the way is one of encoder steps: there the speed says what it was, nearly.
-double maxFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness, double period) noexcept
+// periods under a millisecond the way is one of encoder steps: there the speed says what it was, less what half a step may
+// have added to it.
+double maxFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness,
+               const StabiliserOptions& o) noexcept
 {
-    const double estimated = period >= tickSeconds
-                                 ? slew + stiffness * glm::length(way)
-                                 : std::max(slew, fallShare * slew + stiffness * period * glm::length(motion.velocity));
+    double estimated = slew + stiffness * glm::length(way);
+    if (o.period < tickSeconds) {
+        const double sure = motion.time * glm::length(motion.velocity) - 0.5 * o.device.encoder;
+        const double speed = motion.time > 0.0 ? std::max(0.0, sure) / motion.time : 0.0;
+        estimated = std::max(slew, fallShare * slew + stiffness * o.period * speed);
+    }
     return std::min(estimated, slew + stiffness * read);
 }
 
@@ -242,7 +261,8 @@ Motion motionIn(const MotionWindow& w, double encoder, double period) noexcept
     const auto stiffness = [&](const auto& of) {
         return square > 0.0 ? std::max(0.0, -glm::dot(change(of), way) / square) : 0.0;
     };
-    return {way / (static_cast<double>(length) * period), stiffness(w.force), stiffness(w.basic)};
+    const double time = static_cast<double>(length) * period;
+    return {way / time, time, stiffness(w.force), stiffness(w.basic)};
 }
 
 SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec3 read, const StabiliserOptions& o,
@@ -266,9 +286,9 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
     } else {
         const StableLimits limits = stableLimits(o);
         const double slew = slewRate * o.period * cap;
-        // What is over the cap is no force to return from later; and the ramp alone brings in what is there at the start.
-        const Vec3 tissue = bounded(basic, maxTissue * cap);
+        const Vec3 tissue = beyondCap(basic, device.position, cap, s);
         if (s.gain <= 0.0) {
+            // The ramp alone brings in what is there at the start.
             s.tissue = tissue;
             s.coupled = bounded(tissue, cap);
         }
@@ -289,7 +309,7 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
         // A spring that is let go gives energy where its force does not fall with the motion.
         const bool falls =
             device.fresh && glm::dot(s.sent.basic, way) > 0.0 && glm::length(sent.total()) < glm::length(s.sent.total());
-        sent = towards(s.sent, sent, falls ? maxFall(way, readWay, motion, slew, limits.stiffness, o.period) : slew, cap);
+        sent = towards(s.sent, sent, falls ? maxFall(way, readWay, motion, slew, limits.stiffness, o) : slew, cap);
     }
     s.sent = sent;
     s.ledger.sent[s.ledger.ticks++ % EnergyLedger::longest] = sent;

@@ -60,6 +60,7 @@ struct MotionWindow {
 /// What the window says of the motion.
 struct Motion {
     Vec3 velocity{0.0};    // [m/s]
+    double time = 0;       // that it is the mean of [s]
     double stiffness = 0;  // what the force fell by along the way, over the way [N/m]
     double basic = 0;      // the same of the tissue's part [N/m]
 };
@@ -86,7 +87,8 @@ struct StabiliserState {
     double unsettled = 0;  // time that a pose that jumped still has to hold still [s]
     Vec3 resting{0.0};     // where the hand stands still [m], and since when [s]
     double rest = 0;
-    Vec3 tissue{0.0};   // basic force of the tick before, as computed [N]
+    Vec3 tissue{0.0};   // basic force of the tick before, as computed, see beyondCap() [N]
+    Vec3 atCap{0.0};    // where it was last within the cap [m]
     Vec3 coupled{0.0};  // what the virtual coupling made of it [N]
     MotionWindow window;
     EnergyLedger ledger;

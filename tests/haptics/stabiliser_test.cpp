@@ -282,6 +282,34 @@ TEST(Stabiliser, NoWallGivesEnergy)
     }
 }
 
+// Soft tissue pressed to three times what the device can do, and left at 20 mm/s: all the way out the force is that of the
+// tissue, or the cap, less at most what the tissue has on 2 mm. It is not gone as soon as the hand turns round.
+TEST(Stabiliser, TissueBeyondTheCapIsFeltOnTheWayOut)
+{
+    constexpr double speed = 20e-3;
+    for (const auto& name : deviceNames()) {
+        const StabiliserOptions o{deviceParameters(name), tickSeconds, 8.5};
+        const double cap = std::min(8.5, o.device.peakForce);
+        constexpr double stiffness = 800.0;
+        const double deepest = 3.0 * cap / stiffness;
+        StabiliserState state;
+        sendFor(1.0, Vec3(0.0), heldAt(Vec3(0.0)), o, state);
+        double depth = 0.0;
+        const auto send = [&](double by) {
+            depth += by;
+            return -stabilise(Vec3(-stiffness * depth, 0, 0), Vec3(0.0), heldAt({depth, 0, 0}), o, state).total().x;
+        };
+        while (depth < deepest) {
+            send(speed * tickSeconds);
+        }
+        while (depth > 1e-3) {
+            const double sent = send(-speed * tickSeconds), asked = std::min(stiffness * depth, cap);
+            EXPECT_GT(sent, 0.98 * asked - stiffness * 2e-3) << name << " " << depth;
+            EXPECT_LT(sent, asked + 1e-6) << name << " " << depth;
+        }
+    }
+}
+
 // A spring that nobody holds has nothing but the controller to calm it.
 TEST(Stabiliser, SpringsLetGoAtFullLoadDecay)
 {
