@@ -1,7 +1,7 @@
 #include <apps/command.h>
 #include <base/counted.h>
 #include <base/outputs.h>
-#include <base/trainer_files.h>
+#include <base/user_files.h>
 #include <command/json.h>
 #include <training/case.h>
 #include <training/curriculum.h>

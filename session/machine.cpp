@@ -3,6 +3,7 @@
 #include <base/build.h>
 #include <base/outputs.h>
 #include <base/processor_time.h>
+#include <base/user_files.h>
 #include <datasets/scene.h>
 #include <haptics/simulation.h>
 #include <haptics/timing.h>
@@ -13,7 +14,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <memory>
 #include <string_view>
@@ -170,13 +170,8 @@ FittingSetting fittingHere(const std::filesystem::path& cache, bool probe)
 
 std::filesystem::path machineCache()
 {
-    const char* folder = std::getenv("XDG_CACHE_HOME");
-    if (folder != nullptr && *folder == '/') {
-        return std::filesystem::path(folder) / "palpate" / "machine.json";
-    }
-    const char* home = std::getenv("HOME");
-    return home != nullptr && *home == '/' ? std::filesystem::path(home) / ".cache" / "palpate" / "machine.json"
-                                           : std::filesystem::path();
+    const std::filesystem::path folder = base::userFolder(base::UserFolder::cache);
+    return folder.empty() ? folder : folder / "machine.json";
 }
 
 }  // namespace palpate::session

@@ -38,7 +38,7 @@ TickTime measureSetting(const std::string& setting, bool probe = false);
 /// @param probe  of a scene with an ultrasound probe: the body has two tools to bear
 FittingSetting fittingHere(const std::filesystem::path& cache, bool probe = false);
 
-/// $XDG_CACHE_HOME/palpate/machine.json or ~/.cache/palpate/machine.json; empty where there is no home.
+/// machine.json of base::UserFolder::cache; empty where there is none.
 std::filesystem::path machineCache();
 
 }  // namespace palpate::session

@@ -3,7 +3,7 @@
 #include <base/outputs.h>
 #include <base/process.h>
 #include <base/temporary_folder.h>
-#include <base/trainer_files.h>
+#include <base/user_files.h>
 #include <base/words.h>
 #include <trainer/lists.h>
 #include <trainer/running.h>

@@ -1,6 +1,7 @@
 #include <trainer/results.h>
 
 #include <base/said.h>
+#include <base/user_files.h>
 #include <trainer/state.h>
 
 #include <fmt/chrono.h>
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <stdexcept>
@@ -215,11 +215,8 @@ std::optional<double> SessionFolder::best(const CaseEntry& of) const
 
 fs::path sessionsFolder()
 {
-    if (const char* data = std::getenv("XDG_DATA_HOME"); data != nullptr && *data != '\0') {
-        return fs::path(data) / "palpate" / "sessions";
-    }
-    const char* home = std::getenv("HOME");
-    return fs::path(home != nullptr ? home : "/tmp") / ".local" / "share" / "palpate" / "sessions";
+    const fs::path data = base::userFolder(base::UserFolder::data);
+    return (data.empty() ? fs::temp_directory_path() / "palpate" : data) / "sessions";
 }
 
 }  // namespace palpate::trainer

@@ -45,7 +45,7 @@ private:
     std::filesystem::path folder_;
 };
 
-/// $XDG_DATA_HOME/palpate/sessions, or ~/.local/share/palpate/sessions.
+/// `sessions` of base::UserFolder::data; without a home, of a folder for temporary files.
 std::filesystem::path sessionsFolder();
 
 }  // namespace palpate::trainer

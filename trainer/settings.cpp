@@ -43,6 +43,9 @@ std::string writeSettings(const fs::path& file, const Settings& settings)
                               {"sounds", settings.sounds},
                               {"text_scale", settings.textScale},
                               {"person", settings.person}};
+    if (file.empty()) {
+        return std::string("trainer.json") + base::tr(": the settings cannot be kept");
+    }
     std::error_code failed;
     fs::create_directories(file.parent_path(), failed);
     const fs::path fresh = file.string() + ".new";

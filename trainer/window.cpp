@@ -1,6 +1,6 @@
 #include <trainer/window.h>
 
-#include <base/trainer_files.h>
+#include <base/user_files.h>
 #include <base/words.h>
 #include <trainer/errands.h>
 #include <trainer/example.h>

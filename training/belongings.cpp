@@ -1,7 +1,7 @@
 #include <training/belongings.h>
 
 #include <base/outputs.h>
-#include <base/trainer_files.h>
+#include <base/user_files.h>
 #include <haptics/record_format.h>
 
 #include <nlohmann/json.hpp>

@@ -1,6 +1,7 @@
 #include <training/folders.h>
 
 #include <base/child_process.h>
+#include <base/user_files.h>
 
 #include <cstdlib>
 #include <set>
@@ -21,15 +22,11 @@ fs::path installedData()
 
 fs::path userData()
 {
-    // The XDG base directory specification: a path that is not absolute is ignored.
-    if (const char* const named = std::getenv("XDG_DATA_HOME"); named != nullptr && *named == '/') {
-        return fs::path(named) / "palpate";
-    }
-    const char* const home = std::getenv("HOME");
-    if (home == nullptr || *home == 0) {
+    fs::path folder = base::userFolder(base::UserFolder::data);
+    if (folder.empty()) {
         throw std::runtime_error("profiles: neither XDG_DATA_HOME nor HOME says where they are: give --profiles FILE");
     }
-    return fs::path(home) / ".local" / "share" / "palpate";
+    return folder;
 }
 
 std::vector<fs::path> dataFolders(const char* kind)

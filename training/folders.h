@@ -10,7 +10,7 @@ namespace palpate::training {
 /// Where data that come along lie: share/palpate beside the program's folder, or the folder that PALPATE_DATA names.
 std::filesystem::path installedData();
 
-/// Where this user's data lie: $XDG_DATA_HOME/palpate, else ~/.local/share/palpate. Not made here.
+/// base::UserFolder::data.
 /// Throws std::runtime_error where neither XDG_DATA_HOME nor HOME is set.
 std::filesystem::path userData();
 

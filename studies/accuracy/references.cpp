@@ -2,6 +2,7 @@
 
 #include <base/child_process.h>
 #include <base/process.h>
+#include <base/user_files.h>
 
 #include <fmt/format.h>
 
@@ -91,13 +92,9 @@ ReferenceFolders referenceFolders(const fs::path& own)
 {
     ReferenceFolders out;
     out.own = own;
-    const char* const cache = std::getenv("XDG_CACHE_HOME");
-    const char* const home = std::getenv("HOME");
     if (own.empty()) {
-        const fs::path base = cache != nullptr && *cache != '\0' ? fs::path(cache)
-                              : home != nullptr                  ? fs::path(home) / ".cache"
-                                                                 : fs::temp_directory_path();
-        out.own = base / "palpate" / "references";
+        const fs::path cache = base::userFolder(base::UserFolder::cache);
+        out.own = (cache.empty() ? fs::temp_directory_path() / "palpate" : cache) / "references";
     }
     out.others = {base::programFolder().parent_path() / "share" / "palpate" / "references", PALPATE_REFERENCES};
     return out;

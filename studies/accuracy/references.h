@@ -16,7 +16,7 @@ struct ReferenceFolders {
     std::filesystem::path own;                  // new ones are written here
     std::vector<std::filesystem::path> others;  // that come with the program
 };
-/// @param own  "" = $XDG_CACHE_HOME/palpate/references (~/.cache without it)
+/// @param own  "" = `references` of base::UserFolder::cache
 ReferenceFolders referenceFolders(const std::filesystem::path& own);
 
 using SolvedReference = std::pair<Reference, ReferenceInfo>;

@@ -29,6 +29,8 @@ TEST(Settings, AreThereAgain)
     EXPECT_EQ(s.textScale, 1.5);
     EXPECT_EQ(s.person, "Ada");
     EXPECT_NE(writeSettings("/proc/none/trainer.json", s), "") << "cannot be written, and says so";
+    EXPECT_NE(writeSettings({}, s), "") << "a user without a home";
+    EXPECT_FALSE(std::filesystem::exists(".new"));
 }
 
 TEST(Settings, WhatIsNotAsItShouldBeIsAsAtFirst)
