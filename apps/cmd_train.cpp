@@ -358,8 +358,8 @@ void train(TrainArguments o)
     // Only a session that keeps time needs ticks that fit in it.
     std::string fitted;
     if (!o.unpaced) {
-        o.changes.fit = [&fitted](bool probe) {
-            const session::FittingSetting fitting = session::fittingHere(session::machineCache(), probe);
+        o.changes.fit = [&fitted](const datasets::Scene& scene) {
+            const session::FittingSetting fitting = session::fittingHere(session::machineCache(), session::loadOf(scene));
             fitted = fmt::format("setting {}: {}", fitting.setting, fitting.reason);
             return fitting.setting;
         };

@@ -71,7 +71,7 @@ Vec3 Elastic::displacementOf(Index3 cell) const noexcept
 void Elastic::settle() noexcept
 {
     products_.reset();
-    siteCount_ = 0;
+    siteCount_ = touching_ = 0;
     for (HeldTool& held : held_) {
         held.forgetContacts();
     }
@@ -106,22 +106,58 @@ std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> too
     return tools_;
 }
 
-// True when the sites found for an earlier call still serve: nothing moved far.
-bool Elastic::sitesHold(const ElasticLoad& load, bool moved) noexcept
+// True when the surface points found for an earlier call still serve: no tool moved far.
+bool Elastic::sitesHold(std::span<const ElasticTool> tools) const noexcept
 {
-    if (moved || atRest_ || load.tools.size() != foundFor_.size() || load.ties.size() != tiesFound_.size()) {
+    if (atRest_ || tools.size() != foundFor_.size()) {
         return false;
     }
     const double spacing = stack_.body().levels.front().nodes.spacing, far = drift * spacing;
     for (std::size_t i = 0; i < foundFor_.size(); ++i) {
-        const auto& now = load.tools[i].shape;
+        const auto& now = tools[i].shape;
         const auto& [then, isQuartered] = foundFor_[i];
         if (glm::distance(now.a, then.a) > far || glm::distance(now.b, then.b) > far || now.radiusA != then.radiusA ||
-            now.radiusB != then.radiusB || isQuartered != touchesLittle(load.tools[i], spacing)) {
+            now.radiusB != then.radiusB || isQuartered != touchesLittle(tools[i], spacing)) {
             return false;
         }
     }
-    return std::ranges::equal(load.ties, tiesFound_, [](const Tie& a, const Tie& b) { return a.holdsAs(b); });
+    return true;
+}
+
+bool Elastic::tiesHold(std::span<const Tie> ties) const noexcept
+{
+    return std::ranges::equal(ties, tiesFound_, [](const Tie& a, const Tie& b) { return a.holdsAs(b); });
+}
+
+// Finds the points that tools may touch, and behind them in the list the ties: a needle that goes on has other ones in every
+// call, and a probe beside it the same points.
+void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
+{
+    const bool toolsHold = !moved && sitesHold(load.tools);
+    if (toolsHold && tiesHold(load.ties)) {
+        return;
+    }
+    const double spacing = stack_.body().levels.front().nodes.spacing;
+    std::size_t fresh = touching_;  // the first site that is new
+    if (!toolsHold) {
+        for (const ContactSite& s : sites()) {
+            if (!s.isTie) {
+                slip_[s.point] = Vec3f(s.slip);
+            }
+        }
+        fresh = 0;
+        touching_ = findSites(stack_.body(), stack_.windows(), load.tools, shapes_, reach * spacing, sites_);
+        foundFor_.clear();
+        for (const ElasticTool& tool : load.tools) {
+            foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});
+        }
+    }
+    siteCount_ = touching_ + findTies(stack_.body(), stack_.windows(), load.ties, std::span(sites_).subspan(touching_));
+    tiesFound_.assign(load.ties.begin(),
+                      load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
+    for (ContactSite& s : active().subspan(fresh)) {
+        s.slip = s.isTie ? Vec3(0.0) : Vec3(slip_[s.point]);
+    }
 }
 
 void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
@@ -131,24 +167,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
         shapes_.emplace_back(tool.shape);
     }
     ties_ = load.ties;
-    if (!sitesHold(load, moved)) {
-        const double spacing = stack_.body().levels.front().nodes.spacing, near = reach * spacing;
-        for (const ContactSite& s : sites()) {
-            if (!s.isTie) {
-                slip_[s.point] = Vec3f(s.slip);
-            }
-        }
-        siteCount_ = findSites(stack_.body(), stack_.windows(), load, shapes_, near, sites_);
-        foundFor_.clear();
-        for (const ElasticTool& tool : load.tools) {
-            foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});
-        }
-        tiesFound_.assign(load.ties.begin(),
-                          load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
-        for (ContactSite& s : active()) {
-            s.slip = s.isTie ? Vec3(0.0) : Vec3(slip_[s.point]);
-        }
-    }
+    findSitesOf(load, moved);
     drag(load);
     spreadPressure();
     for (ContactSite& s : active()) {
@@ -404,29 +423,59 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     if (hasLain) {
         remember(load.periods);
     }
-    const double start = result.start = energy_ + contactEnergy();
+    course_ = {.effort = effort, .start = energy_ + contactEnergy()};
+    result.start = course_.start;
     startEnergy_ = energy_;
-    bool isOpen = false;  // the tissue's force was not evaluated where it is
-    bool hasGone = false;
     if (hasIncrement_) {
-        hasGone = warmStart(result);
-        isOpen = hasGone && !volume::isSmall(options_.law);
+        course_.hasGone = warmStart(result);
+        course_.isOpen = course_.hasGone && !volume::isSmall(options_.law);
     } else {
         forgetIncrement();
     }
     hasIncrement_ = options_.warmStart;
     // No hand feels tissue that springs back.
-    const int most = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
-    for (int i = 0; i < most + (isTouched && effort.far > 0.0 ? 1 : 0); ++i) {
-        const double tolerance = i == 0 ? effort.first : i < most ? effort.further : effort.far;
-        result.residual = refreshResidual(hasGone);
-        if (tolerance > 0.0 && result.residual <= std::max(tolerance * loadForce(), i < most ? 0.0 : options_.unfelt)) {
-            if (!isOpen || effort.isTick) {
+    course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
+    course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
+    // A call that has only a part of the cycles has none beside a move, which costs as much as two.
+    solve(effort.inParts ? (result.moved ? 0 : 1) : course_.last, result);
+    finish(result);
+    return result;
+}
+
+ElasticResult Elastic::goOn() noexcept
+{
+    ElasticResult result;
+    if (atRest_ || course_.next >= course_.last) {
+        return result;
+    }
+    result.start = energy_ + contactEnergy();
+    result.cycles = static_cast<std::uint32_t>(course_.next);
+    solve(1, result);
+    finish(result);
+    return result;
+}
+
+bool Elastic::isBalanced(double residual, double tolerance) const noexcept
+{
+    const double unfelt = course_.next < course_.usual ? 0.0 : options_.unfelt;
+    return tolerance > 0.0 && residual <= std::max(tolerance * loadForce(), unfelt);
+}
+
+// Cycles until the forces are balanced, `most` at most. The force is evaluated where that ends.
+void Elastic::solve(int most, ElasticResult& result) noexcept
+{
+    Course& c = course_;
+    for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
+        const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? c.effort.further : c.effort.far;
+        result.residual = refreshResidual(c.hasGone);
+        if (isBalanced(result.residual, tolerance)) {
+            if (!c.isOpen || c.effort.isTick) {
+                c.next = c.last;
                 break;
             }
             // The force was carried along; it may be another where the tissue is now.
-            isOpen = hasGone = false;
-            if (confirm(start)) {
+            c.isOpen = c.hasGone = false;
+            if (confirm(c.start)) {
                 refreshForces();
             } else {
                 again(result);
@@ -434,26 +483,30 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
             continue;
         }
         ++result.cycles;
-        hasGone = oneCycle(isOpen ? start : noLimit, result);
-        if (!hasGone && isOpen && !confirm(start)) {
+        c.hasGone = oneCycle(c.isOpen ? c.start : noLimit, result);
+        if (!c.hasGone && c.isOpen && !confirm(c.start)) {
             again(result);
-        } else if (!hasGone) {
+        } else if (!c.hasGone) {
             refreshForces();
             forgetStep();
         }
-        isOpen = false;
+        c.isOpen = false;
     }
-    if (isOpen && !confirm(start)) {
+    if (c.isOpen && !confirm(c.start)) {
         again(result);
     }
+    c.isOpen = false;
+}
+
+void Elastic::finish(ElasticResult& result) noexcept
+{
     if (!std::isfinite(energy_ + contactEnergy())) {
         startAnew();
-        return result;
+        return;
     }
     letSlip();
     balance();
     measure(result);
-    return result;
 }
 
 // Virtual work along the displacement itself: the tissue's own, over that of the contacts.

@@ -73,11 +73,18 @@ public:
 
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
-    ElasticResult relax(const ElasticLoad& load) noexcept
+    ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
+    /// As relax(), with at most one cycle; goOn() has the others. So a load whose force nobody waits for spreads over
+    /// calls.
+    ElasticResult begin(const ElasticLoad& load) noexcept
     {
-        const double t = options_.tolerance;
-        return relaxWhile(load, {options_.cycles, t, furtherCycles * t, farOff * t});
+        Effort part = tick();
+        part.inParts = true;
+        return relaxWhile(load, part);
     }
+    /// Goes on with the last load by at most one cycle, and by none where relax() would have stopped by now. What the load
+    /// refers to must still live.
+    ElasticResult goOn() noexcept;
     /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces. No tool is
     /// held back.
     ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept
@@ -148,8 +155,27 @@ private:
         int cycles;
         double first, further, far;
         bool isTick = true;  // tools are held back where the body does not bear them, and a warm start may be the last step
+        bool inParts = false;  // one cycle in this call, and goOn() has the others
+    };
+    Effort tick() const noexcept
+    {
+        const double t = options_.tolerance;
+        return {options_.cycles, t, furtherCycles * t, farOff * t};
+    }
+    // How far the solution of a load has got.
+    struct Course {
+        Effort effort{};
+        int usual = 0;         // cycles that it may have, but for one more where it is far off
+        int last = 0;          // and with that one
+        int next = 0;          // the cycle that comes next
+        double start = 0;      // energy when the call began, tissue and contacts [J]
+        bool isOpen = false;   // the tissue's force was not evaluated where it is
+        bool hasGone = false;  // r is a
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
+    void solve(int most, ElasticResult& result) noexcept;
+    bool isBalanced(double residual, double tolerance) const noexcept;
+    void finish(ElasticResult& result) noexcept;
     std::span<const ElasticTool> heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept;
     void settle() noexcept;
     void startAnew() noexcept;
@@ -166,7 +192,9 @@ private:
     void look() noexcept;
     double lineSearch(double slope, double curvature, Along start, int steps) const noexcept;
     double contactEnergy() const noexcept;
-    bool sitesHold(const ElasticLoad& load, bool moved) noexcept;
+    bool sitesHold(std::span<const ElasticTool> tools) const noexcept;
+    bool tiesHold(std::span<const Tie> ties) const noexcept;
+    void findSitesOf(const ElasticLoad& load, bool moved) noexcept;
     void moveSites(double length) noexcept;
     void drag(const ElasticLoad& load) noexcept;
     void letSlip() noexcept;
@@ -194,7 +222,7 @@ private:
     WindowStack stack_;
     Multigrid multigrid_;
     std::vector<ContactSite> sites_;
-    std::size_t siteCount_ = 0;
+    std::size_t siteCount_ = 0, touching_ = 0;  // sites, and those of tools, which come first
     std::vector<occupancy::ShapeDistance> shapes_;
     struct FoundFor {
         occupancy::RoundCone shape;
@@ -215,6 +243,7 @@ private:
     double historyEnergy_ = 0;                          // history . u [J]
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
+    Course course_;
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
     double stiffness_ = 0;                           // along the last step, of tissue and contacts

@@ -494,15 +494,22 @@ bool Tie::holdsAs(const Tie& other) const noexcept
            piece == other.piece && restAxis == other.restAxis;
 }
 
-std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
+std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
                       std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept
 {
     Finder finder(body, windows, near, out);
-    for (std::size_t i = 0; i < load.ties.size(); ++i) {
-        finder.addTie(load.ties[i], i);
+    for (std::size_t i = 0; i < tools.size(); ++i) {
+        finder.addTool(tools[i], shapes[i], i);
     }
-    for (std::size_t i = 0; i < load.tools.size(); ++i) {
-        finder.addTool(load.tools[i], shapes[i], i);
+    return finder.count();
+}
+
+std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,
+                     std::span<ContactSite> out) noexcept
+{
+    Finder finder(body, windows, 0.0, out);
+    for (std::size_t i = 0; i < ties.size(); ++i) {
+        finder.addTie(ties[i], i);
     }
     return finder.count();
 }

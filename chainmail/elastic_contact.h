@@ -128,11 +128,15 @@ std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) no
 /// That surface of one tool [m^2].
 double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept;
 
-/// Fills `out` with the ties and with the surface points that a tool may touch: those within `near` [m] of it, as the
-/// tissue lies now or as it would lie at rest.
+/// Fills `out` with the surface points that tools may touch: those within `near` [m] of one, as the tissue lies now or as
+/// it would lie at rest.
 /// @returns  how many; more than out holds are left out
-std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, const ElasticLoad& load,
+std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
                       std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept;
+/// Fills `out` with the ties.
+/// @returns  how many; more than out holds are left out
+std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,
+                     std::span<ContactSite> out) noexcept;
 
 /// Area of the surface around a site now, over that at rest: |cof(F) N|, F the cell's mean deformation gradient and N the
 /// normal at rest (Nanson's formula), within bounds that keep a cell that is turned inside out from having its say.

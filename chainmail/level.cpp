@@ -169,7 +169,9 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     if (turn_ == 0) {
         ElasticLoad all = load(grip);
         all.periods = std::exchange(since_, 0);
-        last_ = elastic_.relax(all);
+        last_ = takesTurns ? elastic_.begin(all) : elastic_.relax(all);
+    } else if (const ElasticResult further = elastic_.goOn(); further.cycles > 0) {
+        last_ = further;
     }
     const int fractions = takesTurns ? period_ : 1;
     if ((!takesTurns || turn_ == 1) && !(wasAtRest && elastic_.atRest())) {

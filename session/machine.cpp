@@ -27,7 +27,9 @@ namespace {
 using nlohmann::json;
 
 constexpr int warmUp = 40;  // ticks before those that count
-constexpr int counted = 160;
+constexpr int counted =
+    160;  // with a needle twice as many: its ticks take less, and each move of the windows is one in many
+constexpr double needleStep = 20e-6;  // way of a needle in a tick [m]
 constexpr double probeAside = 15e-3;  // of the ball, and how deep it presses [m]
 constexpr double probePress = 4e-3;
 
@@ -56,7 +58,7 @@ private:
     std::thread thread_;
 };
 
-haptics::SessionModel smallBlock(const std::string& setting, bool probe)
+haptics::SessionModel smallBlock(const std::string& setting, const TissueLoad& load)
 {
     datasets::Scene scene = *datasets::builtInScene("block");
     scene.source.phantom.numbers["width_mm"] = 60;
@@ -64,7 +66,10 @@ haptics::SessionModel smallBlock(const std::string& setting, bool probe)
     scene.source.phantom.voxel = 2e-3;
     scene.model.level = datasets::ModelLevel::elastic;
     scene.model.elastic = datasets::elasticSetting(setting);
-    if (probe) {
+    if (load.needle) {
+        scene.tool = datasets::ToolSpec{};
+    }
+    if (load.probe) {
         scene.probe.kind = datasets::ProbeKind::linear;
         scene.probe.face = {0, 0, probeAside};
     }
@@ -109,18 +114,26 @@ FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>&
     return {"default", words};
 }
 
-TickTime measureSetting(const std::string& setting, bool probe)
+TissueLoad loadOf(const datasets::Scene& scene) noexcept
 {
-    const haptics::SessionModel model = smallBlock(setting, probe);
+    return {scene.tool.kind == datasets::ToolKind::needle, scene.probe.kind != datasets::ProbeKind::none};
+}
+
+TickTime measureSetting(const std::string& setting, const TissueLoad& load)
+{
+    const haptics::SessionModel model = smallBlock(setting, load);
     haptics::Simulation simulation(model);
     const Neighbour viewer;
     haptics::Histogram times;
     const double radius = model.scene.tool.radius;
+    const int most = warmUp + (load.needle ? 4 : 1) * counted;
     haptics::DeviceSample sample{.position = {0, -radius, 0}, .buttons = haptics::buttonDeadMan};
-    for (int tick = 0; tick < warmUp + counted; ++tick) {
+    sample.axis = {0, 1, 0};
+    for (int tick = 0; tick < most; ++tick) {
         const double swing = 0.02 * tick;
-        sample.position = {4e-3 * std::sin(swing), 0.4 * radius * (1.0 - std::cos(swing)) - radius, 0};
-        sample.probe.press = 0.5 * probePress * (1.0 - std::cos(swing));
+        const double deep = load.needle ? needleStep * tick : 0.4 * radius * (1.0 - std::cos(swing));
+        sample.position = {load.needle ? 0.0 : 4e-3 * std::sin(swing), deep - radius, 0};
+        sample.probe.press = 0.5 * probePress * (1.0 - std::cos(load.needle ? 0.5 * swing : swing));
         const double start = base::processorTime();
         simulation.tick(sample);
         if (tick >= warmUp) {
@@ -131,7 +144,7 @@ TickTime measureSetting(const std::string& setting, bool probe)
     return {p.p50, p.p99};
 }
 
-FittingSetting fittingHere(const std::filesystem::path& cache, bool probe)
+FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad& load)
 {
     json known;
     if (std::ifstream in(cache); in) {
@@ -141,7 +154,7 @@ FittingSetting fittingHere(const std::filesystem::path& cache, bool probe)
     if (!known.is_object() || known.value("machine", json()) != here) {
         known = json{{"machine", here}};
     }
-    const char* const what = probe ? "tool and probe" : "tool";
+    const std::string what = std::string(load.needle ? "needle" : "tool") + (load.probe ? " and probe" : "");
     const json kept = known.value(what, json::object());
     const auto text = [&kept](const char* name) {
         const auto found = kept.is_object() ? kept.find(name) : kept.end();
@@ -151,10 +164,10 @@ FittingSetting fittingHere(const std::filesystem::path& cache, bool probe)
     if (std::find(names.begin(), names.end(), text("setting")) != names.end()) {
         return {text("setting"), text("reason")};
     }
-    FittingSetting found = fittingSetting([probe](const std::string& setting) { return measureSetting(setting, probe); });
-    if (probe) {
-        found.reason = "with a probe beside the tool " + found.reason;
-    }
+    FittingSetting found = fittingSetting([&load](const std::string& setting) { return measureSetting(setting, load); });
+    found.reason =
+        fmt::format("{}{}{}", load.needle ? "with a needle " : "",
+                    load.probe ? (load.needle ? "and a probe " : "with a probe beside the tool ") : "", found.reason);
     if (!cache.empty()) {
         std::error_code none;
         std::filesystem::create_directories(cache.parent_path(), none);

@@ -1,10 +1,19 @@
 #pragma once
 
+#include <datasets/scene.h>
+
 #include <filesystem>
 #include <functional>
 #include <string>
 
 namespace palpate::session {
+
+/// What the tissue of a scene has to bear, which decides how long a tick takes.
+struct TissueLoad {
+    bool needle = false;  // and no ball or finger: the force of a needle does not wait for the tissue's shape
+    bool probe = false;   // an ultrasound probe is pressed beside
+};
+TissueLoad loadOf(const datasets::Scene& scene) noexcept;
 
 /// The setting of level `elastic` that this machine holds at 1 kHz, and why.
 struct FittingSetting {
@@ -26,17 +35,17 @@ struct TickTime {
 /// @param timeOf  measures a setting
 FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>& timeOf);
 
-/// A ball pressed into a small block, as fast as it goes, while another thread keeps the memory busy as a viewer does: 0.1
-/// s. Times are of the processor, so that other programs do not count: the servo thread goes before them.
+/// A ball pressed into a small block, or a needle pushed into it, as fast as it goes, while another thread keeps the memory
+/// busy as a viewer does: 0.1 s. Times are of the processor, so that other programs do not count: the servo thread goes
+/// before them.
 /// @param setting  of level `elastic`
-/// @param probe  an ultrasound probe is pressed beside the ball
-TickTime measureSetting(const std::string& setting, bool probe = false);
+TickTime measureSetting(const std::string& setting, const TissueLoad& load = {});
 
 /// fittingSetting() of this machine and build, from `cache` where it is known; else it is measured, and written there. A
 /// cache that cannot be read or written costs the measurement and nothing else.
 /// @param cache  the file
-/// @param probe  of a scene with an ultrasound probe: the body has two tools to bear
-FittingSetting fittingHere(const std::filesystem::path& cache, bool probe = false);
+/// @param load   each has its own measurement
+FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad& load = {});
 
 /// machine.json of base::UserFolder::cache; empty where there is none.
 std::filesystem::path machineCache();

@@ -118,7 +118,7 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
 {
     const bool elastic = changes.model.value_or(std::string(levelOf(scene))) == "elastic";
     if (changes.fit && elastic && !changes.setting && !scene.model.settingNamed) {
-        changes.setting = changes.fit(scene.probe.kind != datasets::ProbeKind::none);
+        changes.setting = changes.fit(scene);
     }
     if (!anyOf(changes)) {
         return scene;

@@ -188,6 +188,54 @@ TEST(Elastic, UnfeltForcesCostNoFurtherCycle)
     EXPECT_LE(longerFelt, longer / 2) << longer;
 }
 
+// A load solved in parts ends with the bits of one call: the same cycles, at most one in a part, and none once balanced. A
+// needle that is drawn through the tissue beside a ball that is pressed, so far at once that a call takes three.
+TEST(Elastic, PartsOfALoadEndWhereOneCallEnds)
+{
+    const ElasticBody block = body();
+    for (const bool finite : {false, true}) {
+        ElasticOptions options;
+        options.law = finite ? volume::Law(volume::NeoHookean{}) : volume::Law();
+        Elastic whole(block, options, tests::focusUnder(top)), inParts(block, options, tests::focusUnder(top));
+        std::array<int, 4> ofCycles{};
+        for (int i = 0; i < 60; ++i) {
+            const std::array tools{pressed(1e-3 + 0.02e-3 * i)};
+            const std::array ties{
+                tieAt(top + Vec3(3e-3, 5e-3, 0.0), (i % 7 == 0 ? 0.2e-3 : 0.02e-3) * i * Vec3(0, 1, 0.3))};
+            const auto load = tests::loadOf(tools, ties, top);
+            const ElasticResult once = whole.relax(load);
+            ElasticResult part = inParts.begin(load);
+            EXPECT_LE(part.cycles, 1U) << i;
+            std::uint32_t cycles = part.cycles;
+            for (int parts = 1; parts < 4; ++parts) {
+                part = inParts.goOn();
+                EXPECT_LE(part.cycles, cycles + 1) << i;
+                cycles = std::max(cycles, part.cycles);
+            }
+            ASSERT_EQ(cycles, once.cycles) << i;
+            ++ofCycles.at(cycles);
+            ASSERT_EQ(inParts.toolForce(0), whole.toolForce(0)) << i;
+            ASSERT_EQ(inParts.tieForce(0), whole.tieForce(0)) << i;
+            ASSERT_EQ(inParts.displacement(top + Vec3(0, 2e-3, 0)), whole.displacement(top + Vec3(0, 2e-3, 0))) << i;
+        }
+        EXPECT_GT(ofCycles[2] + ofCycles[3], 3) << "nothing was left for the other parts";
+    }
+}
+
+// Without a load there is nothing to go on with.
+TEST(Elastic, GoingOnAtRestIsNothing)
+{
+    const ElasticBody block = body();
+    Elastic elastic(block, {}, tests::focusUnder(top));
+    EXPECT_EQ(elastic.goOn().cycles, 0U);
+    const std::array tools{pressed(2e-3)};
+    elastic.begin(tests::loadOf(tools, {}, top));
+    elastic.relax({});
+    EXPECT_TRUE(elastic.atRest());
+    EXPECT_EQ(elastic.goOn().cycles, 0U);
+    EXPECT_TRUE(elastic.atRest());
+}
+
 // What tools and ties push in, the fixed nodes hold.
 TEST(Elastic, ActionEqualsReaction)
 {

@@ -71,17 +71,26 @@ TEST(FittingSetting, IsKeptAndACacheThatIsDamagedIsMeasuredAnew)
     }
 }
 
-// A body that bears a probe too asks for more, and each has its own entry.
-TEST(FittingSetting, OfASceneWithAProbeIsMeasuredWithOne)
+// A probe beside the tool asks for more and a needle for less than a ball, and each has its own entry.
+TEST(FittingSetting, IsMeasuredWithTheToolsOfTheScene)
 {
     const tests::Folder folder;
     const std::filesystem::path cache = folder / "machine.json";
-    const FittingSetting alone = fittingHere(cache), both = fittingHere(cache, true);
-    EXPECT_EQ(alone.reason.find("probe"), std::string::npos);
-    EXPECT_NE(both.reason.find("probe"), std::string::npos) << both.reason;
-    EXPECT_EQ(fittingHere(cache).reason, alone.reason);
-    EXPECT_EQ(fittingHere(cache, true).reason, both.reason) << "it was measured again";
-    EXPECT_GT(measureSetting("fast", true).p50, 0.0);
+    const std::vector<TissueLoad> loads{{false, false}, {false, true}, {true, false}, {true, true}};
+    std::vector<std::string> reasons;
+    for (const TissueLoad& load : loads) {
+        reasons.push_back(fittingHere(cache, load).reason);
+        EXPECT_EQ(reasons.back().find("probe") != std::string::npos, load.probe) << reasons.back();
+        EXPECT_EQ(reasons.back().find("needle") != std::string::npos, load.needle) << reasons.back();
+    }
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+        EXPECT_EQ(fittingHere(cache, loads[i]).reason, reasons[i]) << "it was measured again";
+        EXPECT_GT(measureSetting("fast", loads[i]).p50, 0.0);
+    }
+    EXPECT_TRUE(loadOf(*datasets::builtInScene("us-core-biopsy")).needle);
+    EXPECT_TRUE(loadOf(*datasets::builtInScene("us-core-biopsy")).probe);
+    EXPECT_FALSE(loadOf(*datasets::builtInScene("find-lump")).needle);
+    EXPECT_FALSE(loadOf(*datasets::builtInScene("breast")).probe);
 }
 
 TEST(FittingSetting, NeedsNoCache)
