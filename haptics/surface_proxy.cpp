@@ -3,8 +3,10 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace palpate::haptics {
 
@@ -12,29 +14,43 @@ namespace {
 
 constexpr double longestSlip = 1e-3;  // of the proxy over the surface in one step [m]
 constexpr int slipSteps = 8;
-constexpr double axisStep = 1e-3;   // along the segment, where its deepest place is looked for [m]
-constexpr double asDeep = 0.25e-3;  // places less high over the deepest count, by how much less [m]
+constexpr double axisStep = 1e-3;       // along the segment, where its deepest place is looked for [m]
+constexpr double asDeep = 0.25e-3;      // places less high over the deepest count, by how much less [m]
+constexpr int mostSteps = 512;          // along the segment
+constexpr double steepestField = 1.75;  // of a distance between its samples: sqrt(3), where each edge of a cell has slope 1
 
 }  // namespace
 
 DeepestPlace deepestPlace(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front) noexcept
 {
-    const auto steps = static_cast<int>(std::ceil(tool.length / axisStep));
+    const int steps = std::min(static_cast<int>(std::ceil(tool.length / axisStep)), mostSteps);
     if (steps == 0) {
         return {front, surface.distance(front)};
     }
+    const double step = tool.length / steps;
     const auto placeAt = [&](int i) { return front - (tool.length * i / steps) * tool.axis; };
+    struct Seen {
+        int step;
+        double distance;
+    };
+    std::array<Seen, mostSteps + 1> seen;
+    std::size_t count = 0;
     double least = std::numeric_limits<double>::max();
-    for (int i = 0; i <= steps; ++i) {
-        least = std::min(least, surface.distance(placeAt(i)));
+    for (int i = 0; i <= steps;) {
+        const double distance = surface.distance(placeAt(i));
+        seen[count++] = {i, distance};
+        least = std::min(least, distance);
+        // So high over the deepest place so far, the next places are neither deeper nor about as deep. A spacing is for the
+        // border of the field, where it is not quite continuous.
+        const double over = distance - least - asDeep - surface.grid.spacing;
+        i += std::max(1, static_cast<int>(std::min(over / (steepestField * step), static_cast<double>(steps))));
     }
     // With weights that begin at 0 the place does not jump as the tool turns.
     Vec3 sum(0.0);
     double weights = 0.0;
-    for (int i = 0; i <= steps; ++i) {
-        const Vec3 place = placeAt(i);
-        const double weight = std::max(least + asDeep - surface.distance(place), 0.0);
-        sum += weight * place;
+    for (const Seen& s : std::span(seen).first(count)) {
+        const double weight = std::max(least + asDeep - s.distance, 0.0);
+        sum += weight * placeAt(s.step);
         weights += weight;
     }
     return {sum / weights, least};

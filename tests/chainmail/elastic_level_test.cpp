@@ -11,8 +11,8 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <vector>
 #include <random>
+#include <vector>
 
 namespace palpate::chainmail {
 namespace {

@@ -1,0 +1,67 @@
+#include <haptics/surface_proxy.h>
+
+#include <gtest/gtest.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace palpate::haptics {
+namespace {
+
+// Distance to a ball, or to two, in a box that does not reach far beside them.
+volume::DistanceField balls(double apart, double radius)
+{
+    constexpr double spacing = 1.5e-3;
+    volume::DistanceField field;
+    field.grid = {Index3(40, 24, 28), -spacing * Vec3(19.5, 11.5, 13.5), spacing};
+    volume::forEachIndex(Index3(0), field.grid.size - 1, [&](Index3 n) {
+        const Vec3 p = field.grid.position(n), middle(0.5 * apart, 0, 0);
+        field.values.push_back(static_cast<float>(std::min(glm::distance(p, middle), glm::distance(p, -middle)) - radius));
+    });
+    return field;
+}
+
+// What it is by definition: every place along the tool is looked at.
+DeepestPlace everyPlace(const volume::DistanceField& surface, const ProxyTool& tool, Vec3 front)
+{
+    const int steps = std::min(static_cast<int>(std::ceil(tool.length / 1e-3)), 512);
+    const auto placeAt = [&](int i) { return front - (tool.length * i / steps) * tool.axis; };
+    double least = surface.distance(front);
+    for (int i = 1; i <= steps; ++i) {
+        least = std::min(least, surface.distance(placeAt(i)));
+    }
+    Vec3 sum(0.0);
+    double weights = 0.0;
+    for (int i = 0; i <= steps; ++i) {
+        const double weight = std::max(least + 0.25e-3 - surface.distance(placeAt(i)), 0.0);
+        sum += weight * placeAt(i);
+        weights += weight;
+    }
+    return {sum / weights, least};
+}
+
+// Places that are passed over because the distance cannot fall so fast change nothing, inside the field and beside it.
+TEST(SurfaceProxy, DeepestPlaceIsThatOfEveryPlace)
+{
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    for (const double apart : {0.0, 16e-3, 30e-3}) {
+        const auto surface = balls(apart, 7e-3);
+        for (int i = 0; i < 2000; ++i) {
+            const auto direction = [&] { return Vec3(unit(random), unit(random), unit(random)); };
+            const ProxyTool tool{3e-3, i % 10 == 0 ? 0.5 : 1e-3 + 40e-3 * std::abs(unit(random)),
+                                 glm::normalize(direction()), 0.0};
+            const Vec3 front = 40e-3 * direction();
+            const DeepestPlace found = deepestPlace(surface, tool, front);
+            const DeepestPlace expected = everyPlace(surface, tool, front);
+            ASSERT_EQ(found.distance, expected.distance) << apart << " " << i;
+            ASSERT_EQ(found.at, expected.at) << apart << " " << i;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace palpate::haptics
