@@ -251,7 +251,8 @@ void runPress(const PressArguments& o)
     changes.tool = [&](const ToolSpec& scene) { return toolOf(o, scene); };
     Run run{session::openSession(o.scene, changes), {}, {}, {}, {}, {}};
     run.press = {run.model.scene.tool, o.every, o.converge};
-    run.path = studies::loadPosePath(o.path, studies::plannedAxis(run.model));
+    const bool hasAxis = run.press.tool.kind != ToolKind::sphere;
+    run.path = studies::loadPosePath(o.path, hasAxis ? studies::plannedAxis(run.model) : Vec3(0, 1, 0));
     if (!o.at.empty()) {
         run.points = studies::loadPoints(o.at);
     }

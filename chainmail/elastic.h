@@ -65,6 +65,7 @@ struct ElasticResult {
 class Elastic {
     static constexpr double furtherCycles = 1.5;  // a second cycle in a tick costs too much for what is nearly balanced
     static constexpr double farOff = 6.0;         // and one beyond the most is worth it for what is not
+    static constexpr std::size_t maxTools = 16, maxTies = 64;
 
 public:
     /// @param focus  where the windows start

@@ -181,10 +181,15 @@ struct SceneAim {
 /// Of the text of a scene, as a record keeps it. A text that is no scene asks for a biopsy.
 SceneAim aimOf(const std::string& sceneText);
 
-std::vector<std::string> builtInScenes();  // "breast", "layered", "block", "plate", "pair"
+std::vector<std::string> builtInScenes();  // their names, in order
 std::optional<Scene> builtInScene(const std::string& name);
-/// The scene for a volume file alone: target = the first tumour (else the structure nearest the middle), vital = all of
-/// role vital.
+/// The structure of a volume that a biopsy is for: the first of role tumour, else the first with a name such as lesion,
+/// mass or nodule; "" where there is none.
+std::string lesionOf(const volume::Tissue& tissue);
+/// The structure of largest volume that is not air; "" where there is none.
+std::string largestStructure(const volume::Tissue& tissue);
+/// The scene for a volume file alone: target = lesionOf(), vital = all of role vital. Throws std::runtime_error where there
+/// is no lesion and no target is named.
 Scene sceneForVolume(const std::filesystem::path& file, const volume::Tissue& tissue, const std::string& target = {});
 
 /// The scene's volume: loads the file or makes the phantom.
@@ -192,8 +197,9 @@ volume::Tissue sceneVolume(const Scene& scene);
 
 /// The straight line of a procedure.
 struct Approach {
-    Vec3 entry;  // on the surface of the body [m]
-    Vec3 aim;    // inside the target [m]
+    Vec3 entry;             // on the surface of the body [m]
+    Vec3 aim;               // inside the target [m]
+    bool isPlanned = true;  // false: there is no way, of what is no session and needs none
 };
 
 /// Takes entry and aim of the scene where given, else searches the surface: shortest line to the middle of the target that

@@ -32,30 +32,16 @@ Role roleOf(const Tissue& tissue, const Structure& structure)
     return tissue.table().rows[structure.tissue].role;
 }
 
-std::string chooseTarget(const std::filesystem::path& file, const Tissue& tissue)
+// The names of all structures that are not air.
+std::vector<std::string> solidNames(const Tissue& tissue)
 {
-    const std::span<const Structure> all = tissue.structures();
-    const auto tumour =
-        std::find_if(all.begin(), all.end(), [&](const Structure& s) { return roleOf(tissue, s) == Role::tumour; });
-    if (tumour != all.end()) {
-        return tumour->name;
-    }
-    static constexpr std::array<std::string_view, 6> hints{"lesion", "tumor", "mass", "nodule", "target", "tdlu"};
-    for (const std::string_view hint : hints) {
-        for (const Structure& s : all) {
-            if (roleOf(tissue, s) != Role::air && lower(s.name).find(hint) != std::string::npos) {
-                return s.name;
-            }
-        }
-    }
     std::vector<std::string> names;
-    for (const Structure& s : all) {
+    for (const Structure& s : tissue.structures()) {
         if (roleOf(tissue, s) != Role::air) {
             names.push_back(s.name);
         }
     }
-    throw std::runtime_error(fmt::format("{}: no tumour or lesion to aim at: choose with --target NAME, one of {}",
-                                         file.string(), fmt::join(names, ", ")));
+    return names;
 }
 
 struct Candidate {
@@ -98,13 +84,48 @@ std::vector<VitalStructure> chooseVital(const Tissue& tissue, const std::string&
 
 }  // namespace
 
+std::string lesionOf(const Tissue& tissue)
+{
+    const std::span<const Structure> all = tissue.structures();
+    const auto tumour =
+        std::find_if(all.begin(), all.end(), [&](const Structure& s) { return roleOf(tissue, s) == Role::tumour; });
+    if (tumour != all.end()) {
+        return tumour->name;
+    }
+    static constexpr std::array<std::string_view, 6> hints{"lesion", "tumor", "mass", "nodule", "target", "tdlu"};
+    for (const std::string_view hint : hints) {
+        for (const Structure& s : all) {
+            if (roleOf(tissue, s) != Role::air && lower(s.name).find(hint) != std::string::npos) {
+                return s.name;
+            }
+        }
+    }
+    return "";
+}
+
+std::string largestStructure(const Tissue& tissue)
+{
+    const Structure* largest = nullptr;
+    for (const Structure& s : tissue.structures()) {
+        if (roleOf(tissue, s) != Role::air && (largest == nullptr || s.volume > largest->volume)) {
+            largest = &s;
+        }
+    }
+    return largest != nullptr ? largest->name : "";
+}
+
 Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, const std::string& target)
 {
+    const std::string aim = target.empty() ? lesionOf(tissue) : target;
+    if (aim.empty()) {
+        throw std::runtime_error(fmt::format("{}: no tumour or lesion to aim at: choose with --target NAME, one of {}",
+                                             file.string(), fmt::join(solidNames(tissue), ", ")));
+    }
     Scene scene;
     scene.name = file.stem().string();
     scene.source.file = std::filesystem::absolute(file).lexically_normal();
     scene.dffb = builtInScene("breast")->dffb;
-    scene.target = target.empty() ? chooseTarget(file, tissue) : target;
+    scene.target = aim;
     scene.vital = chooseVital(tissue, scene.target);
     return parseScene(sceneText(scene), file);
 }

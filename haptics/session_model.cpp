@@ -106,9 +106,19 @@ datasets::Approach approachOf(datasets::Scene& scene, const Posed& posture, cons
     return plan.approach;
 }
 
+datasets::Approach approachIfAny(datasets::Scene& scene, const Posed& posture, const volume::DistanceField& surface,
+                                 const std::vector<GuardedStructure>& structures)
+{
+    try {
+        return approachOf(scene, posture, surface, structures);
+    } catch (const std::runtime_error&) {
+        return {Vec3(0.0), Vec3(0.0), false};
+    }
+}
+
 }  // namespace
 
-SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isStepped)
+SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession)
 {
     if (tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures) {
         throw std::runtime_error(fmt::format("{}: at most {} tissues and {} vital structures are supported", scene.name,
@@ -131,10 +141,11 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
         structures.back().gain = vital.gain;
     }
     auto surface = tissue->distanceToBody(grid);
-    const auto approach = approachOf(scene, posture, surface, structures);
+    const auto approach = isSession ? approachOf(scene, posture, surface, structures)
+                                    : approachIfAny(scene, posture, surface, structures);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
-    if (isStepped) {
+    if (isSession) {
         checkToolFits(scene, lattice);
     }
     auto elastic = elasticOf(scene, *tissue, lattice.grid, surface);

@@ -40,7 +40,9 @@ struct SessionModel {
 /// std::runtime_error for structures that the volume does not have, and more of them than maxStructures.
 /// @param scene      what to build
 /// @param tissue     its volume
-/// @param isStepped  for sessions, which may step down to ChainMail: a tool that holds too many nodes for a tick is refused
-SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isStepped = true);
+/// @param isSession  a session may step down to ChainMail, so that a tool that holds too many nodes for a tick is refused;
+/// and
+///                   it needs a way to the target. What is none (palpate press) has approach.isPlanned false without a way
+SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession = true);
 
 }  // namespace palpate::haptics

@@ -39,6 +39,7 @@ FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>&
 /// busy as a viewer does: 0.1 s. Times are of the processor, so that other programs do not count: the servo thread goes
 /// before them.
 /// @param setting  of level `elastic`
+/// @param load     which tools
 TickTime measureSetting(const std::string& setting, const TissueLoad& load = {});
 
 /// fittingSetting() of this machine and build, from `cache` where it is known; else it is measured, and written there. A

@@ -177,8 +177,15 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     if (path.extension() == ".vdb") {
         auto alone = loadVolume(path);
         auto tissue = std::make_shared<const volume::Tissue>(withLesion(std::move(alone), changes));
+        // What is no session aims at nothing. A scene has a target all the same: the largest structure, without a way to it.
+        const bool aims = !changes.tool || changes.target || !datasets::lesionOf(*tissue).empty();
+        if (!aims) {
+            changes.target = datasets::largestStructure(*tissue);
+        }
         auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
-        return haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
+        auto model = haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
+        model.approach.isPlanned = model.approach.isPlanned && aims;
+        return model;
     }
     if (changes.lesion) {
         throw std::runtime_error(

@@ -211,18 +211,21 @@ ToolPose PosePath::at(std::size_t tick) const noexcept
     return pose;
 }
 
-PosePath readPosePath(std::istream& in, const std::string& origin, Vec3 standardAxis)
+PosePath readPosePath(std::istream& in, const std::string& origin, std::optional<Vec3> standardAxis)
 {
     NumberFile file(in, origin, pathColumns);
     const bool timed = file.has(seconds);
     const bool turned = file.has(axis) || file.has(axis + 1) || file.has(axis + 2);
+    if (!turned && !standardAxis) {
+        throw std::runtime_error(origin + ": the scene has no planned line: add the columns axis_x,axis_y,axis_z");
+    }
     for (std::size_t c = axis; turned && c < pathColumns.size(); ++c) {
         file.require(pathColumns[c]);
     }
     PosePath path;
     path.origin = origin;
     while (file.nextRow()) {
-        ToolPose pose{file.position(), turned ? axisOf(file) : standardAxis};
+        ToolPose pose{file.position(), turned ? axisOf(file) : *standardAxis};
         pose.seconds = timed ? file.number(seconds, latest, " s") : tickSeconds * static_cast<double>(path.poses.size());
         if (!path.poses.empty()) {
             checkFollows(file, path.poses.back(), pose);
@@ -239,7 +242,7 @@ PosePath readPosePath(std::istream& in, const std::string& origin, Vec3 standard
     return path;
 }
 
-PosePath loadPosePath(const std::filesystem::path& file, Vec3 standardAxis)
+PosePath loadPosePath(const std::filesystem::path& file, std::optional<Vec3> standardAxis)
 {
     std::ifstream in = opened(file, "a path (CSV with the columns x_mm,y_mm,z_mm)");
     return readPosePath(in, file.string(), standardAxis);

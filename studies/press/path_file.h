@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,12 +32,12 @@ struct PosePath {
 /// Reads a path: CSV with a line of column names, in any order: x_mm, y_mm, z_mm; seconds (without it: one pose per
 /// millisecond); axis_x, axis_y, axis_z (of any length but zero; without them: `axis`). Lines that are empty or begin with
 /// # do not count.
-/// @param axis  unit vector
+/// @param axis  unit vector; nothing: the file must have one
 /// Throws std::runtime_error ("FILE:LINE: what is wrong and what to do"), also for numbers that are not finite, positions
 /// over 10 m from the origin, times that do not rise, and over 10 million ticks.
-PosePath loadPosePath(const std::filesystem::path& file, Vec3 axis);
+PosePath loadPosePath(const std::filesystem::path& file, std::optional<Vec3> axis);
 /// As loadPosePath() from text; `origin` stands for the file in errors.
-PosePath readPosePath(std::istream& in, const std::string& origin, Vec3 axis);
+PosePath readPosePath(std::istream& in, const std::string& origin, std::optional<Vec3> axis);
 
 /// A point in a file.
 struct FilePoint {

@@ -19,8 +19,11 @@ constexpr double touchStep = 0.25e-3;    // at most so deep a tool is found that
 
 }  // namespace
 
-Vec3 plannedAxis(const haptics::SessionModel& model) noexcept
+std::optional<Vec3> plannedAxis(const haptics::SessionModel& model) noexcept
 {
+    if (!model.approach.isPlanned) {
+        return std::nullopt;
+    }
     const Vec3 way = model.approach.aim - model.approach.entry;
     return glm::length(way) > 0.0 ? glm::normalize(way) : -model.surface.normal(model.approach.entry);
 }

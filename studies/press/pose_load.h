@@ -61,7 +61,7 @@ private:
     chainmail::ElasticLoad load_;
 };
 
-/// From entry to aim of the scene.
-Vec3 plannedAxis(const haptics::SessionModel& model) noexcept;
+/// From entry to aim of the scene; nothing where there is no way between them.
+std::optional<Vec3> plannedAxis(const haptics::SessionModel& model) noexcept;
 
 }  // namespace palpate::studies

@@ -133,6 +133,23 @@ TEST_F(PressCommand, AnotherToolIsTakenOnlyWithWhatTheSceneDoesNotSay)
     }
 }
 
+// A volume need not be one for a biopsy: without a lesion and without a way to anything it is pressed all the same. What a
+// planned line would say, the direction of a tool that has one, must then be in the file.
+TEST_F(PressCommand, AVolumeWithoutALesionIsPressed)
+{
+    const std::string volume = folder / "block.vdb";
+    ASSERT_EQ(palpate({"phantom", "block", "--set", "tumours=0", "width_mm=30", "thickness_mm=16", "-o", volume}).status, 0);
+    const std::vector<std::string> ball{"press", volume, "--path", path, "--tool", "sphere", "--radius-mm", "5"};
+    const auto j = figures(ball);
+    EXPECT_GT(j.at("peak_force_n").get<double>(), 0.01);
+    EXPECT_EQ(j.at("peak_force_n"), figures({"press", scene, "--path", path, "--setting", "default"}).at("peak_force_n"));
+    const std::vector<std::string> capsule{"press",   volume,        "--path", path,          "--tool",
+                                           "capsule", "--radius-mm", "5",      "--length-mm", "10"};
+    expectRefusal(capsule, path + ": the scene has no planned line: add the columns axis_x,axis_y,axis_z");
+    writeText(path, "seconds,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n0,0,-5.5,0,0,1,0\n0.1,0,-3,0,0,1,0\n");
+    EXPECT_GT(figures(capsule).at("peak_force_n").get<double>(), 0.01);
+}
+
 TEST_F(PressCommand, WhatIsWrongIsSaidOnOneLine)
 {
     const std::string bad = folder / "bad.csv", none = folder / "none.csv";

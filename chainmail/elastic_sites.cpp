@@ -1,0 +1,177 @@
+// The sites of Elastic: which points meet the tools, and how they move with them.
+#include <chainmail/elastic.h>
+
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
+constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
+constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
+
+}  // namespace
+
+// The tools, held back where the body does not bear them.
+std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept
+{
+    held_.resize(tools.size());
+    tools_.clear();
+    for (std::size_t i = 0; i < tools.size(); ++i) {
+        tools_.push_back(held_[i].place(tools[i], stack_.body().levels.front(), volume::isSmall(options_.law), holdsBack));
+    }
+    return tools_;
+}
+
+// True when the surface points found for an earlier call still serve: no tool moved far.
+bool Elastic::sitesHold(std::span<const ElasticTool> tools) const noexcept
+{
+    if (atRest_ || tools.size() != foundFor_.size()) {
+        return false;
+    }
+    const double spacing = stack_.body().levels.front().nodes.spacing, far = drift * spacing;
+    for (std::size_t i = 0; i < foundFor_.size(); ++i) {
+        const auto& now = tools[i].shape;
+        const auto& [then, isQuartered] = foundFor_[i];
+        if (glm::distance(now.a, then.a) > far || glm::distance(now.b, then.b) > far || now.radiusA != then.radiusA ||
+            now.radiusB != then.radiusB || isQuartered != touchesLittle(tools[i], spacing)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool Elastic::tiesHold(std::span<const Tie> ties) const noexcept
+{
+    return std::ranges::equal(ties, tiesFound_, [](const Tie& a, const Tie& b) { return a.holdsAs(b); });
+}
+
+// Finds the points that tools may touch, and behind them in the list the ties: a needle that goes on has other ones in
+// every call, and a probe beside it the same points.
+void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
+{
+    const bool toolsHold = !moved && sitesHold(load.tools);
+    if (toolsHold && tiesHold(load.ties)) {
+        return;
+    }
+    const double spacing = stack_.body().levels.front().nodes.spacing;
+    std::size_t fresh = touching_;  // the first site that is new
+    if (!toolsHold) {
+        for (const ContactSite& s : sites()) {
+            if (!s.isTie) {
+                slip_[s.point] = Vec3f(s.slip);
+            }
+        }
+        fresh = 0;
+        touching_ = findSites(stack_.body(), stack_.windows(), load.tools, shapes_, reach * spacing, sites_);
+        foundFor_.clear();
+        for (const ElasticTool& tool : load.tools) {
+            foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});
+        }
+    }
+    siteCount_ = touching_ + findTies(stack_.body(), stack_.windows(), load.ties, std::span(sites_).subspan(touching_));
+    tiesFound_.assign(load.ties.begin(),
+                      load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
+    for (ContactSite& s : active().subspan(fresh)) {
+        s.slip = s.isTie ? Vec3(0.0) : Vec3(slip_[s.point]);
+    }
+}
+
+void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
+{
+    shapes_.clear();
+    for (const ElasticTool& tool : load.tools) {
+        shapes_.emplace_back(tool.shape);
+    }
+    ties_ = load.ties;
+    findSitesOf(load, moved);
+    drag(load);
+    spreadPressure();
+    for (ContactSite& s : active()) {
+        touch(s, shapes_, ties_);
+        if (const double friction = frictionOf(s); friction > 0.0) {
+            s.limit = friction * std::max(s.depth, 0.0);
+            press(s);
+        }
+    }
+}
+
+// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells resolve, by
+// Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves, so that a call keeps one energy.
+void Elastic::spreadPressure() noexcept
+{
+    const auto& body = stack_.body();
+    const auto& grid = body.levels.front().nodes;
+    std::array<double, maxTools> patch{};  // radius, in cells
+    std::array<Between, maxTools> across;  // where its middle is
+    for (std::size_t i = 0; i < tools_.size(); ++i) {
+        patch[i] = tools_[i].pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tools_[i]) / grid.spacing;
+        across[i] = betweenNodes(grid, tools_[i]);
+    }
+    AreaRatio areaRatio(body, stack_.windows());
+    for (ContactSite& s : active()) {
+        if (!s.isTie) {
+            // What moved last was measured then.
+            const double ratio = volume::isSmall(options_.law) ? 1.0 : s.stretch > 0.0 ? s.stretch : areaRatio(s);
+            s.stiffness = resolvedShare(patch[s.owner], s.between, across[s.owner]) * ratio * s.atRest;
+        }
+    }
+}
+
+// True when a tool is inside the tissue, as it lies or as it would lie at rest.
+bool Elastic::touched() const noexcept
+{
+    const auto all = sites();
+    return std::any_of(all.begin(), all.end(),
+                       [&](const ContactSite& s) { return s.active() || shapes_[s.owner].distance(s.rest) < 0.0; });
+}
+
+void Elastic::moveSites(double length) noexcept
+{
+    for (ContactSite& s : active()) {
+        s.u += length * s.p;
+        s.slip -= length * s.p;
+        touch(s, shapes_, ties_);
+    }
+}
+
+// Tools that moved on take the points that they hold along.
+void Elastic::drag(const ElasticLoad& load) noexcept
+{
+    if (toolAt_.size() == load.tools.size()) {
+        for (ContactSite& s : active()) {
+            s.slip += s.isTie ? Vec3(0.0) : load.tools[s.owner].shape.a - toolAt_[s.owner];
+        }
+    }
+    toolAt_.clear();
+    for (const ElasticTool& tool : load.tools) {
+        toolAt_.push_back(tool.shape.a);
+    }
+}
+
+// Beyond what friction holds by the contact's own force the tool has slipped, for good.
+void Elastic::letSlip() noexcept
+{
+    for (ContactSite& s : active()) {
+        const double friction = frictionOf(s);
+        if (friction <= 0.0) {
+            continue;
+        }
+        s.limit = friction * std::max(s.depth, 0.0);
+        const Vec3 along = s.along();
+        const double length = glm::length(along);
+        s.slip = length > s.limit ? s.limit / length * along : along;
+        press(s);
+    }
+}
+
+double Elastic::frictionOf(const ContactSite& site) const noexcept
+{
+    return site.isTie ? 0.0 : tools_[site.owner].friction;
+}
+
+}  // namespace palpate::chainmail
