@@ -239,13 +239,34 @@ double Elastic::contactEnergy() const noexcept
     return sum;
 }
 
+// Moves the windows to where the load has them. True when any moved: contacts have to be found again.
+bool Elastic::follow(const Focus& focus) noexcept
+{
+    multigrid_.clearContacts();
+    return stack_.follow(focus, !atRest_);
+}
+
+ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
+{
+    if (!follow(load.focus)) {
+        return relaxWhile(load, part());
+    }
+    // To move the windows is work enough for a call.
+    refreshForces();
+    sinceRefresh_ = 0;
+    hasMoved_ = true;
+    waiting_ = load;
+    return {.moved = true};
+}
+
 ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) noexcept
 {
     ElasticResult result;
     ElasticLoad load = all;
+    waiting_.reset();
     load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.isTick);
-    multigrid_.clearContacts();
-    result.moved = stack_.follow(load.focus, !atRest_);
+    const bool hasMoved = std::exchange(hasMoved_, false), moves = follow(load.focus);
+    result.moved = moves || hasMoved;
     meet(load, result.moved);
     const bool isTouched = touched();
     untouchedFor_ = isTouched ? 0.0 : untouchedFor_ + load.periods * options_.period;
@@ -254,7 +275,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
         return result;
     }
     const bool hasLain = !std::exchange(atRest_, false);
-    if (result.moved || ++sinceRefresh_ >= refreshPeriod) {
+    if (moves || (!hasMoved && ++sinceRefresh_ >= refreshPeriod)) {
         refreshForces();
         sinceRefresh_ = 0;
     }
@@ -274,7 +295,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     // No hand feels tissue that springs back.
     course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
     course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
-    // A call that has only a part of the cycles has none beside a move, which costs as much as two.
+    // A call that has only a part of the cycles has none beside the search for contacts in windows that moved.
     solve(effort.inParts ? (result.moved ? 0 : 1) : course_.last, result);
     finish(result);
     return result;
@@ -282,6 +303,9 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 
 ElasticResult Elastic::goOn() noexcept
 {
+    if (waiting_) {
+        return relaxWhile(ElasticLoad(*waiting_), part());
+    }
     ElasticResult result;
     if (atRest_ || course_.next >= course_.last) {
         return result;

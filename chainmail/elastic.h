@@ -75,14 +75,9 @@ public:
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
     ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
-    /// As relax(), with at most one cycle; goOn() has the others. So a load whose force nobody waits for spreads over
-    /// calls.
-    ElasticResult begin(const ElasticLoad& load) noexcept
-    {
-        Effort part = tick();
-        part.inParts = true;
-        return relaxWhile(load, part);
-    }
+    /// As relax(), with at most one cycle, or only a move of the windows; goOn() has the rest. So a load whose force nobody
+    /// waits for spreads over calls.
+    ElasticResult begin(const ElasticLoad& load) noexcept;
     /// Goes on with the last load by at most one cycle, and by none where relax() would have stopped by now. What the load
     /// refers to must still live.
     ElasticResult goOn() noexcept;
@@ -163,6 +158,12 @@ private:
         const double t = options_.tolerance;
         return {options_.cycles, t, furtherCycles * t, farOff * t};
     }
+    Effort part() const noexcept
+    {
+        Effort effort = tick();
+        effort.inParts = true;
+        return effort;
+    }
     // How far the solution of a load has got.
     struct Course {
         Effort effort{};
@@ -174,6 +175,7 @@ private:
         bool hasGone = false;  // r is a
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
+    bool follow(const Focus& focus) noexcept;
     void solve(int most, ElasticResult& result) noexcept;
     bool isBalanced(double residual, double tolerance) const noexcept;
     void finish(ElasticResult& result) noexcept;
@@ -245,6 +247,8 @@ private:
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
     Course course_;
+    std::optional<ElasticLoad> waiting_;  // windows moved for it, and no more
+    bool hasMoved_ = false;               // windows, since contacts were found
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
     double stiffness_ = 0;                           // along the last step, of tissue and contacts

@@ -161,7 +161,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
 {
     // Where no hand presses, only the shape is asked for, not the force: solving and writing take turns.
     const bool isShapeOnly = grip.kind == Grip::Kind::point || (grip.kind == Grip::Kind::none && !grip.others.empty());
-    const bool takesTurns = isShapeOnly && isShapeOnly_ && period_ > 1;
+    const bool inParts = isShapeOnly && period_ > 1, takesTurns = inParts && isShapeOnly_;
     isShapeOnly_ = isShapeOnly;
     turn_ = takesTurns ? (turn_ + 1) % period_ : 0;
     const bool wasAtRest = elastic_.atRest();
@@ -169,7 +169,7 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     if (turn_ == 0) {
         ElasticLoad all = load(grip);
         all.periods = std::exchange(since_, 0);
-        last_ = takesTurns ? elastic_.begin(all) : elastic_.relax(all);
+        last_ = inParts ? elastic_.begin(all) : elastic_.relax(all);
     } else if (const ElasticResult further = elastic_.goOn(); further.cycles > 0) {
         last_ = further;
     }
