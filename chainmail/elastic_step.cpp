@@ -13,7 +13,7 @@ namespace {
 
 constexpr int newtonSteps = 3;        // of a line search: contacts open and close along it
 constexpr int maxShortenings = 8;     // of a step that raises the energy
-constexpr int maxInParts = 3;         // the same, where a call has only a part of the cycles: each costs an evaluation
+constexpr int maxInParts = 1;         // the same, where a call has only a part of the cycles: each costs an evaluation
 constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
 constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
