@@ -58,17 +58,24 @@ private:
     std::thread thread_;
 };
 
-haptics::SessionModel smallBlock(const std::string& setting, const TissueLoad& load)
+// A block of fat for a ball. What needles go into has skin, with which ticks take half as long again, and relaxes.
+haptics::SessionModel smallBody(const std::string& setting, const TissueLoad& load)
 {
-    datasets::Scene scene = *datasets::builtInScene("block");
-    scene.source.phantom.numbers["width_mm"] = 60;
-    scene.source.phantom.numbers["thickness_mm"] = 40;
-    scene.source.phantom.voxel = 2e-3;
+    datasets::Scene scene = *datasets::builtInScene(load.needle ? "layered" : "block");
+    auto& numbers = scene.source.phantom.numbers;
+    numbers["width_mm"] = 60;
+    if (load.needle) {
+        numbers["skin_mm"] = 1.5;
+        numbers["gland_mm"] = 15;
+        numbers["muscle_mm"] = 4;
+        numbers["tumour_depth_mm"] = 12;
+        scene.tool = datasets::ToolSpec{};
+    } else {
+        numbers["thickness_mm"] = 40;
+        scene.source.phantom.voxel = 2e-3;
+    }
     scene.model.level = datasets::ModelLevel::elastic;
     scene.model.elastic = datasets::elasticSetting(setting);
-    if (load.needle) {
-        scene.tool = datasets::ToolSpec{};
-    }
     if (load.probe) {
         scene.probe.kind = datasets::ProbeKind::linear;
         scene.probe.face = {0, 0, probeAside};
@@ -121,7 +128,7 @@ TissueLoad loadOf(const datasets::Scene& scene) noexcept
 
 TickTime measureSetting(const std::string& setting, const TissueLoad& load)
 {
-    const haptics::SessionModel model = smallBlock(setting, load);
+    const haptics::SessionModel model = smallBody(setting, load);
     haptics::Simulation simulation(model);
     const Neighbour viewer;
     haptics::Histogram times;

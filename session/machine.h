@@ -35,9 +35,9 @@ struct TickTime {
 /// @param timeOf  measures a setting
 FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>& timeOf);
 
-/// A ball pressed into a small block, or a needle pushed into it, as fast as it goes, while another thread keeps the memory
-/// busy as a viewer does: 0.1 s. Times are of the processor, so that other programs do not count: the servo thread goes
-/// before them.
+/// A ball pressed into a small block, or a needle pushed into small layers under skin, as fast as the program goes, while
+/// another thread keeps the memory busy as a viewer does: 0.1 s. Times are of the processor, so that other programs do not
+/// count: the servo thread goes before them.
 /// @param setting  of level `elastic`
 /// @param load     which tools
 TickTime measureSetting(const std::string& setting, const TissueLoad& load = {});
