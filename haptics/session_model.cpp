@@ -141,8 +141,8 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
         structures.back().gain = vital.gain;
     }
     auto surface = tissue->distanceToBody(grid);
-    const auto approach = isSession ? approachOf(scene, posture, surface, structures)
-                                    : approachIfAny(scene, posture, surface, structures);
+    const auto approach =
+        isSession ? approachOf(scene, posture, surface, structures) : approachIfAny(scene, posture, surface, structures);
     auto modulus = tissue->youngsModulusOn(coarse);
     auto lattice = latticeOf(scene, *tissue);
     if (isSession) {

@@ -177,7 +177,8 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     if (path.extension() == ".vdb") {
         auto alone = loadVolume(path);
         auto tissue = std::make_shared<const volume::Tissue>(withLesion(std::move(alone), changes));
-        // What is no session aims at nothing. A scene has a target all the same: the largest structure, without a way to it.
+        // What is no session aims at nothing. A scene has a target all the same: the largest structure, without a way to
+        // it.
         const bool aims = !changes.tool || changes.target || !datasets::lesionOf(*tissue).empty();
         if (!aims) {
             changes.target = datasets::largestStructure(*tissue);

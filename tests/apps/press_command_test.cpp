@@ -138,7 +138,8 @@ TEST_F(PressCommand, AnotherToolIsTakenOnlyWithWhatTheSceneDoesNotSay)
 TEST_F(PressCommand, AVolumeWithoutALesionIsPressed)
 {
     const std::string volume = folder / "block.vdb";
-    ASSERT_EQ(palpate({"phantom", "block", "--set", "tumours=0", "width_mm=30", "thickness_mm=16", "-o", volume}).status, 0);
+    ASSERT_EQ(palpate({"phantom", "block", "--set", "tumours=0", "width_mm=30", "thickness_mm=16", "-o", volume}).status,
+              0);
     const std::vector<std::string> ball{"press", volume, "--path", path, "--tool", "sphere", "--radius-mm", "5"};
     const auto j = figures(ball);
     EXPECT_GT(j.at("peak_force_n").get<double>(), 0.01);
