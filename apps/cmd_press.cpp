@@ -251,8 +251,11 @@ void runPress(const PressArguments& o)
     changes.tool = [&](const ToolSpec& scene) { return toolOf(o, scene); };
     Run run{session::openSession(o.scene, changes), {}, {}, {}, {}, {}};
     run.press = {run.model.scene.tool, o.every, o.converge};
-    const bool hasAxis = run.press.tool.kind != ToolKind::sphere;
-    run.path = studies::loadPosePath(o.path, hasAxis ? studies::plannedAxis(run.model) : Vec3(0, 1, 0));
+    std::optional<Vec3> axis = studies::plannedAxis(run.model);
+    if (run.press.tool.kind == ToolKind::sphere) {
+        axis = axis.value_or(Vec3(0, 1, 0));
+    }
+    run.path = studies::loadPosePath(o.path, axis);
     if (!o.at.empty()) {
         run.points = studies::loadPoints(o.at);
     }

@@ -248,14 +248,15 @@ bool Elastic::follow(const Focus& focus) noexcept
 
 ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
 {
-    if (!follow(load.focus)) {
+    if (atRest_ || !follow(load.focus)) {
         return relaxWhile(load, part());
     }
     // To move the windows is work enough for a call.
     refreshForces();
     sinceRefresh_ = 0;
-    hasMoved_ = true;
+    const int lost = waiting_ ? waiting_->periods : 0;
     waiting_ = load;
+    waiting_->periods += lost;
     return {.moved = true};
 }
 
@@ -263,9 +264,11 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 {
     ElasticResult result;
     ElasticLoad load = all;
+    const bool hasMoved = waiting_.has_value();
+    load.periods += hasMoved ? waiting_->periods : 0;  // of a load that was never solved
     waiting_.reset();
     load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.isTick);
-    const bool hasMoved = std::exchange(hasMoved_, false), moves = follow(load.focus);
+    const bool moves = follow(load.focus);
     result.moved = moves || hasMoved;
     meet(load, result.moved);
     const bool isTouched = touched();
@@ -296,7 +299,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
     course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
     // A call that has only a part of the cycles has none beside the search for contacts in windows that moved.
-    solve(effort.inParts ? (result.moved ? 0 : 1) : course_.last, result);
+    solve(effort.inParts ? (result.moved && course_.hasGone ? 0 : 1) : course_.last, result);
     finish(result);
     return result;
 }
@@ -304,7 +307,9 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
 ElasticResult Elastic::goOn() noexcept
 {
     if (waiting_) {
-        return relaxWhile(ElasticLoad(*waiting_), part());
+        const ElasticLoad load = *waiting_;
+        waiting_->periods = 0;  // it is this one
+        return relaxWhile(load, part());
     }
     ElasticResult result;
     if (atRest_ || course_.next >= course_.last) {
@@ -356,6 +361,7 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
     }
     if (c.isOpen && !confirm(c.start)) {
         again(result);
+        c.hasGone = false;
     }
     c.isOpen = false;
 }

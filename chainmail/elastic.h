@@ -75,11 +75,12 @@ public:
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
     ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
-    /// As relax(), with at most one cycle, or only a move of the windows; goOn() has the rest. So a load whose force nobody
-    /// waits for spreads over calls.
+    /// As relax(), in parts, for a load whose force nobody waits for: here at most one cycle, or only a move of the
+    /// windows; goOn() has the rest. Without friction, while no windows move and no step is shortened twice, the parts end
+    /// with the bits of relax().
     ElasticResult begin(const ElasticLoad& load) noexcept;
-    /// Goes on with the last load by at most one cycle, and by none where relax() would have stopped by now. What the load
-    /// refers to must still live.
+    /// Goes on with the last load by at most one cycle, and by none where relax() would have stopped by now. After a move
+    /// of the windows it meets the contacts and goes along the last increment. What the load refers to must still live.
     ElasticResult goOn() noexcept;
     /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces. No tool is
     /// held back.
@@ -247,14 +248,14 @@ private:
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
     Course course_;
-    std::optional<ElasticLoad> waiting_;  // windows moved for it, and no more
-    bool hasMoved_ = false;               // windows, since contacts were found
+    std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them
     double stiffness_ = 0;                           // along the last step, of tissue and contacts
     std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
     double balance_ = 1;                             // see toolForce()
     int sinceRefresh_ = 0;
+    int sinceFound_ = 0;         // calls with new ties since surface points were looked for
     double untouchedFor_ = 0.0;  // [s]
     bool atRest_ = true;
     bool hasIncrement_ = false;

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double reach = 0.6;         // spacings from a tool within which surface points are looked at
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
+constexpr int stillPeriod = 64;       // calls after which they are beside ties, which drag tissue to a tool that rests
 constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
 
 }  // namespace
@@ -54,10 +55,11 @@ bool Elastic::tiesHold(std::span<const Tie> ties) const noexcept
 // every call, and a probe beside it the same points.
 void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
 {
-    const bool toolsHold = !moved && sitesHold(load.tools);
+    bool toolsHold = !moved && sitesHold(load.tools);
     if (toolsHold && tiesHold(load.ties)) {
         return;
     }
+    toolsHold = toolsHold && ++sinceFound_ < stillPeriod;
     const double spacing = stack_.body().levels.front().nodes.spacing;
     std::size_t fresh = touching_;  // the first site that is new
     if (!toolsHold) {
@@ -67,7 +69,10 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
             }
         }
         fresh = 0;
-        touching_ = findSites(stack_.body(), stack_.windows(), load.tools, shapes_, reach * spacing, sites_);
+        sinceFound_ = 0;
+        const std::size_t room = sites_.size() - std::min(sites_.size(), placesOf(load.ties, spacing));
+        touching_ =
+            findSites(stack_.body(), stack_.windows(), load.tools, shapes_, reach * spacing, std::span(sites_).first(room));
         foundFor_.clear();
         for (const ElasticTool& tool : load.tools) {
             foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});

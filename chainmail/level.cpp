@@ -169,7 +169,11 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     if (turn_ == 0) {
         ElasticLoad all = load(grip);
         all.periods = std::exchange(since_, 0);
-        last_ = inParts ? elastic_.begin(all) : elastic_.relax(all);
+        // A tip that is in tissue at rest takes over from another level: its shape is asked for at once.
+        const bool takesOver = wasAtRest && grip.kind == Grip::Kind::point && grip.inside;
+        const double residual = last_.residual;
+        last_ = inParts && !takesOver ? elastic_.begin(all) : elastic_.relax(all);
+        last_.residual = last_.moved && last_.cycles == 0 ? residual : last_.residual;
     } else if (const ElasticResult further = elastic_.goOn(); further.cycles > 0) {
         last_ = further;
     }

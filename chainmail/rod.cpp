@@ -14,7 +14,7 @@ constexpr double gives = 1.25;        // the ring's rod over that asked for: so 
 constexpr double shortest = 1.0;      // length over diameter that G is taken for
 constexpr double leastLack = 0.1;     // of differences of G
 constexpr double acrossToAlong = 4.0 * (1.0 - 0.45) / (3.0 - 4.0 * 0.45);  // of the factors before ln(R / r), at nu = 0.45
-constexpr double fewest = 4.0, standard = 8.0, most = 32.0;                // points
+constexpr double fewest = 4.0, standard = 8.0;                             // points
 
 }  // namespace
 
@@ -39,7 +39,7 @@ RodRing ringOf(const RodPiece& piece, double mu, double spacing) noexcept
     const double whole = std::max(standard, std::ceil(2.0 * std::numbers::pi * circle / spacing));
     const double points = piece.length < narrowest * spacing ? 0.5 * whole : whole;
     return {circle, line / lacks(0.980, -0.133), acrossToAlong * line / lacks(0.185, 0.233),
-            std::clamp(std::ceil(points), fewest, most)};
+            std::clamp(std::ceil(points), fewest, maxRingPoints)};
 }
 
 }  // namespace palpate::chainmail

@@ -16,6 +16,8 @@ struct RodPiece {
 double piecesOfRod(double length) noexcept;
 
 /// Points evenly on a circle around a rod's axis, each on its spring, which stand for a piece of the rod.
+inline constexpr double maxRingPoints = 32.0;
+
 struct RodRing {
     double radius = 0;  // of the circle [m]
     double along = 0;   // stiffness of all springs together along the axis [N/m]

@@ -40,9 +40,8 @@ struct SessionModel {
 /// std::runtime_error for structures that the volume does not have, and more of them than maxStructures.
 /// @param scene      what to build
 /// @param tissue     its volume
-/// @param isSession  a session may step down to ChainMail, so that a tool that holds too many nodes for a tick is refused;
-/// and
-///                   it needs a way to the target. What is none (palpate press) has approach.isPlanned false without a way
+/// @param isSession  a session needs a way to the target, and may step down to ChainMail: a tool that holds too many nodes
+///                   for a tick is refused. What is none (palpate press) has approach.isPlanned false where there is no way
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession = true);
 
 }  // namespace palpate::haptics

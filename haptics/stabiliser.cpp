@@ -105,8 +105,10 @@ Vec3 beyondCap(Vec3 basic, Vec3 position, double cap, StabiliserState& s) noexce
 {
     const double size = glm::length(basic);
     if (size <= cap) {
-        s.atCap = position;
         return basic;
+    }
+    if (s.gain <= 0.0) {
+        s.atCap = position + lateFall / size * basic;  // not known: all of it
     }
     const double deeper = -glm::dot(position - s.atCap, basic) / size;
     return bounded(basic, cap + (size - cap) * (deeper > lateFall ? lateFall / deeper : 1.0));
@@ -277,6 +279,9 @@ SentForce stabilise(Vec3 basic, Vec3 additional, const DeviceSample& device, Vec
     const bool held = (device.buttons & buttonDeadMan) != 0;
     const double cap = std::min(o.cap, o.device.peakForce);
     RenderedForce sent;
+    if (believed && glm::length(basic) <= cap) {
+        s.atCap = device.position;
+    }
     if (s.faulted || !held) {
         s.gain = 0.0;
         s.window.read.count = 0;

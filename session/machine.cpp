@@ -27,8 +27,8 @@ namespace {
 using nlohmann::json;
 
 constexpr int warmUp = 40;  // ticks before those that count
-constexpr int counted =
-    160;  // with a needle twice as many: its ticks take less, and each move of the windows is one in many
+constexpr int counted = 160;
+constexpr int countedOfNeedle = 640;  // its ticks take less, and one in two hundred moves windows
 constexpr double needleStep = 20e-6;  // way of a needle in a tick [m]
 constexpr double probeAside = 15e-3;  // of the ball, and how deep it presses [m]
 constexpr double probePress = 4e-3;
@@ -133,7 +133,7 @@ TickTime measureSetting(const std::string& setting, const TissueLoad& load)
     const Neighbour viewer;
     haptics::Histogram times;
     const double radius = model.scene.tool.radius;
-    const int most = warmUp + (load.needle ? 4 : 1) * counted;
+    const int most = warmUp + (load.needle ? countedOfNeedle : counted);
     haptics::DeviceSample sample{.position = {0, -radius, 0}, .buttons = haptics::buttonDeadMan};
     sample.axis = {0, 1, 0};
     for (int tick = 0; tick < most; ++tick) {

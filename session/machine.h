@@ -36,8 +36,8 @@ struct TickTime {
 FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>& timeOf);
 
 /// A ball pressed into a small block, or a needle pushed into small layers under skin, as fast as the program goes, while
-/// another thread keeps the memory busy as a viewer does: 0.1 s. Times are of the processor, so that other programs do not
-/// count: the servo thread goes before them.
+/// another thread keeps the memory busy as a viewer does: 0.1 s (0.2 s with a needle at `default`). Times are of the
+/// processor, so that other programs do not count: the servo thread goes before them.
 /// @param setting  of level `elastic`
 /// @param load     which tools
 TickTime measureSetting(const std::string& setting, const TissueLoad& load = {});

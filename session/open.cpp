@@ -182,6 +182,9 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
         const bool aims = !changes.tool || changes.target || !datasets::lesionOf(*tissue).empty();
         if (!aims) {
             changes.target = datasets::largestStructure(*tissue);
+            if (changes.target->empty()) {
+                throw std::runtime_error(what + ": the volume holds no tissue, only air: import one with tissue");
+            }
         }
         auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
         auto model = haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);

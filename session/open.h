@@ -31,7 +31,6 @@ struct SceneChanges {
     std::optional<std::string> model;    // one of datasets::modelLevels
     std::optional<std::string> setting;  // of level `elastic`: one of datasets::elasticSettings()
     /// Names the setting where level is `elastic` and neither scene nor `setting` says one; empty: the scene's standard.
-    /// `probe`: the scene has an ultrasound probe.
     std::function<std::string(const datasets::Scene&)> fit;
     std::optional<std::string> dffb;   // one of dffbChoices
     std::optional<std::string> trial;  // with "fade": "K/N"

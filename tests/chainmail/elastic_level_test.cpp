@@ -377,6 +377,23 @@ TEST(ElasticLevel, HeldPointIsFollowedByTurns)
     EXPECT_EQ(std::vector(waited.begin() + 1, waited.end()), (std::vector{2, 1, 3}));
 }
 
+// A tip that is in tissue at rest takes over from another level, in a step down: the tissue is there after one call, and
+// not at rest until the next turn.
+TEST(ElasticLevel, TipThatTakesOverHasItsTissueAtOnce)
+{
+    const Vec3 rest(27e-3, 7e-3, 23e-3), pushed(0.5e-3, 2e-3, 0.0);
+    Bench bench;
+    ElasticLevel level(bench.shape, bench.body, bench.surface, smallWindows(), rest + Vec3(12e-3, 0.0, 0.0));
+    level.deform(held(rest, pushed, true));
+    const std::size_t node = bench.grid.offset(Index3(glm::round((rest - bench.grid.origin) / levelSpacing)));
+    const Vec3 first(bench.shape.u()[node]);
+    for (int i = 0; i < 60; ++i) {
+        level.deform(held(rest, pushed, true));
+    }
+    EXPECT_LT(glm::distance(first, Vec3(bench.shape.u()[node])), 0.1 * glm::length(pushed));
+    EXPECT_GT(glm::length(first), 0.5 * glm::length(pushed));
+}
+
 TEST(ElasticLevel, DeformTouchesNoHeap)
 {
     Bench bench;

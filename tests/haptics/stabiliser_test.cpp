@@ -310,6 +310,43 @@ TEST(Stabiliser, TissueBeyondTheCapIsFeltOnTheWayOut)
     }
 }
 
+// A pose that jumps out of the tissue and back says nothing of where the force was at the cap. Where the switch is let go,
+// and taken again in another place beyond the cap, that is not known: then the whole force is what it falls by on the way
+// out, so that the hand gains nothing.
+TEST(Stabiliser, WhatLiesBeyondTheCapIsOfThePlaceWhereTheHandIs)
+{
+    constexpr double stiffness = 800.0, step = 20e-6;
+    const StabiliserOptions o{deviceParameters("touch"), tickSeconds, 8.5};
+    const double cap = o.device.peakForce, deepest = 3.0 * cap / stiffness;
+    for (const bool jumps : {false, true}) {
+        StabiliserState state;
+        const auto send = [&](double x, double depth, bool held) {
+            DeviceSample sample = heldAt({x, depth, 0});
+            sample.buttons = held ? sample.buttons : 0;
+            return -stabilise(Vec3(0, -stiffness * std::max(depth, 0.0), 0), Vec3(0.0), sample, o, state).total().y;
+        };
+        for (int i = 0; i < 1000; ++i) {
+            send(0.0, 0.0, true);
+        }
+        for (double depth = 0.0; depth < deepest; depth += step) {
+            send(0.0, depth, true);
+        }
+        for (int i = 0; i < 1000; ++i) {
+            jumps ? send(0.0, i == 0 ? -0.5 : deepest, true) : send(1e-4 * i, deepest, false);
+        }
+        const double x = jumps ? 0.0 : 0.1;
+        for (int i = 0; i < 1500; ++i) {
+            send(x, deepest, true);
+        }
+        for (double depth = deepest; depth > 1e-3; depth -= step) {
+            const double sent = send(x, depth, true), asked = std::min(stiffness * depth, cap);
+            EXPECT_GT(sent, jumps ? 0.98 * asked - stiffness * 2e-3 : -1e-9) << jumps << " " << depth;
+            EXPECT_LT(sent, asked + 1e-6) << jumps << " " << depth;
+            EXPECT_TRUE(jumps || depth > deepest - cap / stiffness || sent < 1e-6) << depth;
+        }
+    }
+}
+
 // A spring that nobody holds has nothing but the controller to calm it.
 TEST(Stabiliser, SpringsLetGoAtFullLoadDecay)
 {
