@@ -504,15 +504,6 @@ std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, 
     return finder.count();
 }
 
-std::size_t placesOf(std::span<const Tie> ties, double spacing) noexcept
-{
-    double sum = 0.0;
-    for (const Tie& tie : ties) {
-        sum += tie.piece.isRod() ? maxRingPoints * (1.0 + std::ceil(tie.piece.length / spacing)) : 1.0;
-    }
-    return static_cast<std::size_t>(sum);
-}
-
 std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,
                      std::span<ContactSite> out) noexcept
 {

@@ -133,9 +133,6 @@ double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept;
 /// @returns  how many; more than out holds are left out
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
                       std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept;
-/// How many sites ties take, at most.
-/// @param spacing  of the finest cells [m]
-std::size_t placesOf(std::span<const Tie> ties, double spacing) noexcept;
 /// Fills `out` with the ties.
 /// @returns  how many; more than out holds are left out
 std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,

@@ -1,10 +1,12 @@
 // The sites of Elastic: which points meet the tools, and how they move with them.
 #include <chainmail/elastic.h>
+#include <chainmail/rod.h>
 
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace palpate::chainmail {
 
@@ -14,6 +16,16 @@ constexpr double reach = 0.6;         // spacings from a tool within which surfa
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
 constexpr int stillPeriod = 64;       // calls after which they are beside ties, which drag tissue to a tool that rests
 constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
+
+// How many sites ties take, at most.
+std::size_t placesOf(std::span<const Tie> ties, double spacing) noexcept
+{
+    double sum = 0.0;
+    for (const Tie& tie : ties) {
+        sum += tie.piece.isRod() ? maxRingPoints * (1.0 + std::ceil(tie.piece.length / spacing)) : 1.0;
+    }
+    return static_cast<std::size_t>(sum);
+}
 
 }  // namespace
 
