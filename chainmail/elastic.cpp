@@ -298,8 +298,8 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     // No hand feels tissue that springs back.
     course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
     course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
-    // A call that has only a part of the cycles has none beside the search for contacts in windows that moved.
-    solve(effort.inParts ? (result.moved && course_.hasGone ? 0 : 1) : course_.last, result);
+    // A call that has only a part of the cycles has none beside a search for surface points.
+    solve(effort.inParts ? (sinceFound_ == 0 && course_.hasGone ? 0 : 1) : course_.last, result);
     finish(result);
     return result;
 }

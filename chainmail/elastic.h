@@ -75,9 +75,9 @@ public:
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
     ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
-    /// As relax(), in parts, for a load whose force nobody waits for: here at most one cycle, or only a move of the
-    /// windows; goOn() has the rest. Without friction, while no windows move and no step is shortened twice, the parts end
-    /// with the bits of relax().
+    /// As relax(), in parts, for a load whose force nobody waits for: here at most one cycle, a search for surface points,
+    /// or a move of the windows; goOn() has the rest. Without friction, moves, searches and steps that are shortened twice,
+    /// the parts end with the bits of relax().
     ElasticResult begin(const ElasticLoad& load) noexcept;
     /// Goes on with the last load by at most one cycle, and by none where relax() would have stopped by now. After a move
     /// of the windows it meets the contacts and goes along the last increment. What the load refers to must still live.
@@ -255,7 +255,7 @@ private:
     std::array<double, 3> nearness_{1, 1, 1};        // by cycle: stiffness along z, in the residual's work along it
     double balance_ = 1;                             // see toolForce()
     int sinceRefresh_ = 0;
-    int sinceFound_ = 0;         // calls with new ties since surface points were looked for
+    int sinceFound_ = 0;         // calls since surface points were looked for
     double untouchedFor_ = 0.0;  // [s]
     bool atRest_ = true;
     bool hasIncrement_ = false;

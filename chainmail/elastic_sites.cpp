@@ -68,10 +68,11 @@ bool Elastic::tiesHold(std::span<const Tie> ties) const noexcept
 void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
 {
     bool toolsHold = !moved && sitesHold(load.tools);
+    ++sinceFound_;
     if (toolsHold && tiesHold(load.ties)) {
         return;
     }
-    toolsHold = toolsHold && ++sinceFound_ < stillPeriod;
+    toolsHold = toolsHold && (load.tools.empty() || sinceFound_ < stillPeriod);
     const double spacing = stack_.body().levels.front().nodes.spacing;
     std::size_t fresh = touching_;  // the first site that is new
     if (!toolsHold) {

@@ -189,7 +189,7 @@ TEST(Elastic, UnfeltForcesCostNoFurtherCycle)
 }
 
 // A load solved in parts ends with the bits of one call: the same cycles, at most one in a part, and none once balanced. A
-// needle that is drawn through the tissue beside a ball that is pressed, so far at once that a call takes three.
+// needle that is drawn through the tissue beside a ball that rests, so far at once that a call takes three.
 TEST(Elastic, PartsOfALoadEndWhereOneCallEnds)
 {
     const ElasticBody block = body();
@@ -199,7 +199,7 @@ TEST(Elastic, PartsOfALoadEndWhereOneCallEnds)
         Elastic whole(block, options, tests::focusUnder(top)), inParts(block, options, tests::focusUnder(top));
         std::array<int, 4> ofCycles{};
         for (int i = 0; i < 60; ++i) {
-            const std::array tools{pressed(1e-3 + 0.02e-3 * i)};
+            const std::array tools{pressed(1.5e-3)};
             const std::array ties{
                 tieAt(top + Vec3(3e-3, 5e-3, 0.0), (i % 7 == 0 ? 0.2e-3 : 0.02e-3) * i * Vec3(0, 1, 0.3))};
             const auto load = tests::loadOf(tools, ties, top);
