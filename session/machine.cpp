@@ -58,7 +58,7 @@ private:
     std::thread thread_;
 };
 
-// A block of fat for a ball. What needles go into has skin, with which ticks take half as long again, and relaxes.
+// A block of fat for a ball. What needles go into has skin and relaxes, with which ticks take up to twice as long.
 haptics::SessionModel smallBody(const std::string& setting, const TissueLoad& load)
 {
     datasets::Scene scene = *datasets::builtInScene(load.needle ? "layered" : "block");
