@@ -42,8 +42,8 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
         return nullptr;
     }
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
-    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells), surface,
-                                                                           scene.model.elastic.poissonCap, presses,
+    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells, surface),
+                                                                           surface, scene.model.elastic.poissonCap, presses,
                                                                            scene.model.relaxation, tissue.support()));
 }
 

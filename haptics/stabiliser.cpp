@@ -114,6 +114,15 @@ Vec3 beyondCap(Vec3 basic, Vec3 position, double cap, StabiliserState& s) noexce
     return bounded(basic, cap + (size - cap) * (deeper > lateFall ? lateFall / deeper : 1.0));
 }
 
+// A smaller force costs a hand nothing and is taken over at once, but for its direction: that may have been far behind, and
+// goes there by `most` at a time.
+Vec3 turned(Vec3 from, Vec3 to, double most) noexcept
+{
+    const double size = glm::length(from);
+    const Vec3 smaller = size > 0.0 ? std::min(1.0, glm::length(to) / size) * from : Vec3(0.0);
+    return smaller + bounded(to - smaller, most);
+}
+
 // `limit` is the stable stiffness, `rise` how much the force may grow in this tick: pressed faster than that it falls
 // behind here, and not in a limit behind, so that on the way out it is already on its way down. The tissue's own change is
 // that beyond the cap, for the same reason; see beyondCap().
@@ -131,7 +140,7 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
     Vec3 next = bounded(s.coupled + answerable(change, way, stiffest), cap);
     const Vec3 behind = wanted - next;
     if (glm::length(wanted) <= glm::length(next) || glm::length(behind) < noForce) {
-        next = wanted;
+        next = turned(next, wanted, rise);
     } else if (glm::dot(next, wanted) < 0.0) {
         next = Vec3(0.0);
     } else if (s.rest >= restTime) {

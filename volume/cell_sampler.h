@@ -15,9 +15,8 @@
 // Inside volume/ only.
 namespace palpate::volume {
 
-// Reads the voxels that fill a node's cell, by s^3 samples of the cell. Along voxel axes that are about as coarse as the
-// samples it interpolates: the nearest voxel alone would shift everything by up to half a voxel where samples fall on the
-// faces between voxels.
+// Reads the voxels that fill a node's cell, by s^3 samples of the cell, and interpolates between them: the nearest voxel
+// alone would shift everything by up to half a voxel where samples fall on the faces between voxels.
 class CellSampler {
 public:
     // `blocks` must outlive it. `forMaterial`: for visitMaterial(), which samples cells far smaller than the voxels more
@@ -43,9 +42,21 @@ public:
         farthest_ = std::sqrt(3.0) * (0.5 * grid.spacing + std::max({voxel.x, voxel.y, voxel.z}));
         step_ = toIndex * grid.spacing;
         start_ = toIndex * (grid.origin - tissue.affine.origin);
-        for (int k = 0; k < 3; ++k) {
-            interpolate_[k] = voxel[k] > 0.8 * grid.spacing / s;
+    }
+
+    // Variance of the place in which visit() reads a node's cell, along each patient axis: of the samples, and of the hats
+    // between voxels [m^2].
+    Vec3 variance(const NodeGrid& grid, const Affine& affine) const noexcept
+    {
+        Vec3 sum(0.0);
+        for (const Vec3& place : places_) {
+            sum += place * place / static_cast<double>(places_.size());
         }
+        sum *= 0.25 * grid.spacing * grid.spacing;
+        for (int k = 0; k < 3; ++k) {
+            sum += affine.linear[k] * affine.linear[k] / 6.0;
+        }
+        return sum;
     }
 
     // The label of all voxels that visit() reads at node n; LabelBlocks::several where they have several, or some are
@@ -91,13 +102,7 @@ public:
     template <typename Visit>
     void visit(Index3 n, const Visit& visit) const
     {
-        forEachSample(n, [&](Vec3 at, double fraction, Vec3 place) {
-            if (glm::any(interpolate_)) {
-                visitAround(at, fraction, place, visit);
-            } else {
-                read(Index3(glm::floor(at + 0.5)), fraction, place, visit);
-            }
-        });
+        forEachSample(n, [&](Vec3 at, double fraction, Vec3 place) { visitAround(at, fraction, place, visit); });
     }
 
     // The same for material alone, labels of which isTissue(label) is true: between voxels far larger than a cell, a sample
@@ -146,8 +151,8 @@ private:
     template <typename Visit>
     void visitAround(Vec3 at, double fraction, Vec3 place, const Visit& visit) const
     {
-        const Vec3 low = glm::mix(glm::floor(at + 0.5), glm::floor(at), Vec3(interpolate_));
-        const Vec3 t = (at - low) * Vec3(interpolate_);
+        const Vec3 low = glm::floor(at);
+        const Vec3 t = at - low;
         const std::array<Vec3, 2> w{1.0 - t, t};
         for (std::size_t corner = 0; corner < 8; ++corner) {
             const std::array<std::size_t, 3> far{corner & 1, (corner >> 1) & 1, (corner >> 2) & 1};
@@ -201,9 +206,8 @@ private:
     std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
     std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
     double farthest_ = 0.0;
-    Mat3 step_{1.0};   // node steps in voxels
-    Vec3 start_{0.0};  // node (0, 0, 0) in voxels
-    glm::bvec3 interpolate_{false};
+    Mat3 step_{1.0};         // node steps in voxels
+    Vec3 start_{0.0};        // node (0, 0, 0) in voxels
     bool isCoarse_ = false;  // voxels, beside the cells
 };
 

@@ -298,6 +298,34 @@ std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> f
     return distance;
 }
 
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,
+                                  float weight)
+{
+    std::vector<std::int32_t> nearest(grid.count(), -1);
+    std::vector<SurfacePoint> points = surface.points;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        points[k].at += weight * surface.back[k] * points[k].normal;
+        nearest[surface.nodes[k]] = static_cast<std::int32_t>(k);
+    }
+    spreadNearest(grid.size, points, nearest);
+
+    const auto diagonal = static_cast<float>(glm::length(Vec3(grid.size)));
+    const auto spacing = static_cast<float>(grid.spacing);
+    std::vector<float> distance(grid.count());
+    forEachNode(grid, [&](Index3 n, std::size_t i) {
+        float d = diagonal;
+        bool isInside = fraction[i] > 0.5F;
+        if (nearest[i] >= 0) {
+            const SurfacePoint& point = points[static_cast<std::size_t>(nearest[i])];
+            const Vec3f away = Vec3f(n) - point.at;
+            d = distanceTo(n, point);
+            isInside = glm::dot(away, away) < 1.0F ? glm::dot(away, point.normal) < 0.0F : isInside;
+        }
+        distance[i] = (isInside ? -d : d) * spacing;
+    });
+    return distance;
+}
+
 double integral(const NodeGrid& grid, std::span<const float> fraction)
 {
     double sum = 0;
@@ -407,6 +435,14 @@ float isoForVolume(const NodeGrid& grid, std::span<const float> fraction, double
         iso = std::clamp(histogram.levelOf(wanted), lowestIso, highestIso);
     }
     return std::min(iso, 0.9F * *std::max_element(fraction.begin(), fraction.end()));
+}
+
+double enclosedVolume(const NodeGrid& grid, std::span<const float> distance)
+{
+    const auto h = static_cast<float>(grid.spacing);
+    std::vector<float> depth(distance.begin(), distance.end());
+    std::transform(depth.begin(), depth.end(), depth.begin(), std::negate<>());
+    return histogramOf(grid, depth, -h, h, 3).above(0.0F) * grid.spacing * grid.spacing * grid.spacing;
 }
 
 void keepVolume(const NodeGrid& grid, std::vector<float>& distance, double volume)

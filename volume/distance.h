@@ -1,5 +1,6 @@
 #pragma once
 
+#include <volume/blurred_surface.h>
 #include <volume/geometry.h>
 
 #include <cstdint>
@@ -8,12 +9,6 @@
 
 // Inside volume/ only: distance transforms of dense arrays on a NodeGrid.
 namespace palpate::volume {
-
-/// A point on a surface and the unit normal there, in node units; a zero normal means "unknown".
-struct SurfacePoint {
-    Vec3f at{0.0F};
-    Vec3f normal{0.0F};
-};
 
 /// Finds the nearest of `points` for every node.
 ///
@@ -29,6 +24,14 @@ void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vecto
 /// Signed distance [m], negative where fraction > iso, to the surface fraction = iso of the trilinear `fraction` (nodes x
 /// 1). Where no surface crosses the grid, the diagonal of the grid with the sign of the side it lies on.
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, float iso);
+
+/// The same to a surface from fractions, of which more than half are inside.
+/// @param weight  of the surface's way back: 1 as it was computed
+std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,
+                                  float weight);
+
+/// Volume where the trilinear interpolant of `distance` is negative [m^3].
+double enclosedVolume(const NodeGrid& grid, std::span<const float> distance);
 
 /// The value between 0.05 and 0.6 whose isosurface encloses `volume` [m^3]; 0.5 when that does within 0.5 %.
 /// At most nine tenths of the largest fraction, so that something is inside. Source of `fraction`: nodes x 1, trilinear.

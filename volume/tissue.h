@@ -147,6 +147,10 @@ public:
     ScalarField youngsModulusOn(const NodeGrid& grid) const;
     /// What fills each node's cell, for elastic models (count x 1).
     std::vector<CellMaterial> materialOn(const NodeGrid& grid) const;
+    /// The same where `surface` is the body's, of distanceToBody() on any grid: cells that it cuts are as full as it says,
+    /// so that the steps of voxels are not felt in their stiffness. Where it says something quite different from the
+    /// voxels, as in structures thinner than its spacing, these decide.
+    std::vector<CellMaterial> materialOn(const NodeGrid& grid, const DistanceField& surface) const;
     /// Row of the tissue table that fills most of each node's cell (count x 1); air where under half of it is tissue.
     std::vector<std::uint8_t> tissueOn(const NodeGrid& grid) const;
     /// Mean of the image over the tissue in each node's cell; not a number where there is none, or no image (count x 1).

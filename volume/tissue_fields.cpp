@@ -15,6 +15,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 
 namespace palpate::volume {
@@ -61,8 +62,8 @@ void forEachRow(const TissueData& tissue, const NodeGrid& grid, const NodeRange&
 }
 
 // Of the cell of node n, which is at `at`.
-CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, Index3 n, Vec3 at,
-                          const std::vector<const TissueRow*>& rows)
+CellMixture cellMixture(const TissueData& tissue, const CellSampler& sampler, Index3 n, Vec3 at,
+                        const std::vector<const TissueRow*>& rows)
 {
     CellMixture mixture;
     const int only = sampler.isScaled() ? LabelBlocks::several : sampler.onlyLabel(n);
@@ -72,7 +73,7 @@ CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, 
         if (row != nullptr) {
             mixture.add(*row, 1.0, 1.0, row->fixed);
         }
-        return mixture.material();
+        return mixture;
     }
     const auto isTissue = [&](std::uint16_t label) { return rows[label] != nullptr; };
     sampler.visitMaterial(n, isTissue, [&](std::uint16_t label, double weight, const openvdb::Coord& voxel, Vec3 part) {
@@ -82,8 +83,49 @@ CellMaterial cellMaterial(const TissueData& tissue, const CellSampler& sampler, 
             mixture.add(*row, weight, sampler.factor(label, voxel), held, part);
         }
     });
-    return mixture.material();
+    return mixture;
 }
+
+// Fraction of a cell behind the surface: the mean of 4^3 parts, each from empty to full over its edge.
+double fractionBehind(const DistanceField& surface, Vec3 middle, double edge)
+{
+    constexpr int side = 4;
+    const double part = edge / side;
+    double sum = 0.0;
+    forEachIndex(Index3(0), Index3(side - 1), [&](Index3 n) {
+        const Vec3 at = middle + part * (Vec3(n) + 0.5 - 0.5 * side);
+        sum += std::clamp(0.5 - surface.at(at) / part, 0.0, 1.0);
+    });
+    return sum / (side * side * side);
+}
+
+// What the surface makes of the stiffness of a cell of which the voxels fill `filled`.
+class SurfaceCells {
+public:
+    SurfaceCells(const DistanceField& surface, const NodeGrid& cells, Vec3 voxel)
+        : surface_(surface),
+          edge_(cells.spacing),
+          noise_(std::min(0.3 * std::max({voxel.x, voxel.y, voxel.z}) / cells.spacing, 0.5))
+    {
+    }
+
+    double scale(Vec3 middle, double filled) const
+    {
+        if (filled < least || std::abs(surface_.at(middle)) > 0.9 * edge_) {
+            return 1.0;
+        }
+        const double more = fractionBehind(surface_, middle, edge_) - filled;
+        const double trust = std::clamp(3.0 - 2.0 * std::abs(more) / noise_, 0.0, 1.0);
+        return 1.0 + trust * more / filled;
+    }
+
+private:
+    static constexpr double least = 1e-6;  // fraction of a cell that may be none
+
+    const DistanceField& surface_;
+    double edge_;   // of a cell [m]
+    double noise_;  // what the steps of voxels do to a fraction
+};
 
 NodeRange grown(const NodeRange& range, const NodeGrid& grid, Index3 by)
 {
@@ -168,10 +210,22 @@ Index3 smoothingPasses(const TissueData& tissue, const NodeGrid& grid)
     return passes;
 }
 
+Blur blurOf(const TissueData& tissue, const NodeGrid& grid, Index3 passes)
+{
+    const LabelBlocks none(tissue, {Index3(0), Index3(0)});
+    const Vec3 cell = CellSampler(tissue, grid, none, false).variance(grid, tissue.affine);
+    const Vec3 voxel = tissue.affine.spacing();
+    return {glm::sqrt(12.0 * cell) / grid.spacing, passes, std::max({voxel.x, voxel.y, voxel.z}) / grid.spacing};
+}
+
 bool inside(const Box& box, const Box& of)
 {
     return glm::all(glm::greaterThan(box.low, of.low)) && glm::all(glm::lessThan(box.high, of.high));
 }
+
+// Where the surface from blurred fractions misses the volume by more, structures are thinner than the blur.
+constexpr double tooThin = 0.15;
+constexpr double exact = 0.01;
 
 // A structure beside the grid: the distance to its box.
 DistanceField distanceToBox(const NodeGrid& grid, const Box& box)
@@ -205,9 +259,18 @@ DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, c
     for (int axis = 0; axis < 3; ++axis) {
         smoothAxis(fraction, grid, smoothed, axis, passes[axis]);
     }
-    const float iso = isoForVolume(grid, fraction, volume);
-    DistanceField field{{grid, signedDistance(grid, fraction, iso)}};
-    keepVolume(grid, field.values, volume);
+    const BlurredSurface surface = blurredSurface(grid, fraction, blurOf(tissue, grid, passes));
+    DistanceField field{{grid, signedDistance(grid, fraction, surface, 1.0F)}};
+    const double missing = 1.0 - enclosedVolume(grid, field.values) / volume;
+    const double shell = surface.shell * std::pow(grid.spacing, 3) / volume;
+    if (std::abs(missing) > tooThin || shell > tooThin) {
+        field.values = signedDistance(grid, fraction, isoForVolume(grid, fraction, volume));
+        keepVolume(grid, field.values, volume);
+    } else if (std::abs(missing) > exact && shell > exact) {
+        // The way back is of first order: on bodies that are curved all over, their volume says how much of it is due.
+        const double weight = std::clamp(1.0 + missing / shell, 0.75, 1.25);
+        field.values = signedDistance(grid, fraction, surface, static_cast<float>(weight));
+    }
     return field;
 }
 
@@ -292,6 +355,31 @@ std::uint8_t cellRow(const CellSampler& sampler, Index3 n, const LabelLookup& lo
     return std::max_element(rows.begin(), end, [](const auto& a, const auto& b) { return a.second < b.second; })->first;
 }
 
+template <typename Scale>
+std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& grid, const Scale& scale)
+{
+    checkGrid(grid);
+    std::vector<const TissueRow*> rows(65536, nullptr);
+    for (const Structure& s : tissue.structures) {
+        rows[s.value] = tissue.lookup.solid[s.value] != 0 ? &tissue.table.rows[s.tissue] : nullptr;
+    }
+    std::vector<CellMaterial> cells(grid.count());
+    const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
+    forEachRow(
+        tissue, grid, range,
+        [&](const CellSampler& sampler, Index3 n) {
+            for (; n.x <= range.high.x; ++n.x) {
+                const Vec3 at = grid.position(n);
+                const CellMixture mixture = cellMixture(tissue, sampler, n, at, rows);
+                CellMaterial& cell = cells[grid.offset(n)];
+                cell = mixture.material();
+                cell.youngsModulus *= static_cast<float>(scale(at, mixture.fraction()));
+            }
+        },
+        true);
+    return cells;
+}
+
 }  // namespace
 
 DistanceField Tissue::distanceTo(std::span<const std::uint16_t> labels, const NodeGrid& grid) const
@@ -339,23 +427,13 @@ ScalarField Tissue::youngsModulusOn(const NodeGrid& grid) const
 
 std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid) const
 {
-    checkGrid(grid);
-    const TissueData& tissue = *impl_;
-    std::vector<const TissueRow*> rows(65536, nullptr);
-    for (const Structure& s : tissue.structures) {
-        rows[s.value] = tissue.lookup.solid[s.value] != 0 ? &tissue.table.rows[s.tissue] : nullptr;
-    }
-    std::vector<CellMaterial> cells(grid.count());
-    const NodeRange range = nodesAround(tissue, grid, tissue.extentOf(tissue.lookup.solid));
-    forEachRow(
-        tissue, grid, range,
-        [&](const CellSampler& sampler, Index3 n) {
-            for (; n.x <= range.high.x; ++n.x) {
-                cells[grid.offset(n)] = cellMaterial(tissue, sampler, n, grid.position(n), rows);
-            }
-        },
-        true);
-    return cells;
+    return materials(*impl_, grid, [](Vec3, double) { return 1.0; });
+}
+
+std::vector<CellMaterial> Tissue::materialOn(const NodeGrid& grid, const DistanceField& surface) const
+{
+    const SurfaceCells cells(surface, grid, impl_->affine.spacing());
+    return materials(*impl_, grid, [&](Vec3 at, double filled) { return cells.scale(at, filled); });
 }
 
 std::vector<std::uint8_t> Tissue::tissueOn(const NodeGrid& grid) const

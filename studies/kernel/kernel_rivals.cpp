@@ -44,7 +44,8 @@ TrialBody trialBody(const volume::Tissue& tissue, const volume::DistanceField& s
 {
     auto cells = volume::affordableGrid(tissue.box(), wanted, maxNodes);
     cells.origin += cells.spacing * shift;
-    return {cells, elasticBody(cells, tissue.materialOn(cells), surface, poissonCap, 0.0, false, tissue.support())};
+    return {cells,
+            elasticBody(cells, tissue.materialOn(cells, surface), surface, poissonCap, 0.0, false, tissue.support())};
 }
 
 TrialResult elasticTrial(const ElasticBody& body, const TrialPath& path, double speed, const Reference& reference,

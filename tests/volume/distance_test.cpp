@@ -1,10 +1,12 @@
 #include "bodies.h"
 
+#include <volume/blurred_surface.h>
 #include <volume/tissue.h>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 #include <random>
 
 namespace palpate::volume {
@@ -79,10 +81,95 @@ TEST(Distance, OfAVoxelisedSphereIsTheAnalyticOne)
         }
         const double rms = std::sqrt(squares / count);
         const double half = 0.5 * std::max(c.voxel, c.spacing) / c.voxel;
-        EXPECT_LT(near, half) << c.name;
-        EXPECT_LT(rms, 0.12) << c.name;
+        EXPECT_LT(near, 1.05 * half) << c.name;
+        EXPECT_LT(rms, 0.09) << c.name;
         EXPECT_LT(far, half) << c.name;
         EXPECT_LT(relative, 0.025) << c.name;
+    }
+}
+
+// Error of the body's surface [m], on places of a shape that voxels of edge `voxel` were filled with.
+struct SurfaceError {
+    double bias = 0, rms = 0, max = 0;
+    double normal = 0;  // root mean square [rad]
+};
+
+// A box that is turned about z, far from its edges: planes that voxels cross obliquely.
+SurfaceError errorOfTurnedBox(double degrees, double voxel, double spacing)
+{
+    constexpr double half = 18e-3;
+    const double angle = degrees * std::numbers::pi / 180.0;
+    const Vec3 n(std::sin(angle), std::cos(angle), 0.0), along(std::cos(angle), -std::sin(angle), 0.0);
+    const auto inBox = [&](Vec3 p) {
+        return std::max({std::abs(glm::dot(p, n)), std::abs(glm::dot(p, along)), std::abs(p.z)}) < half ? 1 : 0;
+    };
+    const Index3 size(static_cast<int>(std::lround(60e-3 / voxel)));
+    const Tissue tissue =
+        Tissue::fromLabels(voxelise(size, centred(straight(Vec3(voxel)), size), inBox), table(), names(), {});
+    const DistanceField field = tissue.distanceToBody(coveringGrid(tissue.box(), spacing, 2 * spacing));
+    SurfaceError error;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> within(-0.6 * half, 0.6 * half);
+    constexpr int count = 2000;
+    for (int i = 0; i < count; ++i) {
+        const Vec3 p = half * n + within(random) * along + Vec3(0.0, 0.0, within(random));
+        const double e = field.at(p);
+        const double lean = std::acos(std::min(1.0, glm::dot(field.normal(p), n)));
+        error.bias += e / count;
+        error.rms += e * e / count;
+        error.max = std::max(error.max, std::abs(e));
+        error.normal += lean * lean / count;
+    }
+    error.rms = std::sqrt(error.rms);
+    error.normal = std::sqrt(error.normal);
+    return error;
+}
+
+// A plane at any angle, and that of a body with sharp edges, which smoothing rounds: its faces stay where they are. Voxels
+// of a quarter of a spacing leave steps of 0.5 mm, of which a twentieth may be felt, those of 1 mm in cells of 1 mm a
+// ninth.
+TEST(Distance, OfATurnedBoxIsThatOfItsPlanes)
+{
+    for (const double degrees : {0.0, 10.0, 17.0, 30.0, 40.0}) {
+        const SurfaceError fine = errorOfTurnedBox(degrees, 0.5e-3, 2e-3);
+        EXPECT_LT(std::abs(fine.bias), 0.025e-3) << degrees;
+        EXPECT_LT(fine.rms, 0.04e-3) << degrees;
+        EXPECT_LT(fine.max, 0.12e-3) << degrees;
+        EXPECT_LT(fine.normal, 0.015) << degrees;
+        const SurfaceError coarse = errorOfTurnedBox(degrees, 1e-3, 1e-3);
+        EXPECT_LT(std::abs(coarse.bias), 0.02e-3) << degrees;
+        EXPECT_LT(coarse.rms, 0.11e-3) << degrees;
+        EXPECT_LT(coarse.normal, 0.05) << degrees;
+    }
+}
+
+// Along an axis the fraction is linear between known corners. At any normal it is the volume of the blurred cell that is
+// behind the plane: counted.
+TEST(Distance, PlaneDepthInvertsTheFractionOfABlurredHalfSpace)
+{
+    const PlaneDepth planes(Blur{Vec3(1.0), Index3(1), 0.5});
+    const auto box = [](double d) { return std::clamp(0.5 + d, 0.0, 1.0); };
+    for (double depth = -1.2; depth <= 1.2; depth += 0.05) {
+        const double fraction = 0.25 * box(depth - 1.0) + 0.5 * box(depth) + 0.25 * box(depth + 1.0);
+        for (int axis = 0; axis < 3; ++axis) {
+            Vec3f normal(0.0F);
+            normal[axis] = 1.0F;
+            EXPECT_NEAR(planes.at(static_cast<float>(fraction), normal), depth, 0.02) << axis;
+        }
+    }
+    const Vec3f oblique = glm::normalize(Vec3f(0.3F, -0.8F, 0.5F));
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> inCell(-0.5F, 0.5F);
+    std::uniform_int_distribution<int> step(0, 1);
+    const auto blur = [&] { return inCell(random) + static_cast<float>(step(random) + step(random) - 1); };
+    for (const float depth : {-0.8F, -0.3F, 0.1F, 0.6F}) {
+        constexpr int count = 200000;
+        int behind = 0;
+        for (int i = 0; i < count; ++i) {
+            const Vec3f place(blur(), blur(), blur());
+            behind += glm::dot(place, oblique) < depth ? 1 : 0;
+        }
+        EXPECT_NEAR(planes.at(static_cast<float>(behind) / count, oblique), depth, 0.01);
     }
 }
 
@@ -212,6 +299,42 @@ TEST(Modulus, OfAHalfAndHalfCellIsTheRootOfArithmeticTimesHarmonicMean)
 }
 
 // A cell with bone is a layer of what is not bone, as much stiffer as it is thinner.
+// Cells that an oblique plane cuts are as full as it leaves them, and not as the steps of voxels do.
+TEST(Material, OfCellsThatAnObliquePlaneCutsIsAsTheSurfaceSays)
+{
+    const Vec3 n = glm::normalize(Vec3(0.27, 1.0, 0.12));
+    const Index3 size(48);
+    const Affine affine = centred(straight(Vec3(1e-3)), size);
+    const LabelImage image =
+        voxelise(size, affine, [&](Vec3 p) { return glm::dot(p, n) < 0.0 && glm::length(p) < 22e-3 ? 1 : 0; });
+    const Tissue tissue = Tissue::fromLabels(image, table(), names(), {});
+    const NodeGrid grid = coveringGrid(tissue.box(), 2e-3, 4e-3);
+    const DistanceField surface = tissue.distanceToBody(coveringGrid(tissue.box(), 1e-3, 4e-3));
+    const auto voxels = tissue.materialOn(grid), cells = tissue.materialOn(grid, surface);
+    double before = 0.0, after = 0.0;
+    int count = 0;
+    forEachIndex(Index3(0), grid.size - 1, [&](Index3 c) {
+        const Vec3 middle = grid.position(c);
+        if (std::abs(glm::dot(middle, n)) > 1e-3 || glm::length(middle) > 14e-3) {
+            EXPECT_TRUE(voxels[grid.offset(c)].youngsModulus > 0.0F || cells[grid.offset(c)].youngsModulus == 0.0F);
+            return;
+        }
+        double behind = 0.0;
+        constexpr int side = 10;
+        forEachIndex(Index3(0), Index3(side - 1), [&](Index3 part) {
+            const Vec3 at = middle + 2e-3 * ((Vec3(part) + 0.5) / static_cast<double>(side) - 0.5);
+            behind += glm::dot(at, n) < 0.0 ? 1.0 / (side * side * side) : 0.0;
+        });
+        const double whole = table().rows[1].youngsModulus;
+        before += std::pow(static_cast<double>(voxels[grid.offset(c)].youngsModulus) / whole - behind, 2);
+        after += std::pow(static_cast<double>(cells[grid.offset(c)].youngsModulus) / whole - behind, 2);
+        ++count;
+    });
+    EXPECT_GT(count, 50);
+    EXPECT_LT(std::sqrt(after / count), 0.045);
+    EXPECT_LT(after, 0.3 * before);
+}
+
 TEST(Material, OfACellThatIsPartlyHeldIsAThinnerLayer)
 {
     std::vector<LabelName> labels = names();

@@ -1,0 +1,419 @@
+#include <volume/blurred_surface.h>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <optional>
+
+namespace palpate::volume {
+
+namespace {
+
+// A density on the line, symmetrical about 0, by its values at even steps.
+class Density {
+public:
+    // A box of one step.
+    Density(double reach, double step) : step_(step), half_(static_cast<int>(std::ceil(reach / step)))
+    {
+        values_.assign(static_cast<std::size_t>(2 * half_ + 1), 0.0);
+        values_[static_cast<std::size_t>(half_)] = 1.0 / step;
+    }
+
+    // Of the sum with a number that is even between -width / 2 and width / 2.
+    void addBox(double width)
+    {
+        if (width < step_) {
+            return;
+        }
+        const std::vector<double> sum = integrals();
+        for (int i = -half_; i <= half_; ++i) {
+            const double at = i * step_;
+            value(i) = (read(sum, at + 0.5 * width) - read(sum, at - 0.5 * width)) / width;
+        }
+    }
+
+    // Of the sum with -way / 2 or way / 2, as likely.
+    void addStep(double way)
+    {
+        const std::vector<double> before = values_;
+        for (int i = -half_; i <= half_; ++i) {
+            const double at = i * step_;
+            value(i) = 0.5 * (read(before, at - 0.5 * way) + read(before, at + 0.5 * way));
+        }
+    }
+
+    // Numbers under which `fraction` of all lie, for ascending fractions.
+    template <typename Fractions, typename Take>
+    void quantiles(const Fractions& fractions, const Take& take) const
+    {
+        const std::vector<double> sum = integrals();
+        std::size_t i = 1;
+        std::size_t k = 0;
+        for (const double fraction : fractions) {
+            const double wanted = fraction * sum.back();
+            while (i + 1 < sum.size() && sum[i] < wanted) {
+                ++i;
+            }
+            const double inside = sum[i] > sum[i - 1] ? (wanted - sum[i - 1]) / (sum[i] - sum[i - 1]) : 0.0;
+            take(k++, (static_cast<double>(i - 1) + inside - half_) * step_);
+        }
+    }
+
+private:
+    double& value(int i) { return values_[static_cast<std::size_t>(i + half_)]; }
+    // Up to each place, by the trapezoidal rule.
+    std::vector<double> integrals() const
+    {
+        std::vector<double> sum(values_.size(), 0.0);
+        for (std::size_t i = 1; i < sum.size(); ++i) {
+            sum[i] = sum[i - 1] + 0.5 * step_ * (values_[i - 1] + values_[i]);
+        }
+        return sum;
+    }
+    // Linear between the steps, and even beyond the ends.
+    double read(const std::vector<double>& values, double at) const
+    {
+        const double place = std::clamp(at / step_ + half_, 0.0, static_cast<double>(values.size() - 1));
+        const auto low = std::min(static_cast<std::size_t>(place), values.size() - 2);
+        const double t = place - static_cast<double>(low);
+        return (1.0 - t) * values[low] + t * values[low + 1];
+    }
+
+    double step_;
+    int half_;
+    std::vector<double> values_;
+};
+
+Density projected(const Blur& blur, Vec3 normal)
+{
+    constexpr double step = 0.01;
+    double reach = step;
+    for (int k = 0; k < 3; ++k) {
+        reach += std::abs(normal[k]) * (0.5 * blur.box[k] + blur.passes[k]);
+    }
+    Density density(reach, step);
+    for (int k = 0; k < 3; ++k) {
+        density.addBox(std::abs(normal[k]) * blur.box[k]);
+        for (int pass = 0; pass < 2 * blur.passes[k]; ++pass) {
+            density.addStep(std::abs(normal[k]));
+        }
+    }
+    return density;
+}
+
+}  // namespace
+
+double Blur::variance() const noexcept
+{
+    const Vec3 all = box * box / 12.0 + 0.5 * Vec3(passes);
+    return (all.x + all.y + all.z) / 3.0;
+}
+
+PlaneDepth::PlaneDepth(const Blur& blur)
+{
+    std::array<double, bins + 1> fractions;
+    for (std::size_t i = 0; i < fractions.size(); ++i) {
+        fractions[i] = 0.5 + (0.5 - static_cast<double>(lowest)) * static_cast<double>(i) / bins;
+    }
+    for (int i = 0; i <= directions; ++i) {
+        for (int j = 0; j <= directions - i; ++j) {
+            const Vec3 squares(Vec3(i, j, directions - i - j) / static_cast<double>(directions));
+            Curve curve;
+            projected(blur, glm::sqrt(squares)).quantiles(fractions, [&](std::size_t k, double at) {
+                curve[k] = static_cast<float>(at);
+            });
+            curves_.push_back(curve);
+        }
+    }
+}
+
+const PlaneDepth::Curve& PlaneDepth::curve(int i, int j) const noexcept
+{
+    return curves_[static_cast<std::size_t>(i * (directions + 1) - i * (i - 1) / 2 + j)];
+}
+
+float PlaneDepth::at(float fraction, Vec3f normal) const noexcept
+{
+    const float inside = std::min(std::max(fraction, 1.0F - fraction), 1.0F - lowest);
+    const float bin = (inside - 0.5F) / (0.5F - lowest) * static_cast<float>(bins);
+    const int low = std::min(static_cast<int>(bin), bins - 1);
+    const float t = bin - static_cast<float>(low);
+    const auto read = [&](int i, int j) {
+        const Curve& c = curve(i, j);
+        const auto k = static_cast<std::size_t>(low);
+        return c[k] + t * (c[k + 1] - c[k]);
+    };
+    const float x = std::min(normal.x * normal.x, 1.0F) * static_cast<float>(directions);
+    const float y =
+        std::clamp(normal.y * normal.y * static_cast<float>(directions), 0.0F, static_cast<float>(directions) - x);
+    int i = std::min(static_cast<int>(x), directions - 1);
+    int j = std::min(static_cast<int>(y), directions - 1 - i);
+    const float u = x - static_cast<float>(i);
+    const float v = y - static_cast<float>(j);
+    float depth = 0.0F;
+    if (u + v <= 1.0F || i + j + 2 > directions) {
+        depth = (1.0F - u - v) * read(i, j) + u * read(i + 1, j) + v * read(i, j + 1);
+    } else {
+        depth = (u + v - 1.0F) * read(i + 1, j + 1) + (1.0F - v) * read(i + 1, j) + (1.0F - u) * read(i, j + 1);
+    }
+    return fraction >= 0.5F ? depth : -depth;
+}
+
+namespace {
+
+// Height over a plane, a + b u + c v + d u^2 + e u v + f v^2, by weighted least squares.
+class Paraboloid {
+public:
+    Paraboloid(const SurfacePoint& top, float reach) : origin_(top.at), normal_(top.normal), reach_(reach)
+    {
+        const Vec3f other = std::abs(normal_.x) < 0.7F ? Vec3f(1, 0, 0) : Vec3f(0, 1, 0);
+        u_ = glm::normalize(glm::cross(normal_, other));
+        v_ = glm::cross(normal_, u_);
+    }
+
+    // A point within reach.
+    void add(Vec3f point)
+    {
+        const Vec3f way = (point - origin_) / reach_;
+        const float far = glm::dot(way, way);
+        if (far >= 1.0F) {
+            return;
+        }
+        const double weight = static_cast<double>((1.0F - far) * (1.0F - far));
+        const double u = glm::dot(way, u_);
+        const double v = glm::dot(way, v_);
+        const double w = glm::dot(way, normal_);
+        const std::array<double, 6> row{1.0, u, v, u * u, u * v, v * v};
+        for (std::size_t i = 0; i < 6; ++i) {
+            for (std::size_t j = 0; j <= i; ++j) {
+                matrix_[i][j] += weight * row[i] * row[j];
+            }
+            right_[i] += weight * row[i] * w;
+        }
+        ++count_;
+    }
+
+    // By Cholesky's factors. False where the points do not tell.
+    bool solve()
+    {
+        constexpr int fewest = 10;
+        constexpr double leastPivot = 1e-3;
+        if (count_ < fewest) {
+            return false;
+        }
+        for (std::size_t i = 0; i < 6; ++i) {
+            for (std::size_t j = 0; j <= i; ++j) {
+                double sum = matrix_[i][j];
+                for (std::size_t k = 0; k < j; ++k) {
+                    sum -= matrix_[i][k] * matrix_[j][k];
+                }
+                if (i == j && sum < leastPivot * leastPivot * matrix_[0][0]) {
+                    return false;
+                }
+                matrix_[i][j] = i == j ? std::sqrt(sum) : sum / matrix_[j][j];
+            }
+        }
+        for (std::size_t i = 0; i < 6; ++i) {
+            for (std::size_t k = 0; k < i; ++k) {
+                right_[i] -= matrix_[i][k] * right_[k];
+            }
+            right_[i] /= matrix_[i][i];
+        }
+        for (std::size_t i = 6; i-- > 0;) {
+            for (std::size_t k = i + 1; k < 6; ++k) {
+                right_[i] -= matrix_[k][i] * right_[k];
+            }
+            right_[i] /= matrix_[i][i];
+        }
+        return true;
+    }
+
+    float height() const { return static_cast<float>(right_[0]) * reach_; }
+    // Sum of the second derivatives: negative where the structure is convex.
+    float bend() const { return static_cast<float>(2.0 * (right_[3] + right_[5])) / reach_; }
+    Vec3f normal() const
+    {
+        return glm::normalize(normal_ - static_cast<float>(right_[1]) * u_ - static_cast<float>(right_[2]) * v_);
+    }
+
+private:
+    Vec3f origin_, normal_, u_, v_;
+    float reach_;
+    std::array<std::array<double, 6>, 6> matrix_{};  // lower triangle
+    std::array<double, 6> right_{};
+    int count_ = 0;
+};
+
+// Works on the nodes whose cells the blurred edge runs through.
+class Band {
+public:
+    Band(const NodeGrid& grid, std::span<const float> fraction, const Blur& blur)
+        : grid_(grid),
+          fraction_(fraction),
+          planes_(blur),
+          toBack_(static_cast<float>(0.5 * blur.variance() + interpolated)),
+          reach_(std::clamp(2.0F + 6.0F * static_cast<float>(blur.voxel), leastReach, farthestReach))
+    {
+        steps_ = {1, static_cast<std::ptrdiff_t>(grid.size.x), static_cast<std::ptrdiff_t>(grid.size.x) * grid.size.y};
+        for (std::size_t i = 0; i < fraction.size(); ++i) {
+            if (isIn(i)) {
+                nodes_.push_back(static_cast<std::uint32_t>(i));
+            }
+        }
+        normals_.resize(nodes_.size());
+        depth_.resize(fraction.size());
+    }
+
+    BlurredSurface surface()
+    {
+        findPlanes();
+        const BlurredSurface found = pointsInOwnCells();
+        findRows(found.nodes);
+        BlurredSurface fitted = found;
+        forEach(found.nodes.size(), [&](std::size_t k) { fit(found, k, fitted); });
+        // A layer of nodes within nearOwn on both sides of the surface has 2 nearOwn of them in a unit of area.
+        fitted.shell = std::accumulate(fitted.back.begin(), fitted.back.end(), 0.0) / (2.0 * nearOwn);
+        return fitted;
+    }
+
+private:
+    static constexpr double interpolated = 1.0 / 12.0;  // of a field's bend: what linear interpolation adds, on average
+    static constexpr float nearOwn = 0.7F;     // points lie in their cells, or a little beyond: none is lost on a face
+    static constexpr float leastReach = 2.5F;  // of a paraboloid [spacings]
+    static constexpr float farthestReach = 8.0F;
+    static constexpr float leastCurvedReach = 2.0F;
+    static constexpr float turn = 0.9F;           // reach over radius of curvature
+    static constexpr float farthestShift = 0.5F;  // of a point by its paraboloid [spacings]
+    static constexpr float alike = 0.8F;          // cosine between normals of one paraboloid
+
+    bool isIn(std::size_t i) const { return fraction_[i] > PlaneDepth::lowest && fraction_[i] < 1.0F - PlaneDepth::lowest; }
+
+    template <typename Visit>
+    static void forEach(std::size_t count, const Visit& visit)
+    {
+        constexpr std::size_t grain = 512;
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
+            for (std::size_t k = range.begin(); k != range.end(); ++k) {
+                visit(k);
+            }
+        });
+    }
+
+    // The normal of a plane follows from depths, which are linear in space, and the depths from the normal. The fractions
+    // give the first one: it leans too far from the nearest axis.
+    void findPlanes()
+    {
+        forEach(nodes_.size(), [&](std::size_t k) { normals_[k] = normalFrom(fraction_, k); });
+        for (int turns = 0; turns < 3; ++turns) {
+            forEach(nodes_.size(),
+                    [&](std::size_t k) { depth_[nodes_[k]] = planes_.at(fraction_[nodes_[k]], normals_[k]); });
+            forEach(nodes_.size(), [&](std::size_t k) { normals_[k] = normalFrom(depth_, k); });
+        }
+    }
+
+    // Against the gradient of values that grow inwards: from the neighbours in the band, on one side where the other is
+    // beyond it.
+    template <typename Values>
+    Vec3f normalFrom(const Values& values, std::size_t k) const
+    {
+        const std::size_t i = nodes_[k];
+        const Index3 n = grid_.node(i);
+        Vec3f slope(0.0F);
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto step = static_cast<std::size_t>(steps_[static_cast<std::size_t>(axis)]);
+            const bool low = n[axis] > 0 && isIn(i - step);
+            const bool high = n[axis] + 1 < grid_.size[axis] && isIn(i + step);
+            slope[axis] = (values[high ? i + step : i] - values[low ? i - step : i]) / (low && high ? 2.0F : 1.0F);
+        }
+        const float length = glm::length(slope);
+        return length > 1e-4F ? -slope / length : Vec3f(0.0F, 0.0F, 1.0F);
+    }
+
+    BlurredSurface pointsInOwnCells() const
+    {
+        BlurredSurface found;
+        for (std::size_t k = 0; k < nodes_.size(); ++k) {
+            const Vec3f way = depth_[nodes_[k]] * normals_[k];
+            const Vec3f along = glm::abs(way);
+            if (std::max({along.x, along.y, along.z}) <= nearOwn) {
+                found.nodes.push_back(nodes_[k]);
+                found.points.push_back({Vec3f(grid_.node(nodes_[k])) + way, normals_[k]});
+            }
+        }
+        found.back.assign(found.nodes.size(), 0.0F);
+        return found;
+    }
+
+    // First entry of each row of nodes along x.
+    void findRows(const std::vector<std::uint32_t>& nodes)
+    {
+        const auto width = static_cast<std::size_t>(grid_.size.x);
+        rows_.assign(static_cast<std::size_t>(grid_.size.y) * static_cast<std::size_t>(grid_.size.z) + 1, 0);
+        for (const std::uint32_t node : nodes) {
+            ++rows_[node / width + 1];
+        }
+        std::partial_sum(rows_.begin(), rows_.end(), rows_.begin());
+    }
+
+    std::optional<Paraboloid> through(const BlurredSurface& found, std::size_t k, float reach) const
+    {
+        const SurfacePoint& own = found.points[k];
+        Paraboloid paraboloid(own, reach);
+        const auto addRow = [&](std::size_t row) {
+            for (std::size_t o = rows_[row]; o < rows_[row + 1]; ++o) {
+                if (glm::dot(own.normal, found.points[o].normal) > alike) {
+                    paraboloid.add(found.points[o].at);
+                }
+            }
+        };
+        const Index3 n = grid_.node(found.nodes[k]);
+        const int nodes = static_cast<int>(std::ceil(reach));
+        for (int z = std::max(n.z - nodes, 0); z <= std::min(n.z + nodes, grid_.size.z - 1); ++z) {
+            for (int y = std::max(n.y - nodes, 0); y <= std::min(n.y + nodes, grid_.size.y - 1); ++y) {
+                addRow(static_cast<std::size_t>(y) + static_cast<std::size_t>(z) * static_cast<std::size_t>(grid_.size.y));
+            }
+        }
+        return paraboloid.solve() ? std::optional(paraboloid) : std::nullopt;
+    }
+
+    // A point takes the paraboloid through the points around it, a narrower one where the surface is curved.
+    void fit(const BlurredSurface& found, std::size_t k, BlurredSurface& fitted) const
+    {
+        std::optional<Paraboloid> paraboloid = through(found, k, reach_);
+        const float narrow =
+            paraboloid ? std::max(leastCurvedReach, 2.0F * turn / std::abs(paraboloid->bend())) : leastCurvedReach;
+        if (narrow < 0.8F * reach_) {
+            paraboloid = through(found, k, narrow);
+        }
+        if (paraboloid && std::abs(paraboloid->height()) < farthestShift) {
+            fitted.points[k].at += paraboloid->height() * found.points[k].normal;
+            fitted.points[k].normal = paraboloid->normal();
+            fitted.back[k] = -toBack_ * std::clamp(paraboloid->bend(), -1.0F, 1.0F);
+        }
+    }
+
+    const NodeGrid& grid_;
+    std::span<const float> fraction_;
+    PlaneDepth planes_;
+    float toBack_;  // in a bend of the surface
+    float reach_;
+    std::array<std::ptrdiff_t, 3> steps_{};
+    std::vector<std::uint32_t> nodes_;
+    std::vector<Vec3f> normals_;  // of nodes_
+    std::vector<float> depth_;    // of all nodes
+    std::vector<std::uint32_t> rows_;
+};
+
+}  // namespace
+
+BlurredSurface blurredSurface(const NodeGrid& grid, std::span<const float> fraction, const Blur& blur)
+{
+    return Band(grid, fraction, blur).surface();
+}
+
+}  // namespace palpate::volume
