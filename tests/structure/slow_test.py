@@ -40,7 +40,7 @@ for name, is_explained in (("tests/slow.txt", True), ("tests/slow_asan.txt", Fal
             continue
         patterns += 1
         groups += len(re.findall(r"(?<!\\)\(", pattern))
-        found = [test for test in names if re.match(pattern, test)]
+        found = [test for test in set(names) if re.match(pattern, test)]
         if not found:
             faults.append(f"{name}:{number}: there is no test {pattern}")
         if is_explained and not neighbour:
