@@ -77,7 +77,6 @@ public:
     const std::string& recordFile() const noexcept { return recordFile_; }
     /// Of a session that has begun its ticks: that of the last; else that of the planned line.
     Vec3 axis() const noexcept { return axis_; }
-    void setAxis(Vec3 axis) noexcept { axis_ = axis; }
 
 private:
     void heed(const haptics::TickRecord& tick);

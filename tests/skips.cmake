@@ -1,10 +1,10 @@
 # Which tests may skip, and why. A skip for any other reason is a failure; ctest lists the others at its end.
 #
 # ctest reads this file when it runs, once for each test program, with
-#   palpate_name, palpate_list   the target, and the file in which gtest_discover_tests() has listed its tests; or
-#   palpate_tests                names of tests that are no program of ours
-#   palpate_data                 the folder of real volumes
-#   palpate_viewer               whether the viewer is built
+#   palpate_tests        names of tests, or a file of list_suites.py with those of a program of ours
+#   palpate_properties   of these tests
+#   palpate_data         the folder of real volumes
+#   palpate_viewer       whether the viewer is built
 #
 # What scripts/install-packages installs is there, and a display is (Xvfb): neither is a reason.
 set(reasons)
@@ -34,20 +34,23 @@ endif()
 # The kernel of the virtual machine is Debian's and is downloaded once: not where there is no network.
 list(APPEND reasons "there is no kernel for the virtual machine and none could be downloaded")
 
-# gtest_discover_tests() tells ctest to take every skip for one; ctest only ever adds to such a property.
-if(NOT palpate_tests)
-  if(EXISTS "${palpate_list}")
-    file(READ "${palpate_list}" code)
-    string(REPLACE SKIP_REGULAR_EXPRESSION FAIL_REGULAR_EXPRESSION code "${code}")
-    cmake_language(EVAL CODE "${code}")
-    set(palpate_tests ${${palpate_name}_TESTS})
-  else()
-    add_test(${palpate_name}_NOT_BUILT ${palpate_name}_NOT_BUILT)
-    set(palpate_tests ${palpate_name}_NOT_BUILT)
-  endif()
-endif()
-
 list(JOIN reasons "|" reasons)
-# Tests that are disabled are run.
-set_tests_properties(${palpate_tests} PROPERTIES
-  SKIP_REGULAR_EXPRESSION "Skipped\n(${reasons})" FAIL_REGULAR_EXPRESSION "\\[  SKIPPED \\]" DISABLED FALSE)
+
+# A program of ours judges its skips itself (main.cpp): a suite may have a test that skips and one that fails.
+if(palpate_tests MATCHES "_suites\\.cmake$")
+  if(EXISTS "${palpate_tests}")
+    include("${palpate_tests}")
+    if(palpate_alone)
+      set_tests_properties(${palpate_alone} PROPERTIES RUN_SERIAL ON LABELS alone)
+    endif()
+  else()
+    add_test(${palpate_tests} NOT_BUILT)
+  endif()
+  set_tests_properties(${palpate_tests} PROPERTIES ${palpate_properties})
+  # ctest adds to an environment.
+  set_tests_properties(${palpate_tests} PROPERTIES SKIP_RETURN_CODE 77 ENVIRONMENT "PALPATE_SKIPS=${reasons}")
+else()
+  # Tests that are disabled are run.
+  set_tests_properties(${palpate_tests} PROPERTIES
+    SKIP_REGULAR_EXPRESSION "Skipped\n(${reasons})" FAIL_REGULAR_EXPRESSION "\\[  SKIPPED \\]" DISABLED FALSE)
+endif()

@@ -19,16 +19,13 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::array<std::pair<const char*, const char*>, 14> shownNames{
+constexpr std::array<std::pair<const char*, const char*>, 11> shownNames{
     {{"elastic", "Palpate, small strain"},
      {"elastic_finite", "Palpate, finite strain"},
      {"single_grid", "one grid, small strain"},
      {"single_grid_finite", "one grid, finite strain"},
      {"chainmail", "ChainMail, by violation"},
      {"chainmail_fifo", "ChainMail, first in first out"},
-     {"chainmail_laplacian", "ChainMail + averaging"},
-     {"chainmail_navier", "ChainMail + elastic sweeps"},
-     {"relaxation", "elastic sweeps alone"},
      {"tets_prefactored", "tetrahedra, factored before"},
      {"tets_conforming", "conforming tetrahedra (TetGen), factored before"},
      {"xpbd", "XPBD, neo-Hookean"},

@@ -43,9 +43,10 @@ std::string Desktop::xdotool(const std::vector<std::string>& words) const
     return Program("/usr/bin/env", all).wait().out;
 }
 
-std::string Desktop::window(const std::string& name) const
+std::string Desktop::window(const std::string& name, double seconds) const
 {
-    for (int i = 0; i < patience; ++i) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    while (std::chrono::steady_clock::now() < end) {
         std::istringstream found(xdotool({"search", "--onlyvisible", "--name", name}));
         if (std::string id; found >> id)
             return id;

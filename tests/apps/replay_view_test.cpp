@@ -127,7 +127,8 @@ std::vector<std::uint64_t> ticksIn(const fs::path& timeline)
     return ticks;
 }
 
-TEST(ReplayView, KeysGoThroughTheRecordInBothDirections)
+// Each key has its picture within a second: alone on the machine.
+TEST(ReplayKeys, GoThroughTheRecordInBothDirections)
 {
     if (!canDraw() || !installed("xdotool"))
         GTEST_SKIP() << "needs palpate-view, Xvfb and xdotool (packages xvfb and xdotool)";

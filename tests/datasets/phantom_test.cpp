@@ -9,7 +9,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <utility>
 
 namespace palpate::datasets {
 namespace {
@@ -20,6 +22,18 @@ using volume::Tissue;
 PhantomSpec breast(std::uint64_t seed, double voxel = 1e-3)
 {
     return {.name = "breast", .seed = seed, .voxel = voxel};
+}
+
+// Several tests look at one breast.
+const Tissue& breastTissue(std::uint64_t seed, double voxel)
+{
+    static std::map<std::pair<std::uint64_t, double>, Tissue> made;
+    const std::pair key(seed, voxel);
+    auto found = made.find(key);
+    if (found == made.end()) {
+        found = made.emplace(key, makePhantom(breast(seed, voxel), defaultTissues())).first;
+    }
+    return found->second;
 }
 
 // FNV-1a over the labels.
@@ -42,7 +56,9 @@ double facesOf(const Voxels& voxels, std::uint16_t label)
 {
     double faces = 0;
     voxels.forEach([&](Index3 n, std::uint16_t value) {
-        voxels.forEachNeighbour(n, [&](Index3 next) { faces += value == label && voxels.at(next) != label ? 1 : 0; });
+        if (value == label) {
+            voxels.forEachNeighbour(n, [&](Index3 next) { faces += voxels.at(next) != label ? 1 : 0; });
+        }
     });
     return faces;
 }
@@ -114,7 +130,7 @@ class BreastPhantoms : public ::testing::TestWithParam<std::uint64_t> {};
 TEST_P(BreastPhantoms, SkinIsClosed)
 {
     for (const double voxel : {1e-3, 2e-3}) {
-        const Tissue tissue = makePhantom(breast(GetParam(), voxel), defaultTissues());
+        const Tissue& tissue = breastTissue(GetParam(), voxel);
         const Voxels voxels(tissue);
         const std::uint16_t skin = structureNamed(tissue, "skin")->value, nipple = structureNamed(tissue, "nipple")->value;
         int holes = 0;
@@ -179,7 +195,7 @@ TEST_P(BreastPhantoms, TumourLiesAsDeepAsAsked)
 TEST_P(BreastPhantoms, VesselsAreInOnePieceAndClearOfTheTumour)
 {
     for (const double voxel : {1e-3, 2e-3}) {
-        const Tissue tissue = makePhantom(breast(GetParam(), voxel), defaultTissues());
+        const Tissue& tissue = breastTissue(GetParam(), voxel);
         const Voxels voxels(tissue);
         const std::uint16_t tumour = structureNamed(tissue, "tumour")->value;
         for (const char* name : {"artery", "vein"}) {

@@ -91,10 +91,13 @@ class Sweeps(InFolder):
 
 class Plans(unittest.TestCase):
     def test_a_plan_is_that_of_the_program(self):
-        scene = palpate.Scene("block").changed({k: v for k, v in SMALL.items() if k != "model.setting"})
-        ours = palpate.plan(scene, error=0.2, budget=1e-3)
+        smaller = {"width_mm": 42, "thickness_mm": 27, "tumour_centre_mm": 14, "tumour_diameter_mm": 10}
+        keys = SMALL | {f"volume.parameters.{key}": value for key, value in smaller.items()} | {"target.aim_mm.y": 14}
+        del keys["model.setting"]
+        scene = palpate.Scene("block").changed(keys)
+        ours = palpate.plan(scene, error=0.25, budget=1e-3)
         self.assertTrue(ours["found"])
-        self.assertLessEqual(ours["predicted_error_pct"], 20)
+        self.assertLessEqual(ours["predicted_error_pct"], 25)
         self.assertLessEqual(ours["predicted_us"], 1000)
         self.assertGreater(len(ours["candidates"]), 3)
         for wrong in ({"error": 0}, {"error": 3}, {"budget": -1}, {"speed": float("nan")}):

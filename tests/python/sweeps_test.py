@@ -1,8 +1,11 @@
 """A sweep in parts, whoever runs them, is the sweep."""
 
 import csv
+import functools
+import pathlib
 import shutil
 import subprocess
+import tempfile
 import unittest
 
 import palpate
@@ -47,6 +50,16 @@ def without_timing(file):
     return [[row[i] for i in keep] for row in rows]
 
 
+@functools.lru_cache(maxsize=None)
+def whole():
+    """The table of the uninterrupted run, without timing."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        (folder / "parts.toml").write_text(PLAN)
+        program("sweep", folder / "parts.toml", "-o", folder / "whole", "--jobs", 2)
+        return without_timing(folder / "whole" / "table.csv")
+
+
 def refused(*arguments):
     done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
     if done.returncode == 0:
@@ -60,20 +73,15 @@ class Shards(InFolder):
         self.plan = self.folder / "parts.toml"
         self.plan.write_text(PLAN)
 
-    def whole(self):
-        program("sweep", self.plan, "-o", self.folder / "whole", "--jobs", 2)
-        return without_timing(self.folder / "whole" / "table.csv")
-
     def test_seven_shards_merged_are_the_uninterrupted_run(self):
         parts = self.folder / "parts"
         for k in (4, 1, 7, 2, 6, 3, 5):
             program("sweep", self.plan, "-o", parts, "--shard", f"{k}/7", "--jobs", 1)
         said = program("sweep", "-o", parts, "--merge")
         self.assertIn(f"{CASES} of {CASES} cases, 0 failed", said)
-        whole = self.whole()
-        self.assertEqual(without_timing(parts / "table.csv"), whole)
-        self.assertEqual(len(whole), 1 + CASES)
-        self.assertGreater(len({row[whole[0].index("force_n")] for row in whole[1:]}), 3)
+        self.assertEqual(without_timing(parts / "table.csv"), whole())
+        self.assertEqual(len(whole()), 1 + CASES)
+        self.assertGreater(len({row[whole()[0].index("force_n")] for row in whole()[1:]}), 3)
 
     def test_shards_from_elsewhere_and_lists_of_cases_merge_too(self):
         program("sweep", self.plan, "-o", self.folder / "a", "--shard", "1/2", "--jobs", 2)
@@ -84,7 +92,7 @@ class Shards(InFolder):
         self.assertIn("4 of 18 cases are missing: run them with --cases 13,15-17", said)
         program("sweep", self.plan, "-o", all_, "--cases", "13,15-17", "--jobs", 2)
         program("sweep", "-o", all_, "--merge")
-        self.assertEqual(without_timing(all_ / "table.csv"), self.whole())
+        self.assertEqual(without_timing(all_ / "table.csv"), whole())
         self.assertEqual(len(palpate.merge(all_)), CASES)
 
     def test_shards_of_another_plan_are_refused(self):
@@ -118,13 +126,12 @@ class Managers(InFolder):
     def setUp(self):
         super().setUp()
         (self.folder / "lump.toml").write_text(PLAN)
-        program("sweep", self.folder / "lump.toml", "-o", self.folder / "whole", "--jobs", 2)
         self.environment = {"PATH": f"{PROGRAM.parent}:/usr/bin:/bin", "HOME": str(self.folder), "LC_ALL": "C.UTF-8"}
 
     def run_here(self, *command):
         done = subprocess.run(command, cwd=self.folder, env=self.environment, capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
-        self.assertEqual(without_timing(self.folder / "lump" / "table.csv"), without_timing(self.folder / "whole" / "table.csv"))
+        self.assertEqual(without_timing(self.folder / "lump" / "table.csv"), whole())
 
     def test_gnu_parallel(self):
         text = (SOURCE / "docs" / "sweeps.md").read_text(encoding="utf-8")

@@ -13,5 +13,11 @@ TEST(Skip, OnlyWhenAsked)
     }
 }
 
+// Its neighbour in the suite.
+TEST(Skip, FailsWhenAsked)
+{
+    EXPECT_EQ(std::getenv("PALPATE_FAIL"), nullptr);
+}
+
 }  // namespace
 }  // namespace palpate

@@ -14,19 +14,19 @@ REASON = "no test volumes in /data"
 SKIP = "/tests/some_test.cpp:12: Skipped\n{}\n\n[  SKIPPED ] Some.Test (0 ms)\n[  PASSED  ] 0 tests.\n[  SKIPPED ] 1 test, listed below:\n"
 
 
-def run(folder, reason=None):
-    """What ctest makes of the one test in `folder`, and whether the run has failed."""
-    environment = os.environ | ({"PALPATE_SKIP_REASON": reason} if reason else {})
+def run(folder, reason=None, fail=False):
+    """What ctest makes of the one entry in `folder`, and whether the run has failed."""
+    environment = os.environ | ({"PALPATE_SKIP_REASON": reason} if reason else {}) | ({"PALPATE_FAIL": "1"} if fail else {})
     done = subprocess.run([CTEST], cwd=folder, env=environment, capture_output=True, text=True)
     words = [w for w in ("Passed", "Skipped", "Disabled", "Failed") if f"{w} " in done.stdout or f"({w})" in done.stdout]
     return words[0] if words else done.stdout + done.stderr, done.returncode != 0
 
 
-def built(reason):
-    """The same of a test as the build registers it, which skips for `reason`."""
+def built(reason, fail=False):
+    """The same of a suite as the build registers it: one of its tests skips for `reason`, another fails."""
     with tempfile.TemporaryDirectory() as folder:
         (pathlib.Path(folder) / "CTestTestfile.cmake").write_text(f'include("{TESTS}")\n', encoding="utf-8")
-        return run(folder, reason)
+        return run(folder, reason, fail)
 
 
 def fate(said, data_is_there, status=0, disabled=False):
@@ -52,7 +52,10 @@ CASES = [
     ("an unlisted skip of a program of ours", built("needs Xvfb (package xvfb)"), ("Failed", True)),
     ("a listed skip of a program of ours", built("there is no kernel for the virtual machine and none could be downloaded"),
      ("Skipped", False)),
+    ("the same beside a test that fails", built("there is no kernel for the virtual machine and none could be downloaded", True),
+     ("Failed", True)),
     ("a program of ours that passes", built(None), ("Passed", False)),
+    ("a program of ours that fails", built(None, True), ("Failed", True)),
     ("a test that passes", fate("[  PASSED  ] 1 test.\n", False), ("Passed", False)),
     ("a test that fails", fate("[  FAILED  ] 1 test.\n", False, status=1), ("Failed", True)),
     ("a disabled test that fails", fate("[  FAILED  ] 1 test.\n", False, status=1, disabled=True), ("Failed", True)),

@@ -1,9 +1,10 @@
 #!/usr/bin/python3 -B
-"""Every line of the lists of slow tests is of a test that ctest has: slow_test.py SOURCES BUILD CTEST
+"""Every line of the lists of slow tests is of a test of ctest's programs: slow_test.py SOURCES BUILD CTEST
 
 A line of tests/slow.txt also says what else sees what the test would find.
 """
 
+import json
 import pathlib
 import re
 import subprocess
@@ -12,8 +13,22 @@ import sys
 MOST_GROUPS = 6  # CMake's regular expressions have nine, of which .ci/run needs some; ctest ignores one with more, without a message
 
 sources, build, ctest = sys.argv[1:]
-listed = subprocess.run([ctest, "--test-dir", build, "-N"], capture_output=True, text=True, check=True).stdout
-names = re.findall(r"^\s*Test\s+#\d+: (\S+)", listed, re.M)
+listed = subprocess.run([ctest, "--test-dir", build, "--show-only=json-v1"], capture_output=True, text=True, check=True).stdout
+names, programs = [], {}
+for entry in json.loads(listed)["tests"]:
+    command = entry.get("command", ["none"])
+    names.append(entry["name"])
+    if any(word.startswith("--gtest_filter=") for word in command):
+        programs.setdefault(tuple(command[:-2]), entry["name"].partition(".")[0])
+# An entry is a suite, or a test that a list names in this build.
+for program, prefix in programs.items():
+    suite = ""
+    for line in subprocess.run([*program, "--gtest_list_tests"], capture_output=True, text=True, check=True).stdout.splitlines():
+        name = line.partition("#")[0].rstrip()
+        if name.startswith("  "):
+            names.append(f"{prefix}.{suite}{name.strip()}")
+        elif name.endswith("."):
+            suite = name
 faults = []
 patterns = 0
 for name, is_explained in (("tests/slow.txt", True), ("tests/slow_asan.txt", False)):
@@ -25,7 +40,7 @@ for name, is_explained in (("tests/slow.txt", True), ("tests/slow_asan.txt", Fal
             continue
         patterns += 1
         groups += len(re.findall(r"(?<!\\)\(", pattern))
-        found = [test for test in names if re.match(pattern, test)]
+        found = [test for test in set(names) if re.match(pattern, test)]
         if not found:
             faults.append(f"{name}:{number}: there is no test {pattern}")
         if is_explained and not neighbour:

@@ -24,7 +24,7 @@ struct Baseline {
     std::function<TrialModel()> build;  // at rest; throws std::runtime_error when the scene is too large for it
 };
 
-/// Methods on a lattice: ChainMail and relaxation.
+/// Methods on a lattice: ChainMail.
 std::vector<Baseline> latticeBaselines(const BaselineScene& scene);
 /// Methods on tetrahedra: prefactored linear finite elements, and XPBD.
 std::vector<Baseline> tetBaselines(const BaselineScene& scene);

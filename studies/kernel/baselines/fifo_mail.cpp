@@ -31,8 +31,7 @@ FifoScratch::FifoScratch(const Lattice& lattice)
 {
 }
 
-std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratch& scratch, std::span<const Seed> seeds,
-                          float scale)
+std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratch& scratch, std::span<const Seed> seeds)
 {
     ++scratch.pass;
     scratch.queue.clear();
@@ -41,7 +40,7 @@ std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratc
         scratch.held[seed.node] = scratch.pass;
         move(scratch, u, seed.node, seed.u);
     }
-    const float least = rounding * static_cast<float>(lattice.grid.spacing) * scale;
+    const float least = rounding * static_cast<float>(lattice.grid.spacing);
     const std::size_t most = movesPerNode * lattice.tissue.size();
     std::size_t moves = 0;
     for (std::size_t head = 0; head < scratch.queue.size(); ++head) {
@@ -52,9 +51,7 @@ std::size_t propagateFifo(const Lattice& lattice, std::span<Vec3f> u, FifoScratc
             if (!lattice.isNode(b) || lattice.isFixed(b) || scratch.held[b] == scratch.pass) {
                 continue;
             }
-            const LinkLimits& whole = lattice.between(a, b);
-            const LinkLimits limits{scale * whole.shorter, scale * whole.longer, scale * whole.shear};
-            const Vec3f step = correction(u[b] - u[a], side, limits);
+            const Vec3f step = correction(u[b] - u[a], side, lattice.between(a, b));
             if (glm::dot(step, step) > least * least) {
                 move(scratch, u, b, u[b] + step);
                 ++moves;

@@ -25,12 +25,11 @@ struct FifoScratch {
 ///
 /// @param u      displacement of every node [m] (count x 3); updated in place
 /// @param seeds  nodes that stay where they are put
-/// @param scale  of all limits [-]
 /// @returns      how many times a node was moved; at most four times the lattice's nodes
 ///
 /// Cost O(moves); allocates only until the scratch has seen its largest call. Source: S. F. F. Gibson, "3D ChainMail: a
 /// Fast Algorithm for Deforming Volumetric Objects", Symposium on Interactive 3D Graphics, 1997.
 std::size_t propagateFifo(const chainmail::Lattice& lattice, std::span<Vec3f> u, FifoScratch& scratch,
-                          std::span<const chainmail::Seed> seeds, float scale = 1.0F);
+                          std::span<const chainmail::Seed> seeds);
 
 }  // namespace palpate::studies
