@@ -91,12 +91,13 @@ private:
 
 Density projected(const Blur& blur, Vec3 normal)
 {
-    constexpr double step = 0.01;
-    double reach = step;
+    constexpr double finest = 0.01;
+    constexpr double steps = 300;
+    double reach = finest;
     for (int k = 0; k < 3; ++k) {
         reach += std::abs(normal[k]) * (0.5 * blur.box[k] + blur.passes[k]);
     }
-    Density density(reach, step);
+    Density density(reach, std::max(finest, reach / steps));
     for (int k = 0; k < 3; ++k) {
         density.addBox(std::abs(normal[k]) * blur.box[k]);
         for (int pass = 0; pass < 2 * blur.passes[k]; ++pass) {
@@ -176,15 +177,20 @@ public:
         v_ = glm::cross(normal_, u_);
     }
 
-    // A point within reach.
-    void add(Vec3f point)
+    // A point, if it is within reach and may lie on the same sheet of the surface: a layer below or above has the same
+    // normals.
+    void add(const SurfacePoint& point)
     {
-        const Vec3f way = (point - origin_) / reach_;
+        const float likeness = std::max(0.0F, 1.0F - (1.0F - glm::dot(point.normal, normal_)) / unlike);
+
+        constexpr float level = 0.5F;  // height of points beside the origin [spacings]
+        constexpr float slope = 0.3F;  // and how it grows with their distance
+        const Vec3f way = (point.at - origin_) / reach_;
         const float far = glm::dot(way, way);
-        if (far >= 1.0F) {
+        if (far >= 1.0F || likeness <= 0.0F || std::abs(glm::dot(way, normal_)) > level / reach_ + slope * std::sqrt(far)) {
             return;
         }
-        const double weight = static_cast<double>((1.0F - far) * (1.0F - far));
+        const double weight = static_cast<double>((1.0F - far) * (1.0F - far) * likeness * likeness);
         const double u = glm::dot(way, u_);
         const double v = glm::dot(way, v_);
         const double w = glm::dot(way, normal_);
@@ -202,7 +208,7 @@ public:
     bool solve()
     {
         constexpr int fewest = 10;
-        constexpr double leastPivot = 1e-3;
+        constexpr double leastPivot = 0.05;
         if (count_ < fewest) {
             return false;
         }
@@ -242,6 +248,8 @@ public:
     }
 
 private:
+    static constexpr float unlike = 0.2F;  // 1 less the cosine between normals from which on a point does not count
+
     Vec3f origin_, normal_, u_, v_;
     float reach_;
     std::array<std::array<double, 6>, 6> matrix_{};  // lower triangle
@@ -289,7 +297,6 @@ private:
     static constexpr float leastCurvedReach = 2.0F;
     static constexpr float turn = 0.9F;           // reach over radius of curvature
     static constexpr float farthestShift = 0.5F;  // of a point by its paraboloid [spacings]
-    static constexpr float alike = 0.8F;          // cosine between normals of one paraboloid
 
     bool isIn(std::size_t i) const { return fraction_[i] > PlaneDepth::lowest && fraction_[i] < 1.0F - PlaneDepth::lowest; }
 
@@ -366,9 +373,7 @@ private:
         Paraboloid paraboloid(own, reach);
         const auto addRow = [&](std::size_t row) {
             for (std::size_t o = rows_[row]; o < rows_[row + 1]; ++o) {
-                if (glm::dot(own.normal, found.points[o].normal) > alike) {
-                    paraboloid.add(found.points[o].at);
-                }
+                paraboloid.add(found.points[o]);
             }
         };
         const Index3 n = grid_.node(found.nodes[k]);

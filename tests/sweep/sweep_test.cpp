@@ -277,7 +277,7 @@ TEST(CaseRunner, ForceContrastFallsWithDepthAndRisesWithSizeAndStiffness)
 TEST(CaseRunner, DelayChangesASession)
 {
     const SweepPlan plan = parsePlan(
-        "scene = \"block\"\noutputs = [\"peak_force_n\", \"energy_made_mj\", \"finished\"]\n"
+        "scene = \"block\"\noutputs = [\"path_mm\", \"tissue_work_mj\", \"finished\"]\n"
         "[[axis]]\nkey = \"procedure.delay_ms\"\nvalues = [0, 8]\n"
         "[procedure]\nkind = \"session\"\nseconds = 20\n"
         "[set]\nvolume.voxel_mm = 4\nvolume.parameters.width_mm = 40\nmodel.level = \"chainmail\"\nmodel.spacing_mm = 4\n",

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <numbers>
 #include <random>
+#include <utility>
 
 namespace palpate::volume {
 namespace {
@@ -140,6 +141,30 @@ TEST(Distance, OfATurnedBoxIsThatOfItsPlanes)
         EXPECT_LT(std::abs(coarse.bias), 0.02e-3) << degrees;
         EXPECT_LT(coarse.rms, 0.11e-3) << degrees;
         EXPECT_LT(coarse.normal, 0.05) << degrees;
+    }
+}
+
+// Two layers with a gap between them, turned in the grid: faces that look the same way, 6 mm apart, know nothing of each
+// other.
+TEST(Distance, OfLayersIsThatOfEach)
+{
+    const double angle = 0.2;
+    const Vec3 n(std::sin(angle), std::cos(angle), 0.0), along(std::cos(angle), -std::sin(angle), 0.0);
+    const auto layers = [&](Vec3 p) {
+        const double up = glm::dot(p, n);
+        const bool inside = std::max(std::abs(glm::dot(p, along)), std::abs(p.z)) < 16e-3;
+        return inside && ((up > -3.5e-3 && up < -1.5e-3) || (up > 1.5e-3 && up < 4.5e-3)) ? 1 : 0;
+    };
+    const Index3 size(96);
+    const Tissue tissue =
+        Tissue::fromLabels(voxelise(size, centred(straight(Vec3(0.5e-3)), size), layers), table(), names(), {});
+    const DistanceField field = tissue.distanceToBody(coveringGrid(tissue.box(), 0.75e-3, 3e-3));
+    for (const auto& [height, outwards] : {std::pair(-3.5e-3, -1.0), {-1.5e-3, 1.0}, {1.5e-3, -1.0}, {4.5e-3, 1.0}}) {
+        for (double x = -8e-3; x <= 8e-3; x += 0.7e-3) {
+            const Vec3 p = height * n + x * along + Vec3(0.0, 0.0, 0.5 * x);
+            EXPECT_NEAR(field.at(p), 0.0, 0.15e-3) << height << " " << x;
+            EXPECT_GT(glm::dot(field.normal(p), outwards * n), 0.99) << height << " " << x;
+        }
     }
 }
 
