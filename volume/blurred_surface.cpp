@@ -281,7 +281,8 @@ public:
     {
         findPlanes();
         const BlurredSurface found = pointsInOwnCells();
-        findRows(found.nodes);
+        all_ = rowsOf(found.nodes, false);
+        sparse_ = rowsOf(found.nodes, true);
         BlurredSurface fitted = found;
         forEach(found.nodes.size(), [&](std::size_t k) { fit(found, k, fitted); });
         // A layer of nodes within nearOwn on both sides of the surface has 2 nearOwn of them in a unit of area.
@@ -294,6 +295,7 @@ private:
     static constexpr float nearOwn = 0.7F;     // points lie in their cells, or a little beyond: none is lost on a face
     static constexpr float leastReach = 2.5F;  // of a paraboloid [spacings]
     static constexpr float farthestReach = 8.0F;
+    static constexpr float widestOfAll = 5.0F;  // reach up to which a paraboloid takes every point
     static constexpr float leastCurvedReach = 2.0F;
     static constexpr float turn = 0.9F;           // reach over radius of curvature
     static constexpr float farthestShift = 0.5F;  // of a point by its paraboloid [spacings]
@@ -356,24 +358,37 @@ private:
         return found;
     }
 
-    // First entry of each row of nodes along x.
-    void findRows(const std::vector<std::uint32_t>& nodes)
+    // Points by rows of nodes along x.
+    struct Rows {
+        std::vector<std::uint32_t> points;
+        std::vector<std::uint32_t> first;  // of each row, and the end
+    };
+
+    // All of the points, or a quarter of them, scattered: a wide paraboloid needs no more.
+    Rows rowsOf(const std::vector<std::uint32_t>& nodes, bool isSparse) const
     {
+        Rows rows;
         const auto width = static_cast<std::size_t>(grid_.size.x);
-        rows_.assign(static_cast<std::size_t>(grid_.size.y) * static_cast<std::size_t>(grid_.size.z) + 1, 0);
-        for (const std::uint32_t node : nodes) {
-            ++rows_[node / width + 1];
+        rows.first.assign(static_cast<std::size_t>(grid_.size.y) * static_cast<std::size_t>(grid_.size.z) + 1, 0);
+        for (std::size_t k = 0; k < nodes.size(); ++k) {
+            constexpr std::uint32_t scatter = 2654435761U;  // D. E. Knuth's multiplicative hash
+            if (!isSparse || nodes[k] * scatter >> 30U == 0U) {
+                rows.points.push_back(static_cast<std::uint32_t>(k));
+                ++rows.first[nodes[k] / width + 1];
+            }
         }
-        std::partial_sum(rows_.begin(), rows_.end(), rows_.begin());
+        std::partial_sum(rows.first.begin(), rows.first.end(), rows.first.begin());
+        return rows;
     }
 
     std::optional<Paraboloid> through(const BlurredSurface& found, std::size_t k, float reach) const
     {
         const SurfacePoint& own = found.points[k];
         Paraboloid paraboloid(own, reach);
+        const Rows& rows = reach > widestOfAll ? sparse_ : all_;
         const auto addRow = [&](std::size_t row) {
-            for (std::size_t o = rows_[row]; o < rows_[row + 1]; ++o) {
-                paraboloid.add(found.points[o]);
+            for (std::size_t o = rows.first[row]; o < rows.first[row + 1]; ++o) {
+                paraboloid.add(found.points[rows.points[o]]);
             }
         };
         const Index3 n = grid_.node(found.nodes[k]);
@@ -411,7 +426,7 @@ private:
     std::vector<std::uint32_t> nodes_;
     std::vector<Vec3f> normals_;  // of nodes_
     std::vector<float> depth_;    // of all nodes
-    std::vector<std::uint32_t> rows_;
+    Rows all_, sparse_;
 };
 
 }  // namespace
