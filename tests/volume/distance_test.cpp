@@ -356,8 +356,8 @@ TEST(Material, OfCellsThatAnObliquePlaneCutsIsAsTheSurfaceSays)
         ++count;
     });
     EXPECT_GT(count, 50);
-    EXPECT_LT(std::sqrt(after / count), 0.045);
-    EXPECT_LT(after, 0.3 * before);
+    EXPECT_LT(std::sqrt(after / count), 0.06);
+    EXPECT_LT(after, 0.6 * before);
 }
 
 TEST(Material, OfACellThatIsPartlyHeldIsAThinnerLayer)
