@@ -35,7 +35,7 @@ using nlohmann::json;
 
 struct ReferenceArguments {
     std::string scene;
-    std::string vtu, json, save, ccx;
+    std::string vtu, json, save, ccx, pathOf;
     std::string tool = "sphere_10mm";
     std::string law = "linear";
     std::string elements = "P2/P1";
@@ -93,6 +93,18 @@ studies::TrialTool toolOf(const ReferenceArguments& o)
         tool.name = fmt::format("capsule_{:g}mm_{:g}mm", 1e3 * tool.radius, o.length);
     }
     return tool;
+}
+
+studies::ReferencePress pressIn(const std::string& file, const studies::TrialTool& tool)
+{
+    const auto info = studies::loadReference(file).second;
+    if (!info.press) {
+        throw std::runtime_error(fmt::format("--path-of {}: the file has no path: it is older than November 2026", file));
+    }
+    if (info.tool != tool.name) {
+        throw std::runtime_error(fmt::format("--path-of {}: its tool is {}, not {}", file, info.tool, tool.name));
+    }
+    return *info.press;
 }
 
 // Straight in, and back out by the same looks.
@@ -281,6 +293,9 @@ void run(const ReferenceArguments& o)
     const auto model = session::openSession(o.scene, changes);
     const auto place = studies::trialPlace(*model.tissue, model.surface, model.approach.entry, model.approach.aim);
     auto path = studies::trialPath(*model.tissue, model.surface, place, tool, 1e-3 * o.size);
+    if (!o.pathOf.empty()) {
+        path = studies::pressedBy(path, pressIn(o.pathOf, tool));
+    }
     if (o.press > 0.0) {
         path.press = path.gap + 1e-3 * o.press;
     }
@@ -291,7 +306,10 @@ void run(const ReferenceArguments& o)
     json figures;
     Results results = solveScene(o, model, path, figures);
     auto& info = results.info;
-    info.key = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, model.scene.model.elastic.poissonCap);
+    const double poissonCap = model.scene.model.elastic.poissonCap;
+    info.press = studies::pressOf(path);
+    info.body = studies::bodyKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap);
+    info.key = studies::referenceKey(*model.tissue, path, 1e-3 * o.speed, o.law, poissonCap);
     info.scene = model.scene.name;
     info.tool = tool.name;
     info.law = o.law;
@@ -344,6 +362,8 @@ void addOptions(CLI::App& app, ReferenceArguments& o)
         ->check(CLI::Range(0.3, 10.0))
         ->capture_default_str();
     app.add_option("--press", o.press, "Depth of the press [mm] (default: as in the trial)")->check(CLI::Range(0.1, 50.0));
+    app.add_option("--path-of", o.pathOf, "Press where this reference does (.ref), not at the scene's entry")
+        ->check(CLI::ExistingFile);
     app.add_option("--radius-mm", o.radius, "Radius of the sphere, instead of that of --tool [mm]")
         ->check(CLI::Range(0.5, 100.0));
     app.add_option("--length-mm", o.length, "Press a capsule end on, of this length between its end centres [mm]")

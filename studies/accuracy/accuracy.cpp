@@ -142,7 +142,7 @@ AccuracySubject accuracySubject(std::shared_ptr<const haptics::SessionModel> mod
     constexpr double anySpacing = 2e-3;  // a sphere has no ties that it would matter to [m]
     const auto tools = trialTools();
     const auto tool = std::ranges::find(tools, "sphere_10mm", &TrialTool::name);
-    AccuracySubject out{std::move(model), {}, speed};
+    AccuracySubject out{std::move(model), {}, speed, {}};
     const haptics::SessionModel& m = *out.model;
     const TrialPlace place = trialPlace(*m.tissue, m.surface, m.approach.entry, m.approach.aim);
     out.path = trialPath(*m.tissue, m.surface, place, *tool, anySpacing);

@@ -4,6 +4,7 @@
 #include <studies/kernel/baselines/baseline.h>
 
 #include <cstddef>
+#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -15,7 +16,8 @@ namespace palpate::studies {
 struct AccuracySubject {
     std::shared_ptr<const haptics::SessionModel> model;
     TrialPath path;
-    double speed = 0;  // [m/s]
+    double speed = 0;              // [m/s]
+    std::filesystem::path pathOf;  // the reference whose path it is; "" = the scene's own, as no reference was taken yet
 
     double poissonCap() const { return model->scene.model.elastic.poissonCap; }
     BaselineScene scene() const { return {*model->tissue, model->surface, path, poissonCap()}; }

@@ -152,9 +152,17 @@ ReferenceState stateOf(const json& in, std::size_t count)
 
 json infoJson(const ReferenceInfo& i)
 {
-    return {{"key", i.key},           {"scene", i.scene},    {"tool", i.tool}, {"law", i.law},
-            {"elements", i.elements}, {"speed", i.speed},    {"tets", i.tets}, {"unknowns", i.unknowns},
-            {"seconds", i.seconds},   {"program", i.program}};
+    json out{{"key", i.key},           {"scene", i.scene},    {"tool", i.tool}, {"law", i.law},
+             {"elements", i.elements}, {"speed", i.speed},    {"tets", i.tets}, {"unknowns", i.unknowns},
+             {"seconds", i.seconds},   {"program", i.program}};
+    if (i.press) {
+        out["body"] = i.body;
+        out["press"] = {{"start", vectorJson(i.press->start)},
+                        {"inward", vectorJson(i.press->inward)},
+                        {"sideways", vectorJson(i.press->sideways)},
+                        {"press", i.press->press}};
+    }
+    return out;
 }
 
 ReferenceInfo infoOf(const json& in)
@@ -169,6 +177,11 @@ ReferenceInfo infoOf(const json& in)
     i.tets = in.at("tets").get<std::size_t>();
     i.unknowns = in.at("unknowns").get<std::size_t>();
     i.seconds = in.at("seconds").get<double>();
+    if (const auto press = in.find("press"); press != in.end()) {
+        i.body = in.at("body").get<std::string>();
+        i.press = {vectorOf(press->at("start")), vectorOf(press->at("inward")), vectorOf(press->at("sideways")),
+                   press->at("press").get<double>()};
+    }
     return i;
 }
 
@@ -271,6 +284,30 @@ void addTissue(volume::Fnv& hash, const volume::Tissue& tissue, double poissonCa
     hash.add(length);
 }
 
+std::string keyOf(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
+                  double poissonCap, bool withPress)
+{
+    volume::Fnv hash;
+    hash.add(referenceVersion);
+    hash.addText(law);
+    addLength(hash, speed);
+    hash.add(path.tool.kind);
+    for (const double length : {path.tool.radius, path.tool.length, withPress ? path.press : 0.0, path.drag, path.gap}) {
+        addLength(hash, length);
+    }
+    if (withPress) {
+        addVector(hash, path.start, 1e-6);
+        addVector(hash, path.inward, 1e-5);
+        addVector(hash, path.sideways, 1e-5);
+    }
+    for (const chainmail::Tie& tie : path.ties) {
+        addVector(hash, tie.rest, 1e-6);
+        addVector(hash, Vec3(tie.along, tie.across, 0.0), 1e-3);
+    }
+    addTissue(hash, tissue, poissonCap);
+    return fmt::format("{:016x}", hash.value);
+}
+
 }  // namespace
 
 void saveReference(const std::filesystem::path& file, const Reference& reference, const ReferenceInfo& info)
@@ -306,23 +343,27 @@ std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& f
 std::string referenceKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
                          double poissonCap)
 {
-    volume::Fnv hash;
-    hash.add(referenceVersion);
-    hash.addText(law);
-    addLength(hash, speed);
-    hash.add(path.tool.kind);
-    for (const double length : {path.tool.radius, path.tool.length, path.press, path.drag, path.gap}) {
-        addLength(hash, length);
-    }
-    addVector(hash, path.start, 1e-6);
-    addVector(hash, path.inward, 1e-5);
-    addVector(hash, path.sideways, 1e-5);
-    for (const chainmail::Tie& tie : path.ties) {
-        addVector(hash, tie.rest, 1e-6);
-        addVector(hash, Vec3(tie.along, tie.across, 0.0), 1e-3);
-    }
-    addTissue(hash, tissue, poissonCap);
-    return fmt::format("{:016x}", hash.value);
+    return keyOf(tissue, path, speed, law, poissonCap, true);
+}
+
+std::string bodyKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
+                    double poissonCap)
+{
+    return keyOf(tissue, path, speed, law, poissonCap, false);
+}
+
+ReferencePress pressOf(const TrialPath& path)
+{
+    return {path.start, path.inward, path.sideways, path.press};
+}
+
+TrialPath pressedBy(TrialPath path, const ReferencePress& press)
+{
+    path.start = press.start;
+    path.inward = press.inward;
+    path.sideways = press.sideways;
+    path.press = press.press;
+    return path;
 }
 
 }  // namespace palpate::studies

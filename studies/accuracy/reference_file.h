@@ -3,6 +3,7 @@
 #include <studies/kernel/kernel_trial.h>
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -11,6 +12,13 @@ namespace palpate::studies {
 /// Rises whenever the reference program would solve the same problem otherwise, so that what it solved before is not
 /// taken any more.
 inline constexpr int referenceVersion = 1;
+
+/// Where a reference's tool presses. The rest of its path follows from tool and speed.
+struct ReferencePress {
+    Vec3 start{0.0};                  // of the sphere's middle [m]
+    Vec3 inward{0.0}, sideways{0.0};  // unit vectors
+    double press = 0;                 // from the start [m]
+};
 
 /// What a solved reference says of itself.
 struct ReferenceInfo {
@@ -22,8 +30,10 @@ struct ReferenceInfo {
     double speed = 0;      // the looks are those of schedule(path, speed) [m/s]
     std::size_t tets = 0;
     std::size_t unknowns = 0;
-    double seconds = 0;   // CPU time of the solution [s]
-    std::string program;  // that solved it, with its version
+    double seconds = 0;                   // CPU time of the solution [s]
+    std::string program;                  // that solved it, with its version
+    std::string body;                     // key without the press, see bodyKey(); "" in files of before November 2026
+    std::optional<ReferencePress> press;  // none in files of before November 2026
 };
 
 /// Displacements are kept to a 32,000th of the largest one of each state. Written beside and renamed. Throws
@@ -35,5 +45,13 @@ std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& f
 /// referenceVersion, and the bound of Poisson's ratio. 16 hexadecimal digits.
 std::string referenceKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
                          double poissonCap = 0.49);
+/// The same without ReferencePress: what presses which body. A scene's entry lies on the surface that is read from the
+/// voxels, and moves by hundredths of a millimetre when that is read otherwise.
+std::string bodyKey(const volume::Tissue& tissue, const TrialPath& path, double speed, const std::string& law,
+                    double poissonCap = 0.49);
+
+ReferencePress pressOf(const TrialPath& path);
+/// The path with another press. Its ties stay where they are.
+TrialPath pressedBy(TrialPath path, const ReferencePress& press);
 
 }  // namespace palpate::studies

@@ -5,10 +5,12 @@
 #include <base/user_files.h>
 
 #include <fmt/format.h>
+#include <glm/geometric.hpp>
 
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <set>
@@ -34,15 +36,45 @@ std::vector<fs::path> referencesIn(const fs::path& folder)
     return files;
 }
 
-std::optional<SolvedReference> find(const std::string& key, const ReferenceFolders& folders)
+std::vector<fs::path> referencesIn(const ReferenceFolders& folders)
 {
-    std::vector<fs::path> all{folders.own};
-    all.insert(all.end(), folders.others.begin(), folders.others.end());
-    for (const fs::path& folder : all) {
-        for (const fs::path& file : referencesIn(folder)) {
-            if (file.stem().string().ends_with(key)) {
-                return loadReference(file);
-            }
+    std::vector<fs::path> files = referencesIn(folders.own);
+    for (const fs::path& folder : folders.others) {
+        const std::vector<fs::path> more = referencesIn(folder);
+        files.insert(files.end(), more.begin(), more.end());
+    }
+    return files;
+}
+
+std::optional<fs::path> find(const std::string& key, const ReferenceFolders& folders)
+{
+    for (const fs::path& file : referencesIn(folders)) {
+        if (file.stem().string().ends_with(key)) {
+            return file;
+        }
+    }
+    return std::nullopt;
+}
+
+// Whether a reference presses where a scene's path does, but for the way in which the surface was read.
+bool isNear(const ReferencePress& reference, const TrialPath& path)
+{
+    constexpr double beside = 1e-3;    // [m]
+    constexpr double turned = 0.9848;  // cosine of 10 degrees
+    const double far = path.tool.radius + path.gap;
+    return glm::distance(reference.start + far * reference.inward, path.start + far * path.inward) < beside &&
+           std::abs(reference.press - path.press) < beside && glm::dot(reference.inward, path.inward) > turned &&
+           glm::dot(reference.sideways, path.sideways) > turned;
+}
+
+// A file that presses the same body nearly as `subject` does.
+std::optional<fs::path> findNear(const AccuracySubject& subject, const std::string& law, const ReferenceFolders& folders)
+{
+    const std::string body = bodyKey(*subject.model->tissue, subject.path, subject.speed, law, subject.poissonCap());
+    for (const fs::path& file : referencesIn(folders)) {
+        const ReferenceInfo info = loadReference(file).second;
+        if (info.press && info.body == body && isNear(*info.press, subject.path)) {
+            return file;
         }
     }
     return std::nullopt;
@@ -77,8 +109,13 @@ void solve(const std::string& what, const AccuracySubject& subject, const std::s
         throw std::runtime_error(fmt::format("{}: cannot be made ({}): name another folder with --references",
                                              folder.string(), failed.message()));
     }
-    const int status = runReferenceProgram({what, "--law", law, "--tool", subject.path.tool.name, "--speed",
-                                            fmt::format("{:g}", 1e3 * subject.speed), "--save", file.string()});
+    std::vector<std::string> arguments{
+        what,     "--law",      law, "--tool", subject.path.tool.name, "--speed", fmt::format("{:g}", 1e3 * subject.speed),
+        "--save", file.string()};
+    if (!subject.pathOf.empty()) {
+        arguments.insert(arguments.end(), {"--path-of", subject.pathOf.string()});
+    }
+    const int status = runReferenceProgram(arguments);
     if (status != 0) {
         throw std::runtime_error(
             fmt::format("{}: palpate-reference did not solve its {} reference (exit status {}): its message is above", what,
@@ -100,12 +137,24 @@ ReferenceFolders referenceFolders(const fs::path& own)
     return out;
 }
 
-SolvedReference solvedReference(const std::string& what, const AccuracySubject& subject, const std::string& law,
+SolvedReference solvedReference(const std::string& what, AccuracySubject& subject, const std::string& law,
                                 const ReferenceFolders& folders, const std::function<void(const std::string&)>& tell)
 {
     const std::string key = referenceKey(*subject.model->tissue, subject.path, subject.speed, law, subject.poissonCap());
-    if (auto found = find(key, folders)) {
-        return std::move(*found);
+    const auto taken = [&](const fs::path& file) {
+        subject.pathOf = subject.pathOf.empty() ? file : subject.pathOf;
+        return loadReference(file);
+    };
+    if (const auto file = find(key, folders)) {
+        return taken(*file);
+    }
+    if (const auto file = subject.pathOf.empty() ? findNear(subject, law, folders) : std::nullopt) {
+        SolvedReference found = taken(*file);
+        const Vec3 before = subject.path.start;
+        subject.path = pressedBy(subject.path, *found.second.press);
+        tell(fmt::format("{}: pressed where its reference is, {:.3f} mm beside the scene's entry", what,
+                         1e3 * glm::distance(before, subject.path.start)));
+        return found;
     }
     const std::string& scene = subject.model->scene.name;
     if (referenceProgram().empty()) {
@@ -117,7 +166,7 @@ SolvedReference solvedReference(const std::string& what, const AccuracySubject& 
     tell(fmt::format("{}: {} reference by finite elements", what, law));
     const fs::path file = folders.own / fmt::format("{}-{}-{}.ref", scene, law, key);
     solve(what, subject, law, file);
-    SolvedReference made = loadReference(file);
+    SolvedReference made = taken(file);
     if (made.second.key != key) {
         throw std::runtime_error(
             fmt::format("{}: palpate-reference solved another problem (key {} instead of {}): both "

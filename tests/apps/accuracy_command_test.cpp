@@ -44,7 +44,7 @@ struct Place {
             const auto solved = solveReference(body.body, subject.path, speeds,
                                                {.law = *volume::lawNamed(law), .tolerance = 1e-3, .maxCycles = 50});
             saveReference(std::filesystem::path(references) / (std::string(law) + "-" + key + ".ref"), solved,
-                          {key, "small", "sphere_10mm", law, "P2", subject.speed, 1, 2, 3.0, "stand-in"});
+                          {key, "small", "sphere_10mm", law, "P2", subject.speed, 1, 2, 3.0, "stand-in", {}, {}});
         }
     }
     std::vector<std::string> command(const std::string& output) const

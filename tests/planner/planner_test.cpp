@@ -1,6 +1,6 @@
 #include <planner/planner.h>
 #include <studies/accuracy/accuracy.h>
-#include <studies/accuracy/reference_file.h>
+#include <studies/accuracy/references.h>
 #include <studies/kernel/kernel_rivals.h>
 
 #include <tests/studies/small_block.h>
@@ -106,10 +106,9 @@ TEST(Planner, PredictsTheErrorAgainstOutsideFiniteElements)
     scene.model.level = ModelLevel::spring;
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
     const auto model = std::make_shared<const haptics::SessionModel>(haptics::buildModel(scene, tissue));
-    const studies::AccuracySubject subject = studies::accuracySubject(model);
-    const std::string key = studies::referenceKey(*tissue, subject.path, subject.speed, "neo-hookean");
+    studies::AccuracySubject subject = studies::accuracySubject(model);
     const auto [outside, info] =
-        studies::loadReference(std::filesystem::path(PALPATE_REFERENCES) / ("plate-neo-hookean-" + key + ".ref"));
+        studies::solvedReference("plate", subject, "neo-hookean", {PALPATE_REFERENCES, {}}, [](const std::string&) {});
     for (const double error : {0.015}) {
         PlanRequest request;
         request.error = error;

@@ -1,5 +1,5 @@
 #include <studies/accuracy/accuracy.h>
-#include <studies/accuracy/reference_file.h>
+#include <studies/accuracy/references.h>
 #include <studies/kernel/kernel_rivals.h>
 #include <studies/kernel/trial_errors.h>
 
@@ -43,7 +43,7 @@ const PressedBlock& pressedBlock()
 
 ReferenceInfo someInfo()
 {
-    return {"0123456789abcdef", "small", "sphere_10mm", "linear", "P2", 20e-3, 1234, 5678, 9.5, "stand-in 1"};
+    return {"0123456789abcdef", "small", "sphere_10mm", "linear", "P2", 20e-3, 1234, 5678, 9.5, "stand-in 1", {}, {}};
 }
 
 // Follows a reference: its displacements and forces, times `fraction`.
@@ -92,6 +92,7 @@ TEST(ReferenceFile, GivesBackWhatWasSaved)
     EXPECT_EQ(info.program, someInfo().program);
     EXPECT_EQ(info.unknowns, someInfo().unknowns);
     EXPECT_EQ(info.speed, someInfo().speed);
+    EXPECT_FALSE(info.press);
     EXPECT_EQ(after.position, before.position);
     EXPECT_EQ(after.peakForce, before.peakForce);
     ASSERT_EQ(after.states.size(), before.states.size());
@@ -212,6 +213,60 @@ TEST(ReferenceFile, TheKeyDoesNotFeelRounding)
     path.start *= 1.0 - 1e-12;
     path.inward = glm::normalize(path.inward + Vec3(1e-12));
     EXPECT_EQ(referenceKey(*p.subject.model->tissue, path, p.subject.speed, "linear"), p.key());
+}
+
+// A folder of references of one body; `solve` puts one there that presses beside the scene's entry.
+struct Shelf {
+    tests::Folder folder;
+    ReferenceFolders folders{std::filesystem::path(std::string(folder / "")), {}};
+    AccuracySubject subject = pressedBlock().subject;
+
+    void solve(const std::string& name, const std::string& law, Vec3 beside)
+    {
+        TrialPath path = subject.path;
+        path.start += beside;
+        ReferenceInfo info = someInfo();
+        info.law = law;
+        info.key = referenceKey(*subject.model->tissue, path, subject.speed, law);
+        info.body = bodyKey(*subject.model->tissue, path, subject.speed, law);
+        info.press = pressOf(path);
+        saveReference(folder / (name + "-" + info.key + ".ref"), {}, info);
+    }
+    // Name of the reference that is taken; what went wrong where none is.
+    std::string taken(const std::string& law)
+    {
+        std::string name;
+        const std::string error =
+            errorOf([&] { name = solvedReference("no such scene", subject, law, folders, [](const auto&) {}).second.law; });
+        return name.empty() ? error : name;
+    }
+};
+
+// The surface is read from voxels, and a scene's entry with it: the press of the reference counts, for all laws alike.
+TEST(References, OneBesideTheEntryIsTakenAndItsPathToo)
+{
+    Shelf shelf;
+    const Vec3 own = shelf.subject.path.start;
+    shelf.solve("near", "linear", Vec3(1e-5, -2e-4, 0.0));
+    shelf.solve("same", "neo-hookean", Vec3(1e-5, -2e-4, 0.0));
+    shelf.solve("other", "exponential", Vec3(0.0));
+    EXPECT_EQ(shelf.taken("linear"), "linear");
+    EXPECT_NEAR(glm::distance(shelf.subject.path.start, own + Vec3(1e-5, -2e-4, 0.0)), 0.0, 1e-12);
+    EXPECT_EQ(shelf.taken("neo-hookean"), "neo-hookean");
+    EXPECT_NE(shelf.taken("exponential"), "exponential");  // its path is another one than the first reference's
+    EXPECT_EQ(shelf.subject.pathOf.filename().string().substr(0, 4), "near");
+}
+
+TEST(References, OneFarFromTheEntryOrOfAnotherBodyIsNotTaken)
+{
+    Shelf shelf;
+    shelf.solve("far", "linear", Vec3(1.1e-3, 0.0, 0.0));
+    EXPECT_NE(shelf.taken("linear"), "linear");
+    shelf.subject.speed *= 2.0;
+    shelf.solve("fast", "linear", Vec3(1e-5, 0.0, 0.0));
+    shelf.subject.speed /= 2.0;
+    EXPECT_NE(shelf.taken("linear"), "linear");
+    EXPECT_TRUE(shelf.subject.pathOf.empty());
 }
 
 TEST(Accuracy, AModelThatIsTheReferenceHasNoErrorAndHalfOfItHalf)
