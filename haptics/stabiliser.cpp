@@ -16,7 +16,7 @@ namespace {
 constexpr double rampTime = 0.5;   // [s]
 constexpr double fadeTime = 0.05;  // [s]
 constexpr double slewRate = 50.0;  // of the cap, per second
-constexpr double fallShare = 0.8;  // of the slew beside what the motion asks for, where that is known to about the rest
+constexpr double fallShare = 0.7;  // of the slew beside what the motion asks for, where that is known to about the rest
 constexpr double riseShare = 0.9;  // of the slew for the tissue, the rest for ramp and damping
 constexpr double fastestMotion = 10.0;    // of a hand [m/s]
 constexpr double slowMotion = 0.03;       // [m/s]
@@ -157,9 +157,10 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
 double maxFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness,
                const StabiliserOptions& o) noexcept
 {
-    double estimated = slew + stiffness * glm::length(way);
+    const double unsure = 0.5 * o.device.encoder;
+    double estimated = slew + stiffness * std::max(0.0, glm::length(way) - unsure);
     if (o.period < tickSeconds) {
-        const double sure = motion.time * glm::length(motion.velocity) - 0.5 * o.device.encoder;
+        const double sure = motion.time * glm::length(motion.velocity) - unsure;
         const double speed = motion.time > 0.0 ? std::max(0.0, sure) / motion.time : 0.0;
         estimated = std::max(slew, fallShare * slew + stiffness * o.period * speed);
     }

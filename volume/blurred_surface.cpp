@@ -181,13 +181,15 @@ public:
     // normals.
     void add(const SurfacePoint& point)
     {
-        const float likeness = std::max(0.0F, 1.0F - (1.0F - glm::dot(point.normal, normal_)) / unlike);
-
         constexpr float level = 0.5F;  // height of points beside the origin [spacings]
         constexpr float slope = 0.3F;  // and how it grows with their distance
         const Vec3f way = (point.at - origin_) / reach_;
         const float far = glm::dot(way, way);
-        if (far >= 1.0F || likeness <= 0.0F || std::abs(glm::dot(way, normal_)) > level / reach_ + slope * std::sqrt(far)) {
+        if (far >= 1.0F || std::abs(glm::dot(way, normal_)) > level / reach_ + slope * std::sqrt(far)) {
+            return;
+        }
+        const float likeness = 1.0F - (1.0F - glm::dot(point.normal, normal_)) / unlike;
+        if (likeness <= 0.0F) {
             return;
         }
         const double weight = static_cast<double>((1.0F - far) * (1.0F - far) * likeness * likeness);
@@ -247,9 +249,9 @@ public:
         return glm::normalize(normal_ - static_cast<float>(right_[1]) * u_ - static_cast<float>(right_[2]) * v_);
     }
 
-private:
     static constexpr float unlike = 0.2F;  // 1 less the cosine between normals from which on a point does not count
 
+private:
     Vec3f origin_, normal_, u_, v_;
     float reach_;
     std::array<std::array<double, 6>, 6> matrix_{};  // lower triangle
@@ -281,8 +283,8 @@ public:
     {
         findPlanes();
         const BlurredSurface found = pointsInOwnCells();
-        all_ = rowsOf(found.nodes, false);
-        sparse_ = rowsOf(found.nodes, true);
+        all_ = rowsOf(found.points);
+        sparse_ = rowsOf(fewer(found));
         BlurredSurface fitted = found;
         forEach(found.nodes.size(), [&](std::size_t k) { fit(found, k, fitted); });
         // A layer of nodes within nearOwn on both sides of the surface has 2 nearOwn of them in a unit of area.
@@ -360,25 +362,80 @@ private:
 
     // Points by rows of nodes along x.
     struct Rows {
-        std::vector<std::uint32_t> points;
+        std::vector<SurfacePoint> points;
         std::vector<std::uint32_t> first;  // of each row, and the end
     };
 
-    // All of the points, or a quarter of them, scattered: a wide paraboloid needs no more.
-    Rows rowsOf(const std::vector<std::uint32_t>& nodes, bool isSparse) const
+    std::size_t rowOf(Index3 n) const
     {
-        Rows rows;
-        const auto width = static_cast<std::size_t>(grid_.size.x);
+        return static_cast<std::size_t>(n.y) + static_cast<std::size_t>(n.z) * static_cast<std::size_t>(grid_.size.y);
+    }
+
+    Rows rowsOf(const std::vector<SurfacePoint>& points) const
+    {
+        const auto row = [&](const SurfacePoint& point) {
+            return rowOf(glm::clamp(Index3(glm::round(point.at)), Index3(0), grid_.size - 1));
+        };
+        Rows rows{std::vector<SurfacePoint>(points.size()), {}};
         rows.first.assign(static_cast<std::size_t>(grid_.size.y) * static_cast<std::size_t>(grid_.size.z) + 1, 0);
-        for (std::size_t k = 0; k < nodes.size(); ++k) {
-            constexpr std::uint32_t scatter = 2654435761U;  // D. E. Knuth's multiplicative hash
-            if (!isSparse || nodes[k] * scatter >> 30U == 0U) {
-                rows.points.push_back(static_cast<std::uint32_t>(k));
-                ++rows.first[nodes[k] / width + 1];
-            }
+        for (const SurfacePoint& point : points) {
+            ++rows.first[row(point) + 1];
         }
         std::partial_sum(rows.first.begin(), rows.first.end(), rows.first.begin());
+        std::vector<std::uint32_t> next(rows.first.begin(), rows.first.end() - 1);
+        for (const SurfacePoint& point : points) {
+            rows.points[next[row(point)]++] = point;
+        }
         return rows;
+    }
+
+    // A wide paraboloid needs no more: of nodes that are one behind the other under the surface one point, in the middle
+    // of theirs, as what their depths are off has opposite signs on its two sides. One column in two, scattered.
+    std::vector<SurfacePoint> fewer(const BlurredSurface& found) const
+    {
+        constexpr std::uint32_t scatter = 2654435761U;  // D. E. Knuth's multiplicative hash
+        constexpr std::uint32_t none = ~0U;
+        std::vector<std::uint32_t> pointOf(fraction_.size(), none);
+        for (std::size_t k = 0; k < found.nodes.size(); ++k) {
+            pointOf[found.nodes[k]] = static_cast<std::uint32_t>(k);
+        }
+        // The next point in the column of point k, or none.
+        const auto beside = [&](std::size_t k, int axis, int way) {
+            const int there = grid_.node(found.nodes[k])[axis] + way;
+            if (there < 0 || there >= grid_.size[axis]) {
+                return none;
+            }
+            const auto step = way * steps_[static_cast<std::size_t>(axis)];
+            const std::uint32_t other = pointOf[static_cast<std::size_t>(found.nodes[k] + step)];
+            return other != none && columnAxis(found.points[other].normal) == axis &&
+                           glm::dot(found.points[k].normal, found.points[other].normal) > 1.0F - Paraboloid::unlike
+                       ? other
+                       : none;
+        };
+        std::vector<SurfacePoint> out;
+        for (std::size_t k = 0; k < found.nodes.size(); ++k) {
+            const int axis = columnAxis(found.points[k].normal);
+            const auto above = grid_.node(found.nodes[k])[axis] * steps_[static_cast<std::size_t>(axis)];
+            if ((found.nodes[k] - static_cast<std::uint32_t>(above)) * scatter >> 31U != 0U ||
+                beside(k, axis, -1) != none) {
+                continue;
+            }
+            SurfacePoint sum = found.points[k];
+            float count = 1.0F;
+            for (std::uint32_t o = beside(k, axis, 1); o != none; o = beside(o, axis, 1)) {
+                sum.at += found.points[o].at;
+                sum.normal += found.points[o].normal;
+                ++count;
+            }
+            out.push_back({sum.at / count, glm::normalize(sum.normal)});
+        }
+        return out;
+    }
+
+    static int columnAxis(Vec3f normal)
+    {
+        const Vec3f along = glm::abs(normal);
+        return along.x >= along.y && along.x >= along.z ? 0 : along.y >= along.z ? 1 : 2;
     }
 
     std::optional<Paraboloid> through(const BlurredSurface& found, std::size_t k, float reach) const
@@ -388,14 +445,14 @@ private:
         const Rows& rows = reach > widestOfAll ? sparse_ : all_;
         const auto addRow = [&](std::size_t row) {
             for (std::size_t o = rows.first[row]; o < rows.first[row + 1]; ++o) {
-                paraboloid.add(found.points[rows.points[o]]);
+                paraboloid.add(rows.points[o]);
             }
         };
         const Index3 n = grid_.node(found.nodes[k]);
         const int nodes = static_cast<int>(std::ceil(reach));
         for (int z = std::max(n.z - nodes, 0); z <= std::min(n.z + nodes, grid_.size.z - 1); ++z) {
             for (int y = std::max(n.y - nodes, 0); y <= std::min(n.y + nodes, grid_.size.y - 1); ++y) {
-                addRow(static_cast<std::size_t>(y) + static_cast<std::size_t>(z) * static_cast<std::size_t>(grid_.size.y));
+                addRow(rowOf({n.x, y, z}));
             }
         }
         return paraboloid.solve() ? std::optional(paraboloid) : std::nullopt;

@@ -151,7 +151,7 @@ TEST(Press, ForcesAreThoseOfATrial)
     const Pressed own = pressed(path, {ball});
     ASSERT_EQ(own.samples.size(), forces.size());
     for (std::size_t i = 0; i < forces.size(); ++i) {
-        EXPECT_LT(glm::distance(own.samples[i].force, forces[i]), 4e-2 * glm::length(forces.back())) << i;
+        EXPECT_LT(glm::distance(own.samples[i].force, forces[i]), 2e-2 * glm::length(forces.back())) << i;
     }
     EXPECT_LT(forces.back().y, -0.05);
     EXPECT_EQ(own.summary.ticks, forces.size());
@@ -161,7 +161,8 @@ TEST(Press, ForcesAreThoseOfATrial)
 
 // A session with device "ideal" takes positions as they are: no encoder's half step lies between its force and that of the
 // path (15 um of a Premium's are 5 % at a depth of half a millimetre). A capsule lies flat, its windows under its middle;
-// touches with its back alone; with its middle alone, over the block's edge; and turns about its front.
+// touches with its back alone; with its middle alone, over the block's edge; and turns about its front, after which the
+// windows, which are not wider than it is long, may lie a node apart.
 TEST(Press, ForcesAreThoseOfASessionWithoutEncoder)
 {
     const PosePath down = read("seconds,x_mm,y_mm,z_mm\n0,0,-5.5,0\n0.05,0,-4.5,0\n0.1,0,-4.5,0\n");
@@ -174,8 +175,16 @@ TEST(Press, ForcesAreThoseOfASessionWithoutEncoder)
     const PosePath turning = read(
         "seconds,x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n0,10,-6.5,0,1,1,0\n0.2,10,-6.5,0,4,-1,0\n0.4,10,-6.5,0,4,-1,0\n");
     const ToolSpec finger = toolOf(ToolKind::capsule, 5e-3, 20e-3);
-    for (const auto& [tool, path] : {std::pair{ball, down}, std::pair{finger, flat}, std::pair{finger, back},
-                                     std::pair{finger, middle}, std::pair{finger, turning}}) {
+    struct Case {
+        ToolSpec tool;
+        const PosePath& path;
+        double bound;
+    };
+    for (const auto& [tool, path, bound] : {Case{ball, down, 3e-3},
+                                            {finger, flat, 3e-3},
+                                            {finger, back, 3e-3},
+                                            {finger, middle, 3e-3},
+                                            {finger, turning, 0.015}}) {
         haptics::SessionModel small = smallBlock("[safety]\ndevice = \"ideal\"\n");
         small.scene.model.level = datasets::ModelLevel::elastic;
         small.scene.tool = tool;
@@ -191,7 +200,7 @@ TEST(Press, ForcesAreThoseOfASessionWithoutEncoder)
         }
         const PressSample own = pressed(model, path, {tool}).samples.back();
         EXPECT_GT(glm::length(own.force), 0.004);
-        EXPECT_LT(glm::distance(own.force, tick.tissueForce), 0.015 * glm::length(own.force));  // the kernel's tolerance
+        EXPECT_LT(glm::distance(own.force, tick.tissueForce), bound * glm::length(own.force));
         EXPECT_NEAR(own.depth, tick.penetration, 2e-6);
     }
 }
@@ -205,7 +214,7 @@ TEST(Press, NoPointOfALargeContactIsLeftOut)
     const Pressed p = pressed(model, read("seconds,x_mm,y_mm,z_mm\n0,0,-100.1,0\n0.155,0,-97,0\n"),
                               {toolOf(ToolKind::sphere, 100e-3, 0.0)});
     const PressSample& s = p.samples.back();
-    EXPECT_GT(s.contactArea, 650e-6);
+    EXPECT_GT(s.contactArea, 700e-6);
     EXPECT_LT(std::abs(s.force.z), 0.01 * std::abs(s.force.y));
 }
 

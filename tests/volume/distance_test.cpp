@@ -82,7 +82,8 @@ TEST(Distance, OfAVoxelisedSphereIsTheAnalyticOne)
         }
         const double rms = std::sqrt(squares / count);
         const double half = 0.5 * std::max(c.voxel, c.spacing) / c.voxel;
-        EXPECT_LT(near, 1.05 * half) << c.name;
+        // At the poles the voxels end in a flat cap, and know the ball to half of one: 0.518 is found.
+        EXPECT_LT(near, 1.04 * half) << c.name;
         EXPECT_LT(rms, 0.09) << c.name;
         EXPECT_LT(far, half) << c.name;
         EXPECT_LT(relative, 0.025) << c.name;
