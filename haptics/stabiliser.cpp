@@ -151,9 +151,9 @@ Vec3 couple(Vec3 tissue, Vec3 way, double limit, double cap, double rise, const 
     return next;
 }
 
-// How much the force may change where it falls with the motion: that which was estimated, and no more than was read. In
-// periods under a millisecond the way is one of encoder steps: there the speed says what it was, less what half a step may
-// have added to it.
+// How much the force may change where it falls with the motion: that which was estimated, less what half a step of the
+// encoder may have added to it, and no more than was read. In periods under a millisecond the way is one of such steps:
+// there the speed says what it was.
 double maxFall(Vec3 way, double read, const Motion& motion, double slew, double stiffness,
                const StabiliserOptions& o) noexcept
 {

@@ -268,6 +268,24 @@ float distanceTo(Index3 n, const SurfacePoint& point)
     return std::sqrt(plane * plane + beyond * beyond);
 }
 
+// Of each node to the surface around its nearest point [m], negative where isInside(node, offset, that point); without any
+// point (null) the grid's diagonal.
+template <typename IsInside>
+std::vector<float> distances(const NodeGrid& grid, std::span<const SurfacePoint> points, std::vector<std::int32_t>& nearest,
+                             const IsInside& isInside)
+{
+    spreadNearest(grid.size, points, nearest);
+    const auto diagonal = static_cast<float>(glm::length(Vec3(grid.size)));
+    const auto spacing = static_cast<float>(grid.spacing);
+    std::vector<float> distance(grid.count());
+    forEachNode(grid, [&](Index3 n, std::size_t i) {
+        const SurfacePoint* point = nearest[i] >= 0 ? &points[static_cast<std::size_t>(nearest[i])] : nullptr;
+        const float d = point != nullptr ? distanceTo(n, *point) : diagonal;
+        distance[i] = (isInside(n, i, point) ? -d : d) * spacing;
+    });
+    return distance;
+}
+
 }  // namespace
 
 void spreadNearest(Index3 size, std::span<const SurfacePoint> points, std::vector<std::int32_t>& nearest)
@@ -285,17 +303,7 @@ std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> f
     const Samples samples{grid, fraction};
     std::vector<std::int32_t> nearest(grid.count(), -1);
     const std::vector<SurfacePoint> points = collectSurface(samples, iso, nearest);
-    spreadNearest(grid.size, points, nearest);
-
-    const auto diagonal = static_cast<float>(glm::length(Vec3(grid.size)));
-    const auto spacing = static_cast<float>(grid.spacing);
-    std::vector<float> distance(grid.count());
-    forEachNode(grid, [&](Index3 n, std::size_t i) {
-        const std::int32_t point = nearest[i];
-        const float d = point < 0 ? diagonal : distanceTo(n, points[static_cast<std::size_t>(point)]);
-        distance[i] = (fraction[i] > iso ? -d : d) * spacing;
-    });
-    return distance;
+    return distances(grid, points, nearest, [&](Index3, std::size_t i, const SurfacePoint*) { return fraction[i] > iso; });
 }
 
 std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> fraction, const BlurredSurface& surface,
@@ -307,23 +315,10 @@ std::vector<float> signedDistance(const NodeGrid& grid, std::span<const float> f
         points[k].at += weight * surface.back[k] * points[k].normal;
         nearest[surface.nodes[k]] = static_cast<std::int32_t>(k);
     }
-    spreadNearest(grid.size, points, nearest);
-
-    const auto diagonal = static_cast<float>(glm::length(Vec3(grid.size)));
-    const auto spacing = static_cast<float>(grid.spacing);
-    std::vector<float> distance(grid.count());
-    forEachNode(grid, [&](Index3 n, std::size_t i) {
-        float d = diagonal;
-        bool isInside = fraction[i] > 0.5F;
-        if (nearest[i] >= 0) {
-            const SurfacePoint& point = points[static_cast<std::size_t>(nearest[i])];
-            const Vec3f away = Vec3f(n) - point.at;
-            d = distanceTo(n, point);
-            isInside = glm::dot(away, away) < 1.0F ? glm::dot(away, point.normal) < 0.0F : isInside;
-        }
-        distance[i] = (isInside ? -d : d) * spacing;
+    return distances(grid, points, nearest, [&](Index3 n, std::size_t i, const SurfacePoint* point) {
+        const Vec3f away = point != nullptr ? Vec3f(n) - point->at : Vec3f(1.0F);
+        return glm::dot(away, away) < 1.0F ? glm::dot(away, point->normal) < 0.0F : fraction[i] > 0.5F;
     });
-    return distance;
 }
 
 double integral(const NodeGrid& grid, std::span<const float> fraction)
