@@ -72,9 +72,12 @@ std::optional<fs::path> findNear(const AccuracySubject& subject, const std::stri
 {
     const std::string body = bodyKey(*subject.model->tissue, subject.path, subject.speed, law, subject.poissonCap());
     for (const fs::path& file : referencesIn(folders)) {
-        const ReferenceInfo info = loadReference(file).second;
-        if (info.press && info.body == body && isNear(*info.press, subject.path)) {
-            return file;
+        try {
+            const ReferenceInfo info = loadReference(file).second;
+            if (info.press && info.body == body && isNear(*info.press, subject.path)) {
+                return file;
+            }
+        } catch (const std::runtime_error&) {  // damaged: told of where it is asked for by its name
         }
     }
     return std::nullopt;

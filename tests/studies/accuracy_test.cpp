@@ -269,6 +269,15 @@ TEST(References, OneFarFromTheEntryOrOfAnotherBodyIsNotTaken)
     EXPECT_TRUE(shelf.subject.pathOf.empty());
 }
 
+// One that cannot be read is in nobody's way but of those who ask for it.
+TEST(References, ADamagedOneHidesNoOther)
+{
+    Shelf shelf;
+    write(shelf.folder / "a.ref", "no reference");
+    shelf.solve("near", "linear", Vec3(1e-5, 0.0, 0.0));
+    EXPECT_EQ(shelf.taken("linear"), "linear");
+}
+
 TEST(Accuracy, AModelThatIsTheReferenceHasNoErrorAndHalfOfItHalf)
 {
     const auto& p = pressedBlock();

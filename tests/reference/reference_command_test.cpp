@@ -1,0 +1,71 @@
+#include <studies/accuracy/reference_file.h>
+#include <tests/apps/program.h>
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace palpate::apps {
+namespace {
+
+constexpr const char* sceneText =
+    "name = \"small\"\n[volume]\nphantom = \"block\"\nvoxel_mm = 2.0\n[volume.parameters]\nwidth_mm = 40\n"
+    "thickness_mm = 24\ntumour_diameter_mm = 12\ntumour_centre_mm = 12\n[target]\nstructure = \"tumour\"\n"
+    "entry_mm = [0, 0, 0]\naim_mm = [0, 12, 0]\n";
+
+// A reference file of which only the press counts: 4 mm beside the scene's entry.
+std::string pressBeside(const Folder& folder, const std::string& tool, bool hasPress)
+{
+    studies::ReferenceInfo info;
+    info.tool = tool;
+    info.scene = "small";
+    if (hasPress) {
+        info.press = {Vec3(4e-3, -10.5e-3, 0.0), Vec3(0, 1, 0), Vec3(1, 0, 0), 8.5e-3};
+    }
+    const std::string file = folder / "beside.ref";
+    studies::saveReference(file, {}, info);
+    return file;
+}
+
+// Beside the lump the ball feels less of it than over it, and is pushed away from it.
+TEST(ReferenceCommand, PressesWhereAnotherReferenceDoes)
+{
+    const Folder folder;
+    writeText(folder / "small.toml", sceneText);
+    const auto solved = [&](std::vector<std::string> more) {
+        std::vector<std::string> arguments{folder / "small.toml", "--looks", "3", "--size", "8", "--json",
+                                           folder / "r.json"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const Outcome o = Program("palpate-reference", arguments).wait();
+        EXPECT_EQ(o.status, 0) << o.err;
+        return nlohmann::json::parse(readText(folder / "r.json"));
+    };
+    const auto over = solved({}), beside = solved({"--path-of", pressBeside(folder, "sphere_10mm", true)});
+    EXPECT_NE(over.at("key"), beside.at("key"));
+    const auto force = [](const nlohmann::json& r, std::size_t i) {
+        return r.at("looks")[0].at("force_n")[i].get<double>();
+    };
+    EXPECT_LT(force(over, 1), 1.03 * force(beside, 1));  // against the press
+    EXPECT_GT(force(beside, 0), 0.01 * std::abs(force(beside, 1)));
+}
+
+TEST(ReferenceCommand, RefusesPathsThatAreNone)
+{
+    const Folder folder;
+    writeText(folder / "small.toml", sceneText);
+    const auto refused = [&](const std::string& file, const std::string& hint) {
+        const Outcome o =
+            Program("palpate-reference", {folder / "small.toml", "--path-of", file, "--json", folder / "r.json"}).wait();
+        EXPECT_GT(o.status, 0) << hint;
+        EXPECT_EQ(std::ranges::count(o.err, '\n'), 1) << o.err;
+        EXPECT_NE(o.err.find(hint), std::string::npos) << o.err;
+    };
+    refused(pressBeside(folder, "sphere_10mm", false), "has no path");
+    refused(pressBeside(folder, "sphere_5mm", true), "its tool is sphere_5mm, not sphere_10mm");
+    refused(folder / "small.toml", "is no reference that can be used");
+    refused(folder / "none.ref", "none.ref");
+}
+
+}  // namespace
+}  // namespace palpate::apps
