@@ -284,7 +284,9 @@ public:
         findPlanes();
         const BlurredSurface found = pointsInOwnCells();
         all_ = rowsOf(found.points);
-        sparse_ = rowsOf(fewer(found));
+        if (reach_ > widestOfAll) {
+            sparse_ = rowsOf(fewer(found));
+        }
         BlurredSurface fitted = found;
         forEach(found.nodes.size(), [&](std::size_t k) { fit(found, k, fitted); });
         // A layer of nodes within nearOwn on both sides of the surface has 2 nearOwn of them in a unit of area.
