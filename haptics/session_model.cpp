@@ -78,6 +78,18 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     return s;
 }
 
+// A plan that names a point alone samples the structure in which the point lies.
+std::string structureAt(const volume::Tissue& tissue, Vec3 aim, const std::string& scene)
+{
+    const std::uint16_t label = volume::Tissue::Reader(tissue).label(aim);
+    const auto at = std::ranges::find(tissue.structures(), label, &volume::Structure::value);
+    if (at == tissue.structures().end() || tissue.table().rows[at->tissue].role == volume::Role::air) {
+        throw std::runtime_error(fmt::format("{}: [target] aim_mm = [{:g}, {:g}, {:g}] lies outside the body", scene,
+                                             1e3 * aim.x, 1e3 * aim.y, 1e3 * aim.z));
+    }
+    return at->name;
+}
+
 void checkToolFits(const datasets::Scene& scene, const chainmail::Lattice& lattice)
 {
     constexpr std::size_t maxSeeds = 1U << 16;  // nodes that a tool may hold: beyond, a tick has no time for them
@@ -131,6 +143,9 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     }
     const Posed posture = posed(scene, std::move(tissue));
     tissue = posture.tissue;
+    if (scene.target.empty() && posture.aim) {
+        scene.target = structureAt(*tissue, *posture.aim, scene.name);
+    }
     const auto grid = fieldGrid(*tissue, surfaceNodes);
     const auto coarse = fieldGrid(*tissue, structureNodes);
     std::vector<GuardedStructure> structures;
