@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <random>
 #include <stdexcept>
 
 namespace palpate::haptics {
@@ -68,22 +67,9 @@ std::vector<std::string> deviceNames()
     return names;
 }
 
-std::vector<double> seededLateness(std::size_t count, double mean, double period, std::uint64_t seed)
-{
-    std::mt19937_64 random(seed);
-    std::vector<double> lateness(count);
-    for (double& late : lateness) {
-        // Standard distributions differ between libraries; these bits do not.
-        const double uniform = static_cast<double>(random() >> 11U) * 0x1.0p-53;
-        late = std::min(-mean * std::log1p(-uniform), 0.5 * period);
-    }
-    return lateness;
-}
-
 Arm::Arm(const DeviceParameters& device, const Grip& grip, Vec3 start, double period)
     : device_(device), grip_(grip), period_(period), goal_(start), position_(start)
 {
-    // Jitter brings samples nearer together than a period, by less than one.
     if (!(device.delay / period < static_cast<double>(longestLine - 2))) {
         throw std::runtime_error("device '" + std::string(device.name) + "': a delay of " + std::to_string(device.delay) +
                                  " s is over " + std::to_string(longestLine - 2) +
@@ -97,20 +83,10 @@ void Arm::release(Vec3 position, Vec3 velocity) noexcept
     velocity_ = velocity;
 }
 
-void Arm::jitter(std::span<const double> lateness)
-{
-    lateness_.assign(lateness.begin(), lateness.end());
-}
-
-double Arm::lateness(std::uint64_t sample) const noexcept
-{
-    return lateness_.empty() ? 0.0 : lateness_[sample % lateness_.size()];
-}
-
 Vec3 Arm::read() noexcept
 {
     ++samples_;
-    live(static_cast<double>(samples_) * period_ + lateness(samples_) - time_);
+    live(static_cast<double>(samples_) * period_ - time_);
     return rounded(position_, device_.encoder);
 }
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -40,9 +39,6 @@ struct Grip {
 };
 inline constexpr Grip released{0, 0, 0};
 
-/// How late each sample comes [s]: exponentially distributed with mean `mean`, cut at half a `period`. For Arm::jitter().
-std::vector<double> seededLateness(std::size_t count, double mean, double period, std::uint64_t seed);
-
 /// A simulated device in a simulated hand: (m + m_hand) x'' = f - (b + b_hand) x' - c x'/|x'| + k_hand (goal - x).
 ///
 /// f is the force that was written, rounded to the force step, bounded by the peak, delayed, held until the next one is
@@ -66,8 +62,6 @@ public:
     void pull(Vec3 goal) noexcept { goal_ = goal; }
     void hold(const Grip& grip) noexcept { grip_ = grip; }
     void letGo() noexcept { grip_ = released; }
-    /// Sample n comes `lateness[n mod size]` [s] after it is due, each from 0 to below a period. Allocates.
-    void jitter(std::span<const double> lateness);
     /// Puts the tip there with that velocity [m, m/s].
     void release(Vec3 position, Vec3 velocity = Vec3(0.0)) noexcept;
 
@@ -88,7 +82,6 @@ private:
     };
     static constexpr std::size_t longestLine = 256;
 
-    double lateness(std::uint64_t sample) const noexcept;
     void live(double seconds) noexcept;
     void step(double h) noexcept;
 
@@ -106,7 +99,6 @@ private:
     std::uint64_t samples_ = 0;
     std::array<Command, longestLine> line_{};  // on their way, the oldest first
     std::size_t first_ = 0, waiting_ = 0;
-    std::vector<double> lateness_;
 };
 
 }  // namespace palpate::haptics

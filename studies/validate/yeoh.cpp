@@ -20,13 +20,6 @@ double uniaxialStress(const Incompressible& law, double stretch) noexcept
     return 2.0 * law.slope(invariant) * (stretch - 1.0 / (stretch * stretch));
 }
 
-double equibiaxialStress(const Incompressible& law, double stretch) noexcept
-{
-    const double fourth = 1.0 / (stretch * stretch * stretch * stretch);
-    const double invariant = 2.0 * stretch * stretch + fourth - 3.0;
-    return 2.0 * law.slope(invariant) * (stretch - fourth / stretch);
-}
-
 double scaleOf(const std::vector<double>& shape, const std::vector<double>& values) noexcept
 {
     double mixed = 0.0, own = 0.0;

@@ -18,8 +18,6 @@ struct Incompressible {
 
 /// Nominal stress of a bar stretched to `stretch` times its length [Pa]; under 0: it is pressed.
 double uniaxialStress(const Incompressible& law, double stretch) noexcept;
-/// Nominal stress of a sheet stretched by `stretch` along both its sides [Pa].
-double equibiaxialStress(const Incompressible& law, double stretch) noexcept;
 
 /// The factor by which a curve of `shape` comes nearest to `values`, least squares.
 double scaleOf(const std::vector<double>& shape, const std::vector<double>& values) noexcept;

@@ -165,21 +165,6 @@ TEST(Arm, WorkIsKineticEnergyAndFriction)
     EXPECT_NEAR(arm.work(), kinetic + arm.friction(), 0.02 * arm.friction());
 }
 
-// Sample n of a steady motion is read at n T + lateness.
-TEST(Arm, LateSamplesAreReadLate)
-{
-    const auto lateness = seededLateness(37, 50e-6, 1e-3, 5);
-    Arm arm(massOf(0.1), released);
-    arm.jitter(lateness);
-    arm.release(Vec3(0.0), {1.0, 0, 0});
-    double mean = 0.0;
-    for (std::size_t n = 1; n <= 100; ++n) {
-        EXPECT_NEAR(arm.read().x, 1e-3 * static_cast<double>(n) + lateness[n % 37], 1e-12);
-        mean += lateness[n % 37] / 100;
-    }
-    EXPECT_NEAR(mean, 50e-6, 20e-6);
-}
-
 TEST(Arm, UnknownDevicesAndEndlessDelaysAreRefused)
 {
     EXPECT_NE(tests::errorOf([] { deviceParameters("omega"); }).find("premium, touch, falcon"), std::string::npos);

@@ -22,20 +22,10 @@ double uniaxialEnergy(const Incompressible& law, double stretch)
     return law.energy(stretch * stretch + 2.0 / stretch - 3.0);
 }
 
-double equibiaxialEnergy(const Incompressible& law, double stretch)
-{
-    return law.energy(2.0 * stretch * stretch + std::pow(stretch, -4) - 3.0);
-}
-
-double slopeOf(double (*energy)(const Incompressible&, double), const Incompressible& law, double stretch)
-{
-    constexpr double step = 1e-5;
-    return (energy(law, stretch + step) - energy(law, stretch - step)) / (2.0 * step);
-}
-
-// Nominal stress of a bar is dW/dstretch, of a sheet half of it: two sides work. Beyond the bound of softening too.
+// Nominal stress of a bar is dW/dstretch, beyond the bound of softening too.
 TEST(Yeoh, StressIsTheDerivativeOfEnergy)
 {
+    constexpr double step = 1e-5;
     using Case = std::pair<volume::Law, double>;
     for (const auto& [of, b] :
          {Case(volume::NeoHookean{}, 0.0), Case(volume::NeoHookean{}, 1.5), Case(volume::NeoHookean{}, -0.12),
@@ -43,20 +33,18 @@ TEST(Yeoh, StressIsTheDerivativeOfEnergy)
         const Incompressible law{2.0, b, of};
         for (const double stretch : {0.45, 0.6, 0.9, 1.2, 1.6, 2.4}) {
             const double scale = 1.0 + std::abs(uniaxialStress(law, stretch));
-            EXPECT_NEAR(uniaxialStress(law, stretch), slopeOf(uniaxialEnergy, law, stretch), 1e-5 * scale) << b;
-            const double wide = 1.0 + std::abs(equibiaxialStress(law, stretch));
-            EXPECT_NEAR(equibiaxialStress(law, stretch), 0.5 * slopeOf(equibiaxialEnergy, law, stretch), 1e-4 * wide) << b;
+            const double slope = (uniaxialEnergy(law, stretch + step) - uniaxialEnergy(law, stretch - step)) / (2.0 * step);
+            EXPECT_NEAR(uniaxialStress(law, stretch), slope, 1e-5 * scale) << b;
         }
     }
 }
 
-// At rest the tangent is Young's modulus, 3 mu, under a load along one axis, and 6 mu along two.
+// At rest the tangent is Young's modulus, 3 mu.
 TEST(Yeoh, TangentAtRestIsHookes)
 {
     constexpr double step = 1e-4;
     const Incompressible law{2.0, -0.2};
     EXPECT_NEAR((uniaxialStress(law, 1.0 + step) - uniaxialStress(law, 1.0 - step)) / (2.0 * step), 6.0, 1e-5);
-    EXPECT_NEAR((equibiaxialStress(law, 1.0 + step) - equibiaxialStress(law, 1.0 - step)) / (2.0 * step), 12.0, 1e-4);
 }
 
 // Of all laws and all b that a tissue may have: more stretch, more stress.
