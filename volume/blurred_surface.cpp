@@ -447,7 +447,9 @@ private:
         const Rows& rows = reach > widestOfAll ? sparse_ : all_;
         const auto addRow = [&](std::size_t row) {
             for (std::size_t o = rows.first[row]; o < rows.first[row + 1]; ++o) {
-                paraboloid.add(rows.points[o]);
+                if (std::abs(rows.points[o].at.x - own.at.x) < reach) {  // most of a row is farther away
+                    paraboloid.add(rows.points[o]);
+                }
             }
         };
         const Index3 n = grid_.node(found.nodes[k]);
