@@ -2,6 +2,7 @@
 #include <base/process.h>
 #include <report/chart/axis.h>
 #include <report/chart/chart.h>
+#include <report/chart/labels.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -126,20 +127,11 @@ std::string axisCommands(char name, const std::string& label, bool log, AxisRang
     return out + fmt::format("set logscale {0} 10\nset {0}tics ({1})\n", name, ticks);
 }
 
-// A text in a block of data, where gnuplot knows no escapes.
-std::string dataText(std::string_view text)
-{
-    std::string out = tidy(text, longestPointLabel);
-    std::ranges::replace(out, '"', '\'');
-    return "\"" + out + "\"";
-}
-
 std::string dataBlock(const ChartSeries& s, std::size_t index)
 {
     std::string out = fmt::format("$s{} << END\n", index);
     for (std::size_t k = 0; k < s.x.size(); ++k) {
-        const std::string text = s.written.empty() ? "" : " " + dataText(s.written[k]);
-        out += std::isnan(s.x[k]) ? "NaN NaN\n" : fmt::format("{} {}{}\n", s.x[k], s.y[k], text);
+        out += std::isnan(s.x[k]) ? "NaN NaN\n" : fmt::format("{} {}\n", s.x[k], s.y[k]);
     }
     return out + "END\n";
 }
@@ -158,17 +150,54 @@ std::string dataCommands(const Chart& chart)
                                            : "points lw 1.6 " + marks;
         plots += fmt::format("{}$s{} using 1:2 with {} lc rgb '{}' title {}", plots.empty() ? "" : ", ", i, style,
                              s.markers ? colours[i % colours.size()] : "#999999", quoted(s.name, longestName));
-        if (!s.written.empty()) {
-            plots +=
-                fmt::format(", $s{} using 1:2:3 with labels left offset 0.9,0.55 font 'Sans,11' textcolor rgb '{}' notitle",
-                            i, colours[i % colours.size()]);
-        }
     }
     for (std::size_t i = 0; i < chart.bounds.size(); ++i) {
         plots += fmt::format(", {} with lines lw 1.8 dt {} lc rgb '#444444' title {}", chart.bounds[i].y, i % 4 + 2,
                              quoted(chart.bounds[i].name, longestName));
     }
     return data + "plot " + plots + "\n";
+}
+
+double share(double value, AxisRange range, bool log)
+{
+    return log ? std::log(value / range.low) / std::log(range.high / range.low)
+               : (value - range.low) / (range.high - range.low);
+}
+
+// The texts beside points, where they cover each other and markers least.
+std::string pointLabels(const DrawableChart& drawn, int width, int height)
+{
+    constexpr double textHeight = 17, textLetter = 8;  // of the font below [px]
+    std::vector<PointLabel> labels;
+    std::vector<std::string> commands;
+    std::vector<glm::dvec2> markers;
+    for (std::size_t i = 0; i < drawn.chart.series.size(); ++i) {
+        const ChartSeries& s = drawn.chart.series[i];
+        for (std::size_t k = 0; k < s.x.size(); ++k) {
+            if (std::isnan(s.x[k])) {
+                continue;
+            }
+            const glm::dvec2 at(plotColumns * share(s.x[k], drawn.x, drawn.chart.logX),
+                                plotRows * share(s.y[k], drawn.y, drawn.chart.logY));
+            if (s.markers) {
+                markers.push_back(at);
+            }
+            if (s.written.empty() || s.written[k].empty()) {
+                continue;
+            }
+            const auto wide = static_cast<double>(letters(tidy(s.written[k], longestPointLabel)));
+            labels.push_back({at, {textLetter * wide, textHeight}});
+            commands.push_back(
+                fmt::format("set label {} at first {}, first {} left font 'Sans,11' textcolor rgb '{}' front",
+                            quoted(s.written[k], longestPointLabel), s.x[k], s.y[k], colours[i % colours.size()]));
+        }
+    }
+    std::string out;
+    const auto places = placedLabels(labels, markers);
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        out += fmt::format("{} offset screen {}, screen {}\n", commands[i], places[i].x / width, places[i].y / height);
+    }
+    return out;
 }
 
 std::string script(const DrawableChart& drawn)
@@ -201,7 +230,7 @@ std::string script(const DrawableChart& drawn)
                            up(noteLine * static_cast<int>(note.size() - i) - 6));
     }
     return out + axisCommands('x', c.xLabel, c.logX, drawn.x) + axisCommands('y', c.yLabel, c.logY, drawn.y) +
-           dataCommands(c);
+           pointLabels(drawn, width, height) + dataCommands(c);
 }
 
 using TemporaryFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;

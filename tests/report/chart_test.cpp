@@ -1,11 +1,13 @@
 #include <report/chart/axis.h>
 #include <report/chart/chart.h>
+#include <report/chart/labels.h>
 
 #include <tests/error_of.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
 
+#include <glm/common.hpp>
 #include <nlohmann/json.hpp>
 
 #include <signal.h>
@@ -276,6 +278,36 @@ TEST(ChartHtml, HoldsTheDataAndNeedsNoNetwork)
     for (const std::string outside : {"src=", "href=", "@import", "url(", "<link", "<b>bold", "alert(1)</script>"}) {
         EXPECT_EQ(html.find(outside), std::string::npos) << outside;
     }
+}
+
+// However points lie beside each other, no text covers another.
+TEST(Labels, OfNeighboursDoNotCoverEachOther)
+{
+    const glm::dvec2 size(150, 17);
+    for (const glm::dvec2 step : {glm::dvec2(0, 0), glm::dvec2(40, 2), glm::dvec2(60, -3), glm::dvec2(3, 12)}) {
+        std::vector<PointLabel> labels;
+        std::vector<glm::dvec2> markers;
+        for (int i = 0; i < 4; ++i) {
+            labels.push_back({glm::dvec2(300, 300) + double(i) * step, size});
+            markers.push_back(labels.back().point);
+        }
+        const auto places = placedLabels(labels, markers);
+        ASSERT_EQ(places.size(), labels.size());
+        for (std::size_t i = 0; i < labels.size(); ++i) {
+            for (std::size_t k = 0; k < i; ++k) {
+                const glm::dvec2 apart = glm::abs(labels[i].point + places[i] - labels[k].point - places[k]);
+                EXPECT_TRUE(apart.x >= size.x || apart.y >= size.y) << step.x << " " << i << " " << k;
+            }
+        }
+    }
+}
+
+TEST(Labels, WithRoomAllAroundStandsAboveAndToTheRight)
+{
+    const PointLabel label{{500, 500}, {80, 17}};
+    const auto place = placedLabels(std::span(&label, 1), std::span(&label.point, 1)).front();
+    EXPECT_GT(place.x, 0.0);
+    EXPECT_GT(place.y, 0.0);
 }
 
 }  // namespace
