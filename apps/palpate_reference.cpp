@@ -129,6 +129,21 @@ std::array<bool, 3> planesOf(const ReferenceArguments& o)
     return planes;
 }
 
+// Half a tool is half its force only where the plane of symmetry goes through its middle.
+void checkInPlanes(const ReferenceArguments& o, const studies::TrialPath& path)
+{
+    constexpr double rounding = 1e-6;  // [m], and of directions
+    const auto planes = planesOf(o);
+    for (int axis = 0; axis < 3; ++axis) {
+        const double off = std::max(std::abs(path.start[axis]), std::abs(path.at({path.press, path.drag})[axis]));
+        if (planes[static_cast<std::size_t>(axis)] && off > rounding) {
+            throw std::runtime_error(
+                fmt::format("--mirrored {}: the tool is {:.3f} mm from the plane {} = 0: solve all of it", o.mirrored,
+                            1e3 * off, "xyz"[axis]));
+        }
+    }
+}
+
 // F.vtu with a look's number before its ending.
 std::string numbered(const std::string& file, std::size_t look)
 {
@@ -303,6 +318,7 @@ void run(const ReferenceArguments& o)
         path.press = path.gap + 1e-3 * std::ranges::max(o.looks);
         path.drag = 0.0;
     }
+    checkInPlanes(o, path);
     json figures;
     Results results = solveScene(o, model, path, figures);
     auto& info = results.info;

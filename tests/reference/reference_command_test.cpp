@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 namespace palpate::apps {
 namespace {
@@ -48,6 +49,20 @@ TEST(ReferenceCommand, PressesWhereAnotherReferenceDoes)
     };
     EXPECT_LT(force(over, 1), 1.03 * force(beside, 1));  // against the press
     EXPECT_GT(force(beside, 0), 0.01 * std::abs(force(beside, 1)));
+}
+
+// What lies on one side of the plane would count twice: without a word up to twice the force.
+TEST(ReferenceCommand, RefusesAPlaneOfSymmetryBesideTheTool)
+{
+    const Folder folder;
+    writeText(folder / "small.toml", sceneText);
+    const Outcome o =
+        Program("palpate-reference", {folder / "small.toml", "--path-of", pressBeside(folder, "sphere_10mm", true),
+                                      "--looks", "3", "--mirrored", "x", "--json", folder / "r.json"})
+            .wait();
+    EXPECT_GT(o.status, 0);
+    EXPECT_EQ(o.err, "palpate-reference: --mirrored x: the tool is 4.000 mm from the plane x = 0: solve all of it\n");
+    EXPECT_FALSE(std::filesystem::exists(folder / "r.json"));
 }
 
 TEST(ReferenceCommand, RefusesPathsThatAreNone)
