@@ -99,7 +99,7 @@ Density projected(const Blur& blur, Vec3 normal)
     }
     Density density(reach, std::max(finest, reach / steps));
     for (int k = 0; k < 3; ++k) {
-        density.addBox(std::abs(normal[k]) * blur.box[k]);
+        density.addBox(std::abs(normal[k]) * (normal[k] == 1.0 ? blur.face : blur.box)[k]);
         for (int pass = 0; pass < 2 * blur.passes[k]; ++pass) {
             density.addStep(std::abs(normal[k]));
         }

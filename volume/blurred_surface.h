@@ -19,6 +19,7 @@ struct SurfacePoint {
 /// What spreads the edge of a structure over neighbouring cells, along each axis of the grid. In spacings.
 struct Blur {
     Vec3 box{1.0};     // width of a box with the variance of a cell's samples and of the voxels that they read
+    Vec3 face{1.0};    // the same for a plane along the faces of voxels, which has no steps of voxels
     Index3 passes{1};  // of [1 2 1] / 4
     double voxel = 0;  // longest edge of a voxel: how far steps of voxels are to be smoothed
     /// Mean over the axes [spacings^2].

@@ -215,7 +215,17 @@ Blur blurOf(const TissueData& tissue, const NodeGrid& grid, Index3 passes)
     const LabelBlocks none(tissue, {Index3(0), Index3(0)});
     const Vec3 cell = CellSampler(tissue, grid, none, false).variance(grid, tissue.affine);
     const Vec3 voxel = tissue.affine.spacing();
-    return {glm::sqrt(12.0 * cell) / grid.spacing, passes, std::max({voxel.x, voxel.y, voxel.z}) / grid.spacing};
+    // Between the middles of voxels on both sides of a face values are linear: half a hat's variance is the voxels' own,
+    // and the other half that of steps, which are at any height in a plane that is not along a face.
+    Vec3 steps(0.0);
+    for (int k = 0; k < 3; ++k) {
+        const Vec3 edge = tissue.affine.linear[k];
+        constexpr double alongAxis = 0.99;  // cosine
+        const Vec3 along = glm::abs(edge);
+        steps += std::max({along.x, along.y, along.z}) > alongAxis * glm::length(edge) ? edge * edge / 12.0 : Vec3(0.0);
+    }
+    return {glm::sqrt(12.0 * cell) / grid.spacing, glm::sqrt(12.0 * (cell - steps)) / grid.spacing, passes,
+            std::max({voxel.x, voxel.y, voxel.z}) / grid.spacing};
 }
 
 bool inside(const Box& box, const Box& of)
