@@ -129,8 +129,11 @@ void next(const CurriculumArguments& o)
         }
         const std::string reason = training::reasonFor(*e);
         const bool test = e->exercise->gate.testOnly && !e->gate.open;
-        const std::string how = fmt::format("palpate train --profile '{}' --exercise {}/{}{}", person.name, c.id,
-                                            e->exercise->id, test ? " --test" : "");
+        const bool inFile = std::filesystem::path(o.id).extension() == ".toml";
+        const std::string exercise =
+            inFile ? fmt::format("'{}/{}'", o.id, e->exercise->id) : fmt::format("{}/{}", c.id, e->exercise->id);
+        const std::string how =
+            fmt::format("palpate train --profile '{}' --exercise {}{}", person.name, exercise, test ? " --test" : "");
         figures.push_back({{"curriculum", c.id},
                            {"finished", false},
                            {"exercise", e->exercise->id},

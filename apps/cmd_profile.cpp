@@ -138,17 +138,10 @@ void addRecords(const ProfileArguments& o)
             s.caseId = training::findCase(o.caseId).id;
         }
         if (!o.exercise.empty()) {
-            const std::size_t slash = o.exercise.find('/');
-            const auto curriculum = training::findCurriculum(o.exercise.substr(0, slash));
-            const auto* const exercise =
-                slash == std::string::npos ? nullptr : curriculum.exercise(o.exercise.substr(slash + 1));
-            if (exercise == nullptr) {
-                throw std::runtime_error("--exercise " + o.exercise +
-                                         ": give CURRICULUM/EXERCISE (palpate curriculum check)");
-            }
+            const auto [curriculum, exercise] = training::findExercise(o.exercise);
             s.curriculum = curriculum.id;
-            s.exercise = exercise->id;
-            s.caseId = o.caseId.empty() ? exercise->caseId : s.caseId;
+            s.exercise = exercise;
+            s.caseId = o.caseId.empty() ? curriculum.exercise(exercise)->caseId : s.caseId;
         }
         s.test = s.test || o.test;
         sessions.push_back(std::move(s));

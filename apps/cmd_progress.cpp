@@ -3,6 +3,7 @@
 #include <base/counted.h>
 #include <base/outputs.h>
 #include <command/json.h>
+#include <report/measure_table.h>
 #include <training/progress_page.h>
 
 #include <fmt/format.h>
@@ -185,6 +186,9 @@ void run(const ProgressArguments& o)
             if (!o.all) {
                 printSessionsOf(p);
             }
+        }
+        if (!groups.empty()) {
+            fmt::print("{}\n", report::groupTable(groups));
         }
         for (const auto& [what, file] : {std::pair{"page", o.html}, {"table", o.csv}, {"statements", o.xapi}}) {
             if (!file.empty() && file != "-") {

@@ -2,6 +2,7 @@
 #include <base/build.h>
 #include <command/json.h>
 #include <report/groups.h>
+#include <report/measure_table.h>
 #include <report/report.h>
 #include <session/figures.h>
 
@@ -155,37 +156,6 @@ json figures(const std::vector<Session>& sessions, const std::vector<Group>& gro
     return out;
 }
 
-std::string cell(double value, int decimals)
-{
-    return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "-";
-}
-
-// Measures down, columns across: one per session or group.
-void printTable(const std::vector<std::string>& heads, const std::vector<std::vector<std::string>>& columns)
-{
-    std::vector<std::size_t> widths;
-    for (std::size_t c = 0; c < heads.size(); ++c) {
-        widths.push_back(std::max<std::size_t>(heads[c].size(), 8));
-        for (const std::string& value : columns[c]) {
-            widths[c] = std::max(widths[c], value.size());
-        }
-    }
-    std::string text = fmt::format("{:<12}", "");
-    for (std::size_t c = 0; c < heads.size(); ++c) {
-        text += fmt::format("  {:>{}}", heads[c], widths[c]);
-    }
-    for (std::size_t m = 0; m < haptics::measures().size(); ++m) {
-        if (std::ranges::all_of(columns, [&](const auto& column) { return column[m] == "-"; })) {
-            continue;
-        }
-        text += fmt::format("\n{:<12}", haptics::measures()[m].title);
-        for (std::size_t c = 0; c < heads.size(); ++c) {
-            text += fmt::format("  {:>{}}", columns[c][m], widths[c]);
-        }
-    }
-    std::printf("%s\n", text.c_str());
-}
-
 void printSessions(const std::vector<Session>& sessions)
 {
     if (sessions.size() > maxColumns) {
@@ -204,10 +174,10 @@ void printSessions(const std::vector<Session>& sessions)
             heads.push_back(s.file.filename().string());
             columns.emplace_back();
             for (const haptics::Measure& m : haptics::measures()) {
-                columns.back().push_back(cell(m.value(s.score), m.decimals));
+                columns.back().push_back(report::cell(m.value(s.score), m.decimals));
             }
         }
-        printTable(heads, columns);
+        fmt::print("{}\n", report::measureTable(heads, columns));
     }
 }
 
@@ -219,36 +189,6 @@ void warn(const std::vector<Session>& sessions)
             fmt::print(stderr, "palpate: warning: {}: {}\n", s.file.string(), warning);
         }
     }
-}
-
-void printGroups(const std::vector<Group>& groups, const std::vector<Session>& sessions)
-{
-    std::vector<std::string> heads;
-    std::vector<std::vector<std::string>> columns;
-    for (const Group& g : groups) {
-        heads.push_back(fmt::format("{} (n={})", g.name, g.sessions.size()));
-        columns.emplace_back();
-        for (const haptics::Measure& m : haptics::measures()) {
-            const auto values = valuesOf(g, sessions, m);
-            const int decimals = report::decimalsOf(m);
-            const auto at = [&](double fraction) { return cell(report::quantile(values, fraction), decimals); };
-            const bool any = std::ranges::any_of(values, [](double v) { return std::isfinite(v); });
-            columns.back().push_back(any ? fmt::format("{} ({} to {})", at(0.5), at(0.25), at(0.75)) : "-");
-        }
-    }
-    std::printf("\nMedians (quartiles)%s\n",
-                groups.size() > 1 ? ", and Cliff's delta of one group over another (-1 to 1)" : "");
-    for (std::size_t a = 0; a < groups.size(); ++a) {
-        for (std::size_t b = a + 1; b < groups.size(); ++b) {
-            heads.push_back(groups[a].name + " over " + groups[b].name);
-            columns.emplace_back();
-            for (const haptics::Measure& m : haptics::measures()) {
-                const auto delta = report::effectSize(scored(groups[a], sessions), scored(groups[b], sessions), m);
-                columns.back().push_back(delta ? fmt::format("{:+.2f}", *delta) : "-");
-            }
-        }
-    }
-    printTable(heads, columns);
 }
 
 void scoreRecord(const ScoreArguments& options)
@@ -265,12 +205,12 @@ void scoreRecord(const ScoreArguments& options)
         throw std::runtime_error("score: give at least one record, or --group NAME=FILE,FILE");
     }
     warn(sessions);
+    std::vector<report::ScoredGroup> all;
+    for (const Group& g : groups) {
+        all.push_back(scored(g, sessions));
+    }
     if (!options.report.empty()) {
         if (!groups.empty()) {
-            std::vector<report::ScoredGroup> all;
-            for (const Group& g : groups) {
-                all.push_back(scored(g, sessions));
-            }
             report::writeGroupReport(options.report, all);
         } else if (sessions.size() == 1) {
             report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures, sessions[0].file);
@@ -285,7 +225,7 @@ void scoreRecord(const ScoreArguments& options)
     if (options.json != "-") {
         printSessions(sessions);
         if (!groups.empty()) {
-            printGroups(groups, sessions);
+            fmt::print("\n{}\n", report::groupTable(all));
         }
     }
 }

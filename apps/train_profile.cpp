@@ -26,13 +26,9 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         throw std::runtime_error("--profiles: needs a profile: add --profile NAME");
     }
     if (!options_.exercise.empty()) {
-        const std::size_t slash = options_.exercise.find('/');
-        curriculum_ = training::findCurriculum(options_.exercise.substr(0, slash));
-        exercise_ = slash == std::string::npos ? nullptr : curriculum_->exercise(options_.exercise.substr(slash + 1));
-        if (exercise_ == nullptr) {
-            throw std::runtime_error(fmt::format("--exercise {}: {} has no such exercise (palpate curriculum check {})",
-                                                 options_.exercise, curriculum_->id, curriculum_->id));
-        }
+        auto [curriculum, exercise] = training::findExercise(options_.exercise);
+        curriculum_ = std::move(curriculum);
+        exercise_ = curriculum_->exercise(exercise);
         if (!options_.caseId.empty()) {
             throw std::runtime_error("--case: --exercise has a case of its own: leave out one of them");
         }

@@ -43,7 +43,7 @@ constexpr std::array<Measure, 36> all{{
     {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
     {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
     {"targeting_error_mm", "target mm", "Targeting error", "mm", 1, Listed::ifFired,
-     [](const Score& s) { return s.targetingError * 1e3; }},
+     [](const Score& s) { return ofCores(s, s.targetingError * 1e3); }},
     {"best_target_pct", "core %", "Target in best core", "%", 0, Listed::ifFired,
      [](const Score& s) { return ofCores(s, s.bestTargetFraction * 100); }},
     {"best_target_length_mm", "core mm", "Length in target", "mm", 1, Listed::ifFired,

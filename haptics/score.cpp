@@ -103,7 +103,7 @@ ScoreShares sharesOf(const Score& s) noexcept
             .reached = ramp(s.tipToTarget, 0, 10e-3)};
 }
 
-// Marks say that a hand has palpated, whatever a scene asks for that knows no better.
+// A tool that is no needle has palpated where it has marked something. A mark with a needle is no size of a lump.
 Judged judgedBy(const Score& s) noexcept
 {
     using Task = datasets::SessionTask;
@@ -118,7 +118,7 @@ Judged judgedBy(const Score& s) noexcept
             break;
     }
     const bool needle = s.aim.tool == datasets::ToolKind::needle;
-    return s.marks > 0 ? Judged::marks : needle ? Judged::core : Judged::nothing;
+    return needle ? Judged::core : s.marks > 0 ? Judged::marks : Judged::nothing;
 }
 
 namespace {

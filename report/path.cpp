@@ -129,10 +129,10 @@ std::string draw(const View& view, const Frame& frame, const ReportData& d,
     }
     for (const Core& core : d.cores) {
         drawing.line({core.sample.notchStart * 1e3, core.sample.notchEnd * 1e3},
-                     "stroke=\"#111\" stroke-width=\"4\" opacity=\"0.55\"");
+                     "stroke=\"currentColor\" stroke-width=\"4\" opacity=\"0.55\"");
     }
     for (const Vec3& mark : d.marks) {
-        drawing.circle(mark, 1, "fill=\"#111\"");
+        drawing.circle(mark, 1, "fill=\"currentColor\"");
     }
     return drawing.finish();
 }

@@ -194,6 +194,21 @@ Curriculum findCurriculum(const std::string& id)
                                          meant.empty() ? "" : "; did you mean " + meant + "?"));
 }
 
+std::pair<Curriculum, std::string> findExercise(const std::string& named)
+{
+    // A curriculum in a file has a folder's slashes.
+    const std::size_t slash = fs::path(named).extension() == ".toml" ? std::string::npos : named.rfind('/');
+    Curriculum curriculum = findCurriculum(named.substr(0, slash));
+    std::string exercise = slash == std::string::npos ? "" : named.substr(slash + 1);
+    if (curriculum.exercise(exercise) == nullptr) {
+        throw std::runtime_error(
+            fmt::format("--exercise {}: {} has no such exercise: give CURRICULUM/EXERCISE (palpate "
+                        "curriculum check {})",
+                        named, curriculum.id, named.substr(0, slash)));
+    }
+    return {std::move(curriculum), std::move(exercise)};
+}
+
 double guidanceOf(const Exercise& exercise, int number, bool test) noexcept
 {
     if (test || exercise.guidance == Guidance::off) {

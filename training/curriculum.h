@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::training {
@@ -46,6 +47,10 @@ std::vector<Curriculum> allCurricula(std::vector<std::string>* faults = nullptr)
 
 /// The curriculum called so, or in that file. Throws std::runtime_error, with the nearest name that there is.
 Curriculum findCurriculum(const std::string& id);
+
+/// The curriculum that "CURRICULUM/EXERCISE" names, as findCurriculum() does, and the id of the exercise, which it has.
+/// Throws std::runtime_error where it has none.
+std::pair<Curriculum, std::string> findExercise(const std::string& named);
 
 /// The fraction of guidance in trial `number` (from 1 up) of an exercise: 1 all, 0 none.
 double guidanceOf(const Exercise& exercise, int number, bool test) noexcept;

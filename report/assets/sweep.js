@@ -49,6 +49,13 @@ const axisStyle = () => ({
 });
 const tip = () => ({ backgroundColor: colour("card"), borderColor: colour("line"), textStyle: { color: colour("ink"), fontSize: 12.5 } });
 
+// Ends of an axis of numbers. ECharts would end a logarithmic one at powers of ten below the values.
+function extent(axis, steps) {
+  const all = steps.map((s) => s.middle), low = Math.min(...all), high = Math.max(...all);
+  const room = axis.log ? 1.05 : 1;
+  return low < high ? { min: low / room, max: high * room } : {};
+}
+
 // One curve with its band: the middle half of the cases at each level.
 function curveOf(rows, a, o, steps) {
   return steps.map((level, i) => {
@@ -111,7 +118,7 @@ function drawCurve(o, a, b) {
   const top = 20 + row * legend.rows;
   const x = axis.words
     ? { type: "category", data: steps.map((s) => s.label) }
-    : { type: axis.log ? "log" : "value", scale: true, min: "dataMin", max: "dataMax", axisLabel: { color: colour("soft"), formatter: short } };
+    : { type: axis.log ? "log" : "value", scale: true, ...extent(axis, steps), axisLabel: { color: colour("soft"), formatter: short } };
   chart("curve", {
     grid: { left: 74, right: 24, top, bottom: 92 },
     legend: { type: "plain", top: 4, textStyle: { color: colour("soft") }, data: legend.names },

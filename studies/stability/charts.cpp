@@ -75,14 +75,14 @@ std::optional<report::Chart> chartOfView(const json& figures, const StabilityVie
 
 std::string numberText(const json& value)
 {
-    return value.is_number() ? fmt::format("{:.3g}", value.get<double>()) : "no number";
+    return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : "no number";
 }
 
 std::string summaryTable(const json& figures)
 {
     std::string out =
         "<section class=\"card\"><h2>Cells passed, and the worst figure under a hand that holds "
-        "on</h2><table><tr><th>scene</th>";
+        "on</h2><div class=\"scroll\"><table class=\"plain\"><tr><th>scene</th>";
     const auto methods = namesOf(figures, "method");
     for (const auto& method : methods) {
         out += "<th>" + report::escape(method) + "</th>";
@@ -94,30 +94,31 @@ std::string summaryTable(const json& figures)
         for (const auto& method : methods) {
             const Tally t = tallyOf(figures, scene, method);
             of = t.unit.empty() ? of : t.unit;
-            const char* const colour = t.passed == t.cells ? "" : " style=\"color:#b00020\"";
+            const char* const colour = t.passed == t.cells ? "" : " style=\"color:var(--bad)\"";
             out += t.cells == 0 ? std::string("<td>-</td>")
                                 : fmt::format("<td{}>{}/{}<br>{}</td>", colour, t.passed, t.cells,
                                               t.worstFinite ? fmt::format("{:.3g}", t.worst) : "no number");
         }
         out += "<td>" + report::escape(of) + "</td></tr>";
     }
-    return out + "</table></section>";
+    return out + "</table></div></section>";
 }
 
 std::string cellTable(const json& figures)
 {
     std::string out =
-        "<section class=\"card\"><h2>All cells</h2><table><tr><th>cell</th><th>measure</th><th>figure</th><th>bound</th>"
+        "<section class=\"card\"><h2>All cells</h2><div class=\"scroll\"><table "
+        "class=\"plain\"><tr><th>cell</th><th>measure</th><th>figure</th><th>bound</th>"
         "<th>unit</th><th></th></tr>";
     for (const json& cell : figures.at("cells")) {
         const bool pass = cell.at("pass");
         out += fmt::format("<tr{}><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-                           pass ? "" : " style=\"color:#b00020\"", report::escape(cell.at("id").get<std::string>()),
+                           pass ? "" : " style=\"color:var(--bad)\"", report::escape(cell.at("id").get<std::string>()),
                            report::escape(cell.at("measure").get<std::string>()), numberText(cell.at("figure")),
                            numberText(cell.at("bound")), report::escape(cell.at("unit").get<std::string>()),
                            pass ? "pass" : "FAIL");
     }
-    return out + "</table></section>";
+    return out + "</table></div></section>";
 }
 
 std::string theoryTable(const json& figures)
@@ -126,14 +127,15 @@ std::string theoryTable(const json& figures)
         return {};
     }
     std::string out =
-        "<section class=\"card\"><h2>Largest stable stiffness: formulas and simulation</h2><table><tr><th>condition</th>"
+        "<section class=\"card\"><h2>Largest stable stiffness: formulas and simulation</h2><div class=\"scroll\"><table "
+        "class=\"plain\"><tr><th>condition</th>"
         "<th>predicted</th><th>simulated</th><th>difference [%]</th></tr>";
     for (const json& row : figures.at("theory")) {
         out += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
                            report::escape(row.at("name").get<std::string>()), numberText(row.at("predicted")),
                            numberText(row.at("simulated")), numberText(row.at("error_pct")));
     }
-    return out + "</table></section>";
+    return out + "</table></div></section>";
 }
 
 }  // namespace

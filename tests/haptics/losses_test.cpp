@@ -100,6 +100,7 @@ TEST(Losses, AndTheTotalAddUpToAHundred)
 TEST(Losses, APalpationThatMissesKeepsNoMoreThanABiopsyThatMisses)
 {
     Score s;
+    s.aim.tool = datasets::ToolKind::capsule;
     s.skinContacts = 1;
     s.marks = 2;
     s.markError = 25 * oneMillimetre;

@@ -268,11 +268,26 @@ TEST(Score, ASessionHasOnlyMeasuresOfWhatItIsFor)
     for (const auto task : {datasets::SessionTask::touch, datasets::SessionTask::advance, datasets::SessionTask::find}) {
         s.aim.task = task;
         EXPECT_TRUE(std::isnan(measured(s, "best_target_pct")) && std::isnan(measured(s, "best_target_length_mm")));
+        EXPECT_TRUE(std::isnan(measured(s, "targeting_error_mm")));
         EXPECT_EQ(std::isnan(measured(s, "rest_s")), task != datasets::SessionTask::touch);
     }
     s.passes = 1;
     EXPECT_EQ(measured(s, "best_target_pct"), 0) << "a core that was taken is judged";
     EXPECT_TRUE(std::isnan(measured(s, "probe_s")) && std::isnan(measured(s, "ct_scans")));
+}
+
+// A mark with a needle, by a key that slipped: no core is no core.
+TEST(Score, AMarkDoesNotMakeABiopsyAPalpation)
+{
+    Score s;
+    s.aim.tool = datasets::ToolKind::needle;
+    s.skinContacts = 1;
+    s.marks = 1;
+    EXPECT_EQ(judgedBy(s), Judged::core);
+    EXPECT_EQ(parts(s).core, 0);
+    EXPECT_EQ(parts(s).technique, 0);
+    s.aim.tool = datasets::ToolKind::capsule;
+    EXPECT_EQ(judgedBy(s), Judged::marks);
 }
 
 // Half the target fraction of a full mark, half its length, half its error: 15 + 5 + 5. Two touches, 1 s and 0.5 mm: 25 (1

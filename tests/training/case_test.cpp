@@ -116,6 +116,26 @@ TEST(Curriculum, ErrorsNameFileLineAndKey)
               std::string::npos);
 }
 
+// A curriculum in a file has slashes of its own; ids have none.
+TEST(Curriculum, AnExerciseIsNamedByItsCurriculumOrByTheFileOfOne)
+{
+    useOwnData();
+    const Folder folder;
+    std::ofstream(folder / "mine.toml") << "title = \"T\"\n[[exercise]]\nid = \"a\"\ntitle = \"A\"\ncase = \"layered\"\n"
+                                           "[[exercise.level]]\nmeasure = \"total\"\nat_least = 50\n";
+    const auto [mine, exercise] = findExercise((folder / "mine.toml").string() + "/a");
+    EXPECT_EQ(mine.id, "mine");
+    EXPECT_EQ(exercise, "a");
+    const Curriculum ours = breastCourse();
+    EXPECT_EQ(findExercise(ours.id + "/" + ours.exercises[0].id).second, ours.exercises[0].id);
+    for (const std::string& named :
+         {ours.id, ours.id + "/none", (folder / "mine.toml").string(), (folder / "mine.toml").string() + "/b"}) {
+        EXPECT_NE(errorOf([&] { findExercise(named); }).find("has no such exercise: give CURRICULUM/EXERCISE"),
+                  std::string::npos)
+            << named;
+    }
+}
+
 TEST(Curriculum, GuidanceFadesFromTheFirstTrialToNone)
 {
     Exercise fading;
