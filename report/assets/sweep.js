@@ -50,10 +50,9 @@ const axisStyle = () => ({
 const tip = () => ({ backgroundColor: colour("card"), borderColor: colour("line"), textStyle: { color: colour("ink"), fontSize: 12.5 } });
 
 // Ends of an axis of numbers. ECharts would end a logarithmic one at powers of ten below the values.
-function extent(axis, steps) {
+function extent(steps) {
   const all = steps.map((s) => s.middle), low = Math.min(...all), high = Math.max(...all);
-  const room = axis.log ? 1.05 : 1;
-  return low < high ? { min: low / room, max: high * room } : {};
+  return low < high ? { min: low, max: high } : {};
 }
 
 // One curve with its band: the middle half of the cases at each level.
@@ -118,7 +117,7 @@ function drawCurve(o, a, b) {
   const top = 20 + row * legend.rows;
   const x = axis.words
     ? { type: "category", data: steps.map((s) => s.label) }
-    : { type: axis.log ? "log" : "value", scale: true, ...extent(axis, steps), axisLabel: { color: colour("soft"), formatter: short } };
+    : { type: axis.log ? "log" : "value", scale: true, ...extent(steps), axisLabel: { color: colour("soft"), formatter: short } };
   chart("curve", {
     grid: { left: 74, right: 24, top, bottom: 92 },
     legend: { type: "plain", top: 4, textStyle: { color: colour("soft") }, data: legend.names },
