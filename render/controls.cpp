@@ -138,14 +138,18 @@ void Controls::button(int button, bool down)
     used_ = true;
     if (button == GLFW_MOUSE_BUTTON_MIDDLE)
         return camera(down ? vtkCommand::MiddleButtonPressEvent : vtkCommand::MiddleButtonReleaseEvent);
-    if (!down)
+    if (!down) {
+        if (measuring_)
+            picture_.ultrasound().endCaliper();
         measuring_ = probing_ = false;
-    if (down && onUltrasound() && (button == GLFW_MOUSE_BUTTON_LEFT || button == GLFW_MOUSE_BUTTON_RIGHT)) {
-        measuring_ = button == GLFW_MOUSE_BUTTON_LEFT;
-        probing_ = !measuring_;
+    }
+    if (down && onUltrasound()) {
+        measuring_ = button == GLFW_MOUSE_BUTTON_LEFT && measures();
+        probing_ = button == GLFW_MOUSE_BUTTON_RIGHT;
         if (measuring_)
             picture_.ultrasound().beginCaliper(point(cursor_));
-        return;
+        if (measuring_ || probing_)
+            return;
     }
     if (button == GLFW_MOUSE_BUTTON_RIGHT && down && hand_.held())
         return hand_.fire();
@@ -216,7 +220,7 @@ void Controls::wheel(double notches, bool fine, bool intoPicture)
     used_ = true;
     if (onUltrasound() && fine)
         moveProbe({.press = notches * pressStep});
-    else if (onUltrasound())
+    else if (onUltrasound() && !hand_.held())
         picture_.ultrasound().turn(Knob::depth, notches > 0 ? -1 : 1);
     else if (hand_.is())
         step(intoPicture ? screen().into : hand_.axis(), notches, fine);
@@ -235,6 +239,12 @@ Controls::Screen Controls::screen() const
 bool Controls::onUltrasound() const
 {
     return picture_.ultrasoundShown() && picture_.ultrasound().holds(point(cursor_));
+}
+
+// On a live picture the mouse that is the hand leads the needle.
+bool Controls::measures() const
+{
+    return !hand_.is() || picture_.ultrasound().frozen();
 }
 
 void Controls::scrub()

@@ -91,6 +91,7 @@ private:
     double shownTime() const;
     void scrub();
     bool onUltrasound() const;
+    bool measures() const;
     void camera(unsigned long event);
     void showHelp();
     void close();

@@ -349,6 +349,14 @@ void UltrasoundPicture::dragCaliper(Point2 pixel)
                                                 static_cast<float>(area_.y + area_.height - 1 - pixel[1]));
 }
 
+// A click measures nothing.
+void UltrasoundPicture::endCaliper()
+{
+    constexpr float least = 0.2e-3F;  // [m]
+    if (!calipers_.empty() && glm::distance(calipers_.back()[0], calipers_.back()[1]) < least)
+        calipers_.pop_back();
+}
+
 // The session and the tick in its name: no picture takes the place of another.
 void UltrasoundPicture::store(const std::filesystem::path& folder)
 {

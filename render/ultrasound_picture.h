@@ -56,6 +56,7 @@ public:
     bool holds(Point2 pixel) const noexcept;
     void beginCaliper(Point2 pixel);
     void dragCaliper(Point2 pixel);
+    void endCaliper();
     void clearCalipers() { calipers_.clear(); }
     /// Writes the picture beside those before into `folder`.
     void store(const std::filesystem::path& folder);
