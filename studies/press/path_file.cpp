@@ -130,6 +130,9 @@ private:
 
     void addColumn(std::string_view name)
     {
+        if (name.size() > 1 && name.front() == '"' && name.back() == '"') {  // as R writes names
+            name = name.substr(1, name.size() - 2);
+        }
         const auto at = std::ranges::find(known_, name);
         if (at == known_.end()) {
             throw std::runtime_error(fmt::format("{}: column '{}' is not known: the columns are {}", where(),
@@ -154,13 +157,12 @@ private:
 
 std::ifstream opened(const std::filesystem::path& file, const char* what)
 {
-    std::error_code none;
-    if (std::filesystem::is_directory(file, none)) {
-        throw std::runtime_error(fmt::format("{}: is a folder: give {}", file.string(), what));
+    const std::string why = base::whyNoFile(file);
+    std::ifstream in;
+    if (why.empty()) {
+        in.open(file);
     }
-    std::ifstream in(file);
-    if (!in) {
-        const std::string why = base::whyNoFile(file);
+    if (!in.is_open()) {
         throw std::runtime_error(fmt::format("{}: {}; give {}", file.string(), why.empty() ? "cannot be read" : why, what));
     }
     return in;

@@ -4,6 +4,7 @@
 #include <studies/kernel/trial_path.h>
 #include <studies/press/pose_load.h>
 
+#include <tests/error_of.h>
 #include <tests/folder.h>
 #include <tests/studies/pressed.h>
 #include <tests/studies/small_block.h>
@@ -11,6 +12,8 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
+
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
@@ -82,7 +85,7 @@ TEST(PressPath, GoesStraightAndEvenlyBetweenItsRows)
 
 TEST(PressPath, WithoutSecondsEveryRowIsAMillisecond)
 {
-    const PosePath path = read("x_mm,y_mm,z_mm\n1,2,3\n2,2,3\n4,2,3\n");
+    const PosePath path = read("\"x_mm\",y_mm,\"z_mm\"\n1,2,3\n2,2,3\n4,2,3\n");  // names as R writes them
     ASSERT_EQ(path.ticks(), 3U);
     EXPECT_EQ(path.at(1).position, 1e-3 * Vec3(2, 2, 3));
     EXPECT_EQ(path.at(2).position, 1e-3 * Vec3(4, 2, 3));
@@ -129,6 +132,11 @@ TEST(PressPath, AFileThatIsNotThereIsRefused)
     EXPECT_THROW(loadPosePath(folder / "none.csv", Vec3(0, 1, 0)), std::runtime_error);
     EXPECT_THROW(loadPosePath(folder / "", Vec3(0, 1, 0)), std::runtime_error);
     EXPECT_THROW(loadPoints(folder / "none.csv"), std::runtime_error);
+    // A pipe would be waited for, and a device has no end.
+    ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+    EXPECT_NE(tests::errorOf([&] { loadPosePath(folder / "pipe", Vec3(0, 1, 0)); }).find("is a named pipe"),
+              std::string::npos);
+    EXPECT_NE(tests::errorOf([] { loadPoints("/dev/zero"); }).find("is a device"), std::string::npos);
 }
 
 // The trial sets up its tools, its windows and its contacts by itself; where a tool would lie at rest, a path knows to some
