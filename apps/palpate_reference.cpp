@@ -132,7 +132,7 @@ std::array<bool, 3> planesOf(const ReferenceArguments& o)
 // Half a tool is half its force only where the plane of symmetry goes through its middle.
 void checkInPlanes(const ReferenceArguments& o, const studies::TrialPath& path)
 {
-    constexpr double rounding = 1e-6;  // [m], and of directions
+    constexpr double rounding = 1e-6;  // [m]
     const auto planes = planesOf(o);
     for (int axis = 0; axis < 3; ++axis) {
         const double off = std::max(std::abs(path.start[axis]), std::abs(path.at({path.press, path.drag})[axis]));

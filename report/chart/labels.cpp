@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 namespace palpate::report {
@@ -37,7 +38,7 @@ std::vector<glm::dvec2> placedLabels(std::span<const PointLabel> labels, std::sp
     std::vector<Rectangle> texts;
     std::vector<glm::dvec2> out;
     for (const PointLabel& label : labels) {
-        double least = 0;
+        double least = std::numeric_limits<double>::infinity();
         std::pair<glm::dvec2, Rectangle> best;
         for (const glm::dvec2 side : sides(label.size)) {
             const glm::dvec2 low = label.point + side - glm::dvec2(0, 0.5 * label.size.y);
@@ -49,7 +50,7 @@ std::vector<glm::dvec2> placedLabels(std::span<const PointLabel> labels, std::sp
             for (const glm::dvec2 marker : markers) {
                 covered += common(text, {marker - markerReach, marker + markerReach});
             }
-            if (side == sides(label.size).front() || covered < least) {
+            if (covered < least) {
                 least = covered;
                 best = {side, text};
             }
