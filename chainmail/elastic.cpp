@@ -14,13 +14,13 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double minEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
-constexpr double forgets = 10.0;    // longest times of relaxation after which nothing is left of it
-constexpr int callsPerTurn = 2;     // from one term of the history to the next
-constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
-constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;    // cycles, so that windows that moved are not felt
-constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
+constexpr double minEnergy = 1e-9;    // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr double forgets = 10.0;      // longest times of relaxation after which nothing is left of it
+constexpr int callsPerTurn = 2;       // from one term of the history to the next
+constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
+constexpr double maxBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
+constexpr double farAfterMove = 2.0;  // in what is far off else: one cycle more, so that windows that moved are not felt
+constexpr int refreshPeriod = 256;    // calls after which forces that are carried along are computed anew
 
 }  // namespace
 
@@ -220,7 +220,8 @@ void Elastic::prepareContacts() noexcept
             continue;
         }
         const glm::dmat3 tangent =
-            s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
+            s.limit > 0.0 ? glm::dmat3(s.resist({1, 0, 0}), s.resist({0, 1, 0}), s.resist({0, 0, 1}))
+                          : s.across * glm::dmat3(1.0) + (s.stiffness - s.across) * glm::outerProduct(s.normal, s.normal);
         const Layout& l = stack_[s.level].layout;
         for (int c = 0; c < 8; ++c) {
             const double fraction = static_cast<double>(s.fraction[static_cast<std::size_t>(c)]);
@@ -248,16 +249,36 @@ bool Elastic::follow(const Focus& focus) noexcept
 
 ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
 {
+    return makeWay(load) ? ElasticResult{.moved = true} : relaxWhile(load, part());
+}
+
+// To move the windows is work enough for a call: the load waits for the next, and until then the tools have the forces that
+// they had.
+bool Elastic::makeWay(const ElasticLoad& load) noexcept
+{
     if (atRest_ || !follow(load.focus)) {
-        return relaxWhile(load, part());
+        return false;
     }
-    // To move the windows is work enough for a call.
     refreshForces();
     sinceRefresh_ = 0;
     const int lost = waiting_ ? waiting_->periods : 0;
     waiting_ = load;
     waiting_->periods += lost;
-    return {.moved = true};
+    return true;
+}
+
+ElasticResult Elastic::relax(const ElasticLoad& load) noexcept
+{
+    if (waiting_ || !goesOn(load) || !makeWay(load)) {
+        return relaxWhile(load, tick());
+    }
+    for (ContactSite& s : active()) {
+        locate(stack_.body(), stack_.windows(), s.anchor, s);
+    }
+    ElasticResult result = felt_;
+    result.moved = true;
+    result.cycles = result.shortened = 0;
+    return result;
 }
 
 ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) noexcept
@@ -296,8 +317,8 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     }
     hasIncrement_ = options_.warmStart;
     // No hand feels tissue that springs back.
-    course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
-    course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
+    course_.usual = isTouched ? effort.cycles : 1;
+    course_.last = course_.usual + (isTouched && effort.far > 0.0 ? (result.moved ? 2 : 1) : 0);
     // A call that has only a part of the cycles has none beside a search for surface points.
     solve(effort.inParts ? (sinceFound_ == 0 && course_.hasGone ? 0 : 1) : course_.last, result);
     finish(result);
@@ -333,13 +354,18 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
 {
     Course& c = course_;
     for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
-        const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? c.effort.further : c.effort.far;
+        const double tolerance = c.next == 0         ? c.effort.first
+                                 : c.next < c.usual  ? c.effort.further
+                                 : c.next == c.usual ? c.effort.far
+                                                     : farAfterMove * c.effort.far;
         result.residual = refreshResidual(c.hasGone);
+        c.isKnown = true;
         if (isBalanced(result.residual, tolerance)) {
             if (!c.isOpen || c.effort.isTick) {
                 c.next = c.last;
                 break;
             }
+            c.isKnown = false;
             // The force was carried along; it may be another where the tissue is now.
             c.isOpen = c.hasGone = false;
             if (confirm(c.start)) {
@@ -350,6 +376,7 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
             continue;
         }
         ++result.cycles;
+        c.isKnown = false;
         c.hasGone = oneCycle(c.isOpen ? c.start : noLimit, result);
         if (!c.hasGone && c.isOpen && !confirm(c.start)) {
             again(result);
@@ -359,11 +386,13 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
         }
         c.isOpen = false;
     }
-    if (c.isOpen && !confirm(c.start)) {
-        again(result);
-        c.hasGone = false;
+    if (c.isOpen) {
+        c.isKnown = false;
+        c.hasGone = confirm(c.start);
     }
-    c.isOpen = false;
+    if (std::exchange(c.isOpen, false) && !c.hasGone) {
+        again(result);
+    }
 }
 
 void Elastic::finish(ElasticResult& result) noexcept
@@ -375,6 +404,8 @@ void Elastic::finish(ElasticResult& result) noexcept
     letSlip();
     balance();
     measure(result);
+    findLag();
+    felt_ = result;
 }
 
 // Virtual work along the displacement itself: the tissue's own, over that of the contacts.
@@ -386,6 +417,24 @@ void Elastic::balance() noexcept
         contacts += glm::dot(s.force, s.u);
     }
     balance_ = contacts > 0.0 ? std::clamp(tissue / contacts, 1.0 / maxBalance, maxBalance) : 1.0;
+}
+
+// What the force along the surface lacks short of balance: the forces out of balance times what the displacement does when
+// the tool moves along. Without friction the dent moves with it: by -du/dx, exact where the body is the same all along, and
+// has no history.
+void Elastic::findLag() noexcept
+{
+    const auto touches = [](const HeldTool& held) { return held.load > 0.0; };
+    const auto only = std::ranges::find_if(held_, touches);
+    const bool hasTies = siteCount_ > touching_;
+    if (hasTies || only == held_.end() || only->friction > 0.0 || std::any_of(only + 1, held_.end(), touches)) {
+        return;
+    }
+    if (!course_.isKnown) {
+        refreshResidual(std::exchange(course_.hasGone, false));
+    }
+    const Vec3 all = stack_.alongSlopes(Field::r, Field::u);
+    only->lag = all - glm::dot(all, only->inward) * only->inward;
 }
 
 void Elastic::measure(ElasticResult& result) noexcept

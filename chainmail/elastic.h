@@ -74,7 +74,7 @@ public:
 
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
-    ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
+    ElasticResult relax(const ElasticLoad& load) noexcept;
     /// As relax(), in parts, for a load whose force nobody waits for: here at most one cycle, a search for surface points,
     /// or a move of the windows; goOn() has the rest. Without friction, moves, searches and steps that are shortened twice,
     /// the parts end with the bits of relax().
@@ -94,7 +94,9 @@ public:
     /// error of the displacement, since they are what a tool moves first; with the ratio they are out by its square, as
     /// far as the tissue's answer to the next push is like its answer so far. (Becker and Rannacher, "An optimal control
     /// approach to a posteriori error estimation", Acta Numerica 10, 2001: the residual times the dual solution, for which
-    /// the displacement itself stands here.)
+    /// the displacement itself stands here.) A frictionless tool that alone touches the body, without ties, also has the
+    /// lag of the force along the surface taken off: there the displacement goes along with the tool, and -du/dx stands for
+    /// the dual solution, see findLag().
     Vec3 toolForce(std::size_t i) const noexcept { return force(i, false); }
     Vec3 tieForce(std::size_t i) const noexcept { return force(i, true); }
     /// By how much tool `i` of the last load is held back, see HeldTool [m].
@@ -173,10 +175,13 @@ private:
         int next = 0;          // the cycle that comes next
         double start = 0;      // energy when the call began, tissue and contacts [J]
         bool isOpen = false;   // the tissue's force was not evaluated where it is
-        bool hasGone = false;  // r is a
+        bool hasGone = false;  // r is a, or the residual
+        bool isKnown = false;  // r is the residual
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     bool follow(const Focus& focus) noexcept;
+    bool makeWay(const ElasticLoad& load) noexcept;
+    bool goesOn(const ElasticLoad& load) const noexcept;
     void solve(int most, ElasticResult& result) noexcept;
     bool isBalanced(double residual, double tolerance) const noexcept;
     void finish(ElasticResult& result) noexcept;
@@ -218,6 +223,7 @@ private:
     double contactForce() const noexcept;
     double loadForce() const noexcept;
     void balance() noexcept;
+    void findLag() noexcept;
     void measure(ElasticResult& result) noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
 
@@ -248,6 +254,7 @@ private:
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
     Course course_;
+    ElasticResult felt_;                  // of the last call that solved
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them

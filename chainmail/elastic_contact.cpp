@@ -413,10 +413,12 @@ void addFriction(const ContactSite& s, double alpha, Along& sum) noexcept
     const Vec3 side = s.p - glm::dot(s.p, s.normal) * s.normal;
     const Vec3 stretch = s.along() - alpha * side;
     const double length = glm::length(stretch);
-    const double held = std::min(length, s.limit);
-    sum.energy += frictionEnergy(s.stiffness, length, s.limit);
-    sum.slope -= length > 0.0 ? s.stiffness * held / length * glm::dot(stretch, side) : 0.0;
-    sum.curvature += length < s.limit ? s.stiffness * glm::dot(side, side) : 0.0;
+    const double held = length > 0.0 ? std::min(s.limit / length, 1.0) : 1.0;
+    const double rate = glm::dot(stretch, side);
+    const double turning = length < s.limit ? 0.0 : rate * rate / (length * length);
+    sum.energy += frictionEnergy(s.grip(), length, s.limit);
+    sum.slope -= s.grip() * held * rate;
+    sum.curvature += s.grip() * held * (glm::dot(side, side) - turning);
 }
 
 }  // namespace
@@ -446,8 +448,8 @@ void press(ContactSite& site) noexcept
     const Vec3 along = site.along();
     const double length = glm::length(along);
     const double held = std::min(length, site.limit);
-    site.force += held > 0.0 ? site.stiffness * held / length * along : Vec3(0.0);
-    site.energy += frictionEnergy(site.stiffness, length, site.limit);
+    site.force += held > 0.0 ? site.grip() * held / length * along : Vec3(0.0);
+    site.energy += frictionEnergy(site.grip(), length, site.limit);
 }
 
 Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept

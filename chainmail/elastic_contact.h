@@ -52,8 +52,14 @@ struct ElasticLoad {
 /// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area as the
 /// tissue lies now: under a pressure p a tool sinks in by p h / 20 E, however far the surface under it is stretched.
 ///
+/// Friction is a spring along the surface up to Coulomb's limit, softer than the push: under a friction of mu p a point
+/// slips by mu p h / 2 E until it slides, 0.1 mm and less. As stiff as the push it would slide and stick from one call to
+/// the next, since a tool goes further in a millisecond.
+///
 /// A call goes over all sites some ten times: what is asked for together lies in one cache line.
 struct alignas(64) ContactSite {
+    static constexpr double gripOfPush = 0.1;  // stiffness of friction, of the push's
+
     Vec3 p{0.0};           // of the search direction [m]
     Vec3 normal{0.0};      // out of the tool there; of a tie, its axis
     double depth = 0;      // of a surface point inside the tool [m]
@@ -61,7 +67,7 @@ struct alignas(64) ContactSite {
 
     Vec3 u{0.0};       // its displacement [m]
     Vec3 force{0.0};   // on the tissue [N]
-    double limit = 0;  // of the slip along the surface that friction holds [m]
+    double limit = 0;  // slip along the surface up to which friction is a spring; 0: none [m]
     bool isTie = false;
 
     Vec3 rest{0.0};
@@ -84,20 +90,31 @@ struct alignas(64) ContactSite {
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
+    double grip() const noexcept { return gripOfPush * stiffness; }
     /// By how much the force falls when the point moves by v [N].
     Vec3 resist(Vec3 v) const noexcept
     {
         if (!active()) {
             return Vec3(0.0);
         }
-        const bool sticks = limit > 0.0 && glm::length(along()) < limit;
-        const double side = sticks ? stiffness : across;
-        return side * v + (stiffness - side) * glm::dot(normal, v) * normal;
+        if (limit > 0.0) {
+            const double out = glm::dot(normal, v);
+            return stiffness * out * normal + resistAlong(v - out * normal);
+        }
+        return across * v + (stiffness - across) * glm::dot(normal, v) * normal;
+    }
+    /// The same of friction alone. Where it slips, its force keeps its size and turns.
+    /// @param v  along the surface
+    Vec3 resistAlong(Vec3 v) const noexcept
+    {
+        const Vec3 way = along();
+        const double length = glm::length(way);
+        return length < limit ? grip() * v : grip() * limit / length * (v - glm::dot(way, v) / (length * length) * way);
     }
 };
 
-/// Depth, normal, force and energy of a site where it is now. Friction holds a point with the stiffness of the contact up
-/// to the slip `limit`; beyond, its force stays. The limit is Coulomb's, but kept while a call solves: so friction has an
+/// Depth, normal, force and energy of a site where it is now. Friction holds a point with the stiffness grip() up to the
+/// slip `limit`; beyond, its force stays. The limit is Coulomb's, but kept while a call solves: so friction has an
 /// energy, and the contact stays a convex problem.
 void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept;
 /// The same where only the slip or its limit is another. @pre the site is no tie

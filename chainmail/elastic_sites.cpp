@@ -58,6 +58,16 @@ bool Elastic::sitesHold(std::span<const ElasticTool> tools) const noexcept
     return true;
 }
 
+// True where tools alone touch the body, and the last call had them next to where they are.
+bool Elastic::goesOn(const ElasticLoad& load) const noexcept
+{
+    const double far = drift * stack_.body().levels.front().nodes.spacing;
+    const auto isNear = [&](const ElasticTool& tool, const Vec3& before) {
+        return glm::distance(tool.shape.a, before) <= far;
+    };
+    return touching_ > 0 && touching_ == siteCount_ && load.ties.empty() && std::ranges::equal(load.tools, toolAt_, isNear);
+}
+
 bool Elastic::tiesHold(std::span<const Tie> ties) const noexcept
 {
     return std::ranges::equal(ties, tiesFound_, [](const Tie& a, const Tie& b) { return a.holdsAs(b); });
@@ -112,7 +122,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     for (ContactSite& s : active()) {
         touch(s, shapes_, ties_);
         if (const double friction = frictionOf(s); friction > 0.0) {
-            s.limit = friction * std::max(s.depth, 0.0);
+            s.limit = friction / ContactSite::gripOfPush * std::max(s.depth, 0.0);
             press(s);
         }
     }
@@ -179,7 +189,7 @@ void Elastic::letSlip() noexcept
         if (friction <= 0.0) {
             continue;
         }
-        s.limit = friction * std::max(s.depth, 0.0);
+        s.limit = friction / ContactSite::gripOfPush * std::max(s.depth, 0.0);
         const Vec3 along = s.along();
         const double length = glm::length(along);
         s.slip = length > s.limit ? s.limit / length * along : along;

@@ -23,10 +23,15 @@ struct HeldTool {
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
+    Vec3 lag{0.0};        // by which the force along the surface is too large, see Elastic::findLag() [N]
     double stopped = 0;   // force by which what is held in space stops the real tool [N]
 
     /// Nothing is known yet of this call's contacts.
-    void forgetContacts() noexcept { depth = load = stretch = 0.0; }
+    void forgetContacts() noexcept
+    {
+        depth = load = stretch = 0.0;
+        lag = Vec3(0.0);
+    }
     /// The tool for this call, as deep as the last one lets it go.
     /// @param holdsBack  false: as it is
     ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool isSmall, bool holdsBack) noexcept;

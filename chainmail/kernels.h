@@ -133,6 +133,8 @@ struct Kernels {
 
     /// sums[0] = x . a, sums[1] = x . b
     void (*dots)(const float* x, const float* a, const float* b, std::size_t n, double* sums) noexcept;
+    /// Sum of (r(i) + r(i + step)) / 2 (u(i + step) - u(i)) over i < n for one component, where `tissue` is 1 at both nodes
+    double (*alongSlope)(const float* tissue, const float* r, const float* u, std::size_t step, std::size_t n) noexcept;
     /// out = x + a y; out may be x or y
     void (*combine)(const float* x, float a, const float* y, float* out, std::size_t n) noexcept;
     /// d *= step,  e *= step,  u += d,  a += e,  r = a

@@ -16,8 +16,9 @@ namespace {
 
 constexpr Kernels table(const char* name) noexcept
 {
-    return {name,   W,           apply,  residualOf, smoothOf, applyFinite, dots,    combine, warmStart, direct,   keepStep,
-            negate, smoothFirst, smooth, chebyshev,  blend,    addMasked,   average, hat,     spread,    gatherAdd};
+    return {name,    W,         apply,   residualOf, smoothOf, applyFinite, dots,   alongSlope,
+            combine, warmStart, direct,  keepStep,   negate,   smoothFirst, smooth, chebyshev,
+            blend,   addMasked, average, hat,        spread,   gatherAdd};
 }
 
 }  // namespace

@@ -61,6 +61,19 @@ void dots(const float* x, const float* a, const float* b, std::size_t n, double*
     sums[1] = second.sum();
 }
 
+double alongSlope(const float* tissue, const float* r, const float* u, std::size_t step, std::size_t n) noexcept
+{
+    Products sum;
+    inBlocks(
+        n,
+        [&](std::size_t i, int v) {
+            const Lanes both = 0.5F * load(tissue + i) * load(tissue + i + step);
+            sum.add(v, both * (load(r + i) + load(r + i + step)) * (load(u + i + step) - load(u + i)));
+        },
+        [&] { sum.flush(); });
+    return sum.sum();
+}
+
 void combine(const float* x, float a, const float* y, float* out, std::size_t n) noexcept
 {
     for (std::size_t i = 0; i < n; i += W) {

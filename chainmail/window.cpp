@@ -87,7 +87,8 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
 Window::Window(Index3 size, bool relaxes, bool layered)
     : layout(Layout::of(size.x, size.y, size.z)), layers(layout, layered)
 {
-    for (Floats* cells : {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof}) {
+    for (Floats* cells :
+         {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof, &tissue}) {
         cells->assign(layout.count + Layout::lanes, 0.0F);
     }
     const auto always = relaxes ? fieldCount : static_cast<std::size_t>(Field::h);
@@ -130,6 +131,7 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
         const bool follows = !coarsest && onFace(layout, n);
         border[node] = follows && !held ? 1.0F : 0.0F;
         open[node] = held ? 0.0F : 1.0F;
+        tissue[node] = sum > 0.0F ? 1.0F : 0.0F;
         const bool isFree = !held && !follows && sum > 0.0F;
         diagonal[node] = isFree ? 1.0F / sum : 0.0F;
         dof[node] = isFree ? 1.0F : 0.0F;

@@ -96,6 +96,7 @@ struct Window {
     Floats border;    // nodes that follow the next coarser window
     Floats open;      // free, or border
     Floats dof;       // degrees of freedom: free and not covered
+    Floats tissue;    // nodes of a cell with tissue
     std::array<Floats, fieldCount> fields;
     float weight = 0.2F;  // of the smoother
 

@@ -259,6 +259,22 @@ std::array<double, 2> WindowStack::dots(Field x, Field a, Field b) const noexcep
     return sum;
 }
 
+Vec3 WindowStack::alongSlopes(Field r, Field u) const noexcept
+{
+    const Window& w = windows_.front();
+    const Layout& l = w.layout;
+    const float *along = w.field(r), *of = w.field(u), *tissue = w.tissue.data();
+    Vec3 sum(0.0);
+    for (std::size_t c = 0; c < 3 * l.count; c += l.count) {
+        sum.x += kernels_->alongSlope(tissue, along + c, of + c, 1, l.count);
+        sum.z += kernels_->alongSlope(tissue, along + c, of + c, l.plane, l.count - l.plane);
+        for (std::size_t at = 0; at < l.count; at += l.plane) {
+            sum.y += kernels_->alongSlope(tissue + at, along + c + at, of + c + at, l.row, l.plane - l.row);
+        }
+    }
+    return sum / body_->levels.front().nodes.spacing;
+}
+
 void WindowStack::combine(Field x, double a, Field y, Field out) noexcept
 {
     for (Window& w : windows_) {

@@ -85,6 +85,8 @@ public:
     /// { x . a, x . b }, over the degrees of freedom where a and b are zero elsewhere.
     std::array<double, 2> dots(Field x, Field a, Field b) const noexcept;
     double dot(Field x, Field a) const noexcept { return dots(x, a, a)[0]; }
+    /// r . du/dx_i for each axis i, in the finest window [x r / m].
+    Vec3 alongSlopes(Field r, Field u) const noexcept;
     /// out = x + a y
     void combine(Field x, double a, Field y, Field out) noexcept;
     /// d *= step, e *= step, u += d, a += e, r = a.

@@ -109,6 +109,7 @@ public:
         last = elastic_.relax(tests::loadOf({&tool, 1}, {}, entry_ + Vec3(along, 0.0, 0.0)));
         const Vec3 force = elastic_.toolForce(0);
         pull = std::max(pull, force.y);
+        sideways = std::max(sideways, std::hypot(force.x, force.z));
         step = std::max(step, glm::length(before) > 0.0 ? glm::distance(force, before) : 0.0);
         const double work = 0.5 * ((before.y + force.y) * (depth - depth_) + (before.x + force.x) * (along - along_));
         made += work;
@@ -121,6 +122,7 @@ public:
     ElasticResult last;
     double stiffest = 1e6;  // of the contact [N/m]
     double pull = 0;        // largest force into the body [N]
+    double sideways = 0;    // largest force across the way in [N]
     double step = 0;        // largest change of the force in a tick [N]
     double made = 0;        // work that the tissue did on the tool [J]
     double moved = 0;       // and its size along the way [J]
@@ -215,7 +217,9 @@ TEST(ElasticDeep, StiffTissueDoesNotPassThroughTheTool)
     }
 }
 
-// At one and a half radii sideways: no pull, and no tick changes the force by more than 6 %.
+// At one and a half radii sideways: no pull; no tick changes the force by more than 1.5 %, though windows move; and where a
+// block is the same all along and its sides are far, nothing pushes sideways. Without what findLag() takes off, single
+// ticks were off by 8 %.
 TEST(ElasticDeep, DraggedDeepTheForceIsEven)
 {
     const ElasticBody body = softBlock();
@@ -225,7 +229,8 @@ TEST(ElasticDeep, DraggedDeepTheForceIsEven)
     way.step = 0.0;
     way.dragTo(16e-3);
     EXPECT_NEAR(way.force(), force, 0.04 * force);
-    EXPECT_LT(way.step, 0.06 * force);
+    EXPECT_LT(way.step, 0.015 * force);
+    EXPECT_LT(way.sideways, 0.02 * force);
     way.to(-0.5e-3);
     EXPECT_LE(way.pull, 0.0);
 }

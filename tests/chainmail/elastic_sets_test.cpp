@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -192,6 +193,30 @@ TEST(ElasticSets, DotsOfSmallAndLargeNumbersGiveTheSameBits)
     };
     for (const Kernels* k : supportedKernels()) {
         EXPECT_EQ(dots(*k), dots(*supportedKernels().front())) << k->name;
+    }
+}
+
+// Only where both nodes have tissue.
+TEST(ElasticSets, SlopesGiveTheSameBits)
+{
+    std::minstd_rand random(6);
+    for (std::size_t n = Layout::lanes; n < 5000; n = 3 * n + Layout::lanes) {
+        for (const std::size_t step : {std::size_t{1}, 3 * Layout::lanes}) {
+            const Floats r = randomFloats(n + step, random), u = randomFloats(n + step, random);
+            Floats tissue = randomFloats(n + step, random);
+            std::ranges::transform(tissue, tissue.begin(), [](float t) { return t > -0.5F ? 1.0F : 0.0F; });
+            double sum = 0.0;
+            for (std::size_t i = 0; i < n; ++i) {
+                sum +=
+                    static_cast<double>(0.5F * tissue[i] * tissue[i + step] * (r[i] + r[i + step]) * (u[i + step] - u[i]));
+            }
+            const auto slope = [&](const Kernels& k) { return k.alongSlope(tissue.data(), r.data(), u.data(), step, n); };
+            const double first = slope(*supportedKernels().front());
+            EXPECT_NEAR(first, sum, 1e-6 * static_cast<double>(n));
+            for (const Kernels* k : supportedKernels()) {
+                EXPECT_EQ(slope(*k), first) << k->name;
+            }
+        }
     }
 }
 
