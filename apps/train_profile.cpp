@@ -163,6 +163,9 @@ std::vector<std::string> Training::notKept(const session::TrainResult& result, c
     if (!person_) {
         return {};
     }
+    if (result.recordCut) {
+        return {fmt::format("not kept for {}: the record of the session is not whole", person_->name)};
+    }
     return {fmt::format("not kept for {}: the session {}{}", person_->name,
                         result.signal != 0 ? "was interrupted" : "ended with a fault",
                         record.empty() ? "" : "; palpate profile add-record adds its record")};
