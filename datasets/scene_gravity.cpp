@@ -31,10 +31,11 @@ Vec3 readDown(Section& section, std::string_view named, std::string_view directe
     if (const auto index = section.choice(named, names)) {
         return patientPostures[*index].down;
     }
-    const auto direction = section.point(directed, largest);
+    auto direction = section.point(directed, largest);
     if (!direction) {
         section.missing(named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
     }
+    direction = volume::rescaled(*direction);
     if (!(glm::length(*direction) > 0)) {
         section.refuse(directed, "a direction must not be [0, 0, 0]");
     }
