@@ -1,8 +1,10 @@
 #include <apps/command.h>
 #include <apps/version.h>
 #include <base/child_process.h>
+#include <base/inputs.h>
 #include <base/nearest.h>
 #include <command/interrupted.h>
+#include <command/options.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
 #include <studies/validate/command.h>
@@ -116,6 +118,7 @@ int main(int argc, char** argv)
     sweep::addSweep(app);
 #endif
 
+    command::refuseEmptyValues(app);
     command::endOnSignals();
     try {
         app.parse(wordsOf(argc, argv));
@@ -127,6 +130,9 @@ int main(int argc, char** argv)
     } catch (const command::Interrupted& e) {
         std::fprintf(stderr, "palpate: %s\n", e.what());
         return e.exitStatus();
+    } catch (const std::filesystem::filesystem_error& e) {
+        std::fprintf(stderr, "palpate: %s\n", palpate::base::inWords(e).c_str());
+        return 1;
     } catch (const std::exception& e) {
         std::fprintf(stderr, "palpate: %s\n", e.what());
         return 1;
