@@ -134,11 +134,8 @@ public:
             frames_ += static_cast<std::uint64_t>(frames);
         }
     }
-    void finish()
-    {
-        if (movie_)
-            movie_->finish();
-    }
+    /// Whether there is a film.
+    bool finish() { return movie_ && movie_->finish(); }
 
     static constexpr double early = 0.501e-3;  // [s]: half a tick, and rounding
 
@@ -236,8 +233,9 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>
     picture.showUltrasound(options.ultrasound);
     Follower follower(options.session, options.wait, options.result);
     writeAll(options, stop, picture, follower, outputs);
-    outputs.finish();
+    const bool filmed = outputs.finish();
     ViewerFigures figures = follower.figures();
+    figures.filmed = filmed;
     figures.display = figures.frames > 0 ? picture.display() : "";
     addScans(picture.ultrasound(), figures);
     picture.close();

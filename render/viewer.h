@@ -86,6 +86,7 @@ struct ViewerFigures {
     double scanP50 = 0, scanP90 = 0, firstScan = 0;
     std::vector<std::pair<std::string, double>> scanStages;
     std::vector<Shown> shown;  // each picture of a tick that was not shown before
+    bool filmed = false;       // there is a film, with pictures in it
     int signal = 0;            // that has ended it; 0: none
 };
 
