@@ -1,6 +1,7 @@
 #include <datasets/scene_text.h>
 
 #include <datasets/toml_fields.h>
+#include <volume/direction.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>

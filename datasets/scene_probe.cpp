@@ -2,6 +2,7 @@
 
 #include <base/units.h>
 #include <datasets/toml_fields.h>
+#include <volume/direction.h>
 
 #include <glm/geometric.hpp>
 

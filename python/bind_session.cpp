@@ -3,6 +3,7 @@
 #include <python/tick_rows.h>
 
 #include <session/figures.h>
+#include <volume/direction.h>
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>

@@ -3,19 +3,9 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-#include <algorithm>
 #include <cmath>
 
 namespace palpate::volume {
-
-Vec3 rescaled(Vec3 direction) noexcept
-{
-    constexpr double least = 1e-100, most = 1e100;
-    const double length = glm::length(direction);
-    const double largest = std::max({std::abs(direction.x), std::abs(direction.y), std::abs(direction.z)});
-    const bool usable = length >= least && length <= most;
-    return usable || largest == 0 || !std::isfinite(largest) ? direction : direction / largest;
-}
 
 Vec3 Affine::toIndex(Vec3 patient) const noexcept
 {

@@ -17,10 +17,6 @@ using Index3 = glm::ivec3;
 
 namespace volume {
 
-/// A direction whose length can be computed with: `direction` itself where its length is 1e-100 to 1e100, else divided by
-/// its largest component, so that no square overflows or vanishes. Zero and what is not finite stay what they are.
-Vec3 rescaled(Vec3 direction) noexcept;
-
 /// Axis-aligned box in the patient frame [m].
 struct Box {
     Vec3 low{0.0};   // the corner with the smallest coordinates

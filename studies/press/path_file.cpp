@@ -3,6 +3,7 @@
 #include <base/inputs.h>
 #include <base/split.h>
 #include <haptics/tick.h>
+#include <volume/direction.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
