@@ -99,11 +99,12 @@ TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
         for (const auto& [layout, layoutName] : layouts) {
             const std::string name = "scan-" + std::to_string(wide) + "x" + std::to_string(high) + "-" + layoutName;
             studio->resize(wide, high);
-            studio->take(2.9, layout, true, name);
+            studio->take(1.0, layout, true, name);  // there is no warning yet
             const std::vector<Written> all = picture.written();
             expectApart(all, wide, high, name);
-            if (layout == Layout::trainee && wide > 320)
-                EXPECT_EQ(std::ranges::count(all, std::string("P"), &Written::words), 1) << name;
+            const bool marked = layout == Layout::instructor || wide == 320 ||
+                                std::ranges::count(all, std::string("P"), &Written::words) == 1;
+            EXPECT_TRUE(marked) << name << ": the probe's side is hidden";
         }
     picture.showUltrasound(false);
     picture.setCaption("");
