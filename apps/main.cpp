@@ -81,8 +81,12 @@ int main(int argc, char** argv)
         const auto unknown = program->remaining(true);
         std::string what = e.what();
         if (e.get_name() == "RequiredError" && !unknown.empty()) {
+            const CLI::App* within = program;  // `palpate case`, for a word behind it
+            while (!within->get_subcommands().empty()) {
+                within = within->get_subcommands().front();
+            }
             std::vector<std::string> commands;
-            for (const CLI::App* command : program->get_subcommands({})) {
+            for (const CLI::App* command : within->get_subcommands({})) {
                 commands.push_back(command->get_name());
             }
             const std::string meant = palpate::base::nearest(unknown[0], commands);

@@ -54,6 +54,8 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"nosuch"}, "nosuch: there is no such command");
     expectRefusal({"trian"}, "trian: there is no such command or option; did you mean train?");
     expectRefusal({"bench", "nosuch"}, "nosuch: there is no such command");
+    expectRefusal({"case", "lisst"}, "lisst: there is no such command or option; did you mean list?");
+    EXPECT_EQ(palpate({"case", "info", "x"}).err.find("did you mean info"), std::string::npos);
     expectRefusal({"train", "--nosuch"}, "--nosuch");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--model", "nosuch"}, "nosuch");
