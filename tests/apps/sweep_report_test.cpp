@@ -100,13 +100,23 @@ struct Placed {
     double x = 0, y = 0;
 };
 
+// The number behind `name` in an element; 0 where it has none.
+double attribute(const std::string& element, const std::string& name)
+{
+    const auto at = element.find(" " + name + "=\"");
+    return at == std::string::npos ? 0 : std::stod(element.substr(at + name.size() + 3));
+}
+
 std::vector<Placed> textsOf(const std::string& chart)
 {
     std::vector<Placed> all;
     for (auto at = chart.find("<text"); at != std::string::npos; at = chart.find("<text", at + 1)) {
-        const auto place = chart.find("translate(", at), open = chart.find('>', at), close = chart.find("</text", at);
-        Placed text{chart.substr(open + 1, close - open - 1)};
+        const auto open = chart.find('>', at), close = chart.find("</text", at), place = chart.find("translate(", at);
+        const std::string element = chart.substr(at, open - at);
+        Placed text{chart.substr(open + 1, close - open - 1), 0, 0};
         if (place < open && std::sscanf(chart.c_str() + place, "translate(%lf %lf)", &text.x, &text.y) == 2) {
+            text.x += attribute(element, "x");
+            text.y += attribute(element, "y");
             all.push_back(text);
         }
     }
@@ -128,12 +138,12 @@ TEST(SweepReport, NoTextsOfANarrowPageLieOnEachOther)
     figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
     figures({"sweep", "--report", here / "s"});
     const std::string wide = documentOf("file://" + std::string(here / "s" / "report.html"), here / "profile", "1280,1400");
-    EXPECT_EQ(wide.find("Point at a field"), std::string::npos);
+    EXPECT_NE(wide.find("id=\"fields\"></span>"), std::string::npos);
     std::string narrow = readText(here / "s" / "report.html");
     narrow.insert(narrow.find("</head>"), "<style>html { width: 390px }</style>");  // a window of chromium is wider
     writeText(here / "narrow.html", narrow);
     const std::string page = documentOf("file://" + std::string(here / "narrow.html"), here / "profile");
-    EXPECT_NE(page.find("Point at a field to read its value."), std::string::npos);
+    EXPECT_NE(page.find("id=\"fields\"> Point at a field to read its value.</span>"), std::string::npos);
     constexpr double letter = 6, high = 11;  // about the least of a text with 12 px
     for (const char* const part : {"map", "rank"}) {
         const std::vector<Placed> texts = textsOf(partOf(page, part));
