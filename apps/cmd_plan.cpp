@@ -150,9 +150,12 @@ void planScene(const PlanArguments& o)
     }
     if (!plan.choice) {
         const PlanCandidate& c = plan.candidates[plan.nearest];
-        throw std::runtime_error(
-            fmt::format("{}: no model holds {:g} % in {:g} us; the nearest is {}: {:.2f} % in {:.0f} us", o.scene,
-                        100.0 * request.error, 1e6 * request.budget, c.name(), c.error, c.microseconds));
+        throw std::runtime_error(fmt::format(
+            "{}: no model holds {:g} %{} in {:g} us; the nearest is {}: {:.2f} %{} in {:.0f} us", o.scene,
+            100.0 * request.error,
+            request.forceError ? fmt::format(" and {:g} % of the force", 100.0 * *request.forceError) : "",
+            1e6 * request.budget, c.name(), c.error,
+            request.forceError && c.force ? fmt::format(" and {:.2f} % of the force", *c.force) : "", c.microseconds));
     }
     if (tell) {
         const PlanCandidate& c = plan.candidates[*plan.choice];

@@ -391,8 +391,7 @@ void train(TrainArguments o)
     session::TrainResult result = runToItsEnd(model, info, options);
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     const auto written = writeOutputs(o, info, model, viewers, took, result);
-    const bool counts = result.signal == 0 && !result.faulted;
-    const auto kept = counts ? training.keep(info, result, record) : training.notKept(result, record);
+    const auto kept = training.conclude(info, result, record);
 
     if (o.json != "-" && !o.tryout) {
         summarise(result, info, model);

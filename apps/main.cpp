@@ -1,8 +1,10 @@
 #include <apps/command.h>
 #include <apps/version.h>
 #include <base/child_process.h>
+#include <base/inputs.h>
 #include <base/nearest.h>
 #include <command/interrupted.h>
+#include <command/options.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
 #include <studies/validate/command.h>
@@ -79,8 +81,12 @@ int main(int argc, char** argv)
         const auto unknown = program->remaining(true);
         std::string what = e.what();
         if (e.get_name() == "RequiredError" && !unknown.empty()) {
+            const CLI::App* within = program;  // `palpate case`, for a word behind it
+            while (!within->get_subcommands().empty()) {
+                within = within->get_subcommands().front();
+            }
             std::vector<std::string> commands;
-            for (const CLI::App* command : program->get_subcommands({})) {
+            for (const CLI::App* command : within->get_subcommands({})) {
                 commands.push_back(command->get_name());
             }
             const std::string meant = palpate::base::nearest(unknown[0], commands);
@@ -116,6 +122,7 @@ int main(int argc, char** argv)
     sweep::addSweep(app);
 #endif
 
+    command::refuseEmptyValues(app);
     command::endOnSignals();
     try {
         app.parse(wordsOf(argc, argv));
@@ -127,6 +134,9 @@ int main(int argc, char** argv)
     } catch (const command::Interrupted& e) {
         std::fprintf(stderr, "palpate: %s\n", e.what());
         return e.exitStatus();
+    } catch (const std::filesystem::filesystem_error& e) {
+        std::fprintf(stderr, "palpate: %s\n", palpate::base::inWords(e).c_str());
+        return 1;
     } catch (const std::exception& e) {
         std::fprintf(stderr, "palpate: %s\n", e.what());
         return 1;

@@ -164,12 +164,18 @@ void run(Words& words, palpate::render::ViewerOptions& options)
     // Of a record every picture was asked for; a session that runs is watched for as long as one likes.
     const bool pictures = !options.offscreen.empty() || !options.movie.empty();
     const std::string what = options.movie.empty() ? "the pictures end" : options.movie.string() + " ends";
+    const bool missing = !options.movie.empty() && !figures.filmed;
+    const std::string nothing = options.movie.string() + ": there is no film: no picture had been drawn";
+    if (missing && figures.signal != 0)
+        throw palpate::command::Interrupted(figures.signal, "interrupted: " + nothing);
     if (player && pictures && figures.signal != 0)
         throw palpate::command::Interrupted(figures.signal, "interrupted: " + what + " before the record does");
     if (!options.movie.empty() && figures.signal != 0)
         std::fprintf(stderr, "palpate-view: interrupted: %s before the session does\n", what.c_str());
     if (player && !player->problem().empty())
         throw std::runtime_error(player->problem());
+    if (missing)
+        throw std::runtime_error(nothing);
 }
 
 }  // namespace

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <base/build.h>
+#include <base/inputs.h>
 #include <command/interrupted.h>
+#include <command/options.h>
 
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <string>
 
 namespace palpate::apps {
@@ -25,6 +28,7 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
     app.failure_message(
         [&](const CLI::App*, const CLI::Error& e) { return name + ": " + e.what() + " (see " + name + " --help)\n"; });
     add(app);
+    command::refuseEmptyValues(app);
     try {
         app.parse(argc, argv);
         run();
@@ -35,6 +39,9 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
     } catch (const command::Interrupted& e) {
         std::fprintf(stderr, "%s: %s\n", name.c_str(), e.what());
         return e.exitStatus();
+    } catch (const std::filesystem::filesystem_error& e) {
+        std::fprintf(stderr, "%s: %s\n", name.c_str(), base::inWords(e).c_str());
+        return 1;
     } catch (const std::exception& e) {
         std::fprintf(stderr, "%s: %s\n", name.c_str(), e.what());
         return 1;

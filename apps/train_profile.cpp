@@ -158,14 +158,30 @@ std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const 
     return lines;
 }
 
-std::vector<std::string> Training::notKept(const session::TrainResult& result, const fs::path& record) const
+std::vector<std::string> Training::notKept(const std::string& why, const fs::path& record) const
 {
     if (!person_) {
         return {};
     }
-    return {fmt::format("not kept for {}: the session {}{}", person_->name,
-                        result.signal != 0 ? "was interrupted" : "ended with a fault",
+    return {fmt::format("not kept for {}: {}{}", person_->name, why,
                         record.empty() ? "" : "; palpate profile add-record adds its record")};
+}
+
+std::vector<std::string> Training::conclude(const haptics::SessionInfo& info, session::TrainResult& result,
+                                            const fs::path& record)
+{
+    if (result.recordCut) {
+        return notKept("the record of the session is not whole", {});
+    }
+    if (result.signal != 0 || result.faulted) {
+        return notKept(result.signal != 0 ? "the session was interrupted" : "the session ended with a fault", record);
+    }
+    try {
+        return keep(info, result, record);
+    } catch (const std::runtime_error& e) {
+        result.problem += (result.problem.empty() ? "" : "; ") + std::string(e.what());
+        return notKept("the profile could not be written", record);
+    }
 }
 
 void addTrainingOptions(CLI::App& command, TrainingOptions& o)

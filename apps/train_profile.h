@@ -38,16 +38,20 @@ public:
     std::filesystem::path record() const;
     /// What the record says of it.
     void describe(haptics::SessionInfo& info) const;
-    /// Keeps the session in the profile. @returns  what there is to say, a line each: the largest losses of points first
-    std::vector<std::string> keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
-                                  const std::filesystem::path& record);
-    /// What there is to say where a session does not count.
-    std::vector<std::string> notKept(const session::TrainResult& result, const std::filesystem::path& record) const;
+    /// Keeps a session that counts in the profile. A profile that cannot be written is added to the problem of `result`.
+    /// @returns  what there is to say, a line each: the largest losses of points first
+    std::vector<std::string> conclude(const haptics::SessionInfo& info, session::TrainResult& result,
+                                      const std::filesystem::path& record);
     /// Whether who trains holds needle and mouse in the left hand.
     bool leftHanded() const noexcept;
     const std::string& profile() const noexcept { return options_.profile; }
 
 private:
+    std::vector<std::string> keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
+                                  const std::filesystem::path& record);
+    // What there is to say where a session is not kept.
+    std::vector<std::string> notKept(const std::string& why, const std::filesystem::path& record) const;
+
     TrainingOptions options_;
     std::optional<training::Case> case_;
     std::optional<training::Curriculum> curriculum_;

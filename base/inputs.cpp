@@ -34,4 +34,13 @@ std::string whyNoFile(const std::filesystem::path& file)
     return "there is no such file: check the name";
 }
 
+std::string inWords(const std::filesystem::filesystem_error& error)
+{
+    if (error.path1().empty()) {
+        return error.code().message();
+    }
+    const bool loop = error.code() == std::errc::too_many_symbolic_link_levels;
+    return error.path1().string() + ": " + (loop ? whyNoFile(error.path1()) : error.code().message());
+}
+
 }  // namespace palpate::base

@@ -1,5 +1,7 @@
 #include <base/quantities.h>
 
+#include <base/split.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,6 +18,7 @@ namespace {
 // A number and what stands behind it, without the blanks between.
 std::optional<std::pair<double, std::string_view>> split(std::string_view text)
 {
+    text = withoutPlus(text);
     double number = 0.0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || !std::isfinite(number)) {

@@ -38,9 +38,17 @@ inline std::vector<std::string_view> csvCells(std::string_view line)
     return cells;
 }
 
+/// Without the '+' before a plain number, which std::from_chars() does not take: "0" for "+0", and "+-0" for "+-0".
+inline std::string_view withoutPlus(std::string_view text)
+{
+    const bool signedNumber = text.size() > 1 && text[0] == '+' && ((text[1] >= '0' && text[1] <= '9') || text[1] == '.');
+    return signedNumber ? text.substr(1) : text;
+}
+
 /// The number that a cell holds, which may be infinite or NaN; nothing where it holds anything else.
 inline std::optional<double> numberIn(std::string_view cell)
 {
+    cell = withoutPlus(cell);
     double value = 0.0;
     const auto [rest, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
     return error == std::errc() && rest == cell.data() + cell.size() ? std::optional(value) : std::nullopt;

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include <stdexcept>
+#include <string>
 
 namespace palpate::command {
 
@@ -19,6 +20,24 @@ void addSetting(CLI::App& command, session::SceneChanges& changes)
         .add_option("--setting", changes.setting,
                     "Resolution of level elastic (default: as in the scene; if it has none, train fits it to the machine)")
         ->check(CLI::IsMember(datasets::elasticSettings()));
+}
+
+void refuseEmptyValues(CLI::App& app)
+{
+    // Without a description, which --help would print behind each option.
+    const CLI::Validator filled(
+        [](const std::string& value) {
+            return value.empty() ? std::string("the value is empty: give one, or leave out the option") : std::string();
+        },
+        "");
+    for (CLI::Option* const option : app.get_options([](const CLI::Option* o) { return !o->get_lnames().empty(); })) {
+        if (option->get_expected_min() > 0) {
+            option->transform(filled);  // before its other checks
+        }
+    }
+    for (CLI::App* const command : app.get_subcommands([](const CLI::App*) { return true; })) {
+        refuseEmptyValues(*command);
+    }
 }
 
 void addFalconOptions(CLI::App& command, session::FalconOptions& options)

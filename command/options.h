@@ -12,6 +12,10 @@ void addModel(CLI::App& command, session::SceneChanges& changes);
 /// The option --setting of a command.
 void addSetting(CLI::App& command, session::SceneChanges& changes);
 
+/// Call after all options have been added, for a program's app: none of them takes an empty value ("--csv ''", a variable
+/// of a shell that is not set), but for those that may have none (expected(0, 1)).
+void refuseEmptyValues(CLI::App& app);
+
 void addFalconOptions(CLI::App& command, session::FalconOptions& options);
 /// Throws std::runtime_error when one of them was given without the Falcon.
 void checkFalconOptions(const CLI::App& command, bool falcon);

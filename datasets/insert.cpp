@@ -1,5 +1,6 @@
 #include <datasets/insert.h>
 
+#include <base/split.h>
 #include <datasets/phantom_parts.h>
 
 #include <fmt/format.h>
@@ -122,7 +123,8 @@ Vec3 parsePoint(const std::string& line, const std::string& where)
     const char* at = line.data();
     const char* const end = line.data() + line.find_last_not_of(" \t\r") + 1;
     for (int axis = 0; axis < 3; ++axis) {
-        const auto [rest, error] = std::from_chars(at, end, p[axis]);
+        const auto number = base::withoutPlus({at, end});
+        const auto [rest, error] = std::from_chars(number.data(), end, p[axis]);
         const bool separated = axis == 2 ? rest == end : rest != end && *rest == ',';
         if (error != std::errc() || !separated || !(std::abs(p[axis]) <= farthestCoordinate)) {
             throw std::runtime_error(fmt::format("{}: '{}': must be three numbers x,y,z [mm], each -{:g} to {:g}", where,

@@ -1,6 +1,7 @@
 #include <datasets/scene_text.h>
 
 #include <datasets/toml_fields.h>
+#include <volume/direction.h>
 
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
@@ -31,10 +32,11 @@ Vec3 readDown(Section& section, std::string_view named, std::string_view directe
     if (const auto index = section.choice(named, names)) {
         return patientPostures[*index].down;
     }
-    const auto direction = section.point(directed, largest);
+    auto direction = section.point(directed, largest);
     if (!direction) {
         section.missing(named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
     }
+    direction = volume::rescaled(*direction);
     if (!(glm::length(*direction) > 0)) {
         section.refuse(directed, "a direction must not be [0, 0, 0]");
     }

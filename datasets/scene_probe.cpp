@@ -2,6 +2,7 @@
 
 #include <base/units.h>
 #include <datasets/toml_fields.h>
+#include <volume/direction.h>
 
 #include <glm/geometric.hpp>
 
@@ -34,10 +35,11 @@ constexpr std::array<Field<ProbeStep>, 7> probeStepFields{{
 // Any length but 0, given as three numbers; the unit vector.
 Vec3 readDirection(Section& section, std::string_view key)
 {
-    const auto v = section.point(key, farthestCoordinate);
+    auto v = section.point(key, farthestCoordinate);
     if (!v) {
         section.missing(key, "a direction [x, y, z] in the patient frame LPS");
     }
+    v = volume::rescaled(*v);
     if (!(glm::length(*v) > 0)) {
         section.refuse(key, "a direction must not be [0, 0, 0]");
     }

@@ -3,6 +3,7 @@
 #include <python/tick_rows.h>
 
 #include <session/figures.h>
+#include <volume/direction.h>
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -41,8 +42,9 @@ struct TickBox {
 // As given where it is a unit vector to the last bits, so that a record's poses stay what they are.
 Vec3 unit(Vec3 axis)
 {
+    axis = volume::rescaled(axis);
     const double length = glm::length(axis);
-    if (!(length > 0)) {
+    if (!(length > 0) || !std::isfinite(length)) {
         throw py::value_error("pose: the axis has no length");
     }
     return std::abs(length - 1) < 1e-12 ? axis : axis / length;

@@ -124,15 +124,40 @@ void Canvas::introduce(double size, const Colour& colour, bool bold)
         renderer->GetBoundingBox(look, "x", box.data(), screenDpi);
 }
 
+double Canvas::leftOf(const Put& put) const
+{
+    if (put.align == Align::left)
+        return put.at[0];
+    const double wide = widthOf(put.words, put.size, put.bold);
+    return put.at[0] - (put.align == Align::centre ? wide / 2 : wide);
+}
+
 std::vector<Written> Canvas::written() const
 {
     std::vector<Written> all;
     for (const Put& p : put_) {
-        const double wide = widthOf(p.words, p.size, p.bold);
-        const double left = p.at[0] - (p.align == Align::left ? 0 : p.align == Align::centre ? wide / 2 : wide);
-        all.push_back({p.words, {left, p.at[1]}, {left + wide, p.at[1] + p.size}});
+        if (p.covered)
+            continue;
+        const double left = leftOf(p);
+        all.push_back({p.words, {left, p.at[1]}, {left + widthOf(p.words, p.size, p.bold), p.at[1] + p.size}});
     }
     return all;
+}
+
+// Words are measured last: most lie elsewhere anyway.
+void Canvas::cover(Point2 low, Point2 size)
+{
+    const Point2 high{low[0] + size[0], low[1] + size[1]};
+    for (std::size_t i = 0; i < put_.size(); ++i) {
+        Put& p = put_[i];
+        if (p.covered || p.at[1] >= high[1] || p.at[1] + p.size <= low[1] ||
+            (p.align == Align::left && p.at[0] >= high[0]) || (p.align == Align::right && p.at[0] <= low[0]))
+            continue;
+        const double left = leftOf(p);
+        p.covered = left < high[0] && left + widthOf(p.words, p.size, p.bold) > low[0];
+        if (p.covered)
+            texts_[i]->SetVisibility(0);
+    }
 }
 
 double Canvas::widthOf(const std::string& words, double size, bool bold) const

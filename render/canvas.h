@@ -45,6 +45,9 @@ public:
     /// `at`: the baseline's left end, middle or right end. `size` in pixels.
     void text(Point2 at, const std::string& words, double size, const Colour& colour, Align align = Align::left,
               bool bold = false);
+    /// Takes away the words that lie in this rectangle, or partly in it: a card that comes over them would not hide them,
+    /// since all words lie on all shapes.
+    void cover(Point2 low, Point2 size);
     void end();
     /// How wide text() draws these words [pixels].
     double widthOf(const std::string& words, double size, bool bold = false) const;
@@ -59,7 +62,10 @@ private:
         double size;
         Align align;
         bool bold;
+        bool covered = false;
     };
+    // Where a text's box begins [pixels].
+    double leftOf(const Put& put) const;
     void introduce(double size, const Colour& colour, bool bold);
 
     vtkRenderer& renderer_;

@@ -45,6 +45,7 @@ struct Column {
             widest = std::max(widest, canvas.widthOf(part, size, true));
         const double high = heightOf(words, size);
         y -= high + boxGap * font;
+        canvas.cover({left - 0.4 * font, y}, {widest + size, high});
         canvas.rectangle({left - 0.4 * font, y}, {widest + size, high}, back, opacity);
         for (std::size_t i = 0; i < lines.size(); ++i)
             canvas.text({left - 0.4 * font + 0.5 * size, y + high - 0.1 * size - 1.3 * size * static_cast<double>(i + 1)},
@@ -116,8 +117,8 @@ std::vector<Part> partsOf(const ScreenPlan& plan, const channel::Scenery& scener
             {warningWords(scenery, state), 1.35 * font, severe ? red : amber, 1, {0.05, 0.05, 0.05}, 0}};
 }
 
-// Empties what has no room down to `floor`.
-void leaveOut(std::vector<Part>& parts, const Column& column, double floor)
+// Empties what has no room down to `floor`; a warning may go on down to `lowest`.
+void leaveOut(std::vector<Part>& parts, const Column& column, double floor, double lowest)
 {
     double room = column.y - floor;
     for (int rank = 0; rank < static_cast<int>(parts.size()); ++rank)
@@ -125,7 +126,7 @@ void leaveOut(std::vector<Part>& parts, const Column& column, double floor)
             if (part.rank != rank || part.words.empty())
                 continue;
             const double high = column.heightOf(part.words, part.size) + boxGap * column.font;
-            if (high > room)
+            if (high > room + (rank == 0 ? floor - lowest : 0))
                 part.words.clear();
             else
                 room -= high;
@@ -199,12 +200,14 @@ HeaderPlaces drawHeader(Canvas& canvas, const ScreenPlan& plan, const channel::S
                       static_cast<double>(area.y + area.height) - 0.3 * font, font};
     };
     Column title = columnOf(plan.title);
-    drawTitle(title, scenery, state, header.session);
-    const bool apart = !plan.events.empty();  // the title has a place of its own
+    const bool apart = !plan.events.empty();  // the title has a place of its own, which the keys need
+    if (!header.keysListed || !apart)
+        drawTitle(title, scenery, state, header.session);
     Column column = apart ? columnOf({plan.banner.x, 0, plan.banner.width, plan.height}) : title;
     std::vector<Part> parts = partsOf(plan, scenery, state, header);
     const double bar = header.timeline < 0 ? 0 : font;
-    leaveOut(parts, column, plan.health.height + bar);
+    const double lowest = plan.health.height + bar;
+    leaveOut(parts, column, header.keysListed ? helpBelow * plan.height + bar : lowest, lowest);
     HeaderPlaces places;
     for (std::size_t i = 0; i < parts.size(); ++i) {
         const Part& part = parts[i];
@@ -234,6 +237,7 @@ void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words
     for (const std::string& line : small)
         widest = std::max(widest, canvas.widthOf(line, plan.font, false));
     double y = 0.5 * plan.height + high / 2;
+    canvas.cover({x - widest / 2 - size / 2, y - high}, {widest + size, high});
     canvas.rectangle({x - widest / 2 - size / 2, y - high}, {widest + size, high}, cardColour, 0.9);
     y -= 0.4 * size;
     for (const std::string& line : large)
@@ -278,6 +282,7 @@ void drawResult(Canvas& canvas, const ScreenPlan& plan, const ResultCard& result
         high -= 1.45 * lines.back().size;
     const double x = plan.banner.x + 0.02 * plan.banner.width;
     double y = std::min(0.5 * plan.height + high / 2, static_cast<double>(plan.height));
+    canvas.cover({x, y - high}, {wide, high});
     canvas.rectangle({x, y - high}, {wide, high}, cardColour, 0.94);
     y -= 0.4 * font;
     for (const Line& line : lines)
@@ -296,6 +301,9 @@ bool drawHelp(Canvas& canvas, const ScreenPlan& plan, std::span<const KeyHelp> k
     }
     // A key and its words stay together.
     const std::size_t high = (lines + table.columns - 1) / table.columns + (table.columns > 1 ? 1 : 0);
+    // Over the whole window nothing else is drawn, and what was there before would stay.
+    if (!table.inBody)
+        canvas.rectangle({0, 0}, {static_cast<double>(plan.width), static_cast<double>(plan.height)}, cardColour);
     const double top = table.low + 0.5 * (table.room + row * (static_cast<double>(high) + 1));
     canvas.rectangle({table.from, top - row * (static_cast<double>(high) + 1)},
                      {table.width * static_cast<double>(table.columns), row * (static_cast<double>(high) + 1)}, cardColour,

@@ -24,6 +24,7 @@ struct Header {
     std::string session, caption;
     double timeline = -1;  // how much of a record is over, in [0, 1]; negative: no record
     Coaching coaching;
+    bool keysListed = false;  // below it
 };
 
 /// Words broken into lines of at most `width` pixels.

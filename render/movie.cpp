@@ -80,6 +80,7 @@ void MovieFile::add(int frames)
     vtkImageData& image = *grab->GetOutput();
     const auto* bytes = static_cast<const char*>(image.GetScalarPointer());
     const auto size = static_cast<std::size_t>(image.GetNumberOfPoints()) * 3;
+    any_ = any_ || frames > 0;
     for (int i = 0; i < frames; ++i)
         for (std::size_t done = 0; done < size;) {
             const ssize_t written = ::write(pipe_, bytes + done, size - done);
@@ -89,14 +90,17 @@ void MovieFile::add(int frames)
         }
 }
 
-void MovieFile::finish()
+bool MovieFile::finish()
 {
     const int status = closeAndWait();
+    if (!any_)
+        return false;
     std::error_code error;
     if (status == 0)
         std::filesystem::rename(partial_, file_, error);
     if (status != 0 || error)
         throw std::runtime_error(file_.string() + ": cannot be written (ffmpeg's message is above)");
+    return true;
 }
 
 }  // namespace palpate::render

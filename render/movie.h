@@ -21,14 +21,16 @@ public:
 
     /// The window as it is drawn, for so many frames. Throws std::runtime_error when ffmpeg has ended.
     void add(int frames);
-    /// Waits for ffmpeg, and shows the file under its name. Throws std::runtime_error when ffmpeg failed.
-    void finish();
+    /// Waits for ffmpeg, and shows the file under its name. Returns whether there is a film: of no frames there is none,
+    /// and no file. Throws std::runtime_error when ffmpeg failed.
+    bool finish();
 
 private:
     int closeAndWait() noexcept;
 
     std::filesystem::path file_, partial_;
     vtkRenderWindow& window_;
+    bool any_ = false;  // frames were added
     int pipe_ = -1;
     pid_t ffmpeg_ = -1;
 };

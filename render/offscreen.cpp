@@ -1,3 +1,4 @@
+#include <base/outputs.h>
 #include <base/png.h>
 #include <render/events.h>
 #include <render/follower.h>
@@ -19,9 +20,8 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
-
-#include <unistd.h>
 
 namespace palpate::render {
 namespace {
@@ -62,7 +62,8 @@ std::string fileWords(const Event& event, const channel::Name& structure)
     return name;
 }
 
-// Writes under another name first, so that whoever watches the folder never reads half a picture.
+// Writes under another name first, so that whoever watches the folder never reads half a picture. The folder is made with
+// the first picture: a viewer that finds no session leaves nothing behind.
 class PictureFiles {
 public:
     PictureFiles(std::filesystem::path folder, vtkRenderWindow& window) : folder_(std::move(folder)), window_(window) {}
@@ -74,6 +75,8 @@ public:
 private:
     void write(const std::string& name, double time)
     {
+        if (!std::exchange(made_, true))
+            base::makeFolders(folder_);
         const std::filesystem::path file = folder_ / name, partial = folder_ / (name + ".part");
         vtkNew<vtkWindowToImageFilter> grab;
         grab->SetInput(&window_);
@@ -98,6 +101,7 @@ private:
     std::filesystem::path folder_;
     vtkRenderWindow& window_;
     std::uint64_t frames_ = 0, events_ = 0;
+    bool made_ = false;  // the folder
 };
 
 // What the pictures of a session go to.
@@ -134,11 +138,8 @@ public:
             frames_ += static_cast<std::uint64_t>(frames);
         }
     }
-    void finish()
-    {
-        if (movie_)
-            movie_->finish();
-    }
+    /// Whether there is a film.
+    bool finish() { return movie_ && movie_->finish(); }
 
     static constexpr double early = 0.501e-3;  // [s]: half a tick, and rounding
 
@@ -148,16 +149,6 @@ private:
     std::optional<PictureFiles> files_;
     std::optional<MovieFile> movie_;
 };
-
-void makeFolder(const std::filesystem::path& folder)
-{
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (!std::filesystem::is_directory(folder, error))
-        throw std::runtime_error(folder.string() + ": cannot be made into a folder");
-    if (::access(folder.c_str(), W_OK) != 0)
-        throw std::runtime_error(folder.string() + ": this folder cannot be written to");
-}
 
 // Asks whoever plays a record for the tick at `time`; whether it is there.
 bool askFor(Playback& playback, double time, const Follower& follower)
@@ -219,8 +210,8 @@ void writeAll(const ViewerOptions& options, const std::atomic<int>& stop, Pictur
 
 ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>& stop)
 {
-    if (!options.offscreen.empty())
-        makeFolder(options.offscreen);
+    base::checkOutputFolder(options.offscreen);
+    base::checkOutput(options.movie);
     vtkNew<vtkRenderWindow> window;
     window->SetShowWindow(false);
     window->SetOffScreenRendering(1);
@@ -236,8 +227,9 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>
     picture.showUltrasound(options.ultrasound);
     Follower follower(options.session, options.wait, options.result);
     writeAll(options, stop, picture, follower, outputs);
-    outputs.finish();
+    const bool filmed = outputs.finish();
     ViewerFigures figures = follower.figures();
+    figures.filmed = filmed;
     figures.display = figures.frames > 0 ? picture.display() : "";
     addScans(picture.ultrasound(), figures);
     picture.close();

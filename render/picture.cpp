@@ -352,27 +352,38 @@ void Picture::awaitSlices()
         painting_.get();
 }
 
+// Below the list of keys their places are empty: what was drawn there before would stay.
+void Picture::drawTraces(const ScreenPlan& plan)
+{
+    for (const Area& area : {plan.forces, plan.distances})
+        if (!area.empty() && !help_.empty())
+            canvas_.rectangle({static_cast<double>(area.x), static_cast<double>(area.y)},
+                              {static_cast<double>(area.width), static_cast<double>(area.height)}, panelColour);
+    if (!plan.forces.empty() && help_.empty())
+        drawForceTraces(canvas_, plan.forces, plan.font, session_->scenery, session_->history);
+    if (!plan.distances.empty() && help_.empty())
+        drawDistanceTraces(canvas_, plan.distances, plan.font, session_->scenery, session_->history);
+}
+
 void Picture::drawFlat(const ScreenPlan& plan)
 {
     Session& s = *session_;
     step_ = {};
     if (layout_ == Layout::body)
         return;
+    drawTraces(plan);
     const bool covered = !help_.empty() && drawHelp(canvas_, plan, help_);
     if (!covered) {
         drawFigures(canvas_, plan, s.scenery, s.state, s.health, !concealed_.tissues.empty());
         drawEvents(canvas_, plan, s.scenery, s.history.events);
     }
-    if (!plan.forces.empty() && help_.empty())
-        drawForceTraces(canvas_, plan.forces, plan.font, s.scenery, s.history);
-    if (!plan.distances.empty() && help_.empty())
-        drawDistanceTraces(canvas_, plan.distances, plan.font, s.scenery, s.history);
     const bool apart = !plan.events.empty(), free = words_.empty() && help_.empty();
     double below = plan.height;
     if (s.known) {
         // Help leaves room for title, caption and warning.
         Header words = header();
-        if (!help_.empty())
+        words.keysListed = !help_.empty();
+        if (words.keysListed)
             words.coaching = {};
         lastStep_ = words.coaching.last;
         const HeaderPlaces places = drawHeader(canvas_, plan, s.scenery, s.state, words);

@@ -125,6 +125,7 @@ private:
     void openBody();
     void drawSlices(const ScreenPlan& plan, int step);
     void awaitSlices();
+    void drawTraces(const ScreenPlan& plan);
     void drawFlat(const ScreenPlan& plan);
     Header header() const;
 

@@ -152,13 +152,16 @@ void UltrasoundPicture::drawScale(Canvas& canvas, const ultrasound::BeamImage& i
     const double half = static_cast<double>(beam.halfWidth() * layout(image).pixelsPerMetre());
     const double middle = area_.x + 0.5 * area_.width,
                  right = std::min(middle + half + 8, area_.x + area_.width - 2.2 * font);
+    double written = pixel(image, {0, 0})[1];  // the last number, which a small picture has no room beside
     for (int depth = 0; depth <= static_cast<int>(std::lround(mm * static_cast<double>(image.settings.depth)));
          depth += 5) {
         const double y = pixel(image, {0, 1e-3F * static_cast<float>(depth)})[1];
         const bool whole = depth % 10 == 0;
         canvas.line({right, y}, {right + (whole ? 8.0 : 4.0), y}, 1.5, grey);
-        if (whole && depth > 0)
+        if (whole && depth > 0 && written - y >= font) {
             canvas.text({right + 10, y - 0.35 * font}, fmt::format("{}", depth / 10), 0.85 * font, grey);
+            written = y;
+        }
     }
     const double focus = pixel(image, {0, image.settings.focus})[1];
     canvas.polygon(std::array<Point2, 3>{{{right - 7, focus + 4}, {right - 7, focus - 4}, {right - 1, focus}}}, amber);
@@ -174,6 +177,7 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
     double y = area_.y + 0.4 * font;
     const auto words = [&](const std::string& all, const Colour& colour, bool bold = false) {
         const std::string what = shortened(canvas, all, 0.9 * font, bold, area_.width - font);
+        canvas.cover({x, y}, {canvas.widthOf(what, 0.9 * font, bold), 0.9 * font});  // numbers of the scale
         canvas.text({x + 1, y - 1}, what, 0.9 * font, {0, 0, 0}, Align::left, bold);
         canvas.text({x, y}, what, 0.9 * font, colour, Align::left, bold);
         y += row;

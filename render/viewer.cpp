@@ -44,8 +44,8 @@ void standBack()
 
 void check(const ViewerOptions& options)
 {
-    constexpr int least = 320, most = 8192;
-    if (options.width < least || options.height < least || options.width > most || options.height > most)
+    constexpr int most = 8192;
+    if (options.width < leastSide || options.height < leastSide || options.width > most || options.height > most)
         throw std::runtime_error("size " + std::to_string(options.width) + "x" + std::to_string(options.height) +
                                  ": each side must be 320 to 8192 pixels");
     if (!(options.every >= 0) || !(options.wait >= 0))

@@ -42,6 +42,8 @@ struct Playback {
     std::atomic<const char*> fault{nullptr};                             // what is wrong with the record, in a few words
 };
 
+inline constexpr int leastSide = 320;  // of windows and pictures [pixels]
+
 /// What a viewer shows, and where.
 struct ViewerOptions {
     std::string session;                   // name; empty = the only one that runs
@@ -86,6 +88,7 @@ struct ViewerFigures {
     double scanP50 = 0, scanP90 = 0, firstScan = 0;
     std::vector<std::pair<std::string, double>> scanStages;
     std::vector<Shown> shown;  // each picture of a tick that was not shown before
+    bool filmed = false;       // there is a film, with pictures in it
     int signal = 0;            // that has ended it; 0: none
 };
 

@@ -58,6 +58,7 @@ Window openWindow(const ViewerOptions& options)
     Window window(glfwCreateWindow(width, height, "Palpate", nullptr, nullptr));
     if (!window)
         throw std::runtime_error("the display has no OpenGL 3.2, which the viewer needs");
+    glfwSetWindowSizeLimits(window.get(), leastSide, leastSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
     glfwMakeContextCurrent(window.get());
     glfwSwapInterval(0);
     return window;

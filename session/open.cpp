@@ -1,6 +1,7 @@
 #include <session/open.h>
 
 #include <base/build.h>
+#include <base/inputs.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
 #include <haptics/replay.h>
@@ -19,6 +20,7 @@
 #include <ctime>
 #include <memory>
 #include <stdexcept>
+#include <system_error>
 
 namespace palpate::session {
 
@@ -150,7 +152,7 @@ Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissu
 
 volume::Tissue loadVolume(const std::filesystem::path& file)
 {
-    if (std::filesystem::is_directory(file)) {
+    if (std::error_code none; std::filesystem::is_directory(file, none)) {
         throw std::runtime_error(file.string() + ": is a folder: give a volume (.vdb)");
     }
     return volume::Tissue::load(file);
@@ -197,10 +199,14 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
                         what, changes.lesion->from.string()));
     }
     auto builtIn = datasets::builtInScene(what);
-    if (!builtIn && std::filesystem::is_directory(path)) {
+    std::error_code none;
+    if (!builtIn && std::filesystem::is_directory(path, none)) {
         throw std::runtime_error(what + ": is a folder: give a scene (.toml) or a volume (.vdb)");
     }
-    if (!builtIn && !std::filesystem::exists(path)) {
+    if (!builtIn && std::filesystem::is_symlink(path, none) && !std::filesystem::exists(path, none)) {
+        throw std::runtime_error(what + ": " + base::whyNoFile(path));
+    }
+    if (!builtIn && !std::filesystem::exists(path, none)) {
         throw std::runtime_error(fmt::format("{}: no such scene or volume; built-in scenes are: {}", what,
                                              fmt::join(datasets::builtInScenes(), ", ")));
     }

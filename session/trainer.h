@@ -29,6 +29,7 @@ struct TrainOptions {
 struct TrainResult : SessionFigures {
     haptics::ServoTiming timing;        // of the loop
     std::uint64_t lostRecords = 0;      // ticks that the recorder had no room for
+    bool recordCut = false;             // a record was asked for, and it has not all ticks
     std::vector<std::string> warnings;  // a sentence each, for the user
     bool restart = false;               // its user wants it to begin anew
     int signal = 0;                     // that ended it before its time; 0: none

@@ -117,7 +117,7 @@ std::string body(const SweepPlan& plan, const std::vector<std::optional<SweepRow
                "its curve.</p></section>"
                "<section class=\"card\"><h2>Map</h2><div class=\"choices\">{}{}</div><div id=\"map\" class=\"chart\"></div>"
                "<p class=\"note\">Mean of the cases in each field, of the output chosen above; an axis "
-               "with over twelve values is put into bins.</p></section>"
+               "with over twelve values is put into bins.<span id=\"fields\"></span></p></section>"
                "<section class=\"card\"><h2>What matters</h2><div id=\"rank\" class=\"chart\"></div><p class=\"note\" "
                "id=\"method\"></p><div class=\"scroll\"><table class=\"plain\" id=\"indices\"></table></div></section>",
                choice("output", "output"), choice("x", "over"), choice("by", "a curve for each"), choice("mapx", "across"),

@@ -174,7 +174,7 @@ Case findCase(const std::string& id)
             return loadCase(folder / id);
         }
     }
-    if (fs::is_directory(id)) {
+    if (std::error_code none; fs::is_directory(id, none)) {
         throw std::runtime_error(id + ": no case: there is no " + std::string(caseFile) + " in it");
     }
     std::vector<std::string> ids;

@@ -11,7 +11,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <set>
+#include <string>
 #include <utility>
 
 namespace palpate::training {
@@ -42,22 +44,47 @@ json trialNumbers(std::size_t count)
     return x;
 }
 
+// "at least 50 %": what a level asks of a measure, with its unit.
+std::string limitInWords(std::string_view side, double value, const haptics::Measure& m)
+{
+    const std::string words = fmt::format("{} {:.{}f}", side, value, m.decimals);
+    // A limit between two printed values keeps its own digits.
+    const bool whole = std::abs(std::stod(words.substr(side.size())) - value) < 1e-9 * std::max(1.0, std::abs(value));
+    return (whole ? words : fmt::format("{} {:g}", side, value)) + (*m.unit == 0 ? "" : " ") + m.unit;
+}
+
 // What a measure has to be, as lines across its chart.
-json levelLines(const Exercise& exercise, std::string_view key)
+json levelLines(const Exercise& exercise, const haptics::Measure& m)
 {
     json lines = json::array();
+    const auto add = [&](const char* side, std::optional<double> at) {
+        if (at) {
+            lines.push_back({{"at", *at}, {"label", side}, {"words", limitInWords(side, *at, m)}, {"colour", "good"}});
+        }
+    };
     for (const Level& level : exercise.gate.levels) {
-        if (level.measure != key) {
-            continue;
-        }
-        if (level.atLeast) {
-            lines.push_back({{"at", *level.atLeast}, {"label", "at least"}, {"colour", "good"}});
-        }
-        if (level.atMost) {
-            lines.push_back({{"at", *level.atMost}, {"label", "at most"}, {"colour", "good"}});
+        if (level.measure == m.key) {
+            add("at least", level.atLeast);
+            add("at most", level.atMost);
         }
     }
     return lines;
+}
+
+// Why no session has a value of this measure, and what its level asks for.
+std::string whyNoValue(const Exercise& exercise, const haptics::Measure& m)
+{
+    using Listed = haptics::Measure::Listed;
+    std::string words = "-: ";
+    words += m.listed == Listed::ifFired    ? "the gun was not fired in any session"
+             : m.listed == Listed::ifMarked ? "nothing was marked in any session"
+             : m.listed == Listed::ifProbe  ? "no session had an ultrasound probe"
+             : m.listed == Listed::ifCt     ? "no session had a CT scanner"
+                                            : "no session has a value of it";
+    for (const json& line : levelLines(exercise, m)) {
+        words += "; level: " + line["words"].get<std::string>();
+    }
+    return words;
 }
 
 json axis(std::string_view name, std::string_view unit)
@@ -76,7 +103,7 @@ json measureChart(const ExerciseProgress& p, const haptics::Measure& m)
     return {{"columns", json::array({trialNumbers(p.sessions.size()), y})},
             {"x", axis("session", "")},
             {"y", {{"name", m.label}, {"unit", m.unit}, {"label", *m.unit == 0 ? "number" : m.unit}}},
-            {"lines", levelLines(*p.exercise, m.key)},
+            {"lines", levelLines(*p.exercise, m)},
             {"points", true},
             {"height", 210},
             {"series", json::array({{{"label", m.label}, {"colour", "c0"}, {"width", 2}}})}};
@@ -207,7 +234,15 @@ std::string exerciseCard(const ExerciseProgress& e, const CusumPlan& plan, json&
     place(cusumChart(e, plan), "CUSUM");
     for (const std::string& key : keys) {
         const haptics::Measure& m = measureCalled(key);
-        place(measureChart(e, m), m.label);
+        const bool any = std::ranges::any_of(e.sessions, [&](const StoredSession& session) {
+            const auto at = session.values.find(m.key);
+            return at != session.values.end() && std::isfinite(at->second);
+        });
+        if (any) {
+            place(measureChart(e, m), m.label);
+        } else {
+            out += fmt::format("<div><h3>{}</h3><p class=\"note\">{}</p></div>", m.label, whyNoValue(*e.exercise, m));
+        }
     }
     out += "</div>";
     std::string notes;

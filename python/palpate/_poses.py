@@ -21,6 +21,10 @@ def press_path(start, direction, depth, *, speed=0.02, hold=0.1, lead=1e-3):
     """
     start, direction = np.asarray(start, float), np.asarray(direction, float)
     length = np.linalg.norm(direction)
+    if not 1e-100 < length < 1e100:  # squares of its components vanish or overflow
+        largest = np.abs(direction).max()
+        direction = direction / largest if 0 < largest < np.inf else np.zeros(3)
+        length = np.linalg.norm(direction)
     if not length > 0:
         raise ValueError("direction: has no length")
     if not (speed > 0 and depth >= 0 and hold >= 0 and lead >= 0):

@@ -54,7 +54,7 @@ function nameLines(place, chart) {
   names.className = "lines";
   for (const line of chart.lines) {
     const name = document.createElement("span");
-    name.textContent = chart.y.unit ? `${line.label}, ${+line.at.toFixed(2)} ${chart.y.unit}` : line.label;
+    name.textContent = line.words ?? `${line.label}, ${+line.at.toFixed(2)} ${chart.y.unit || ""}`.trim();
     name.style.setProperty("--of", colour(line.colour));
     names.append(name);
   }

@@ -79,6 +79,18 @@ function rowsOfLegend(names, width) {
   return rows;
 }
 
+const lineHeight = 16; // of names in several lines [px]
+// A name in lines of at most `width`, which end at spaces or after '_', '.' and '/'.
+function inLines(name, width) {
+  pen.font = font;
+  const lines = [""];
+  for (const part of name.match(/[^ _./]*[ _./]*/g).filter(Boolean)) {
+    if (lines.at(-1) && pen.measureText(lines.at(-1) + part).width > width) lines.push("");
+    lines[lines.length - 1] += part;
+  }
+  return lines.join("\n");
+}
+
 // What the points of the curves stand for where an axis has too many values.
 function binsInWords(steps, a, groups, b) {
   const points = steps.binned ? ` ${names[a]} has ${steps.binned} values: they are put into ${steps.length} bins, and a point stands in the middle of its bin.` : "";
@@ -136,16 +148,24 @@ function drawMap(o, a, b) {
     if (values.length) cells.push([i, j, values.reduce((s, x) => s + x, 0) / values.length, values.length]);
   }));
   const values = cells.map((c) => c[2]);
+  // On a narrow page the scale lies below the fields, and a value is left out that is wider than its field.
+  const width = byId("map").clientWidth, narrow = width < 560;
+  pen.font = font;
+  const widest = (words) => 1.05 * Math.max(...words.map((w) => pen.measureText(w).width));
+  const beside = Math.min(widest(up.map((l) => l.label)), 0.3 * width), left = Math.max(beside + 44, narrow ? 0 : 84), right = narrow ? 12 : 110;
+  const numbered = cells.length <= 64 && widest(values.map(short)) + 4 <= (width - left - right) / across.length;
+  byId("fields").textContent = numbered ? "" : " Point at a field to read its value.";
   chart("map", {
-    grid: { left: 84, right: 110, top: 16, bottom: 56 },
+    grid: { left, right, top: 16, bottom: narrow ? 100 : 56 },
     tooltip: { ...tip(), formatter: (p) => `${names[a]} ${across[p.value[0]].label}, ${names[b]} ${up[p.value[1]].label}<br>${data.outputs[o]}: ${short(p.value[2])} (${p.value[3]} cases)` },
     xAxis: { ...axisStyle(), type: "category", name: names[a], nameGap: 30, data: across.map((l) => l.label) },
-    yAxis: { ...axisStyle(), type: "category", name: names[b], nameGap: 58, data: up.map((l) => l.label) },
+    yAxis: { ...axisStyle(), type: "category", name: names[b], nameGap: left - 26, axisLabel: { color: colour("soft"), width: beside + 10, overflow: "truncate" }, data: up.map((l) => l.label) },
     visualMap: {
-      min: Math.min(...values), max: Math.max(...values), calculable: true, right: 4, top: "middle", dimension: 2, formatter: short,
+      min: Math.min(...values), max: Math.max(...values), calculable: true, dimension: 2, formatter: short,
+      ...(narrow ? { orient: "horizontal", left: "center", bottom: 0, itemHeight: 120 } : { right: 4, top: "middle" }),
       textStyle: { color: colour("soft") }, inRange: { color: ["#440154", "#3b528b", "#21918c", "#5ec962", "#fde725"] },
     },
-    series: [{ type: "heatmap", data: cells, label: { show: cells.length <= 64, formatter: (p) => short(p.value[2]) } }],
+    series: [{ type: "heatmap", data: cells, label: { show: numbered, formatter: (p) => short(p.value[2]) } }],
   });
 }
 
@@ -155,14 +175,16 @@ function drawRank(o) {
   const cells = (tag, values) => values.map((v) => { const e = document.createElement(tag); e.textContent = v; return e; });
   const line = (tag, values) => { const tr = document.createElement("tr"); tr.append(...cells(tag, values)); return tr; };
   byId("indices").replaceChildren(...(list.length ? [line("th", ["axis", ...s.measures]), ...list.map((e) => line("td", [e.axis, ...e.values.map(short)]))] : []));
-  const bars = list.slice().reverse();
+  // Names have at most two fifths of the width, in several lines where they are longer; the axis has room for its labels.
+  const bars = list.slice().reverse(), width = byId("rank").clientWidth;
+  const labels = bars.map((e) => inLines(e.axis, 0.4 * width)), most = Math.max(1, ...labels.map((l) => l.split("\n").length));
   chart("rank", {
     grid: { left: 8, right: 40, top: 6, bottom: 4, containLabel: true },
-    tooltip: { ...tip(), formatter: (p) => `${p.name}: ${short(p.value)}` },
-    xAxis: { ...axisStyle(), type: "value", min: 0 },
-    yAxis: { ...axisStyle(), type: "category", data: bars.map((e) => e.axis) },
+    tooltip: { ...tip(), formatter: (p) => `${bars[p.dataIndex].axis}: ${short(p.value)}` },
+    xAxis: { ...axisStyle(), type: "value", min: 0, splitNumber: Math.max(1, Math.min(5, Math.floor(width / 120))) },
+    yAxis: { ...axisStyle(), type: "category", data: labels, axisLabel: { color: colour("soft"), interval: 0, lineHeight } },
     series: [{ type: "bar", data: bars.map((e) => Math.max(e.values[0] ?? 0, 0)), itemStyle: { color: colour("accent") }, barMaxWidth: 26 }],
-  }, 60 + 34 * Math.max(list.length, 1));
+  }, 60 + Math.max(34, lineHeight * most + 6) * Math.max(list.length, 1));
 }
 
 function fill(id, labels, chosen) {
@@ -170,12 +192,18 @@ function fill(id, labels, chosen) {
   byId(id).value = labels.includes(chosen) ? chosen : labels[0];
 }
 
-function draw() {
-  const o = data.outputs.indexOf(byId("output").value), at = (id) => names.indexOf(byId(id).value);
-  drawCurve(o, at("x"), byId("by").value === all ? null : at("by"));
+const output = () => data.outputs.indexOf(byId("output").value), axisOf = (id) => names.indexOf(byId(id).value);
+
+// What fits itself to the width of the page.
+function drawFitted() {
   byId("map").closest("section").hidden = names.length < 2;
-  if (names.length > 1) drawMap(o, at("mapx"), at("mapy"));
-  drawRank(o);
+  if (names.length > 1) drawMap(output(), axisOf("mapx"), axisOf("mapy"));
+  drawRank(output());
+}
+
+function draw() {
+  drawCurve(output(), axisOf("x"), byId("by").value === all ? null : axisOf("by"));
+  drawFitted();
   document.body.dataset.drawn = byId("output").value;
 }
 
@@ -195,6 +223,7 @@ for (const id of ["output", "x", "by", "mapx", "mapy"]) {
 draw();
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 addEventListener("resize", () => {
-  Object.values(charts).forEach((c) => c.resize());
+  charts.curve.resize(); // drawn anew, it would forget what part of it is looked at
   if (rowsOfLegend(legend.names, byId("curve").clientWidth) !== legend.rows) draw();
+  else drawFitted();
 });

@@ -3,6 +3,7 @@
 #include <base/inputs.h>
 #include <base/split.h>
 #include <haptics/tick.h>
+#include <volume/direction.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -12,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -26,7 +28,6 @@ namespace {
 constexpr double farthest = 10.0;      // from the origin along each axis [m]
 constexpr double latest = 1e9;         // more than any clock says [s]
 constexpr double maxTicks = 10e6;      // nearly three hours
-constexpr double minAxis = 1e-6;       // shorter ones have no direction
 constexpr double halfTurn = -0.999;    // cosine between axes of which neither way round is the shorter
 constexpr double pathRounding = 1e-6;  // of a tick
 
@@ -170,10 +171,11 @@ std::ifstream opened(const std::filesystem::path& file, const char* what)
 
 Vec3 axisOf(const NumberFile& file)
 {
-    constexpr double most = 1e6;
-    const Vec3 along(file.number(axis, most, ""), file.number(axis + 1, most, ""), file.number(axis + 2, most, ""));
+    constexpr double most = std::numeric_limits<double>::max();
+    const Vec3 along =
+        volume::rescaled({file.number(axis, most, ""), file.number(axis + 1, most, ""), file.number(axis + 2, most, "")});
     const double length = glm::length(along);
-    if (length < minAxis) {
+    if (!(length > 0)) {
         throw std::runtime_error(file.where() + ": the axis is zero: it must say where the tool points to");
     }
     return along / length;

@@ -54,6 +54,8 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"nosuch"}, "nosuch: there is no such command");
     expectRefusal({"trian"}, "trian: there is no such command or option; did you mean train?");
     expectRefusal({"bench", "nosuch"}, "nosuch: there is no such command");
+    expectRefusal({"case", "lisst"}, "lisst: there is no such command or option; did you mean list?");
+    EXPECT_EQ(palpate({"case", "info", "x"}).err.find("did you mean info"), std::string::npos);
     expectRefusal({"train", "--nosuch"}, "--nosuch");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--model", "nosuch"}, "nosuch");
@@ -70,6 +72,41 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"train", "nosuch"}, "layered, block, plate, pair");
     expectRefusal({"phantom", "nosuch", "-o", "never.vdb"}, "breast, layered, block");
     expectRefusal({"train", "layered", "--headless", "--target", "nosuch"}, "nosuch");
+}
+
+TEST(CommandLine, ALinkThatLeadsBackToItselfIsRefusedLikeAnyFileThatCannotBeRead)
+{
+    const Folder folder;
+    const std::string volume = folder / "loop.vdb", scene = folder / "loop.toml", bare = folder / "loop";
+    for (const std::string& link : {volume, scene, bare}) {
+        std::filesystem::create_symlink(link, link);
+    }
+    const std::string why = ": is a symbolic link that leads back to itself: name the file itself";
+    writeText(folder / "p.csv", "x_mm,y_mm,z_mm\n0,0,0\n");
+    expectRefusal({"info", volume}, volume + why);
+    expectRefusal({"export", volume, "-o", folder / "x.nrrd"}, volume + why);
+    for (const std::string& file : {volume, scene, bare}) {
+        expectRefusal({"press", file, "--path", folder / "p.csv"}, file + why);
+        expectRefusal({"train", file, "--headless"}, file + why);
+    }
+    expectRefusal({"train", "--case", bare, "--headless"}, bare + ": there is no such case");
+    expectRefusal({"train", "block", "--headless", "--unpaced", "--record", bare}, bare + why);
+}
+
+// A variable of a shell that is not set: what was asked for would not be written, and nobody would be told.
+TEST(CommandLine, AnOptionWithAnEmptyValueIsRefused)
+{
+    for (const std::string option : {"--json", "--report", "--record", "--pictures", "--seconds", "--setting"}) {
+        expectRefusal({"train", "block", "--headless", "--unpaced", option, ""}, option + ": the value is empty: give one");
+    }
+    const Folder folder;
+    writeText(folder / "p.csv", "x_mm,y_mm,z_mm\n0,0,0\n");
+    for (const std::string option : {"--csv", "--json", "--at"}) {
+        expectRefusal({"press", "block", "--path", folder / "p.csv", option, ""}, option + ": the value is empty");
+    }
+    const Outcome viewer = Program("palpate-view", {"--json", ""}).wait();
+    EXPECT_EQ(viewer.status, 2);
+    EXPECT_EQ(viewer.err.find("palpate-view: --json: the value is empty"), 0U) << viewer.err;
 }
 
 TEST(CommandLine, AMissingFileIsRefusedOnOneLine)

@@ -1,10 +1,12 @@
 #include <base/png.h>
 #include <tests/apps/desktop.h>
+#include <tests/apps/sweep_plan.h>
 
 #include <gtest/gtest.h>
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
@@ -237,6 +239,31 @@ TEST(ReplayView, AFilmThatASignalHasEndedIsSaidToBe)
     EXPECT_EQ(live.status, 0);
     EXPECT_EQ(live.err, "palpate-view: interrupted: " + film + " ends before the session does\n");
     EXPECT_TRUE(fs::exists(film));
+}
+
+// Ended before its first picture: ffmpeg has made a file of 262 bytes, which nothing plays.
+TEST(ReplayView, AFilmWithoutPicturesIsNoFile)
+{
+    if (!canDraw() || !installed("ffmpeg"))
+        GTEST_SKIP() << "needs palpate-view, Xvfb and ffmpeg (packages xvfb and ffmpeg)";
+    const Folder folder;
+    const std::string film = folder / "s.mp4";
+    Program view("palpate-view", {"--session", "film-" + std::to_string(::getpid()) + "-none", "--movie", film, "--size",
+                                  "320x320", "--wait", "60"});
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    const auto filming = [&] {
+        return std::ranges::any_of(childrenOf(view.pid()), [](int child) {
+            return readText("/proc/" + std::to_string(child) + "/comm") == "ffmpeg\n";
+        });
+    };
+    while (!filming() && std::chrono::steady_clock::now() < end)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    view.send(SIGINT);
+    const Outcome outcome = view.wait();
+    EXPECT_EQ(outcome.status, 130);
+    EXPECT_EQ(outcome.err, "palpate-view: interrupted: " + film + ": there is no film: no picture had been drawn\n");
+    EXPECT_FALSE(fs::exists(film));
+    EXPECT_FALSE(fs::exists(film + ".part"));
 }
 
 TEST(ReplayView, RefusesWhatCannotBePlayed)

@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace palpate::apps {
 namespace {
@@ -90,6 +92,72 @@ TEST(SweepReport, TheLegendLiesAboveTheCurvesAndBinsAreNamed)
         EXPECT_LT(y + 14, top) << depth;
     }
     EXPECT_NE(page.find("youngs_kpa has 14 values: they are put into 12 bins"), std::string::npos);
+}
+
+// A text of a chart and the place where it stands [px].
+struct Placed {
+    std::string words;
+    double x = 0, y = 0;
+};
+
+// The number behind `name` in an element; 0 where it has none.
+double attribute(const std::string& element, const std::string& name)
+{
+    const auto at = element.find(" " + name + "=\"");
+    return at == std::string::npos ? 0 : std::stod(element.substr(at + name.size() + 3));
+}
+
+std::vector<Placed> textsOf(const std::string& chart)
+{
+    std::vector<Placed> all;
+    for (auto at = chart.find("<text"); at != std::string::npos; at = chart.find("<text", at + 1)) {
+        const auto open = chart.find('>', at), close = chart.find("</text", at), place = chart.find("translate(", at);
+        const std::string element = chart.substr(at, open - at);
+        Placed text{chart.substr(open + 1, close - open - 1), 0, 0};
+        if (place < open && std::sscanf(chart.c_str() + place, "translate(%lf %lf)", &text.x, &text.y) == 2) {
+            text.x += attribute(element, "x");
+            text.y += attribute(element, "y");
+            all.push_back(text);
+        }
+    }
+    return all;
+}
+
+// Twelve columns have no room for their values on a telephone, whose screen is 390 px wide: there the page says how they
+// are read. Names of axes stay in the chart, in several lines.
+TEST(SweepReport, NoTextsOfANarrowPageLieOnEachOther)
+{
+    if (!std::filesystem::exists("/usr/bin/chromium")) {
+        GTEST_SKIP() << "no chromium here (Debian: chromium)";
+    }
+    const Folder here;
+    std::string text = shortPlan(1);
+    text.replace(text.find("steps = 3"), 9, "steps = 12");
+    text.replace(text.find("name = \"youngs_kpa\""), 19, "name = \"youngs_modulus_of_the_fat_around_it_kpa\"");
+    writeText(here / "p.toml", text);
+    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
+    figures({"sweep", "--report", here / "s"});
+    const std::string wide = documentOf("file://" + std::string(here / "s" / "report.html"), here / "profile", "1280,1400");
+    EXPECT_NE(wide.find("id=\"fields\"></span>"), std::string::npos);
+    std::string narrow = readText(here / "s" / "report.html");
+    narrow.insert(narrow.find("</head>"), "<style>html { width: 390px }</style>");  // a window of chromium is wider
+    writeText(here / "narrow.html", narrow);
+    const std::string page = documentOf("file://" + std::string(here / "narrow.html"), here / "profile");
+    EXPECT_NE(page.find("id=\"fields\"> Point at a field to read its value.</span>"), std::string::npos);
+    constexpr double letter = 6, high = 11;  // about the least of a text with 12 px
+    for (const char* const part : {"map", "rank"}) {
+        const std::vector<Placed> texts = textsOf(partOf(page, part));
+        EXPECT_GT(texts.size(), 4U) << part;
+        for (std::size_t a = 0; a < texts.size(); ++a) {
+            for (std::size_t b = 0; b < a; ++b) {
+                const auto letters = static_cast<double>(std::min(texts[a].words.size(), texts[b].words.size()));
+                EXPECT_TRUE(std::abs(texts[a].y - texts[b].y) >= high ||
+                            std::abs(texts[a].x - texts[b].x) >= letter * letters)
+                    << part << ": '" << texts[a].words << "' lies on '" << texts[b].words << "'";
+            }
+        }
+    }
+    EXPECT_GE(countOf(partOf(page, "rank"), ">youngs_modulus"), 1U);
 }
 
 // Curves, map and ranking are drawn by the page itself, offline, and follow what its address chooses.

@@ -5,6 +5,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 namespace palpate::apps {
@@ -137,6 +138,21 @@ TEST_F(TrainingCommands, AnInterruptedSessionSaysThatItIsNotKept)
         << cut.out << cut.err;
     EXPECT_TRUE(figures({"progress", "anna"})["sessions"].empty());
     EXPECT_EQ(palpate({"profile", "add-record", "anna", record}).status, 0);
+}
+
+// Nobody can score or replay again what the profile would then claim.
+TEST_F(TrainingCommands, ASessionWhoseDiskWasFullIsNotKept)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    const std::string record = folder_ / "cut.db";
+    const Outcome cut = palpate({"train", "layered", "--profile", "anna", "--headless", "--unpaced", "--setting", "fast",
+                                 "--record", record, "--inject", "disk-full@1500ms"});
+    EXPECT_EQ(cut.status, 1);
+    EXPECT_EQ(std::ranges::count(cut.err, '\n'), 1) << cut.err;
+    EXPECT_NE(cut.err.find(record + ": recording stopped: "), std::string::npos) << cut.err;
+    EXPECT_NE(cut.out.find("not kept for anna: the record of the session is not whole"), std::string::npos) << cut.out;
+    EXPECT_TRUE(figures({"progress", "anna"})["sessions"].empty());
+    expectRefusal({"profile", "add-record", "anna", record}, "was not closed");
 }
 
 // Of the window too, and of a session that was interrupted: its record names who trained, and no profile names it.

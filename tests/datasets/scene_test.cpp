@@ -156,6 +156,8 @@ TEST(Scene, GravityOfAnySceneComesBack)
     const Scene aslant = parseScene(scene + "direction = [3, 0, -4]\nshape = \"unloaded\"\ng_m_s2 = 1.62\n", origin);
     EXPECT_NEAR(aslant.gravity.down.z, -0.8, 1e-12);
     EXPECT_EQ(aslant.gravity.shapeDown, Vec3(0.0));
+    const Scene faint = parseScene(scene + "direction = [3e-200, 0, -4e-200]\nshape = \"unloaded\"\n", origin);
+    EXPECT_NEAR(faint.gravity.down.z, -0.8, 1e-12);
     for (const Scene& s : {named, aslant}) {
         const Scene again = parseScene(sceneText(s), origin);
         EXPECT_EQ(sceneText(again), sceneText(s));

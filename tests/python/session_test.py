@@ -70,6 +70,14 @@ class Run(InFolder):
         self.assertFalse(ticks["fresh"][500])
         self.assertTrue(np.all(np.isfinite(ticks["total"])))
 
+    def test_an_axis_of_any_length_is_normalised(self):
+        session, poses = palpate.Session(small_block()), np.zeros((3, 6))
+        poses[:, 4] = [2.0, 2e200, 2e-200]
+        np.testing.assert_array_equal(session.run(poses)["axis"], [[0, 1, 0]] * 3)
+        plain = palpate.press_path([0, 0, 0], [0, 1, 0], 1e-3)
+        for length in 1e200, 1e-200:
+            np.testing.assert_array_equal(palpate.press_path([0, 0, 0], [0, length, 0], 1e-3), plain)
+
     def test_bad_arguments_are_refused_and_change_nothing(self):
         session = palpate.Session(small_block())
         for wrong, call in [

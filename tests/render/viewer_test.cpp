@@ -396,9 +396,11 @@ TEST_F(Viewer, TellsInOneLineWhatIsMissing)
     expectError(view({"--wait", "0.3"}), "install the package xvfb", true);
     expectError(view({"--every", "-1"}), "0 s or more");
     expectError({program(), "--size", "12"}, "WIDTHxHEIGHT");
+    EXPECT_FALSE(fs::exists(pictures())) << "a folder without a picture is left";
     fs::remove_all(pictures());
     std::ofstream(pictures()) << "a file";
-    expectError(view({"--wait", "0.3"}), "cannot be made into a folder");
+    expectError(view({"--wait", "0.3"}), "cannot be made: ");
+    expectError({program(), "--session", session_, "--movie", pictures() + "/film.mp4"}, "there is no folder");
 }
 
 }  // namespace

@@ -56,6 +56,62 @@ TEST_F(WordsTest, AllKeysCanBeReadInASmallWindow)
     studio->resize(width, height);
 }
 
+// The list lies below caption and warning and on no other words: neither on the title of the instructor's small body nor on
+// what a picture before it has left in parts of the window that nothing else draws.
+TEST_F(WordsTest, TheListOfKeysLiesOnNoOtherWords)
+{
+    Picture& picture = studio->picture();
+    picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
+    std::vector<KeyHelp> keys(
+        26, {"Page down, up", "push it in by 1 mm along itself, pull it out; with Ctrl into the picture"});
+    for (std::size_t i = 0; i < keys.size(); ++i)
+        keys[i].what = std::to_string(i) + " " + keys[i].what;
+    constexpr std::array<std::pair<int, int>, 4> sizes{{{320, 320}, {480, 360}, {640, 480}, {1280, 960}}};
+    for (const auto& [wide, high] : sizes)
+        for (const auto& [layout, layoutName] : layouts) {
+            const std::string name = "keys-" + std::to_string(wide) + "x" + std::to_string(high) + "-" + layoutName;
+            studio->resize(wide, high);
+            const auto listedAfter = [&](Layout before) {
+                picture.setHelp({});
+                studio->take(2.9, before, true);
+                picture.setHelp(keys);
+                return studio->take(2.9, layout, true, name);
+            };
+            const Image one = listedAfter(Layout::trainee);
+            expectApart(picture.written(), wide, high, name);
+            const Image other = listedAfter(Layout::instructor);
+            EXPECT_EQ(one.differing(other, {0, 0, wide, high}), 0) << name << ": what was before is seen";
+        }
+    picture.setHelp({});
+    picture.setCaption("");
+    studio->resize(width, height);
+}
+
+// Scale, console and the mark of the probe's side, with caption and step above them.
+TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
+{
+    Picture& picture = studio->picture();
+    picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
+    picture.setSteps(true, 0, true);
+    picture.showUltrasound(true);
+    constexpr std::array<std::pair<int, int>, 4> sizes{{{320, 320}, {480, 360}, {640, 480}, {1280, 960}}};
+    for (const auto& [wide, high] : sizes)
+        for (const auto& [layout, layoutName] : layouts) {
+            const std::string name = "scan-" + std::to_string(wide) + "x" + std::to_string(high) + "-" + layoutName;
+            studio->resize(wide, high);
+            studio->take(1.0, layout, true, name);  // there is no warning yet
+            const std::vector<Written> all = picture.written();
+            expectApart(all, wide, high, name);
+            const bool marked = layout == Layout::instructor || wide == 320 ||
+                                std::ranges::count(all, std::string("P"), &Written::words) == 1;
+            EXPECT_TRUE(marked) << name << ": the probe's side is hidden";
+        }
+    picture.showUltrasound(false);
+    picture.setCaption("");
+    picture.setSteps(false, 0, false);
+    studio->resize(width, height);
+}
+
 // In every window and with everything that there may be to say: words lie inside the window and on no other words.
 TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
 {

@@ -126,6 +126,26 @@ TEST(PressPath, WhatIsWrongIsSaidWithItsLine)
     }
 }
 
+// "Any length but zero", also where its square is no number; R and spreadsheets write "+0" and "+1.5".
+TEST(PressPath, AnAxisOfAnyLengthIsNormalisedAndPlusSignsAreRead)
+{
+    const PosePath path = [] {
+        std::istringstream in(
+            "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z\n+0,+1.5,-2,3e200,4e200,0\n0,0,0,3e-200,4e-200,0\n+.5,0,0,+3,4e0,+0\n");
+        return readPosePath(in, "path.csv", std::nullopt);
+    }();
+    for (const ToolPose& pose : path.poses) {
+        EXPECT_NEAR(glm::distance(pose.axis, Vec3(0.6, 0.8, 0)), 0, 1e-15);
+    }
+    EXPECT_EQ(path.poses[0].position, 1e-3 * Vec3(0, 1.5, -2));
+    for (const char* const text : {"+-1", "++1", "+", "+x", "+inf"}) {
+        std::istringstream in(std::string("x_mm,y_mm,z_mm\n0,0,") + text + "\n");
+        EXPECT_NE(tests::errorOf([&] { readPosePath(in, "path.csv", Vec3(0, 1, 0)); }).find("must be a number"),
+                  std::string::npos)
+            << text;
+    }
+}
+
 TEST(PressPath, AFileThatIsNotThereIsRefused)
 {
     const tests::Folder folder;

@@ -59,6 +59,30 @@ TEST(ProgressPage, SaysWhatIsNextAndWhatTheChartAssumes)
     EXPECT_GE(places.size(), 4U);
 }
 
+// Of a measure without a unit as well: "at most" alone says nothing.
+TEST(ProgressPage, LimitsHaveTheirValueAndUnit)
+{
+    const tests::Folder folder;
+    Somebody somebody("Eve");
+    CurriculumProgress& course = somebody.people[0].curricula[0];
+    ExerciseProgress& first = course.exercises[0];
+    Exercise exercise = *first.exercise;
+    exercise.gate.levels = {{"vital_contacts", {}, 0.0}, {"best_target_pct", 33.5, {}}, {"ct_dose_mgy_cm", {}, 120.0}};
+    first.exercise = &exercise;
+    ASSERT_FALSE(first.sessions.empty());
+    for (StoredSession& session : first.sessions) {
+        session.values["best_target_pct"] = 40;
+        session.values.erase("ct_dose_mgy_cm");
+    }
+    writeProgressPage(folder / "p.html", somebody.people, {});
+    const std::string page = textOf(folder / "p.html");
+    EXPECT_NE(page.find("\"words\":\"at most 0\""), std::string::npos);
+    EXPECT_NE(page.find("\"words\":\"at least 33.5 %\""), std::string::npos);
+    EXPECT_NE(page.find("Dose of the CT scans</h3><p class=\"note\">-: no session had a CT scanner; level: at most 120.0 "
+                        "mGy cm</p>"),
+              std::string::npos);
+}
+
 TEST(ProgressCsv, HasALineForEachSession)
 {
     const tests::Folder folder;

@@ -1,5 +1,6 @@
 #include <volume/prepare/steps.h>
 
+#include <base/split.h>
 #include <volume/clean.h>
 #include <volume/resample.h>
 
@@ -145,7 +146,8 @@ private:
         const char* at = options_.crop.data();
         const char* const end = at + options_.crop.size();
         for (std::size_t i = 0; i < mm.size(); ++i) {
-            const auto [rest, error] = std::from_chars(at, end, mm[i]);
+            const auto number = base::withoutPlus({at, end});
+            const auto [rest, error] = std::from_chars(number.data(), end, mm[i]);
             if (error != std::errc() || (i < 5 ? rest == end || *rest != ',' : rest != end)) {
                 return std::nullopt;
             }
