@@ -272,6 +272,7 @@ ElasticResult Elastic::relax(const ElasticLoad& load) noexcept
     if (waiting_ || !goesOn(load) || !makeWay(load)) {
         return relaxWhile(load, tick());
     }
+    // Between the calls sites are asked for, as by those who measure the contact's area.
     for (ContactSite& s : active()) {
         locate(stack_.body(), stack_.windows(), s.anchor, s);
     }
@@ -359,13 +360,12 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
                                  : c.next == c.usual ? c.effort.far
                                                      : farAfterMove * c.effort.far;
         result.residual = refreshResidual(c.hasGone);
-        c.isKnown = true;
         if (isBalanced(result.residual, tolerance)) {
             if (!c.isOpen || c.effort.isTick) {
+                c.isKnown = !c.isOpen;
                 c.next = c.last;
                 break;
             }
-            c.isKnown = false;
             // The force was carried along; it may be another where the tissue is now.
             c.isOpen = c.hasGone = false;
             if (confirm(c.start)) {
@@ -376,7 +376,6 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
             continue;
         }
         ++result.cycles;
-        c.isKnown = false;
         c.hasGone = oneCycle(c.isOpen ? c.start : noLimit, result);
         if (!c.hasGone && c.isOpen && !confirm(c.start)) {
             again(result);
@@ -386,13 +385,11 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
         }
         c.isOpen = false;
     }
-    if (c.isOpen) {
-        c.isKnown = false;
-        c.hasGone = confirm(c.start);
-    }
-    if (std::exchange(c.isOpen, false) && !c.hasGone) {
+    if (c.isOpen && !confirm(c.start)) {
         again(result);
+        c.hasGone = false;
     }
+    c.isOpen = false;
 }
 
 void Elastic::finish(ElasticResult& result) noexcept

@@ -176,7 +176,7 @@ private:
         double start = 0;      // energy when the call began, tissue and contacts [J]
         bool isOpen = false;   // the tissue's force was not evaluated where it is
         bool hasGone = false;  // r is a, or the residual
-        bool isKnown = false;  // r is the residual
+        bool isKnown = false;  // r is the residual: it ended balanced
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     bool follow(const Focus& focus) noexcept;

@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -90,6 +91,8 @@ struct alignas(64) ContactSite {
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
+    /// Takes Coulomb's limit, by the push as it is.
+    void limitBy(double friction) noexcept { limit = friction / gripOfPush * std::max(depth, 0.0); }
     double grip() const noexcept { return gripOfPush * stiffness; }
     /// By how much the force falls when the point moves by v [N].
     Vec3 resist(Vec3 v) const noexcept

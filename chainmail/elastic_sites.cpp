@@ -122,7 +122,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     for (ContactSite& s : active()) {
         touch(s, shapes_, ties_);
         if (const double friction = frictionOf(s); friction > 0.0) {
-            s.limit = friction / ContactSite::gripOfPush * std::max(s.depth, 0.0);
+            s.limitBy(friction);
             press(s);
         }
     }
@@ -189,7 +189,7 @@ void Elastic::letSlip() noexcept
         if (friction <= 0.0) {
             continue;
         }
-        s.limit = friction / ContactSite::gripOfPush * std::max(s.depth, 0.0);
+        s.limitBy(friction);
         const Vec3 along = s.along();
         const double length = glm::length(along);
         s.slip = length > s.limit ? s.limit / length * along : along;

@@ -1,10 +1,8 @@
 #include <datasets/scene_text.h>
 
 #include <datasets/toml_fields.h>
-#include <volume/direction.h>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
@@ -32,15 +30,11 @@ Vec3 readDown(Section& section, std::string_view named, std::string_view directe
     if (const auto index = section.choice(named, names)) {
         return patientPostures[*index].down;
     }
-    auto direction = section.point(directed, largest);
+    const auto direction = section.direction(directed, largest);
     if (!direction) {
         section.missing(named, fmt::format("{}; or {}, [x, y, z]", fmt::join(names, ", "), directed));
     }
-    direction = volume::rescaled(*direction);
-    if (!(glm::length(*direction) > 0)) {
-        section.refuse(directed, "a direction must not be [0, 0, 0]");
-    }
-    return glm::normalize(*direction);
+    return *direction;
 }
 
 std::string downText(std::string_view named, std::string_view directed, Vec3 down)

@@ -2,7 +2,6 @@
 
 #include <base/units.h>
 #include <datasets/toml_fields.h>
-#include <volume/direction.h>
 
 #include <glm/geometric.hpp>
 
@@ -35,15 +34,11 @@ constexpr std::array<Field<ProbeStep>, 7> probeStepFields{{
 // Any length but 0, given as three numbers; the unit vector.
 Vec3 readDirection(Section& section, std::string_view key)
 {
-    auto v = section.point(key, farthestCoordinate);
-    if (!v) {
+    const auto direction = section.direction(key, farthestCoordinate);
+    if (!direction) {
         section.missing(key, "a direction [x, y, z] in the patient frame LPS");
     }
-    v = volume::rescaled(*v);
-    if (!(glm::length(*v) > 0)) {
-        section.refuse(key, "a direction must not be [0, 0, 0]");
-    }
-    return glm::normalize(*v);
+    return *direction;
 }
 
 std::string triple(Vec3 v)

@@ -1,9 +1,11 @@
 #include <datasets/toml_section.h>
 
 #include <base/inputs.h>
+#include <volume/direction.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -269,6 +271,19 @@ std::optional<Vec3> Section::point(std::string_view key, double limit)
         }
     }
     return p;
+}
+
+std::optional<Vec3> Section::direction(std::string_view key, double limit)
+{
+    const auto given = point(key, limit);
+    if (!given) {
+        return std::nullopt;
+    }
+    const Vec3 way = volume::rescaled(*given);
+    if (!(glm::length(way) > 0)) {
+        refuse(key, "a direction must not be [0, 0, 0]");
+    }
+    return glm::normalize(way);
 }
 
 std::optional<Section> Section::section(std::string_view key)

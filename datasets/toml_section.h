@@ -38,6 +38,8 @@ public:
     std::optional<std::size_t> choice(std::string_view key, std::span<const std::string_view> choices);
     /// Three numbers in mm, as metres; each within `limit` mm of 0.
     std::optional<Vec3> point(std::string_view key, double limit);
+    /// A direction of any length but 0, as point(): the unit vector.
+    std::optional<Vec3> direction(std::string_view key, double limit);
     /// A table inside this one; its title is "[outer.key]".
     std::optional<Section> section(std::string_view key);
     /// The tables of an array; titles "[[key]]".

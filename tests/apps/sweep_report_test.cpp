@@ -65,6 +65,21 @@ double placeOf(const std::string& chart, const std::string& text)
     return at == std::string::npos || place == std::string::npos ? -1 : std::stod(chart.substr(chart.find(' ', place)));
 }
 
+// Runs the short plan with so many steps of its first axis and another name for one, and draws it. The report's file.
+std::string reportWith(const Folder& here, int steps, const std::string& axis, const std::string& name)
+{
+    std::string text = shortPlan(1);
+    const auto put = [&](const std::string& what, const std::string& instead) {
+        text.replace(text.find(what), what.size(), instead);
+    };
+    put("steps = 3", "steps = " + std::to_string(steps));
+    put("name = \"" + axis + "\"", "name = \"" + name + "\"");
+    writeText(here / "p.toml", text);
+    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
+    figures({"sweep", "--report", here / "s"});
+    return here / "s" / "report.html";
+}
+
 // On a telephone each name of the legend has a row of its own, above the curves. Values that are put into bins are said to
 // be so below them.
 TEST(SweepReport, TheLegendLiesAboveTheCurvesAndBinsAreNamed)
@@ -73,13 +88,8 @@ TEST(SweepReport, TheLegendLiesAboveTheCurvesAndBinsAreNamed)
         GTEST_SKIP() << "no chromium here (Debian: chromium)";
     }
     const Folder here;
-    std::string text = shortPlan(1);
-    text.replace(text.find("steps = 3"), 9, "steps = 14");
-    text.replace(text.find("name = \"depth_mm\""), 17, "name = \"depth_of_the_finger_in_the_tissue_mm\"");
-    writeText(here / "p.toml", text);
-    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
-    figures({"sweep", "--report", here / "s"});
-    const std::string page = documentOf("file://" + std::string(here / "s" / "report.html"), here / "profile", "420,1400");
+    const std::string file = reportWith(here, 14, "depth_mm", "depth_of_the_finger_in_the_tissue_mm");
+    const std::string page = documentOf("file://" + file, here / "profile", "420,1400");
     const std::string curve = partOf(page, "curve");
     // The highest line of the grid: "M74 116.5L423 116.5".
     double top = 1e9;
@@ -131,15 +141,10 @@ TEST(SweepReport, NoTextsOfANarrowPageLieOnEachOther)
         GTEST_SKIP() << "no chromium here (Debian: chromium)";
     }
     const Folder here;
-    std::string text = shortPlan(1);
-    text.replace(text.find("steps = 3"), 9, "steps = 12");
-    text.replace(text.find("name = \"youngs_kpa\""), 19, "name = \"youngs_modulus_of_the_fat_around_it_kpa\"");
-    writeText(here / "p.toml", text);
-    figures({"sweep", here / "p.toml", "-o", here / "s", "--jobs", "2"});
-    figures({"sweep", "--report", here / "s"});
-    const std::string wide = documentOf("file://" + std::string(here / "s" / "report.html"), here / "profile", "1280,1400");
+    const std::string file = reportWith(here, 12, "youngs_kpa", "youngs_modulus_of_the_fat_around_it_kpa");
+    const std::string wide = documentOf("file://" + file, here / "profile", "1280,1400");
     EXPECT_NE(wide.find("id=\"fields\"></span>"), std::string::npos);
-    std::string narrow = readText(here / "s" / "report.html");
+    std::string narrow = readText(file);
     narrow.insert(narrow.find("</head>"), "<style>html { width: 390px }</style>");  // a window of chromium is wider
     writeText(here / "narrow.html", narrow);
     const std::string page = documentOf("file://" + std::string(here / "narrow.html"), here / "profile");
