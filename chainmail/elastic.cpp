@@ -14,13 +14,13 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double minEnergy = 1e-9;    // of tissue that springs back: with less it is at rest, within some micrometres [J]
-constexpr double forgets = 10.0;      // longest times of relaxation after which nothing is left of it
-constexpr int callsPerTurn = 2;       // from one term of the history to the next
-constexpr int callsOfGiven = 20;      // in which windows that take over find their displacement
-constexpr double maxBalance = 1.5;    // of forces that are far from balanced: these are taken as they are
-constexpr double farAfterMove = 2.0;  // in what is far off else: one cycle more, so that windows that moved are not felt
-constexpr int refreshPeriod = 256;    // calls after which forces that are carried along are computed anew
+constexpr double minEnergy = 1e-9;  // of tissue that springs back: with less it is at rest, within some micrometres [J]
+constexpr double forgets = 10.0;    // longest times of relaxation after which nothing is left of it
+constexpr int callsPerTurn = 2;     // from one term of the history to the next
+constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
+constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
+constexpr int moreAfterMove = 2;    // cycles, so that windows that moved are not felt
+constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
 
@@ -249,37 +249,16 @@ bool Elastic::follow(const Focus& focus) noexcept
 
 ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
 {
-    return makeWay(load) ? ElasticResult{.moved = true} : relaxWhile(load, part());
-}
-
-// To move the windows is work enough for a call: the load waits for the next, and until then the tools have the forces that
-// they had.
-bool Elastic::makeWay(const ElasticLoad& load) noexcept
-{
     if (atRest_ || !follow(load.focus)) {
-        return false;
+        return relaxWhile(load, part());
     }
+    // To move the windows is work enough for a call.
     refreshForces();
     sinceRefresh_ = 0;
     const int lost = waiting_ ? waiting_->periods : 0;
     waiting_ = load;
     waiting_->periods += lost;
-    return true;
-}
-
-ElasticResult Elastic::relax(const ElasticLoad& load) noexcept
-{
-    if (waiting_ || !goesOn(load) || !makeWay(load)) {
-        return relaxWhile(load, tick());
-    }
-    // Between the calls sites are asked for, as by those who measure the contact's area.
-    for (ContactSite& s : active()) {
-        locate(stack_.body(), stack_.windows(), s.anchor, s);
-    }
-    ElasticResult result = felt_;
-    result.moved = true;
-    result.cycles = result.shortened = 0;
-    return result;
+    return {.moved = true};
 }
 
 ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) noexcept
@@ -318,8 +297,8 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     }
     hasIncrement_ = options_.warmStart;
     // No hand feels tissue that springs back.
-    course_.usual = isTouched ? effort.cycles : 1;
-    course_.last = course_.usual + (isTouched && effort.far > 0.0 ? (result.moved ? 2 : 1) : 0);
+    course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
+    course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
     // A call that has only a part of the cycles has none beside a search for surface points.
     solve(effort.inParts ? (sinceFound_ == 0 && course_.hasGone ? 0 : 1) : course_.last, result);
     finish(result);
@@ -355,10 +334,7 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
 {
     Course& c = course_;
     for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
-        const double tolerance = c.next == 0         ? c.effort.first
-                                 : c.next < c.usual  ? c.effort.further
-                                 : c.next == c.usual ? c.effort.far
-                                                     : farAfterMove * c.effort.far;
+        const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? c.effort.further : c.effort.far;
         result.residual = refreshResidual(c.hasGone);
         if (isBalanced(result.residual, tolerance)) {
             if (!c.isOpen || c.effort.isTick) {
@@ -402,7 +378,6 @@ void Elastic::finish(ElasticResult& result) noexcept
     balance();
     measure(result);
     findLag();
-    felt_ = result;
 }
 
 // Virtual work along the displacement itself: the tissue's own, over that of the contacts.

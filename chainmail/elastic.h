@@ -74,7 +74,7 @@ public:
 
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
-    ElasticResult relax(const ElasticLoad& load) noexcept;
+    ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
     /// As relax(), in parts, for a load whose force nobody waits for: here at most one cycle, a search for surface points,
     /// or a move of the windows; goOn() has the rest. Without friction, moves, searches and steps that are shortened twice,
     /// the parts end with the bits of relax().
@@ -180,8 +180,6 @@ private:
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     bool follow(const Focus& focus) noexcept;
-    bool makeWay(const ElasticLoad& load) noexcept;
-    bool goesOn(const ElasticLoad& load) const noexcept;
     void solve(int most, ElasticResult& result) noexcept;
     bool isBalanced(double residual, double tolerance) const noexcept;
     void finish(ElasticResult& result) noexcept;
@@ -254,7 +252,6 @@ private:
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
     Course course_;
-    ElasticResult felt_;                  // of the last call that solved
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them

@@ -58,16 +58,6 @@ bool Elastic::sitesHold(std::span<const ElasticTool> tools) const noexcept
     return true;
 }
 
-// True where tools alone touch the body, and the last call had them next to where they are.
-bool Elastic::goesOn(const ElasticLoad& load) const noexcept
-{
-    const double far = drift * stack_.body().levels.front().nodes.spacing;
-    const auto isNear = [&](const ElasticTool& tool, const Vec3& before) {
-        return glm::distance(tool.shape.a, before) <= far;
-    };
-    return touching_ > 0 && touching_ == siteCount_ && load.ties.empty() && std::ranges::equal(load.tools, toolAt_, isNear);
-}
-
 bool Elastic::tiesHold(std::span<const Tie> ties) const noexcept
 {
     return std::ranges::equal(ties, tiesFound_, [](const Tie& a, const Tie& b) { return a.holdsAs(b); });
