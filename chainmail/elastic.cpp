@@ -19,7 +19,8 @@ constexpr double forgets = 10.0;    // longest times of relaxation after which n
 constexpr int callsPerTurn = 2;     // from one term of the history to the next
 constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
 constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;    // cycles, so that windows that moved are not felt
+constexpr int moreAfterMove = 2;    // cycles in a tick, so that windows that moved are not felt,
+constexpr double moreFor = 3.0;     // for what is out of balance by this many times what a tick bears otherwise
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
@@ -334,7 +335,8 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
 {
     Course& c = course_;
     for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
-        const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? c.effort.further : c.effort.far;
+        const double further = (result.moved && c.effort.isTick ? moreFor : 1.0) * c.effort.further;
+        const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? further : c.effort.far;
         result.residual = refreshResidual(c.hasGone);
         if (isBalanced(result.residual, tolerance)) {
             if (!c.isOpen || c.effort.isTick) {
@@ -423,7 +425,7 @@ void Elastic::measure(ElasticResult& result) noexcept
             ++result.contacts;
             result.depth = std::max(result.depth, s.depth);
             HeldTool& held = held_[s.owner];
-            held.depth = std::max(held.depth, s.depth);
+            held.depth = std::max(held.depth, s.depth * static_cast<double>(s.resolved));
             held.load += glm::length(s.force);
             s.stretch = areaRatio(s);
             held.stretch = std::max(held.stretch, s.stretch);

@@ -53,6 +53,14 @@ double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& t
     return std::min(penalty * youngsModulusOf(p.mu) / spacing, cap) * static_cast<double>(p.area);
 }
 
+// How much more compliance than the finest cells those around a site lack, over its own. What is as stiff as may be gives
+// way less than that in cells of any size.
+double coarserThanFinest(const ContactSite& site, const SurfacePoint& p, double spacing) noexcept
+{
+    const double uncapped = penalty * youngsModulusOf(p.mu) / spacing * static_cast<double>(site.area);
+    return 1.0 + (std::ldexp(1.0, site.level) - 1.0) * site.atRest / uncapped;
+}
+
 // A unit vector across a unit vector.
 Vec3 acrossOf(Vec3 way) noexcept
 {
@@ -225,8 +233,10 @@ private:
             --count_;
             return false;
         }
-        const Vec3 normal(body_.points[added.point].normal);
-        added.between = static_cast<float>(betweenNodes(body_.levels.front().nodes, added.anchor, normal * normal).b);
+        const SurfacePoint& point = body_.points[added.point];
+        const Vec3 normal(point.normal);
+        added.coarser = static_cast<float>(coarserThanFinest(added, point, body_.levels.front().nodes.spacing));
+        added.between = static_cast<float>(betweenNodes(body_.levels[added.level].nodes, added.anchor, normal * normal).b);
         return true;
     }
 
@@ -370,7 +380,7 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
     return {glm::mix(mean.b, place.b, isRound), glm::mix(mean.square, place.square, isRound)};
 }
 
-double resolvedShare(double radiusInCells, double along, const Between& across) noexcept
+double resolvedShare(double radiusInCells, double along, const Between& across, double coarser) noexcept
 {
     const Between mean;
     const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
@@ -383,7 +393,7 @@ double resolvedShare(double radiusInCells, double along, const Between& across) 
     const double lacks =
         glm::mix(lacksAt(from), lacksAt(to), t) +
         0.3 * along * std::min(radiusInCells / 0.75, 1.0) * std::max(1.0 - radiusInCells * radiusInCells / 16.0, 0.0);
-    return 1.0 / (1.0 + penalty * std::max(lacks, 0.0));
+    return 1.0 / (1.0 + penalty * coarser * std::max(lacks, 0.0));
 }
 
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept

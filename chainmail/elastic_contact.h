@@ -88,6 +88,8 @@ struct alignas(64) ContactSite {
     std::uint32_t point = 0;  // index of the surface point
     float between = 0;        // of the surface point: betweenNodes() along its normal
     float area = 0;           // of the surface that it stands for, at rest [m^2]
+    float coarser = 1;        // see resolvedShare()
+    float resolved = 1;       // fraction of its stiffness that wider cells leave it
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
@@ -195,9 +197,12 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
 /// m, g and q are functions of a / h; all end at 2. They and the factor of `along` are what a ball on a half-space (Hertz
 /// 1882; nu 0.45 to 0.49) needs on grids shifted along and across the surface; `palpate accuracy --verify` has the errors
 /// that are left.
+///
+/// A point in a wider window lies in cells that are `coarser` times as wide as h: they lack as many times the compliance.
+/// @param radiusInCells  in cells of its window
 /// @param along   betweenNodes() of the point along the surface's normal
 /// @param across  and of the tool
-double resolvedShare(double radiusInCells, double along, const Between& across) noexcept;
+double resolvedShare(double radiusInCells, double along, const Between& across, double coarser = 1.0) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

@@ -118,25 +118,32 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
 }
 
-// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells resolve, by
-// Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves, so that a call keeps one energy.
+// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells of a window
+// resolve, by Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves, so that a call keeps one
+// energy.
 void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
-    const auto& grid = body.levels.front().nodes;
-    std::array<double, maxTools> patch{};  // radius, in cells
-    std::array<Between, maxTools> across;  // where its middle is
-    for (std::size_t i = 0; i < tools_.size(); ++i) {
-        patch[i] = tools_[i].pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tools_[i]) / grid.spacing;
-        across[i] = betweenNodes(grid, tools_[i]);
-    }
     AreaRatio areaRatio(body, stack_.windows());
+    const ContactSite* before = nullptr;
+    double patch = 0.0;  // radius, in cells
+    Between across;      // where its middle is
     for (ContactSite& s : active()) {
-        if (!s.isTie) {
-            // What moved last was measured then.
-            const double ratio = volume::isSmall(options_.law) ? 1.0 : s.stretch > 0.0 ? s.stretch : areaRatio(s);
-            s.stiffness = resolvedShare(patch[s.owner], s.between, across[s.owner]) * ratio * s.atRest;
+        if (s.isTie) {
+            continue;
         }
+        if (before == nullptr || before->owner != s.owner || before->level != s.level) {
+            const ElasticTool& tool = tools_[s.owner];
+            const auto& grid = body.levels[s.level].nodes;
+            patch = tool.pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tool) / grid.spacing;
+            across = betweenNodes(grid, tool);
+            before = &s;
+        }
+        // What moved last was measured then.
+        const double ratio = volume::isSmall(options_.law) ? 1.0 : s.stretch > 0.0 ? s.stretch : areaRatio(s);
+        const double share = resolvedShare(patch, s.between, across, static_cast<double>(s.coarser));
+        s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
+        s.stiffness = share * ratio * s.atRest;
     }
 }
 

@@ -14,6 +14,7 @@ namespace {
 constexpr int newtonSteps = 3;        // of a line search: contacts open and close along it
 constexpr int maxShortenings = 8;     // of a step that raises the energy
 constexpr int maxInParts = 1;         // the same, where a call has only a part of the cycles: each costs an evaluation
+constexpr int maxFromAbove = 2;       // the same, where the increment may have led up: then no step is short enough
 constexpr double rounding = 1e-6;     // relative: sums of single-precision products are no better
 constexpr double minStiffness = 0.1;  // of a direction, in what is expected along the preconditioned residual
 constexpr double maxNearness = 10.0;  // of that expectation, bounds
@@ -155,7 +156,7 @@ bool Elastic::takeStep(const Direction& to, double limit, ElasticResult& result)
     const Along& contacts = to.contacts;
     const double slope = to.tissue.slope;
     const double steepness = slope + contacts.slope;
-    const int most = course_.effort.inParts ? maxInParts : maxShortenings;
+    const int most = course_.effort.inParts ? maxInParts : limit > noLimit ? maxFromAbove : maxShortenings;
     double length = lineSearch(slope, to.tissue.curvature, contacts, 1);
     double gone = 0.0;
     for (int i = 0, searches = 0; length != 0.0;) {

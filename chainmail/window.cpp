@@ -9,11 +9,6 @@ namespace palpate::chainmail {
 
 namespace {
 
-bool onFace(const Layout& l, Index3 n) noexcept
-{
-    return n.x == 0 || n.y == 0 || n.z == 0 || n.x == l.nx - 1 || n.y == l.ny - 1 || n.z == l.nz - 1;
-}
-
 // True when one of the cells from `first` to `last` is not empty.
 bool anyTissue(const Layout& l, const Floats& mu, Index3 first, Index3 last) noexcept
 {
@@ -123,19 +118,43 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
     for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
         placeTerm(level, i);
     }
-    volume::forEachIndex(Index3(0), size() - 1, [&](Index3 n) {
+    placeNodes(level);
+    if (coarsest) {
+        return;
+    }
+    const auto follow = [&](Index3 n) {
         const std::size_t node = layout.at(n.x, n.y, n.z);
-        const std::size_t inLevel = level.nodes.offset(low + n);
-        const float sum = level.diagonal[inLevel];
-        const bool held = level.fixed[inLevel] != 0;
-        const bool follows = !coarsest && onFace(layout, n);
-        border[node] = follows && !held ? 1.0F : 0.0F;
-        open[node] = held ? 0.0F : 1.0F;
-        tissue[node] = sum > 0.0F ? 1.0F : 0.0F;
-        const bool isFree = !held && !follows && sum > 0.0F;
-        diagonal[node] = isFree ? 1.0F / sum : 0.0F;
-        dof[node] = isFree ? 1.0F : 0.0F;
-    });
+        border[node] = open[node];
+        diagonal[node] = dof[node] = 0.0F;
+    };
+    const Index3 last = size() - 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        Index3 first(0), end = last;
+        end[axis] = 0;
+        volume::forEachIndex(first, end, follow);
+        first[axis] = end[axis] = last[axis];
+        volume::forEachIndex(first, end, follow);
+    }
+}
+
+// The masks of a window without a border.
+void Window::placeNodes(const CellLevel& level) noexcept
+{
+    std::fill(border.begin(), border.end(), 0.0F);
+    for (int k = 0; k < layout.nz; ++k) {
+        for (int j = 0; j < layout.ny; ++j) {
+            const std::size_t from = level.nodes.offset(low + Index3(0, j, k));
+            const std::size_t to = layout.at(0, j, k);
+            for (std::size_t i = 0; i < static_cast<std::size_t>(layout.nx); ++i) {
+                const float sum = level.diagonal[from + i];
+                const bool isHeld = level.fixed[from + i] != 0, isFree = !isHeld && sum > 0.0F;
+                open[to + i] = isHeld ? 0.0F : 1.0F;
+                tissue[to + i] = sum > 0.0F ? 1.0F : 0.0F;
+                diagonal[to + i] = isFree ? 1.0F / sum : 0.0F;
+                dof[to + i] = isFree ? 1.0F : 0.0F;
+            }
+        }
+    }
 }
 
 void Window::placeTerm(const CellLevel& level, std::size_t i) noexcept
@@ -172,6 +191,9 @@ void Window::cover(const Window& finer) noexcept
     // A node on the finer window's border may be left with nothing but empty cells around it.
     const auto pulled = [&](Index3 n) {
         bool any = anyTissue(layout, uncoveredMu, n - 1, n);
+        if (any) {
+            return true;
+        }
         const Index3 fine = 2 * (n - o);
         volume::forEachIndex(glm::max(fine - 1, Index3(0)), glm::min(fine + 1, finer.size() - 1), [&](Index3 m) {
             any =

@@ -153,6 +153,7 @@ struct Window {
     void cover(const Window& finer) noexcept;
 
 private:
+    void placeNodes(const CellLevel& level) noexcept;
     void placeTerm(const CellLevel& level, std::size_t i) noexcept;
 };
 

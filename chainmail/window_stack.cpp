@@ -100,12 +100,19 @@ void WindowStack::place() noexcept
             low_[l + 1] -= 2 * Index3(glm::greaterThan(low_[l + 1], most));
         }
     }
+    bool finerMoves = false;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
-        windows_[l].place(body_->levels[l], low_[l], l + 1 == windows_.size());
-        if (l > 0) {
-            windows_[l].cover(windows_[l - 1]);
+        Window& w = windows_[l];
+        const bool moves = !isPlaced_ || w.low != low_[l];
+        if (moves || finerMoves) {
+            w.place(body_->levels[l], low_[l], l + 1 == windows_.size());
+            if (l > 0) {
+                w.cover(windows_[l - 1]);
+            }
         }
+        finerMoves = moves;
     }
+    isPlaced_ = true;
 }
 
 bool WindowStack::follow(const Focus& focus, bool carry) noexcept
