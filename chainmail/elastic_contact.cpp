@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
 
 namespace palpate::chainmail {
@@ -170,13 +171,14 @@ private:
     bool mayTouch(const occupancy::ShapeDistance& shape, const SurfaceCell& cell) noexcept
     {
         const auto& grid = body_.levels.front().nodes;
-        ContactSite middle;
-        middle.rest = grid.position(cell.cell) + 0.5 * grid.spacing;
-        locate(body_, windows_, middle.rest, middle);
-        if (middle.level >= windows_.size()) {
-            return false;
+        const Vec3 rest = grid.position(cell.cell) + 0.5 * grid.spacing;
+        const double near = near_ + 1.2 * grid.spacing;
+        if (shape.distance(rest) < near) {
+            return true;
         }
-        return nearest(shape, middle.rest, gather(windows_, middle, Field::u)) < near_ + 1.2 * grid.spacing;
+        ContactSite middle;
+        locateMiddle(windows_, cell.cell, middle);
+        return middle.level < windows_.size() && shape.distance(rest + gather(windows_, middle, Field::u)) < near;
     }
 
     void addCell(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
@@ -184,8 +186,11 @@ private:
     {
         const double spacing = body_.levels.front().nodes.spacing;
         for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
+            if (count_ == out_.size()) {
+                return;
+            }
             const SurfacePoint& point = body_.points[i];
-            ContactSite site;
+            ContactSite& site = *std::construct_at(&out_[count_]);
             site.rest = Vec3(point.position);
             site.anchor = Vec3(point.anchor);
             site.owner = static_cast<std::uint16_t>(index);
@@ -203,7 +208,7 @@ private:
     void quarterLast(const occupancy::ShapeDistance& shape) noexcept
     {
         const ContactSite whole = out_[count_ - 1];
-        if (nearest(shape, whole.rest, whole.u) > close * body_.levels.front().nodes.spacing) {
+        if (!isNear(shape, whole, close * body_.levels.front().nodes.spacing)) {
             return;
         }
         --count_;
@@ -212,7 +217,10 @@ private:
         const double quarter = 0.25 * std::sqrt(static_cast<double>(point.area));
         const Vec3 one = quarter * acrossOf(normal), other = glm::cross(normal, one);
         for (const Vec3& off : {-one - other, one - other, other - one, one + other}) {
-            ContactSite site = whole;
+            if (count_ == out_.size()) {
+                return;
+            }
+            ContactSite& site = out_[count_] = whole;
             site.rest += off;
             site.anchor += hasTissue(site.anchor + off) ? off : Vec3(0.0);
             site.atRest = site.stiffness = 0.25 * whole.atRest;
@@ -223,38 +231,42 @@ private:
 
     bool hasTissue(Vec3 at) const noexcept { return muAt(body_.levels.front(), at) > 0.0F; }
 
+    // The site at the list's end stays there where a tool is near.
     bool addIfNear(const occupancy::ShapeDistance& shape, ContactSite& site) noexcept
     {
-        if (!add(site)) {
+        if (!meetsTissue(site) || !isNear(shape, site, near_)) {
             return false;
         }
-        ContactSite& added = out_[count_ - 1];
-        if (nearest(shape, added.rest, added.u) > near_) {
-            --count_;
-            return false;
-        }
-        const SurfacePoint& point = body_.points[added.point];
+        const SurfacePoint& point = body_.points[site.point];
         const Vec3 normal(point.normal);
-        added.coarser = static_cast<float>(coarserThanFinest(added, point, body_.levels.front().nodes.spacing));
-        added.between = static_cast<float>(betweenNodes(body_.levels[added.level].nodes, added.anchor, normal * normal).b);
+        site.coarser = static_cast<float>(coarserThanFinest(site, point, body_.levels.front().nodes.spacing));
+        site.between = static_cast<float>(betweenNodes(body_.levels[site.level].nodes, site.anchor, normal * normal).b);
+        ++count_;
         return true;
     }
 
     // Tissue that a tool left behind still has to find back to it.
-    static double nearest(const occupancy::ShapeDistance& shape, Vec3 rest, Vec3 u) noexcept
+    static bool isNear(const occupancy::ShapeDistance& shape, const ContactSite& site, double near) noexcept
     {
-        return std::min(shape.distance(rest + u), shape.distance(rest));
+        return shape.distance(site.rest) <= near || shape.distance(site.rest + site.u) <= near;
     }
 
-    bool add(ContactSite& site) noexcept
+    // Where it is, and how it has moved. False where no window has it.
+    bool meetsTissue(ContactSite& site) const noexcept
     {
         locate(body_, windows_, site.anchor, site);
-        if (site.level >= windows_.size() || count_ == out_.size()) {
+        if (site.level >= windows_.size()) {
             return false;
         }
         site.u = gather(windows_, site, Field::u);
-        out_[count_++] = site;
         return true;
+    }
+
+    void add(ContactSite& site) noexcept
+    {
+        if (count_ < out_.size() && meetsTissue(site)) {
+            out_[count_++] = site;
+        }
     }
 
     const ElasticBody& body_;
