@@ -12,6 +12,8 @@
 
 namespace palpate::chainmail {
 
+inline constexpr double penalty = 20.0;  // contact stiffness per area, in E / h
+
 /// A rigid tool that tissue cannot enter.
 struct ElasticTool {
     occupancy::RoundCone shape;  // where it is now [m]

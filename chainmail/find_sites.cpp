@@ -1,0 +1,307 @@
+// Which points of the surface tools may touch, how stiff they are, and where ties hold.
+#include <chainmail/elastic_contact.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+namespace palpate::chainmail {
+
+namespace {
+
+constexpr double coarse = 0.11;          // area of a surface point that is quartered, in that of a cell's face,
+constexpr double close = 0.3;            // and how far from the tool it may be [cells]
+constexpr double lengthRounding = 1e-6;  // of a rod, in cells
+
+// Stiffness of a surface point by its area at rest. A whole contact must not be stiffer than `stiffest`: spread over a
+// quarter of the tool's cross-section, what a shallow press touches.
+double touchedAtFirst(double radius) noexcept
+{
+    return 0.25 * std::numbers::pi * radius * radius;
+}
+
+double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
+{
+    const double cap = tool.stiffest / touchedAtFirst(tool.shape.widest());
+    return std::min(penalty * youngsModulusOf(p.mu) / spacing, cap) * static_cast<double>(p.area);
+}
+
+// How much more compliance than the finest cells those around a site lack, over its own. What is as stiff as may be gives
+// way less than that in cells of any size.
+double coarserThanFinest(const ContactSite& site, const SurfacePoint& p, double spacing) noexcept
+{
+    const double uncapped = penalty * youngsModulusOf(p.mu) / spacing * static_cast<double>(site.area);
+    return 1.0 + (std::ldexp(1.0, site.level) - 1.0) * site.atRest / uncapped;
+}
+
+// A unit vector across a unit vector.
+Vec3 acrossOf(Vec3 way) noexcept
+{
+    const Vec3 size = glm::abs(way);
+    const Vec3 axis = size.x <= size.y && size.x <= size.z ? Vec3(1, 0, 0)
+                      : size.y <= size.z                   ? Vec3(0, 1, 0)
+                                                           : Vec3(0, 0, 1);
+    return glm::normalize(glm::cross(way, axis));
+}
+
+class Finder {
+public:
+    Finder(const ElasticBody& body, std::span<const Window> windows, double near, std::span<ContactSite> out)
+        : body_(body), windows_(windows), near_(near), out_(out)
+    {
+    }
+
+    void addTie(const Tie& tie, std::size_t index) noexcept
+    {
+        ContactSite site;
+        site.rest = site.anchor = tie.rest;
+        site.owner = static_cast<std::uint16_t>(index);
+        site.isTie = true;
+        site.stiffness = tie.along;
+        site.across = tie.across;
+        site.normal = tie.axis;
+        if (tie.piece.isRod()) {
+            addRod(tie, site, index);
+        } else {
+            add(site);
+        }
+    }
+
+    void addTool(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        const auto& s = tool.shape;
+        const double radius = s.widest() + near_ + grid.spacing;
+        const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.pushed) - radius;
+        const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.pushed) + radius;
+        // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
+        const Vec3 last(grid.size - 2);
+        const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), last));
+        const Index3 to(glm::clamp(glm::floor((high - grid.origin) / grid.spacing), Vec3(0.0), last));
+        for (int z = from.z; z <= to.z; ++z) {
+            for (int y = from.y; y <= to.y; ++y) {
+                addRow(tool, shape, index, static_cast<std::size_t>(y + z * grid.size.y), from.x, to.x);
+            }
+        }
+    }
+
+    std::size_t count() const noexcept { return count_; }
+
+private:
+    // A piece of a rod: rings of points around it, one per cell along it. Points that would lie outside of the tissue move
+    // with the axis.
+    void addRod(const Tie& tie, ContactSite site, std::size_t index) noexcept
+    {
+        const auto mu = static_cast<double>(muAt(body_.levels.front(), tie.rest));
+        locate(body_, windows_, tie.rest, site);
+        if (mu <= 0.0 || site.level >= windows_.size()) {
+            return;
+        }
+        // Next to a window's border cells give way as little as those of the next coarser window, which hold it.
+        const std::size_t level = std::min<std::size_t>(site.level + (atBorder(site) ? 1U : 0U), windows_.size() - 1);
+        const double spacing = body_.levels[level].nodes.spacing;
+        const double rings = std::max(1.0, std::ceil(tie.piece.length / spacing - lengthRounding));
+        const RodRing ring = ringOf({tie.piece.radius, tie.piece.length / rings, tie.piece.rod}, mu, spacing);
+        site.stiffness = ring.along / ring.points;
+        site.across = ring.across / ring.points;
+        const Vec3 one = acrossOf(tie.restAxis), other = glm::cross(tie.restAxis, one);
+        for (double r = 0.0; r < rings; ++r) {
+            const Vec3 middle = tie.rest + tie.piece.length * ((r + 0.5) / rings - 0.5) * tie.restAxis;
+            for (double i = 0.0; i < ring.points; ++i) {
+                // Pieces are turned against each other: where cells are long, there are several rings in each.
+                const double angle = 2.0 * std::numbers::pi * (i / ring.points + 0.125 * static_cast<double>(index));
+                site.rest = middle + ring.radius * (std::cos(angle) * one + std::sin(angle) * other);
+                site.anchor = hasTissue(site.rest) ? site.rest : tie.rest;
+                add(site);
+            }
+        }
+    }
+
+    // Of a site's cell: whether the next coarser window holds one of its nodes.
+    bool atBorder(const ContactSite& site) const noexcept
+    {
+        const Window& w = windows_[site.level];
+        for (int c = 0; c < 8; ++c) {
+            if (w.border[w.layout.corner(site.node, c)] != 0.0F) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    void addRow(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index, std::size_t row,
+                int first, int last) noexcept
+    {
+        for (std::uint32_t c = body_.rows[row]; c < body_.rows[row + 1]; ++c) {
+            const SurfaceCell& cell = body_.cells[c];
+            if (cell.cell.x >= first && cell.cell.x <= last && mayTouch(shape, cell)) {
+                addCell(tool, shape, index, cell);
+            }
+        }
+    }
+
+    bool mayTouch(const occupancy::ShapeDistance& shape, const SurfaceCell& cell) noexcept
+    {
+        const auto& grid = body_.levels.front().nodes;
+        const Vec3 rest = grid.position(cell.cell) + 0.5 * grid.spacing;
+        const double near = near_ + 1.2 * grid.spacing;
+        if (shape.distance(rest) < near) {
+            return true;
+        }
+        ContactSite middle;
+        locateMiddle(windows_, cell.cell, middle);
+        return middle.level < windows_.size() && shape.distance(rest + gather(windows_, middle, Field::u)) < near;
+    }
+
+    void addCell(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index,
+                 const SurfaceCell& cell) noexcept
+    {
+        const double spacing = body_.levels.front().nodes.spacing;
+        for (std::uint32_t i = cell.first; i < cell.first + cell.count; ++i) {
+            if (count_ == out_.size()) {
+                return;
+            }
+            const SurfacePoint& point = body_.points[i];
+            ContactSite& site = *std::construct_at(&out_[count_]);
+            site.rest = Vec3(point.position);
+            site.anchor = Vec3(point.anchor);
+            site.owner = static_cast<std::uint16_t>(index);
+            site.point = i;
+            site.atRest = site.stiffness = siteStiffness(point, spacing, tool);
+            site.area = point.area;
+            const bool added = addIfNear(shape, site);
+            if (added && touchesLittle(tool, spacing) && static_cast<double>(point.area) > coarse * spacing * spacing) {
+                quarterLast(shape);
+            }
+        }
+    }
+
+    // The piece of the surface that was added last as four, where it may soon touch.
+    void quarterLast(const occupancy::ShapeDistance& shape) noexcept
+    {
+        const ContactSite whole = out_[count_ - 1];
+        if (!isNear(shape, whole, close * body_.levels.front().nodes.spacing)) {
+            return;
+        }
+        --count_;
+        const SurfacePoint& point = body_.points[whole.point];
+        const Vec3 normal(point.normal);
+        const double quarter = 0.25 * std::sqrt(static_cast<double>(point.area));
+        const Vec3 one = quarter * acrossOf(normal), other = glm::cross(normal, one);
+        for (const Vec3& off : {-one - other, one - other, other - one, one + other}) {
+            if (count_ == out_.size()) {
+                return;
+            }
+            ContactSite& site = out_[count_] = whole;
+            site.rest += off;
+            site.anchor += hasTissue(site.anchor + off) ? off : Vec3(0.0);
+            site.atRest = site.stiffness = 0.25 * whole.atRest;
+            site.area = 0.25F * whole.area;
+            addIfNear(shape, site);
+        }
+    }
+
+    bool hasTissue(Vec3 at) const noexcept { return muAt(body_.levels.front(), at) > 0.0F; }
+
+    // The site at the list's end stays there where a tool is near.
+    bool addIfNear(const occupancy::ShapeDistance& shape, ContactSite& site) noexcept
+    {
+        if (!meetsTissue(site) || !isNear(shape, site, near_)) {
+            return false;
+        }
+        const SurfacePoint& point = body_.points[site.point];
+        const Vec3 normal(point.normal);
+        site.coarser = static_cast<float>(coarserThanFinest(site, point, body_.levels.front().nodes.spacing));
+        site.between = static_cast<float>(betweenNodes(body_.levels[site.level].nodes, site.anchor, normal * normal).b);
+        ++count_;
+        return true;
+    }
+
+    // Tissue that a tool left behind still has to find back to it.
+    static bool isNear(const occupancy::ShapeDistance& shape, const ContactSite& site, double near) noexcept
+    {
+        return shape.distance(site.rest) <= near || shape.distance(site.rest + site.u) <= near;
+    }
+
+    // Where it is, and how it has moved. False where no window has it.
+    bool meetsTissue(ContactSite& site) const noexcept
+    {
+        locate(body_, windows_, site.anchor, site);
+        if (site.level >= windows_.size()) {
+            return false;
+        }
+        site.u = gather(windows_, site, Field::u);
+        return true;
+    }
+
+    void add(ContactSite& site) noexcept
+    {
+        if (count_ < out_.size() && meetsTissue(site)) {
+            out_[count_++] = site;
+        }
+    }
+
+    const ElasticBody& body_;
+    std::span<const Window> windows_;
+    double near_;  // [m]
+    std::span<ContactSite> out_;
+    std::size_t count_ = 0;
+};
+
+}  // namespace
+
+double stiffnessUncapped(const ElasticBody& body, double radius) noexcept
+{
+    const CellLevel& finest = body.levels.front();
+    float mu = 0.0F;
+    for (const SurfacePoint& p : body.points) {
+        const Index3 node(glm::round((Vec3(p.anchor) - finest.nodes.origin) / finest.nodes.spacing));
+        const bool isFixed = finest.nodes.contains(node) && finest.fixed[finest.nodes.offset(node)] != 0;
+        mu = isFixed ? mu : std::max(mu, p.mu);
+    }
+    return std::max(ElasticTool().stiffest, penalty * youngsModulusOf(mu) / finest.nodes.spacing * touchedAtFirst(radius));
+}
+
+double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept
+{
+    const double reach = shape.widest() + 3.0 * spacing;
+    return 2.0 * std::numbers::pi * reach * (2.0 * reach + glm::distance(shape.a, shape.b));
+}
+
+std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) noexcept
+{
+    constexpr double sides = 2.0, quarters = 1024.0;  // what few points near a small patch are more, as four each
+    double whole = 0.0;
+    for (const SurfacePoint& p : body.points) {
+        whole += static_cast<double>(p.area);
+    }
+    const double share = whole > 0.0 ? std::min(sides * area / whole, 1.0) : 0.0;
+    return std::max(least, static_cast<std::size_t>(share * static_cast<double>(body.points.size()) + quarters));
+}
+
+std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
+                      std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept
+{
+    Finder finder(body, windows, near, out);
+    for (std::size_t i = 0; i < tools.size(); ++i) {
+        finder.addTool(tools[i], shapes[i], i);
+    }
+    return finder.count();
+}
+
+std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,
+                     std::span<ContactSite> out) noexcept
+{
+    Finder finder(body, windows, 0.0, out);
+    for (std::size_t i = 0; i < ties.size(); ++i) {
+        finder.addTie(ties[i], i);
+    }
+    return finder.count();
+}
+
+}  // namespace palpate::chainmail
