@@ -14,11 +14,26 @@ namespace palpate::base {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// A link that leads back to itself would be replaced by the file.
+void refuseCircle(const fs::path& file)
+{
+    std::error_code failed;
+    static_cast<void>(fs::status(file, failed));
+    if (failed == std::errc::too_many_symbolic_link_levels) {
+        throw std::runtime_error(file.string() + ": is a symbolic link that leads back to itself: name the file itself");
+    }
+}
+
+}  // namespace
+
 void checkOutput(const fs::path& file)
 {
     if (file.empty() || file == "-") {
         return;
     }
+    refuseCircle(file);
     std::error_code none;
     if (fs::is_directory(file, none) || !file.has_filename()) {
         throw std::runtime_error(file.string() + ": is a folder: give the name of a file");
@@ -81,6 +96,7 @@ fs::path replaceable(const fs::path& file)
     if (takesBytes(file)) {
         throw std::runtime_error(file.string() + ": is no file: give the name of a file");
     }
+    refuseCircle(file);
     std::error_code none;
     const fs::path target = fs::is_symlink(file, none) ? fs::weakly_canonical(file, none) : file;
     return target.empty() ? file : target;

@@ -16,7 +16,7 @@ void checkOutputFolder(const std::filesystem::path& folder);
 bool makeFolders(const std::filesystem::path& folder);
 
 /// What will be replaced when `file` is written whole and put in its place: itself, or what it links to.
-/// Throws std::runtime_error where that is no file: a device or a pipe would be gone.
+/// Throws std::runtime_error where that is no file (a device or a pipe would be gone), or a link that leads to itself.
 std::filesystem::path replaceable(const std::filesystem::path& file);
 
 /// Writes a file that appears whole or not at all; one that is there is replaced. A device or a pipe is written into.

@@ -57,5 +57,16 @@ TEST(Outputs, ALinkStaysALink)
     EXPECT_THROW(writeWhole(folder / "none/of.csv", "x"), std::runtime_error);
 }
 
+TEST(Outputs, ALinkToItselfIsRefusedAndStays)
+{
+    const tests::Folder folder;
+    const std::string one = folder / "one.json", two = folder / "two.json";
+    fs::create_symlink(two, one);
+    fs::create_symlink(one, two);
+    EXPECT_THROW(checkOutput(one), std::runtime_error);
+    EXPECT_THROW(writeWhole(one, "x"), std::runtime_error);
+    EXPECT_TRUE(fs::is_symlink(one));
+}
+
 }  // namespace
 }  // namespace palpate::base
