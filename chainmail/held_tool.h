@@ -18,7 +18,7 @@ namespace palpate::chainmail {
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
-    double depth = 0;     // to which the surface sank into it in the last call [m]
+    double depth = 0;     // to which the surface sank into it in the last call, as it would in the finest cells [m]
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
