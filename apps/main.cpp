@@ -16,7 +16,6 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -29,17 +28,16 @@
 
 namespace {
 
-// `palpate help [COMMAND]` and `palpate version`, as other programs have them. Last word first, as CLI11 takes them.
-std::vector<std::string> wordsOf(int argc, char** argv)
+// `palpate help [COMMAND]` and `palpate version`, as other programs have them.
+std::vector<std::string> commandOf(int argc, char** argv)
 {
-    std::vector<std::string> words(argv + std::min(argc, 1), argv + argc);
-    if (!words.empty() && words[0] == "help") {
-        words.erase(words.begin());
-        words.emplace_back("--help");
-    } else if (!words.empty() && words[0] == "version") {
-        words[0] = "--version";
+    std::vector<std::string> words = palpate::command::wordsOf(argc, argv);
+    if (!words.empty() && words.back() == "help") {
+        words.pop_back();
+        words.insert(words.begin(), "--help");
+    } else if (!words.empty() && words.back() == "version") {
+        words.back() = "--version";
     }
-    std::ranges::reverse(words);
     return words;
 }
 
@@ -125,7 +123,7 @@ int main(int argc, char** argv)
     command::refuseEmptyValues(app);
     command::endOnSignals();
     try {
-        app.parse(wordsOf(argc, argv));
+        app.parse(commandOf(argc, argv));
         checkStandardOutput();
         return 0;
     } catch (const CLI::ParseError& e) {

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace palpate::command {
 
@@ -38,6 +39,20 @@ void refuseEmptyValues(CLI::App& app)
     for (CLI::App* const command : app.get_subcommands([](const CLI::App*) { return true; })) {
         refuseEmptyValues(*command);
     }
+}
+
+std::vector<std::string> wordsOf(int argc, char** argv)
+{
+    std::vector<std::string> words;
+    for (int i = argc - 1; i > 0; --i) {
+        std::string word = argv[i];
+        if (word.size() > 3 && word.starts_with("--") && word.find('=') == word.size() - 1) {
+            words.emplace_back();
+            word.pop_back();
+        }
+        words.push_back(std::move(word));
+    }
+    return words;
 }
 
 void addFalconOptions(CLI::App& command, session::FalconOptions& options)

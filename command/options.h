@@ -5,6 +5,9 @@
 
 #include <CLI/App.hpp>
 
+#include <string>
+#include <vector>
+
 namespace palpate::command {
 
 /// The option --model of a command.
@@ -15,6 +18,10 @@ void addSetting(CLI::App& command, session::SceneChanges& changes);
 /// Call after all options have been added, for a program's app: none of them takes an empty value ("--csv ''", a variable
 /// of a shell that is not set), but for those that may have none (expected(0, 1)).
 void refuseEmptyValues(CLI::App& app);
+
+/// The words of a command line, last first as CLI11 takes them. An empty value behind `=` ("--csv=") is a word of its own:
+/// CLI11 would take the next word.
+std::vector<std::string> wordsOf(int argc, char** argv);
 
 void addFalconOptions(CLI::App& command, session::FalconOptions& options);
 /// Throws std::runtime_error when one of them was given without the Falcon.

@@ -104,6 +104,7 @@ TEST(CommandLine, AnOptionWithAnEmptyValueIsRefused)
     for (const std::string option : {"--csv", "--json", "--at"}) {
         expectRefusal({"press", "block", "--path", folder / "p.csv", option, ""}, option + ": the value is empty");
     }
+    expectRefusal({"press", "block", "--csv=", "--path", folder / "p.csv"}, "--csv: the value is empty");
     const Outcome viewer = Program("palpate-view", {"--json", ""}).wait();
     EXPECT_EQ(viewer.status, 2);
     EXPECT_EQ(viewer.err.find("palpate-view: --json: the value is empty"), 0U) << viewer.err;
