@@ -31,7 +31,7 @@ namespace {
 // `palpate help [COMMAND]` and `palpate version`, as other programs have them.
 std::vector<std::string> commandOf(int argc, char** argv)
 {
-    std::vector<std::string> words = palpate::command::wordsOf(argc, argv);
+    std::vector<std::string> words = palpate::command::argumentsOf(argc, argv);
     if (!words.empty() && words.back() == "help") {
         words.pop_back();
         words.insert(words.begin(), "--help");

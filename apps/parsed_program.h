@@ -30,7 +30,7 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
     add(app);
     command::refuseEmptyValues(app);
     try {
-        app.parse(command::wordsOf(argc, argv));
+        app.parse(command::argumentsOf(argc, argv));
         run();
         return 0;
     } catch (const CLI::ParseError& e) {

@@ -1,3 +1,4 @@
+#include <base/inputs.h>
 #include <base/outputs.h>
 
 #include <fmt/format.h>
@@ -22,7 +23,7 @@ void refuseCircle(const fs::path& file)
     std::error_code failed;
     static_cast<void>(fs::status(file, failed));
     if (failed == std::errc::too_many_symbolic_link_levels) {
-        throw std::runtime_error(file.string() + ": is a symbolic link that leads back to itself: name the file itself");
+        throw std::runtime_error(file.string() + ": " + whyNoFile(file));
     }
 }
 

@@ -425,7 +425,8 @@ void Elastic::measure(ElasticResult& result) noexcept
             ++result.contacts;
             result.depth = std::max(result.depth, s.depth);
             HeldTool& held = held_[s.owner];
-            held.depth = std::max(held.depth, s.depth * static_cast<double>(s.resolved));
+            held.depth = std::max(held.depth, s.depth);
+            held.sunk = std::max(held.sunk, s.depth * static_cast<double>(s.resolved));
             held.load += glm::length(s.force);
             s.stretch = areaRatio(s);
             held.stretch = std::max(held.stretch, s.stretch);

@@ -54,7 +54,7 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     const double most = isSmall ? std::min(wanted, smallStrain * radius) : wanted;
     const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, maxSink * radius);
     const double bears = std::min(sink + onBone * load / tool.stiffest, std::max(sink, mostOnBone * radius));
-    const double further = std::min(bears - depth, ease * radius * (maxStretch - stretch));
+    const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
     friction = tool.friction;

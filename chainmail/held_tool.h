@@ -18,7 +18,8 @@ namespace palpate::chainmail {
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
-    double depth = 0;     // to which the surface sank into it in the last call, as it would in the finest cells [m]
+    double depth = 0;     // to which the surface sank into it in the last call [m]
+    double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
@@ -29,7 +30,7 @@ struct HeldTool {
     /// Nothing is known yet of this call's contacts.
     void forgetContacts() noexcept
     {
-        depth = load = stretch = 0.0;
+        depth = sunk = load = stretch = 0.0;
         lag = Vec3(0.0);
     }
     /// The tool for this call, as deep as the last one lets it go.

@@ -190,10 +190,10 @@ void Window::cover(const Window& finer) noexcept
     volume::forEachIndex(o + 1, o + cells - 1, [&](Index3 n) { dof[layout.at(n.x, n.y, n.z)] = 0.0F; });
     // A node on the finer window's border may be left with nothing but empty cells around it.
     const auto pulled = [&](Index3 n) {
-        bool any = anyTissue(layout, uncoveredMu, n - 1, n);
-        if (any) {
+        if (anyTissue(layout, uncoveredMu, n - 1, n)) {
             return true;
         }
+        bool any = false;
         const Index3 fine = 2 * (n - o);
         volume::forEachIndex(glm::max(fine - 1, Index3(0)), glm::min(fine + 1, finer.size() - 1), [&](Index3 m) {
             any =

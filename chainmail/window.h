@@ -83,9 +83,9 @@ private:
 /// The masks are 1 or 0 per node, so that the kernels multiply where others would branch.
 struct Window {
     Layout layout;
-    Index3 low{0};                        // index of node (0, 0, 0) in the level; even but in the coarsest window
-    Floats mu, lambda;                    // of each cell, times spacing / 32 [N/m]
-    Floats stiffening;                    // of each cell [-]
+    Index3 low{-1};     // index of node (0, 0, 0) in the level; even but in the coarsest window; -1: none yet
+    Floats mu, lambda;  // of each cell, times spacing / 32 [N/m]
+    Floats stiffening;  // of each cell [-]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
     LayerFields layers;                   // of the finest window only
     struct Term {

@@ -103,7 +103,7 @@ void WindowStack::place() noexcept
     bool finerMoves = false;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         Window& w = windows_[l];
-        const bool moves = !isPlaced_ || w.low != low_[l];
+        const bool moves = w.low != low_[l];
         if (moves || finerMoves) {
             w.place(body_->levels[l], low_[l], l + 1 == windows_.size());
             if (l > 0) {
@@ -112,7 +112,6 @@ void WindowStack::place() noexcept
         }
         finerMoves = moves;
     }
-    isPlaced_ = true;
 }
 
 bool WindowStack::follow(const Focus& focus, bool carry) noexcept

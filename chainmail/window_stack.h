@@ -113,7 +113,6 @@ private:
     const Kernels* kernels_;
     std::vector<Window> windows_;
     std::vector<Index3> low_, oldLow_;
-    bool isPlaced_ = false;
     Floats scratch_;
 };
 

@@ -41,7 +41,7 @@ void refuseEmptyValues(CLI::App& app)
     }
 }
 
-std::vector<std::string> wordsOf(int argc, char** argv)
+std::vector<std::string> argumentsOf(int argc, char** argv)
 {
     std::vector<std::string> words;
     for (int i = argc - 1; i > 0; --i) {

@@ -21,7 +21,7 @@ void refuseEmptyValues(CLI::App& app);
 
 /// The words of a command line, last first as CLI11 takes them. An empty value behind `=` ("--csv=") is a word of its own:
 /// CLI11 would take the next word.
-std::vector<std::string> wordsOf(int argc, char** argv);
+std::vector<std::string> argumentsOf(int argc, char** argv);
 
 void addFalconOptions(CLI::App& command, session::FalconOptions& options);
 /// Throws std::runtime_error when one of them was given without the Falcon.

@@ -224,6 +224,11 @@ TEST(ElasticContact, WiderWindowsFeelABallAsTheFinestDoes)
             tests::settle(elastic, tests::loadOf(tools, {}, focus), 1e-4);
             EXPECT_TRUE(std::ranges::all_of(elastic.sites(),
                                             [&](const ContactSite& s) { return !s.active() || s.level == level; }));
+            double deepest = 0.0;
+            for (const ContactSite& s : elastic.sites()) {
+                deepest = std::max(deepest, s.depth);
+            }
+            EXPECT_EQ(elastic.depth(0), deepest);  // what is told is what it is, whatever bounds it
             return -elastic.toolForce(0).y;
         };
         const double force = forceFrom(0.0, 0);
