@@ -418,7 +418,7 @@ void Elastic::measure(ElasticResult& result) noexcept
         held.forgetContacts();
         result.behind = std::max(result.behind, held.behind);
     }
-    AreaRatio areaRatio(stack_.body(), stack_.windows());
+    StretchAt stretchAt(stack_, options_.law);
     for (ContactSite& s : active()) {
         s.stretch = 0.0;
         if (!s.isTie && s.active()) {
@@ -428,7 +428,9 @@ void Elastic::measure(ElasticResult& result) noexcept
             held.depth = std::max(held.depth, s.depth);
             held.sunk = std::max(held.sunk, s.depth * static_cast<double>(s.resolved));
             held.load += glm::length(s.force);
-            s.stretch = areaRatio(s);
+            const Stretch now = stretchAt(s);
+            s.stretch = now.area;
+            s.stiffer = static_cast<float>(now.modulus);
             held.stretch = std::max(held.stretch, s.stretch);
         }
     }

@@ -34,6 +34,7 @@ constexpr double little = 1.25;  // radius of a patch, in cells, up to which sur
 constexpr double slightly = 1e-6;
 constexpr double minRatio = 0.3;  // of areas: bounds far beyond what tissue bears
 constexpr double maxRatio = 30.0;
+constexpr double maxStiffer = 100.0;
 
 }  // namespace
 
@@ -79,13 +80,13 @@ void locateMiddle(std::span<const Window> windows, Index3 cell, ContactSite& sit
     site.level = static_cast<std::uint16_t>(windows.size());
 }
 
-double AreaRatio::operator()(const ContactSite& site) noexcept
+Stretch StretchAt::operator()(const ContactSite& site) noexcept
 {
     if (site.node != node_ || site.level != level_) {
         node_ = site.node;
         level_ = site.level;
-        const Window& w = windows_[site.level];
-        const double quarter = 0.25 / body_.levels[site.level].nodes.spacing;
+        const Window& w = stack_.windows()[site.level];
+        const double quarter = 0.25 / stack_.body().levels[site.level].nodes.spacing;
         std::array<Vec3, 3> f{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
         for (int c = 0; c < 8; ++c) {
             const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
@@ -94,10 +95,16 @@ double AreaRatio::operator()(const ContactSite& site) noexcept
             f[2] += (c & 4) != 0 ? u : -u;
         }
         cofactor_ = {glm::cross(f[1], f[2]), glm::cross(f[2], f[0]), glm::cross(f[0], f[1])};
+        const double change = glm::dot(f[0], cofactor_[0]) - 1.0;
+        const double square = glm::dot(f[0], f[0]) + glm::dot(f[1], f[1]) + glm::dot(f[2], f[2]);
+        const auto b = static_cast<double>(w.stiffening[site.node]);
+        const double i = volume::isochoric(square - 3.0 - 2.0 * change, change).i;
+        const auto beyond = volume::beyond(law_, 1.0, b, i);
+        modulus_ = 1.0 + beyond.slope;
     }
-    const Vec3 n(body_.points[site.point].normal);
+    const Vec3 n(stack_.body().points[site.point].normal);
     const Vec3 area = n.x * cofactor_[0] + n.y * cofactor_[1] + n.z * cofactor_[2];
-    return std::clamp(glm::length(area), minRatio, maxRatio);
+    return {std::clamp(glm::length(area), minRatio, maxRatio), std::min(modulus_, maxStiffer)};
 }
 
 Between betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept

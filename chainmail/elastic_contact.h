@@ -52,8 +52,9 @@ struct ElasticLoad {
 ///
 /// The penalty grows with the square of the depth, E = k depth^2 / 2 at each surface point, so that the force is smooth
 /// when the tool slides, and the sum of all sites' forces is the gradient of one energy. A sphere on a grid of nodes would
-/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area as the
-/// tissue lies now: under a pressure p a tool sinks in by p h / 20 E, however far the surface under it is stretched.
+/// pop from node to node; points four times as dense as the nodes, with their areas, do not. k = 20 E / h per area, both as
+/// the tissue lies now: under a pressure p a tool sinks in by p h / 20 E, however far the surface under it is stretched,
+/// and however much the tissue stiffens by that.
 ///
 /// Friction is a spring along the surface up to Coulomb's limit, softer than the push: under a friction of mu p a point
 /// slips by mu p h / 2 E until it slides, 0.1 mm and less. As stiff as the push it would slide and stick from one call to
@@ -86,12 +87,13 @@ struct alignas(64) ContactSite {
 
     Vec3 anchor{0.0};         // the point in a cell that it moves with [m]
     double atRest = 0;        // stiffness of a surface point, by its area at rest [N/m]
-    double stretch = 0;       // areaRatio() at the end of the last call; 0: not known
+    double stretch = 0;       // of its area at the end of the last call, see StretchAt; 0: not known
     std::uint32_t point = 0;  // index of the surface point
     float between = 0;        // of the surface point: betweenNodes() along its normal
     float area = 0;           // of the surface that it stands for, at rest [m^2]
     float coarser = 1;        // see resolvedShare()
     float resolved = 1;       // fraction of its stiffness that wider cells leave it
+    float stiffer = 1;        // by which its tissue had stiffened at the end of the last call, see StretchAt
 
     bool active() const noexcept { return isTie || depth > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
@@ -140,6 +142,9 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept;
 /// no hand will feel. At least the standard.
 double stiffnessUncapped(const ElasticBody& body, double radius) noexcept;
 
+/// What the contact of a tool is at most as stiff as, per area of the surface now: ElasticTool::stiffest, spread over a
+/// quarter of the tool's cross-section, what a shallow press touches [N/m^3].
+double stiffestPerArea(const ElasticTool& tool) noexcept;
 /// Of the patch that a tool touches, sqrt(R d) by Hertz [m].
 double radiusOfPatch(const ElasticTool& tool) noexcept;
 /// True while that is so small that each surface point is quartered.
@@ -162,20 +167,26 @@ std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, 
 std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,
                      std::span<ContactSite> out) noexcept;
 
-/// Area of the surface around a site now, over that at rest: |cof(F) N|, F the cell's mean deformation gradient and N the
-/// normal at rest (Nanson's formula), within bounds that keep a cell that is turned inside out from having its say.
-/// Remembers the last cell: sites of one cell follow each other.
-class AreaRatio {
+/// The surface around a site now, over that at rest.
+struct Stretch {
+    double area = 1;  // |cof(F) N|, F the cell's mean deformation gradient and N the normal at rest (Nanson's formula) [-]
+    double modulus = 1;  // shear modulus, by the law of material at F [-]
+};
+
+/// Stretch at sites, within bounds that keep a cell that is turned inside out from having its say. Remembers the last cell:
+/// sites of one cell follow each other.
+class StretchAt {
 public:
-    AreaRatio(const ElasticBody& body, std::span<const Window> windows) noexcept : body_(body), windows_(windows) {}
-    double operator()(const ContactSite& site) noexcept;
+    StretchAt(const WindowStack& stack, const volume::Law& law) noexcept : stack_(stack), law_(law) {}
+    Stretch operator()(const ContactSite& site) noexcept;
 
 private:
-    const ElasticBody& body_;
-    std::span<const Window> windows_;
+    const WindowStack& stack_;
+    volume::Law law_;
     std::uint32_t node_ = 0;
     std::uint32_t level_ = ~0U;
     std::array<Vec3, 3> cofactor_{};  // columns of cof(F)
+    double modulus_ = 1;
 };
 
 /// How far between nodes a place is: over the edges of a cell, each with its weight, sums of b = f (1 - f) and of b^2, f

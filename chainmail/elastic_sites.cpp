@@ -16,6 +16,7 @@ constexpr double reach = 0.6;         // spacings from a tool within which surfa
 constexpr double drift = 0.25;        // spacings that a tool may move until they are looked for again
 constexpr int stillPeriod = 64;       // calls after which they are beside ties, which drag tissue to a tool that rests
 constexpr double lacksNothing = 4.0;  // radius of a patch, in cells: taken where a tool's depth is not known
+constexpr double stiffened = 10.0;    // a contact whose tissue stiffens: times ElasticTool::stiffest
 
 // How many sites ties take, at most.
 std::size_t placesOf(std::span<const Tie> ties, double spacing) noexcept
@@ -118,15 +119,16 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     }
 }
 
-// Contacts press on the area that the tissue has now, and are softer while a tool touches less than the cells of a window
-// resolve, by Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves, so that a call keeps one
-// energy.
+// Contacts press on the area that the tissue has now, as stiffly as it is now, and are softer while a tool touches less
+// than the cells of a window resolve, by Hertz's radius of what it touches, sqrt(R d). Both are kept while a call solves,
+// so that a call keeps one energy.
 void Elastic::spreadPressure() noexcept
 {
     const auto& body = stack_.body();
-    AreaRatio areaRatio(body, stack_.windows());
+    StretchAt stretchAt(stack_, options_.law);
     const ContactSite* before = nullptr;
     double patch = 0.0;  // radius, in cells
+    double most = 0.0;   // stiffness per area
     Between across;      // where its middle is
     for (ContactSite& s : active()) {
         if (s.isTie) {
@@ -137,13 +139,16 @@ void Elastic::spreadPressure() noexcept
             const auto& grid = body.levels[s.level].nodes;
             patch = tool.pushed == Vec3(0.0) ? lacksNothing : radiusOfPatch(tool) / grid.spacing;
             across = betweenNodes(grid, tool);
+            most = stiffestPerArea(tool);
             before = &s;
         }
         // What moved last was measured then.
-        const double ratio = volume::isSmall(options_.law) ? 1.0 : s.stretch > 0.0 ? s.stretch : areaRatio(s);
+        const Stretch now = volume::isSmall(options_.law) ? Stretch{}
+                            : s.stretch > 0.0             ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
+                                                          : stretchAt(s);
         const double share = resolvedShare(patch, s.between, across, static_cast<double>(s.coarser));
         s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
-        s.stiffness = share * ratio * s.atRest;
+        s.stiffness = share * now.area * std::min(now.modulus * s.atRest, stiffened * most * static_cast<double>(s.area));
     }
 }
 

@@ -18,17 +18,15 @@ constexpr double coarse = 0.11;          // area of a surface point that is quar
 constexpr double close = 0.3;            // and how far from the tool it may be [cells]
 constexpr double lengthRounding = 1e-6;  // of a rod, in cells
 
-// Stiffness of a surface point by its area at rest. A whole contact must not be stiffer than `stiffest`: spread over a
-// quarter of the tool's cross-section, what a shallow press touches.
 double touchedAtFirst(double radius) noexcept
 {
     return 0.25 * std::numbers::pi * radius * radius;
 }
 
+// Stiffness of a surface point by its area at rest.
 double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& tool) noexcept
 {
-    const double cap = tool.stiffest / touchedAtFirst(tool.shape.widest());
-    return std::min(penalty * youngsModulusOf(p.mu) / spacing, cap) * static_cast<double>(p.area);
+    return std::min(penalty * youngsModulusOf(p.mu) / spacing, stiffestPerArea(tool)) * static_cast<double>(p.area);
 }
 
 // How much more compliance than the finest cells those around a site lack, over its own. What is as stiff as may be gives
@@ -254,6 +252,11 @@ private:
 };
 
 }  // namespace
+
+double stiffestPerArea(const ElasticTool& tool) noexcept
+{
+    return tool.stiffest / touchedAtFirst(tool.shape.widest());
+}
 
 double stiffnessUncapped(const ElasticBody& body, double radius) noexcept
 {

@@ -65,11 +65,11 @@ struct Finite {
         for (int i = 0; i < 3; ++i) {
             square += f[i][0] * f[i][0] + f[i][1] * f[i][1] + f[i][2] * f[i][2];
         }
-        // I_C - 3 - 2 (J - 1), where it is more than 0.
-        const Lanes stretch = square - 2.0F * (minors + determinant);
-        const Lanes more = stretch > 0.0F ? stretch : Lanes{};
+        const volume::Invariant<Lanes> stretch = volume::isochoric(square - 2.0F * (minors + determinant), volume);
         const volume::Stiffening<Lanes> beyond =
-            Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, more);
+            Law::beyond(mu, stiffening != nullptr ? load(stiffening + cell) : Lanes{}, stretch.i);
+        const Lanes shear = mu + beyond.slope * stretch.byShape;
+        const Lanes pushed = pressure + 0.5F * beyond.slope * stretch.byVolume;
         Lanes p[3][3];
 #pragma GCC unroll 3
         for (int i = 0; i < 3; ++i) {
@@ -77,8 +77,7 @@ struct Finite {
             for (int j = 0; j < 3; ++j) {
                 // Cofactor of F, less I: tr G I - G^T + cof G.
                 const Lanes cofactor = c[i][j] - f[j][i] + (i == j ? trace : Lanes{});
-                p[i][j] =
-                    h8 * ((mu + beyond.slope) * (f[i][j] - cofactor) + pressure * (i == j ? cofactor + 1.0F : cofactor));
+                p[i][j] = h8 * (shear * (f[i][j] - cofactor) + pushed * (i == j ? cofactor + 1.0F : cofactor));
             }
         }
         g[0].x = p[0][0];

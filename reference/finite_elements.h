@@ -21,8 +21,8 @@ namespace palpate::reference {
 ///
 /// beyond() being the law's own, the very function that the kernel calls (volume/law.h).
 ///
-/// Tissue stiffens by the isochoric I, which is never negative: pressure alone does not stiffen it. The kernel takes I_C -
-/// 3 - 2 (J - 1) where it is positive: the same but for the square of the change of volume.
+/// Tissue stiffens by the isochoric I, which is never negative: pressure alone does not stiffen it. The kernel has a series
+/// for the root in it (volume::isochoric).
 ///
 /// The tool pushes by the augmented Lagrangian  (lambda - r gap)_+^2 / 2r  per area at rest, lambda linear on faces, gap
 /// measured from where a point is to the tool itself, at small strain too.

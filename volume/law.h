@@ -20,6 +20,35 @@ struct Stiffening {
     Number curvature{};  // d(slope)/dI [as mu]
 };
 
+/// The invariant I of a stretch, and its derivatives.
+template <typename Number>
+struct Invariant {
+    Number i{};         // not under 0; there no law has a slope [-]
+    Number byShape{};   // dI / d(shape)
+    Number byVolume{};  // dI / d(change)
+};
+
+/// I = J^(-2/3) I_C - 3, which pressure alone does not change: J^(-2/3) times (shape + w), w being what `shape` lacks where
+/// only the volume changes, 3 + 2 (J - 1) - 3 J^(2/3). Both are their series about J = 1, with one term more for J < 1, and
+/// constant beyond J = 0 and 1.6: so nothing ends where a cell is inverted. I is right within 2 % from J = 0.65 to 1.3.
+/// @param shape   I_C - 3 - 2 (J - 1): both arguments without small differences of large numbers
+/// @param change  J - 1
+template <typename Number>
+[[gnu::always_inline]] inline Invariant<Number> isochoric(Number shape, Number change) noexcept
+{
+    constexpr float most = 0.6F;  // where the quadratic of J^(-2/3) is lowest
+    const Number above = change > most ? Number{} + most : change;
+    const Number v = above < -1.0F ? Number{} - 1.0F : above;
+    const Number pressed = v < 0.0F ? v : Number{};
+    const Number square = v * v, cube = pressed * square;
+    const Number share = 1.0F + v * (v * (5.0F / 9.0F) - 2.0F / 3.0F) - cube * (40.0F / 81.0F);
+    const Number slope = v * (10.0F / 9.0F) - 2.0F / 3.0F - pressed * v * (40.0F / 27.0F);
+    const Number whole = shape + square * (1.0F / 3.0F - v * (4.0F / 27.0F)) + cube * v * (7.0F / 81.0F);
+    const Number lacks = v * (2.0F / 3.0F - v * (4.0F / 9.0F)) + cube * (28.0F / 81.0F);
+    const Number i = share * whole;
+    return {i > 0.0F ? i : Number{}, share, v == change ? slope * whole + share * lacks : Number{}};
+}
+
 /// Least and largest stiffening b that a tissue may have: from -1/4 on more stretch is always more stress [-].
 inline constexpr double minStiffening = -0.25;
 inline constexpr double maxStiffening = 1000;
@@ -104,8 +133,8 @@ struct Exponential {
 /// Goes, T. Kim, "Stable Neo-Hookean Flesh Simulation", ACM Trans. Graphics 37, 2018) and what its beyond() adds. Its
 /// parameters are a tissue's Young's modulus, Poisson's ratio and stiffening b (TissueRow). A new law is a struct as these,
 /// and a place at the end of this list: scenes, the kernel, the reference and the planner go through it. `work` is what a
-/// node costs in a tick, in neo-Hookean's, and `reach` how straight its stress is. The kernel's cells take for I what a
-/// change of volume leaves as it is, but for its square: I_C - 3 - 2 (J - 1).
+/// node costs in a tick, in neo-Hookean's, and `reach` how straight its stress is. The kernel's cells take I from
+/// isochoric().
 using Law = std::variant<SmallStrain, NeoHookean, Exponential>;
 inline constexpr std::size_t lawCount = std::variant_size_v<Law>;
 

@@ -155,10 +155,10 @@ private:
 double contactArea(const Elastic& elastic) noexcept
 {
     double area = 0.0;
-    chainmail::AreaRatio ratio(elastic.body(), elastic.stack().windows());
+    chainmail::StretchAt stretchAt(elastic.stack(), volume::SmallStrain{});
     for (const chainmail::ContactSite& site : elastic.sites()) {
         if (!site.isTie && site.active()) {
-            area += ratio(site) * static_cast<double>(site.area);
+            area += stretchAt(site).area * static_cast<double>(site.area);
         }
     }
     return area;

@@ -45,7 +45,7 @@ void expectItsEnergy(double b)
         cells.move([&](Index3 n) { return (stretch - 1.0) * Vec3(n); });
         const double i = glm::dot(stretch, stretch) - 3.0;
         const double j = stretch.x * stretch.y * stretch.z - 1.0;
-        const double felt = std::max(i - 2.0 * j, 0.0);
+        const double felt = volume::isochoric(i - 2.0 * j, j).i;
         const double density = 0.5 * mu * i - mu * j + 0.5 * (lambda + mu) * j * j + Law::beyond(mu, b, felt).energy;
         EXPECT_NEAR(applyOf<Law>(cells), density * 11 * 5 * 4, 2e-5 * density * 220) << b << " " << i;
     }
@@ -85,6 +85,27 @@ void expectBoth()
             expectItsEnergy<Law>(b);
             expectItsForce<Law>(b);
         }
+    }
+}
+
+// I by its series is J^(-2/3) I_C - 3, and its derivatives are those of it, inverted cells included.
+TEST(ElasticLaws, TheInvariantOfCellsIsTheIsochoricOne)
+{
+    for (const double change : {-0.35, -0.2, -0.05, 0.0, 0.1, 0.3}) {
+        for (const double shape : {0.05, 0.5, 4.0, 30.0}) {
+            const double whole = std::pow(1.0 + change, -2.0 / 3.0) * (shape + 3.0 + 2.0 * change) - 3.0;
+            EXPECT_NEAR(volume::isochoric(shape, change).i, whole, 0.02 * whole + 0.02 * std::abs(change))
+                << change << shape;
+        }
+    }
+    for (const double change : {-3.0, -0.8, -0.3, 0.0, 0.3, 0.59, 2.0}) {
+        const double shape = 2.0, step = 1e-4;
+        const auto at = volume::isochoric(shape, change);
+        EXPECT_NEAR((volume::isochoric(shape + step, change).i - volume::isochoric(shape - step, change).i) / (2.0 * step),
+                    at.byShape, 1e-5);
+        EXPECT_NEAR((volume::isochoric(shape, change + step).i - volume::isochoric(shape, change - step).i) / (2.0 * step),
+                    at.byVolume, 1e-3)
+            << change;
     }
 }
 
