@@ -19,8 +19,7 @@ constexpr double forgets = 10.0;    // longest times of relaxation after which n
 constexpr int callsPerTurn = 2;     // from one term of the history to the next
 constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
 constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
-constexpr int moreAfterMove = 2;    // cycles in a tick, so that windows that moved are not felt,
-constexpr double moreFor = 3.0;     // for what is out of balance by this many times what a tick bears otherwise
+constexpr double afterMove = 3.0;   // a second cycle in a tick in which windows move: for so much more out of balance
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
@@ -71,6 +70,7 @@ void Elastic::settle() noexcept
     siteCount_ = touching_ = 0;
     for (HeldTool& held : held_) {
         held.forgetContacts();
+        held.blend.forget();
     }
     if (atRest_) {
         return;
@@ -298,11 +298,14 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     }
     hasIncrement_ = options_.warmStart;
     // No hand feels tissue that springs back.
-    course_.usual = isTouched ? effort.cycles + (result.moved ? moreAfterMove : 0) : 1;
+    course_.usual = isTouched ? effort.cycles : 1;
     course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
     // A call that has only a part of the cycles has none beside a search for surface points.
     solve(effort.inParts ? (sinceFound_ == 0 && course_.hasGone ? 0 : 1) : course_.last, result);
     finish(result);
+    if (effort.isTick && !effort.inParts) {
+        blendMoves(result.moved);
+    }
     return result;
 }
 
@@ -335,7 +338,7 @@ void Elastic::solve(int most, ElasticResult& result) noexcept
 {
     Course& c = course_;
     for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
-        const double further = (result.moved && c.effort.isTick ? moreFor : 1.0) * c.effort.further;
+        const double further = (result.moved && c.effort.isTick ? afterMove : 1.0) * c.effort.further;
         const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? further : c.effort.far;
         result.residual = refreshResidual(c.hasGone);
         if (isBalanced(result.residual, tolerance)) {
@@ -451,6 +454,16 @@ double Elastic::loadForce() const noexcept
 {
     const double contacts = contactForce();
     return stack_.body().relaxes ? std::max(contacts, std::sqrt(stack_.dot(Field::h, Field::h))) : contacts;
+}
+
+// Each tool's force from where the windows were to where they are.
+void Elastic::blendMoves(bool moved) noexcept
+{
+    for (std::size_t i = 0; i < held_.size(); ++i) {
+        HeldTool& held = held_[i];
+        const Vec3 whole = force(i, false) - held.blend.offset();
+        held.blend.count(whole, tools_[i].shape.a + held.behind * held.inward, moved);
+    }
 }
 
 Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept

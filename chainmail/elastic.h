@@ -223,6 +223,7 @@ private:
     void balance() noexcept;
     void findLag() noexcept;
     void measure(ElasticResult& result) noexcept;
+    void blendMoves(bool moved) noexcept;
     Vec3 force(std::size_t owner, bool isTie) const noexcept;
 
     ElasticOptions options_;

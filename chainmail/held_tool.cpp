@@ -73,7 +73,8 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
 
 Vec3 HeldTool::force(Vec3 felt) const noexcept
 {
-    const Vec3 sum = (given > 0.0 ? std::pow(1.0 + behind / given, 1.5) : 1.0) * (felt - lag) - stopped * inward;
+    const Vec3 sum =
+        (given > 0.0 ? std::pow(1.0 + behind / given, 1.5) : 1.0) * (felt - lag) - stopped * inward + blend.offset();
     const double into = glm::dot(sum, inward);
     return friction > 0.0 || into <= 0.0 ? sum : sum - into * inward;
 }

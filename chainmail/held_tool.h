@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chainmail/elastic_contact.h>
+#include <chainmail/move_blend.h>
 
 namespace palpate::chainmail {
 
@@ -24,6 +25,7 @@ struct HeldTool {
     double stretch = 0;   // largest area under it in the last call, over that at rest [-]
     double friction = 0;  // Coulomb [-]
     Vec3 inward{0.0};     // unit vector along its way; or zero
+    MoveBlend blend;      // over moves of the windows
     Vec3 lag{0.0};        // by which the force along the surface is too large, see Elastic::findLag() [N]
     double stopped = 0;   // force by which what is held in space stops the real tool [N]
 

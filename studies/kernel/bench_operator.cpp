@@ -101,7 +101,7 @@ void timeSet(const Kernels& k, const MachineRates& rates, Cube& cube, std::vecto
 OperatorCost operatorCost(bool finiteStrain) noexcept
 {
     constexpr double bytes = 8 * sizeof(float);
-    return finiteStrain ? OperatorCost{316, 227, bytes} : OperatorCost{128, 28, bytes};
+    return finiteStrain ? OperatorCost{329, 248, bytes} : OperatorCost{128, 28, bytes};
 }
 
 double minTime(const OperatorCost& cost, const MachineRates& rates) noexcept

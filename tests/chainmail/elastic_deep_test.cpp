@@ -217,9 +217,9 @@ TEST(ElasticDeep, StiffTissueDoesNotPassThroughTheTool)
     }
 }
 
-// At one and a half radii sideways: no pull; no tick changes the force by more than 1.5 %, though windows move; and where a
-// block is the same all along and its sides are far, nothing pushes sideways. Without what findLag() takes off, single
-// ticks were off by 8 %.
+// At one and a half radii sideways: no pull; no tick changes the force by more than half a percent, though windows move;
+// and where a block is the same all along and its sides are far, nothing pushes sideways. Without what findLag() takes off,
+// single ticks were off by 8 %, and without MoveBlend by 1.2 %.
 TEST(ElasticDeep, DraggedDeepTheForceIsEven)
 {
     const ElasticBody body = softBlock();
@@ -229,7 +229,7 @@ TEST(ElasticDeep, DraggedDeepTheForceIsEven)
     way.step = 0.0;
     way.dragTo(16e-3);
     EXPECT_NEAR(way.force(), force, 0.04 * force);
-    EXPECT_LT(way.step, 0.015 * force);
+    EXPECT_LT(way.step, 0.005 * force);
     EXPECT_LT(way.sideways, 0.02 * force);
     way.to(-0.5e-3);
     EXPECT_LE(way.pull, 0.0);

@@ -162,7 +162,7 @@ void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes
             ASSERT_TRUE(allFinite(elastic)) << "push " << i;
         }
     }
-    EXPECT_GT(contacts, pushes / 12);
+    EXPECT_GT(contacts, pushes / 16);
     // Tissue that relaxes has to come back first.
     for (int i = 0; i < 20000 && !elastic.atRest() && body.relaxes; ++i) {
         elastic.relax({});
