@@ -91,6 +91,9 @@ int main(int argc, char** argv)
             what = unknown[0] + ": there is no such command or option" +
                    (meant.empty() ? "" : "; did you mean " + meant + "?");
         }
+        if (what.ends_with("not expected: ")) {
+            what += "\"\"; an option that takes no value has no = behind it";
+        }
         return "palpate: " + what + " (see palpate --help)\n";
     });
 

@@ -105,6 +105,8 @@ TEST(CommandLine, AnOptionWithAnEmptyValueIsRefused)
         expectRefusal({"press", "block", "--path", folder / "p.csv", option, ""}, option + ": the value is empty");
     }
     expectRefusal({"press", "block", "--csv=", "--path", folder / "p.csv"}, "--csv: the value is empty");
+    expectRefusal({"train", "block", "--headless="},
+                  "The following argument was not expected: \"\"; an option that takes no value has no =");
     const Outcome viewer = Program("palpate-view", {"--json", ""}).wait();
     EXPECT_EQ(viewer.status, 2);
     EXPECT_EQ(viewer.err.find("palpate-view: --json: the value is empty"), 0U) << viewer.err;
