@@ -303,9 +303,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     // A call that has only a part of the cycles has none beside a search for surface points.
     solve(effort.inParts ? (sinceFound_ == 0 && course_.hasGone ? 0 : 1) : course_.last, result);
     finish(result);
-    if (effort.isTick && !effort.inParts) {
-        blendMoves(result.moved);
-    }
+    blendMoves(effort.isTick && !effort.inParts, result.moved);
     return result;
 }
 
@@ -456,17 +454,20 @@ double Elastic::loadForce() const noexcept
     return stack_.body().relaxes ? std::max(contacts, std::sqrt(stack_.dot(Field::h, Field::h))) : contacts;
 }
 
-// Each tool's force from where the windows were to where they are.
-void Elastic::blendMoves(bool moved) noexcept
+// Each tool's force from where the windows were to where they are. What is solved otherwise than tick by tick has its own.
+void Elastic::blendMoves(bool isTick, bool moved) noexcept
 {
     for (std::size_t i = 0; i < held_.size(); ++i) {
         HeldTool& held = held_[i];
-        const Vec3 whole = force(i, false) - held.blend.offset();
-        held.blend.count(whole, tools_[i].shape.a + held.behind * held.inward, moved);
+        if (isTick) {
+            held.blend.count(held.ownForce(sumOfContacts(i, false)), tools_[i].shape.a + held.behind * held.inward, moved);
+        } else {
+            held.blend.forget();
+        }
     }
 }
 
-Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept
+Vec3 Elastic::sumOfContacts(std::size_t owner, bool isTie) const noexcept
 {
     Vec3 sum(0.0);
     for (const ContactSite& s : sites()) {
@@ -474,7 +475,13 @@ Vec3 Elastic::force(std::size_t owner, bool isTie) const noexcept
             sum -= balance_ * s.force;
         }
     }
-    return isTie || owner >= held_.size() ? sum : held_[owner].force(sum);
+    return sum;
+}
+
+Vec3 Elastic::toolForce(std::size_t i) const noexcept
+{
+    const Vec3 sum = sumOfContacts(i, false);
+    return i < held_.size() ? held_[i].force(sum) : sum;
 }
 
 }  // namespace palpate::chainmail

@@ -97,8 +97,9 @@ public:
     /// the displacement itself stands here.) A frictionless tool that alone touches the body, without ties, also has the
     /// lag of the force along the surface taken off: there the displacement goes along with the tool, and -du/dx stands for
     /// the dual solution, see findLag().
-    Vec3 toolForce(std::size_t i) const noexcept { return force(i, false); }
-    Vec3 tieForce(std::size_t i) const noexcept { return force(i, true); }
+    /// Over a move of the windows, toolForce() is blended, see MoveBlend.
+    Vec3 toolForce(std::size_t i) const noexcept;
+    Vec3 tieForce(std::size_t i) const noexcept { return sumOfContacts(i, true); }
     /// By how much tool `i` of the last load is held back, see HeldTool [m].
     double behind(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].behind; }
     /// How deep the surface is in tool `i` of the last load, as deep as that is held back [m].
@@ -223,8 +224,8 @@ private:
     void balance() noexcept;
     void findLag() noexcept;
     void measure(ElasticResult& result) noexcept;
-    void blendMoves(bool moved) noexcept;
-    Vec3 force(std::size_t owner, bool isTie) const noexcept;
+    void blendMoves(bool isTick, bool moved) noexcept;
+    Vec3 sumOfContacts(std::size_t owner, bool isTie) const noexcept;
 
     ElasticOptions options_;
     volume::Reach reach_;

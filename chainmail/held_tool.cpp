@@ -71,12 +71,15 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     return felt;
 }
 
-Vec3 HeldTool::force(Vec3 felt) const noexcept
+Vec3 HeldTool::ownForce(Vec3 felt) const noexcept
 {
-    const Vec3 sum =
-        (given > 0.0 ? std::pow(1.0 + behind / given, 1.5) : 1.0) * (felt - lag) - stopped * inward + blend.offset();
-    const double into = glm::dot(sum, inward);
-    return friction > 0.0 || into <= 0.0 ? sum : sum - into * inward;
+    return outward((given > 0.0 ? std::pow(1.0 + behind / given, 1.5) : 1.0) * (felt - lag) - stopped * inward);
+}
+
+Vec3 HeldTool::outward(Vec3 force) const noexcept
+{
+    const double into = glm::dot(force, inward);
+    return friction > 0.0 || into <= 0.0 ? force : force - into * inward;
 }
 
 }  // namespace palpate::chainmail

@@ -40,7 +40,12 @@ struct HeldTool {
     ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool isSmall, bool holdsBack) noexcept;
     /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
     /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
-    Vec3 force(Vec3 felt) const noexcept;
+    Vec3 force(Vec3 felt) const noexcept { return outward(ownForce(felt) + blend.offset()); }
+    /// The same of the windows where they are.
+    Vec3 ownForce(Vec3 felt) const noexcept;
+
+private:
+    Vec3 outward(Vec3 force) const noexcept;
 };
 
 }  // namespace palpate::chainmail

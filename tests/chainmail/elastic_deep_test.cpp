@@ -118,6 +118,18 @@ public:
         along_ = along;
     }
     double force() const { return -elastic_.toolForce(0).y; }
+    // Solved to convergence where the tool is: the force, less that of the contacts.
+    Vec3 offConverged()
+    {
+        ElasticTool tool = tests::ball(entry_ + Vec3(along_, depth_ - radius_, 0.0), radius_, stiffest);
+        tool.pushed = Vec3(0.0, depth_, 0.0);
+        elastic_.relax(tests::loadOf({&tool, 1}, {}, entry_ + Vec3(along_, 0.0, 0.0)), 300, 1e-4);
+        Vec3 off = elastic_.toolForce(0);
+        for (const ContactSite& s : elastic_.sites()) {
+            off += s.force;
+        }
+        return off;
+    }
 
     ElasticResult last;
     double stiffest = 1e6;  // of the contact [N/m]
@@ -233,6 +245,20 @@ TEST(ElasticDeep, DraggedDeepTheForceIsEven)
     EXPECT_LT(way.sideways, 0.02 * force);
     way.to(-0.5e-3);
     EXPECT_LE(way.pull, 0.0);
+}
+
+// What is solved to convergence is not blended with what was felt before.
+TEST(ElasticDeep, WhatIsConvergedIsTheContactsForce)
+{
+    const ElasticBody body = softBlock();
+    Way way(body, middle, 6e-3, 0.0, asInASession);
+    way.to(6e-3);
+    bool moved = false;
+    for (double along = 0.0; !moved; along += 20e-6) {
+        way.tick(6e-3, along);
+        moved = way.last.moved;
+    }
+    EXPECT_LT(glm::length(way.offConverged()), 1e-3 * way.force());
 }
 
 // A tool that comes by a radius per tick does not get through a plate of one cell: what holds it never lets go.
