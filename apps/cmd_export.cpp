@@ -94,9 +94,7 @@ void checkOptions(ExportArguments& o)
     if (!isVtu(o.output) && !isPng(o.output)) {
         volume::checkExportName(o.output);
     }
-    base::checkOutput(o.output);
-    base::checkOutput(o.map);
-    base::checkOutput(o.json);
+    base::checkOutputs({o.output, o.map, o.json}, {o.volume, o.record, o.like});
 }
 
 double timeFrom(const std::string& text)

@@ -63,9 +63,8 @@ void checkOptions(const ImportArguments& o)
         throw std::runtime_error(o.output.string() + ": a volume is a .vdb file: name it so");
     }
     prepare::checkRequest(o);
-    base::checkOutput(o.output);
-    base::checkOutput(o.mapping.writeMap);
-    base::checkOutput(o.json);
+    base::checkOutputs({o.output, o.mapping.writeMap, o.json},
+                       {o.input, o.image, o.stiffness, o.tissues, o.mapping.map, o.mapping.names});
 }
 
 void runImport(ImportArguments o)

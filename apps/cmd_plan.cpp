@@ -119,7 +119,7 @@ void printReference(const Plan& plan, const planner::PlanCosts& costs, const std
 
 void planScene(const PlanArguments& o)
 {
-    base::checkOutput(o.json);
+    base::checkOutputs({o.json}, {o.scene, o.costs});
     planner::PlanRequest request;
     request.error = base::parseShare("--error", o.error);
     if (!o.forceError.empty()) {

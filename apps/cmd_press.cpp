@@ -239,8 +239,7 @@ void warnOfSmall(const Run& run)
 
 void runPress(const PressArguments& o)
 {
-    base::checkOutput(o.json);
-    base::checkOutput(o.csv);
+    base::checkOutputs({o.json, o.csv}, {o.scene, o.path, o.at});
     if (o.json == "-" && o.csv == "-") {
         throw std::runtime_error("--json -, --csv -: standard output takes one of them: give the other a file");
     }

@@ -84,7 +84,7 @@ void exportOne(const ProfileArguments& o)
 {
     const ProfileStore store = open(o);
     const fs::path to = o.output.empty() ? fs::path("-") : o.output;
-    base::checkOutput(to);
+    base::checkOutputs({to}, {store.file()});
     command::writeJson(to, store.exported(store.find(o.name)));
 }
 

@@ -143,10 +143,8 @@ void printSessionsOf(const PersonProgress& p)
 
 void run(const ProgressArguments& o)
 {
-    for (const fs::path& file : {o.html, o.csv, o.xapi, o.json}) {
-        base::checkOutput(file);
-    }
     const training::ProfileStore store(o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles);
+    base::checkOutputs({o.html, o.csv, o.xapi, o.json}, {store.file()});
     Curricula curricula;
     std::vector<std::string> asked;
     for (const std::string& id : o.curricula) {

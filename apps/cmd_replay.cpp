@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/build.h>
+#include <base/outputs.h>
 #include <command/json.h>
 
 #include <haptics/record_check.h>
@@ -64,6 +65,7 @@ std::string faultsOf(const haptics::Record& record, const haptics::ReplayResult&
 
 void replayRecord(const ReplayArguments& o)
 {
+    base::checkOutputs({o.json}, {o.file});
     const haptics::Record record(o.file);
     const auto model = session::reopenSession(o.file, record.info());
     const auto result = haptics::replay(record, model);

@@ -247,8 +247,7 @@ void printWays(const Scene& scene, const FoundWays& found, const SceneArguments&
 
 void runScene(const SceneArguments& o)
 {
-    base::checkOutput(o.output);
-    base::checkOutput(o.json);
+    base::checkOutputs({o.output, o.json}, {o.volume});
     std::optional<double> margin;
     if (!o.margin.empty()) {
         margin = base::lengthFrom("--margin", o.margin, 0, 6e-3);

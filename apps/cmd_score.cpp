@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/build.h>
+#include <base/outputs.h>
 #include <command/json.h>
 #include <report/groups.h>
 #include <report/measure_table.h>
@@ -15,6 +16,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -203,6 +205,9 @@ void scoreRecord(const ScoreArguments& options)
     if (sessions.empty()) {
         throw std::runtime_error("score: give at least one record, or --group NAME=FILE,FILE");
     }
+    std::vector<std::filesystem::path> read;
+    std::ranges::transform(sessions, std::back_inserter(read), &Session::file);
+    base::checkOutputs({options.json, options.report}, read);
     warn(sessions);
     std::vector<report::ScoredGroup> all;
     for (const Group& g : groups) {

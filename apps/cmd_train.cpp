@@ -171,14 +171,13 @@ void applyTask(TrainArguments& o)
 // Everything that would fail at the end of a session for a reason that is there at its beginning.
 void checkOutputs(const TrainArguments& o)
 {
-    base::checkOutput(o.json);
-    base::checkOutput(o.report);
+    base::checkOutputs({o.json, o.report}, {o.scene});
     base::checkOutputFolder(o.pictures);
     if (drawsLater(o)) {
         checkViewer();
     }
     const auto record = recordFile(o);
-    base::checkOutput(record);
+    base::checkOutputs({o.json, record}, {});
     if (!record.empty() && fs::exists(record)) {
         throw std::runtime_error(record.string() + ": exists already; choose another name or remove it" +
                                  (o.record.empty() ? " (the record beside the report)" : ""));

@@ -121,8 +121,7 @@ void run(const MeshArguments& o)
         throw std::runtime_error("nothing to write: name a file with -o, which ends in " + reference::meshFileEndings());
     }
     reference::checkMeshFile(o.output);
-    base::checkOutput(o.output);
-    base::checkOutput(o.json);
+    base::checkOutputs({o.output, o.json}, {o.volume});
     const volume::Tissue tissue = openVolume(o.volume);
     command::Progress progress(command::Progress::Clock::ticking);
     reference::VolumeMeshOptions options;

@@ -1,5 +1,6 @@
 #include <apps/parsed_program.h>
 #include <apps/replay_player.h>
+#include <base/outputs.h>
 #include <base/words.h>
 #include <command/interrupted.h>
 #include <command/json.h>
@@ -144,6 +145,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
 {
     readSize(words.size, options);
     applyLook(words, options);
+    palpate::base::checkOutputs({words.json, words.timeline, options.movie}, {words.replay, words.ghost, options.result});
     std::optional<palpate::apps::ReplayPlayer> player;
     if (!words.replay.empty()) {
         player.emplace(words.replay);

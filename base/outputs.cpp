@@ -5,6 +5,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -47,6 +48,40 @@ void checkOutput(const fs::path& file)
     if (access(fs::exists(file, none) ? file.c_str() : folder.c_str(), W_OK) != 0) {
         throw std::runtime_error(
             fmt::format("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno)));
+    }
+}
+
+namespace {
+
+// Whether both names lead to one file. Not for what takes bytes from everybody: a device, standard output.
+bool areOneFile(const fs::path& a, const fs::path& b)
+{
+    if (a.empty() || b.empty() || a == "-" || b == "-") {
+        return false;
+    }
+    std::error_code none;
+    if (fs::exists(a, none) && fs::exists(b, none)) {
+        return fs::is_regular_file(a, none) && fs::equivalent(a, b, none);
+    }
+    const fs::path there = fs::weakly_canonical(fs::absolute(a), none);
+    return !fs::exists(a, none) && there == fs::weakly_canonical(fs::absolute(b), none);
+}
+
+}  // namespace
+
+void checkOutputs(const std::vector<fs::path>& outputs, const std::vector<fs::path>& inputs)
+{
+    for (auto file = outputs.begin(); file != outputs.end(); ++file) {
+        checkOutput(*file);
+        const auto same = [&](const fs::path& other) { return areOneFile(*file, other); };
+        std::error_code none;
+        if (fs::exists(*file, none) && std::ranges::any_of(inputs, same)) {
+            throw std::runtime_error(file->string() +
+                                     ": is a file that is read, and would be replaced: choose another name");
+        }
+        if (std::any_of(outputs.begin(), file, same)) {
+            throw std::runtime_error(file->string() + ": would be written twice: give each file a name of its own");
+        }
     }
 }
 

@@ -2,12 +2,17 @@
 
 #include <filesystem>
 #include <string_view>
+#include <vector>
 
 namespace palpate::base {
 
 /// Checks before the work begins that it will be possible to write `file` ("" = not asked for, "-" = standard output).
 /// Throws std::runtime_error ("FILE: what is wrong and what to do").
 void checkOutput(const std::filesystem::path& file);
+
+/// Checks each of `outputs` as checkOutput() does, that no two of them are one file, and that none of them is one of the
+/// files that are read, `inputs` ("" = none): it would be replaced, and gone. Throws std::runtime_error.
+void checkOutputs(const std::vector<std::filesystem::path>& outputs, const std::vector<std::filesystem::path>& inputs);
 
 /// As checkOutput() for a folder that is made, with those above it, when it is not there.
 void checkOutputFolder(const std::filesystem::path& folder);

@@ -247,7 +247,7 @@ std::vector<std::size_t> conclude(const SweepArguments& o, const SweepFolder& fo
 
 void run(const SweepArguments& o)
 {
-    base::checkOutput(o.json);
+    base::checkOutputs({o.json}, {o.plan});
     heedSignals();
     SweepFolder folder(placeOf(o), o.plan, true);
     folder.clean();

@@ -112,6 +112,42 @@ TEST(CommandLine, AnOptionWithAnEmptyValueIsRefused)
     EXPECT_EQ(viewer.err.find("palpate-view: --json: the value is empty"), 0U) << viewer.err;
 }
 
+// A name that was typed twice replaced the path, the segmentation, the volume, the record or all profiles by the output.
+TEST(CommandLine, AFileThatIsReadIsNotReplacedByWhatIsWritten)
+{
+    const Folder folder;
+    const std::string path = folder / "p.csv", volume = folder / "v.vdb", labels = folder / "l.nii.gz";
+    const std::string record = folder / "s.db", profiles = folder / "profiles.db";
+    writeText(path, "seconds,x_mm,y_mm,z_mm\n0,0,-12,0\n0.1,0,-12,0\n");
+    ASSERT_EQ(palpate({"phantom", "layered", "--voxel", "4", "-o", volume}).status, 0);
+    ASSERT_EQ(palpate({"export", volume, "-o", labels}).status, 0);
+    ASSERT_EQ(palpate({"train", "layered", "--headless", "--unpaced", "--setting", "fast", "--seconds", "0.1", "--record",
+                       record})
+                  .status,
+              0);
+    ASSERT_EQ(palpate({"profile", "new", "ann", "--profiles", profiles}).status, 0);
+    const std::vector<std::pair<std::string, Words>> commands{
+        {path, {"press", "block", "--setting", "fast", "--path", path, "--csv", path}},
+        {labels, {"import", labels, "--write-map", labels}},
+        {volume, {"scene", volume, "-o", volume}},
+        {volume, {"export", volume, "-o", labels, "--write-map", volume}},
+        {record, {"score", record, "--report", record}},
+        {record, {"replay", record, "--json", record}},
+        {profiles, {"profile", "export", "ann", "--profiles", profiles, "-o", profiles}},
+        {profiles, {"progress", "ann", "--profiles", profiles, "--csv", profiles}}};
+    for (const auto& [file, words] : commands) {
+        const auto before = std::filesystem::file_size(file);
+        expectRefusal(words, file + ": is a file that is read, and would be replaced");
+        EXPECT_EQ(std::filesystem::file_size(file), before);
+    }
+    const std::string twice = folder / "twice";
+    expectRefusal({"press", "block", "--path", path, "--csv", twice, "--json", twice}, twice + ": would be written twice");
+    const Outcome viewer =
+        Program("palpate-view", {"--replay", record, "--offscreen", folder / "p", "--json", record}).wait();
+    EXPECT_NE(viewer.status, 0);
+    EXPECT_NE(viewer.err.find(record + ": is a file that is read"), std::string::npos) << viewer.err;
+}
+
 TEST(CommandLine, AMissingFileIsRefusedOnOneLine)
 {
     const Folder folder;

@@ -68,5 +68,23 @@ TEST(Outputs, ALinkToItselfIsRefusedAndStays)
     EXPECT_TRUE(fs::is_symlink(one));
 }
 
+// Also by another path to it, and through a link; a device may be both, and a file that is not there is no file that is
+// read.
+TEST(Outputs, WhatIsReadIsNotReplacedAndNothingIsWrittenTwice)
+{
+    const tests::Folder folder;
+    const std::string file = folder / "poses.csv", link = folder / "link.csv", round = folder / "./poses.csv";
+    writeWhole(file, "x_mm\n1\n");
+    fs::create_symlink(file, link);
+    for (const std::string& name : {file, link, round}) {
+        EXPECT_THROW(checkOutputs({"", name}, {"block", file}), std::runtime_error) << name;
+        EXPECT_THROW(checkOutputs({file, name}, {}), std::runtime_error) << name;
+    }
+    const std::string fresh = folder / "fresh.json";
+    EXPECT_THROW(checkOutputs({fresh, folder / "./fresh.json"}, {}), std::runtime_error);
+    EXPECT_NO_THROW(checkOutputs({fresh, file, "", ""}, {fresh, "", "-"}));
+    EXPECT_NO_THROW(checkOutputs({"-", "-", "/dev/null", "/dev/null"}, {"-", "/dev/null"}));
+}
+
 }  // namespace
 }  // namespace palpate::base
