@@ -249,7 +249,7 @@ haptics::SessionModel openModel(TrainArguments& o)
     return model;
 }
 
-void applyTraining(TrainArguments& o, const Training& training)
+void applyTraining(TrainArguments& o, Training& training)
 {
     if (const std::string scene = training.scene(); !scene.empty()) {
         if (o.sceneGiven || !o.task.empty()) {
@@ -319,7 +319,7 @@ void applyTryout(TrainArguments& o)
     o.view = o.closeAtEnd = true;
 }
 
-void prepare(TrainArguments& o, const Training& training)
+void prepare(TrainArguments& o, Training& training)
 {
     applyTryout(o);
     for (const auto& text : o.inject) {
@@ -389,6 +389,7 @@ void train(TrainArguments o)
     const auto begun = std::chrono::steady_clock::now();
     session::TrainResult result = runToItsEnd(model, info, options);
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+    training.markCut(result, o.record);
     const auto written = writeOutputs(o, info, model, viewers, took, result);
     const auto kept = training.conclude(info, result, record);
 

@@ -74,7 +74,7 @@ void Training::change(session::SceneChanges& changes) const
     }
 }
 
-fs::path Training::record() const
+fs::path Training::record()
 {
     if (!store_) {
         return {};
@@ -83,8 +83,27 @@ fs::path Training::record() const
     if (base::makeFolders(folder)) {
         fs::permissions(folder, fs::perms::owner_all);
     }
-    return folder / fmt::format("{:%Y%m%d-%H%M%S}-{}-{}.db", fmt::gmtime(std::time(nullptr)), case_ ? case_->id : "session",
+    own_ = folder / fmt::format("{:%Y%m%d-%H%M%S}-{}-{}.db", fmt::gmtime(std::time(nullptr)), case_ ? case_->id : "session",
                                 ::getpid());
+    return own_;
+}
+
+void Training::markCut(session::TrainResult& result, std::string& record) const
+{
+    if (!result.recordCut || own_.empty() || own_ != record) {
+        return;
+    }
+    const fs::path marked = own_.parent_path() / (own_.stem().string() + "-cut-off.db");
+    std::error_code failed;
+    fs::rename(own_, marked, failed);
+    if (failed) {
+        return;
+    }
+    for (const char* log : {"-wal", "-shm"}) {
+        fs::rename(own_.string() + log, marked.string() + log, failed);  // not there where all is in the record itself
+    }
+    record = marked.string();
+    result.problem += "; its name is now " + record;
 }
 
 void Training::describe(haptics::SessionInfo& info) const

@@ -35,7 +35,10 @@ public:
     /// Guidance of this trial.
     void change(session::SceneChanges& changes) const;
     /// Where the record goes when nobody asked for one; empty: nowhere.
-    std::filesystem::path record() const;
+    std::filesystem::path record();
+    /// Renames the record of record() where it is not whole, so that nobody takes it for a session: X.db, and its log, to
+    /// X-cut-off.db. `record` is its name before and after, and the problem of `result` says it.
+    void markCut(session::TrainResult& result, std::string& record) const;
     /// What the record says of it.
     void describe(haptics::SessionInfo& info) const;
     /// Keeps a session that counts in the profile. A profile that cannot be written is added to the problem of `result`.
@@ -58,7 +61,8 @@ private:
     const training::Exercise* exercise_ = nullptr;
     std::optional<training::ProfileStore> store_;
     std::optional<training::Person> person_;
-    int trial_ = 1;  // of the exercise, from 1 up
+    int trial_ = 1;              // of the exercise, from 1 up
+    std::filesystem::path own_;  // the record that record() named
 };
 
 /// The options of `palpate train`.

@@ -155,6 +155,24 @@ TEST_F(TrainingCommands, ASessionWhoseDiskWasFullIsNotKept)
     expectRefusal({"profile", "add-record", "anna", record}, "was not closed");
 }
 
+// Among the records of whole sessions it would be taken for one.
+TEST_F(TrainingCommands, ARecordThatAFullDiskCutIsMarkedByItsName)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    const Outcome cut = palpate({"train", "layered", "--profile", "anna", "--headless", "--unpaced", "--setting", "fast",
+                                 "--inject", "disk-full@1500ms"});
+    EXPECT_EQ(cut.status, 1);
+    EXPECT_EQ(std::ranges::count(cut.err, '\n'), 1) << cut.err;
+    std::string record;
+    for (const auto& entry : fs::directory_iterator(folder_ / "palpate/records")) {
+        EXPECT_NE(entry.path().string().find("-cut-off.db"), std::string::npos) << entry.path();
+        record = entry.path().extension() == ".db" ? entry.path().string() : record;
+    }
+    EXPECT_NE(cut.err.find("; its name is now " + record), std::string::npos) << cut.err;
+    EXPECT_NE(cut.out.find("record: " + record + "\n"), std::string::npos) << cut.out;
+    EXPECT_EQ(palpate({"replay", record}).status, 0);
+}
+
 // Of the window too, and of a session that was interrupted: its record names who trained, and no profile names it.
 TEST_F(TrainingCommands, ErasingRemovesRecordsOfTheWindowAndOfInterruptedSessions)
 {
