@@ -1,6 +1,8 @@
 #include <apps/command.h>
+#include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <training/course_check.h>
 #include <training/folders.h>
@@ -130,10 +132,9 @@ void next(const CurriculumArguments& o)
         const std::string reason = training::reasonFor(*e);
         const bool test = e->exercise->gate.testOnly && !e->gate.open;
         const bool inFile = std::filesystem::path(o.id).extension() == ".toml";
-        const std::string exercise =
-            inFile ? fmt::format("'{}/{}'", o.id, e->exercise->id) : fmt::format("{}/{}", c.id, e->exercise->id);
-        const std::string how =
-            fmt::format("palpate train --profile '{}' --exercise {}{}", person.name, exercise, test ? " --test" : "");
+        const std::string exercise = base::shellWord(fmt::format("{}/{}", inFile ? o.id : c.id, e->exercise->id));
+        const std::string how = fmt::format("palpate train --profile {} --exercise {}{}", base::shellWord(person.name),
+                                            exercise, test ? " --test" : "");
         figures.push_back({{"curriculum", c.id},
                            {"finished", false},
                            {"exercise", e->exercise->id},

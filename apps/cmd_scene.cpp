@@ -1,7 +1,9 @@
 #include <apps/command.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
+#include <base/shell_word.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <datasets/approach.h>
 #include <datasets/insert.h>
@@ -286,7 +288,8 @@ void runScene(const SceneArguments& o)
     writeScene(scene, o, found, chosen, warnings);
     if (o.json != "-") {
         printWays(scene, found, o);
-        fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose, o.output.string());
+        fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose,
+                   base::shellWord(o.output.string()));
     }
     if (!o.json.empty()) {
         command::writeJson(o.json, wayFigures(scene, found, o));

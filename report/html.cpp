@@ -1,5 +1,6 @@
 #include <report/html.h>
 
+#include <base/shell_word.h>
 #include <base/spoken.h>
 #include <datasets/tables.h>
 #include <haptics/measures.h>
@@ -191,7 +192,8 @@ std::string header(const ReportData& d, const haptics::Record& record, const std
         "<p class=\"outcome\">{}</p>{}</div></header>",
         escape(info.model), escape(info.device), escape(info.scene), outcome(d, record),
         file.empty() ? ""
-                     : "<p class=\"note\">To see it again: <code>palpate-view --replay " + escape(file) + "</code></p>");
+                     : "<p class=\"note\">To see it again: <code>palpate-view --replay " + escape(base::shellWord(file)) +
+                           "</code></p>");
     if (!record.complete()) {
         out +=
             "<p class=\"warning\">The program that wrote this record was stopped before the session ended. Everything up "

@@ -2,6 +2,7 @@
 
 #include <base/build.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <sweep/local.h>
@@ -261,7 +262,7 @@ void run(const SweepArguments& o)
                                              wanted.cases.size() - missing.size(), wanted.cases.size()));
     }
     if (isPart(o) && o.json != "-") {
-        fmt::print("when all parts are done: palpate sweep -o {} --merge\n", o.folder);
+        fmt::print("when all parts are done: palpate sweep -o {} --merge\n", base::shellWord(o.folder));
     }
 }
 

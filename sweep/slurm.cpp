@@ -2,6 +2,7 @@
 
 #include <base/child_process.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <sweep/local.h>
 #include <sweep/lock.h>
 
@@ -43,20 +44,11 @@ struct Answer {
     std::string text;  // standard output and error
 };
 
-std::string shellWord(const std::string& word)
-{
-    std::string out = "'";
-    for (const char c : word) {
-        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    }
-    return out + "'";
-}
-
 Answer ask(const std::vector<std::string>& words)
 {
     std::string line;
     for (const std::string& word : words) {
-        line += shellWord(word) + " ";
+        line += base::shellWord(word) + " ";
     }
     const auto closed = [](FILE* f) { pclose(f); };
     std::unique_ptr<FILE, decltype(closed)> pipe(popen((line + "2>&1").c_str(), "r"), closed);
@@ -183,8 +175,8 @@ private:
         for (const std::string& more : settings_.options) {
             option(more);
         }
-        return out +
-               fmt::format("exec {} sweep --work {}\n", shellWord(base::programFolder() / "palpate"), shellWord(file));
+        return out + fmt::format("exec {} sweep --work {}\n", base::shellWord((base::programFolder() / "palpate").string()),
+                                 base::shellWord(file.string()));
     }
 
     void takeIn(Submission& s, const std::string& queue, std::vector<std::size_t>& lost)

@@ -1,6 +1,7 @@
 #include <trainer/state.h>
 
 #include <base/said.h>
+#include <base/shell_word.h>
 
 #include <fmt/format.h>
 
@@ -340,18 +341,9 @@ std::vector<std::string> expertArguments(const State& state, const std::filesyst
 
 std::string asTyped(const std::string& program, const std::vector<std::string>& arguments)
 {
-    constexpr const char* plain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_./=:,+@";
     std::string line = program;
     for (const std::string& word : arguments) {
-        if (!word.empty() && word.find_first_not_of(plain) == std::string::npos) {
-            line += " " + word;
-            continue;
-        }
-        line += " '";
-        for (const char c : word) {
-            line += c == '\'' ? std::string("'\\''") : std::string(1, c);
-        }
-        line += "'";
+        line += " " + base::shellWord(word);
     }
     return line;
 }

@@ -2,6 +2,7 @@
 
 #include <base/counted.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <haptics/measures.h>
 #include <report/html.h>
 
@@ -191,10 +192,10 @@ std::string whatNext(const CurriculumProgress& c, const Person& person)
     }
     const bool test = next->exercise->gate.testOnly && !next->gate.open;
     return fmt::format(
-        "<p class=\"outcome\"><b>Next: {}</b>. It {}.</p><pre class=\"command\">palpate train --profile '{}' --exercise "
+        "<p class=\"outcome\"><b>Next: {}</b>. It {}.</p><pre class=\"command\">palpate train --profile {} --exercise "
         "{}/{}{}</pre>",
-        escape(next->exercise->title), escape(reasonFor(*next)), escape(person.name), escape(c.curriculum->id),
-        escape(next->exercise->id), test ? " --test" : "");
+        escape(next->exercise->title), escape(reasonFor(*next)), escape(base::shellWord(person.name)),
+        escape(c.curriculum->id), escape(next->exercise->id), test ? " --test" : "");
 }
 
 std::string assumptions(const CusumPlan& plan)
