@@ -173,6 +173,26 @@ volume::Tissue withLesion(volume::Tissue tissue, SceneChanges& changes)
 
 }  // namespace
 
+namespace {
+
+// A record or a label map where a scene is asked for: as a scene it would be refused for its first byte.
+void refuseNoScene(const std::filesystem::path& file)
+{
+    const std::filesystem::path end = file.extension() == ".gz" ? file.stem().extension() : file.extension();
+    if (end == ".db") {
+        throw std::runtime_error(file.string() +
+                                 ": is no scene: a record is shown by 'palpate-view --replay' and "
+                                 "scored by 'palpate score'; give a scene (.toml) or a volume (.vdb)");
+    }
+    constexpr std::array<const char*, 9> labels{".nii", ".hdr", ".img", ".nrrd", ".nhdr", ".mha", ".mhd", ".mgz", ".dcm"};
+    if (std::ranges::find(labels, end) != labels.end()) {
+        throw std::runtime_error(file.string() +
+                                 ": is no scene: 'palpate import' makes a volume (.vdb) of a label map first");
+    }
+}
+
+}  // namespace
+
 haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
 {
     const std::filesystem::path path(what);
@@ -209,6 +229,9 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     if (!builtIn && !std::filesystem::exists(path, none)) {
         throw std::runtime_error(fmt::format("{}: no such scene or volume; built-in scenes are: {}", what,
                                              fmt::join(datasets::builtInScenes(), ", ")));
+    }
+    if (!builtIn) {
+        refuseNoScene(path);
     }
     auto scene = changed(builtIn ? *builtIn : datasets::loadScene(path), changes, what);
     scene.source.phantom.memory = changes.memory;

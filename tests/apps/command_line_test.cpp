@@ -74,6 +74,20 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"train", "layered", "--headless", "--target", "nosuch"}, "nosuch");
 }
 
+TEST(CommandLine, ARecordOrALabelMapInPlaceOfASceneIsNamed)
+{
+    const Folder folder;
+    const std::string record = folder / "s.db", labels = folder / "seg.nii.gz", volume = folder / "seg.nrrd";
+    for (const std::string& file : {record, labels, volume}) {
+        writeText(file, "not read");
+    }
+    expectRefusal({"train", record, "--headless"}, record + ": is no scene: a record is shown by 'palpate-view --replay'");
+    for (const std::string& file : {labels, volume}) {
+        expectRefusal({"train", file, "--headless"}, file + ": is no scene: 'palpate import' makes a volume");
+        expectRefusal({"press", file, "--path", "p.csv"}, file + ": is no scene: 'palpate import' makes a volume");
+    }
+}
+
 TEST(CommandLine, ALinkThatLeadsBackToItselfIsRefusedLikeAnyFileThatCannotBeRead)
 {
     const Folder folder;
