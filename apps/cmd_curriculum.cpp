@@ -282,7 +282,9 @@ void addCurriculum(CLI::App& app)
               std::tuple("--sessions", &o->most, "Maximum number of sessions per person")}) {
             sub->add_option(name, *value, what)->check(CLI::Range(1, 100000))->capture_default_str();
         }
-        sub->add_option("--seed", o->seed, "Seed of all random choices")->capture_default_str();
+        sub->add_option("--seed", o->seed, "Seed of all random choices")
+            ->capture_default_str()
+            ->check(command::seedFault, "a whole number");
     };
     CLI::App* const tried =
         c->add_subcommand("simulate", "Count the sessions that simulated people of three skills need, to choose gates");

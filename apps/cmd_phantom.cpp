@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <base/memory.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <datasets/phantom.h>
 #include <datasets/tables.h>
 
@@ -140,7 +141,9 @@ void addPhantom(CLI::App& app)
     CLI::App* command = app.add_subcommand("phantom", "Make a phantom: breast, layered or block");
     command->add_option("name", options->spec.name, "Phantom to make (--list shows all)")->type_name("NAME");
     command->add_option("-o,--output", options->output, "Volume to write (.vdb)")->type_name("V.vdb");
-    command->add_option("--seed", options->spec.seed, "Seed of all random choices")->capture_default_str();
+    command->add_option("--seed", options->spec.seed, "Seed of all random choices")
+        ->capture_default_str()
+        ->check(command::seedFault, "a whole number");
     command->add_option("--voxel", options->voxel, "Edge length of a voxel [mm]")->type_name("MM")->capture_default_str();
     command->add_option("--set", options->settings, "Set parameters (--list shows them)")->type_name("KEY=VALUE");
     command->add_flag("--list", options->list, "List parameters with units, ranges and defaults");

@@ -329,7 +329,9 @@ void addScene(CLI::App& app)
     command->add_option("--lesion-tissue", o->lesionTissue, "Tissue of the lesion (default: idc_high_grade)")
         ->type_name("NAME")
         ->needs(in);
-    command->add_option("--seed", o->seed, "Seed of the lesion's position and shape (default: 1)")->needs(in);
+    command->add_option("--seed", o->seed, "Seed of the lesion's position and shape (default: 1)")
+        ->needs(in)
+        ->check(command::seedFault, "a whole number");
     command->add_option("--json", o->json, "Write figures to this file (- = standard output)")->type_name("FILE");
     command->final_callback([o] { runScene(*o); });
 }

@@ -431,13 +431,6 @@ std::string operatorFault(const std::string& text)
     return text.empty() || text.size() > 200 || control ? "must be 1 to 200 bytes of text in one line" : "";
 }
 
-// Empty, or what is wrong with a value of --seed.
-std::string seedFault(const std::string& text)
-{
-    const bool digits = !text.empty() && text.size() < 20 && text.find_first_not_of("0123456789") == std::string::npos;
-    return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
-}
-
 }  // namespace
 
 void addTrain(CLI::App& app)
@@ -475,7 +468,7 @@ void addTrain(CLI::App& app)
     c->add_option("--trial", o->changes.trial, "With --dffb fade: trial K/N; all guidance in the first, none in the last");
     c->add_option("--target", o->changes.target, "Structure to sample (default: as in the scene)");
     c->add_option("--seed", o->changes.seed, "Seed of random choices (default: the scene's; 1 for --trainee and lesion)")
-        ->check(seedFault, "a whole number");
+        ->check(command::seedFault, "a whole number");
     c->add_option("--seconds", o->seconds, "Maximum session time [s] (0: no limit)")->check(secondsFault, "0 to 86400");
     auto* unpaced = c->add_flag("--unpaced", o->unpaced, "Run as fast as possible, instead of one tick per millisecond");
     c->add_flag("--view", o->view, "Open a window (default if there is a display)")->excludes(unpaced);

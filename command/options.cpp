@@ -23,6 +23,12 @@ void addSetting(CLI::App& command, session::SceneChanges& changes)
         ->check(CLI::IsMember(datasets::elasticSettings()));
 }
 
+std::string seedFault(const std::string& text)
+{
+    const bool digits = !text.empty() && text.size() < 20 && text.find_first_not_of("0123456789") == std::string::npos;
+    return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
+}
+
 void refuseEmptyValues(CLI::App& app)
 {
     // Without a description, which --help would print behind each option.

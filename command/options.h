@@ -15,6 +15,9 @@ void addModel(CLI::App& command, session::SceneChanges& changes);
 /// The option --setting of a command.
 void addSetting(CLI::App& command, session::SceneChanges& changes);
 
+/// Empty, or what is wrong with a value of --seed: of a negative or a huge one CLI11 would make another number.
+std::string seedFault(const std::string& text);
+
 /// Call after all options have been added, for a program's app: none of them takes an empty value ("--csv ''", a variable
 /// of a shell that is not set), but for those that may have none (expected(0, 1)).
 void refuseEmptyValues(CLI::App& app);

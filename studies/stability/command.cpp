@@ -2,6 +2,7 @@
 
 #include <base/outputs.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <studies/stability/figures.h>
 #include <studies/stability/record.h>
@@ -164,7 +165,9 @@ void addStability(CLI::App& app)
     c->add_flag("--quick", o->choice.quick, "Some scenes, one device, 1 kHz: under a minute");
     auto* fuzzed = c->add_option("--fuzz", o->fuzz, "Also run this many hostile sessions of Palpate's own levels");
     c->add_flag("--fuzz-only", o->fuzzOnly, "Run only the hostile sessions")->needs(fuzzed);
-    c->add_option("--seed", o->seed, "Seed of the hostile sessions")->capture_default_str();
+    c->add_option("--seed", o->seed, "Seed of the hostile sessions")
+        ->capture_default_str()
+        ->check(command::seedFault, "a whole number");
     c->add_option("--case", o->cell, "Run one cell, by its id");
     c->add_option("--record", o->record, "With --case: record it as a session (.db), its volume beside it (.vdb)");
     c->add_option("--jobs", o->jobs, "Number of threads (default: all cores); the figures do not depend on it")

@@ -5,6 +5,7 @@
 #include <base/quantiles.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
+#include <command/options.h>
 #include <command/progress.h>
 #include <datasets/phantom_random.h>
 #include <studies/thesis/figures.h>
@@ -205,7 +206,8 @@ void addBenchTasks(CLI::App& bench)
         ->check(CLI::Range(1, 1000))
         ->capture_default_str();
     c->add_option("--seed", o->seed, "Seed of the objects' positions and of the order of measurement")
-        ->capture_default_str();
+        ->capture_default_str()
+        ->check(command::seedFault, "a whole number");
     c->add_flag("--no-view", o->noView, "Start no viewer, and leave out the events with graphics");
     c->add_option("-o,--output", o->folder, "Folder for tasks.json, tasks.html and tasks.png");
     c->add_option("--chart", o->chart, "Write the chart to this file (PNG)");

@@ -66,7 +66,13 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
         expectRefusal({"train", "--seconds", seconds}, "--seconds: " + seconds + ": must be 0 to 86400 s");
     }
     for (const std::string seed : {"-1", "1.5", "x", "99999999999999999999999"}) {
-        expectRefusal({"train", "--seed", seed}, "--seed: " + seed + ": must be a whole number, 0 or more");
+        const std::string why = "--seed: " + seed + ": must be a whole number, 0 or more";
+        expectRefusal({"train", "--seed", seed}, why);
+        expectRefusal({"phantom", "breast", "--seed", seed, "-o", "never.vdb"}, why);
+        expectRefusal({"scene", "v.vdb", "--lesion-in", "fat", "--seed", seed, "-o", "never.toml"}, why);
+        expectRefusal({"curriculum", "verify", "breast-core-biopsy", "--seed", seed}, why);
+        expectRefusal({"stability", "--seed", seed}, why);
+        expectRefusal({"bench", "tasks", "--seed", seed}, why);
     }
     expectRefusal({"bench"}, "--help");
     expectRefusal({"train", "nosuch"}, "layered, block, plate, pair");
