@@ -17,9 +17,8 @@ using base::tr;
 
 constexpr double helpBelow = 0.84;  // of the height: title, caption and warning stand above
 constexpr double helpLine = 1.27;   // height of a line, in fonts
-constexpr Colour cardColour{0.05, 0.06, 0.09};
-constexpr double edge = 0.8;    // of a text from its area, in fonts
-constexpr double boxGap = 0.3;  // between boxes, in fonts
+constexpr double edge = 0.8;        // of a text from its area, in fonts
+constexpr double boxGap = 0.3;      // between boxes, in fonts
 
 // Goes down an area, line by line.
 struct Column {

@@ -237,7 +237,11 @@ void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& st
     for (const std::string& words : {viewer, simulation}) {
         if (words.empty())
             continue;
-        canvas.text({x, y}, shortened(canvas, words, font, false, room), font, grey);
+        const std::string shown = shortened(canvas, words, font, false, room);
+        // A bone below them is as bright as the words.
+        canvas.rectangle({x - 0.4 * font, y - 0.35 * font}, {canvas.widthOf(shown, font) + 0.8 * font, 1.4 * font},
+                         cardColour, 0.75);
+        canvas.text({x, y}, shown, font, grey);
         y += 1.4 * font;
     }
 }

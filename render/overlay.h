@@ -16,6 +16,7 @@ namespace palpate::render {
 inline constexpr Colour white{0.95, 0.96, 0.98}, grey{0.62, 0.66, 0.72}, dark{0.20, 0.22, 0.27};
 inline constexpr Colour good{0.45, 0.85, 0.50}, amber{1.0, 0.75, 0.15}, red{1.0, 0.30, 0.25};
 inline constexpr Colour panelColour{0.09, 0.10, 0.13};
+inline constexpr Colour cardColour{0.05, 0.06, 0.09};  // behind words that lie on a picture
 inline constexpr Colour basicColour{0.35, 0.65, 1.0}, additionalColour{0.75, 0.55, 1.0};
 
 /// How well viewer and simulation keep up.

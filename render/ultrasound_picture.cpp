@@ -177,8 +177,10 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
     double y = area_.y + 0.4 * font;
     const auto words = [&](const std::string& all, const Colour& colour, bool bold = false) {
         const std::string what = shortened(canvas, all, 0.9 * font, bold, area_.width - font);
-        canvas.cover({x, y}, {canvas.widthOf(what, 0.9 * font, bold), 0.9 * font});  // numbers of the scale
-        canvas.text({x + 1, y - 1}, what, 0.9 * font, {0, 0, 0}, Align::left, bold);
+        const double wide = canvas.widthOf(what, 0.9 * font, bold);
+        canvas.cover({x, y}, {wide, 0.9 * font});  // numbers of the scale
+        // Speckle is as bright as the words.
+        canvas.rectangle({x - 0.4 * font, y - 0.35 * font}, {wide + 0.8 * font, row}, cardColour, 0.75);
         canvas.text({x, y}, what, 0.9 * font, colour, Align::left, bold);
         y += row;
     };
