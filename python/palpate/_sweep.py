@@ -1,5 +1,6 @@
 """Sweeps: many cases, one table."""
 
+import collections.abc
 import csv
 import json
 import os
@@ -29,6 +30,9 @@ def _rows(cases):
     """The cases as a list of dictionaries with the same keys."""
     if hasattr(cases, "to_dict") and hasattr(cases, "columns"):
         cases = cases.to_dict("records")
+    cases = cases if isinstance(cases, (str, collections.abc.Mapping)) else list(cases)
+    if not all(isinstance(case, collections.abc.Mapping) for case in cases):
+        raise TypeError("sweep: cases: give a pandas.DataFrame, or a list with a dictionary for each case")
     rows = [dict(case) for case in cases]
     if not rows:
         raise Error("sweep: there are no cases")

@@ -65,6 +65,8 @@ class Sweeps(InFolder):
             sweep(self.folder / "s", [{"tissue.cheese.youngs_kpa": 4.0}])
         with self.assertRaisesRegex(palpate.Error, "other keys"):
             sweep(self.folder / "t", [{"a": 1}, {"b": 1}])
+        with self.assertRaisesRegex(TypeError, "a list with a dictionary for each case"):  # columns, as pandas takes them
+            sweep(self.folder / "t", {"tissue.fat.youngs_kpa": [2.0, 4.0]})
         with self.assertRaisesRegex(palpate.Error, "no cases"):
             sweep(self.folder / "u", [])
 
