@@ -61,31 +61,39 @@ function nameLines(place, chart) {
   place.append(names);
 }
 
+// All lines first: a later one would go through the words of an earlier one.
 function vertical(u, events) {
   const { ctx, bbox } = u;
-  let free = [-Infinity, -Infinity, -Infinity];
-  for (const event of events) {
-    const x = u.valToPos(event.seconds, "x", true);
-    if (!(event.kind in eventColours) || x < bbox.left || x > bbox.left + bbox.width) continue;
-    ctx.save();
+  const shown = events.map((event) => ({ ...event, x: u.valToPos(event.seconds, "x", true) }))
+    .filter(({ kind, x }) => kind in eventColours && x >= bbox.left && x <= bbox.left + bbox.width);
+  ctx.save();
+  ctx.lineWidth = devicePixelRatio;
+  for (const event of shown) {
     ctx.strokeStyle = colour(eventColours[event.kind]);
-    ctx.lineWidth = devicePixelRatio;
     ctx.beginPath();
-    ctx.moveTo(x, bbox.top);
-    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.moveTo(event.x, bbox.top);
+    ctx.lineTo(event.x, bbox.top + bbox.height);
     ctx.stroke();
-    ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-    ctx.textAlign = "left";
-    ctx.textBaseline = "top";
-    const text = event.label;
-    const width = ctx.measureText(text).width;
-    const left = x + width + 4 * devicePixelRatio > bbox.left + bbox.width ? x - width - 4 * devicePixelRatio : x + 4 * devicePixelRatio;
+  }
+  nameEvents(ctx, bbox, shown);
+  ctx.restore();
+}
+
+// In three rows; a name that has no room in any of them is left out.
+function nameEvents(ctx, bbox, events) {
+  const gap = 4 * devicePixelRatio;
+  const free = [-Infinity, -Infinity, -Infinity];
+  ctx.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+  ctx.textAlign = "left";
+  ctx.textBaseline = "top";
+  for (const { label, x } of events) {
+    const width = ctx.measureText(label).width;
+    const left = x + width + gap > bbox.left + bbox.width ? x - width - gap : x + gap;
     const row = free.findIndex((end) => end < left);
     if (row >= 0) {
-      write(ctx, text, left, bbox.top + (2 + 14 * row) * devicePixelRatio);
-      free[row] = left + width + 6 * devicePixelRatio;
+      write(ctx, label, left, bbox.top + (2 + 14 * row) * devicePixelRatio);
+      free[row] = left + width + 1.5 * gap;
     }
-    ctx.restore();
   }
 }
 
