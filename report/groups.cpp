@@ -149,7 +149,7 @@ std::string row(const std::vector<ScoredGroup>& groups, const haptics::Measure& 
         const auto values = valuesOf(groups[i], measure);
         const auto at = [&](double fraction) { return number(quantile(values, fraction), decimals); };
         medians += fmt::format("<div><i style=\"background:{}\"></i>{}: {}</div>", colourOf(i), escape(groups[i].name),
-                               without(values) ? "-" : fmt::format("{} ({} to {})", at(0.5), at(0.25), at(0.75)));
+                               quartilesText(at(0.5), at(0.25), at(0.75)));
     }
     for (std::size_t b = 1; b < groups.size(); ++b) {
         const auto delta = effectSize(groups[0], groups[b], measure);
@@ -218,6 +218,11 @@ std::optional<double> effectSize(const ScoredGroup& a, const ScoredGroup& b, con
     const auto first = rounded(valuesOf(a, measure), measure), second = rounded(valuesOf(b, measure), measure);
     const bool few = std::min(first.size(), second.size()) < 2;
     return few || (without(first) && without(second)) ? std::nullopt : std::optional(cliffsDelta(first, second));
+}
+
+std::string quartilesText(const std::string& median, const std::string& low, const std::string& high)
+{
+    return median == "-" && low == "-" && high == "-" ? "-" : fmt::format("{} ({} to {})", median, low, high);
 }
 
 std::string groupsPart(const std::vector<ScoredGroup>& groups)

@@ -40,6 +40,9 @@ double cliffsDelta(const std::vector<double>& a, const std::vector<double>& b);
 /// than two values, or all values of both are infinite.
 std::optional<double> effectSize(const ScoredGroup& a, const ScoredGroup& b, const haptics::Measure& measure);
 
+/// "median (low to high)" of a median and quartiles as printed; "-" where none of them is a number.
+std::string quartilesText(const std::string& median, const std::string& low, const std::string& high);
+
 /// The comparison as part of a page: heading, what the drawings mean, a table.
 /// @pre  at least one group; every row is whole
 std::string groupsPart(const std::vector<ScoredGroup>& groups);

@@ -50,8 +50,7 @@ std::string groupTable(const std::vector<ScoredGroup>& groups)
             const auto values = valuesOf(g, m);
             const int decimals = decimalsOf(m);
             const auto at = [&](double fraction) { return cell(quantile(values, fraction), decimals); };
-            const bool any = std::ranges::any_of(values, [](double v) { return std::isfinite(v); });
-            columns.back().push_back(any ? fmt::format("{} ({} to {})", at(0.5), at(0.25), at(0.75)) : "-");
+            columns.back().push_back(quartilesText(at(0.5), at(0.25), at(0.75)));
         }
     }
     for (std::size_t a = 0; a < groups.size(); ++a) {

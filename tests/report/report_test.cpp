@@ -1,5 +1,6 @@
 #include <base/png.h>
 #include <report/data.h>
+#include <report/groups.h>
 #include <report/html.h>
 #include <report/report.h>
 
@@ -258,6 +259,14 @@ TEST(Report, PicturesStandInTheOrderOfTheirTimes)
     EXPECT_EQ(captions(),
               "contact, 1.3 s|inserted, 2.5 s|fired|near the artery, 5.0 s|very near artery, 6.3 s|out, 7.6 "
               "s|fault, 8.8 s|0.0 s|9.5 s|");
+}
+
+// Of two sessions one has no value: infinite, and so is what lies between them.
+TEST(Report, QuartilesWithoutANumberAreOneDash)
+{
+    EXPECT_EQ(quartilesText("-", "-", "-"), "-");
+    EXPECT_EQ(quartilesText("-", "41.8", "-"), "- (41.8 to -)");
+    EXPECT_EQ(quartilesText("2.0", "1.0", "3.0"), "2.0 (1.0 to 3.0)");
 }
 
 // On a narrow screen a table in a box of its own is scrolled: its words stay whole.
