@@ -171,10 +171,6 @@ volume::Tissue withLesion(volume::Tissue tissue, SceneChanges& changes)
     return datasets::withInserts(tissue, changes.inserts);
 }
 
-}  // namespace
-
-namespace {
-
 // A record or a label map where a scene is asked for: as a scene it would be refused for its first byte.
 void refuseNoScene(const std::filesystem::path& file)
 {
