@@ -14,9 +14,13 @@ inline std::string shellWord(std::string_view word)
     }
     std::string quoted = "'";
     for (const char c : word) {
-        quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+        if (c == '\'') {
+            quoted += "'\\'";  // out of the quotes, a quote, and in again
+        }
+        quoted += c;
     }
-    return quoted + "'";
+    quoted += '\'';
+    return quoted;
 }
 
 }  // namespace palpate::base
