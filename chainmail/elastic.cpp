@@ -20,6 +20,9 @@ constexpr int callsPerTurn = 2;     // from one term of the history to the next
 constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
 constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
 constexpr double afterMove = 3.0;   // a second cycle in a tick in which windows move: for so much more out of balance
+// Way along the surface from which a ball slips as a whole, in friction times depth: (2 - nu) / (2 - 2 nu), at nu = 0.5.
+// Source: R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949.
+constexpr double slipsWhole = 1.5;
 constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
@@ -32,6 +35,7 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
       sites_(sitesFor(body, options.touches, options.maxSites))
 {
     held_.reserve(maxTools);
+    pressed_.reserve(maxTools);
     tools_.reserve(maxTools);
     shapes_.reserve(maxTools);
     foundFor_.reserve(maxTools);
@@ -242,15 +246,35 @@ double Elastic::contactEnergy() const noexcept
 }
 
 // Moves the windows to where the load has them. True when any moved: contacts have to be found again.
-bool Elastic::follow(const Focus& focus) noexcept
+bool Elastic::follow(const ElasticLoad& load) noexcept
 {
     multigrid_.clearContacts();
-    return stack_.follow(focus, !atRest_);
+    return stack_.follow(whereItSticks(load), !atRest_);
+}
+
+// The tissue that sticks to a tool stays behind the tool's place over the surface at rest, and windows belong around the
+// tissue. By how much follows from the tool's way alone: were it taken from the solution, windows and slip would drive each
+// other.
+Focus Elastic::whereItSticks(const ElasticLoad& load) noexcept
+{
+    Focus focus = load.focus;
+    const bool isLed = load.led < std::min(held_.size(), load.tools.size());
+    const double most = isLed ? slipsWhole * load.tools[load.led].friction * held_[load.led].given : 0.0;
+    if (most <= 0.0) {
+        stuck_.reset();
+        return focus;
+    }
+    Vec3 back = stuck_.value_or(focus.point) - focus.point;
+    back -= glm::dot(back, focus.inward) * focus.inward;
+    const double length = glm::length(back);
+    focus.point += length > most ? most / length * back : back;
+    stuck_ = focus.point;
+    return focus;
 }
 
 ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
 {
-    if (atRest_ || !follow(load.focus)) {
+    if (atRest_ || !follow(load)) {
         return relaxWhile(load, part());
     }
     // To move the windows is work enough for a call.
@@ -270,7 +294,7 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     load.periods += hasMoved ? waiting_->periods : 0;  // of a load that was never solved
     waiting_.reset();
     load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.isTick);
-    const bool moves = follow(load.focus);
+    const bool moves = follow(load);
     result.moved = moves || hasMoved;
     meet(load, result.moved);
     const bool isTouched = touched();

@@ -180,7 +180,8 @@ private:
         bool isKnown = false;  // r is the residual: it ended balanced
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
-    bool follow(const Focus& focus) noexcept;
+    bool follow(const ElasticLoad& load) noexcept;
+    Focus whereItSticks(const ElasticLoad& load) noexcept;
     void solve(int most, ElasticResult& result) noexcept;
     bool isBalanced(double residual, double tolerance) const noexcept;
     void finish(ElasticResult& result) noexcept;
@@ -238,12 +239,13 @@ private:
         occupancy::RoundCone shape;
         bool isQuartered = false;
     };
-    std::vector<FoundFor> foundFor_;  // the tools when the sites were looked for
-    std::vector<Tie> tiesFound_;      // the ties then, as far as there are not more than that
-    std::vector<HeldTool> held_;      // of each tool
-    std::vector<ElasticTool> tools_;  // as the body feels them
-    std::vector<Vec3> toolAt_;        // in the last call [m]
-    std::vector<Vec3f> slip_;         // of each surface point that was a site, where there is friction [m]
+    std::vector<FoundFor> foundFor_;   // the tools when the sites were looked for
+    std::vector<PressedBox> pressed_;  // by each tool, when the sites were looked for
+    std::vector<Tie> tiesFound_;       // the ties then, as far as there are not more than that
+    std::vector<HeldTool> held_;       // of each tool
+    std::vector<ElasticTool> tools_;   // as the body feels them
+    std::vector<Vec3> toolAt_;         // in the last call [m]
+    std::vector<Vec3f> slip_;          // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is
@@ -254,6 +256,7 @@ private:
     double energy_ = 0;                                 // of the tissue, history's included [J]
     double startEnergy_ = 0;                            // the same when the call began [J]
     Course course_;
+    std::optional<Vec3> stuck_;           // the middle of the tissue that sticks to the tool that is led, at rest [m]
     std::optional<ElasticLoad> waiting_;  // windows moved for it, and contacts were not found since
     LastStep last_;
     std::optional<std::array<double, 3>> products_;  // a . u, a . d, e . d, where the last step left them

@@ -4,9 +4,11 @@
 #include <chainmail/window_stack.h>
 #include <occupancy/tool_shape.h>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -42,10 +44,13 @@ struct Tie {
 };
 
 struct ElasticLoad {
+    static constexpr std::size_t noTool = std::numeric_limits<std::size_t>::max();
+
     std::span<const ElasticTool> tools;
     std::span<const Tie> ties;
     Focus focus;
-    int periods = 1;  // since the call before, see ElasticOptions: tissue that relaxes goes on by as much
+    std::size_t led = noTool;  // index of the tool that the focus lies under, if there is one
+    int periods = 1;           // since the call before, see ElasticOptions: tissue that relaxes goes on by as much
 };
 
 /// Where tool and tissue meet: a point of the surface that a tool may press, or a tie.
@@ -157,11 +162,24 @@ std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) no
 /// That surface of one tool [m^2].
 double touchedBy(const occupancy::RoundCone& shape, double spacing) noexcept;
 
+/// Box around what a tool presses, where that lies at rest. Friction drags tissue along with a tool, away from there.
+struct PressedBox {
+    Vec3 low{std::numeric_limits<double>::max()}, high{std::numeric_limits<double>::lowest()};  // [m]
+
+    void add(Vec3 rest) noexcept
+    {
+        low = glm::min(low, rest);
+        high = glm::max(high, rest);
+    }
+};
+
 /// Fills `out` with the surface points that tools may touch: those within `near` [m] of one, as the tissue lies now or as
-/// it would lie at rest.
-/// @returns  how many; more than out holds are left out
+/// it would lie at rest. Looked at are those that lie around the tool at rest, or around what it pressed before.
+/// @param pressed  by each tool before; may be shorter
+/// @returns        how many; more than out holds are left out
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
-                      std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept;
+                      std::span<const occupancy::ShapeDistance> shapes, std::span<const PressedBox> pressed, double near,
+                      std::span<ContactSite> out) noexcept;
 /// Fills `out` with the ties.
 /// @returns  how many; more than out holds are left out
 std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, std::span<const Tie> ties,

@@ -77,16 +77,20 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
     const double spacing = stack_.body().levels.front().nodes.spacing;
     std::size_t fresh = touching_;  // the first site that is new
     if (!toolsHold) {
+        pressed_.assign(held_.size(), PressedBox());
         for (const ContactSite& s : sites()) {
             if (!s.isTie) {
                 slip_[s.point] = Vec3f(s.slip);
+            }
+            if (!s.isTie && s.active() && s.owner < pressed_.size()) {
+                pressed_[s.owner].add(s.rest);
             }
         }
         fresh = 0;
         sinceFound_ = 0;
         const std::size_t room = sites_.size() - std::min(sites_.size(), placesOf(load.ties, spacing));
-        touching_ =
-            findSites(stack_.body(), stack_.windows(), load.tools, shapes_, reach * spacing, std::span(sites_).first(room));
+        touching_ = findSites(stack_.body(), stack_.windows(), load.tools, shapes_, pressed_, reach * spacing,
+                              std::span(sites_).first(room));
         foundFor_.clear();
         for (const ElasticTool& tool : load.tools) {
             foundFor_.push_back({tool.shape, touchesLittle(tool, spacing)});

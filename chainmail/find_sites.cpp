@@ -70,17 +70,19 @@ public:
         }
     }
 
-    void addTool(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index) noexcept
+    void addTool(const ElasticTool& tool, const occupancy::ShapeDistance& shape, const PressedBox& pressed,
+                 std::size_t index) noexcept
     {
         const auto& grid = body_.levels.front().nodes;
         const auto& s = tool.shape;
-        const double radius = s.widest() + near_ + grid.spacing;
-        const Vec3 low = glm::min(glm::min(s.a, s.b), glm::min(s.a, s.b) - tool.pushed) - radius;
-        const Vec3 high = glm::max(glm::max(s.a, s.b), glm::max(s.a, s.b) - tool.pushed) + radius;
+        const double around = near_ + grid.spacing, radius = s.widest() + around;
+        const Vec3 first = glm::min(s.a, s.b), last = glm::max(s.a, s.b);
+        const Vec3 low = glm::min(glm::min(first, first - tool.pushed) - radius, pressed.low - around);
+        const Vec3 high = glm::max(glm::max(last, last - tool.pushed) + radius, pressed.high + around);
         // Cells in the list of the surface are numbered by their middles' grid, which starts at the lowest node.
-        const Vec3 last(grid.size - 2);
-        const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), last));
-        const Index3 to(glm::clamp(glm::floor((high - grid.origin) / grid.spacing), Vec3(0.0), last));
+        const Vec3 most(grid.size - 2);
+        const Index3 from(glm::clamp(glm::floor((low - grid.origin) / grid.spacing), Vec3(0.0), most));
+        const Index3 to(glm::clamp(glm::floor((high - grid.origin) / grid.spacing), Vec3(0.0), most));
         for (int z = from.z; z <= to.z; ++z) {
             for (int y = from.y; y <= to.y; ++y) {
                 addRow(tool, shape, index, static_cast<std::size_t>(y + z * grid.size.y), from.x, to.x);
@@ -288,11 +290,12 @@ std::size_t sitesFor(const ElasticBody& body, double area, std::size_t least) no
 }
 
 std::size_t findSites(const ElasticBody& body, std::span<const Window> windows, std::span<const ElasticTool> tools,
-                      std::span<const occupancy::ShapeDistance> shapes, double near, std::span<ContactSite> out) noexcept
+                      std::span<const occupancy::ShapeDistance> shapes, std::span<const PressedBox> pressed, double near,
+                      std::span<ContactSite> out) noexcept
 {
     Finder finder(body, windows, near, out);
     for (std::size_t i = 0; i < tools.size(); ++i) {
-        finder.addTool(tools[i], shapes[i], i);
+        finder.addTool(tools[i], shapes[i], i < pressed.size() ? pressed[i] : PressedBox(), i);
     }
     return finder.count();
 }

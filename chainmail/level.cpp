@@ -122,6 +122,7 @@ ElasticLoad ElasticLevel::load(const Grip& grip) noexcept
         const Vec3 at = grip.proxy + grip.deepest;
         const Vec3 under = at - surface_.distance(at) * surface_.normal(at);
         load.focus = focusAt(surface_, under);
+        load.led = others;
     } else if (grip.kind == Grip::Kind::point) {
         load = tie(grip);
     }

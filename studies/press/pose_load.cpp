@@ -36,6 +36,7 @@ PoseLoad::PoseLoad(const haptics::SessionModel& model, const datasets::ToolSpec&
         surface_.friction = model.scene.model.elastic.friction;
         surface_.stiffest = chainmail::stiffnessUncapped(*model.elastic, tool.radius);
         load_.tools = {&surface_, 1};
+        load_.led = 0;
         return;
     }
     if (model.surface.distance(first.position) < 0.0) {

@@ -105,8 +105,11 @@ public:
         ElasticTool tool = tests::ball(at, radius_, stiffest);
         tool.shape.b -= Vec3(0.0, length_, 0.0);
         tool.pushed = Vec3(0.0, std::max(depth, 0.0), 0.0);
+        tool.friction = friction;
         const Vec3 before = elastic_.toolForce(0);
-        last = elastic_.relax(tests::loadOf({&tool, 1}, {}, entry_ + Vec3(along, 0.0, 0.0)));
+        ElasticLoad load = tests::loadOf({&tool, 1}, {}, entry_ + Vec3(along, 0.0, 0.0));
+        load.led = 0;
+        last = elastic_.relax(load);
         const Vec3 force = elastic_.toolForce(0);
         pull = std::max(pull, force.y);
         sideways = std::max(sideways, std::hypot(force.x, force.z));
@@ -133,6 +136,7 @@ public:
 
     ElasticResult last;
     double stiffest = 1e6;  // of the contact [N/m]
+    double friction = 0;    // Coulomb [-]
     double pull = 0;        // largest force into the body [N]
     double sideways = 0;    // largest force across the way in [N]
     double step = 0;        // largest change of the force in a tick [N]
@@ -245,6 +249,24 @@ TEST(ElasticDeep, DraggedDeepTheForceIsEven)
     EXPECT_LT(way.sideways, 0.02 * force);
     way.to(-0.5e-3);
     EXPECT_LE(way.pull, 0.0);
+}
+
+// Friction drags tissue along with a tool, out of where the tool and its windows were at rest: it stays in contact, and in
+// the finest cells.
+TEST(ElasticDeep, TissueThatFrictionDragsAlongStaysInContact)
+{
+    const ElasticBody body = softBlock();
+    for (const double friction : {0.3, 0.6, 2.0}) {
+        Way way(body, middle - Vec3(8e-3, 0.0, 0.0), 6e-3, 0.0, asInASession);
+        way.friction = friction;
+        way.to(7.8e-3);
+        const double force = way.force();
+        const std::uint32_t contacts = way.last.contacts;
+        way.step = 0.0;
+        way.dragTo(16e-3);
+        EXPECT_LT(way.step, 0.05 * force) << friction;
+        EXPECT_GT(way.last.contacts, 0.8 * contacts) << friction;
+    }
 }
 
 // What is solved to convergence is not blended with what was felt before.
