@@ -239,13 +239,13 @@ private:
         occupancy::RoundCone shape;
         bool isQuartered = false;
     };
-    std::vector<FoundFor> foundFor_;   // the tools when the sites were looked for
-    std::vector<PressedBox> pressed_;  // by each tool, when the sites were looked for
-    std::vector<Tie> tiesFound_;       // the ties then, as far as there are not more than that
-    std::vector<HeldTool> held_;       // of each tool
-    std::vector<ElasticTool> tools_;   // as the body feels them
-    std::vector<Vec3> toolAt_;         // in the last call [m]
-    std::vector<Vec3f> slip_;          // of each surface point that was a site, where there is friction [m]
+    std::vector<FoundFor> foundFor_;            // the tools when the sites were looked for
+    std::vector<PressedBox> pressed_;           // by each tool, when the sites were looked for
+    std::vector<Tie> tiesFound_;                // the ties then, as far as there are not more than that
+    std::vector<HeldTool> held_;                // of each tool
+    std::vector<ElasticTool> tools_;            // as the body feels them
+    std::vector<occupancy::RoundCone> toolAt_;  // in the last call
+    std::vector<Vec3f> slip_;                   // of each surface point that was a site, where there is friction [m]
     std::span<const Tie> ties_;
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is

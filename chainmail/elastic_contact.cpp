@@ -237,16 +237,20 @@ Along contactsAlong(std::span<const ContactSite> sites, double alpha) noexcept
     return sum;
 }
 
+Vec3 turnedWay(Vec3 off, Vec3 from, Vec3 to) noexcept
+{
+    const Vec3 turn = glm::cross(from, to), once = glm::cross(turn, off);
+    const double cosine = glm::dot(from, to);
+    return cosine > -1.0 + slightly ? once + glm::cross(turn, once) / (1.0 + cosine) : Vec3(0.0);
+}
+
 Vec3 Tie::pulled(Vec3 at) const noexcept
 {
     const Vec3 off = at - rest;
     if (!piece.isRod() || axis == restAxis) {
         return u;
     }
-    // The least turn from restAxis to axis, see Rodrigues. Against each other they have none: then none is made.
-    const Vec3 turn = glm::cross(restAxis, axis), once = glm::cross(turn, off);
-    const double cosine = glm::dot(restAxis, axis);
-    return cosine > -1.0 + slightly ? u + once + glm::cross(turn, once) / (1.0 + cosine) : u;
+    return u + turnedWay(off, restAxis, axis);
 }
 
 bool Tie::holdsAs(const Tie& other) const noexcept

@@ -43,6 +43,10 @@ struct Tie {
     bool holdsAs(const Tie& other) const noexcept;
 };
 
+/// The way of a point at `off` from where a body turns about, when that turns by the least turn from one unit vector to
+/// another (O. Rodrigues, 1840); none where these are against each other.
+Vec3 turnedWay(Vec3 off, Vec3 from, Vec3 to) noexcept;
+
 struct ElasticLoad {
     static constexpr std::size_t noTool = std::numeric_limits<std::size_t>::max();
 

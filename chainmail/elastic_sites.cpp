@@ -28,6 +28,13 @@ std::size_t placesOf(std::span<const Tie> ties, double spacing) noexcept
     return static_cast<std::size_t>(sum);
 }
 
+// The way of a tool's material point at `at` when the tool moves by the least turn of its axis.
+Vec3 wayOf(Vec3 at, const occupancy::RoundCone& from, const occupancy::RoundCone& to) noexcept
+{
+    const Vec3 way = to.a - from.a, before = from.b - from.a, after = to.b - to.a;
+    return before == after ? way : way + turnedWay(at - from.a, glm::normalize(before), glm::normalize(after));
+}
+
 }  // namespace
 
 // The tools, held back where the body does not bear them.
@@ -178,12 +185,12 @@ void Elastic::drag(const ElasticLoad& load) noexcept
 {
     if (toolAt_.size() == load.tools.size()) {
         for (ContactSite& s : active()) {
-            s.slip += s.isTie ? Vec3(0.0) : load.tools[s.owner].shape.a - toolAt_[s.owner];
+            s.slip += s.isTie ? Vec3(0.0) : wayOf(s.rest + s.u, toolAt_[s.owner], load.tools[s.owner].shape);
         }
     }
     toolAt_.clear();
     for (const ElasticTool& tool : load.tools) {
-        toolAt_.push_back(tool.shape.a);
+        toolAt_.push_back(tool.shape);
     }
 }
 

@@ -185,6 +185,39 @@ TEST(ElasticFriction, BallThatSticksIsASpring)
     EXPECT_NEAR(drag.along(way), -stiffness * 0.3e-3, 0.1 * stiffness * 0.3e-3);
 }
 
+// A rod that lies on the block, sticks to it and turns about its middle: by symmetry its force is straight, and both ends
+// drag tissue along. Turned about its end it has the force along the surface of its middle's way.
+TEST(ElasticFriction, RodThatTurnsDragsTissueAlongAtBothEnds)
+{
+    const double radius = 4e-3, half = 4e-3;
+    const auto place = [&](Elastic& elastic, double angle, Vec3 aside) {
+        const Vec3 along(std::cos(angle), 0.0, std::sin(angle)), middle = blockTop + Vec3(0.0, depth - radius, 0.0) + aside;
+        std::array tools{tests::ball(middle, radius)};
+        tools[0].shape.a = middle - half * along;
+        tools[0].shape.b = middle + half * along;
+        tools[0].friction = 3.0;
+        return tests::settle(elastic, tests::loadOf(tools, {}, blockTop), 3e-6).energy;
+    };
+    const Focus focus = tests::focusUnder(blockTop);
+    Elastic aboutMiddle(block(), {}, focus), aboutEnd(block(), {}, focus), straight(block(), {}, focus);
+    double before = place(aboutMiddle, 0.0, Vec3(0.0));
+    place(aboutEnd, 0.0, Vec3(0.0));
+    place(straight, 0.0, Vec3(0.0));
+    for (int i = 1; i <= 4; ++i) {
+        const double angle = 0.02 * i;
+        const double energy = place(aboutMiddle, angle, Vec3(0.0));
+        EXPECT_GT(energy, before) << i;
+        before = energy;
+        const Vec3 force = aboutMiddle.toolForce(0);
+        EXPECT_LT(std::hypot(force.x, force.z), 0.002 * -force.y) << i;
+        const Vec3 way = half * Vec3(1.0 - std::cos(angle), 0.0, -std::sin(angle));
+        place(aboutEnd, angle, way);
+        place(straight, 0.0, way);
+        EXPECT_GT(straight.toolForce(0).z, 0.0) << i;
+        EXPECT_NEAR(aboutEnd.toolForce(0).z, straight.toolForce(0).z, 0.05 * straight.toolForce(0).z) << i;
+    }
+}
+
 // Press, drag, back, off: the hand never gets work out of friction. A drag that slips costs mu N times its way there and
 // back; one without friction gives everything back.
 TEST(ElasticFriction, ClosedPathsTakeEnergyOut)
