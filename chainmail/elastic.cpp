@@ -41,7 +41,7 @@ Elastic::Elastic(const ElasticBody& body, const ElasticOptions& options, const F
     foundFor_.reserve(maxTools);
     tiesFound_.reserve(maxTies);
     toolAt_.reserve(maxTools);
-    slip_.assign(body.points.size(), Vec3f(0.0F));
+    slip_.assign(body.points.size(), Slip());
 }
 
 std::size_t Elastic::nodes() const noexcept

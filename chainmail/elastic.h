@@ -245,7 +245,11 @@ private:
     std::vector<HeldTool> held_;                // of each tool
     std::vector<ElasticTool> tools_;            // as the body feels them
     std::vector<occupancy::RoundCone> toolAt_;  // in the last call
-    std::vector<Vec3f> slip_;                   // of each surface point that was a site, where there is friction [m]
+    struct Slip {
+        Vec3f way{0.0F};
+        float limit = 0;
+    };
+    std::vector<Slip> slip_;  // ContactSite::slip and limit of each surface point that was a site, where there is friction
     std::span<const Tie> ties_;
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is

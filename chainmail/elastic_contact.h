@@ -80,7 +80,7 @@ struct alignas(64) ContactSite {
 
     Vec3 u{0.0};       // its displacement [m]
     Vec3 force{0.0};   // on the tissue [N]
-    double limit = 0;  // slip along the surface up to which friction is a spring; 0: none [m]
+    double limit = 0;  // slip along the surface up to which friction is a spring in this call; 0: none [m]
     bool isTie = false;
 
     Vec3 rest{0.0};
@@ -104,7 +104,7 @@ struct alignas(64) ContactSite {
     float resolved = 1;       // fraction of its stiffness that wider cells leave it
     float stiffer = 1;        // by which its tissue had stiffened at the end of the last call, see StretchAt
 
-    bool active() const noexcept { return isTie || depth > 0.0; }
+    bool active() const noexcept { return isTie || depth > 0.0 || limit > 0.0; }
     Vec3 along() const noexcept { return slip - glm::dot(slip, normal) * normal; }
     /// Takes Coulomb's limit, by the push as it is.
     void limitBy(double friction) noexcept { limit = friction / gripOfPush * std::max(depth, 0.0); }
@@ -117,7 +117,7 @@ struct alignas(64) ContactSite {
         }
         if (limit > 0.0) {
             const double out = glm::dot(normal, v);
-            return stiffness * out * normal + resistAlong(v - out * normal);
+            return (depth > 0.0 ? stiffness : 0.0) * out * normal + resistAlong(v - out * normal);
         }
         return across * v + (stiffness - across) * glm::dot(normal, v) * normal;
     }
@@ -132,8 +132,9 @@ struct alignas(64) ContactSite {
 };
 
 /// Depth, normal, force and energy of a site where it is now. Friction holds a point with the stiffness grip() up to the
-/// slip `limit`; beyond, its force stays. The limit is Coulomb's, but kept while a call solves: so friction has an
-/// energy, and the contact stays a convex problem.
+/// slip `limit`; beyond, its force stays. The limit is Coulomb's, by the push at the end of the call before, and kept while
+/// a call solves: so friction has an energy, and the contact stays a convex problem. A tool that goes back by more than the
+/// surface is sunk into it lets go of nothing until the tissue had its time to follow.
 void touch(ContactSite& site, std::span<const occupancy::ShapeDistance> shapes, std::span<const Tie> ties) noexcept;
 /// The same where only the slip or its limit is another. @pre the site is no tie
 void press(ContactSite& site) noexcept;

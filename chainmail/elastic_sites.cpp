@@ -87,7 +87,7 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
         pressed_.assign(held_.size(), PressedBox());
         for (const ContactSite& s : sites()) {
             if (!s.isTie) {
-                slip_[s.point] = Vec3f(s.slip);
+                slip_[s.point] = {Vec3f(s.slip), static_cast<float>(s.limit)};
             }
             if (!s.isTie && s.active() && s.owner < pressed_.size()) {
                 pressed_[s.owner].add(s.rest);
@@ -107,7 +107,9 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
     tiesFound_.assign(load.ties.begin(),
                       load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
     for (ContactSite& s : active().subspan(fresh)) {
-        s.slip = s.isTie ? Vec3(0.0) : Vec3(slip_[s.point]);
+        const Slip before = s.isTie ? Slip() : slip_[s.point];
+        s.slip = Vec3(before.way);
+        s.limit = static_cast<double>(before.limit);
     }
 }
 
@@ -123,7 +125,7 @@ void Elastic::meet(const ElasticLoad& load, bool moved) noexcept
     spreadPressure();
     for (ContactSite& s : active()) {
         touch(s, shapes_, ties_);
-        if (const double friction = frictionOf(s); friction > 0.0) {
+        if (const double friction = frictionOf(s); friction > 0.0 && s.limit <= 0.0) {
             s.limitBy(friction);
             press(s);
         }

@@ -147,6 +147,39 @@ TEST(ElasticFriction, BallThatIsDraggedInTicksFeelsItEvenly)
     }
 }
 
+// A ball that goes back by more per tick than the surface is sunk into it, as one held by a device with coarse encoders
+// does: friction holds until the tissue has followed, and does not let go in each tick. It did, with steps of a quarter to
+// a half.
+TEST(ElasticFriction, BallThatIsDrawnBackInTicksKeepsItsGrip)
+{
+    for (const double mu : {0.3, 0.6}) {
+        Elastic elastic(block(), {.law = volume::NeoHookean{}}, tests::focusUnder(blockTop));
+        const Vec3 way = alongTop(20.0);
+        Vec3 at = blockTop - Vec3(0.0, bigRadius, 0.0), force(0.0);
+        double deep = 0.0, step = 0.0;
+        const auto go = [&](Vec3 by, int ticks) {
+            for (int left = ticks; left > 0; --left) {
+                at += by;
+                deep += by.y;
+                std::array tools{tests::ball(at, bigRadius)};
+                tools[0].friction = mu;
+                tools[0].pushed = Vec3(0.0, deep, 0.0);
+                elastic.relax(tests::loadOf(tools, {}, blockTop));
+                const Vec3 before = std::exchange(force, elastic.toolForce(0));
+                step = std::max(step, glm::distance(force, before) / glm::length(before));
+            }
+        };
+        go(Vec3(0, 20e-6, 0), 200);
+        go(20e-6 * way, 100);
+        step = 0.0;
+        for (int i = 0; i < 15; ++i) {
+            go(Vec3(0, -90e-6, 0), 1);
+            go(Vec3(0, -60e-6, 0) - 30e-6 * way, 1);
+        }
+        EXPECT_LT(step, 0.1) << mu;
+    }
+}
+
 // Pressed straight down in the middle of a block that is the same on both sides, the ball goes on feeling straight forces,
 // however much the tissue slips under it.
 TEST(ElasticFriction, StraightPressHasAStraightForce)
