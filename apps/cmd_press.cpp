@@ -237,6 +237,22 @@ void warnOfSmall(const Run& run)
     }
 }
 
+// Such a tool is pushed from the nearest place of the surface, by all its depth at once.
+void warnOfStartInside(const Run& run)
+{
+    const ToolSpec& tool = run.press.tool;
+    const studies::ToolPose& first = run.path.poses.front();
+    const haptics::ProxyTool shape{tool.radius, tool.pressedLength(), first.axis};
+    const double inside = -haptics::deepestPlace(run.model.surface, shape, first.position).distance;
+    if (tool.kind != ToolKind::needle && inside > 0.0) {
+        fmt::print(
+            stderr,
+            "palpate press: the path begins with the tool's middle {:.1f} mm inside the body: forces have no meaning "
+            "until the tool has been outside; start it there\n",
+            1e3 * inside);
+    }
+}
+
 void runPress(const PressArguments& o)
 {
     base::checkOutputs({o.json, o.csv}, {o.scene, o.path, o.at});
@@ -260,6 +276,7 @@ void runPress(const PressArguments& o)
     }
     progress.clear();
     warnOfSmall(run);
+    warnOfStartInside(run);
     const auto ticks = static_cast<double>(run.path.ticks());
     try {
         run.summary = studies::press(run.model, run.path, run.points, run.press, [&](const PressSample& s) {

@@ -63,6 +63,15 @@ TEST_F(PressCommand, AToolSmallerThanACellIsSaidToBe)
     EXPECT_EQ(palpate({"press", scene, "--path", path, "--radius-mm", "3"}).err, "");
 }
 
+TEST_F(PressCommand, APathThatBeginsInsideTheBodyIsSaidTo)
+{
+    writeText(path, "x_mm,y_mm,z_mm\n0,5,0\n0,5,0\n");
+    const Outcome inside = palpate({"press", scene, "--path", path});
+    EXPECT_EQ(inside.status, 0) << inside.err;
+    EXPECT_NE(inside.err.find("the path begins with the tool's middle 5.0 mm inside the body"), std::string::npos)
+        << inside.err;
+}
+
 TEST_F(PressCommand, AToolThatIsHeldBackIsSaidToBe)
 {
     writeText(path, "x_mm,y_mm,z_mm\n0,0,0\n0,0,0\n");
