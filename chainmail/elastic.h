@@ -248,8 +248,10 @@ private:
     struct Slip {
         Vec3f way{0.0F};
         float limit = 0;
+        std::uint32_t search = 0;  // that it was kept for
     };
-    std::vector<Slip> slip_;  // ContactSite::slip and limit of each surface point that was a site, where there is friction
+    std::vector<Slip> slip_;  // ContactSite::slip and limit of each surface point, from one search for sites to the next
+    std::uint32_t searches_ = 0;  // for surface points
     std::span<const Tie> ties_;
     std::array<int, volume::relaxationTerms> since_{};  // periods since each term of the history went on
     std::size_t term_ = 0;                              // whose turn it is

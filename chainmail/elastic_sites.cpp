@@ -85,9 +85,10 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
     std::size_t fresh = touching_;  // the first site that is new
     if (!toolsHold) {
         pressed_.assign(held_.size(), PressedBox());
+        ++searches_;
         for (const ContactSite& s : sites()) {
             if (!s.isTie) {
-                slip_[s.point] = {Vec3f(s.slip), static_cast<float>(s.limit)};
+                slip_[s.point] = {Vec3f(s.slip), static_cast<float>(s.limit), searches_};
             }
             if (!s.isTie && s.active() && s.owner < pressed_.size()) {
                 pressed_[s.owner].add(s.rest);
@@ -107,9 +108,10 @@ void Elastic::findSitesOf(const ElasticLoad& load, bool moved) noexcept
     tiesFound_.assign(load.ties.begin(),
                       load.ties.begin() + static_cast<std::ptrdiff_t>(std::min(load.ties.size(), maxTies)));
     for (ContactSite& s : active().subspan(fresh)) {
-        const Slip before = s.isTie ? Slip() : slip_[s.point];
-        s.slip = Vec3(before.way);
-        s.limit = static_cast<double>(before.limit);
+        if (frictionOf(s) > 0.0 && slip_[s.point].search == searches_) {
+            s.slip = Vec3(slip_[s.point].way);
+            s.limit = static_cast<double>(slip_[s.point].limit);
+        }
     }
 }
 

@@ -135,6 +135,9 @@ public:
         }
     }
 
+    Vec3 way() const { return way_; }
+    Vec3 force() const { return force_; }
+
     double step = 0.0;  // largest change of the force in a tick, in the force
     double most = 0.0;  // largest force along the surface, in that across
 
@@ -176,6 +179,21 @@ TEST(ElasticFriction, BallThatIsDrawnBackInTicksKeepsItsGrip)
             drag.go(Vec3(0, -60e-6, 0) - 30e-6 * alongTop(20.0), 1);
         }
         EXPECT_LT(drag.step, 0.1) << mu;
+    }
+}
+
+// What a ball dragged before it jumped off the block is forgotten: it touches as if for the first time.
+TEST(ElasticFriction, BallThatComesBackHasNoGripOfBefore)
+{
+    TickedDrag first(0.6), again(0.6);
+    again.go(Vec3(0, 20e-6, 0), 100);
+    again.go(20e-6 * alongTop(20.0), 60);
+    again.go(-again.way() - Vec3(0.0, 10e-3, 0.0), 1);
+    again.go(Vec3(0.0, 10e-3, 0.0), 1);
+    for (int i = 1; i <= 20; ++i) {
+        first.go(Vec3(0, 20e-6, 0), 1);
+        again.go(Vec3(0, 20e-6, 0), 1);
+        EXPECT_LT(glm::distance(again.force(), first.force()), 0.02 * glm::length(first.force())) << i;
     }
 }
 
