@@ -1,8 +1,9 @@
 #include <chainmail/cell_levels.h>
 
+#include <chainmail/block_mean.h>
 #include <chainmail/cell_layers.h>
+#include <chainmail/split_level.h>
 #include <chainmail/window.h>
-#include <volume/cell_mixture.h>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -11,8 +12,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <random>
+#include <unordered_map>
+#include <utility>
 
 namespace palpate::chainmail {
 
@@ -20,67 +22,22 @@ namespace {
 
 constexpr int powerSteps = 30;
 
-struct Moduli {
-    double mu = 0;
-    double bulk = 0;
-    double stiffening = 0;
-    double held = 0;                                         // fraction of the tissue
-    std::array<double, volume::relaxationTerms> relaxing{};  // weights
-};
-
 int coarseNodes(int fine)
 {
     return fine / 2 + 1;
 }
 
-// Energy and not volume decides: under the same strain cells side by side add their stiffness, under the same stress they
-// add their compliance. Inside the body a block of eight is between the two: the geometric mean of both bounds keeps thin
-// stiff layers stiff and thin gaps soft. Layers under a free surface bear no stress across, and along it they have the
-// strain of the surface: their stiffness adds, as in a laminate. What is held in space gives way in neither: it leaves less
-// of the block to be strained, and the rest of it by as much more. Sources: W. Voigt 1889 and A. Reuss 1929 (bounds); the
-// mean as in docs/decisions.md, 8.
-class BlockMean {
-public:
-    /// @param held  fraction of the cell's tissue that is held
-    void add(double modulus, double held)
-    {
-        ++filled_;
-        whole_ += modulus;
-        const double free = 1.0 - held;
-        if (free > 1.0 - static_cast<double>(whollyHeld)) {
-            free_ += free;
-            sum_ += free * free * modulus;
-            inverse_ += 1.0 / modulus;
-        }
-    }
-    double modulus(bool atSurface) const
-    {
-        if (filled_ == 0) {
-            return 0.0;
-        }
-        const double fraction = filled_ / 8.0;
-        if (free_ <= 0.0) {
-            return whole_ / filled_ * fraction;
-        }
-        const double mean = atSurface ? sum_ / free_ : std::sqrt(sum_ / inverse_);
-        return mean * filled_ / free_ * fraction;
-    }
-
-private:
-    int filled_ = 0;
-    double whole_ = 0.0;
-    double free_ = 0.0;  // cells
-    double sum_ = 0.0;   // of moduli without what is held, by share
-    double inverse_ = 0.0;
-};
-
 class Coarsening {
 public:
     /// @param held  fraction of each cell's tissue that is held
-    Coarsening(const CellLevel& fine, const std::vector<float>& held) : fine_(fine), held_(held) {}
+    /// @param loose  see splitLevel()
+    Coarsening(CellLevel& fine, const std::vector<float>& held, const std::vector<std::uint8_t>& loose)
+        : fine_(fine), held_(held), loose_(loose)
+    {
+    }
 
-    /// And the shares of its own cells.
-    CellLevel level(std::vector<float>& held) const
+    /// And the shares of its own cells, and which are loose. Links the fine level to it.
+    CellLevel level(std::vector<float>& held, std::vector<std::uint8_t>& loose)
     {
         CellLevel coarse;
         const auto& g = fine_.nodes;
@@ -94,8 +51,13 @@ public:
             coarse.relaxing[i].assign(relaxes() ? count : 0, 0.0F);
         }
         held.assign(count, 0.0F);
+        split(coarse, loose);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 2, [&](Index3 c) {
-            const Moduli m = upscaled(2 * c);
+            unsigned children = 0xFF;
+            for (const CellFragment& f : coarse.fragments.in(c, coarse.nodes.size.y)) {
+                children &= ~static_cast<unsigned>(f.children);
+            }
+            const Moduli m = upscaled(2 * c, children, noFragment);
             const std::size_t at = coarse.nodes.offset(c);
             coarse.mu[at] = static_cast<float>(m.mu);
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
@@ -105,91 +67,150 @@ public:
                 coarse.relaxing[i][at] = static_cast<float>(m.relaxing[i]);
             }
         });
-        volume::forEachIndex(Index3(0), coarse.nodes.size - 1,
-                             [&](Index3 n) { coarse.fixed[coarse.nodes.offset(n)] = mostlyFixed(2 * n) ? 1 : 0; });
+        volume::forEachIndex(Index3(0), coarse.nodes.size - 1, [&](Index3 n) {
+            coarse.fixed[coarse.nodes.offset(n)] = sharesAround(2 * n).isMostlyFixed() ? 1 : 0;
+        });
+        fixFragments(coarse);
         return coarse;
     }
 
 private:
-    // A coarse node stands for the fine ones around it, weighted as it interpolates to them. Those without tissue have no
-    // say: so the floor of a body that lies between two planes of coarse nodes is held by the plane outside.
-    bool mostlyFixed(Index3 middle) const
+    // Of the fine nodes around a coarse one, weighted as it interpolates to them.
+    struct Shares {
+        double fixed = 0, tissue = 0;
+        void add(double weight, bool isFixed) noexcept
+        {
+            tissue += weight;
+            fixed += isFixed ? weight : 0.0;
+        }
+        bool isMostlyFixed() const noexcept { return fixed > 0.3 * tissue; }
+    };
+
+    static double weightOf(Index3 off) noexcept { return 1.0 / static_cast<double>(1 << (off.x + off.y + off.z)); }
+
+    // A coarse node stands for the fine ones around it. Those without tissue have no say: so the floor of a body that lies
+    // between two planes of coarse nodes is held by the plane outside.
+    Shares sharesAround(Index3 middle) const
     {
-        double fixed = 0.0;
-        double tissue = 0.0;
+        Shares shares;
         const auto& g = fine_.nodes;
         volume::forEachIndex(glm::max(middle - 1, Index3(0)), glm::min(middle + 1, g.size - 1), [&](Index3 n) {
-            const Index3 off = glm::abs(n - middle);
-            const double weight = 1.0 / static_cast<double>(1 << (off.x + off.y + off.z));
             const std::size_t at = g.offset(n);
             if (fine_.diagonal[at] > 0.0F) {
-                tissue += weight;
-                fixed += fine_.fixed[at] != 0 ? weight : 0.0;
+                shares.add(weightOf(glm::abs(n - middle)), fine_.fixed[at] != 0);
             }
         });
-        return fixed > 0.3 * tissue;
+        return shares;
+    }
+
+    void split(CellLevel& coarse, std::vector<std::uint8_t>& loose)
+    {
+        Split found = splitLevel(fine_, loose_, coarse.nodes);
+        loose = std::move(found.loose);
+        coarse.fragments = std::move(found.coarse);
+        fine_.fragments.links = std::move(found.links);
+        fine_.fragments.linkRows = std::move(found.linkRows);
+        for (std::size_t i = 0; i < found.parents.size(); ++i) {
+            fine_.fragments.cells[i].parent = found.parents[i];
+        }
+        for (std::size_t i = 0; i < coarse.fragments.cells.size(); ++i) {
+            CellFragment& f = coarse.fragments.cells[i];
+            const Moduli m = upscaled(2 * f.cell, f.children, static_cast<std::uint32_t>(i));
+            f.mu = static_cast<float>(m.mu);
+            f.lambda = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
+            f.stiffening = static_cast<float>(m.stiffening);
+            f.held = static_cast<float>(m.held);
+            for (std::size_t k = 0; k < m.relaxing.size(); ++k) {
+                f.relaxing[k] = static_cast<float>(m.relaxing[k]);
+            }
+        }
+    }
+
+    // Where nodes share a place, each stands for the fine ones that follow it.
+    void fixFragments(CellLevel& coarse) const
+    {
+        const std::size_t fineCount = fine_.nodes.count(), count = coarse.nodes.count();
+        std::unordered_map<std::size_t, Shares> shares;  // of places, and of virtual nodes
+        for (const VirtualNode& n : coarse.fragments.nodes) {
+            shares.try_emplace(coarse.nodes.offset(n.at), sharesAround(2 * n.at));
+        }
+        for (const NodeLink& l : fine_.fragments.links) {
+            const bool isVirtual = l.node >= fineCount;
+            const VirtualNode fine = isVirtual ? fine_.fragments.nodes[l.node - fineCount]
+                                               : VirtualNode{l.at, fine_.diagonal[l.node], fine_.fixed[l.node] != 0};
+            for (std::size_t i = 0; i < l.count && fine.diagonal > 0.0F; ++i) {
+                const std::uint32_t parent = l.parents[i];
+                const bool isBeside = parent >= count;
+                const Index3 at = isBeside ? coarse.fragments.nodes[parent - count].at : coarse.nodes.node(parent);
+                const double weight = weightOf(glm::abs(l.at - 2 * at));
+                if (isBeside) {
+                    shares[parent].add(weight, fine.isFixed);
+                }
+                // A node of the level was counted as one that follows the place's own.
+                if (const auto here = shares.find(coarse.nodes.offset(at)); isBeside != isVirtual && here != shares.end()) {
+                    here->second.add(isBeside ? -weight : weight, fine.isFixed);
+                }
+            }
+        }
+        for (std::size_t i = 0; i < coarse.fragments.nodes.size(); ++i) {
+            VirtualNode& n = coarse.fragments.nodes[i];
+            n.isFixed = shares[count + i].isMostlyFixed();
+            coarse.fixed[coarse.nodes.offset(n.at)] = shares[coarse.nodes.offset(n.at)].isMostlyFixed() ? 1 : 0;
+        }
     }
 
     bool relaxes() const { return !fine_.relaxing[0].empty(); }
 
-    // A coarse cell has the shear modulus of its eight cells right after a step, and that of a long time after it; the
-    // terms share what is gone as they do on average.
-    Moduli upscaled(Index3 low) const
+    // @param children  of the eight, a bit for each, and of their fragments those that lie in the coarse fragment `parent`
+    Moduli upscaled(Index3 low, unsigned children, std::uint32_t parent) const
     {
-        BlockMean mu, bulk, relaxed;
-        volume::StiffeningMean stiffening;
-        Moduli mean;
-        int filled = 0;
+        BlockSums sums;
+        int child = 0;
         volume::forEachIndex(low, low + 1, [&](Index3 c) {
             const std::size_t at = fine_.nodes.offset(c);
-            const double m = static_cast<double>(fine_.mu[at]);
-            if (m > 0.0) {
-                const double held = static_cast<double>(held_[at]);
-                mu.add(m, held);
-                bulk.add(static_cast<double>(fine_.lambda[at]) + 2.0 / 3.0 * m, held);
-                stiffening.add(1.0, m, static_cast<double>(fine_.stiffening[at]));
-                mean.held += held;
-                double left = 1.0;
-                for (std::size_t i = 0; i < mean.relaxing.size() && relaxes(); ++i) {
-                    const double weight = static_cast<double>(fine_.relaxing[i][at]);
-                    mean.relaxing[i] += m * weight;
-                    left -= weight;
+            if (fine_.mu[at] > 0.0F && (children >> child & 1U) != 0) {
+                CellFragment whole{.mu = fine_.mu[at], .lambda = fine_.lambda[at], .stiffening = fine_.stiffening[at]};
+                whole.held = held_[at];
+                for (std::size_t i = 0; i < whole.relaxing.size() && relaxes(); ++i) {
+                    whole.relaxing[i] = fine_.relaxing[i][at];
                 }
-                relaxed.add(m * left, held);
-                ++filled;
+                sums.add(whole);
             }
+            for (const CellFragment& f : fine_.fragments.in(c, fine_.nodes.size.y)) {
+                if (f.parent == parent) {
+                    sums.add(f);
+                }
+            }
+            ++child;
         });
-        const int cells = std::max(filled, 1);
-        const bool surface = atSurface(fine_, low, low + 1);
-        const double sum = std::accumulate(mean.relaxing.begin(), mean.relaxing.end(), 0.0);
-        const double gone = sum > 0.0 ? 1.0 - relaxed.modulus(surface) / mu.modulus(surface) : 0.0;
-        for (double& weight : mean.relaxing) {
-            weight *= sum > 0.0 ? gone / sum : 0.0;
-        }
-        return {mu.modulus(surface), bulk.modulus(surface), stiffening.mean(), mean.held / cells, mean.relaxing};
+        return sums.moduli(parent != noFragment || atSurface(fine_, low, low + 1));
     }
 
-    const CellLevel& fine_;
+    CellLevel& fine_;
     const std::vector<float>& held_;
+    const std::vector<std::uint8_t>& loose_;
 };
 
-// What one cell's modes give to the diagonal at each of its nodes: h / 32 (2 mu (46 / 9 + 4 / 3 (1 + s)) + 2 lambda), with
-// s = lambda / (lambda + 2 mu) of bending.
 void addDiagonal(CellLevel& level)
 {
     const auto& g = level.nodes;
     level.diagonal.assign(g.count(), 0.0F);
     volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
         const std::size_t at = g.offset(c);
-        const float mu = level.mu[at];
-        const float lambda = level.lambda[at];
-        if (mu > 0.0F) {
-            const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
-            const float fraction =
-                static_cast<float>(g.spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
+        if (level.mu[at] > 0.0F) {
+            const float fraction = diagonalOf(level.mu[at], level.lambda[at], g.spacing);
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += fraction; });
         }
     });
+    for (VirtualNode& n : level.fragments.nodes) {
+        n.diagonal = 0.0F;
+    }
+    for (const CellFragment& f : level.fragments.cells) {
+        for (const std::uint32_t n : f.nodes) {
+            float& sum = n < g.count() ? level.diagonal[n] : level.fragments.nodes[n - g.count()].diagonal;
+            sum += diagonalOf(f.mu, f.lambda, g.spacing);
+        }
+    }
     for (const CellLayer& l : level.layers) {
         const std::size_t at = g.offset(l.cell);
         const float s = level.lambda[at] / (level.lambda[at] + 2.0F * level.mu[at]);
@@ -238,6 +259,11 @@ public:
             level.mu[level.nodes.offset(c)] *= factor;
             level.lambda[level.nodes.offset(c)] *= factor;
         });
+        for (CellFragment& f : level.fragments.cells) {
+            const float factor = static_cast<float>(layerFactor(level, f.cell));
+            f.mu *= factor;
+            f.lambda *= factor;
+        }
     }
 
 private:
@@ -252,6 +278,9 @@ private:
             level.fixed[g.offset(n)] = on ? 1 : 0;
             nearest += on && height > -g.spacing ? 1 : 0;
         });
+        for (VirtualNode& n : level.fragments.nodes) {
+            n.isFixed = level.fixed[g.offset(n.at)] != 0;
+        }
         return nearest;
     }
 
@@ -327,7 +356,9 @@ void rest(const Resting& resting, const FinestLevel& finest, std::vector<CellLev
 double spectralRadius(const CellLevel& level)
 {
     const Index3 size = level.nodes.size;
-    const Layout l = Layout::of(size.x, size.y, size.z);
+    WindowFragments fragments(level, size);
+    fragments.place(level, Index3(0));
+    const Layout l = Layout::of(size.x, size.y, fragments.planes());
     const Kernels& k = kernels();
     std::vector<float> mu(l.count + Layout::lanes), lambda(mu), inverse(mu);
     LayerFields layers(l, !level.layers.empty());
@@ -335,16 +366,26 @@ double spectralRadius(const CellLevel& level)
     std::vector<float> z(l.fieldSize()), az(l.fieldSize()), scratch(l.scratchSize());
     std::minstd_rand random(7);
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);
+    const auto start = [&](std::size_t at, float diagonal, bool isFixed) {
+        inverse[at] = diagonal > 0.0F && !isFixed ? 1.0F / diagonal : 0.0F;
+        for (std::size_t c = 0; c < 3; ++c) {
+            z[c * l.count + at] = inverse[at] == 0.0F ? 0.0F : random() % 2 != 0 ? 1.0F : -1.0F;
+        }
+    };
     volume::forEachIndex(Index3(0), size - 1, [&](Index3 n) {
         const std::size_t from = level.nodes.offset(n);
         const std::size_t to = l.at(n.x, n.y, n.z);
         mu[to] = scale * level.mu[from];
         lambda[to] = scale * level.lambda[from];
-        inverse[to] = level.diagonal[from] > 0.0F && level.fixed[from] == 0 ? 1.0F / level.diagonal[from] : 0.0F;
-        for (std::size_t c = 0; c < 3; ++c) {
-            z[c * l.count + to] = inverse[to] == 0.0F ? 0.0F : random() % 2 != 0 ? 1.0F : -1.0F;
-        }
+        start(to, level.diagonal[from], level.fixed[from] != 0);
     });
+    for (const WindowFragments::Placed& p : fragments.placed()) {
+        mu[p.node] = scale * level.fragments.cells[p.fragment].mu;
+        lambda[p.node] = scale * level.fragments.cells[p.fragment].lambda;
+    }
+    for (const WindowFragments::VirtualAt& v : fragments.virtuals()) {
+        start(v.at, level.fragments.nodes[v.node].diagonal, level.fragments.nodes[v.node].isFixed);
+    }
     const auto norm = [&] {
         std::array<double, 2> sums{};
         k.dots(z.data(), z.data(), z.data(), 3 * l.count, sums.data());
@@ -356,8 +397,10 @@ double spectralRadius(const CellLevel& level)
         if (before <= 0.0) {
             break;
         }
+        fragments.share(z.data(), l.count);
         k.apply(l, {.mu = mu.data(), .lambda = lambda.data(), .layers = layers.view()}, z.data(), az.data(),
                 scratch.data());
+        fragments.collect(az.data(), l.count);
         k.smoothFirst(static_cast<float>(1.0 / before), inverse.data(), az.data(), z.data(), l.count);
         radius = norm();
     }
@@ -372,12 +415,16 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
     FinestLevel first = support ? Resting::freePart(finest) : finest;
     std::vector<CellLevel> levels{withStiffSkin(first)};
     addDiagonal(levels.front());
+    std::vector<std::uint8_t> loose = looseCells(levels.front(), finest.held);
     while (levels.size() < count) {
         std::vector<float> coarser;
-        levels.push_back(Coarsening(levels.back(), first.held).level(coarser));
+        std::vector<std::uint8_t> looser;
+        levels.push_back(Coarsening(levels.back(), first.held, loose).level(coarser, looser));
         addDiagonal(levels.back());
         first.held = std::move(coarser);
+        loose = std::move(looser);
     }
+    first.level.fragments = std::move(levels.front().fragments);
     levels.front() = first.level;
     addLayers(first, finest.held, surface, levels.front());
     addDiagonal(levels.front());

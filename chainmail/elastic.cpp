@@ -64,7 +64,7 @@ Vec3 Elastic::displacement(Vec3 rest) const noexcept
 Vec3 Elastic::displacementOf(Index3 cell) const noexcept
 {
     ContactSite site;
-    locateMiddle(stack_.windows(), cell, site);
+    locateMiddle(stack_.body(), stack_.windows(), cell, site);
     return site.level < stack_.size() ? gather(stack_.windows(), site, Field::u) : Vec3(0.0);
 }
 

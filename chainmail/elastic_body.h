@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chainmail/fragments.h>
 #include <volume/scalar_field.h>
 #include <volume/tissue.h>
 
@@ -31,6 +32,7 @@ struct CellLevel {
     std::vector<std::uint32_t>
         layerRows;                // first of `layers` in row (y, z) of cells, at y + z * nodes along y; none: no layers
     std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
+    Fragments fragments;          // of cells that gaps run through; the finest level has none
     double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
 };
 
@@ -54,6 +56,14 @@ struct SurfaceCell {
 inline double youngsModulusOf(float mu) noexcept
 {
     return 2.9 * static_cast<double>(mu);
+}
+
+/// What a cell's modes give to the operator's diagonal at each of its nodes [N/m]: h / 32 (2 mu (46 / 9 + 4 / 3 (1 + s)) +
+/// 2 lambda), with s = lambda / (lambda + 2 mu) of bending.
+inline float diagonalOf(float mu, float lambda, double spacing) noexcept
+{
+    const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
+    return static_cast<float>(spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
 }
 
 /// Shear modulus of the level's cell that a place lies in; 0 where it is empty, and outside of the grid [Pa].

@@ -48,6 +48,23 @@ bool touchesLittle(const ElasticTool& tool, double spacing) noexcept
     return tool.pushed != Vec3(0.0) && radiusOfPatch(tool) < little * spacing;
 }
 
+namespace {
+
+// Lowest node of a window's cell, or of the fragment of it in which a cell of the finest level lies.
+std::uint32_t nodeOf(const ElasticBody& body, std::span<const Window> windows, std::size_t level, Index3 cell,
+                     Index3 finest) noexcept
+{
+    if (!body.levels[level].fragments.cells.empty()) {
+        const std::uint32_t fragment = fragmentAt(body, level, finest);
+        if (fragment != noFragment) {
+            return windows[level].fragments.nodeOf(fragment);
+        }
+    }
+    return static_cast<std::uint32_t>(windows[level].at(cell));
+}
+
+}  // namespace
+
 void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept
 {
     for (std::size_t l = 0; l < windows.size(); ++l) {
@@ -57,22 +74,25 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
         if (!windows[l].contains(cell) || !windows[l].contains(cell + 1)) {
             continue;
         }
+        const int scale = 1 << l;
+        const auto& finest = body.levels.front().nodes;
+        const Index3 in(glm::floor((rest - finest.origin) / finest.spacing));
         site.fraction = trilinear(at - Vec3(cell));
-        site.node = static_cast<std::uint32_t>(windows[l].at(cell));
+        site.node = nodeOf(body, windows, l, cell, glm::clamp(in, scale * cell, scale * cell + scale - 1));
         site.level = static_cast<std::uint16_t>(l);
         return;
     }
     site.level = static_cast<std::uint16_t>(windows.size());
 }
 
-void locateMiddle(std::span<const Window> windows, Index3 cell, ContactSite& site) noexcept
+void locateMiddle(const ElasticBody& body, std::span<const Window> windows, Index3 cell, ContactSite& site) noexcept
 {
     for (std::size_t l = 0; l < windows.size(); ++l) {
         const int scale = 1 << l;
         const Index3 low = cell / scale;
         if (windows[l].contains(low) && windows[l].contains(low + 1)) {
             site.fraction = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
-            site.node = static_cast<std::uint32_t>(windows[l].at(low));
+            site.node = nodeOf(body, windows, l, low, cell);
             site.level = static_cast<std::uint16_t>(l);
             return;
         }

@@ -258,6 +258,6 @@ inline std::array<float, 8> trilinear(Vec3 t) noexcept
 void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept;
 /// The same for the middle of a cell of the finest level: on a coarser level it lies at (2 m + 1) / 2^(level + 1) of a
 /// cell's edges, m whole numbers.
-void locateMiddle(std::span<const Window> windows, Index3 cell, ContactSite& site) noexcept;
+void locateMiddle(const ElasticBody& body, std::span<const Window> windows, Index3 cell, ContactSite& site) noexcept;
 
 }  // namespace palpate::chainmail

@@ -127,7 +127,7 @@ private:
     {
         const Window& w = windows_[site.level];
         for (int c = 0; c < 8; ++c) {
-            if (w.border[w.layout.corner(site.node, c)] != 0.0F) {
+            if (w.border[w.fragments.original(w.layout.corner(site.node, c))] != 0.0F) {
                 return true;
             }
         }
@@ -154,7 +154,7 @@ private:
             return true;
         }
         ContactSite middle;
-        locateMiddle(windows_, cell.cell, middle);
+        locateMiddle(body_, windows_, cell.cell, middle);
         return middle.level < windows_.size() && shape.distance(rest + gather(windows_, middle, Field::u)) < near;
     }
 

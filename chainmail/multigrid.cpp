@@ -19,7 +19,7 @@ constexpr double coarsestSpread = 20;  // largest to smallest eigenvalue there
 Multigrid::Multigrid(WindowStack& stack, std::size_t maxBlocks) : stack_(stack)
 {
     for (std::size_t l = 0; l < stack_.size(); ++l) {
-        const std::size_t nodes = stack_[l].layout.count;
+        const std::size_t nodes = stack_[l].room();
         blocks_.emplace_back().reserve(std::min(maxBlocks, nodes));
         blockOf_.emplace_back(nodes, 0U);
     }
@@ -42,6 +42,7 @@ void Multigrid::clearContacts() noexcept
 
 void Multigrid::addContact(std::size_t level, std::size_t node, const glm::dmat3& stiffness) noexcept
 {
+    node = stack_[level].fragments.original(node);
     std::uint32_t& index = blockOf_[level][node];
     if (index == 0) {
         if (blocks_[level].size() == blocks_[level].capacity()) {
@@ -77,7 +78,9 @@ void Multigrid::prepare() noexcept
 // t = (A + contacts) z on the coarsest window.
 void Multigrid::operate(Window& w) noexcept
 {
+    w.share(Field::z);
     stack_.kernels().apply(w.layout, w.stiffness(), w.field(Field::z), w.field(Field::t), stack_.scratch());
+    w.collect(Field::t);
     addContacts(stack_.size() - 1, 1.0);
 }
 
@@ -130,6 +133,17 @@ void Multigrid::solveCoarsest() noexcept
         smoothContacts(level, Field::z, false, weight);
         rho = next;
     }
+    w.share(Field::z);
+}
+
+// What the smoother's step lacks of the copies' t, where it is swept with that of their originals alone.
+void Multigrid::smoothCopies(Window& w) noexcept
+{
+    for (const WindowFragments::Copy& copy : w.fragments.copies()) {
+        const double factor = -static_cast<double>(w.weight * w.diagonal[copy.original]);
+        w.add(Field::z, copy.original, factor * w.value(Field::t, copy.at));
+    }
+    w.collect(Field::t);
 }
 
 void Multigrid::cycle(std::size_t level) noexcept
@@ -142,8 +156,10 @@ void Multigrid::cycle(std::size_t level) noexcept
     }
     k.smoothFirst(w.weight, w.diagonal.data(), w.field(Field::r), w.field(Field::z), w.layout.count);
     smoothContacts(level, Field::z, true, 1.0);
+    w.share(Field::z);
     k.residualOf(w.layout, w.stiffness(), w.open.data(), w.field(Field::r), w.field(Field::z), w.field(Field::t),
                  stack_.scratch());
+    w.collect(Field::t);
     addContacts(level, -1.0);
 
     Window& coarse = stack_[level + 1];
@@ -152,10 +168,13 @@ void Multigrid::cycle(std::size_t level) noexcept
 
     prolong(k, coarse, coarse.field(Field::z), w, w.field(Field::t));
     k.addMasked(w.open.data(), w.field(Field::t), w.field(Field::z), w.layout.count);
+    w.share(Field::z);
     const Smoother smoother{w.weight, w.diagonal.data(), w.field(Field::r)};
     k.smoothOf(w.layout, w.stiffness(), smoother, w.field(Field::z), w.field(Field::t), stack_.scratch());
+    smoothCopies(w);
     addContacts(level, 1.0);
     smoothContacts(level, Field::z, false, 1.0);
+    w.share(Field::z);
 }
 
 }  // namespace palpate::chainmail

@@ -39,6 +39,7 @@ private:
     void operate(Window& coarsest) noexcept;
     void addContacts(std::size_t level, double sign) noexcept;
     void smoothContacts(std::size_t level, Field field, bool first, double weight) noexcept;
+    static void smoothCopies(Window& window) noexcept;
     void solveCoarsest() noexcept;
 
     WindowStack& stack_;

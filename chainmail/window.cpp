@@ -3,27 +3,8 @@
 #include <glm/common.hpp>
 
 #include <algorithm>
-#include <cstring>
 
 namespace palpate::chainmail {
-
-namespace {
-
-// True when one of the cells from `first` to `last` is not empty.
-bool anyTissue(const Layout& l, const Floats& mu, Index3 first, Index3 last) noexcept
-{
-    bool any = false;
-    volume::forEachIndex(glm::max(first, Index3(0)), glm::min(last, Index3(l.nx - 2, l.ny - 2, l.nz - 2)),
-                         [&](Index3 c) { any = any || mu[l.at(c.x, c.y, c.z)] > 0.0F; });
-    return any;
-}
-
-Index3 offsetIn(const Window& fine, const Window& coarse) noexcept
-{
-    return fine.low / 2 - coarse.low;
-}
-
-}  // namespace
 
 LayerFields::LayerFields(const Layout& layout, bool any) : layout_(layout)
 {
@@ -79,8 +60,19 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
             any_.data()};
 }
 
-Window::Window(Index3 size, bool relaxes, bool layered)
-    : layout(Layout::of(size.x, size.y, size.z)), layers(layout, layered)
+bool Window::anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept
+{
+    bool any = false;
+    volume::forEachIndex(glm::max(first, Index3(0)), glm::min(last, box - 2),
+                         [&](Index3 c) { any = any || cells[layout.at(c.x, c.y, c.z)] > 0.0F; });
+    return any;
+}
+
+Window::Window(const CellLevel& level, Index3 size, bool relaxes)
+    : box(size),
+      layout(Layout::of(size.x, size.y, WindowFragments::planes(level, size))),
+      layers(layout, !level.layers.empty()),
+      fragments(level, size)
 {
     for (Floats* cells :
          {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof, &tissue}) {
@@ -101,8 +93,8 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
 {
     low = at;
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);
-    for (int k = 0; k + 1 < layout.nz; ++k) {
-        for (int j = 0; j + 1 < layout.ny; ++j) {
+    for (int k = 0; k + 1 < box.z; ++k) {
+        for (int j = 0; j + 1 < box.y; ++j) {
             const std::size_t from = level.nodes.offset(low + Index3(0, j, k));
             const std::size_t to = layout.at(0, j, k);
             for (std::size_t i = 0; i + 1 < static_cast<std::size_t>(layout.nx); ++i) {
@@ -119,6 +111,12 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
         placeTerm(level, i);
     }
     placeNodes(level);
+    placeBorder(coarsest);
+    placeFragments(level, coarsest);
+}
+
+void Window::placeBorder(bool coarsest) noexcept
+{
     if (coarsest) {
         return;
     }
@@ -141,8 +139,8 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
 void Window::placeNodes(const CellLevel& level) noexcept
 {
     std::fill(border.begin(), border.end(), 0.0F);
-    for (int k = 0; k < layout.nz; ++k) {
-        for (int j = 0; j < layout.ny; ++j) {
+    for (int k = 0; k < box.z; ++k) {
+        for (int j = 0; j < box.y; ++j) {
             const std::size_t from = level.nodes.offset(low + Index3(0, j, k));
             const std::size_t to = layout.at(0, j, k);
             for (std::size_t i = 0; i < static_cast<std::size_t>(layout.nx); ++i) {
@@ -159,8 +157,8 @@ void Window::placeNodes(const CellLevel& level) noexcept
 
 void Window::placeTerm(const CellLevel& level, std::size_t i) noexcept
 {
-    for (int k = 0; k + 1 < layout.nz; ++k) {
-        for (int j = 0; j + 1 < layout.ny; ++j) {
+    for (int k = 0; k + 1 < box.z; ++k) {
+        for (int j = 0; j + 1 < box.y; ++j) {
             const float* fraction = level.relaxing[i].data() + level.nodes.offset(low + Index3(0, j, k));
             const std::size_t to = layout.at(0, j, k);
             for (std::size_t c = 0; c + 1 < static_cast<std::size_t>(layout.nx); ++c) {
@@ -174,9 +172,79 @@ void Window::placeTerm(const CellLevel& level, std::size_t i) noexcept
     }
 }
 
-void Window::cover(const Window& finer) noexcept
+// Of fragments and virtual nodes, behind the box. Copies have no mask of their own but that of `open`.
+void Window::placeFragments(const CellLevel& level, bool coarsest) noexcept
 {
-    const Index3 o = offsetIn(finer, *this);
+    fragments.place(level, low);
+    layout = Layout::of(box.x, box.y, fragments.planes());
+    const std::size_t begin = fragments.begin(), rest = layout.count - begin;
+    for (Floats* all :
+         {&mu, &lambda, &stiffening, &uncoveredMu, &uncoveredLambda, &diagonal, &border, &open, &dof, &tissue}) {
+        std::fill_n(all->begin() + static_cast<std::ptrdiff_t>(begin), rest, 0.0F);
+    }
+    const float scale = static_cast<float>(level.nodes.spacing / 32.0);
+    for (const WindowFragments::Placed& b : fragments.placed()) {
+        const CellFragment& f = level.fragments.cells[b.fragment];
+        mu[b.node] = uncoveredMu[b.node] = scale * f.mu;
+        lambda[b.node] = uncoveredLambda[b.node] = scale * f.lambda;
+        stiffening[b.node] = f.stiffening;
+    }
+    for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
+        std::fill_n(terms[i].mu.begin() + static_cast<std::ptrdiff_t>(begin), rest, 0.0F);
+        std::fill_n(terms[i].lambda.begin() + static_cast<std::ptrdiff_t>(begin), rest, 0.0F);
+        for (const WindowFragments::Placed& b : fragments.placed()) {
+            const float fraction = level.fragments.cells[b.fragment].relaxing[i];
+            terms[i].mu[b.node] = fraction * mu[b.node];
+            terms[i].lambda[b.node] = fraction * lambda[b.node];
+        }
+    }
+    for (const std::uint32_t f : fragments.left()) {
+        keepWhole(level, level.fragments.cells[f]);
+    }
+    for (const WindowFragments::VirtualAt& v : fragments.virtuals()) {
+        const VirtualNode& node = level.fragments.nodes[v.node];
+        const bool isFree = !node.isFixed && node.diagonal > 0.0F;
+        const bool follows = !coarsest && !isBetween(node.at - low, Index3(1), box - 2);
+        open[v.at] = node.isFixed ? 0.0F : 1.0F;
+        tissue[v.at] = 1.0F;
+        border[v.at] = follows ? open[v.at] : 0.0F;
+        dof[v.at] = isFree && !follows ? 1.0F : 0.0F;
+        diagonal[v.at] = isFree && !follows ? 1.0F / node.diagonal : 0.0F;
+    }
+    for (const WindowFragments::Copy& copy : fragments.copies()) {
+        open[copy.at] = open[copy.original];
+    }
+}
+
+// A fragment that found no place is one with its cell.
+void Window::keepWhole(const CellLevel& level, const CellFragment& f) noexcept
+{
+    const float scale = static_cast<float>(level.nodes.spacing / 32.0);
+    const std::size_t cell = at(f.cell);
+    const float more = scale * f.mu;
+    stiffening[cell] = (mu[cell] * stiffening[cell] + more * f.stiffening) / (mu[cell] + more);
+    mu[cell] += more;
+    lambda[cell] += scale * f.lambda;
+    uncoveredMu[cell] = mu[cell];
+    uncoveredLambda[cell] = lambda[cell];
+    for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
+        terms[i].mu[cell] += f.relaxing[i] * more;
+        terms[i].lambda[cell] += f.relaxing[i] * scale * f.lambda;
+    }
+    const float own = diagonalOf(f.mu, f.lambda, level.nodes.spacing);
+    for (int c = 0; c < 8; ++c) {
+        const std::size_t node = layout.corner(cell, c);
+        if (open[node] > 0.0F && border[node] == 0.0F) {
+            const float before = diagonal[node] > 0.0F ? 1.0F / diagonal[node] : 0.0F;
+            diagonal[node] = 1.0F / (before + own);
+            dof[node] = tissue[node] = 1.0F;
+        }
+    }
+}
+
+void Window::cover(const CellLevel& level, const Window& finer) noexcept
+{
+    const Index3 o = finer.offsetIn(*this);
     const Index3 cells = (finer.size() - 1) / 2;
     volume::forEachIndex(o, o + cells - 1, [&](Index3 c) {
         uncoveredMu[layout.at(c.x, c.y, c.z)] = 0.0F;
@@ -188,16 +256,16 @@ void Window::cover(const Window& finer) noexcept
         }
     });
     volume::forEachIndex(o + 1, o + cells - 1, [&](Index3 n) { dof[layout.at(n.x, n.y, n.z)] = 0.0F; });
+    coverFragments(level, o, cells);
     // A node on the finer window's border may be left with nothing but empty cells around it.
     const auto pulled = [&](Index3 n) {
-        if (anyTissue(layout, uncoveredMu, n - 1, n)) {
+        if (anyTissue(uncoveredMu, n - 1, n)) {
             return true;
         }
         bool any = false;
         const Index3 fine = 2 * (n - o);
         volume::forEachIndex(glm::max(fine - 1, Index3(0)), glm::min(fine + 1, finer.size() - 1), [&](Index3 m) {
-            any =
-                any || (finer.border[finer.layout.at(m.x, m.y, m.z)] > 0.0F && anyTissue(finer.layout, finer.mu, m - 1, m));
+            any = any || (finer.border[finer.layout.at(m.x, m.y, m.z)] > 0.0F && finer.anyTissue(finer.mu, m - 1, m));
         });
         return any;
     };
@@ -205,119 +273,46 @@ void Window::cover(const Window& finer) noexcept
         float& free = dof[layout.at(n.x, n.y, n.z)];
         free = free > 0.0F && pulled(n) ? 1.0F : 0.0F;
     });
+    pullByFragments(finer);
 }
 
-void prolong(const Kernels& k, const Window& coarse, const float* from, const Window& fine, float* to) noexcept
+// Nodes on the finer window's border that fragments hold, which the masks of cells do not know.
+void Window::pullByFragments(const Window& finer) noexcept
 {
-    const Index3 o = offsetIn(fine, coarse);
-    const Layout& l = fine.layout;
-    for (std::size_t c = 0; c < 3; ++c) {
-        const float* source = from + c * coarse.layout.count;
-        float* target = to + c * l.count;
-        for (int z = 0; z < l.nz; z += 2) {
-            for (int y = 0; y < l.ny; y += 2) {
-                k.spread(source + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2), l.nx, target + l.at(0, y, z));
+    const Index3 first = finer.offsetIn(*this), last = first + (finer.size() - 1) / 2;
+    const auto pull = [&](Index3 cell) {
+        volume::forEachIndex(glm::max(cell, first), glm::min(cell + 1, last), [&](Index3 n) {
+            const std::size_t node = layout.at(n.x, n.y, n.z);
+            if (!isBetween(n, first + 1, last - 1)) {
+                dof[node] = diagonal[node] > 0.0F ? 1.0F : 0.0F;
             }
-            for (int y = 1; y < l.ny; y += 2) {
-                k.average(target + l.at(0, y - 1, z), target + l.at(0, y + 1, z), target + l.at(0, y, z), l.row);
-            }
+        });
+    };
+    for (const WindowFragments::Placed& p : fragments.placed()) {
+        if (uncoveredMu[p.node] > 0.0F) {
+            pull(p.cell - low);
         }
-        for (int z = 1; z < l.nz; z += 2) {
-            k.average(target + l.at(0, 0, z - 1), target + l.at(0, 0, z + 1), target + l.at(0, 0, z), l.plane);
-        }
+    }
+    for (const WindowFragments::Placed& p : finer.fragments.placed()) {
+        pull(p.cell / 2 - low);
     }
 }
 
-void restrictAdd(const Kernels& k, const Window& fine, const float* from, const Window& coarse, float* to,
-                 float* scratch) noexcept
+void Window::coverFragments(const CellLevel& level, Index3 first, Index3 cells) noexcept
 {
-    const Index3 o = offsetIn(fine, coarse);
-    const Layout& l = fine.layout;
-    float* zeros = scratch;
-    float* sum = scratch + l.plane;
-    float* rows = scratch + 2 * l.plane + Layout::lanes;
-    std::memset(zeros, 0, l.plane * sizeof(float));
-    rows[-1] = 0.0F;
-    for (std::size_t c = 0; c < 3; ++c) {
-        const float* source = from + c * l.count;
-        float* target = to + c * coarse.layout.count;
-        for (int z = 0; z < l.nz; z += 2) {
-            const float* below = z > 0 ? source + l.at(0, 0, z - 1) : zeros;
-            const float* above = z + 1 < l.nz ? source + l.at(0, 0, z + 1) : zeros;
-            k.hat(below, source + l.at(0, 0, z), above, sum, l.plane);
-            for (int y = 0; y < l.ny; y += 2) {
-                const float* before = y > 0 ? sum + l.at(0, y - 1, 0) : zeros;
-                const float* after = y + 1 < l.ny ? sum + l.at(0, y + 1, 0) : zeros;
-                k.hat(before, sum + l.at(0, y, 0), after, rows + l.at(0, y / 2, 0), l.row);
-            }
-            // Apart from the loop above: what has just been stored cannot be loaded a lane further at once. A row's padding
-            // is zero, so that it is what lies before the next one's first node.
-            for (int y = 0; y < l.ny; y += 2) {
-                k.gatherAdd(rows + l.at(0, y / 2, 0), l.nx, target + coarse.layout.at(o.x, o.y + y / 2, o.z + z / 2));
-            }
+    for (const WindowFragments::Placed& b : fragments.placed()) {
+        const Index3 c = b.cell - low;
+        const float left = isBetween(c, first, first + cells - 1) ? 0.0F : 1.0F;
+        uncoveredMu[b.node] *= left;
+        uncoveredLambda[b.node] *= left;
+        for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
+            terms[i].mu[b.node] *= left;
+            terms[i].lambda[b.node] *= left;
         }
     }
-}
-
-void keepWhereFree(const Window& w, float* force) noexcept
-{
-    for (std::size_t c = 0; c < 3; ++c, force += w.layout.count) {
-        for (std::size_t i = 0; i < w.layout.count; ++i) {
-            force[i] = w.diagonal[i] > 0.0F ? force[i] : 0.0F;
-        }
-    }
-}
-
-void handDown(Window& coarse, Field field, Window& fine) noexcept
-{
-    const Index3 o = offsetIn(fine, coarse);
-    const Index3 last = (fine.size() - 1) / 2;
-    volume::forEachIndex(Index3(0), last, [&](Index3 n) {
-        const bool inside = n == glm::clamp(n, Index3(1), last - 1);
-        if (!inside && anyTissue(coarse.layout, coarse.uncoveredMu, o + n - 1, o + n)) {
-            return;
-        }
-        const Index3 at = glm::clamp(2 * n, Index3(1), fine.size() - 2);
-        const std::size_t to = fine.layout.at(at.x, at.y, at.z);
-        const std::size_t from = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
-        if (fine.diagonal[to] > 0.0F) {
-            fine.add(field, to, coarse.value(field, from));
-        }
-        coarse.add(field, from, -coarse.value(field, from));
-    });
-}
-
-void inject(const Window& fine, const float* from, const Window& coarse, float* to) noexcept
-{
-    const Index3 o = offsetIn(fine, coarse);
-    volume::forEachIndex(Index3(0), (fine.size() - 1) / 2, [&](Index3 n) {
-        const std::size_t target = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
-        const std::size_t source = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
-        for (std::size_t c = 0; c < 3; ++c) {
-            to[c * coarse.layout.count + target] = from[c * fine.layout.count + source];
-        }
-    });
-}
-
-void carryOver(const Layout& layout, Index3 oldLow, const float* from, Index3 newLow, float* to) noexcept
-{
-    const Index3 size(layout.nx, layout.ny, layout.nz);
-    const Index3 first = glm::max(newLow, oldLow);
-    const Index3 last = glm::min(newLow, oldLow) + size - 1;
-    if (first.x > last.x) {
-        return;
-    }
-    const std::size_t n = static_cast<std::size_t>(last.x - first.x + 1) * sizeof(float);
-    for (std::size_t c = 0; c < 3; ++c) {
-        for (int k = first.z; k <= last.z; ++k) {
-            for (int j = first.y; j <= last.y; ++j) {
-                const Index3 start(first.x, j, k);
-                const Index3 a = start - oldLow;
-                const Index3 b = start - newLow;
-                std::memcpy(to + c * layout.count + layout.at(b.x, b.y, b.z),
-                            from + c * layout.count + layout.at(a.x, a.y, a.z), n);
-            }
-        }
+    for (const WindowFragments::VirtualAt& v : fragments.virtuals()) {
+        const Index3 n = level.fragments.nodes[v.node].at - low;
+        dof[v.at] = isBetween(n, first + 1, first + cells - 1) ? 0.0F : dof[v.at];
     }
 }
 

@@ -2,6 +2,9 @@
 
 #include <chainmail/elastic_body.h>
 #include <chainmail/kernels.h>
+#include <chainmail/window_fragments.h>
+
+#include <glm/vector_relational.hpp>
 
 #include <array>
 #include <cstdlib>
@@ -45,6 +48,12 @@ enum class Field : std::uint8_t {
 static_assert(volume::relaxationTerms == 2, "a field for each term");
 inline constexpr std::size_t fieldCount = static_cast<std::size_t>(Field::count);
 
+/// False for every n where `first` is not before `last`.
+inline bool isBetween(Index3 n, Index3 first, Index3 last) noexcept
+{
+    return glm::all(glm::greaterThanEqual(n, first)) && glm::all(glm::lessThanEqual(n, last));
+}
+
 /// The thin layers of the cells in a box.
 class LayerFields {
 public:
@@ -82,7 +91,8 @@ private:
 ///
 /// The masks are 1 or 0 per node, so that the kernels multiply where others would branch.
 struct Window {
-    Layout layout;
+    Index3 box{0};      // nodes
+    Layout layout;      // of the box, and of the planes behind it with fragments: their number changes where windows move
     Index3 low{-1};     // index of node (0, 0, 0) in the level; even but in the coarsest window; -1: none yet
     Floats mu, lambda;  // of each cell, times spacing / 32 [N/m]
     Floats stiffening;  // of each cell [-]
@@ -97,6 +107,7 @@ struct Window {
     Floats open;      // free, or border
     Floats dof;       // degrees of freedom: free and not covered
     Floats tissue;    // nodes of a cell with tissue
+    WindowFragments fragments;
     std::array<Floats, fieldCount> fields;
     float weight = 0.2F;  // of the smoother
 
@@ -111,11 +122,15 @@ struct Window {
     {
         return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer)};
     }
-    Index3 size() const noexcept { return {layout.nx, layout.ny, layout.nz}; }
+    Index3 size() const noexcept { return box; }
+    /// Node (0, 0, 0) of this window in the next coarser one.
+    Index3 offsetIn(const Window& coarse) const noexcept { return low / 2 - coarse.low; }
+    /// True when one of the box's cells from `first` to `last` is not empty. @param cells  mu, or uncoveredMu
+    bool anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept;
     bool contains(Index3 node) const noexcept  // in the level's indices
     {
         const Index3 n = node - low;
-        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < layout.nx && n.y < layout.ny && n.z < layout.nz;
+        return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < box.x && n.y < box.y && n.z < box.z;
     }
     std::size_t at(Index3 node) const noexcept
     {
@@ -128,6 +143,13 @@ struct Window {
         const float* v = field(f) + node;
         return {v[0], v[layout.count], v[2 * layout.count]};
     }
+    void set(Field f, std::size_t node, Vec3 value) noexcept
+    {
+        float* v = field(f) + node;
+        for (int c = 0; c < 3; ++c, v += layout.count) {
+            *v = static_cast<float>(value[c]);
+        }
+    }
     void add(Field f, std::size_t node, Vec3 value) noexcept
     {
         float* v = field(f) + node;
@@ -139,21 +161,45 @@ struct Window {
     template <typename Visit>
     void visitParents(std::size_t node, const Window& coarse, Visit&& visit) const noexcept
     {
+        if (const WindowFragments::Link* link = fragments.linkOf(node)) {
+            for (std::size_t i = 0; i < link->count; ++i) {
+                visit(link->parents[i], 1.0 / static_cast<double>(link->count));
+            }
+            return;
+        }
+        visitParentsByPlace(node, coarse, visit);
+    }
+    /// The same as if it had no link. @pre it is a node of the box
+    template <typename Visit>
+    void visitParentsByPlace(std::size_t node, const Window& coarse, Visit&& visit) const noexcept
+    {
         const Index3 n = low + Index3(node % layout.row, node % layout.plane / layout.row, node / layout.plane);
         const Index3 odd = n % 2;
         const double fraction = 1.0 / static_cast<double>((1 + odd.x) * (1 + odd.y) * (1 + odd.z));
         volume::forEachIndex(n / 2, n / 2 + odd, [&](Index3 parent) { visit(coarse.at(parent), fraction); });
     }
 
-    explicit Window(Index3 size, bool relaxes = false, bool layered = false);
+    /// Gives copies of a node what the node has, and the node what was given to its copies: see WindowFragments.
+    void share(Field f) noexcept { fragments.share(field(f), layout.count); }
+    void collect(Field f) noexcept { fragments.collect(field(f), layout.count); }
+
+    Window(const CellLevel& level, Index3 size, bool relaxes);
+
+    /// Nodes that it has room for.
+    std::size_t room() const noexcept { return mu.size() - Layout::lanes; }
 
     /// Takes its cells' stiffness from the level, at `at`, and makes the masks. `coarsest`: no border.
     void place(const CellLevel& level, Index3 at, bool coarsest) noexcept;
     /// Leaves out what `finer`, the next finer window, covers.
-    void cover(const Window& finer) noexcept;
+    void cover(const CellLevel& level, const Window& finer) noexcept;
 
 private:
+    void placeBorder(bool coarsest) noexcept;
+    void pullByFragments(const Window& finer) noexcept;
+    void coverFragments(const CellLevel& level, Index3 first, Index3 cells) noexcept;
     void placeNodes(const CellLevel& level) noexcept;
+    void placeFragments(const CellLevel& level, bool coarsest) noexcept;
+    void keepWhole(const CellLevel& level, const CellFragment& fragment) noexcept;
     void placeTerm(const CellLevel& level, std::size_t i) noexcept;
 };
 
@@ -172,10 +218,11 @@ void keepWhereFree(const Window& w, float* force) noexcept;
 /// next to nothing would hold against it.
 void handDown(Window& coarse, Field field, Window& fine) noexcept;
 
-/// coarse = fine where the coarse window has a node that the fine one covers.
-void inject(const Window& fine, const float* from, const Window& coarse, float* to) noexcept;
+/// coarse = fine where the coarse window has a node that the fine one covers. Uses up Field::t of the coarse one.
+void inject(const Window& fine, Window& coarse, Field field) noexcept;
 
 /// Moves what a field holds to a window's new place; `to` keeps what it has where the old window was not.
-void carryOver(const Layout& layout, Index3 oldLow, const float* from, Index3 newLow, float* to) noexcept;
+/// @param oldCount  Layout::count then
+void carryOver(const Window& window, Index3 oldLow, std::size_t oldCount, const float* from, float* to) noexcept;
 
 }  // namespace palpate::chainmail

@@ -41,12 +41,13 @@ WindowStack::WindowStack(const ElasticBody& body, int window, const Focus& focus
     std::size_t scratch = 0;
     const Index3 wanted = windowSize(window, focus);
     for (const auto& level : body.levels) {
-        windows_.emplace_back(glm::min(level.nodes.size, wanted), body.relaxes, !level.layers.empty());
+        windows_.emplace_back(level, glm::min(level.nodes.size, wanted), body.relaxes);
         scratch = std::max(scratch, windows_.back().layout.scratchSize());
     }
     scratch_.assign(scratch, 0.0F);
     low_.assign(windows_.size(), Index3(0));
     oldLow_ = low_;
+    oldCount_.assign(windows_.size(), 0);
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         low_[l] = wantedLow(l, focus);
     }
@@ -107,10 +108,15 @@ void WindowStack::place() noexcept
         if (moves || finerMoves) {
             w.place(body_->levels[l], low_[l], l + 1 == windows_.size());
             if (l > 0) {
-                w.cover(windows_[l - 1]);
+                w.cover(body_->levels[l], windows_[l - 1]);
             }
         }
         finerMoves = moves;
+    }
+    for (std::size_t l = 0; l + 1 < windows_.size(); ++l) {
+        const Window& coarse = windows_[l + 1];
+        windows_[l].fragments.link(body_->levels[l], windows_[l].low, coarse.layout, coarse.low, body_->levels[l + 1],
+                                   coarse.fragments);
     }
 }
 
@@ -119,6 +125,7 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
     bool moves = false;
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         oldLow_[l] = low_[l];
+        oldCount_[l] = windows_[l].layout.count;
         const Vec3 off = glm::abs(wantedPlace(l, focus) - Vec3(low_[l]));
         const Index3 wanted = wantedLow(l, focus);
         if (std::max({off.x, off.y, off.z}) > slack && wanted != low_[l]) {
@@ -132,7 +139,7 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
     if (carry) {
         for (std::size_t l = 0; l + 1 < windows_.size(); ++l) {
             for (const Field f : {Field::u, Field::d}) {
-                inject(windows_[l], windows_[l].field(f), windows_[l + 1], windows_[l + 1].field(f));
+                inject(windows_[l], windows_[l + 1], f);
             }
         }
     }
@@ -141,6 +148,7 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
         gatherForces(history(i));
     }
     place();
+    dropFields(carry);
     if (carry) {
         transfer(Field::u);
         transfer(Field::d);
@@ -152,6 +160,19 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
         combine(history(0), 1.0, history(1), Field::h);
     }
     return true;
+}
+
+// Where a window has got another layout, nothing but what is carried over means anything.
+void WindowStack::dropFields(bool carry) noexcept
+{
+    for (std::size_t l = 0; l < windows_.size(); ++l) {
+        for (std::size_t f = 0; f < fieldCount && windows_[l].layout.count != oldCount_[l]; ++f) {
+            const bool isKept = carry && (Field(f) == Field::u || Field(f) == Field::d || Field(f) >= Field::h);
+            if (!isKept) {
+                std::ranges::fill(windows_[l].fields[f], 0.0F);
+            }
+        }
+    }
 }
 
 // Adds to every window what all finer ones hold, so that each has the whole force.
@@ -171,7 +192,7 @@ void WindowStack::handOutForces(Field field) noexcept
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         Window& w = windows_[l];
         std::memset(w.field(Field::t), 0, 3 * w.layout.count * sizeof(float));
-        carryOver(w.layout, oldLow_[l], w.field(field), w.low, w.field(Field::t));
+        carryOver(w, oldLow_[l], oldCount_[l], w.field(field), w.field(Field::t));
         float* finer = w.field(Field::f);  // what finer windows have
         if (l == 0) {
             std::memset(finer, 0, 3 * w.layout.count * sizeof(float));
@@ -200,12 +221,12 @@ void WindowStack::transfer(Field field) noexcept
         if (w.low == oldLow_[l]) {
             continue;
         }
+        std::memset(w.field(Field::t), 0, 3 * w.layout.count * sizeof(float));
         if (l + 1 < windows_.size()) {
             prolong(*kernels_, windows_[l + 1], windows_[l + 1].field(field), w, w.field(Field::t));
-        } else {
-            std::memset(w.field(Field::t), 0, 3 * w.layout.count * sizeof(float));
         }
-        carryOver(w.layout, oldLow_[l], w.field(field), w.low, w.field(Field::t));
+        carryOver(w, oldLow_[l], oldCount_[l], w.field(field), w.field(Field::t));
+        w.share(Field::t);
         w.fields[static_cast<std::size_t>(field)].swap(w.fields[static_cast<std::size_t>(Field::t)]);
     }
 }
@@ -216,6 +237,7 @@ void WindowStack::joinBorders(Field x) noexcept
         Window& w = windows_[l];
         prolong(*kernels_, windows_[l + 1], windows_[l + 1].field(x), w, w.field(Field::t));
         kernels_->blend(w.border.data(), w.field(Field::t), w.field(x), w.layout.count);
+        w.share(x);
     }
 }
 
@@ -234,6 +256,7 @@ WindowStack::Evaluated WindowStack::evaluate(Field x, Field y, Field along, cons
         } else {
             k.apply(w.layout, stiffness, w.field(x), w.field(y), scratch());
         }
+        w.collect(y);
     }
     for (std::size_t l = 0; l < windows_.size(); ++l) {
         Window& w = windows_[l];

@@ -75,6 +75,7 @@ public:
     void addForce(std::size_t level, std::size_t node, Vec3 force) noexcept
     {
         Window& w = windows_[level];
+        node = w.fragments.original(node);
         if (w.dof[node] != 0.0F) {
             w.add(Field::r, node, force);
         } else if (w.border[node] != 0.0F) {
@@ -103,6 +104,7 @@ private:
     Index3 wantedLow(std::size_t level, const Focus& focus) const noexcept;
     void place() noexcept;
     void addToParents(std::size_t level, std::size_t node, Vec3 force) noexcept;
+    void dropFields(bool carry) noexcept;
     void transfer(Field field) noexcept;
     Evaluated evaluate(Field x, Field y, Field along, const volume::Law& law, std::optional<std::size_t> term) noexcept;
     void gatherForces(Field field) noexcept;
@@ -113,6 +115,7 @@ private:
     const Kernels* kernels_;
     std::vector<Window> windows_;
     std::vector<Index3> low_, oldLow_;
+    std::vector<std::size_t> oldCount_;  // Layout::count
     Floats scratch_;
 };
 

@@ -1,0 +1,424 @@
+#include <chainmail/split_level.h>
+
+#include <glm/common.hpp>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+
+namespace palpate::chainmail {
+
+namespace {
+
+// Of eight cells or nodes around a place, x fastest.
+Index3 octant(int i) noexcept
+{
+    return {i & 1, i >> 1 & 1, i >> 2};
+}
+
+int octantOf(Index3 at) noexcept
+{
+    return at.x + 2 * at.y + 4 * at.z;
+}
+
+// A part of a coarse cell's tissue that hangs together in it.
+struct Piece {
+    Index3 cell{0};
+    std::uint8_t children = 0;             // cells of the fine level without their fragments, a bit for each
+    std::vector<std::uint32_t> fragments;  // of the fine level
+    std::array<std::uint32_t, 8> nodes{};
+};
+
+// Which pieces around a node are one.
+class Groups {
+public:
+    std::size_t add()
+    {
+        lead_.push_back(lead_.size());
+        return lead_.size() - 1;
+    }
+    std::size_t of(std::size_t i) const
+    {
+        while (lead_[i] != i) {
+            i = lead_[i];
+        }
+        return i;
+    }
+    void join(std::size_t a, std::size_t b)
+    {
+        a = of(a);
+        b = of(b);
+        lead_[std::max(a, b)] = std::min(a, b);
+    }
+
+private:
+    std::vector<std::size_t> lead_;
+};
+
+class Splitter {
+public:
+    Splitter(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse)
+        : fine_(fine), loose_(loose), coarse_(coarse), full_(coarse.count())
+    {
+        out_.loose.assign(coarse.count(), 0);
+        volume::forEachIndex(Index3(0), coarse.size - 2, [&](Index3 c) {
+            int filled = 0;
+            bool anyLoose = false, anyHeld = false;
+            volume::forEachIndex(2 * c, 2 * c + 1, [&](Index3 child) {
+                const std::size_t at = fine_.nodes.offset(child);
+                const bool hasFragments = !fragmentsIn(child).empty(), isCell = fine_.mu[at] > 0.0F;
+                filled += isCell && !hasFragments ? 1 : 0;
+                anyLoose = anyLoose || loose_[at] != 0;
+                anyHeld = anyHeld || hasFragments || (isCell && loose_[at] == 0);
+            });
+            full_[coarse.offset(c)] = filled == 8 ? 1 : 0;
+            out_.loose[coarse.offset(c)] = anyLoose && !anyHeld ? 1 : 0;
+        });
+    }
+
+    Split run()
+    {
+        volume::forEachIndex(Index3(0), coarse_.size - 1, [&](Index3 n) {
+            bool full = true;
+            volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, coarse_.size - 2),
+                                 [&](Index3 c) { full = full && full_[coarse_.offset(c)] != 0; });
+            if (!full) {
+                divide(n);
+            }
+        });
+        out_.parents.assign(fine_.fragments.cells.size(), noFragment);
+        keepFragments();
+        linkNodes();
+        return std::move(out_);
+    }
+
+private:
+    struct Pieces {
+        std::size_t first = 0, count = 0;
+    };
+    // A piece beside the node that is looked at.
+    struct Beside {
+        std::size_t piece = 0;
+        int corner = 0;  // of it, that is the node
+    };
+
+    std::span<const CellFragment> fragmentsIn(Index3 fineCell) const
+    {
+        return fine_.fragments.in(fineCell, fine_.nodes.size.y);
+    }
+    std::uint32_t indexOf(const CellFragment& f) const
+    {
+        return static_cast<std::uint32_t>(&f - fine_.fragments.cells.data());
+    }
+    bool isVirtual(std::uint32_t fineNode) const { return fineNode >= fine_.nodes.count(); }
+    Index3 placeOf(std::uint32_t fineNode) const
+    {
+        return isVirtual(fineNode) ? fine_.fragments.nodes[fineNode - fine_.nodes.count()].at : fine_.nodes.node(fineNode);
+    }
+
+    Pieces piecesOf(Index3 cell)
+    {
+        const auto [known, isNew] = pieces_.try_emplace(coarse_.offset(cell));
+        if (!isNew) {
+            return known->second;
+        }
+        std::vector<Piece> found;
+        Piece whole{cell, 0, {}, {}};
+        for (int i = 0; i < 8; ++i) {
+            const bool any = fine_.mu[fine_.nodes.offset(2 * cell + octant(i))] > 0.0F;
+            whole.children |= static_cast<std::uint8_t>(any ? 1 << i : 0);
+        }
+        if (whole.children != 0) {
+            found.push_back(whole);
+        }
+        for (int i = 0; i < 8; ++i) {
+            for (const CellFragment& f : fragmentsIn(2 * cell + octant(i))) {
+                addFragment(f, found);
+            }
+        }
+        known->second = {all_.size(), found.size()};
+        for (Piece& p : found) {
+            for (int c = 0; c < 8; ++c) {
+                p.nodes[static_cast<std::size_t>(c)] = static_cast<std::uint32_t>(coarse_.offset(cell + octant(c)));
+            }
+            all_.push_back(std::move(p));
+        }
+        return known->second;
+    }
+
+    // Joins a fragment of the fine level and the pieces of its coarse cell that share a node with it.
+    void addFragment(const CellFragment& f, std::vector<Piece>& found) const
+    {
+        Piece one{f.cell / 2, 0, {}, {}};
+        std::erase_if(found, [&](const Piece& other) {
+            const bool isPart = shareNode(other, f);
+            one.children |= isPart ? other.children : std::uint8_t{0};
+            one.fragments.insert(one.fragments.end(), other.fragments.begin(),
+                                 isPart ? other.fragments.end() : other.fragments.begin());
+            return isPart;
+        });
+        one.fragments.push_back(indexOf(f));
+        found.push_back(std::move(one));
+    }
+
+    bool shareNode(const Piece& piece, const CellFragment& f) const
+    {
+        return std::ranges::any_of(f.nodes, [&](std::uint32_t node) {
+            const auto has = [&](std::uint32_t other) {
+                const auto& nodes = fine_.fragments.cells[other].nodes;
+                return std::ranges::find(nodes, node) != nodes.end();
+            };
+            return (!isVirtual(node) && isCorner(piece, fine_.nodes.node(node))) ||
+                   std::ranges::any_of(piece.fragments, has);
+        });
+    }
+
+    // Whether a node of the fine level is one of the piece's whole cells.
+    static bool isCorner(const Piece& piece, Index3 node)
+    {
+        for (int i = 0; i < 8; ++i) {
+            const Index3 off = node - (2 * piece.cell + octant(i));
+            if ((piece.children >> i & 1) != 0 && off == glm::clamp(off, Index3(0), Index3(1))) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    // Gives the pieces around a node nodes of their own, where they do not hang together there.
+    void divide(Index3 n)
+    {
+        beside_.clear();
+        Groups groups;
+        std::array<Pieces, 8> at{};
+        for (int i = 0; i < 8; ++i) {
+            Pieces& here = at[static_cast<std::size_t>(i)];
+            const Index3 cell = n - 1 + octant(i);
+            if (cell != glm::clamp(cell, Index3(0), coarse_.size - 2)) {
+                continue;
+            }
+            const Pieces found = piecesOf(cell);
+            here = {beside_.size(), found.count};
+            for (std::size_t k = 0; k < found.count; ++k) {
+                beside_.push_back({found.first + k, 7 - i});
+                groups.add();
+            }
+        }
+        if (beside_.size() < 2) {
+            return;
+        }
+        const Index3 first = glm::max(2 * n - 1, Index3(0)), last = glm::min(2 * n + 1, fine_.nodes.size - 1);
+        volume::forEachIndex(first, last, [&](Index3 fineNode) { joinAt(fineNode, n, at, groups); });
+        std::vector<std::size_t> cells(beside_.size(), 0);  // by group, without those that are loose
+        for (std::size_t i = 0; i < beside_.size(); ++i) {
+            cells[groups.of(i)] += heldCells(all_[beside_[i].piece]);
+        }
+        const auto keeps = static_cast<std::size_t>(std::ranges::max_element(cells) - cells.begin());
+        std::vector<std::uint32_t> nodes(beside_.size(), noFragment);
+        for (std::size_t i = 0; i < beside_.size(); ++i) {
+            const std::size_t group = groups.of(i);
+            if (group != keeps && cells[group] > 0) {
+                if (nodes[group] == noFragment) {
+                    nodes[group] = static_cast<std::uint32_t>(coarse_.count() + out_.coarse.nodes.size());
+                    out_.coarse.nodes.push_back({n, 0.0F, false});
+                }
+                all_[beside_[i].piece].nodes[static_cast<std::size_t>(beside_[i].corner)] = nodes[group];
+            }
+        }
+    }
+
+    std::size_t heldCells(const Piece& piece) const
+    {
+        std::size_t sum = piece.fragments.size();
+        for (int i = 0; i < 8; ++i) {
+            const bool isHeld = loose_[fine_.nodes.offset(2 * piece.cell + octant(i))] == 0;
+            sum += (piece.children >> i & 1) != 0 && isHeld ? 1 : 0;
+        }
+        return sum;
+    }
+
+    // Joins the pieces that share a node of the fine level.
+    void joinAt(Index3 fineNode, Index3 n, const std::array<Pieces, 8>& at, Groups& groups)
+    {
+        sharers_.clear();
+        for (int i = 0; i < 8; ++i) {
+            const Index3 cell = fineNode - 1 + octant(i);
+            if (cell != glm::clamp(cell, Index3(0), fine_.nodes.size - 2)) {
+                continue;
+            }
+            const Pieces& here = at[static_cast<std::size_t>(octantOf(cell / 2 - (n - 1)))];
+            for (std::size_t k = here.first; k < here.first + here.count; ++k) {
+                shareCorner(cell, static_cast<std::size_t>(7 - i), k, groups);
+            }
+        }
+    }
+
+    // Joins a piece with those before that share a corner of a fine cell with it.
+    void shareCorner(Index3 cell, std::size_t corner, std::size_t piece, Groups& groups)
+    {
+        const auto share = [&](std::uint32_t node) {
+            const auto known = std::ranges::find(sharers_, node, &std::pair<std::uint32_t, std::size_t>::first);
+            if (known == sharers_.end()) {
+                sharers_.emplace_back(node, piece);
+            } else {
+                groups.join(known->second, piece);
+            }
+        };
+        const Piece& of = all_[beside_[piece].piece];
+        if ((of.children >> octantOf(cell % 2) & 1) != 0) {
+            share(static_cast<std::uint32_t>(fine_.nodes.offset(cell + octant(static_cast<int>(corner)))));
+        }
+        for (const std::uint32_t f : of.fragments) {
+            const CellFragment& fragment = fine_.fragments.cells[f];
+            if (fragment.cell == cell) {
+                share(fragment.nodes[corner]);
+            }
+        }
+    }
+
+    // Pieces with virtual nodes become fragments of the coarse level.
+    void keepFragments()
+    {
+        for (std::size_t i = 0; i < all_.size(); ++i) {
+            if (std::ranges::any_of(all_[i].nodes, [&](std::uint32_t n) { return n >= coarse_.count(); })) {
+                kept_.push_back(i);
+            }
+        }
+        std::ranges::stable_sort(kept_, {}, [&](std::size_t i) { return coarse_.offset(all_[i].cell); });
+        for (const std::size_t i : kept_) {
+            const Piece& piece = all_[i];
+            const auto index = static_cast<std::uint32_t>(out_.coarse.cells.size());
+            out_.coarse.cells.push_back({.cell = piece.cell, .nodes = piece.nodes, .children = piece.children});
+            for (const std::uint32_t f : piece.fragments) {
+                out_.parents[f] = index;
+            }
+        }
+        out_.coarse.rows = rowsOf(out_.coarse.cells, coarse_.size, &CellFragment::cell);
+    }
+
+    void linkNodes()
+    {
+        for (const std::size_t i : kept_) {
+            const Piece& piece = all_[i];
+            for (int c = 0; c < 64; ++c) {
+                if ((piece.children >> (c / 8) & 1) != 0) {
+                    const Index3 node = 2 * piece.cell + octant(c / 8) + octant(c % 8);
+                    link(static_cast<std::uint32_t>(fine_.nodes.offset(node)), piece.cell, piece.nodes);
+                }
+            }
+            for (const std::uint32_t f : piece.fragments) {
+                for (const std::uint32_t node : fine_.fragments.cells[f].nodes) {
+                    link(node, piece.cell, piece.nodes);
+                }
+            }
+        }
+        for (std::size_t f = 0; f < out_.parents.size(); ++f) {
+            if (out_.parents[f] == noFragment) {
+                linkToCell(fine_.fragments.cells[f]);
+            }
+        }
+        std::ranges::sort(out_.links, {}, [&](const NodeLink& l) { return std::pair(fine_.nodes.offset(l.at), l.node); });
+        out_.linkRows = rowsOf(out_.links, fine_.nodes.size, &NodeLink::at);
+    }
+
+    void linkToCell(const CellFragment& f)
+    {
+        const Index3 cell = f.cell / 2;
+        std::array<std::uint32_t, 8> corners{};
+        for (int c = 0; c < 8; ++c) {
+            corners[static_cast<std::size_t>(c)] = static_cast<std::uint32_t>(coarse_.offset(cell + octant(c)));
+        }
+        for (const std::uint32_t node : f.nodes) {
+            link(node, cell, corners);
+        }
+    }
+
+    // A node in a coarse cell with these corners.
+    void link(std::uint32_t node, Index3 cell, const std::array<std::uint32_t, 8>& corners)
+    {
+        const Index3 at = placeOf(node);
+        NodeLink one{at, node, 0, {}};
+        bool any = isVirtual(node);
+        volume::forEachIndex(at / 2, at / 2 + at % 2, [&](Index3 parent) {
+            const std::uint32_t p = corners[static_cast<std::size_t>(octantOf(parent - cell))];
+            any = any || p >= coarse_.count();
+            one.parents[one.count++] = p;
+        });
+        if (any && linked_.insert(node).second) {
+            out_.links.push_back(one);
+        }
+    }
+
+    template <typename T>
+    static std::vector<std::uint32_t> rowsOf(const std::vector<T>& all, Index3 size, Index3 T::*place)
+    {
+        if (all.empty()) {
+            return {};
+        }
+        std::vector<std::uint32_t> rows(static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z) + 1, 0);
+        for (const T& t : all) {
+            ++rows[static_cast<std::size_t>((t.*place).y + (t.*place).z * size.y) + 1];
+        }
+        std::partial_sum(rows.begin(), rows.end(), rows.begin());
+        return rows;
+    }
+
+    const CellLevel& fine_;
+    const std::vector<std::uint8_t>& loose_;
+    const volume::NodeGrid& coarse_;
+    std::vector<std::uint8_t> full_;  // coarse cells without a gap
+    std::vector<Piece> all_;
+    std::unordered_map<std::size_t, Pieces> pieces_;  // by coarse cell
+    std::vector<std::size_t> kept_;                   // pieces that are fragments
+    std::unordered_set<std::uint32_t> linked_;
+    std::vector<Beside> beside_;
+    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // of a node of the fine level, with the first of each
+    Split out_;
+};
+
+}  // namespace
+
+std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<float>& held)
+{
+    const volume::NodeGrid& g = finest.nodes;
+    std::vector<std::uint8_t> loose(g.count(), 0);
+    std::vector<std::uint32_t> open;
+    const auto reach = [&](std::size_t cell) {
+        loose[cell] = 0;
+        open.push_back(static_cast<std::uint32_t>(cell));
+    };
+    for (std::size_t i = 0; i < g.count(); ++i) {
+        loose[i] = finest.mu[i] > 0.0F ? 1 : 0;
+    }
+    volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
+        const std::size_t cell = g.offset(c);
+        bool isHeld = held[cell] > 0.0F;
+        for (int i = 0; i < 8 && loose[cell] != 0 && !isHeld; ++i) {
+            isHeld = finest.fixed[g.offset(c + octant(i))] != 0;
+        }
+        // What lies behind a support is held, and is no cell.
+        if (isHeld) {
+            reach(cell);
+        }
+    });
+    while (!open.empty()) {
+        const Index3 c = g.node(open.back());
+        open.pop_back();
+        volume::forEachIndex(glm::max(c - 1, Index3(0)), glm::min(c + 1, g.size - 2), [&](Index3 other) {
+            if (loose[g.offset(other)] != 0) {
+                reach(g.offset(other));
+            }
+        });
+    }
+    return loose;
+}
+
+Split splitLevel(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse)
+{
+    return Splitter(fine, loose, coarse).run();
+}
+
+}  // namespace palpate::chainmail
