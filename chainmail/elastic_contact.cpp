@@ -56,8 +56,9 @@ std::uint32_t nodeOf(const ElasticBody& body, std::span<const Window> windows, s
 {
     if (!body.levels[level].fragments.cells.empty()) {
         const std::uint32_t fragment = fragmentAt(body, level, finest);
-        if (fragment != noFragment) {
-            return windows[level].fragments.nodeOf(fragment);
+        const std::uint32_t node = fragment != noFragment ? windows[level].fragments.nodeOf(fragment) : noFragment;
+        if (node != noFragment) {
+            return node;
         }
     }
     return static_cast<std::uint32_t>(windows[level].at(cell));

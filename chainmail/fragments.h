@@ -14,6 +14,16 @@ namespace palpate::chainmail {
 
 inline constexpr std::uint32_t noFragment = std::numeric_limits<std::uint32_t>::max();
 
+/// Of the eight cells, or nodes, at a place: number `i`, x fastest, from the lowest one; and the reverse.
+inline Index3 octant(int i) noexcept
+{
+    return {i & 1, i >> 1 & 1, i >> 2};
+}
+inline int octantOf(Index3 off) noexcept
+{
+    return off.x + 2 * off.y + 4 * off.z;
+}
+
 /// A further node where a level has one: for tissue that does not hang together there with the tissue of that node.
 struct VirtualNode {
     Index3 at{0};
@@ -65,9 +75,8 @@ struct Fragments {
     /// Index of the one in which a cell of the next finer level lies, without its fragments; noFragment: none.
     std::uint32_t holding(Index3 child, int sizeY) const noexcept
     {
-        const Index3 off = child % 2;
         for (const CellFragment& f : in(child / 2, sizeY)) {
-            if ((f.children >> (off.x + 2 * off.y + 4 * off.z) & 1) != 0) {
+            if ((f.children >> octantOf(child % 2) & 1) != 0) {
                 return static_cast<std::uint32_t>(&f - cells.data());
             }
         }

@@ -13,17 +13,6 @@ namespace palpate::chainmail {
 
 namespace {
 
-// Of eight cells or nodes around a place, x fastest.
-Index3 octant(int i) noexcept
-{
-    return {i & 1, i >> 1 & 1, i >> 2};
-}
-
-int octantOf(Index3 at) noexcept
-{
-    return at.x + 2 * at.y + 4 * at.z;
-}
-
 // A part of a coarse cell's tissue that hangs together in it.
 struct Piece {
     Index3 cell{0};

@@ -88,7 +88,7 @@ void WindowFragments::place(const CellLevel& level, Index3 low) noexcept
 
 void WindowFragments::add(const CellLevel& level, std::uint32_t fragment, Index3 low) noexcept
 {
-    if (placed_.size() == placed_.capacity()) {
+    if (placed_.size() == mostIn(level, box_)) {
         left_.push_back(fragment);
         return;
     }
@@ -102,7 +102,7 @@ void WindowFragments::add(const CellLevel& level, std::uint32_t fragment, Index3
         const std::uint32_t id = f.nodes[static_cast<std::size_t>(c)];
         std::uint32_t original = corner;
         if (id < count) {
-            const Index3 n = f.cell + Index3(c & 1, c >> 1 & 1, c >> 2) - low;
+            const Index3 n = f.cell + octant(c) - low;
             original = static_cast<std::uint32_t>(layout_.at(n.x, n.y, n.z));
         } else if (std::uint32_t& known = at_[id - count]; known != noFragment) {
             original = known;

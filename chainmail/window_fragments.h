@@ -3,6 +3,7 @@
 #include <chainmail/elastic_body.h>
 #include <chainmail/kernels.h>
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,7 +21,6 @@ public:
     /// Planes that a window of `box` nodes has at most, with the fragments of a level.
     static int planes(const CellLevel& level, Index3 box) noexcept;
 
-    WindowFragments() = default;
     WindowFragments(const CellLevel& level, Index3 box);
 
     struct Placed {

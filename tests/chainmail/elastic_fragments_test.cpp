@@ -207,8 +207,7 @@ struct Following {
         const auto link = links.find(node);
         std::size_t i = 0;
         volume::forEachIndex(at / 2, at / 2 + at % 2, [&](Index3 parent) {
-            const Index3 off = parent - coarseCell;
-            const auto corner = static_cast<std::size_t>(off.x + 2 * off.y + 4 * off.z);
+            const auto corner = static_cast<std::size_t>(octantOf(parent - coarseCell));
             const auto own = static_cast<std::uint32_t>(coarse.nodes.offset(parent));
             const std::uint32_t wanted = fragment == noFragment ? own : coarse.fragments.cells[fragment].nodes[corner];
             EXPECT_EQ(link == links.end() ? own : link->second->parents[i], wanted);
@@ -224,7 +223,7 @@ struct Following {
     void checkFragment(const CellFragment& f) const
     {
         for (int c = 0; c < 8; ++c) {
-            const Index3 at = f.cell + Index3(c & 1, c >> 1 & 1, c >> 2);
+            const Index3 at = f.cell + octant(c);
             check(f.nodes[static_cast<std::size_t>(c)], at, f.parent, f.cell / 2);
         }
     }
@@ -463,6 +462,24 @@ TEST(ElasticFragments, NoNodeOfTissueIsLeftOut)
         }
     }
     EXPECT_GT(withoutRoom, 0U);
+}
+
+// A place in a fragment without room moves with the cell itself.
+TEST(ElasticFragments, PlacesWithoutRoomMoveWithTheirCell)
+{
+    const ElasticBody body = brush();
+    const Vec3 top(42e-3, 42e-3, 0.0), inward(0, 0, 1);
+    ElasticOptions options;
+    options.window = 9;
+    Elastic elastic(body, options, Focus(top, inward, 0.0));
+    const auto lacksRoom = [](const Window& w) { return !w.fragments.left().empty(); };
+    ASSERT_TRUE(std::ranges::any_of(elastic.stack().windows(), lacksRoom));
+    const ElasticTool tool{{top, top, 6e-3, 6e-3}, 3e-3 * inward};
+    elastic.relax({std::span(&tool, 1), {}, Focus(top, inward, 0.0)}, 20, 1e-3);
+    volume::forEachIndex(Index3(2), Index3(42, 42, 21), [&](Index3 cell) {
+        EXPECT_LT(glm::length(elastic.displacementOf(cell)), 20e-3);
+        EXPECT_LT(glm::length(elastic.displacement(cellSize * (Vec3(cell) - 1.5))), 20e-3);
+    });
 }
 
 // The history is a force: what all of it together is does not change where the windows move, but for what nodes in the air
