@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -335,6 +336,61 @@ CellLevel withStiffSkin(const FinestLevel& finest)
     return level;
 }
 
+// What the fragments do not have of their cells.
+void leaveRest(CellLevel& level, const std::vector<std::uint8_t>& octants)
+{
+    for (const CellFragment& f : level.fragments.cells) {
+        unsigned rest = octants[level.nodes.offset(f.cell)];
+        const auto all = static_cast<float>(std::popcount(rest));
+        bool isFirst = true;
+        for (const CellFragment& other : level.fragments.in(f.cell, level.nodes.size.y)) {
+            rest &= ~static_cast<unsigned>(other.children);
+            isFirst = isFirst && &other >= &f;
+        }
+        const float share = isFirst ? static_cast<float>(std::popcount(rest)) / all : 1.0F;
+        level.mu[level.nodes.offset(f.cell)] *= share;
+        level.lambda[level.nodes.offset(f.cell)] *= share;
+    }
+}
+
+// Gives the finest level the fragments that its gaps make. Each has the share of its cell's material that its eighths are.
+void divideCells(const Split& split, const FinestLevel& finest, CellLevel& level)
+{
+    const auto& g = level.nodes;
+    level.fragments = split.coarse;
+    for (VirtualNode& n : level.fragments.nodes) {
+        n.isFixed = level.fixed[g.offset(n.at)] != 0;
+    }
+    for (CellFragment& f : level.fragments.cells) {
+        const std::size_t at = g.offset(f.cell);
+        const auto share = static_cast<float>(std::popcount(f.children)) / static_cast<float>(std::popcount(finest.octants[at]));
+        f.mu = share * level.mu[at];
+        f.lambda = share * level.lambda[at];
+        f.stiffening = level.stiffening[at];
+        f.held = finest.held[at];
+        for (std::size_t i = 0; i < f.relaxing.size() && !level.relaxing[i].empty(); ++i) {
+            f.relaxing[i] = level.relaxing[i][at];
+        }
+    }
+    leaveRest(level, finest.octants);
+}
+
+// Takes the cells as they are, with their layers, but for those with fragments: these keep what they have.
+void takeWhole(CellLevel whole, CellLevel& level)
+{
+    for (const CellFragment& f : level.fragments.cells) {
+        const std::size_t at = level.nodes.offset(f.cell);
+        whole.mu[at] = level.mu[at];
+        whole.lambda[at] = level.lambda[at];
+    }
+    if (!level.fragments.cells.empty()) {
+        std::erase_if(whole.layers, [&](const CellLayer& l) { return !level.fragments.in(l.cell, level.nodes.size.y).empty(); });
+        indexLayers(whole);
+    }
+    whole.fragments = std::move(level.fragments);
+    level = std::move(whole);
+}
+
 // The finest level keeps what is behind a support, for tools that come from there.
 void rest(const Resting& resting, const FinestLevel& finest, std::vector<CellLevel>& levels)
 {
@@ -361,7 +417,7 @@ double spectralRadius(const CellLevel& level)
     const Layout l = Layout::of(size.x, size.y, fragments.planes());
     const Kernels& k = kernels();
     std::vector<float> mu(l.count + Layout::lanes), lambda(mu), inverse(mu);
-    LayerFields layers(l, !level.layers.empty());
+    LayerFields layers(l, size, !level.layers.empty());
     layers.place(level, Index3(0));
     std::vector<float> z(l.fieldSize()), az(l.fieldSize()), scratch(l.scratchSize());
     std::minstd_rand random(7);
@@ -414,8 +470,14 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
 {
     FinestLevel first = support ? Resting::freePart(finest) : finest;
     std::vector<CellLevel> levels{withStiffSkin(first)};
+    std::vector<std::uint8_t> loose = looseCells(levels.front(), finest.held, finest.octants);
+    Split split;
+    if (!finest.octants.empty()) {
+        split = splitFinest(levels.front(), loose, finest.octants);
+        loose = split.loose;
+    }
+    divideCells(split, first, levels.front());
     addDiagonal(levels.front());
-    std::vector<std::uint8_t> loose = looseCells(levels.front(), finest.held);
     while (levels.size() < count) {
         std::vector<float> coarser;
         std::vector<std::uint8_t> looser;
@@ -424,9 +486,9 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
         first.held = std::move(coarser);
         loose = std::move(looser);
     }
-    first.level.fragments = std::move(levels.front().fragments);
-    levels.front() = first.level;
-    addLayers(first, finest.held, surface, levels.front());
+    CellLevel whole = first.level;
+    addLayers(first, finest.held, surface, whole);
+    takeWhole(std::move(whole), levels.front());
     addDiagonal(levels.front());
     if (support) {
         rest(Resting(*support, surface), finest, levels);

@@ -23,6 +23,9 @@ struct FinestLevel {
     CellLevel level;               // without layers, `diagonal` and `radius`
     std::vector<float> held;       // fraction of each cell's tissue that is held in space (count x 1)
     std::vector<MixedCell> mixed;  // by z, then y, then x
+    /// Which eighths of each cell are mostly tissue, a bit for each, x fastest: gaps between these divide the finest level,
+    /// too (count x 1). Empty: gaps are looked for between whole cells.
+    std::vector<std::uint8_t> octants;
 };
 
 /// The levels of a body from its finest on, each twice as coarse as the one before.

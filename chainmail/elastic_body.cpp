@@ -169,6 +169,23 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
     });
 }
 
+// A cell of tissue thinner than its eighths counts as whole.
+std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, std::span<const std::uint8_t> filled,
+                                    const CellLevel& level)
+{
+    const volume::NodeGrid halves{2 * cells.size, Vec3(0.0), 1.0};
+    std::vector<std::uint8_t> octants(level.nodes.count(), 0);
+    volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
+        std::uint8_t& octant = octants[level.nodes.offset(c)];
+        for (int i = 0; i < 8 && level.mu[level.nodes.offset(c)] > 0.0F; ++i) {
+            const bool is = filled[halves.offset(2 * c + Index3(i & 1, i >> 1 & 1, i >> 2))] != 0;
+            octant |= static_cast<std::uint8_t>(is ? 1 << i : 0);
+        }
+        octant = octant == 0 && level.mu[level.nodes.offset(c)] > 0.0F ? std::uint8_t{0xFF} : octant;
+    });
+    return octants;
+}
+
 void indexRows(ElasticBody& body)
 {
     const Index3 size = body.levels.front().nodes.size;
@@ -185,13 +202,16 @@ void indexRows(ElasticBody& body)
 
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius, bool relaxes,
-                        const std::optional<volume::Support>& support)
+                        const std::optional<volume::Support>& support, std::span<const std::uint8_t> filled)
 {
     ElasticBody body;
     body.relaxes = relaxes;
     int levels = 1;
     const Index3 size = paddedNodes(cells.size, levels);
     FinestLevel all = finest(cells, materials, poissonCap, size, relaxes);
+    if (!filled.empty()) {
+        all.octants = octantsOf(cells, filled, all.level);
+    }
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
     indexRows(body);

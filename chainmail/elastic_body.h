@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -32,7 +33,7 @@ struct CellLevel {
     std::vector<std::uint32_t>
         layerRows;                // first of `layers` in row (y, z) of cells, at y + z * nodes along y; none: no layers
     std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
-    Fragments fragments;          // of cells that gaps run through; the finest level has none
+    Fragments fragments;          // of cells that gaps run through
     double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
 };
 
@@ -70,7 +71,14 @@ inline float diagonalOf(float mu, float lambda, double spacing) noexcept
 inline float muAt(const CellLevel& level, Vec3 at) noexcept
 {
     const Index3 cell(glm::floor((at - level.nodes.origin) / level.nodes.spacing));
-    return level.nodes.contains(cell) ? level.mu[level.nodes.offset(cell)] : 0.0F;
+    if (!level.nodes.contains(cell)) {
+        return 0.0F;
+    }
+    float sum = level.mu[level.nodes.offset(cell)];
+    for (const CellFragment& f : level.fragments.in(cell, level.nodes.size.y)) {
+        sum += f.mu;
+    }
+    return sum;
 }
 
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one
@@ -91,6 +99,8 @@ struct ElasticBody {
 ///                     larger than a cell [m]
 /// @param relaxes      the moduli become those right after a step, and cells keep the weights of their Prony series
 /// @param support      what holds a body in which no tissue is fixed, see volume::Tissue::support()
+/// @param filled       of the cells' eighths, whether they are mostly tissue: twice as many along each axis, x fastest. Gaps
+///                     between these divide the finest cells, too; none: gaps between whole cells alone
 ///
 /// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A support holds, at
 /// every spacing, the nodes on it or behind it where the body meets it. Something must be held.
@@ -98,6 +108,7 @@ struct ElasticBody {
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0,
-                        bool relaxes = false, const std::optional<volume::Support>& support = {});
+                        bool relaxes = false, const std::optional<volume::Support>& support = {},
+                        std::span<const std::uint8_t> filled = {});
 
 }  // namespace palpate::chainmail

@@ -232,6 +232,7 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
     };
     forEachRow([&](Index3 at, std::size_t n, std::size_t first) {
         cellMeans(window, window.at(at), inRow, &now_[first]);
+        takeFragments(at, inRow, &now_[first]);
         for (std::size_t i = 0; i < inRow; ++i) {
             before_[first + i] = u[n + i];
             if (!shape_.lattice().isNode(static_cast<Node>(n + i))) {
@@ -257,6 +258,20 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
             }
         }
     });
+}
+
+// Of the cells of a row that fragments alone fill, the means over their nodes.
+void ElasticLevel::takeFragments(Index3 first, std::size_t count, Vec3f* out) const noexcept
+{
+    const CellLevel& level = elastic_.body().levels.front();
+    const Window& window = elastic_.stack().windows().front();
+    for (const CellFragment& f : level.fragments.cellsOf(first, first.x + static_cast<int>(count) - 1, level.nodes.size.y)) {
+        const auto index = static_cast<std::uint32_t>(&f - level.fragments.cells.data());
+        const std::uint32_t node = window.fragments.nodeOf(index);
+        if (level.mu[level.nodes.offset(f.cell)] <= 0.0F && node != noFragment) {
+            cellMeans(window, node, 1, out + (f.cell.x - first.x));
+        }
+    }
 }
 
 // Edges that are shifted by less than a third of their length cannot turn a cell over: their matrix is diagonally dominant.

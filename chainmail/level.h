@@ -103,6 +103,7 @@ private:
     ElasticLoad load(const Grip& grip) noexcept;
     ElasticLoad tie(const Grip& grip) noexcept;
     void writeFinest(Vec3 around, int layers) noexcept;
+    void takeFragments(Index3 first, std::size_t count, Vec3f* out) const noexcept;
     void writeBox(Index3 low, Index3 high) noexcept;
     void write(Node n, Index3 at) noexcept;
     void writeByTurns(std::size_t level) noexcept;

@@ -370,7 +370,28 @@ private:
 
 }  // namespace
 
-std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<float>& held)
+namespace {
+
+// Whether an eighth of one cell shares a corner with one of the cell at `off` from it. A cell's own eighths meet in its
+// middle.
+bool meet(std::uint8_t one, std::uint8_t other, Index3 off) noexcept
+{
+    if (one == 0xFF && other == 0xFF) {
+        return true;
+    }
+    bool any = false;
+    for (int i = 0; i < 64 && !any; ++i) {
+        const Index3 between = glm::abs(2 * off + octant(i / 8) - octant(i % 8));
+        const bool both = (one >> (i % 8) & 1) != 0 && (other >> (i / 8) & 1) != 0;
+        any = both && between == glm::min(between, Index3(1));
+    }
+    return any;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<float>& held,
+                                     const std::vector<std::uint8_t>& octants)
 {
     const volume::NodeGrid& g = finest.nodes;
     std::vector<std::uint8_t> loose(g.count(), 0);
@@ -393,16 +414,38 @@ std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<
             reach(cell);
         }
     });
+    const auto whole = [&](std::size_t cell) { return octants.empty() ? std::uint8_t{0xFF} : octants[cell]; };
     while (!open.empty()) {
-        const Index3 c = g.node(open.back());
+        const std::size_t from = open.back();
+        const Index3 c = g.node(from);
         open.pop_back();
         volume::forEachIndex(glm::max(c - 1, Index3(0)), glm::min(c + 1, g.size - 2), [&](Index3 other) {
-            if (loose[g.offset(other)] != 0) {
-                reach(g.offset(other));
+            const std::size_t to = g.offset(other);
+            if (loose[to] != 0 && meet(whole(from), whole(to), other - c)) {
+                reach(to);
             }
         });
     }
     return loose;
+}
+
+Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loose,
+                  const std::vector<std::uint8_t>& octants)
+{
+    const volume::NodeGrid& g = finest.nodes;
+    CellLevel halves;
+    halves.nodes = {2 * g.size - 1, g.origin, 0.5 * g.spacing};
+    halves.mu.assign(halves.nodes.count(), 0.0F);
+    std::vector<std::uint8_t> looseHalves(halves.nodes.count(), 0);
+    volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
+        const std::size_t at = g.offset(c);
+        for (int i = 0; i < 8 && finest.mu[at] > 0.0F; ++i) {
+            const std::size_t half = halves.nodes.offset(2 * c + octant(i));
+            halves.mu[half] = (octants[at] >> i & 1) != 0 ? 1.0F : 0.0F;
+            looseHalves[half] = loose[at];
+        }
+    });
+    return splitLevel(halves, looseHalves, g);
 }
 
 Split splitLevel(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse)

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <chainmail/elastic_body.h>
+#include <chainmail/cell_levels.h>
 
 #include <cstdint>
 #include <vector>
@@ -16,10 +16,14 @@ struct Split {
     std::vector<std::uint8_t> loose;     // the same of the coarse level's cells
 };
 
-/// Which cells of the finest level hang together, by nodes that they share, with nothing that is held: not 0 for these
-/// (count x 1). Splitting leaves them to what is near, since alone they would have no place of their own.
-/// @param held  fraction of each cell's tissue that is held in space (count x 1)
-std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<float>& held);
+/// Which cells of the finest level hang together, by nodes that they or their eighths share, with nothing that is held: not 0
+/// for these (count x 1). Splitting leaves them to what is near, since alone they would have no place of their own.
+std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<float>& held,
+                                     const std::vector<std::uint8_t>& octants);
+
+/// Finds what hangs together on the finest level itself, by the eighths of its cells, see FinestLevel::octants.
+Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loose,
+                  const std::vector<std::uint8_t>& octants);
 
 /// Finds which tissue hangs together in the cells of the next coarser level and around its nodes. What shares a node of the
 /// fine level does; the rest gets fragments and virtual nodes. Where two parts meet at a node, the one of more cells keeps

@@ -6,7 +6,7 @@
 
 namespace palpate::chainmail {
 
-LayerFields::LayerFields(const Layout& layout, bool any) : layout_(layout)
+LayerFields::LayerFields(const Layout& layout, Index3 box, bool any) : layout_(layout), box_(box)
 {
     const std::size_t room = any ? layout.count + Layout::lanes : 0;
     mu_.assign(room, 0.0F);
@@ -23,13 +23,13 @@ void LayerFields::place(const CellLevel& level, Index3 at) noexcept
     some_ = false;
     std::fill(mu_.begin(), mu_.end(), 0.0F);
     std::fill(any_.begin(), any_.end(), std::uint8_t{0});
-    const int rows = mu_.empty() ? 0 : (layout_.ny - 1) * (layout_.nz - 1);
+    const int rows = mu_.empty() ? 0 : (box_.y - 1) * (box_.z - 1);
     for (int r = 0; r < rows; ++r) {
-        const Index3 first = at + Index3(0, r % (layout_.ny - 1), r / (layout_.ny - 1));
+        const Index3 first = at + Index3(0, r % (box_.y - 1), r / (box_.y - 1));
         const auto row = static_cast<std::size_t>(first.y + first.z * level.nodes.size.y);
         for (std::uint32_t i = level.layerRows[row]; i < level.layerRows[row + 1]; ++i) {
             const Index3 cell = level.layers[i].cell - at;
-            if (cell.x >= 0 && cell.x + 1 < layout_.nx) {
+            if (cell.x >= 0 && cell.x + 1 < box_.x) {
                 set(layout_.at(cell.x, cell.y, cell.z), level.layers[i], static_cast<float>(level.nodes.spacing / 32.0));
             }
         }
@@ -71,7 +71,7 @@ bool Window::anyTissue(const Floats& cells, Index3 first, Index3 last) const noe
 Window::Window(const CellLevel& level, Index3 size, bool relaxes)
     : box(size),
       layout(Layout::of(size.x, size.y, WindowFragments::planes(level, size))),
-      layers(layout, !level.layers.empty()),
+      layers(layout, size, !level.layers.empty()),
       fragments(level, size)
 {
     for (Floats* cells :

@@ -57,8 +57,9 @@ inline bool isBetween(Index3 n, Index3 first, Index3 last) noexcept
 /// The thin layers of the cells in a box.
 class LayerFields {
 public:
+    /// @param box  nodes that have cells with layers between them
     /// @param any  the level has layers; where it has none, nothing is kept
-    LayerFields(const Layout& layout, bool any);
+    LayerFields(const Layout& layout, Index3 box, bool any);
     /// Takes those of the level's cells from `at` on.
     void place(const CellLevel& level, Index3 at) noexcept;
     /// What the kernels take; without a modulus where no cell of the box has a layer.
@@ -71,6 +72,7 @@ private:
     void set(std::size_t cell, const CellLayer& layer, float scale) noexcept;
 
     Layout layout_;
+    Index3 box_{0};
     Floats mu_;
     std::array<Floats, 3> normal_, middle_, half_;
     std::vector<std::uint8_t> any_;

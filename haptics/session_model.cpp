@@ -35,6 +35,12 @@ chainmail::Lattice latticeOf(const datasets::Scene& scene, const volume::Tissue&
     return {grid, tissue.tissueOn(grid), tissue.table()};
 }
 
+// The middles of a grid of cells' eighths.
+volume::NodeGrid halvesOf(const volume::NodeGrid& cells)
+{
+    return {2 * cells.size, cells.origin - 0.25 * cells.spacing, 0.5 * cells.spacing};
+}
+
 std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& scene, const volume::Tissue& tissue,
                                                         const volume::NodeGrid& cells, const volume::DistanceField& surface)
 {
@@ -44,7 +50,8 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
     return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells, surface),
                                                                            surface, scene.model.elastic.poissonCap, presses,
-                                                                           scene.model.relaxation, tissue.support()));
+                                                                           scene.model.relaxation, tissue.support(),
+                                                                           tissue.tissueOn(halvesOf(cells))));
 }
 
 bool anyWalls(const volume::Tissue& tissue)

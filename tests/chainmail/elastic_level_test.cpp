@@ -287,7 +287,7 @@ TEST(ElasticLevel, LatticeComesToTheShapeOfTheWindows)
         }
         const Vec3 rest = bench.grid.position(bench.grid.node(n));
         ContactSite site;
-        locate(bench.body, level.elastic().stack().windows(), rest, site);
+        locate(bench.body, level.elastic().stack().windows(), rest, rest, site);
         if (site.level >= seen.size()) {
             continue;
         }
