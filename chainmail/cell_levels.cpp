@@ -363,7 +363,8 @@ void divideCells(const Split& split, const FinestLevel& finest, CellLevel& level
     }
     for (CellFragment& f : level.fragments.cells) {
         const std::size_t at = g.offset(f.cell);
-        const auto share = static_cast<float>(std::popcount(f.children)) / static_cast<float>(std::popcount(finest.octants[at]));
+        const auto share =
+            static_cast<float>(std::popcount(f.children)) / static_cast<float>(std::popcount(finest.octants[at]));
         f.mu = share * level.mu[at];
         f.lambda = share * level.lambda[at];
         f.stiffening = level.stiffening[at];
@@ -384,7 +385,8 @@ void takeWhole(CellLevel whole, CellLevel& level)
         whole.lambda[at] = level.lambda[at];
     }
     if (!level.fragments.cells.empty()) {
-        std::erase_if(whole.layers, [&](const CellLayer& l) { return !level.fragments.in(l.cell, level.nodes.size.y).empty(); });
+        std::erase_if(whole.layers,
+                      [&](const CellLayer& l) { return !level.fragments.in(l.cell, level.nodes.size.y).empty(); });
         indexLayers(whole);
     }
     whole.fragments = std::move(level.fragments);

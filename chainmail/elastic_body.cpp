@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -169,21 +170,44 @@ void addSurface(const volume::NodeGrid& cells, const volume::DistanceField& surf
     });
 }
 
-// A cell of tissue thinner than its eighths counts as whole.
+// Of a cell with less tissue than fills an eighth of it by half: its eighths with most filled ones around them, and the
+// whole cell where there are none.
+std::uint8_t sliverOf(const std::vector<std::uint8_t>& octants, const volume::NodeGrid& nodes, Index3 cell)
+{
+    int most = 1;
+    std::uint8_t found = 0;
+    for (int i = 0; i < 8; ++i) {
+        const Index3 half = 2 * cell + Index3(i & 1, i >> 1 & 1, i >> 2);
+        int filled = 0;
+        volume::forEachIndex(half - 1, half + 1, [&](Index3 beside) {
+            const Index3 off = beside % 2;
+            filled += octants[nodes.offset(beside / 2)] >> (off.x + 2 * off.y + 4 * off.z) & 1;
+        });
+        found = filled > most ? std::uint8_t{0} : found;
+        most = std::max(most, filled);
+        found |= static_cast<std::uint8_t>(filled == most ? 1 << i : 0);
+    }
+    return found != 0 ? found : std::uint8_t{0xFF};
+}
+
 std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, std::span<const std::uint8_t> filled,
                                     const CellLevel& level)
 {
     const volume::NodeGrid halves{2 * cells.size, Vec3(0.0), 1.0};
     std::vector<std::uint8_t> octants(level.nodes.count(), 0);
+    const auto isCell = [&](Index3 c) { return level.mu[level.nodes.offset(c)] > 0.0F; };
     volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
-        std::uint8_t& octant = octants[level.nodes.offset(c)];
-        for (int i = 0; i < 8 && level.mu[level.nodes.offset(c)] > 0.0F; ++i) {
+        for (int i = 0; i < 8 && isCell(c); ++i) {
             const bool is = filled[halves.offset(2 * c + Index3(i & 1, i >> 1 & 1, i >> 2))] != 0;
-            octant |= static_cast<std::uint8_t>(is ? 1 << i : 0);
+            octants[level.nodes.offset(c)] |= static_cast<std::uint8_t>(is ? 1 << i : 0);
         }
-        octant = octant == 0 && level.mu[level.nodes.offset(c)] > 0.0F ? std::uint8_t{0xFF} : octant;
     });
-    return octants;
+    std::vector<std::uint8_t> all = octants;
+    volume::forEachIndex(Index3(1), cells.size - 2, [&](Index3 c) {
+        std::uint8_t& octant = all[level.nodes.offset(c)];
+        octant = octant == 0 && isCell(c) ? sliverOf(octants, level.nodes, c) : octant;
+    });
+    return all;
 }
 
 void indexRows(ElasticBody& body)

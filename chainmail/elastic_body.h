@@ -99,7 +99,8 @@ struct ElasticBody {
 ///                     larger than a cell [m]
 /// @param relaxes      the moduli become those right after a step, and cells keep the weights of their Prony series
 /// @param support      what holds a body in which no tissue is fixed, see volume::Tissue::support()
-/// @param filled       of the cells' eighths, whether they are mostly tissue: twice as many along each axis, x fastest. Gaps
+/// @param filled       of the cells' eighths, whether they are mostly tissue: twice as many along each axis, x fastest.
+/// Gaps
 ///                     between these divide the finest cells, too; none: gaps between whole cells alone
 ///
 /// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A support holds, at

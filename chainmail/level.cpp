@@ -265,7 +265,8 @@ void ElasticLevel::takeFragments(Index3 first, std::size_t count, Vec3f* out) co
 {
     const CellLevel& level = elastic_.body().levels.front();
     const Window& window = elastic_.stack().windows().front();
-    for (const CellFragment& f : level.fragments.cellsOf(first, first.x + static_cast<int>(count) - 1, level.nodes.size.y)) {
+    for (const CellFragment& f :
+         level.fragments.cellsOf(first, first.x + static_cast<int>(count) - 1, level.nodes.size.y)) {
         const auto index = static_cast<std::uint32_t>(&f - level.fragments.cells.data());
         const std::uint32_t node = window.fragments.nodeOf(index);
         if (level.mu[level.nodes.offset(f.cell)] <= 0.0F && node != noFragment) {

@@ -429,8 +429,7 @@ std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<
     return loose;
 }
 
-Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loose,
-                  const std::vector<std::uint8_t>& octants)
+Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loose, const std::vector<std::uint8_t>& octants)
 {
     const volume::NodeGrid& g = finest.nodes;
     CellLevel halves;

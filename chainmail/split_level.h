@@ -16,8 +16,8 @@ struct Split {
     std::vector<std::uint8_t> loose;     // the same of the coarse level's cells
 };
 
-/// Which cells of the finest level hang together, by nodes that they or their eighths share, with nothing that is held: not 0
-/// for these (count x 1). Splitting leaves them to what is near, since alone they would have no place of their own.
+/// Which cells of the finest level hang together, by nodes that they or their eighths share, with nothing that is held: not
+/// 0 for these (count x 1). Splitting leaves them to what is near, since alone they would have no place of their own.
 std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<float>& held,
                                      const std::vector<std::uint8_t>& octants);
 

@@ -48,10 +48,9 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
         return nullptr;
     }
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
-    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells, surface),
-                                                                           surface, scene.model.elastic.poissonCap, presses,
-                                                                           scene.model.relaxation, tissue.support(),
-                                                                           tissue.tissueOn(halvesOf(cells))));
+    return std::make_shared<chainmail::ElasticBody>(
+        chainmail::elasticBody(cells, tissue.materialOn(cells, surface), surface, scene.model.elastic.poissonCap, presses,
+                               scene.model.relaxation, tissue.support(), tissue.tissueOn(halvesOf(cells))));
 }
 
 bool anyWalls(const volume::Tissue& tissue)
