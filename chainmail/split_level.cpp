@@ -182,15 +182,12 @@ private:
     {
         beside_.clear();
         Groups groups;
-        std::array<Pieces, 8> at{};
         for (int i = 0; i < 8; ++i) {
-            Pieces& here = at[static_cast<std::size_t>(i)];
             const Index3 cell = n - 1 + octant(i);
             if (cell != glm::clamp(cell, Index3(0), coarse_.size - 2)) {
                 continue;
             }
             const Pieces found = piecesOf(cell);
-            here = {beside_.size(), found.count};
             for (std::size_t k = 0; k < found.count; ++k) {
                 beside_.push_back({found.first + k, 7 - i});
                 groups.add();
@@ -199,8 +196,7 @@ private:
         if (beside_.size() < 2) {
             return;
         }
-        const Index3 first = glm::max(2 * n - 1, Index3(0)), last = glm::min(2 * n + 1, fine_.nodes.size - 1);
-        volume::forEachIndex(first, last, [&](Index3 fineNode) { joinAt(fineNode, n, at, groups); });
+        joinSharers(groups);
         std::vector<std::size_t> cells(beside_.size(), 0);  // by group, without those that are loose
         for (std::size_t i = 0; i < beside_.size(); ++i) {
             cells[groups.of(i)] += heldCells(all_[beside_[i].piece]);
@@ -229,41 +225,28 @@ private:
         return sum;
     }
 
-    // Joins the pieces that share a node of the fine level.
-    void joinAt(Index3 fineNode, Index3 n, const std::array<Pieces, 8>& at, Groups& groups)
+    // Joins the pieces that share a node of the fine level, wherever that is: what hangs together beside a node does at it.
+    void joinSharers(Groups& groups)
     {
         sharers_.clear();
-        for (int i = 0; i < 8; ++i) {
-            const Index3 cell = fineNode - 1 + octant(i);
-            if (cell != glm::clamp(cell, Index3(0), fine_.nodes.size - 2)) {
-                continue;
+        for (std::size_t i = 0; i < beside_.size(); ++i) {
+            const Piece& piece = all_[beside_[i].piece];
+            for (int c = 0; c < 64; ++c) {
+                if ((piece.children >> (c / 8) & 1) != 0) {
+                    const Index3 node = 2 * piece.cell + octant(c / 8) + octant(c % 8);
+                    sharers_.emplace_back(static_cast<std::uint32_t>(fine_.nodes.offset(node)), i);
+                }
             }
-            const Pieces& here = at[static_cast<std::size_t>(octantOf(cell / 2 - (n - 1)))];
-            for (std::size_t k = here.first; k < here.first + here.count; ++k) {
-                shareCorner(cell, static_cast<std::size_t>(7 - i), k, groups);
+            for (const std::uint32_t f : piece.fragments) {
+                for (const std::uint32_t node : fine_.fragments.cells[f].nodes) {
+                    sharers_.emplace_back(node, i);
+                }
             }
         }
-    }
-
-    // Joins a piece with those before that share a corner of a fine cell with it.
-    void shareCorner(Index3 cell, std::size_t corner, std::size_t piece, Groups& groups)
-    {
-        const auto share = [&](std::uint32_t node) {
-            const auto known = std::ranges::find(sharers_, node, &std::pair<std::uint32_t, std::size_t>::first);
-            if (known == sharers_.end()) {
-                sharers_.emplace_back(node, piece);
-            } else {
-                groups.join(known->second, piece);
-            }
-        };
-        const Piece& of = all_[beside_[piece].piece];
-        if ((of.children >> octantOf(cell % 2) & 1) != 0) {
-            share(static_cast<std::uint32_t>(fine_.nodes.offset(cell + octant(static_cast<int>(corner)))));
-        }
-        for (const std::uint32_t f : of.fragments) {
-            const CellFragment& fragment = fine_.fragments.cells[f];
-            if (fragment.cell == cell) {
-                share(fragment.nodes[corner]);
+        std::ranges::sort(sharers_);
+        for (std::size_t i = 1; i < sharers_.size(); ++i) {
+            if (sharers_[i].first == sharers_[i - 1].first) {
+                groups.join(sharers_[i].second, sharers_[i - 1].second);
             }
         }
     }
@@ -364,7 +347,7 @@ private:
     std::vector<std::size_t> kept_;                   // pieces that are fragments
     std::unordered_set<std::uint32_t> linked_;
     std::vector<Beside> beside_;
-    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // of a node of the fine level, with the first of each
+    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // nodes of the fine level, with the pieces that have them
     Split out_;
 };
 
