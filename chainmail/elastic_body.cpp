@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -177,11 +176,11 @@ std::uint8_t sliverOf(const std::vector<std::uint8_t>& octants, const volume::No
     int most = 1;
     std::uint8_t found = 0;
     for (int i = 0; i < 8; ++i) {
-        const Index3 half = 2 * cell + Index3(i & 1, i >> 1 & 1, i >> 2);
+        const Index3 half = 2 * cell + octant(i);
         int filled = 0;
         volume::forEachIndex(half - 1, half + 1, [&](Index3 beside) {
             const Index3 off = beside % 2;
-            filled += octants[nodes.offset(beside / 2)] >> (off.x + 2 * off.y + 4 * off.z) & 1;
+            filled += octants[nodes.offset(beside / 2)] >> octantOf(off) & 1;
         });
         found = filled > most ? std::uint8_t{0} : found;
         most = std::max(most, filled);
@@ -190,24 +189,26 @@ std::uint8_t sliverOf(const std::vector<std::uint8_t>& octants, const volume::No
     return found != 0 ? found : std::uint8_t{0xFF};
 }
 
-std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, std::span<const std::uint8_t> filled,
+// Of every cell, see FinestLevel::octants.
+std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                                     const CellLevel& level)
 {
-    const volume::NodeGrid halves{2 * cells.size, Vec3(0.0), 1.0};
-    std::vector<std::uint8_t> octants(level.nodes.count(), 0);
-    const auto isCell = [&](Index3 c) { return level.mu[level.nodes.offset(c)] > 0.0F; };
+    std::vector<std::uint8_t> known(level.nodes.count(), 0);
+    bool isDivided = false;
     volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
-        for (int i = 0; i < 8 && isCell(c); ++i) {
-            const bool is = filled[halves.offset(2 * c + Index3(i & 1, i >> 1 & 1, i >> 2))] != 0;
-            octants[level.nodes.offset(c)] |= static_cast<std::uint8_t>(is ? 1 << i : 0);
-        }
+        const std::size_t at = level.nodes.offset(c);
+        known[at] = level.mu[at] > 0.0F ? materials[cells.offset(c)].octants : std::uint8_t{0};
+        isDivided = isDivided || (known[at] != 0xFF && level.mu[at] > 0.0F);
     });
-    std::vector<std::uint8_t> all = octants;
+    if (!isDivided) {
+        return {};
+    }
+    std::vector<std::uint8_t> octants = known;
     volume::forEachIndex(Index3(1), cells.size - 2, [&](Index3 c) {
-        std::uint8_t& octant = all[level.nodes.offset(c)];
-        octant = octant == 0 && isCell(c) ? sliverOf(octants, level.nodes, c) : octant;
+        const std::size_t at = level.nodes.offset(c);
+        octants[at] = known[at] == 0 && level.mu[at] > 0.0F ? sliverOf(known, level.nodes, c) : known[at];
     });
-    return all;
+    return octants;
 }
 
 void indexRows(ElasticBody& body)
@@ -226,16 +227,14 @@ void indexRows(ElasticBody& body)
 
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius, bool relaxes,
-                        const std::optional<volume::Support>& support, std::span<const std::uint8_t> filled)
+                        const std::optional<volume::Support>& support)
 {
     ElasticBody body;
     body.relaxes = relaxes;
     int levels = 1;
     const Index3 size = paddedNodes(cells.size, levels);
     FinestLevel all = finest(cells, materials, poissonCap, size, relaxes);
-    if (!filled.empty()) {
-        all.octants = octantsOf(cells, filled, all.level);
-    }
+    all.octants = octantsOf(cells, materials, all.level);
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
     indexRows(body);

@@ -7,7 +7,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -99,9 +98,6 @@ struct ElasticBody {
 ///                     larger than a cell [m]
 /// @param relaxes      the moduli become those right after a step, and cells keep the weights of their Prony series
 /// @param support      what holds a body in which no tissue is fixed, see volume::Tissue::support()
-/// @param filled       of the cells' eighths, whether they are mostly tissue: twice as many along each axis, x fastest.
-/// Gaps
-///                     between these divide the finest cells, too; none: gaps between whole cells alone
 ///
 /// Cells of fixed tissue fix their nodes, and so does tissue of which half around a node is fixed. A support holds, at
 /// every spacing, the nodes on it or behind it where the body meets it. Something must be held.
@@ -109,7 +105,6 @@ struct ElasticBody {
 /// A coarse cell has the moduli that store as much energy as its eight cells: see upscaled() in the source.
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
                         const volume::DistanceField& surface, double poissonCap, double toolRadius = 0.0,
-                        bool relaxes = false, const std::optional<volume::Support>& support = {},
-                        std::span<const std::uint8_t> filled = {});
+                        bool relaxes = false, const std::optional<volume::Support>& support = {});
 
 }  // namespace palpate::chainmail

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <numeric>
 #include <unordered_map>
 #include <unordered_set>
@@ -36,6 +37,11 @@ public:
         }
         return i;
     }
+    bool areOne() const
+    {
+        std::size_t i = 0;
+        return std::ranges::all_of(lead_, [&](std::size_t) { return of(i++) == 0; });
+    }
     void join(std::size_t a, std::size_t b)
     {
         a = of(a);
@@ -49,32 +55,36 @@ private:
 
 class Splitter {
 public:
-    Splitter(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse)
-        : fine_(fine), loose_(loose), coarse_(coarse), full_(coarse.count())
+    // `joinsAround`: see joinAround(), for a fine level without fragments.
+    Splitter(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse,
+             bool joinsAround)
+        : fine_(fine),
+          loose_(loose),
+          coarse_(coarse),
+          joinsAround_(joinsAround),
+          children_(coarse.count()),
+          isDivided_(coarse.count())
     {
         out_.loose.assign(coarse.count(), 0);
         volume::forEachIndex(Index3(0), coarse.size - 2, [&](Index3 c) {
-            int filled = 0;
+            const std::size_t to = coarse.offset(c);
             bool anyLoose = false, anyHeld = false;
-            volume::forEachIndex(2 * c, 2 * c + 1, [&](Index3 child) {
-                const std::size_t at = fine_.nodes.offset(child);
-                const bool hasFragments = !fragmentsIn(child).empty(), isCell = fine_.mu[at] > 0.0F;
-                filled += isCell && !hasFragments ? 1 : 0;
+            for (int i = 0; i < 8; ++i) {
+                const std::size_t at = fine_.nodes.offset(2 * c + octant(i));
+                const bool hasFragments = !fragmentsIn(2 * c + octant(i)).empty(), isCell = fine_.mu[at] > 0.0F;
+                children_[to] |= static_cast<std::uint8_t>(isCell ? 1 << i : 0);
+                isDivided_[to] |= static_cast<std::uint8_t>(hasFragments ? 1 : 0);
                 anyLoose = anyLoose || loose_[at] != 0;
                 anyHeld = anyHeld || hasFragments || (isCell && loose_[at] == 0);
-            });
-            full_[coarse.offset(c)] = filled == 8 ? 1 : 0;
-            out_.loose[coarse.offset(c)] = anyLoose && !anyHeld ? 1 : 0;
+            }
+            out_.loose[to] = anyLoose && !anyHeld ? 1 : 0;
         });
     }
 
     Split run()
     {
         volume::forEachIndex(Index3(0), coarse_.size - 1, [&](Index3 n) {
-            bool full = true;
-            volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, coarse_.size - 2),
-                                 [&](Index3 c) { full = full && full_[coarse_.offset(c)] != 0; });
-            if (!full) {
+            if (!meetsInOne(n)) {
                 divide(n);
             }
         });
@@ -93,6 +103,17 @@ private:
         std::size_t piece = 0;
         int corner = 0;  // of it, that is the node
     };
+
+    // Whether all tissue around a node shares the fine level's node there.
+    bool meetsInOne(Index3 n) const
+    {
+        bool is = true;
+        volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, coarse_.size - 2), [&](Index3 c) {
+            const std::size_t at = coarse_.offset(c);
+            is = is && isDivided_[at] == 0 && (children_[at] == 0 || (children_[at] >> octantOf(n - c) & 1) != 0);
+        });
+        return is;
+    }
 
     std::span<const CellFragment> fragmentsIn(Index3 fineCell) const
     {
@@ -115,13 +136,8 @@ private:
             return known->second;
         }
         std::vector<Piece> found;
-        Piece whole{cell, 0, {}, {}};
-        for (int i = 0; i < 8; ++i) {
-            const bool any = fine_.mu[fine_.nodes.offset(2 * cell + octant(i))] > 0.0F;
-            whole.children |= static_cast<std::uint8_t>(any ? 1 << i : 0);
-        }
-        if (whole.children != 0) {
-            found.push_back(whole);
+        if (const std::uint8_t children = children_[coarse_.offset(cell)]; children != 0) {
+            found.push_back({cell, children, {}, {}});
         }
         for (int i = 0; i < 8; ++i) {
             for (const CellFragment& f : fragmentsIn(2 * cell + octant(i))) {
@@ -196,7 +212,10 @@ private:
         if (beside_.size() < 2) {
             return;
         }
-        joinSharers(groups);
+        joinSharers(n, groups);
+        if (joinsAround_ && !groups.areOne()) {
+            joinAround(n, groups);
+        }
         std::vector<std::size_t> cells(beside_.size(), 0);  // by group, without those that are loose
         for (std::size_t i = 0; i < beside_.size(); ++i) {
             cells[groups.of(i)] += heldCells(all_[beside_[i].piece]);
@@ -225,21 +244,65 @@ private:
         return sum;
     }
 
-    // Joins the pieces that share a node of the fine level, wherever that is: what hangs together beside a node does at it.
-    void joinSharers(Groups& groups)
+    // Joins the pieces that hang together within a further cell around the node: the steps of voxels on a surface are no
+    // gaps.
+    void joinAround(Index3 n, Groups& groups)
     {
+        constexpr int side = 8;  // cells of the fine level, around node n
+        const volume::NodeGrid box{Index3(side), Vec3(0.0), 1.0};
+        const Index3 low = 2 * n - side / 2;
+        std::array<std::size_t, side * side * side> first;  // piece of those that hang together, by cell
+        first.fill(beside_.size());
+        for (std::size_t i = 0; i < beside_.size(); ++i) {
+            const Piece& piece = all_[beside_[i].piece];
+            open_.assign(1, 2 * piece.cell + octant(std::countr_zero(piece.children)) - low);
+            while (!open_.empty()) {
+                const Index3 at = open_.back();
+                open_.pop_back();
+                std::size_t& one = first[box.offset(at)];
+                if (one < beside_.size()) {
+                    groups.join(one, i);
+                    continue;
+                }
+                one = i;
+                volume::forEachIndex(glm::max(at - 1, Index3(0)), glm::min(at + 1, Index3(side - 1)), [&](Index3 next) {
+                    const Index3 fine = low + next;
+                    const bool isFilled = fine_.nodes.contains(fine) && fine_.mu[fine_.nodes.offset(fine)] > 0.0F;
+                    if (isFilled && first[box.offset(next)] != i) {
+                        open_.push_back(next);
+                    }
+                });
+            }
+        }
+    }
+
+    // Joins the pieces that share a node of the fine level, wherever that is: what hangs together beside a node does at it.
+    void joinSharers(Index3 n, Groups& groups)
+    {
+        constexpr int side = 5;  // nodes of the fine level, around node n
+        std::array<std::size_t, side * side * side> first;
+        first.fill(beside_.size());
         sharers_.clear();
+        const auto visit = [&](Index3 node, std::size_t i) {
+            const Index3 off = node - 2 * n + 2;
+            std::size_t& one = first[static_cast<std::size_t>(off.x + side * (off.y + side * off.z))];
+            one = std::min(one, i);
+            groups.join(one, i);
+        };
         for (std::size_t i = 0; i < beside_.size(); ++i) {
             const Piece& piece = all_[beside_[i].piece];
             for (int c = 0; c < 64; ++c) {
                 if ((piece.children >> (c / 8) & 1) != 0) {
-                    const Index3 node = 2 * piece.cell + octant(c / 8) + octant(c % 8);
-                    sharers_.emplace_back(static_cast<std::uint32_t>(fine_.nodes.offset(node)), i);
+                    visit(2 * piece.cell + octant(c / 8) + octant(c % 8), i);
                 }
             }
             for (const std::uint32_t f : piece.fragments) {
                 for (const std::uint32_t node : fine_.fragments.cells[f].nodes) {
-                    sharers_.emplace_back(node, i);
+                    if (isVirtual(node)) {
+                        sharers_.emplace_back(node, i);
+                    } else {
+                        visit(fine_.nodes.node(node), i);
+                    }
                 }
             }
         }
@@ -341,13 +404,16 @@ private:
     const CellLevel& fine_;
     const std::vector<std::uint8_t>& loose_;
     const volume::NodeGrid& coarse_;
-    std::vector<std::uint8_t> full_;  // coarse cells without a gap
+    bool joinsAround_;
+    std::vector<std::uint8_t> children_;   // of coarse cells, as Piece::children
+    std::vector<std::uint8_t> isDivided_;  // coarse cells with fragments of the fine level
     std::vector<Piece> all_;
     std::unordered_map<std::size_t, Pieces> pieces_;  // by coarse cell
     std::vector<std::size_t> kept_;                   // pieces that are fragments
     std::unordered_set<std::uint32_t> linked_;
     std::vector<Beside> beside_;
-    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // nodes of the fine level, with the pieces that have them
+    std::vector<Index3> open_;
+    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // virtual nodes, with the pieces that have them
     Split out_;
 };
 
@@ -427,12 +493,12 @@ Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loos
             looseHalves[half] = loose[at];
         }
     });
-    return splitLevel(halves, looseHalves, g);
+    return Splitter(halves, looseHalves, g, true).run();
 }
 
 Split splitLevel(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse)
 {
-    return Splitter(fine, loose, coarse).run();
+    return Splitter(fine, loose, coarse, false).run();
 }
 
 }  // namespace palpate::chainmail

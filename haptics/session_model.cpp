@@ -35,12 +35,6 @@ chainmail::Lattice latticeOf(const datasets::Scene& scene, const volume::Tissue&
     return {grid, tissue.tissueOn(grid), tissue.table()};
 }
 
-// The middles of a grid of cells' eighths.
-volume::NodeGrid halvesOf(const volume::NodeGrid& cells)
-{
-    return {2 * cells.size, cells.origin - 0.25 * cells.spacing, 0.5 * cells.spacing};
-}
-
 std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& scene, const volume::Tissue& tissue,
                                                         const volume::NodeGrid& cells, const volume::DistanceField& surface)
 {
@@ -48,9 +42,9 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
         return nullptr;
     }
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
-    return std::make_shared<chainmail::ElasticBody>(
-        chainmail::elasticBody(cells, tissue.materialOn(cells, surface), surface, scene.model.elastic.poissonCap, presses,
-                               scene.model.relaxation, tissue.support(), tissue.tissueOn(halvesOf(cells))));
+    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells, surface),
+                                                                           surface, scene.model.elastic.poissonCap, presses,
+                                                                           scene.model.relaxation, tissue.support()));
 }
 
 bool anyWalls(const volume::Tissue& tissue)

@@ -39,6 +39,11 @@ public:
             offsets_.push_back(toIndex * (at * grid.spacing));
             reach_ = glm::max(reach_, glm::abs(offsets_.back()));
         }
+        const int half = std::clamp(static_cast<int>(std::ceil(0.5 * grid.spacing / finest - 1e-6)), 1, 4);
+        for (int i = 0; i < half * half * half; ++i) {
+            const Vec3 at = (Vec3(i % half, i / half % half, i / half / half) + 0.5) / static_cast<double>(half) - 0.5;
+            inOctant_.push_back(toIndex * (0.5 * at * grid.spacing));
+        }
         farthest_ = std::sqrt(3.0) * (0.5 * grid.spacing + std::max({voxel.x, voxel.y, voxel.z}));
         step_ = toIndex * grid.spacing;
         start_ = toIndex * (grid.origin - tissue.affine.origin);
@@ -125,6 +130,23 @@ public:
         });
     }
 
+    // Which eighths of a node's cell are mostly tissue: CellMaterial::octants.
+    template <typename IsTissue>
+    std::uint8_t octants(Index3 n, const IsTissue& isTissue) const
+    {
+        unsigned found = 0;
+        for (unsigned i = 0; i < 8; ++i) {
+            const Vec3 middle = start_ + step_ * (Vec3(n) + 0.5 * Vec3(i & 1, i >> 1 & 1, i >> 2) - 0.25);
+            double tissue = 0.0;
+            for (const Vec3& offset : inOctant_) {
+                visitAround(middle + offset, 1.0, Vec3(0.0),
+                            [&](std::uint16_t label, double weight) { tissue += isTissue(label) ? weight : 0.0; });
+            }
+            found |= tissue >= 0.5 * static_cast<double>(inOctant_.size()) - 1e-9 ? 1U << i : 0U;
+        }
+        return static_cast<std::uint8_t>(found);
+    }
+
     // What the image makes of the modulus of a voxel's tissue.
     double factor(std::uint16_t label, const openvdb::Coord& voxel) const
     {
@@ -205,6 +227,7 @@ private:
     Vec3 reach_{0.0};             // of the samples along each axis [voxels]
     std::vector<Vec3> offsets_;   // samples of a cell, in voxels from the node
     std::vector<Vec3> places_;    // the same, -1 to 1 along each edge of the cell
+    std::vector<Vec3> inOctant_;  // samples of an eighth of a cell, in voxels from its middle
     double farthest_ = 0.0;
     Mat3 step_{1.0};         // node steps in voxels
     Vec3 start_{0.0};        // node (0, 0, 0) in voxels

@@ -69,6 +69,8 @@ struct CellMaterial {
     /// softest tissue's.
     Vec3f middle{0.0F};
     float share = 0;  // of what is not held: that part [-]
+    /// Which of its eighths are mostly tissue, a bit for each, x fastest; none may be where little of it is tissue.
+    std::uint8_t octants = 0xFF;
 };
 
 /// A body as OpenVDB grids: label, stiffness [kPa in the file] and occupancy, with affine, tissue table and provenance.

@@ -368,6 +368,7 @@ std::uint8_t cellRow(const CellSampler& sampler, Index3 n, const LabelLookup& lo
 template <typename Scale>
 std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& grid, const Scale& scale)
 {
+    constexpr double full = 1.0 - 1e-6;  // fraction of a cell that is all of it
     checkGrid(grid);
     std::vector<const TissueRow*> rows(65536, nullptr);
     for (const Structure& s : tissue.structures) {
@@ -383,6 +384,9 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                 const CellMixture mixture = cellMixture(tissue, sampler, n, at, rows);
                 CellMaterial& cell = cells[grid.offset(n)];
                 cell = mixture.material();
+                if (mixture.fraction() < full) {
+                    cell.octants = sampler.octants(n, [&](std::uint16_t label) { return rows[label] != nullptr; });
+                }
                 cell.youngsModulus *= static_cast<float>(scale(at, mixture.fraction()));
             }
         },

@@ -31,7 +31,7 @@ struct Cells {
           mu(layout.count + chainmail::Layout::lanes, 0.0F),
           lambda(mu),
           stiffening(mu),
-          layers(layout, true),
+          layers(layout, nodes, true),
           u(layout.fieldSize(), 0.0F),
           out(u),
           scratch(layout.scratchSize(), 0.0F)

@@ -256,6 +256,39 @@ TEST(TissueCells, NothingLiesOutsideOfCoarseVoxels)
     }
 }
 
+// An eighth of a cell is tissue where a cell of its size would be; a full cell has all eight. Of bodies in any place and at
+// any angle, with cells smaller and larger than voxels.
+TEST(TissueCells, OctantsAreTheTissueOfCellsHalfAsWide)
+{
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> shift(0.0, 1.0);
+    for (const double spacing : {0.4e-3, 0.9e-3, 1.5e-3, 2e-3, 4e-3}) {
+        const Index3 size(24);
+        const Affine affine = bodies::centred(bodies::oblique({1.1e-3, 0.9e-3, 1e-3}, Vec3(0.0), false), size);
+        LabelImage image{size, affine, {}};
+        image.values.assign(image.offset({0, 0, size.z}), 0);
+        forEachIndex({8, 8, 8}, {15, 15, 15}, [&](Index3 n) { image.values[image.offset(n)] = random() % 4 < 3 ? 1 : 0; });
+        const auto tissue = Tissue::fromLabels(image, bodies::table(), bodies::names(), {});
+        const Vec3 from = spacing * Vec3(shift(random), shift(random), shift(random)) - 6.5e-3;
+        const NodeGrid cells{Index3(static_cast<int>(13e-3 / spacing)), from, spacing};
+        const NodeGrid halves{2 * cells.size, cells.origin - 0.25 * spacing, 0.5 * spacing};
+        const auto rows = tissue.tissueOn(halves);
+        int divided = 0;
+        const auto materials = tissue.materialOn(cells);
+        for (std::size_t i = 0; i < materials.size(); ++i) {
+            if (materials[i].youngsModulus <= 0.0F) {
+                continue;
+            }
+            for (int k = 0; k < 8; ++k) {
+                const Index3 half = 2 * cells.node(i) + Index3(k & 1, k >> 1 & 1, k >> 2);
+                ASSERT_EQ((materials[i].octants >> k & 1) != 0, rows[halves.offset(half)] != 0) << spacing << " " << i;
+            }
+            divided += materials[i].octants != 0 && materials[i].octants != 0xFF ? 1 : 0;
+        }
+        EXPECT_GT(divided, 10) << spacing;
+    }
+}
+
 // Nothing fixed: the rear 5 % in whole layers, at least one, of the voxel axis that is nearest to y, on whichever side of
 // it the back is. What is behind the plane is held in cells of any size. A bone holds the body, and there is no plane.
 TEST(TissueSupport, ABodyThatNothingHoldsLiesOnItsBack)

@@ -1,0 +1,143 @@
+// Gaps that are narrower than the cells of the finest level: their eighths say what hangs together.
+#include "elastic_bodies.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <random>
+#include <span>
+#include <vector>
+
+namespace palpate::chainmail {
+namespace {
+
+constexpr double edge = 2e-3;
+constexpr std::uint8_t lowHalf = 0x55, highHalf = 0xAA;  // octants along x
+
+// Two slabs of 16 x 16 x 48 mm, side by side along x, in bone at the end of z, with a gap of half a cell between them: in
+// the cells of the first slab that are beside it, or in those of the second. Or only the second of them.
+ElasticBody slabs(bool gapIsInFirst, bool both)
+{
+    const auto material = [=](Index3 c) {
+        const bool isHeld = c.z >= 24, isFirst = c.x < 8;
+        if (isFirst && !both) {
+            return volume::CellMaterial{};
+        }
+        auto tissue = tests::tissue(5e3, 0.45, isHeld);
+        if (gapIsInFirst ? c.x == 7 : c.x == 8) {
+            tissue.youngsModulus *= 0.5F;
+            tissue.octants = gapIsInFirst ? lowHalf : highHalf;
+        }
+        return tissue;
+    };
+    return tests::bodyOf({Index3(16, 8, 26), edge, material, 4, Vec3(0.0)});
+}
+
+// Force of a ball that presses the second slab's end by 3 mm, along the gap or across it.
+double forceOnSlab(Elastic& elastic, bool acrossGap)
+{
+    const Vec3 way = acrossGap ? Vec3(-1, 0, 0) : Vec3(0, 1, 0);
+    const Vec3 top = acrossGap ? Vec3(32e-3, 8e-3, 8e-3) : Vec3(24e-3, 0.0, 8e-3);
+    ElasticTool tool{{top, top, 6e-3, 6e-3}, Vec3(0.0)};
+    for (int i = 0; i <= 30; ++i) {
+        const double depth = 1e-4 * i;
+        tool.shape.a = tool.shape.b = top + (depth - 6e-3) * way;
+        tool.pushed = depth * way;
+        elastic.relax({std::span(&tool, 1), {}, {top, way, 0.0}}, i < 30 ? 4 : 300, 1e-5);
+    }
+    return -glm::dot(elastic.toolForce(0), way);
+}
+
+// A slab beside another one is as soft as alone, whichever of them has the cells that the gap runs through. As one they
+// would be twice as stiff along the gap, and up to four times across it.
+TEST(FinestGaps, ASlabBesideAnotherBendsAsItDoesAlone)
+{
+    for (const bool gapIsInFirst : {false, true}) {
+        for (const bool acrossGap : {false, true}) {
+            const ElasticBody one = slabs(gapIsInFirst, false), two = slabs(gapIsInFirst, true);
+            ElasticOptions options;
+            options.window = 9;
+            options.law = volume::NeoHookean{};
+            const Focus focus{Vec3(24e-3, 0.0, 8e-3), Vec3(0, 1, 0), 0.0};
+            Elastic alone(one, options, focus), beside(two, options, focus);
+            const double expected = forceOnSlab(alone, acrossGap);
+            EXPECT_NEAR(forceOnSlab(beside, acrossGap), expected, 0.03 * expected)
+                << "gap in the first: " << gapIsInFirst << ", across it: " << acrossGap;
+            for (const double z : {4e-3, 20e-3, 36e-3}) {
+                const double moved = glm::length(beside.displacement({24e-3, 8e-3, z}));
+                const double other = glm::length(beside.displacement({gapIsInFirst ? 14.5e-3 : 15.5e-3, 8e-3, z}));
+                const double own = glm::length(beside.displacement({gapIsInFirst ? 16.5e-3 : 17.5e-3, 8e-3, z}));
+                EXPECT_LT(other, 0.02 * moved) << "z " << z;
+                EXPECT_GT(own, 0.5 * moved) << "z " << z;
+            }
+        }
+    }
+}
+
+// Where a cell is divided, its parts have together what it has, and each octant of tissue is in one of them.
+TEST(FinestGaps, PartsOfACellAreTheCell)
+{
+    std::mt19937 random(23);
+    const Index3 cells(12);
+    std::vector<volume::CellMaterial> all(static_cast<std::size_t>(cells.x * cells.y * cells.z));
+    for (volume::CellMaterial& m : all) {
+        m = random() % 3 == 0 ? volume::CellMaterial{} : tests::tissue(5e3, 0.45);
+        m.octants = static_cast<std::uint8_t>(random() & random());
+    }
+    const auto of = [&](Index3 c) { return all[static_cast<std::size_t>(c.x + cells.x * (c.y + cells.y * c.z))]; };
+    const auto material = [&](Index3 c) { return c.z == 11 ? tests::tissue(5e3, 0.45, true) : of(c); };
+    const ElasticBody body = tests::bodyOf({cells, edge, material, 2, Vec3(0.0)});
+    const CellLevel& finest = body.levels.front();
+    EXPECT_GT(finest.fragments.cells.size(), 20U);
+    volume::forEachIndex(Index3(0), cells - 1, [&](Index3 c) {
+        const Index3 cell = c + 2;
+        const auto m = material(c);
+        double sum = static_cast<double>(finest.mu[finest.nodes.offset(cell)]);
+        unsigned octants = 0;
+        for (const CellFragment& f : finest.fragments.in(cell, finest.nodes.size.y)) {
+            sum += static_cast<double>(f.mu);
+            EXPECT_EQ(octants & f.children, 0U);
+            octants |= f.children;
+        }
+        const double expected = static_cast<double>(m.youngsModulus) / 2.9;
+        EXPECT_NEAR(sum, expected, 1e-4 * expected);
+        if (octants != 0 && m.octants != 0) {
+            EXPECT_EQ(octants & ~static_cast<unsigned>(m.octants), 0U);
+        }
+        EXPECT_NEAR(static_cast<double>(muAt(finest, finest.nodes.position(cell) + 0.3 * edge)), sum, 1e-3);
+    });
+}
+
+// The steps of voxels on a smooth surface are no gaps, at any place in the grid: balls in which some cells have one octant
+// of tissue, and none.
+TEST(FinestGaps, StepsOfVoxelsAreNoGaps)
+{
+    std::mt19937 random(5);
+    std::uniform_real_distribution<double> shift(0.0, 1.0);
+    for (int i = 0; i < 20; ++i) {
+        const Vec3 middle = Vec3(8.0) + Vec3(shift(random), shift(random), shift(random));
+        const double radius = 5.0 + 2.0 * shift(random);
+        const auto isFilled = [&](Vec3 p) { return glm::distance(glm::floor(1.3 * p) / 1.3 + 0.385, middle) < radius; };
+        int slivers = 0;
+        const auto material = [&](Index3 c) {
+            auto tissue = tests::tissue(5e3, 0.45, glm::distance(Vec3(c) + 0.5, middle) < 2.0);
+            tissue.octants = 0;
+            bool any = false;
+            for (int k = 0; k < 512; ++k) {
+                any = any || isFilled(Vec3(c) + (Vec3(k % 8, k / 8 % 8, k / 64) + 0.5) / 8.0);
+            }
+            for (int k = 0; k < 8; ++k) {
+                tissue.octants |= static_cast<std::uint8_t>(isFilled(Vec3(c) + 0.5 * Vec3(octant(k)) + 0.25) ? 1 << k : 0);
+            }
+            slivers += any && std::popcount(tissue.octants) < 2 ? 1 : 0;
+            return any ? tissue : volume::CellMaterial{};
+        };
+        const ElasticBody body = tests::bodyOf({Index3(18), edge, material, 3, Vec3(0.0)});
+        EXPECT_GT(slivers, 10);
+        EXPECT_TRUE(body.levels.front().fragments.cells.empty()) << "ball " << i;
+    }
+}
+
+}  // namespace
+}  // namespace palpate::chainmail
