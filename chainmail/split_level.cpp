@@ -248,63 +248,62 @@ private:
     // gaps.
     void joinAround(Index3 n, Groups& groups)
     {
-        constexpr int side = 8;  // cells of the fine level, around node n
-        const volume::NodeGrid box{Index3(side), Vec3(0.0), 1.0};
-        const Index3 low = 2 * n - side / 2;
-        std::array<std::size_t, side * side * side> first;  // piece of those that hang together, by cell
-        first.fill(beside_.size());
+        const Index3 low = 2 * n - around / 2;
+        reached_.fill(beside_.size());
         for (std::size_t i = 0; i < beside_.size(); ++i) {
             const Piece& piece = all_[beside_[i].piece];
             open_.assign(1, 2 * piece.cell + octant(std::countr_zero(piece.children)) - low);
             while (!open_.empty()) {
                 const Index3 at = open_.back();
                 open_.pop_back();
-                std::size_t& one = first[box.offset(at)];
-                if (one < beside_.size()) {
-                    groups.join(one, i);
-                    continue;
-                }
-                one = i;
-                volume::forEachIndex(glm::max(at - 1, Index3(0)), glm::min(at + 1, Index3(side - 1)), [&](Index3 next) {
-                    const Index3 fine = low + next;
-                    const bool isFilled = fine_.nodes.contains(fine) && fine_.mu[fine_.nodes.offset(fine)] > 0.0F;
-                    if (isFilled && first[box.offset(next)] != i) {
-                        open_.push_back(next);
-                    }
-                });
+                reach(low, at, i, groups);
             }
         }
     }
 
-    // Joins the pieces that share a node of the fine level, wherever that is: what hangs together beside a node does at it.
+    // From piece `i`, the cell at `at` from `low`, and then those beside it; or the piece that was there before.
+    void reach(Index3 low, Index3 at, std::size_t i, Groups& groups)
+    {
+        std::size_t& piece = reached_[box_.offset(at)];
+        if (piece < beside_.size()) {
+            groups.join(piece, i);
+            return;
+        }
+        piece = i;
+        volume::forEachIndex(glm::max(at - 1, Index3(0)), glm::min(at + 1, Index3(around - 1)), [&](Index3 next) {
+            const Index3 fine = low + next;
+            const bool isFilled = fine_.nodes.contains(fine) && fine_.mu[fine_.nodes.offset(fine)] > 0.0F;
+            if (isFilled && reached_[box_.offset(next)] != i) {
+                open_.push_back(next);
+            }
+        });
+    }
+
+    // Calls visit(node) for the nodes of the fine level that a piece has, some more than once.
+    template <typename Visit>
+    void forEachNode(const Piece& piece, const Visit& visit) const
+    {
+        for (int c = 0; c < 64; ++c) {
+            if ((piece.children >> (c / 8) & 1) != 0) {
+                visit(static_cast<std::uint32_t>(fine_.nodes.offset(2 * piece.cell + octant(c / 8) + octant(c % 8))));
+            }
+        }
+        for (const std::uint32_t f : piece.fragments) {
+            std::ranges::for_each(fine_.fragments.cells[f].nodes, visit);
+        }
+    }
+
+    // Joins the pieces that share a node of the fine level at the node or beside it.
     void joinSharers(Index3 n, Groups& groups)
     {
-        constexpr int side = 5;  // nodes of the fine level, around node n
-        std::array<std::size_t, side * side * side> first;
-        first.fill(beside_.size());
         sharers_.clear();
-        const auto visit = [&](Index3 node, std::size_t i) {
-            const Index3 off = node - 2 * n + 2;
-            std::size_t& one = first[static_cast<std::size_t>(off.x + side * (off.y + side * off.z))];
-            one = std::min(one, i);
-            groups.join(one, i);
-        };
         for (std::size_t i = 0; i < beside_.size(); ++i) {
-            const Piece& piece = all_[beside_[i].piece];
-            for (int c = 0; c < 64; ++c) {
-                if ((piece.children >> (c / 8) & 1) != 0) {
-                    visit(2 * piece.cell + octant(c / 8) + octant(c % 8), i);
+            forEachNode(all_[beside_[i].piece], [&](std::uint32_t node) {
+                const Index3 off = placeOf(node) - 2 * n;
+                if (off == glm::clamp(off, Index3(-1), Index3(1))) {
+                    sharers_.emplace_back(node, i);
                 }
-            }
-            for (const std::uint32_t f : piece.fragments) {
-                for (const std::uint32_t node : fine_.fragments.cells[f].nodes) {
-                    if (isVirtual(node)) {
-                        sharers_.emplace_back(node, i);
-                    } else {
-                        visit(fine_.nodes.node(node), i);
-                    }
-                }
-            }
+            });
         }
         std::ranges::sort(sharers_);
         for (std::size_t i = 1; i < sharers_.size(); ++i) {
@@ -338,17 +337,7 @@ private:
     {
         for (const std::size_t i : kept_) {
             const Piece& piece = all_[i];
-            for (int c = 0; c < 64; ++c) {
-                if ((piece.children >> (c / 8) & 1) != 0) {
-                    const Index3 node = 2 * piece.cell + octant(c / 8) + octant(c % 8);
-                    link(static_cast<std::uint32_t>(fine_.nodes.offset(node)), piece.cell, piece.nodes);
-                }
-            }
-            for (const std::uint32_t f : piece.fragments) {
-                for (const std::uint32_t node : fine_.fragments.cells[f].nodes) {
-                    link(node, piece.cell, piece.nodes);
-                }
-            }
+            forEachNode(piece, [&](std::uint32_t node) { link(node, piece.cell, piece.nodes); });
         }
         for (std::size_t f = 0; f < out_.parents.size(); ++f) {
             if (out_.parents[f] == noFragment) {
@@ -412,8 +401,11 @@ private:
     std::vector<std::size_t> kept_;                   // pieces that are fragments
     std::unordered_set<std::uint32_t> linked_;
     std::vector<Beside> beside_;
+    static constexpr int around = 8;  // cells of the fine level along each edge of a box around a node, see joinAround()
+    const volume::NodeGrid box_{Index3(around), Vec3(0.0), 1.0};
+    std::array<std::size_t, around * around * around> reached_{};  // from which piece
     std::vector<Index3> open_;
-    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // virtual nodes, with the pieces that have them
+    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // nodes of the fine level, with the pieces that have them
     Split out_;
 };
 
