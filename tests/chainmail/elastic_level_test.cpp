@@ -53,7 +53,7 @@ struct Bench {
         for (std::size_t i = 0; i < materials.size(); ++i) {
             const Vec3 p = grid.position(grid.node(i));
             materials[i] = inside(p) ? tests::tissue(5e3, 0.45, held(p)) : volume::CellMaterial{};
-            const bool isBesideCut = isCut && grid.node(i).x == 14 && !held(p);
+            const bool isBesideCut = isCut && grid.node(i).x == 8 && !held(p);
             materials[i].octants = isBesideCut ? lowHalf : std::uint8_t{0xFF};
         }
         return elasticBody(grid, std::move(materials), surface, 0.49);
