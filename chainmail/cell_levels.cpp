@@ -10,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -336,53 +335,32 @@ CellLevel withStiffSkin(const FinestLevel& finest)
     return level;
 }
 
-// What the fragments do not have of their cells.
-void leaveRest(CellLevel& level, const std::vector<std::uint8_t>& octants)
-{
-    for (const CellFragment& f : level.fragments.cells) {
-        unsigned rest = octants[level.nodes.offset(f.cell)];
-        const auto all = static_cast<float>(std::popcount(rest));
-        bool isFirst = true;
-        for (const CellFragment& other : level.fragments.in(f.cell, level.nodes.size.y)) {
-            rest &= ~static_cast<unsigned>(other.children);
-            isFirst = isFirst && &other >= &f;
-        }
-        const float share = isFirst ? static_cast<float>(std::popcount(rest)) / all : 1.0F;
-        level.mu[level.nodes.offset(f.cell)] *= share;
-        level.lambda[level.nodes.offset(f.cell)] *= share;
-    }
-}
-
-// Gives the finest level the fragments that its gaps make. Each has the share of its cell's material that its eighths are.
-void divideCells(const Split& split, const FinestLevel& finest, CellLevel& level)
+// Gives the finest level the fragments that its gaps make: each is all of a cell.
+void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 {
     const auto& g = level.nodes;
-    level.fragments = split.coarse;
+    level.fragments = std::move(split.coarse);
     for (VirtualNode& n : level.fragments.nodes) {
         n.isFixed = level.fixed[g.offset(n.at)] != 0;
     }
     for (CellFragment& f : level.fragments.cells) {
         const std::size_t at = g.offset(f.cell);
-        const auto share =
-            static_cast<float>(std::popcount(f.children)) / static_cast<float>(std::popcount(finest.octants[at]));
-        f.mu = share * level.mu[at];
-        f.lambda = share * level.lambda[at];
+        f.mu = std::exchange(level.mu[at], 0.0F);
+        f.lambda = std::exchange(level.lambda[at], 0.0F);
         f.stiffening = level.stiffening[at];
-        f.held = finest.held[at];
+        f.held = held[at];
         for (std::size_t i = 0; i < f.relaxing.size() && !level.relaxing[i].empty(); ++i) {
             f.relaxing[i] = level.relaxing[i][at];
         }
     }
-    leaveRest(level, finest.octants);
 }
 
-// Takes the cells as they are, with their layers, but for those with fragments: these keep what they have.
+// Takes the cells as they are, with their layers, but for those that are fragments.
 void takeWhole(CellLevel whole, CellLevel& level)
 {
     for (const CellFragment& f : level.fragments.cells) {
         const std::size_t at = level.nodes.offset(f.cell);
-        whole.mu[at] = level.mu[at];
-        whole.lambda[at] = level.lambda[at];
+        whole.mu[at] = whole.lambda[at] = 0.0F;
     }
     if (!level.fragments.cells.empty()) {
         std::erase_if(whole.layers,
@@ -478,7 +456,7 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
         split = splitFinest(levels.front(), loose, finest.octants);
         loose = split.loose;
     }
-    divideCells(split, first, levels.front());
+    divideCells(std::move(split), first.held, levels.front());
     addDiagonal(levels.front());
     while (levels.size() < count) {
         std::vector<float> coarser;

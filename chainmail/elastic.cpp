@@ -57,7 +57,7 @@ std::size_t Elastic::nodes() const noexcept
 Vec3 Elastic::displacement(Vec3 rest) const noexcept
 {
     ContactSite site;
-    locate(stack_.body(), stack_.windows(), rest, rest, site);
+    locate(stack_.body(), stack_.windows(), rest, site);
     return site.level < stack_.size() ? gather(stack_.windows(), site, Field::u) : Vec3(0.0);
 }
 

@@ -50,12 +50,12 @@ bool touchesLittle(const ElasticTool& tool, double spacing) noexcept
 
 namespace {
 
-// Lowest node of a window's cell, or of the fragment of it in which an eighth of a cell of the finest level lies.
+// Lowest node of a window's cell, or of the fragment of it in which a cell of the finest level lies.
 std::uint32_t nodeOf(const ElasticBody& body, std::span<const Window> windows, std::size_t level, Index3 cell,
-                     Index3 half) noexcept
+                     Index3 finest) noexcept
 {
     if (!body.levels[level].fragments.cells.empty()) {
-        const std::uint32_t fragment = fragmentAt(body, level, half);
+        const std::uint32_t fragment = fragmentAt(body, level, finest);
         const std::uint32_t node = fragment != noFragment ? windows[level].fragments.nodeOf(fragment) : noFragment;
         if (node != noFragment) {
             return node;
@@ -66,7 +66,7 @@ std::uint32_t nodeOf(const ElasticBody& body, std::span<const Window> windows, s
 
 }  // namespace
 
-void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, Vec3 inside, ContactSite& site) noexcept
+void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept
 {
     for (std::size_t l = 0; l < windows.size(); ++l) {
         const auto& grid = body.levels[l].nodes;
@@ -75,11 +75,11 @@ void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest,
         if (!windows[l].contains(cell) || !windows[l].contains(cell + 1)) {
             continue;
         }
-        const int scale = 2 << l;
+        const int scale = 1 << l;
         const auto& finest = body.levels.front().nodes;
-        const Index3 half(glm::floor((inside - finest.origin) / (0.5 * finest.spacing)));
+        const Index3 in(glm::floor((rest - finest.origin) / finest.spacing));
         site.fraction = trilinear(at - Vec3(cell));
-        site.node = nodeOf(body, windows, l, cell, glm::clamp(half, scale * cell, scale * cell + scale - 1));
+        site.node = nodeOf(body, windows, l, cell, glm::clamp(in, scale * cell, scale * cell + scale - 1));
         site.level = static_cast<std::uint16_t>(l);
         return;
     }
@@ -93,7 +93,7 @@ void locateMiddle(const ElasticBody& body, std::span<const Window> windows, Inde
         const Index3 low = cell / scale;
         if (windows[l].contains(low) && windows[l].contains(low + 1)) {
             site.fraction = trilinear((Vec3(cell - scale * low) + 0.5) / static_cast<double>(scale));
-            site.node = nodeOf(body, windows, l, low, 2 * cell);
+            site.node = nodeOf(body, windows, l, low, cell);
             site.level = static_cast<std::uint16_t>(l);
             return;
         }

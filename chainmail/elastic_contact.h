@@ -255,8 +255,7 @@ inline std::array<float, 8> trilinear(Vec3 t) noexcept
 }
 
 /// Finest window with the cell around `rest` [m], and where in it. `level` = number of windows when none has it.
-/// @param inside  a place in the tissue that it belongs to, where a gap runs through the cell [m]
-void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, Vec3 inside, ContactSite& site) noexcept;
+void locate(const ElasticBody& body, std::span<const Window> windows, Vec3 rest, ContactSite& site) noexcept;
 /// The same for the middle of a cell of the finest level: on a coarser level it lies at (2 m + 1) / 2^(level + 1) of a
 /// cell's edges, m whole numbers.
 void locateMiddle(const ElasticBody& body, std::span<const Window> windows, Index3 cell, ContactSite& site) noexcept;

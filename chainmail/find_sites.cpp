@@ -98,7 +98,7 @@ private:
     void addRod(const Tie& tie, ContactSite site, std::size_t index) noexcept
     {
         const auto mu = static_cast<double>(muAt(body_.levels.front(), tie.rest));
-        locate(body_, windows_, tie.rest, tie.rest, site);
+        locate(body_, windows_, tie.rest, site);
         if (mu <= 0.0 || site.level >= windows_.size()) {
             return;
         }
@@ -228,18 +228,10 @@ private:
         return shape.distance(site.rest) <= near || shape.distance(site.rest + site.u) <= near;
     }
 
-    // A place a little under the surface.
-    Vec3 insideOf(const ContactSite& site) const noexcept
-    {
-        constexpr double under = 0.4;  // of a cell
-        const double depth = site.isTie ? 0.0 : under * body_.levels.front().nodes.spacing;
-        return site.anchor - depth * Vec3(site.isTie ? Vec3f(0.0F) : body_.points[site.point].normal);
-    }
-
     // Where it is, and how it has moved. False where no window has it.
     bool meetsTissue(ContactSite& site) const noexcept
     {
-        locate(body_, windows_, site.anchor, insideOf(site), site);
+        locate(body_, windows_, site.anchor, site);
         if (site.level >= windows_.size()) {
             return false;
         }

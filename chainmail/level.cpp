@@ -260,7 +260,7 @@ void ElasticLevel::writeBox(Index3 low, Index3 high) noexcept
     });
 }
 
-// Of the cells of a row that fragments alone fill, the means over their nodes.
+// Of the cells of a row that are fragments, the means over their nodes.
 void ElasticLevel::takeFragments(Index3 first, std::size_t count, Vec3f* out) const noexcept
 {
     const CellLevel& level = elastic_.body().levels.front();
@@ -269,7 +269,7 @@ void ElasticLevel::takeFragments(Index3 first, std::size_t count, Vec3f* out) co
          level.fragments.cellsOf(first, first.x + static_cast<int>(count) - 1, level.nodes.size.y)) {
         const auto index = static_cast<std::uint32_t>(&f - level.fragments.cells.data());
         const std::uint32_t node = window.fragments.nodeOf(index);
-        if (level.mu[level.nodes.offset(f.cell)] <= 0.0F && node != noFragment) {
+        if (node != noFragment) {
             cellMeans(window, node, 1, out + (f.cell.x - first.x));
         }
     }

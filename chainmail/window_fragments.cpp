@@ -169,16 +169,15 @@ void WindowFragments::collect(float* field, std::size_t count) const noexcept
     }
 }
 
-std::uint32_t fragmentAt(const ElasticBody& body, std::size_t level, Index3 half) noexcept
+std::uint32_t fragmentAt(const ElasticBody& body, std::size_t level, Index3 finestCell) noexcept
 {
-    const CellLevel& finest = body.levels.front();
-    const int sizeY = finest.nodes.size.y;
-    std::uint32_t fragment = finest.fragments.holding(half, sizeY);
-    if (fragment == noFragment && finest.mu[finest.nodes.offset(half / 2)] <= 0.0F) {
-        const auto all = finest.fragments.in(half / 2, sizeY);
-        fragment = all.empty() ? noFragment : static_cast<std::uint32_t>(all.data() - finest.fragments.cells.data());
+    const Fragments& finest = body.levels.front().fragments;
+    const auto divided = finest.in(finestCell, body.levels.front().nodes.size.y);
+    std::uint32_t fragment = noFragment;
+    if (!divided.empty()) {
+        fragment = static_cast<std::uint32_t>(divided.data() - finest.cells.data());
     }
-    Index3 cell = half / 2;
+    Index3 cell = finestCell;
     for (std::size_t l = 1; l <= level; ++l) {
         if (fragment != noFragment) {
             fragment = body.levels[l - 1].fragments.cells[fragment].parent;

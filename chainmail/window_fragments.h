@@ -96,9 +96,7 @@ private:
     std::vector<std::uint32_t> linkOf_;  // index in links_ + 1, by node; empty: there are none
 };
 
-/// The fragment of level `level` in which an eighth of a cell of the finest level lies; noFragment: it lies in the level's
-/// cell itself. Where that has no tissue of its own, in the first fragment of its finest cell.
-/// @param half  in half cells of the finest level
-std::uint32_t fragmentAt(const ElasticBody& body, std::size_t level, Index3 half) noexcept;
+/// The fragment of level `level` in which a cell of the finest level lies; noFragment: it lies in the level's cell itself.
+std::uint32_t fragmentAt(const ElasticBody& body, std::size_t level, Index3 finestCell) noexcept;
 
 }  // namespace palpate::chainmail

@@ -75,38 +75,58 @@ TEST(FinestGaps, ASlabBesideAnotherBendsAsItDoesAlone)
     }
 }
 
-// Where a cell is divided, its parts have together what it has, and each octant of tissue is in one of them.
-TEST(FinestGaps, PartsOfACellAreTheCell)
+// A cell that a gap divides from the tissue beside it is a fragment, with the material that it had; its nodes are held
+// where the cell's are.
+TEST(FinestGaps, AFragmentIsItsCell)
 {
     std::mt19937 random(23);
     const Index3 cells(12);
     std::vector<volume::CellMaterial> all(static_cast<std::size_t>(cells.x * cells.y * cells.z));
     for (volume::CellMaterial& m : all) {
-        m = random() % 3 == 0 ? volume::CellMaterial{} : tests::tissue(5e3, 0.45);
+        m = random() % 3 == 0 ? volume::CellMaterial{} : tests::tissue(5e3, 0.45, random() % 50 == 0);
+        m.relaxing = {0.3F, 0.1F * static_cast<float>(random() % 4)};
         m.octants = static_cast<std::uint8_t>(random() & random());
     }
     const auto of = [&](Index3 c) { return all[static_cast<std::size_t>(c.x + cells.x * (c.y + cells.y * c.z))]; };
-    const auto material = [&](Index3 c) { return c.z == 11 ? tests::tissue(5e3, 0.45, true) : of(c); };
-    const ElasticBody body = tests::bodyOf({cells, edge, material, 2, Vec3(0.0)});
-    const CellLevel& finest = body.levels.front();
+    const ElasticBody body = tests::bodyOf({cells, edge, of, 2, Vec3(0.0)}, 0.4999, true);
+    const ElasticBody whole = tests::bodyOf({cells, edge,
+                                             [&](Index3 c) {
+                                                 auto m = of(c);
+                                                 m.octants = 0xFF;
+                                                 return m;
+                                             },
+                                             2, Vec3(0.0)},
+                                            0.4999, true);
+    const CellLevel &finest = body.levels.front(), &expected = whole.levels.front();
     EXPECT_GT(finest.fragments.cells.size(), 20U);
-    volume::forEachIndex(Index3(0), cells - 1, [&](Index3 c) {
-        const Index3 cell = c + 2;
-        const auto m = material(c);
-        double sum = static_cast<double>(finest.mu[finest.nodes.offset(cell)]);
-        unsigned octants = 0;
-        for (const CellFragment& f : finest.fragments.in(cell, finest.nodes.size.y)) {
-            sum += static_cast<double>(f.mu);
-            EXPECT_EQ(octants & f.children, 0U);
-            octants |= f.children;
-        }
-        const double expected = static_cast<double>(m.youngsModulus) / 2.9;
-        EXPECT_NEAR(sum, expected, 1e-4 * expected);
-        if (octants != 0 && m.octants != 0) {
-            EXPECT_EQ(octants & ~static_cast<unsigned>(m.octants), 0U);
-        }
-        EXPECT_NEAR(static_cast<double>(muAt(finest, finest.nodes.position(cell) + 0.3 * edge)), sum, 1e-3);
-    });
+    for (const CellFragment& f : finest.fragments.cells) {
+        const std::size_t at = finest.nodes.offset(f.cell);
+        EXPECT_EQ(f.mu, expected.mu[at]);
+        EXPECT_EQ(f.lambda, expected.lambda[at]);
+        EXPECT_EQ(f.held, of(f.cell - 2).fixed);
+        EXPECT_EQ(f.relaxing[1], expected.relaxing[1][at]);
+        EXPECT_EQ(finest.mu[at], 0.0F);
+        EXPECT_EQ(muAt(finest, finest.nodes.position(f.cell) + 0.3 * edge), f.mu);
+        EXPECT_EQ(finest.fragments.in(f.cell, finest.nodes.size.y).size(), 1U);
+    }
+    int held = 0;
+    for (const VirtualNode& n : finest.fragments.nodes) {
+        EXPECT_EQ(n.isFixed, finest.fixed[finest.nodes.offset(n.at)] != 0);
+        held += n.isFixed ? 1 : 0;
+    }
+    EXPECT_GT(held, 0);
+}
+
+// Tissue that a gap of half a cell separates from all that is held has no place of its own: it stays with what is beside
+// it.
+TEST(FinestGaps, LooseTissueStaysWithWhatIsNear)
+{
+    const auto material = [](Index3 c) {
+        auto tissue = tests::tissue(5e3, 0.45, c.x < 2);
+        tissue.octants = c.x == 7 ? lowHalf : std::uint8_t{0xFF};
+        return tissue;
+    };
+    EXPECT_TRUE(tests::bodyOf({Index3(16, 8, 8), edge, material, 4, Vec3(0.0)}).levels.front().fragments.cells.empty());
 }
 
 // The steps of voxels on a smooth surface are no gaps, at any place in the grid: balls in which some cells have one octant
