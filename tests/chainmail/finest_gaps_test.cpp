@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <random>
 #include <span>
 #include <vector>
@@ -129,6 +132,25 @@ TEST(FinestGaps, LooseTissueStaysWithWhatIsNear)
     EXPECT_TRUE(tests::bodyOf({Index3(16, 8, 8), edge, material, 4, Vec3(0.0)}).levels.front().fragments.cells.empty());
 }
 
+// Tissue of a cell of which places are filled as told, in cells: of each eighth, its middle says what it is.
+template <typename IsFilled>
+volume::CellMaterial sampled(Index3 c, bool isHeld, const IsFilled& isFilled)
+{
+    bool any = false;
+    for (int k = 0; k < 512; ++k) {
+        any = any || isFilled(Vec3(c) + (Vec3(k % 8, k / 8 % 8, k / 64) + 0.5) / 8.0);
+    }
+    if (!any) {
+        return {};
+    }
+    auto tissue = tests::tissue(5e3, 0.45, isHeld);
+    tissue.octants = 0;
+    for (int k = 0; k < 8; ++k) {
+        tissue.octants |= static_cast<std::uint8_t>(isFilled(Vec3(c) + 0.5 * Vec3(octant(k)) + 0.25) ? 1 << k : 0);
+    }
+    return tissue;
+}
+
 // The steps of voxels on a smooth surface are no gaps, at any place in the grid: balls in which some cells have one octant
 // of tissue, and none.
 TEST(FinestGaps, StepsOfVoxelsAreNoGaps)
@@ -141,21 +163,68 @@ TEST(FinestGaps, StepsOfVoxelsAreNoGaps)
         const auto isFilled = [&](Vec3 p) { return glm::distance(glm::floor(1.3 * p) / 1.3 + 0.385, middle) < radius; };
         int slivers = 0;
         const auto material = [&](Index3 c) {
-            auto tissue = tests::tissue(5e3, 0.45, glm::distance(Vec3(c) + 0.5, middle) < 2.0);
-            tissue.octants = 0;
-            bool any = false;
-            for (int k = 0; k < 512; ++k) {
-                any = any || isFilled(Vec3(c) + (Vec3(k % 8, k / 8 % 8, k / 64) + 0.5) / 8.0);
-            }
-            for (int k = 0; k < 8; ++k) {
-                tissue.octants |= static_cast<std::uint8_t>(isFilled(Vec3(c) + 0.5 * Vec3(octant(k)) + 0.25) ? 1 << k : 0);
-            }
-            slivers += any && std::popcount(tissue.octants) < 2 ? 1 : 0;
-            return any ? tissue : volume::CellMaterial{};
+            const auto m = sampled(c, glm::distance(Vec3(c) + 0.5, middle) < 2.0, isFilled);
+            slivers += m.youngsModulus > 0.0F && std::popcount(m.octants) < 2 ? 1 : 0;
+            return m;
         };
         const ElasticBody body = tests::bodyOf({Index3(18), edge, material, 3, Vec3(0.0)});
         EXPECT_GT(slivers, 10);
         EXPECT_TRUE(body.levels.front().fragments.cells.empty()) << "ball " << i;
+    }
+}
+
+// Of the finest level's nodes, one of each part that hangs together.
+int partsOf(const CellLevel& level)
+{
+    std::vector<std::size_t> lead(level.nodes.count() + level.fragments.nodes.size());
+    std::iota(lead.begin(), lead.end(), std::size_t{0});
+    std::vector<bool> has(lead.size(), false);
+    const auto of = [&](std::size_t i) {
+        while (lead[i] != i) {
+            i = lead[i];
+        }
+        return i;
+    };
+    const auto join = [&](const std::array<std::uint32_t, 8>& nodes) {
+        for (const std::uint32_t n : nodes) {
+            has[n] = true;
+            lead[of(n)] = of(nodes[0]);
+        }
+    };
+    volume::forEachIndex(Index3(0), level.nodes.size - 2, [&](Index3 c) {
+        std::array<std::uint32_t, 8> nodes{};
+        for (int k = 0; k < 8; ++k) {
+            nodes[static_cast<std::size_t>(k)] = static_cast<std::uint32_t>(level.nodes.offset(c + octant(k)));
+        }
+        if (level.mu[level.nodes.offset(c)] > 0.0F) {
+            join(nodes);
+        }
+    });
+    for (const CellFragment& f : level.fragments.cells) {
+        join(f.nodes);
+    }
+    int parts = 0;
+    for (std::size_t i = 0; i < lead.size(); ++i) {
+        parts += has[i] && of(i) == i ? 1 : 0;
+    }
+    return parts;
+}
+
+// A gap of 2.6 cells through all of a body leaves two parts, at any angle and place in the grid: eighths that touch have
+// their middles within 0.87 cells of each other, and one that is little filled touches one that is.
+TEST(FinestGaps, AnObliqueGapLeavesTwoParts)
+{
+    std::mt19937 random(29);
+    std::normal_distribution<double> any;
+    for (int i = 0; i < 100; ++i) {
+        const Vec3 normal = glm::normalize(Vec3(any(random), any(random), any(random)));
+        const Vec3 middle = Vec3(8.0) + 0.3 * Vec3(any(random), any(random), any(random));
+        const auto material = [&](Index3 c) {
+            const double off = glm::dot(normal, Vec3(c) + 0.5 - middle);
+            return sampled(c, std::abs(off) > 4.8, [&](Vec3 p) { return std::abs(glm::dot(normal, p - middle)) > 1.3; });
+        };
+        const ElasticBody body = tests::bodyOf({Index3(16), edge, material, 3, Vec3(0.0)});
+        EXPECT_EQ(partsOf(body.levels.front()), 2) << normal.x << " " << normal.y << " " << normal.z;
     }
 }
 
