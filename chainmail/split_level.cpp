@@ -1,5 +1,7 @@
 #include <chainmail/split_level.h>
 
+#include <chainmail/cell_bits.h>
+
 #include <glm/common.hpp>
 
 #include <algorithm>
@@ -53,32 +55,27 @@ private:
     std::vector<std::size_t> lead_;
 };
 
+// The cells of a level, as the next coarser one has them: of each coarse cell, a bit for each of its eight.
+struct FineCells {
+    volume::NodeGrid nodes;
+    const Fragments& fragments;
+    std::vector<std::uint8_t> tissue;  // cells that are not fragments
+    std::vector<std::uint8_t> loose;   // of these, what hangs together with nothing held
+};
+
 class Splitter {
 public:
     // `joinsAround`: see joinAround(), for a fine level without fragments.
-    Splitter(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse,
-             bool joinsAround)
-        : fine_(fine),
-          loose_(loose),
-          coarse_(coarse),
-          joinsAround_(joinsAround),
-          children_(coarse.count()),
-          isDivided_(coarse.count())
+    Splitter(FineCells fine, const volume::NodeGrid& coarse, bool joinsAround)
+        : fine_(std::move(fine)), coarse_(coarse), joinsAround_(joinsAround), isDivided_(coarse.count(), 0)
     {
-        out_.loose.assign(coarse.count(), 0);
-        volume::forEachIndex(Index3(0), coarse.size - 2, [&](Index3 c) {
-            const std::size_t to = coarse.offset(c);
-            bool anyLoose = false, anyHeld = false;
-            for (int i = 0; i < 8; ++i) {
-                const std::size_t at = fine_.nodes.offset(2 * c + octant(i));
-                const bool hasFragments = !fragmentsIn(2 * c + octant(i)).empty(), isCell = fine_.mu[at] > 0.0F;
-                children_[to] |= static_cast<std::uint8_t>(isCell ? 1 << i : 0);
-                isDivided_[to] |= static_cast<std::uint8_t>(hasFragments ? 1 : 0);
-                anyLoose = anyLoose || loose_[at] != 0;
-                anyHeld = anyHeld || hasFragments || (isCell && loose_[at] == 0);
-            }
-            out_.loose[to] = anyLoose && !anyHeld ? 1 : 0;
-        });
+        for (const CellFragment& f : fine_.fragments.cells) {
+            isDivided_[coarse.offset(f.cell / 2)] = 1;
+        }
+        out_.loose.resize(coarse.count());
+        for (std::size_t i = 0; i < out_.loose.size(); ++i) {
+            out_.loose[i] = fine_.loose[i] != 0 && fine_.loose[i] == fine_.tissue[i] && isDivided_[i] == 0 ? 1 : 0;
+        }
     }
 
     Split run()
@@ -110,7 +107,7 @@ private:
         bool is = true;
         volume::forEachIndex(glm::max(n - 1, Index3(0)), glm::min(n, coarse_.size - 2), [&](Index3 c) {
             const std::size_t at = coarse_.offset(c);
-            is = is && isDivided_[at] == 0 && (children_[at] == 0 || (children_[at] >> octantOf(n - c) & 1) != 0);
+            is = is && isDivided_[at] == 0 && (fine_.tissue[at] == 0 || (fine_.tissue[at] >> octantOf(n - c) & 1) != 0);
         });
         return is;
     }
@@ -136,7 +133,7 @@ private:
             return known->second;
         }
         std::vector<Piece> found;
-        if (const std::uint8_t children = children_[coarse_.offset(cell)]; children != 0) {
+        if (const std::uint8_t children = fine_.tissue[coarse_.offset(cell)]; children != 0) {
             found.push_back({cell, children, {}, {}});
         }
         for (int i = 0; i < 8; ++i) {
@@ -236,73 +233,81 @@ private:
 
     std::size_t heldCells(const Piece& piece) const
     {
-        std::size_t sum = piece.fragments.size();
-        for (int i = 0; i < 8; ++i) {
-            const bool isHeld = loose_[fine_.nodes.offset(2 * piece.cell + octant(i))] == 0;
-            sum += (piece.children >> i & 1) != 0 && isHeld ? 1 : 0;
-        }
-        return sum;
+        const unsigned loose = fine_.loose[coarse_.offset(piece.cell)];
+        return piece.fragments.size() + static_cast<std::size_t>(std::popcount(piece.children & ~loose));
     }
 
     // Joins the pieces that hang together within a further cell around the node: the steps of voxels on a surface are no
     // gaps.
     void joinAround(Index3 n, Groups& groups)
     {
-        const Index3 low = 2 * n - around / 2;
-        reached_.fill(beside_.size());
+        const CellBits tissue = tissueAround(n);
+        std::vector<CellBits> parts(beside_.size());
         for (std::size_t i = 0; i < beside_.size(); ++i) {
             const Piece& piece = all_[beside_[i].piece];
-            open_.assign(1, 2 * piece.cell + octant(std::countr_zero(piece.children)) - low);
-            while (!open_.empty()) {
-                const Index3 at = open_.back();
-                open_.pop_back();
-                reach(low, at, i, groups);
+            const Index3 at = 2 * (piece.cell - n + 2) + octant(std::countr_zero(piece.children));
+            CellBits& part = parts[i];
+            part.set(at);
+            const auto before = std::find_if(parts.begin(), parts.begin() + static_cast<std::ptrdiff_t>(i),
+                                             [&](const CellBits& other) { return other.has(at); });
+            groups.join(static_cast<std::size_t>(before - parts.begin()), i);
+            for (bool grows = &*before == &part; grows;) {
+                grows = part.growIn(tissue);
             }
         }
     }
 
-    // From piece `i`, the cell at `at` from `low`, and then those beside it; or the piece that was there before.
-    void reach(Index3 low, Index3 at, std::size_t i, Groups& groups)
+    // Of the cells of the fine level in the four coarse ones around a node along each axis.
+    CellBits tissueAround(Index3 n) const
     {
-        std::size_t& piece = reached_[box_.offset(at)];
-        if (piece < beside_.size()) {
-            groups.join(piece, i);
-            return;
-        }
-        piece = i;
-        volume::forEachIndex(glm::max(at - 1, Index3(0)), glm::min(at + 1, Index3(around - 1)), [&](Index3 next) {
-            const Index3 fine = low + next;
-            const bool isFilled = fine_.nodes.contains(fine) && fine_.mu[fine_.nodes.offset(fine)] > 0.0F;
-            if (isFilled && reached_[box_.offset(next)] != i) {
-                open_.push_back(next);
+        CellBits tissue;
+        volume::forEachIndex(glm::max(n - 2, Index3(0)), glm::min(n + 1, coarse_.size - 1), [&](Index3 c) {
+            const unsigned children = fine_.tissue[coarse_.offset(c)];
+            for (int i = 0; i < 8; ++i) {
+                if ((children >> i & 1) != 0) {
+                    tissue.set(2 * (c - n + 2) + octant(i));
+                }
             }
         });
+        return tissue;
     }
 
-    // Calls visit(node) for the nodes of the fine level that a piece has, some more than once.
+    // Calls visit(node, its place) for the nodes of the fine level that a piece has, some more than once.
     template <typename Visit>
     void forEachNode(const Piece& piece, const Visit& visit) const
     {
         for (int c = 0; c < 64; ++c) {
             if ((piece.children >> (c / 8) & 1) != 0) {
-                visit(static_cast<std::uint32_t>(fine_.nodes.offset(2 * piece.cell + octant(c / 8) + octant(c % 8))));
+                const Index3 place = 2 * piece.cell + octant(c / 8) + octant(c % 8);
+                visit(static_cast<std::uint32_t>(fine_.nodes.offset(place)), place);
             }
         }
         for (const std::uint32_t f : piece.fragments) {
-            std::ranges::for_each(fine_.fragments.cells[f].nodes, visit);
+            for (const std::uint32_t node : fine_.fragments.cells[f].nodes) {
+                visit(node, placeOf(node));
+            }
         }
     }
 
     // Joins the pieces that share a node of the fine level at the node or beside it.
     void joinSharers(Index3 n, Groups& groups)
     {
+        std::array<std::size_t, 27> first;  // piece that has a node of the level there
+        first.fill(beside_.size());
         sharers_.clear();
         for (std::size_t i = 0; i < beside_.size(); ++i) {
-            forEachNode(all_[beside_[i].piece], [&](std::uint32_t node) {
-                const Index3 off = placeOf(node) - 2 * n;
-                if (off == glm::clamp(off, Index3(-1), Index3(1))) {
-                    sharers_.emplace_back(node, i);
+            forEachNode(all_[beside_[i].piece], [&](std::uint32_t node, Index3 place) {
+                const Index3 off = place - 2 * n;
+                if (off != glm::clamp(off, Index3(-1), Index3(1))) {
+                    return;
                 }
+                if (isVirtual(node)) {
+                    sharers_.emplace_back(node, i);
+                    return;
+                }
+                std::size_t& one = first[static_cast<std::size_t>(13 + off.x + 3 * off.y + 9 * off.z)];
+                one = std::min(one, i);
+                groups.join(one, i);
             });
         }
         std::ranges::sort(sharers_);
@@ -337,7 +342,7 @@ private:
     {
         for (const std::size_t i : kept_) {
             const Piece& piece = all_[i];
-            forEachNode(piece, [&](std::uint32_t node) { link(node, piece.cell, piece.nodes); });
+            forEachNode(piece, [&](std::uint32_t node, Index3) { link(node, piece.cell, piece.nodes); });
         }
         for (std::size_t f = 0; f < out_.parents.size(); ++f) {
             if (out_.parents[f] == noFragment) {
@@ -390,22 +395,16 @@ private:
         return rows;
     }
 
-    const CellLevel& fine_;
-    const std::vector<std::uint8_t>& loose_;
+    const FineCells fine_;
     const volume::NodeGrid& coarse_;
     bool joinsAround_;
-    std::vector<std::uint8_t> children_;   // of coarse cells, as Piece::children
     std::vector<std::uint8_t> isDivided_;  // coarse cells with fragments of the fine level
     std::vector<Piece> all_;
     std::unordered_map<std::size_t, Pieces> pieces_;  // by coarse cell
     std::vector<std::size_t> kept_;                   // pieces that are fragments
     std::unordered_set<std::uint32_t> linked_;
     std::vector<Beside> beside_;
-    static constexpr int around = 8;  // cells of the fine level along each edge of a box around a node, see joinAround()
-    const volume::NodeGrid box_{Index3(around), Vec3(0.0), 1.0};
-    std::array<std::size_t, around * around * around> reached_{};  // from which piece
-    std::vector<Index3> open_;
-    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // nodes of the fine level, with the pieces that have them
+    std::vector<std::pair<std::uint32_t, std::size_t>> sharers_;  // virtual nodes, with the pieces that have them
     Split out_;
 };
 
@@ -473,24 +472,29 @@ std::vector<std::uint8_t> looseCells(const CellLevel& finest, const std::vector<
 Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loose, const std::vector<std::uint8_t>& octants)
 {
     const volume::NodeGrid& g = finest.nodes;
-    CellLevel halves;
-    halves.nodes = {2 * g.size - 1, g.origin, 0.5 * g.spacing};
-    halves.mu.assign(halves.nodes.count(), 0.0F);
-    std::vector<std::uint8_t> looseHalves(halves.nodes.count(), 0);
-    volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
-        const std::size_t at = g.offset(c);
-        for (int i = 0; i < 8 && finest.mu[at] > 0.0F; ++i) {
-            const std::size_t half = halves.nodes.offset(2 * c + octant(i));
-            halves.mu[half] = (octants[at] >> i & 1) != 0 ? 1.0F : 0.0F;
-            looseHalves[half] = loose[at];
-        }
-    });
-    return Splitter(halves, looseHalves, g, true).run();
+    const Fragments none;
+    FineCells eighths{{2 * g.size - 1, g.origin, 0.5 * g.spacing}, none, octants, octants};
+    for (std::size_t i = 0; i < g.count(); ++i) {
+        eighths.loose[i] = loose[i] != 0 ? octants[i] : std::uint8_t{0};
+    }
+    return Splitter(std::move(eighths), g, true).run();
 }
 
 Split splitLevel(const CellLevel& fine, const std::vector<std::uint8_t>& loose, const volume::NodeGrid& coarse)
 {
-    return Splitter(fine, loose, coarse, false).run();
+    FineCells cells{fine.nodes, fine.fragments, std::vector<std::uint8_t>(coarse.count(), 0), {}};
+    cells.loose = cells.tissue;
+    volume::forEachIndex(Index3(0), coarse.size - 2, [&](Index3 c) {
+        unsigned tissue = 0, apart = 0;
+        for (int i = 0; i < 8; ++i) {
+            const std::size_t at = fine.nodes.offset(2 * c + octant(i));
+            tissue |= fine.mu[at] > 0.0F ? 1U << i : 0U;
+            apart |= loose[at] != 0 ? 1U << i : 0U;
+        }
+        cells.tissue[coarse.offset(c)] = static_cast<std::uint8_t>(tissue);
+        cells.loose[coarse.offset(c)] = static_cast<std::uint8_t>(apart);
+    });
+    return Splitter(std::move(cells), coarse, false).run();
 }
 
 }  // namespace palpate::chainmail
