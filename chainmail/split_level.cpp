@@ -475,7 +475,9 @@ Split splitFinest(const CellLevel& finest, const std::vector<std::uint8_t>& loos
     const Fragments none;
     FineCells eighths{{2 * g.size - 1, g.origin, 0.5 * g.spacing}, none, octants, octants};
     for (std::size_t i = 0; i < g.count(); ++i) {
-        eighths.loose[i] = loose[i] != 0 ? octants[i] : std::uint8_t{0};
+        // What lies behind a support is tissue, and no cell.
+        eighths.tissue[i] = finest.mu[i] > 0.0F ? octants[i] : std::uint8_t{0};
+        eighths.loose[i] = loose[i] != 0 ? eighths.tissue[i] : std::uint8_t{0};
     }
     return Splitter(std::move(eighths), g, true).run();
 }

@@ -120,6 +120,34 @@ TEST(FinestGaps, AFragmentIsItsCell)
     EXPECT_GT(held, 0);
 }
 
+// What lies behind a support is tissue, and no cell: it is no fragment. Without stiffness its share of the operator's
+// diagonal was not a number, and no tool met the body.
+TEST(FinestGaps, WhatLiesBehindASupportIsNoFragment)
+{
+    std::mt19937 random(31);
+    const volume::NodeGrid grid{Index3(16), Vec3(0.5 * edge), edge};
+    std::vector<volume::CellMaterial> materials(grid.count());
+    volume::forEachIndex(Index3(3), Index3(12), [&](Index3 c) {
+        auto& m = materials[grid.offset(c)];
+        m = tests::tissue(5e3, 0.45, c.y >= 9);
+        m.octants = random() % 4 != 0 ? static_cast<std::uint8_t>(random() & random()) : std::uint8_t{0xFF};
+    });
+    const auto surface =
+        tests::distanceOn(grid, [](Vec3 p) { return tests::boxDistance(p, Vec3(3 * edge), Vec3(13 * edge)); });
+    const volume::Support support{{0.0, 9 * edge, 0.0}, {0.0, -1.0, 0.0}};
+    const ElasticBody body = elasticBody(grid, materials, surface, 0.49, 0.0, false, support);
+    EXPECT_GT(body.levels.front().fragments.cells.size(), 5U);
+    for (const CellLevel& level : body.levels) {
+        EXPECT_TRUE(std::isfinite(level.radius));
+        for (const CellFragment& f : level.fragments.cells) {
+            EXPECT_GT(f.mu, 0.0F);
+        }
+        for (const float d : level.diagonal) {
+            ASSERT_TRUE(std::isfinite(d));
+        }
+    }
+}
+
 // Tissue that a gap of half a cell separates from all that is held has no place of its own: it stays with what is beside
 // it.
 TEST(FinestGaps, LooseTissueStaysWithWhatIsNear)
