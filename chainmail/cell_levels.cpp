@@ -454,7 +454,6 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
     Split split;
     if (!finest.octants.empty()) {
         split = splitFinest(levels.front(), loose, finest.octants);
-        loose = split.loose;
     }
     divideCells(std::move(split), first.held, levels.front());
     addDiagonal(levels.front());

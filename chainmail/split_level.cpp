@@ -408,10 +408,6 @@ private:
     Split out_;
 };
 
-}  // namespace
-
-namespace {
-
 // Whether an eighth of one cell shares a corner with one of the cell at `off` from it. A cell's own eighths meet in its
 // middle.
 bool meet(std::uint8_t one, std::uint8_t other, Index3 off) noexcept
