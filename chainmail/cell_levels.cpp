@@ -2,6 +2,7 @@
 
 #include <chainmail/block_mean.h>
 #include <chainmail/cell_layers.h>
+#include <chainmail/cut_cells.h>
 #include <chainmail/split_level.h>
 #include <chainmail/window.h>
 
@@ -47,6 +48,7 @@ public:
         coarse.lambda.assign(count, 0.0F);
         coarse.stiffening.assign(count, 0.0F);
         coarse.fixed.assign(count, 0);
+        coarse.cuts.assign(count, {});
         for (std::size_t i = 0; i < fine_.relaxing.size(); ++i) {
             coarse.relaxing[i].assign(relaxes() ? count : 0, 0.0F);
         }
@@ -63,6 +65,7 @@ public:
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
             coarse.stiffening[at] = static_cast<float>(m.stiffening);
             held[at] = static_cast<float>(m.held);
+            coarse.cuts[at] = cutOf(2 * c, children, noFragment);
             for (std::size_t i = 0; i < m.relaxing.size() && relaxes(); ++i) {
                 coarse.relaxing[i][at] = static_cast<float>(m.relaxing[i]);
             }
@@ -120,6 +123,7 @@ private:
             f.lambda = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
             f.stiffening = static_cast<float>(m.stiffening);
             f.held = static_cast<float>(m.held);
+            f.cut = cutOf(2 * f.cell, f.children, static_cast<std::uint32_t>(i));
             for (std::size_t k = 0; k < m.relaxing.size(); ++k) {
                 f.relaxing[k] = static_cast<float>(m.relaxing[k]);
             }
@@ -186,6 +190,25 @@ private:
         return sums.moduli(parent != noFragment || atSurface(fine_, low, low + 1));
     }
 
+    // Of the same cells.
+    CutCell cutOf(Index3 low, unsigned children, std::uint32_t parent) const
+    {
+        CutSum sum;
+        for (int i = 0; i < 8; ++i) {
+            const Index3 child = octant(i);
+            const std::size_t at = fine_.nodes.offset(low + child);
+            if (fine_.mu[at] > 0.0F && (children >> i & 1U) != 0) {
+                sum.add(fine_.cuts[at], child);
+            }
+            for (const CellFragment& f : fine_.fragments.in(low + child, fine_.nodes.size.y)) {
+                if (f.parent == parent) {
+                    sum.add(f.cut, child);
+                }
+            }
+        }
+        return sum.cut();
+    }
+
     CellLevel& fine_;
     const std::vector<float>& held_;
     const std::vector<std::uint8_t>& loose_;
@@ -198,17 +221,21 @@ void addDiagonal(CellLevel& level)
     volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
         const std::size_t at = g.offset(c);
         if (level.mu[at] > 0.0F) {
-            const float fraction = diagonalOf(level.mu[at], level.lambda[at], g.spacing);
-            volume::forEachIndex(c, c + 1, [&](Index3 n) { level.diagonal[g.offset(n)] += fraction; });
+            const CutCell cut = level.cuts.empty() ? CutCell{} : level.cuts[at];
+            for (int i = 0; i < 8; ++i) {
+                level.diagonal[g.offset(c + octant(i))] +=
+                    diagonalOf(level.mu[at], level.lambda[at], g.spacing, cut, 2.0F * Vec3f(octant(i)) - 1.0F);
+            }
         }
     });
     for (VirtualNode& n : level.fragments.nodes) {
         n.diagonal = 0.0F;
     }
     for (const CellFragment& f : level.fragments.cells) {
-        for (const std::uint32_t n : f.nodes) {
+        for (int i = 0; i < 8; ++i) {
+            const std::uint32_t n = f.nodes[static_cast<std::size_t>(i)];
             float& sum = n < g.count() ? level.diagonal[n] : level.fragments.nodes[n - g.count()].diagonal;
-            sum += diagonalOf(f.mu, f.lambda, g.spacing);
+            sum += diagonalOf(f.mu, f.lambda, g.spacing, f.cut, 2.0F * Vec3f(octant(i)) - 1.0F);
         }
     }
     for (const CellLayer& l : level.layers) {
@@ -335,6 +362,20 @@ CellLevel withStiffSkin(const FinestLevel& finest)
     return level;
 }
 
+std::vector<CutCell> finestCuts(const FinestLevel& finest, const volume::DistanceField& surface)
+{
+    const auto& g = finest.level.nodes;
+    std::vector<CutCell> cuts(g.count());
+    volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
+        const std::size_t at = g.offset(c);
+        if (finest.level.mu[at] > 0.0F) {
+            const std::uint8_t octants = finest.octants.empty() ? std::uint8_t{0xFF} : finest.octants[at];
+            cuts[at] = cutBy(surface, g.position(c) + 0.5 * g.spacing, g.spacing, octants);
+        }
+    });
+    return cuts;
+}
+
 // Gives the finest level the fragments that its gaps make: each is all of a cell.
 void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 {
@@ -349,6 +390,7 @@ void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
         f.lambda = std::exchange(level.lambda[at], 0.0F);
         f.stiffening = level.stiffening[at];
         f.held = held[at];
+        f.cut = level.cuts[at];
         for (std::size_t i = 0; i < f.relaxing.size() && !level.relaxing[i].empty(); ++i) {
             f.relaxing[i] = level.relaxing[i][at];
         }
@@ -358,8 +400,9 @@ void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 // Takes the cells as they are, with their layers, but for those that are fragments.
 void takeWhole(CellLevel whole, CellLevel& level)
 {
-    for (const CellFragment& f : level.fragments.cells) {
+    for (CellFragment& f : level.fragments.cells) {
         const std::size_t at = level.nodes.offset(f.cell);
+        f.cut = {};
         whole.mu[at] = whole.lambda[at] = 0.0F;
     }
     if (!level.fragments.cells.empty()) {
@@ -415,7 +458,10 @@ double spectralRadius(const CellLevel& level)
         lambda[to] = scale * level.lambda[from];
         start(to, level.diagonal[from], level.fixed[from] != 0);
     });
+    CutFields cuts(l, size, !level.cuts.empty());
+    cuts.place(level, Index3(0));
     for (const WindowFragments::Placed& p : fragments.placed()) {
+        cuts.set(p.node, level.fragments.cells[p.fragment].cut);
         mu[p.node] = scale * level.fragments.cells[p.fragment].mu;
         lambda[p.node] = scale * level.fragments.cells[p.fragment].lambda;
     }
@@ -434,8 +480,8 @@ double spectralRadius(const CellLevel& level)
             break;
         }
         fragments.share(z.data(), l.count);
-        k.apply(l, {.mu = mu.data(), .lambda = lambda.data(), .layers = layers.view()}, z.data(), az.data(),
-                scratch.data());
+        k.apply(l, {.mu = mu.data(), .lambda = lambda.data(), .layers = layers.view(), .cuts = cuts.view()}, z.data(),
+                az.data(), scratch.data());
         fragments.collect(az.data(), l.count);
         k.smoothFirst(static_cast<float>(1.0 / before), inverse.data(), az.data(), z.data(), l.count);
         radius = norm();
@@ -450,6 +496,7 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
 {
     FinestLevel first = support ? Resting::freePart(finest) : finest;
     std::vector<CellLevel> levels{withStiffSkin(first)};
+    levels.front().cuts = finestCuts(finest, surface);
     std::vector<std::uint8_t> loose = looseCells(levels.front(), finest.held, finest.octants);
     Split split;
     if (!finest.octants.empty()) {

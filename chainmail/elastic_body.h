@@ -31,6 +31,7 @@ struct CellLevel {
     std::vector<CellLayer> layers;                                     // by z, then y, then x
     std::vector<std::uint32_t>
         layerRows;                // first of `layers` in row (y, z) of cells, at y + z * nodes along y; none: no layers
+    std::vector<CutCell> cuts;    // of each cell; none: all are full (count x 1)
     std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
     Fragments fragments;          // of cells that gaps run through
     double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
@@ -64,6 +65,18 @@ inline float diagonalOf(float mu, float lambda, double spacing) noexcept
 {
     const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
     return static_cast<float>(spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
+}
+
+/// The same of a cell that is cut, at its node `side`, -1 or 1 along each axis.
+inline float diagonalOf(float mu, float lambda, double spacing, const CutCell& cut, Vec3f side) noexcept
+{
+    const Vec3f c = cut.middle, s = cut.spread, w = 1.0F + side * c;
+    const Vec3f slope(w.y * w.z, w.z * w.x, w.x * w.y);
+    const Vec3f along = w * w;  // of the modes yz, zx and xy
+    const float bend = 4.0F / 3.0F * mu * (1.0F + lambda / (lambda + 2.0F * mu)), twist = 2.0F / 3.0F * mu;
+    const Vec3f two(s.y + s.z, s.z + s.x, s.x + s.y);
+    const float bending = bend * glm::dot(along, two) + twist * glm::dot(along, two) + 8.0F / 3.0F * mu * s.x * s.y * s.z;
+    return static_cast<float>(spacing / 32.0) * ((8.0F * mu + 2.0F * lambda) * glm::dot(slope, slope) + bending) / 3.0F;
 }
 
 /// Shear modulus of the level's cell that a place lies in; 0 where it is empty, and outside of the grid [Pa].

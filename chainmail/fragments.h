@@ -24,6 +24,16 @@ inline int octantOf(Index3 off) noexcept
     return off.x + 2 * off.y + 4 * off.z;
 }
 
+/// Where the tissue of a cell lies that it fills in part: its energy is that of the strain there, and not in the middle of
+/// the cell. A plate in the lower half of a cell bends as a plate.
+struct CutCell {
+    Vec3f middle{0.0F};  // of the tissue, -1 to 1 along each edge of the cell
+    Vec3f spread{1.0F};  // second moment of the tissue around it along each edge, over that of a full cell
+    float share = 1;     // of the cell that is tissue
+
+    bool isWhole() const noexcept { return middle == Vec3f(0.0F) && spread == Vec3f(1.0F); }
+};
+
 /// A further node where a level has one: for tissue that does not hang together there with the tissue of that node.
 struct VirtualNode {
     Index3 at{0};
@@ -39,6 +49,7 @@ struct CellFragment {
     std::array<std::uint32_t, 8> nodes{};
     float mu = 0, lambda = 0, stiffening = 0;  // as those of a cell
     std::array<float, volume::relaxationTerms> relaxing{};
+    CutCell cut;                // where it lies in the cell
     float held = 0;             // fraction of its tissue that is held in space
     std::uint8_t children = 0;  // the next finer level's cells in it, a bit for each, x fastest; without their fragments
     std::uint32_t parent = noFragment;  // fragment of the next coarser level that it lies in; none: in the cell itself

@@ -43,6 +43,13 @@ struct CellLayers {
     const std::uint8_t* any = nullptr;  // not 0 where one of Layout::lanes cells in a row has a layer (count / lanes x 1)
 };
 
+/// Where the tissue of cells lies that it fills in part (count x 1 each), see CutCell.
+struct CutCells {
+    std::array<const float*, 3> middle{};
+    std::array<const float*, 3> spread{};
+    const std::uint8_t* any = nullptr;  // not 0 where one of Layout::lanes cells in a row is cut (count / lanes x 1)
+};
+
 /// Stiffness of each cell (count x 1), both moduli scaled by spacing / 32, zero where there is no tissue; and the law that
 /// they belong to.
 struct CellStiffness {
@@ -50,6 +57,7 @@ struct CellStiffness {
     const float* lambda = nullptr;                           // Lame's first parameter, times h / 32 [N/m]
     const float* stiffening = nullptr;                       // b of finite strain [-]; none: 0
     CellLayers layers{};                                     // without mu: no cell has one
+    CutCells cuts{};                                         // without any: no cell is cut; else none has a layer
     std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
 };
 

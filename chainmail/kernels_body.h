@@ -7,6 +7,8 @@
 //
 #include <chainmail/kernels_layers.h>
 //
+#include <chainmail/kernels_cuts.h>
+//
 #include <chainmail/kernels_cells.h>
 #include <chainmail/kernels_passes.h>
 

@@ -7,11 +7,14 @@ namespace palpate::chainmail {
 namespace {
 
 // Small strain: the law of kernels.h.
-template <typename Layer>
+template <typename Layer, typename Cut>
 struct Linear {
     Layer layers;
+    Cut cuts;
 
-    void operator()(Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    template <typename Filled>
+    void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
+                    Modes (&g)[3]) noexcept
     {
         const Lanes two = 2.0F * mu;
         const Lanes four = 4.0F * mu;
@@ -22,7 +25,7 @@ struct Linear {
         g[0].y = g[1].x = two * (m[0].y + m[1].x);
         g[0].z = g[2].x = two * (m[0].z + m[2].x);
         g[1].z = g[2].y = two * (m[1].z + m[2].y);
-        hourglass(mu, lambda, m, g);
+        hourglass(filled, mu, lambda, m, g);
         layers.small(cell, lambda / (lambda + two + tiny), m, g);
     }
 };
@@ -30,16 +33,19 @@ struct Linear {
 // Finite strain: stable neo-Hookean and what the law has beyond it, on the mean deformation gradient. With modes eight
 // times their size F = I + m / (4 h), and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h
 // times the scaled stiffness.
-template <typename Law, typename Layer>
+template <typename Law, typename Layer, typename Cut>
 struct Finite {
     float inverse;            // 1 / h
     const float* stiffening;  // of each cell, or none
     Layer layers;
+    Cut cuts;
     Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
     std::size_t turn = 0;
 
     // With G = F - I:  J - 1 = tr G + (tr^2 - G : G^T) / 2 + det G, so that no small difference of large numbers is taken.
-    void operator()(Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3], Modes (&g)[3]) noexcept
+    template <typename Filled>
+    void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
+                    Modes (&g)[3]) noexcept
     {
         const float q = 0.25F * inverse;
         const float h8 = 8.0F / inverse;
@@ -89,7 +95,7 @@ struct Finite {
         g[2].x = p[2][0];
         g[2].y = p[2][1];
         g[2].z = p[2][2];
-        const Lanes bend = hourglassTurned(mu, lambda, q, f, m, g);
+        const Lanes bend = hourglassTurned(filled, mu, lambda, q, f, m, g);
         const Lanes layer = layers.finite(cell, lambda / (lambda + 2.0F * mu + tiny), q, h8, m, g);
         // h^3 W is 32 h^2 times W of the scaled stiffness.
         const float h2 = 32.0F / (inverse * inverse);
@@ -99,6 +105,22 @@ struct Finite {
         turn = (turn + 1) % (Layout::lanes / W);
     }
 };
+
+// The gradient g of the energy of W cells by their modes m, which may change.
+template <typename Law>
+[[gnu::always_inline]] inline void energyOf(Law& law, Lanes mu, Lanes lambda, std::size_t cell, Modes (&m)[3],
+                                            Modes (&g)[3]) noexcept
+{
+    if constexpr (decltype(law.cuts)::some) {
+        if (law.cuts.isAny(cell)) {
+            law.cuts.toMiddle(cell, m);
+            law(law.cuts.spread(cell), mu, lambda, cell, m, g);
+            law.cuts.fromMiddle(cell, g);
+            return;
+        }
+    }
+    law(Whole{}, mu, lambda, cell, m, g);
+}
 
 // What becomes of A u at a node: it is stored,
 struct Keep {
@@ -232,7 +254,7 @@ struct Sweep {
                     m[c] = modesOf(loadPlane(component(planes, c) + inPlane + i, layout.plane), high);
                     storePlane(component(planes, c) + inPlane + i, layout.plane, high);
                 }
-                law(load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
+                energyOf(law, load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
 #pragma GCC unroll 3
                 for (int c = 0; c < 3; ++c) {
                     float* wait = component(pending, c) + inPlane + i;
@@ -277,12 +299,13 @@ template <typename Keeper>
 void sweepLinear(const Layout& layout, const CellStiffness& stiffness, const float* u, const Keeper& keep,
                  float* scratch) noexcept
 {
+    const auto sweep = [&](auto law) { sweepCells(layout, stiffness, u, keep, scratch, law); };
     if (stiffness.layers.mu != nullptr) {
-        Linear<Layers> law{Layers(stiffness.layers)};
-        sweepCells(layout, stiffness, u, keep, scratch, law);
+        sweep(Linear<Layers, NoCuts>{Layers(stiffness.layers), NoCuts(stiffness.cuts)});
+    } else if (stiffness.cuts.any != nullptr) {
+        sweep(Linear<NoLayers, Cuts>{NoLayers(stiffness.layers), Cuts(stiffness.cuts)});
     } else {
-        Linear<NoLayers> law{NoLayers(stiffness.layers)};
-        sweepCells(layout, stiffness, u, keep, scratch, law);
+        sweep(Linear<NoLayers, NoCuts>{NoLayers(stiffness.layers), NoCuts(stiffness.cuts)});
     }
 }
 
@@ -303,11 +326,11 @@ void smoothOf(const Layout& layout, CellStiffness stiffness, const Smoother& by,
     sweepLinear(layout, stiffness, u, KeepSmooth{by.weight, by.diagonal, by.r, u, out, layout.count}, scratch);
 }
 
-template <typename Law, typename Layer>
+template <typename Law, typename Layer, typename Cut>
 double sweepFinite(const Layout& layout, const CellStiffness& stiffness, float inverse, const float* u, float* out,
                    float* scratch) noexcept
 {
-    Finite<Law, Layer> law{inverse, stiffness.stiffening, Layer(stiffness.layers)};
+    Finite<Law, Layer, Cut> law{inverse, stiffness.stiffening, Layer(stiffness.layers), Cut(stiffness.cuts)};
     sweepCells(layout, stiffness, u, Keep{out, layout.count}, scratch, law);
     double sum = 0.0;
     for (const Lanes& part : law.energy) {
@@ -320,8 +343,11 @@ template <typename Law>
 double applyLaw(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                 float* scratch) noexcept
 {
-    return stiffness.layers.mu != nullptr ? sweepFinite<Law, Layers>(layout, stiffness, inverse, u, out, scratch)
-                                          : sweepFinite<Law, NoLayers>(layout, stiffness, inverse, u, out, scratch);
+    if (stiffness.layers.mu != nullptr) {
+        return sweepFinite<Law, Layers, NoCuts>(layout, stiffness, inverse, u, out, scratch);
+    }
+    return stiffness.cuts.any != nullptr ? sweepFinite<Law, NoLayers, Cuts>(layout, stiffness, inverse, u, out, scratch)
+                                         : sweepFinite<Law, NoLayers, NoCuts>(layout, stiffness, inverse, u, out, scratch);
 }
 
 using ApplyFinite = decltype(Kernels::applyFinite);

@@ -66,8 +66,16 @@ inline Plane operator+(const Plane& a, const Plane& b) noexcept
 
 constexpr float tiny = 1e-30F;  // so that an empty cell divides by something
 
+// Second moments of a cell's tissue along each axis, over those of a full cell.
+struct Spread {
+    Lanes x, y, z;
+};
+
+// A cell that is full.
+struct Whole {};
+
 // Modes that bend and twist a cell. Bending: with s = lambda / (lambda + 2 mu), the strain across it as free of stress.
-inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+inline void hourglass(Whole, Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
     const Lanes bend = (4.0F / 3.0F) * mu;
     const Lanes both = bend * lambda / (lambda + 2.0F * mu + tiny);
@@ -92,10 +100,39 @@ inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]
     }
 }
 
+// The same where strain varies over the tissue alone: what varies along an axis counts by the spread along it.
+inline void hourglass(const Spread& s, Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]) noexcept
+{
+    const Lanes bend = (4.0F / 3.0F) * mu;
+    const Lanes both = bend * lambda / (lambda + 2.0F * mu + tiny);
+    const Lanes twist = (2.0F / 3.0F) * mu;
+    const Lanes ninth = (8.0F / 9.0F) * mu * s.x * s.y * s.z;
+    const Lanes alongX = both * (m[1].xy + m[2].zx);
+    const Lanes alongY = both * (m[0].xy + m[2].yz);
+    const Lanes alongZ = both * (m[0].zx + m[1].yz);
+    const Lanes shearX = twist * s.x * (m[1].zx + m[2].xy);
+    const Lanes shearY = twist * s.y * (m[0].yz + m[2].xy);
+    const Lanes shearZ = twist * s.z * (m[0].yz + m[1].zx);
+    g[0].xy = s.y * (bend * m[0].xy + alongY);
+    g[0].zx = s.z * (bend * m[0].zx + alongZ);
+    g[0].yz = shearY + shearZ;
+    g[1].xy = s.x * (bend * m[1].xy + alongX);
+    g[1].yz = s.z * (bend * m[1].yz + alongZ);
+    g[1].zx = shearX + shearZ;
+    g[2].yz = s.y * (bend * m[2].yz + alongY);
+    g[2].zx = s.x * (bend * m[2].zx + alongX);
+    g[2].xy = shearX + shearY;
+#pragma GCC unroll 3
+    for (int q = 0; q < 3; ++q) {
+        g[q].xyz = ninth * m[q].xyz;
+    }
+}
+
 // The same in axes that turn and stretch with the cell: with F its mean deformation gradient, a mode m becomes F^T m.
 // Adds to g the gradient of that energy, and returns twice the energy.
-[[gnu::always_inline]] inline Lanes hourglassTurned(Lanes mu, Lanes lambda, float quarter, const Lanes (&f)[3][3],
-                                                    const Modes (&m)[3], Modes (&g)[3]) noexcept
+template <typename Filled>
+[[gnu::always_inline]] inline Lanes hourglassTurned(const Filled& filled, Lanes mu, Lanes lambda, float quarter,
+                                                    const Lanes (&f)[3][3], const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
     Modes b[3];
     Modes w[3];
@@ -106,7 +143,7 @@ inline void hourglass(Lanes mu, Lanes lambda, const Modes (&m)[3], Modes (&g)[3]
         b[j].zx = m[j].zx + f[0][j] * m[0].zx + f[1][j] * m[1].zx + f[2][j] * m[2].zx;
         b[j].xyz = m[j].xyz + f[0][j] * m[0].xyz + f[1][j] * m[1].xyz + f[2][j] * m[2].xyz;
     }
-    hourglass(mu, lambda, b, w);
+    hourglass(filled, mu, lambda, b, w);
     Lanes twice{};
 #pragma GCC unroll 3
     for (int i = 0; i < 3; ++i) {

@@ -60,6 +60,58 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
             any_.data()};
 }
 
+CutFields::CutFields(const Layout& layout, Index3 box, bool any) : layout_(layout), box_(box)
+{
+    const std::size_t room = any ? layout.count + Layout::lanes : 0;
+    any_.assign(room / Layout::lanes, 0);
+    for (std::size_t c = 0; c < 3; ++c) {
+        middle_[c].assign(room, 0.0F);
+        spread_[c].assign(room, 1.0F);
+    }
+}
+
+void CutFields::place(const CellLevel& level, Index3 at) noexcept
+{
+    some_ = false;
+    if (any_.empty()) {
+        return;
+    }
+    std::fill(any_.begin(), any_.end(), std::uint8_t{0});
+    for (std::size_t c = 0; c < 3; ++c) {
+        std::fill(middle_[c].begin(), middle_[c].end(), 0.0F);
+        std::fill(spread_[c].begin(), spread_[c].end(), 1.0F);
+    }
+    volume::forEachIndex(Index3(0), box_ - 2, [&](Index3 c) {
+        const std::size_t from = level.nodes.offset(at + c);
+        if (level.mu[from] > 0.0F) {
+            set(layout_.at(c.x, c.y, c.z), level.cuts[from]);
+        }
+    });
+}
+
+void CutFields::set(std::size_t cell, const CutCell& cut) noexcept
+{
+    if (any_.empty() || cut.isWhole()) {
+        return;
+    }
+    for (int c = 0; c < 3; ++c) {
+        middle_[static_cast<std::size_t>(c)][cell] = cut.middle[c];
+        spread_[static_cast<std::size_t>(c)][cell] = cut.spread[c];
+    }
+    any_[cell / Layout::lanes] = 1;
+    some_ = true;
+}
+
+CutCells CutFields::view() const noexcept
+{
+    if (!some_) {
+        return {};
+    }
+    return {{middle_[0].data(), middle_[1].data(), middle_[2].data()},
+            {spread_[0].data(), spread_[1].data(), spread_[2].data()},
+            any_.data()};
+}
+
 bool Window::anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept
 {
     bool any = false;
@@ -72,6 +124,7 @@ Window::Window(const CellLevel& level, Index3 size, bool relaxes)
     : box(size),
       layout(Layout::of(size.x, size.y, WindowFragments::planes(level, size))),
       layers(layout, size, !level.layers.empty()),
+      cuts(layout, size, !level.cuts.empty()),
       fragments(level, size)
 {
     for (Floats* cells :
@@ -105,6 +158,7 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
         }
     }
     layers.place(level, at);
+    cuts.place(level, at);
     std::copy(mu.begin(), mu.end(), uncoveredMu.begin());
     std::copy(lambda.begin(), lambda.end(), uncoveredLambda.begin());
     for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
@@ -188,6 +242,7 @@ void Window::placeFragments(const CellLevel& level, bool coarsest) noexcept
         mu[b.node] = uncoveredMu[b.node] = scale * f.mu;
         lambda[b.node] = uncoveredLambda[b.node] = scale * f.lambda;
         stiffening[b.node] = f.stiffening;
+        cuts.set(b.node, f.cut);
     }
     for (std::size_t i = 0; i < terms.size() && !terms[i].mu.empty(); ++i) {
         std::fill_n(terms[i].mu.begin() + static_cast<std::ptrdiff_t>(begin), rest, 0.0F);

@@ -79,6 +79,25 @@ private:
     bool some_ = false;
 };
 
+/// The cut cells in a box, and those behind it.
+class CutFields {
+public:
+    /// @param any  the level has cut cells; where it has none, nothing is kept
+    CutFields(const Layout& layout, Index3 box, bool any);
+    /// Takes those of the level's cells from `at` on. Behind the box no cell is cut.
+    void place(const CellLevel& level, Index3 at) noexcept;
+    void set(std::size_t cell, const CutCell& cut) noexcept;
+    /// What the kernels take; without `any` where no cell is cut.
+    CutCells view() const noexcept;
+
+private:
+    Layout layout_;
+    Index3 box_{0};
+    std::array<Floats, 3> middle_, spread_;
+    std::vector<std::uint8_t> any_;
+    bool some_ = false;
+};
+
 /// A box of nodes of one level that follows the tool. Windows are nested; together they are one finite-element space:
 ///
 ///     +-----------------------------+      every node inside a window that no finer window covers is a degree of
@@ -100,6 +119,7 @@ struct Window {
     Floats stiffening;  // of each cell [-]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
     LayerFields layers;                   // of the finest window only
+    CutFields cuts;                       // of the others
     struct Term {
         Floats mu, lambda, layer;
     };
@@ -115,14 +135,17 @@ struct Window {
 
     float* field(Field f) noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
-    CellStiffness stiffness() const noexcept { return {mu.data(), lambda.data(), stiffening.data(), layers.view()}; }
+    CellStiffness stiffness() const noexcept
+    {
+        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view()};
+    }
     CellStiffness uncovered() const noexcept
     {
-        return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data(), layers.view()};
+        return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data(), layers.view(), cuts.view()};
     }
     CellStiffness term(std::size_t i) const noexcept
     {
-        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer)};
+        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer), cuts.view()};
     }
     Index3 size() const noexcept { return box; }
     /// Node (0, 0, 0) of this window in the next coarser one.

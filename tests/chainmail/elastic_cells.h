@@ -39,7 +39,7 @@ struct Cells {
     }
 
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
-    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data(), layers.view()}; }
+    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data(), layers.view(), {}}; }
 
     /// Moduli of one cell [Pa].
     void set(Index3 cell, double shear, double lame)
