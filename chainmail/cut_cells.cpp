@@ -23,8 +23,8 @@ void CutSum::add(const CutCell& cell, Index3 child) noexcept
 
 CutCell CutSum::cut() const noexcept
 {
-    constexpr double whole = 0.98;      // share from which on a cell counts as full
-    constexpr double thinnest = 0.005;  // spread; a thinner plate would bend without a force
+    constexpr double whole = 0.98;     // share from which on a cell counts as full
+    constexpr double thinnest = 0.02;  // spread: a plate of a seventh of the cell
     if (!(share_ > 0.0)) {
         return {};
     }

@@ -49,7 +49,7 @@ struct CellFragment {
     std::array<std::uint32_t, 8> nodes{};
     float mu = 0, lambda = 0, stiffening = 0;  // as those of a cell
     std::array<float, volume::relaxationTerms> relaxing{};
-    CutCell cut;                // where it lies in the cell
+    CutCell cut{};              // where it lies in the cell
     float held = 0;             // fraction of its tissue that is held in space
     std::uint8_t children = 0;  // the next finer level's cells in it, a bit for each, x fastest; without their fragments
     std::uint32_t parent = noFragment;  // fragment of the next coarser level that it lies in; none: in the cell itself
