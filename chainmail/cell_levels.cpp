@@ -48,7 +48,6 @@ public:
         coarse.lambda.assign(count, 0.0F);
         coarse.stiffening.assign(count, 0.0F);
         coarse.fixed.assign(count, 0);
-        coarse.cuts.assign(count, {});
         for (std::size_t i = 0; i < fine_.relaxing.size(); ++i) {
             coarse.relaxing[i].assign(relaxes() ? count : 0, 0.0F);
         }
@@ -65,11 +64,14 @@ public:
             coarse.lambda[at] = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
             coarse.stiffening[at] = static_cast<float>(m.stiffening);
             held[at] = static_cast<float>(m.held);
-            coarse.cuts[at] = cutOf(2 * c, children, noFragment);
+            if (const Cut cut = cutAround(2 * c, children, noFragment); !cut.isWhole()) {
+                coarse.cuts.push_back({c, cut});
+            }
             for (std::size_t i = 0; i < m.relaxing.size() && relaxes(); ++i) {
                 coarse.relaxing[i][at] = static_cast<float>(m.relaxing[i]);
             }
         });
+        coarse.cutRows = rowsOf(coarse.cuts, coarse.nodes.size, &CutCell::cell);
         volume::forEachIndex(Index3(0), coarse.nodes.size - 1, [&](Index3 n) {
             coarse.fixed[coarse.nodes.offset(n)] = sharesAround(2 * n).isMostlyFixed() ? 1 : 0;
         });
@@ -123,7 +125,7 @@ private:
             f.lambda = static_cast<float>(m.bulk - 2.0 / 3.0 * m.mu);
             f.stiffening = static_cast<float>(m.stiffening);
             f.held = static_cast<float>(m.held);
-            f.cut = cutOf(2 * f.cell, f.children, static_cast<std::uint32_t>(i));
+            f.cut = cutAround(2 * f.cell, f.children, static_cast<std::uint32_t>(i));
             for (std::size_t k = 0; k < m.relaxing.size(); ++k) {
                 f.relaxing[k] = static_cast<float>(m.relaxing[k]);
             }
@@ -191,14 +193,14 @@ private:
     }
 
     // Of the same cells.
-    CutCell cutOf(Index3 low, unsigned children, std::uint32_t parent) const
+    Cut cutAround(Index3 low, unsigned children, std::uint32_t parent) const
     {
         CutSum sum;
         for (int i = 0; i < 8; ++i) {
             const Index3 child = octant(i);
             const std::size_t at = fine_.nodes.offset(low + child);
             if (fine_.mu[at] > 0.0F && (children >> i & 1U) != 0) {
-                sum.add(fine_.cuts[at], child);
+                sum.add(cutOf(fine_, low + child), child);
             }
             for (const CellFragment& f : fine_.fragments.in(low + child, fine_.nodes.size.y)) {
                 if (f.parent == parent) {
@@ -221,10 +223,10 @@ void addDiagonal(CellLevel& level)
     volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
         const std::size_t at = g.offset(c);
         if (level.mu[at] > 0.0F) {
-            const CutCell cut = level.cuts.empty() ? CutCell{} : level.cuts[at];
+            const Cut cut = cutOf(level, c);
             for (int i = 0; i < 8; ++i) {
                 level.diagonal[g.offset(c + octant(i))] +=
-                    diagonalOf(level.mu[at], level.lambda[at], g.spacing, cut, 2.0F * Vec3f(octant(i)) - 1.0F);
+                    diagonalOf(level.mu[at], level.lambda[at], g.spacing, cut, sideOf(i));
             }
         }
     });
@@ -232,10 +234,10 @@ void addDiagonal(CellLevel& level)
         n.diagonal = 0.0F;
     }
     for (const CellFragment& f : level.fragments.cells) {
-        for (int i = 0; i < 8; ++i) {
+        for (int i = 0; i < 8 && f.mu > 0.0F; ++i) {
             const std::uint32_t n = f.nodes[static_cast<std::size_t>(i)];
             float& sum = n < g.count() ? level.diagonal[n] : level.fragments.nodes[n - g.count()].diagonal;
-            sum += diagonalOf(f.mu, f.lambda, g.spacing, f.cut, 2.0F * Vec3f(octant(i)) - 1.0F);
+            sum += diagonalOf(f.mu, f.lambda, g.spacing, f.cut, sideOf(i));
         }
     }
     for (const CellLayer& l : level.layers) {
@@ -362,20 +364,6 @@ CellLevel withStiffSkin(const FinestLevel& finest)
     return level;
 }
 
-std::vector<CutCell> finestCuts(const FinestLevel& finest, const volume::DistanceField& surface)
-{
-    const auto& g = finest.level.nodes;
-    std::vector<CutCell> cuts(g.count());
-    volume::forEachIndex(Index3(0), g.size - 2, [&](Index3 c) {
-        const std::size_t at = g.offset(c);
-        if (finest.level.mu[at] > 0.0F) {
-            const std::uint8_t octants = finest.octants.empty() ? std::uint8_t{0xFF} : finest.octants[at];
-            cuts[at] = cutBy(surface, g.position(c) + 0.5 * g.spacing, g.spacing, octants);
-        }
-    });
-    return cuts;
-}
-
 // Gives the finest level the fragments that its gaps make: each is all of a cell.
 void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 {
@@ -390,7 +378,7 @@ void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
         f.lambda = std::exchange(level.lambda[at], 0.0F);
         f.stiffening = level.stiffening[at];
         f.held = held[at];
-        f.cut = level.cuts[at];
+        f.cut = cutOf(level, f.cell);
         for (std::size_t i = 0; i < f.relaxing.size() && !level.relaxing[i].empty(); ++i) {
             f.relaxing[i] = level.relaxing[i][at];
         }
@@ -400,15 +388,14 @@ void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 // Takes the cells as they are, with their layers, but for those that are fragments.
 void takeWhole(CellLevel whole, CellLevel& level)
 {
-    for (CellFragment& f : level.fragments.cells) {
+    for (const CellFragment& f : level.fragments.cells) {
         const std::size_t at = level.nodes.offset(f.cell);
-        f.cut = {};
         whole.mu[at] = whole.lambda[at] = 0.0F;
     }
     if (!level.fragments.cells.empty()) {
         std::erase_if(whole.layers,
                       [&](const CellLayer& l) { return !level.fragments.in(l.cell, level.nodes.size.y).empty(); });
-        indexLayers(whole);
+        whole.layerRows = rowsOf(whole.layers, whole.nodes.size, &CellLayer::cell);
     }
     whole.fragments = std::move(level.fragments);
     level = std::move(whole);
@@ -458,7 +445,7 @@ double spectralRadius(const CellLevel& level)
         lambda[to] = scale * level.lambda[from];
         start(to, level.diagonal[from], level.fixed[from] != 0);
     });
-    CutFields cuts(l, size, !level.cuts.empty());
+    CutFields cuts(level, l, size);
     cuts.place(level, Index3(0));
     for (const WindowFragments::Placed& p : fragments.placed()) {
         cuts.set(p.node, level.fragments.cells[p.fragment].cut);
@@ -496,7 +483,6 @@ std::vector<CellLevel> cellLevels(const FinestLevel& finest, std::size_t count,
 {
     FinestLevel first = support ? Resting::freePart(finest) : finest;
     std::vector<CellLevel> levels{withStiffSkin(first)};
-    levels.front().cuts = finestCuts(finest, surface);
     std::vector<std::uint8_t> loose = looseCells(levels.front(), finest.held, finest.octants);
     Split split;
     if (!finest.octants.empty()) {

@@ -15,54 +15,46 @@ void CutSum::add(double share, Vec3 middle, Vec3 second) noexcept
     second_ += share * (second + middle * middle);
 }
 
-void CutSum::add(const CutCell& cell, Index3 child) noexcept
+void CutSum::add(const Cut& cell, Index3 child) noexcept
 {
     add(0.125 * static_cast<double>(cell.share), 0.5 * (2.0 * Vec3(child) - 1.0 + Vec3(cell.middle)),
         Vec3(cell.spread) / 12.0);
 }
 
-CutCell CutSum::cut() const noexcept
+Cut CutSum::cut() const noexcept
 {
-    constexpr double whole = 0.98;     // share from which on a cell counts as full
     constexpr double thinnest = 0.02;  // spread: a plate of a seventh of the cell
-    if (!(share_ > 0.0)) {
+    const auto share = static_cast<float>(share_);
+    if (!(share > 0.0F && share < wholeCell)) {
         return {};
     }
     const Vec3 middle = first_ / share_;
     const Vec3 spread = 3.0 * (second_ / share_ - middle * middle);
-    if (share_ > whole) {
-        return {.share = static_cast<float>(share_)};
-    }
-    return {Vec3f(middle), Vec3f(glm::clamp(spread, Vec3(thinnest), Vec3(1.0))), static_cast<float>(share_)};
+    return {Vec3f(middle), Vec3f(glm::clamp(spread, Vec3(thinnest), Vec3(1.0))), share};
 }
 
-CutCell cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, std::uint8_t octants)
+Cut cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, const volume::CellMaterial& material)
 {
     constexpr int side = 4;
     constexpr double least = 0.02;  // share that the surface must know of
     constexpr double second = 1.0 / (3.0 * side * side);
-    if (surface.at(middle) < -0.9 * edge) {
-        return {};
-    }
     const double part = edge / side;
-    CutSum sum;
+    CutSum samples, eighths;
     double known = 0.0;
     volume::forEachIndex(Index3(0), Index3(side - 1), [&](Index3 n) {
         const Vec3 at = (Vec3(n) + 0.5) / static_cast<double>(side) - 0.5;
         const double share = std::clamp(0.5 - surface.at(middle + edge * at) / part, 0.0, 1.0) / (side * side * side);
-        sum.add(share, 2.0 * at, Vec3(second));
+        samples.add(share, 2.0 * at, Vec3(second));
         known += share;
     });
-    if (known >= least || octants == 0) {
-        return sum.cut();
-    }
-    CutSum eighths;
     for (int i = 0; i < 8; ++i) {
-        if ((octants >> i & 1) != 0) {
-            eighths.add(CutCell{}, octant(i));
+        if ((material.octants >> i & 1) != 0) {
+            eighths.add(Cut{}, octant(i));
         }
     }
-    return eighths.cut();
+    Cut cut = known >= least || material.octants == 0 ? samples.cut() : eighths.cut();
+    cut.share = material.fraction;
+    return cut;
 }
 
 }  // namespace palpate::chainmail

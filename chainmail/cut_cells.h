@@ -2,10 +2,12 @@
 
 #include <chainmail/fragments.h>
 #include <volume/scalar_field.h>
-
-#include <cstdint>
+#include <volume/tissue.h>
 
 namespace palpate::chainmail {
+
+/// Fraction of a cell that is tissue from which on all of it is.
+inline constexpr float wholeCell = 0.98F;
 
 /// What the parts of a cell's tissue make together.
 class CutSum {
@@ -15,9 +17,9 @@ public:
     /// @param second  moment of the part around its middle, in the same measure: 1/3 of a part as large as the cell
     void add(double share, Vec3 middle, Vec3 second) noexcept;
     /// The cell `child`, 0 or 1 along each axis, of a level twice as fine.
-    void add(const CutCell& cell, Index3 child) noexcept;
+    void add(const Cut& cell, Index3 child) noexcept;
     /// Whole where nothing was added, or as good as whole.
-    CutCell cut() const noexcept;
+    Cut cut() const noexcept;
 
 private:
     double share_ = 0.0;
@@ -26,9 +28,9 @@ private:
 
 /// Of a cell that the surface cuts, by samples of the distance to it; where the surface passes it by, as it may where
 /// tissue is thinner than a cell, by its eighths.
-/// @param middle   of the cell [m]
-/// @param edge     of the cell [m]
-/// @param octants  see FinestLevel::octants
-CutCell cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, std::uint8_t octants);
+/// @param middle    of the cell [m]
+/// @param edge      of the cell [m]
+/// @param material  what fills it
+Cut cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, const volume::CellMaterial& material);
 
 }  // namespace palpate::chainmail

@@ -1,6 +1,7 @@
 #include <chainmail/elastic_body.h>
 
 #include <chainmail/cell_levels.h>
+#include <chainmail/cut_cells.h>
 #include <volume/relaxation.h>
 
 #include <glm/common.hpp>
@@ -211,16 +212,20 @@ std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, const std::ve
     return octants;
 }
 
-void indexRows(ElasticBody& body)
+// The cells that the body's surface cuts.
+void addCuts(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
+             const volume::DistanceField& surface, CellLevel& level)
 {
-    const Index3 size = body.levels.front().nodes.size;
-    body.rows.assign(static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z) + 1, 0);
-    for (const auto& c : body.cells) {
-        ++body.rows[static_cast<std::size_t>(c.cell.y + c.cell.z * size.y) + 1];
-    }
-    for (std::size_t i = 1; i < body.rows.size(); ++i) {
-        body.rows[i] += body.rows[i - 1];
-    }
+    volume::forEachIndex(Index3(0), cells.size - 1, [&](Index3 c) {
+        const volume::CellMaterial& m = materials[cells.offset(c)];
+        if (level.mu[level.nodes.offset(c)] > 0.0F && m.fraction < wholeCell) {
+            const Cut cut = cutBy(surface, cells.position(c), cells.spacing, m);
+            if (!cut.isWhole()) {
+                level.cuts.push_back({c, cut});
+            }
+        }
+    });
+    level.cutRows = rowsOf(level.cuts, level.nodes.size, &CutCell::cell);
 }
 
 }  // namespace
@@ -235,9 +240,10 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     const Index3 size = paddedNodes(cells.size, levels);
     FinestLevel all = finest(cells, materials, poissonCap, size, relaxes);
     all.octants = octantsOf(cells, materials, all.level);
+    addCuts(cells, materials, surface, all.level);
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
-    indexRows(body);
+    body.rows = rowsOf(body.cells, body.levels.front().nodes.size, &SurfaceCell::cell);
     return body;
 }
 

@@ -20,6 +20,12 @@ struct CellLayer {
     Vec3f half{0.0F};    // from there to the two places that stand for its thickness, in the same measure
 };
 
+/// A cell that its tissue fills in part.
+struct CutCell {
+    Index3 cell{0};
+    Cut cut;
+};
+
 /// The whole body at one spacing: cubic cells, each of one material, between nodes.
 struct CellLevel {
     volume::NodeGrid nodes;           // cell (i, j, k) lies between nodes (i, j, k) and (i + 1, j + 1, k + 1)
@@ -29,9 +35,8 @@ struct CellLevel {
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
     std::array<std::vector<float>, volume::relaxationTerms> relaxing;  // weights of each cell [-]; none: does not relax
     std::vector<CellLayer> layers;                                     // by z, then y, then x
-    std::vector<std::uint32_t>
-        layerRows;                // first of `layers` in row (y, z) of cells, at y + z * nodes along y; none: no layers
-    std::vector<CutCell> cuts;    // of each cell; none: all are full (count x 1)
+    std::vector<CutCell> cuts;                                         // by z, then y, then x
+    std::vector<std::uint32_t> layerRows, cutRows;                     // of both, see rowsOf()
     std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
     Fragments fragments;          // of cells that gaps run through
     double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger
@@ -59,24 +64,25 @@ inline double youngsModulusOf(float mu) noexcept
     return 2.9 * static_cast<double>(mu);
 }
 
-/// What a cell's modes give to the operator's diagonal at each of its nodes [N/m]: h / 32 (2 mu (46 / 9 + 4 / 3 (1 + s)) +
-/// 2 lambda), with s = lambda / (lambda + 2 mu) of bending.
-inline float diagonalOf(float mu, float lambda, double spacing) noexcept
+/// How the tissue lies in a cell.
+inline Cut cutOf(const CellLevel& level, Index3 cell) noexcept
 {
-    const float bending = 4.0F / 3.0F * (1.0F + lambda / (lambda + 2.0F * mu));
-    return static_cast<float>(spacing / 32.0) * (2.0F * mu * (46.0F / 9.0F + bending) + 2.0F * lambda);
+    const auto row = static_cast<std::size_t>(cell.y + cell.z * level.nodes.size.y);
+    const auto found = inRow(level.cuts, level.cutRows, row, cell.x, cell.x, &CutCell::cell);
+    return found.empty() ? Cut{} : found.front().cut;
 }
 
-/// The same of a cell that is cut, at its node `side`, -1 or 1 along each axis.
-inline float diagonalOf(float mu, float lambda, double spacing, const CutCell& cut, Vec3f side) noexcept
+/// What a cell's modes give to the operator's diagonal at its node `side`, -1 or 1 along each axis [N/m]. Of a full cell, at
+/// each: h / 32 (2 mu (46 / 9 + 4 / 3 (1 + s)) + 2 lambda), with s = lambda / (lambda + 2 mu) of bending.
+/// @param mu  over 0
+inline float diagonalOf(float mu, float lambda, double spacing, const Cut& cut, Vec3f side) noexcept
 {
-    const Vec3f c = cut.middle, s = cut.spread, w = 1.0F + side * c;
+    const Vec3f w = 1.0F + side * cut.middle, s = cut.spread;
     const Vec3f slope(w.y * w.z, w.z * w.x, w.x * w.y);
-    const Vec3f along = w * w;  // of the modes yz, zx and xy
     const float bend = 4.0F / 3.0F * mu * (1.0F + lambda / (lambda + 2.0F * mu)), twist = 2.0F / 3.0F * mu;
-    const Vec3f two(s.y + s.z, s.z + s.x, s.x + s.y);
-    const float bending = bend * glm::dot(along, two) + twist * glm::dot(along, two) + 8.0F / 3.0F * mu * s.x * s.y * s.z;
-    return static_cast<float>(spacing / 32.0) * ((8.0F * mu + 2.0F * lambda) * glm::dot(slope, slope) + bending) / 3.0F;
+    const float bending = (bend + twist) * glm::dot(w * w, Vec3f(s.y + s.z, s.z + s.x, s.x + s.y));
+    const float both = 8.0F / 3.0F * mu * s.x * s.y * s.z;
+    return static_cast<float>(spacing / 32.0) * ((8.0F * mu + 2.0F * lambda) * glm::dot(slope, slope) + bending + both) / 3.0F;
 }
 
 /// Shear modulus of the level's cell that a place lies in; 0 where it is empty, and outside of the grid [Pa].

@@ -128,13 +128,6 @@ Stretch StretchAt::operator()(const ContactSite& site) noexcept
     return {std::clamp(glm::length(area), minRatio, maxRatio), std::min(modulus_, maxStiffer)};
 }
 
-Between betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept
-{
-    const Vec3 place = glm::fract((at - grid.origin) / grid.spacing);
-    const Vec3 b = place * (1.0 - place);
-    return {glm::dot(weights, b), glm::dot(weights, b * b)};
-}
-
 Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept
 {
     const Between mean;
@@ -145,12 +138,13 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
     const Vec3 inward = tool.pushed / depth;
     const Vec3 a = tool.shape.a + tool.shape.radiusA * inward, b = tool.shape.b + tool.shape.radiusB * inward;
     const double ahead = glm::dot(a - b, inward);
-    const Between place = betweenNodes(grid, (ahead < 0.0 ? b : a) - tool.pushed, 1.0 - inward * inward);
+    const Vec3 place = glm::fract(((ahead < 0.0 ? b : a) - tool.pushed - grid.origin) / grid.spacing);
+    const Vec3 f = place * (1.0 - place), across = 1.0 - inward * inward;
     const double isRound = tool.shape.a == tool.shape.b ? 1.0 : std::min(std::abs(ahead) / depth, 1.0);
-    return {glm::mix(mean.b, place.b, isRound), glm::mix(mean.square, place.square, isRound)};
+    return {glm::mix(mean.b, glm::dot(across, f), isRound), glm::mix(mean.square, glm::dot(across, f * f), isRound)};
 }
 
-double resolvedShare(double radiusInCells, double along, const Between& across, double coarser) noexcept
+double resolvedShare(double radiusInCells, const Between& across, double coarser) noexcept
 {
     const Between mean;
     const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
@@ -160,9 +154,7 @@ double resolvedShare(double radiusInCells, double along, const Between& across, 
     };
     const Lacking &to = *above, &from = *(above - 1);
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
-    const double lacks =
-        glm::mix(lacksAt(from), lacksAt(to), t) +
-        0.3 * along * std::min(radiusInCells / 0.75, 1.0) * std::max(1.0 - radiusInCells * radiusInCells / 16.0, 0.0);
+    const double lacks = glm::mix(lacksAt(from), lacksAt(to), t);
     return 1.0 / (1.0 + penalty * coarser * std::max(lacks, 0.0));
 }
 

@@ -98,7 +98,6 @@ struct alignas(64) ContactSite {
     double atRest = 0;        // stiffness of a surface point, by its area at rest [N/m]
     double stretch = 0;       // of its area at the end of the last call, see StretchAt; 0: not known
     std::uint32_t point = 0;  // index of the surface point
-    float between = 0;        // of the surface point: betweenNodes() along its normal
     float area = 0;           // of the surface that it stands for, at rest [m^2]
     float coarser = 1;        // see resolvedShare()
     float resolved = 1;       // fraction of its stiffness that wider cells leave it
@@ -212,14 +211,13 @@ private:
     double modulus_ = 1;
 };
 
-/// How far between nodes a place is: over the edges of a cell, each with its weight, sums of b = f (1 - f) and of b^2, f
-/// the place along one, 0 to 1. The defaults are their means over all places, for two edges of weight 1.
+/// How far between nodes a place is: over the edges of a cell along the surface sums of b = f (1 - f) and of b^2, f the
+/// place along one, 0 to 1. The defaults are their means over all places.
 struct Between {
     double b = 1.0 / 3.0;
     double square = 1.0 / 15.0;
 };
-Between betweenNodes(const volume::NodeGrid& grid, Vec3 at, Vec3 weights) noexcept;
-/// The same of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat.
+/// Of the middle of what a tool touches, over the edges across its way. The mean for a capsule that lies flat.
 Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noexcept;
 
 /// Fraction of the contact's stiffness that a point has under a patch of radius a on cells of side h.
@@ -227,18 +225,16 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
 /// Cells do not give way under a patch smaller than themselves as tissue does, least in the middle between nodes. What they
 /// lack there is a compliance c h / E per area:
 ///
-///     c = m + g (b - 1/3) + q (b^2 - 1/15) + 0.3 along min(1, a / 0.75 h) max(0, 1 - (a / 4 h)^2)
+///     c = m + g (b - 1/3) + q (b^2 - 1/15)
 ///     share = 1 / (1 + 20 c)
 ///
-/// m, g and q are functions of a / h; all end at 2. They and the factor of `along` are what a ball on a half-space (Hertz
-/// 1882; nu 0.45 to 0.49) needs on grids shifted along and across the surface; `palpate accuracy --verify` has the errors
-/// that are left.
+/// m, g and q are functions of a / h; all end at 2. They are what a ball on a half-space (Hertz 1882; nu 0.45 to 0.49) needs
+/// on grids shifted along the surface; `palpate accuracy --verify` has the errors that are left.
 ///
 /// A point in a wider window lies in cells that are `coarser` times as wide as h: they lack as many times the compliance.
 /// @param radiusInCells  in cells of its window
-/// @param along   betweenNodes() of the point along the surface's normal
-/// @param across  and of the tool
-double resolvedShare(double radiusInCells, double along, const Between& across, double coarser = 1.0) noexcept;
+/// @param across  betweenNodes() of the tool
+double resolvedShare(double radiusInCells, const Between& across, double coarser = 1.0) noexcept;
 
 /// Value of a field at a site.
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept;

@@ -1,9 +1,9 @@
 #pragma once
 
+#include <chainmail/cell_rows.h>
 #include <volume/geometry.h>
 #include <volume/tissue.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -23,15 +23,20 @@ inline int octantOf(Index3 off) noexcept
 {
     return off.x + 2 * off.y + 4 * off.z;
 }
+/// Of a cell's corner: -1 or 1 along each axis.
+inline Vec3f sideOf(int corner) noexcept
+{
+    return 2.0F * Vec3f(octant(corner)) - 1.0F;
+}
 
 /// Where the tissue of a cell lies that it fills in part: its energy is that of the strain there, and not in the middle of
 /// the cell. A plate in the lower half of a cell bends as a plate.
-struct CutCell {
+struct Cut {
     Vec3f middle{0.0F};  // of the tissue, -1 to 1 along each edge of the cell
     Vec3f spread{1.0F};  // second moment of the tissue around it along each edge, over that of a full cell
     float share = 1;     // of the cell that is tissue
 
-    bool isWhole() const noexcept { return middle == Vec3f(0.0F) && spread == Vec3f(1.0F); }
+    bool isWhole() const noexcept { return share == 1.0F && middle == Vec3f(0.0F) && spread == Vec3f(1.0F); }
 };
 
 /// A further node where a level has one: for tissue that does not hang together there with the tissue of that node.
@@ -49,7 +54,7 @@ struct CellFragment {
     std::array<std::uint32_t, 8> nodes{};
     float mu = 0, lambda = 0, stiffening = 0;  // as those of a cell
     std::array<float, volume::relaxationTerms> relaxing{};
-    CutCell cut{};              // where it lies in the cell
+    Cut cut{};                  // where it lies in the cell
     float held = 0;             // fraction of its tissue that is held in space
     std::uint8_t children = 0;  // the next finer level's cells in it, a bit for each, x fastest; without their fragments
     std::uint32_t parent = noFragment;  // fragment of the next coarser level that it lies in; none: in the cell itself
@@ -81,7 +86,7 @@ struct Fragments {
     /// Those of one cell. @param sizeY  the level's nodes along y
     std::span<const CellFragment> in(Index3 cell, int sizeY) const noexcept
     {
-        return inRow(cells, rows, cell.y + cell.z * sizeY, cell.x, cell.x, [](const CellFragment& f) { return f.cell.x; });
+        return cellsOf(cell, cell.x, sizeY);
     }
     /// Index of the one in which a cell of the next finer level lies, without its fragments; noFragment: none.
     std::uint32_t holding(Index3 child, int sizeY) const noexcept
@@ -96,27 +101,15 @@ struct Fragments {
     /// Those of the cells from `low` on of a row. @param last  along x
     std::span<const CellFragment> cellsOf(Index3 low, int last, int sizeY) const noexcept
     {
-        return inRow(cells, rows, low.y + low.z * sizeY, low.x, last, [](const CellFragment& f) { return f.cell.x; });
+        return inRow(cells, rows, rowOf(low, sizeY), low.x, last, &CellFragment::cell);
     }
     std::span<const NodeLink> linksOf(Index3 low, int last, int sizeY) const noexcept
     {
-        return inRow(links, linkRows, low.y + low.z * sizeY, low.x, last, [](const NodeLink& l) { return l.at.x; });
+        return inRow(links, linkRows, rowOf(low, sizeY), low.x, last, &NodeLink::at);
     }
 
 private:
-    template <typename T, typename Place>
-    static std::span<const T> inRow(const std::vector<T>& all, const std::vector<std::uint32_t>& rows, int row, int low,
-                                    int high, Place&& place) noexcept
-    {
-        if (rows.empty()) {
-            return {};
-        }
-        const T* first = all.data() + rows[static_cast<std::size_t>(row)];
-        const T* last = all.data() + rows[static_cast<std::size_t>(row) + 1];
-        first = std::partition_point(first, last, [&](const T& t) { return place(t) < low; });
-        last = std::partition_point(first, last, [&](const T& t) { return place(t) <= high; });
-        return {first, last};
-    }
+    static std::size_t rowOf(Index3 cell, int sizeY) noexcept { return static_cast<std::size_t>(cell.y + cell.z * sizeY); }
 };
 
 }  // namespace palpate::chainmail

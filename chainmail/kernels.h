@@ -34,7 +34,8 @@ struct Layout {
     std::size_t scratchSize() const noexcept { return 24 * plane + 6 * row + lanes; }
 };
 
-/// Thin layers of cells (count x 1 each), see CellLayer: its shear modulus times h / 32, 0 where a cell has none.
+/// Thin layers of cells (count x 1 each), see CellLayer: its shear modulus times h / 32, 0 where a cell has none; its middle
+/// from that of the cell's tissue, see CutCells.
 struct CellLayers {
     const float* mu = nullptr;
     std::array<const float*, 3> normal{};
@@ -43,7 +44,7 @@ struct CellLayers {
     const std::uint8_t* any = nullptr;  // not 0 where one of Layout::lanes cells in a row has a layer (count / lanes x 1)
 };
 
-/// Where the tissue of cells lies that it fills in part (count x 1 each), see CutCell.
+/// Where the tissue of cells lies that it fills in part (count x 1 each), see Cut.
 struct CutCells {
     std::array<const float*, 3> middle{};
     std::array<const float*, 3> spread{};
@@ -57,7 +58,7 @@ struct CellStiffness {
     const float* lambda = nullptr;                           // Lame's first parameter, times h / 32 [N/m]
     const float* stiffening = nullptr;                       // b of finite strain [-]; none: 0
     CellLayers layers{};                                     // without mu: no cell has one
-    CutCells cuts{};                                         // without any: no cell is cut; else none has a layer
+    CutCells cuts{};                                         // without `any`: no cell is cut
     std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
 };
 

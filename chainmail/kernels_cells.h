@@ -7,10 +7,10 @@ namespace palpate::chainmail {
 namespace {
 
 // Small strain: the law of kernels.h.
-template <typename Layer, typename Cut>
+template <typename Layer>
 struct Linear {
     Layer layers;
-    Cut cuts;
+    Cuts cuts;
 
     template <typename Filled>
     void operator()(const Filled& filled, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
@@ -33,12 +33,12 @@ struct Linear {
 // Finite strain: stable neo-Hookean and what the law has beyond it, on the mean deformation gradient. With modes eight
 // times their size F = I + m / (4 h), and the gradient by a mode is h^2 / 4 times the first Piola-Kirchhoff stress: 8 h
 // times the scaled stiffness.
-template <typename Law, typename Layer, typename Cut>
+template <typename Law, typename Layer>
 struct Finite {
     float inverse;            // 1 / h
     const float* stiffening;  // of each cell, or none
     Layer layers;
-    Cut cuts;
+    Cuts cuts;
     Lanes energy[Layout::lanes / W] = {};  // sixteen partial sums at any width
     std::size_t turn = 0;
 
@@ -111,15 +111,13 @@ template <typename Law>
 [[gnu::always_inline]] inline void energyOf(Law& law, Lanes mu, Lanes lambda, std::size_t cell, Modes (&m)[3],
                                             Modes (&g)[3]) noexcept
 {
-    if constexpr (decltype(law.cuts)::some) {
-        if (law.cuts.isAny(cell)) {
-            law.cuts.toMiddle(cell, m);
-            law(law.cuts.spread(cell), mu, lambda, cell, m, g);
-            law.cuts.fromMiddle(cell, g);
-            return;
-        }
+    if (!law.cuts.isAny(cell)) {
+        law(Whole{}, mu, lambda, cell, m, g);
+        return;
     }
-    law(Whole{}, mu, lambda, cell, m, g);
+    law.cuts.toMiddle(cell, m);
+    law(law.cuts.spread(cell), mu, lambda, cell, m, g);
+    law.cuts.fromMiddle(cell, g);
 }
 
 // What becomes of A u at a node: it is stored,
@@ -301,11 +299,9 @@ void sweepLinear(const Layout& layout, const CellStiffness& stiffness, const flo
 {
     const auto sweep = [&](auto law) { sweepCells(layout, stiffness, u, keep, scratch, law); };
     if (stiffness.layers.mu != nullptr) {
-        sweep(Linear<Layers, NoCuts>{Layers(stiffness.layers), NoCuts(stiffness.cuts)});
-    } else if (stiffness.cuts.any != nullptr) {
-        sweep(Linear<NoLayers, Cuts>{NoLayers(stiffness.layers), Cuts(stiffness.cuts)});
+        sweep(Linear<Layers>{Layers(stiffness.layers), Cuts(stiffness.cuts)});
     } else {
-        sweep(Linear<NoLayers, NoCuts>{NoLayers(stiffness.layers), NoCuts(stiffness.cuts)});
+        sweep(Linear<NoLayers>{NoLayers(stiffness.layers), Cuts(stiffness.cuts)});
     }
 }
 
@@ -326,11 +322,11 @@ void smoothOf(const Layout& layout, CellStiffness stiffness, const Smoother& by,
     sweepLinear(layout, stiffness, u, KeepSmooth{by.weight, by.diagonal, by.r, u, out, layout.count}, scratch);
 }
 
-template <typename Law, typename Layer, typename Cut>
+template <typename Law, typename Layer>
 double sweepFinite(const Layout& layout, const CellStiffness& stiffness, float inverse, const float* u, float* out,
                    float* scratch) noexcept
 {
-    Finite<Law, Layer, Cut> law{inverse, stiffness.stiffening, Layer(stiffness.layers), Cut(stiffness.cuts)};
+    Finite<Law, Layer> law{inverse, stiffness.stiffening, Layer(stiffness.layers), Cuts(stiffness.cuts)};
     sweepCells(layout, stiffness, u, Keep{out, layout.count}, scratch, law);
     double sum = 0.0;
     for (const Lanes& part : law.energy) {
@@ -343,11 +339,8 @@ template <typename Law>
 double applyLaw(const Layout& layout, CellStiffness stiffness, float inverse, const float* u, float* out,
                 float* scratch) noexcept
 {
-    if (stiffness.layers.mu != nullptr) {
-        return sweepFinite<Law, Layers, NoCuts>(layout, stiffness, inverse, u, out, scratch);
-    }
-    return stiffness.cuts.any != nullptr ? sweepFinite<Law, NoLayers, Cuts>(layout, stiffness, inverse, u, out, scratch)
-                                         : sweepFinite<Law, NoLayers, NoCuts>(layout, stiffness, inverse, u, out, scratch);
+    return stiffness.layers.mu != nullptr ? sweepFinite<Law, Layers>(layout, stiffness, inverse, u, out, scratch)
+                                          : sweepFinite<Law, NoLayers>(layout, stiffness, inverse, u, out, scratch);
 }
 
 using ApplyFinite = decltype(Kernels::applyFinite);

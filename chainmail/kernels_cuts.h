@@ -1,4 +1,4 @@
-// Cells that their tissue fills in part, see CutCell. Only kernels_body.h includes it.
+// Cells that their tissue fills in part, see Cut. Only kernels_body.h includes it.
 
 #include <chainmail/kernels.h>
 
@@ -6,20 +6,13 @@ namespace palpate::chainmail {
 
 namespace {
 
-// No cell is cut: the code for those is not even there.
-struct NoCuts {
-    static constexpr bool some = false;
-    explicit NoCuts(const CutCells&) noexcept {}
-};
-
 // The modes of a cell around the middle c of its tissue: with u the sum of modes by x, y, z, x y and so on, its derivatives
 // there. Their gradient goes back the same way.
 class Cuts {
 public:
-    static constexpr bool some = true;
     explicit Cuts(const CutCells& cuts) noexcept : cuts_(cuts) {}
 
-    bool isAny(std::size_t cell) const noexcept { return cuts_.any[cell / Layout::lanes] != 0; }
+    bool isAny(std::size_t cell) const noexcept { return cuts_.any != nullptr && cuts_.any[cell / Layout::lanes] != 0; }
     Spread spread(std::size_t cell) const noexcept
     {
         return {load(cuts_.spread[0] + cell), load(cuts_.spread[1] + cell), load(cuts_.spread[2] + cell)};

@@ -6,6 +6,25 @@
 
 namespace palpate::chainmail {
 
+namespace {
+
+// Calls `use` with each cell of the box from `at` on.
+template <typename T, typename Use>
+void forEachIn(const std::vector<T>& all, const std::vector<std::uint32_t>& rows, int sizeY, Index3 at, Index3 box,
+               Index3 T::*place, Use&& use) noexcept
+{
+    for (int z = at.z; z + 1 < at.z + box.z; ++z) {
+        for (int y = at.y; y + 1 < at.y + box.y; ++y) {
+            const auto row = static_cast<std::size_t>(y + z * sizeY);
+            for (const T& t : inRow(all, rows, row, at.x, at.x + box.x - 2, place)) {
+                use(t);
+            }
+        }
+    }
+}
+
+}  // namespace
+
 LayerFields::LayerFields(const Layout& layout, Index3 box, bool any) : layout_(layout), box_(box)
 {
     const std::size_t room = any ? layout.count + Layout::lanes : 0;
@@ -18,22 +37,17 @@ LayerFields::LayerFields(const Layout& layout, Index3 box, bool any) : layout_(l
     }
 }
 
+// A layer lies in the cell; the kernels want it from the middle of the cell's tissue.
 void LayerFields::place(const CellLevel& level, Index3 at) noexcept
 {
     some_ = false;
     std::fill(mu_.begin(), mu_.end(), 0.0F);
     std::fill(any_.begin(), any_.end(), std::uint8_t{0});
-    const int rows = mu_.empty() ? 0 : (box_.y - 1) * (box_.z - 1);
-    for (int r = 0; r < rows; ++r) {
-        const Index3 first = at + Index3(0, r % (box_.y - 1), r / (box_.y - 1));
-        const auto row = static_cast<std::size_t>(first.y + first.z * level.nodes.size.y);
-        for (std::uint32_t i = level.layerRows[row]; i < level.layerRows[row + 1]; ++i) {
-            const Index3 cell = level.layers[i].cell - at;
-            if (cell.x >= 0 && cell.x + 1 < box_.x) {
-                set(layout_.at(cell.x, cell.y, cell.z), level.layers[i], static_cast<float>(level.nodes.spacing / 32.0));
-            }
-        }
-    }
+    forEachIn(level.layers, level.layerRows, level.nodes.size.y, at, box_, &CellLayer::cell, [&](CellLayer layer) {
+        const Index3 cell = layer.cell - at;
+        layer.middle -= cutOf(level, layer.cell).middle;
+        set(layout_.at(cell.x, cell.y, cell.z), layer, static_cast<float>(level.nodes.spacing / 32.0));
+    });
 }
 
 void LayerFields::set(std::size_t cell, const CellLayer& layer, float scale) noexcept
@@ -60,8 +74,10 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
             any_.data()};
 }
 
-CutFields::CutFields(const Layout& layout, Index3 box, bool any) : layout_(layout), box_(box)
+CutFields::CutFields(const CellLevel& level, const Layout& layout, Index3 box) : layout_(layout), box_(box)
 {
+    const auto isCut = [](const CellFragment& f) { return !f.cut.isWhole(); };
+    const bool any = !level.cuts.empty() || std::ranges::any_of(level.fragments.cells, isCut);
     const std::size_t room = any ? layout.count + Layout::lanes : 0;
     any_.assign(room / Layout::lanes, 0);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -73,25 +89,20 @@ CutFields::CutFields(const Layout& layout, Index3 box, bool any) : layout_(layou
 void CutFields::place(const CellLevel& level, Index3 at) noexcept
 {
     some_ = false;
-    if (any_.empty()) {
-        return;
-    }
     std::fill(any_.begin(), any_.end(), std::uint8_t{0});
     for (std::size_t c = 0; c < 3; ++c) {
         std::fill(middle_[c].begin(), middle_[c].end(), 0.0F);
         std::fill(spread_[c].begin(), spread_[c].end(), 1.0F);
     }
-    volume::forEachIndex(Index3(0), box_ - 2, [&](Index3 c) {
-        const std::size_t from = level.nodes.offset(at + c);
-        if (level.mu[from] > 0.0F) {
-            set(layout_.at(c.x, c.y, c.z), level.cuts[from]);
-        }
+    forEachIn(level.cuts, level.cutRows, level.nodes.size.y, at, box_, &CutCell::cell, [&](const CutCell& c) {
+        const Index3 cell = c.cell - at;
+        set(layout_.at(cell.x, cell.y, cell.z), c.cut);
     });
 }
 
-void CutFields::set(std::size_t cell, const CutCell& cut) noexcept
+void CutFields::set(std::size_t cell, const Cut& cut) noexcept
 {
-    if (any_.empty() || cut.isWhole()) {
+    if (cut.isWhole()) {
         return;
     }
     for (int c = 0; c < 3; ++c) {
@@ -100,6 +111,14 @@ void CutFields::set(std::size_t cell, const CutCell& cut) noexcept
     }
     any_[cell / Layout::lanes] = 1;
     some_ = true;
+}
+
+Cut CutFields::at(std::size_t cell) const noexcept
+{
+    if (!some_) {
+        return {};
+    }
+    return {{middle_[0][cell], middle_[1][cell], middle_[2][cell]}, {spread_[0][cell], spread_[1][cell], spread_[2][cell]}};
 }
 
 CutCells CutFields::view() const noexcept
@@ -124,7 +143,7 @@ Window::Window(const CellLevel& level, Index3 size, bool relaxes)
     : box(size),
       layout(Layout::of(size.x, size.y, WindowFragments::planes(level, size))),
       layers(layout, size, !level.layers.empty()),
-      cuts(layout, size, !level.cuts.empty()),
+      cuts(level, layout, size),
       fragments(level, size)
 {
     for (Floats* cells :
@@ -274,9 +293,15 @@ void Window::placeFragments(const CellLevel& level, bool coarsest) noexcept
 // A fragment that found no place is one with its cell.
 void Window::keepWhole(const CellLevel& level, const CellFragment& f) noexcept
 {
+    if (f.mu <= 0.0F) {
+        return;
+    }
     const float scale = static_cast<float>(level.nodes.spacing / 32.0);
     const std::size_t cell = at(f.cell);
     const float more = scale * f.mu;
+    if (mu[cell] == 0.0F) {
+        cuts.set(cell, f.cut);
+    }
     stiffening[cell] = (mu[cell] * stiffening[cell] + more * f.stiffening) / (mu[cell] + more);
     mu[cell] += more;
     lambda[cell] += scale * f.lambda;
@@ -286,9 +311,9 @@ void Window::keepWhole(const CellLevel& level, const CellFragment& f) noexcept
         terms[i].mu[cell] += f.relaxing[i] * more;
         terms[i].lambda[cell] += f.relaxing[i] * scale * f.lambda;
     }
-    const float own = diagonalOf(f.mu, f.lambda, level.nodes.spacing);
     for (int c = 0; c < 8; ++c) {
         const std::size_t node = layout.corner(cell, c);
+        const float own = diagonalOf(f.mu, f.lambda, level.nodes.spacing, cuts.at(cell), sideOf(c));
         if (open[node] > 0.0F && border[node] == 0.0F) {
             const float before = diagonal[node] > 0.0F ? 1.0F / diagonal[node] : 0.0F;
             diagonal[node] = 1.0F / (before + own);

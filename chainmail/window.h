@@ -82,11 +82,11 @@ private:
 /// The cut cells in a box, and those behind it.
 class CutFields {
 public:
-    /// @param any  the level has cut cells; where it has none, nothing is kept
-    CutFields(const Layout& layout, Index3 box, bool any);
+    CutFields(const CellLevel& level, const Layout& layout, Index3 box);
     /// Takes those of the level's cells from `at` on. Behind the box no cell is cut.
     void place(const CellLevel& level, Index3 at) noexcept;
-    void set(std::size_t cell, const CutCell& cut) noexcept;
+    void set(std::size_t cell, const Cut& cut) noexcept;
+    Cut at(std::size_t cell) const noexcept;
     /// What the kernels take; without `any` where no cell is cut.
     CutCells view() const noexcept;
 
@@ -119,7 +119,7 @@ struct Window {
     Floats stiffening;  // of each cell [-]
     Floats uncoveredMu, uncoveredLambda;  // the same, zero in cells that a finer window covers
     LayerFields layers;                   // of the finest window only
-    CutFields cuts;                       // of the others
+    CutFields cuts;
     struct Term {
         Floats mu, lambda, layer;
     };

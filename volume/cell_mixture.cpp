@@ -58,6 +58,7 @@ CellMaterial CellMixture::material() const noexcept
     const double modulus = free_.fraction > 0.0 ? std::min(free_.mean() * tissue / free_.fraction, rigid) : rigid;
     CellMaterial material{static_cast<float>(tissue * modulus),
                           static_cast<float>(poisson_ / tissue),
+                          static_cast<float>(tissue),
                           static_cast<float>(held_.fraction / tissue),
                           static_cast<float>(stiffening_.mean()),
                           {},

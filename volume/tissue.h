@@ -61,6 +61,7 @@ struct CellMaterial {
     /// space, that of the rest, stiffer by as much as it is thinner [Pa].
     float youngsModulus = 0;
     float poissonRatio = 0;                         // mean over the tissue [-]
+    float fraction = 1;                             // of the cell that is tissue [-]
     float fixed = 0;                                // fraction of the tissue that is held in space [-]
     float stiffening = 0;                           // mean over the tissue [-]
     std::array<float, relaxationTerms> relaxing{};  // weights of Relaxation, mean over what is not held [-]

@@ -387,7 +387,9 @@ std::vector<CellMaterial> materials(const TissueData& tissue, const NodeGrid& gr
                 if (mixture.fraction() < full) {
                     cell.octants = sampler.octants(n, [&](std::uint16_t label) { return rows[label] != nullptr; });
                 }
-                cell.youngsModulus *= static_cast<float>(scale(at, mixture.fraction()));
+                const auto scaled = static_cast<float>(scale(at, mixture.fraction()));
+                cell.youngsModulus *= scaled;
+                cell.fraction = std::min(scaled * cell.fraction, 1.0F);
             }
         },
         true);

@@ -53,8 +53,9 @@ ElasticBody bodyOf(const Slab& slab, double h)
     volume::forEachIndex(Index3(0), grid.size - 1, [&](Index3 n) {
         const Index3 c = n - air;
         if (c == glm::clamp(c, Index3(0), cells - 1)) {
-            materials[grid.offset(n)] = {static_cast<float>(youngsModulus), static_cast<float>(slab.poissonRatio),
-                                         c.y == deep ? 1.0F : 0.0F};
+            materials[grid.offset(n)] = {.youngsModulus = static_cast<float>(youngsModulus),
+                                         .poissonRatio = static_cast<float>(slab.poissonRatio),
+                                         .fixed = c.y == deep ? 1.0F : 0.0F};
         }
         surface.values[grid.offset(n)] = static_cast<float>(boxDistance(grid.position(n), low, low + h * Vec3(cells)));
     });

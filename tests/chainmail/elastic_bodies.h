@@ -18,7 +18,9 @@ namespace palpate::tests {
 
 inline volume::CellMaterial tissue(double youngsModulus, double poissonRatio, bool fixed = false)
 {
-    return {static_cast<float>(youngsModulus), static_cast<float>(poissonRatio), fixed ? 1.0F : 0.0F, 0.0F, {}, 1.0F};
+    return {.youngsModulus = static_cast<float>(youngsModulus),
+            .poissonRatio = static_cast<float>(poissonRatio),
+            .fixed = fixed ? 1.0F : 0.0F};
 }
 
 /// A block of tissue in air. Its surface towards the hand is y = low.y (frame LPS).
@@ -72,7 +74,8 @@ inline chainmail::ElasticBody bodyOf(const ElasticBlock& block, double poissonCa
     volume::forEachIndex(Index3(0), block.cells - 1, [&](Index3 c) {
         auto& material = materials[grid.offset(c + block.air)];
         material = block.material(c);
-        material.youngsModulus *= c.y == 0 ? static_cast<float>(block.full) : 1.0F;
+        material.fraction = c.y == 0 ? static_cast<float>(block.full) : 1.0F;
+        material.youngsModulus *= material.fraction;
     });
     const Vec3 low = block.low + Vec3(0.0, (1.0 - block.full) * h, 0.0), high = block.low + h * Vec3(block.cells);
     const auto surface = distanceOn(grid, [&](Vec3 p) { return boxDistance(p, low, high); });
