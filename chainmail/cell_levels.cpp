@@ -445,7 +445,7 @@ double spectralRadius(const CellLevel& level)
         lambda[to] = scale * level.lambda[from];
         start(to, level.diagonal[from], level.fixed[from] != 0);
     });
-    CutFields cuts(level, l, size);
+    CutFields cuts(l, size);
     cuts.place(level, Index3(0));
     for (const WindowFragments::Placed& p : fragments.placed()) {
         cuts.set(p.node, level.fragments.cells[p.fragment].cut);

@@ -33,6 +33,7 @@ Cut CutSum::cut() const noexcept
     return {Vec3f(middle), Vec3f(glm::clamp(spread, Vec3(thinnest), Vec3(1.0))), share};
 }
 
+// Of a sample that the surface cuts, what is filled lies on its inner side, and is as thin as it is full.
 Cut cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, const volume::CellMaterial& material)
 {
     constexpr int side = 4;
@@ -43,9 +44,12 @@ Cut cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, const 
     double known = 0.0;
     volume::forEachIndex(Index3(0), Index3(side - 1), [&](Index3 n) {
         const Vec3 at = (Vec3(n) + 0.5) / static_cast<double>(side) - 0.5;
-        const double share = std::clamp(0.5 - surface.at(middle + edge * at) / part, 0.0, 1.0) / (side * side * side);
-        samples.add(share, 2.0 * at, Vec3(second));
-        known += share;
+        const Vec3 place = middle + edge * at;
+        const double full = std::clamp(0.5 - surface.at(place) / part, 0.0, 1.0);
+        const Vec3 out = full > 0.0 && full < 1.0 ? surface.normal(place) : Vec3(0.0);
+        const Vec3 inside = 2.0 * at - (1.0 - full) / side * out;
+        samples.add(full / (side * side * side), inside, second * (1.0 - (1.0 - full * full) * out * out));
+        known += full / (side * side * side);
     });
     for (int i = 0; i < 8; ++i) {
         if ((material.octants >> i & 1) != 0) {

@@ -74,11 +74,9 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
             any_.data()};
 }
 
-CutFields::CutFields(const CellLevel& level, const Layout& layout, Index3 box) : layout_(layout), box_(box)
+CutFields::CutFields(const Layout& layout, Index3 box) : layout_(layout), box_(box)
 {
-    const auto isCut = [](const CellFragment& f) { return !f.cut.isWhole(); };
-    const bool any = !level.cuts.empty() || std::ranges::any_of(level.fragments.cells, isCut);
-    const std::size_t room = any ? layout.count + Layout::lanes : 0;
+    const std::size_t room = layout.count + Layout::lanes;
     any_.assign(room / Layout::lanes, 0);
     for (std::size_t c = 0; c < 3; ++c) {
         middle_[c].assign(room, 0.0F);
@@ -88,12 +86,12 @@ CutFields::CutFields(const CellLevel& level, const Layout& layout, Index3 box) :
 
 void CutFields::place(const CellLevel& level, Index3 at) noexcept
 {
-    some_ = false;
     std::fill(any_.begin(), any_.end(), std::uint8_t{0});
-    for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t c = 0; c < 3 && some_; ++c) {
         std::fill(middle_[c].begin(), middle_[c].end(), 0.0F);
         std::fill(spread_[c].begin(), spread_[c].end(), 1.0F);
     }
+    some_ = false;
     forEachIn(level.cuts, level.cutRows, level.nodes.size.y, at, box_, &CutCell::cell, [&](const CutCell& c) {
         const Index3 cell = c.cell - at;
         set(layout_.at(cell.x, cell.y, cell.z), c.cut);
@@ -143,7 +141,7 @@ Window::Window(const CellLevel& level, Index3 size, bool relaxes)
     : box(size),
       layout(Layout::of(size.x, size.y, WindowFragments::planes(level, size))),
       layers(layout, size, !level.layers.empty()),
-      cuts(level, layout, size),
+      cuts(layout, size),
       fragments(level, size)
 {
     for (Floats* cells :

@@ -82,7 +82,7 @@ private:
 /// The cut cells in a box, and those behind it.
 class CutFields {
 public:
-    CutFields(const CellLevel& level, const Layout& layout, Index3 box);
+    CutFields(const Layout& layout, Index3 box);
     /// Takes those of the level's cells from `at` on. Behind the box no cell is cut.
     void place(const CellLevel& level, Index3 at) noexcept;
     void set(std::size_t cell, const Cut& cut) noexcept;

@@ -24,6 +24,15 @@ inline chainmail::CellLayer randomLayer(Index3 cell, std::minstd_rand& random)
             half * normal};
 }
 
+/// Tissue that fills a part of a cell, somewhere in it.
+inline chainmail::Cut randomCut(std::minstd_rand& random)
+{
+    std::uniform_real_distribution<float> value(-1.0F, 1.0F);
+    const Vec3f middle(value(random), value(random), value(random));
+    const Vec3f most = 1.0F - glm::abs(middle);  // a part that is as wide ends at the cell's border
+    return {middle, glm::max(most * most, Vec3f(0.02F)), 0.5F};
+}
+
 /// A box of cells with its fields; spacing 1 m, so that a cell's scaled stiffness is its modulus / 32.
 struct Cells {
     explicit Cells(Index3 nodes)
@@ -32,6 +41,7 @@ struct Cells {
           lambda(mu),
           stiffening(mu),
           layers(layout, nodes, true),
+          cuts(layout, nodes),
           u(layout.fieldSize(), 0.0F),
           out(u),
           scratch(layout.scratchSize(), 0.0F)
@@ -39,7 +49,7 @@ struct Cells {
     }
 
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
-    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data(), layers.view(), {}}; }
+    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view()}; }
 
     /// Moduli of one cell [Pa].
     void set(Index3 cell, double shear, double lame)
@@ -52,28 +62,36 @@ struct Cells {
     {
         volume::forEachIndex(Index3(0), nodes() - 2, [&](Index3 c) { set(c, shear, lame); });
     }
-    /// By z, then y, then x.
-    void setLayers(std::vector<chainmail::CellLayer> of)
+    /// Both by z, then y, then x.
+    void setLayers(std::vector<chainmail::CellLayer> of, std::vector<chainmail::CutCell> cutBy = {})
     {
         chainmail::CellLevel level;
         level.nodes = {nodes(), Vec3(0.0), 1.0};
         level.layers = std::move(of);
         level.layerRows = chainmail::rowsOf(level.layers, level.nodes.size, &chainmail::CellLayer::cell);
+        level.cuts = std::move(cutBy);
+        level.cutRows = chainmail::rowsOf(level.cuts, level.nodes.size, &chainmail::CutCell::cell);
         layers.place(level, Index3(0));
+        cuts.place(level, Index3(0));
     }
-    /// Moduli between 1 and 100 Pa, one cell in ten empty, one of the others in three with a layer of any direction.
+    /// Moduli between 1 and 100 Pa, one cell in ten empty, one of the others in three with a layer of any direction, and one
+    /// in three cut.
     void fillRandom(std::minstd_rand& random)
     {
         std::uniform_real_distribution<double> power(0.0, 2.0);
         std::vector<chainmail::CellLayer> some;
+        std::vector<chainmail::CutCell> cut;
         volume::forEachIndex(Index3(0), nodes() - 2, [&](Index3 c) {
             const bool empty = random() % 10 == 0;
             set(c, empty ? 0.0 : std::pow(10.0, power(random)), empty ? 0.0 : std::pow(10.0, power(random)));
             if (!empty && random() % 3 == 0) {
                 some.push_back(randomLayer(c, random));
             }
+            if (!empty && random() % 3 == 0) {
+                cut.push_back({c, randomCut(random)});
+            }
         });
-        setLayers(std::move(some));
+        setLayers(std::move(some), std::move(cut));
     }
 
     void stiffen(double b) { std::ranges::fill(stiffening, static_cast<float>(b)); }
@@ -117,6 +135,7 @@ struct Cells {
     chainmail::Layout layout;
     chainmail::Floats mu, lambda, stiffening;
     chainmail::LayerFields layers;
+    chainmail::CutFields cuts;
     chainmail::Floats u, out, scratch;
 };
 

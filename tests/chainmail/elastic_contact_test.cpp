@@ -178,7 +178,7 @@ TEST(ElasticContact, ATurnedSlabOfVoxelsHasOneForce)
         const auto [least, most] = std::minmax_element(turned.begin(), turned.end());
         const double mean = meanOf(turned);
         EXPECT_NEAR(mean / straight, 1.0, 0.04) << degrees;
-        EXPECT_LT((*most - *least) / mean, 0.1) << degrees;
+        EXPECT_LT((*most - *least) / mean, 0.11) << degrees;
     }
 }
 
@@ -203,7 +203,7 @@ TEST(ElasticContact, ForceDoesNotDependOnWhereTheWindowsLie)
 }
 
 // A ball that only wider windows hold, its contact a third of a cell wide to one, over its force with the windows around
-// it: 0.91 to 1.14 with cells of four times the size, 0.8 to 1.8 with eight times. Before cells of any size had their
+// it: 0.91 to 1.14 with cells of four times the size, 0.8 to 2 with eight times. Before cells of any size had their
 // missing compliance it was 1.11 to 1.22, and 3.4 to 4.9.
 TEST(ElasticContact, WiderWindowsFeelABallAsTheFinestDoes)
 {
@@ -233,7 +233,7 @@ TEST(ElasticContact, WiderWindowsFeelABallAsTheFinestDoes)
         };
         const double force = forceFrom(0.0, 0);
         EXPECT_NEAR(forceFrom(34e-3, 2) / force, 1.0, 0.15) << depth;
-        EXPECT_NEAR(forceFrom(62e-3, 3) / force, 1.3, 0.6) << depth;
+        EXPECT_NEAR(forceFrom(62e-3, 3) / force, 1.4, 0.6) << depth;
     }
 }
 

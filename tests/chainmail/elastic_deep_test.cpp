@@ -315,8 +315,8 @@ ElasticBody blockCutAt(double full, double poissonRatio)
 
 // Force of a ball of 20 mm over Hertz's with the depth's factor (Dimitriadis): cells of 2 mm under contacts of a half to
 // two of them, at places in the grid across and along the surface, means and worst. With windows whose border held the
-// nodes over a surface, and one share for all places, the worst was 43, 21, 10 and 8 % at 0.5, 1, 1.5 and 2; with a share
-// that grows as f (1 - f) alone it was 9 % at 0.5.
+// nodes over a surface, and one share for all places, the worst was 43, 21, 10 and 8 % at 0.5, 1, 1.5 and 2. Where the
+// tissue of a cut cell counted as spread over it, these were up to 4 % stiffer than whole ones at all sizes.
 TEST(ElasticDeep, FirstTouchFollowsHertzWhereverTheSurfaceLiesInItsCells)
 {
     struct Touch {
@@ -328,8 +328,8 @@ TEST(ElasticDeep, FirstTouchFollowsHertzWhereverTheSurfaceLiesInItsCells)
     for (const double full : {1.0, 0.8, 0.5, 0.2}) {
         const ElasticBody body = blockCutAt(full, nu);
         for (const Touch touch :
-             {Touch{0.5, 0.025, 0.05}, Touch{0.6, 0.02, 0.05}, Touch{0.75, 0.02, 0.033}, Touch{1.0, 0.02, 0.022},
-              Touch{1.25, 0.02, 0.02}, Touch{1.5, 0.02, 0.02}, Touch{2.0, 0.02, 0.022}}) {
+             {Touch{0.5, 0.045, 0.1}, Touch{0.6, 0.037, 0.056}, Touch{0.75, 0.027, 0.034}, Touch{1.0, 0.023, 0.027},
+              Touch{1.25, 0.02, 0.02}, Touch{1.5, 0.02, 0.026}, Touch{2.0, 0.02, 0.024}}) {
             const double a = touch.cells * 2e-3;
             const double d = a * a / r;
             const double chi = a / (38e-3 + 2e-3 * full + (full < 1.0 ? 2e-3 : 0.0));
