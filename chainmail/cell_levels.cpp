@@ -388,9 +388,13 @@ void divideCells(Split split, const std::vector<float>& held, CellLevel& level)
 // Takes the cells as they are, with their layers, but for those that are fragments.
 void takeWhole(CellLevel whole, CellLevel& level)
 {
-    for (const CellFragment& f : level.fragments.cells) {
+    for (CellFragment& f : level.fragments.cells) {
         const std::size_t at = level.nodes.offset(f.cell);
         whole.mu[at] = whole.lambda[at] = 0.0F;
+        f.cut = withoutSliver(f.cut);
+    }
+    for (CutCell& c : whole.cuts) {
+        c.cut = withoutSliver(c.cut);
     }
     if (!level.fragments.cells.empty()) {
         std::erase_if(whole.layers,

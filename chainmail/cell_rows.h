@@ -11,8 +11,8 @@
 
 namespace palpate::chainmail {
 
-/// Of what lies at some of a grid's places, by z, then y, then x: the first in each row, at y + z * size.y, and behind them the
-/// count. Empty where there is nothing.
+/// Of what lies at some of a grid's places, by z, then y, then x: the first in each row, at y + z * size.y, and behind them
+/// the count. Empty where there is nothing.
 /// @param place  of one
 template <typename T>
 std::vector<std::uint32_t> rowsOf(const std::vector<T>& all, Index3 size, Index3 T::*place)

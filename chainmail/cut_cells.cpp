@@ -61,4 +61,11 @@ Cut cutBy(const volume::DistanceField& surface, Vec3 middle, double edge, const 
     return cut;
 }
 
+Cut withoutSliver(const Cut& cut) noexcept
+{
+    constexpr float least = 0.55F;
+    return {glm::clamp(cut.middle, Vec3f(least - 1.0F), Vec3f(1.0F - least)), glm::max(cut.spread, Vec3f(least * least)),
+            cut.share};
+}
+
 }  // namespace palpate::chainmail

@@ -228,8 +228,8 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
 ///     c = m + g (b - 1/3) + q (b^2 - 1/15)
 ///     share = 1 / (1 + 20 c)
 ///
-/// m, g and q are functions of a / h; all end at 2. They are what a ball on a half-space (Hertz 1882; nu 0.45 to 0.49) needs
-/// on grids shifted along the surface; `palpate accuracy --verify` has the errors that are left.
+/// m, g and q are functions of a / h; all end at 2. They are what a ball on a half-space (Hertz 1882; nu 0.45 to 0.49)
+/// needs on grids shifted along the surface; `palpate accuracy --verify` has the errors that are left.
 ///
 /// A point in a wider window lies in cells that are `coarser` times as wide as h: they lack as many times the compliance.
 /// @param radiusInCells  in cells of its window

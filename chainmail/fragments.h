@@ -84,10 +84,7 @@ struct Fragments {
     std::vector<std::uint32_t> linkRows;  // the same of `links`
 
     /// Those of one cell. @param sizeY  the level's nodes along y
-    std::span<const CellFragment> in(Index3 cell, int sizeY) const noexcept
-    {
-        return cellsOf(cell, cell.x, sizeY);
-    }
+    std::span<const CellFragment> in(Index3 cell, int sizeY) const noexcept { return cellsOf(cell, cell.x, sizeY); }
     /// Index of the one in which a cell of the next finer level lies, without its fragments; noFragment: none.
     std::uint32_t holding(Index3 child, int sizeY) const noexcept
     {

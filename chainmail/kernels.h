@@ -34,8 +34,8 @@ struct Layout {
     std::size_t scratchSize() const noexcept { return 24 * plane + 6 * row + lanes; }
 };
 
-/// Thin layers of cells (count x 1 each), see CellLayer: its shear modulus times h / 32, 0 where a cell has none; its middle
-/// from that of the cell's tissue, see CutCells.
+/// Thin layers of cells (count x 1 each), see CellLayer: its shear modulus times h / 32, 0 where a cell has none; its
+/// middle from that of the cell's tissue, see CutCells.
 struct CellLayers {
     const float* mu = nullptr;
     std::array<const float*, 3> normal{};

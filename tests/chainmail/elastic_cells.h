@@ -49,7 +49,10 @@ struct Cells {
     }
 
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
-    chainmail::CellStiffness stiffness() const { return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view()}; }
+    chainmail::CellStiffness stiffness() const
+    {
+        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view()};
+    }
 
     /// Moduli of one cell [Pa].
     void set(Index3 cell, double shear, double lame)
@@ -74,8 +77,8 @@ struct Cells {
         layers.place(level, Index3(0));
         cuts.place(level, Index3(0));
     }
-    /// Moduli between 1 and 100 Pa, one cell in ten empty, one of the others in three with a layer of any direction, and one
-    /// in three cut.
+    /// Moduli between 1 and 100 Pa, one cell in ten empty, one of the others in three with a layer of any direction, and
+    /// one in three cut.
     void fillRandom(std::minstd_rand& random)
     {
         std::uniform_real_distribution<double> power(0.0, 2.0);
