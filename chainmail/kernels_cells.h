@@ -106,18 +106,31 @@ struct Finite {
     }
 };
 
-// The gradient g of the energy of W cells by their modes m, which may change.
 template <typename Law>
-[[gnu::always_inline]] inline void energyOf(Law& law, Lanes mu, Lanes lambda, std::size_t cell, Modes (&m)[3],
+[[gnu::noinline]] void energyOfCut(Law& law, Lanes mu, Lanes lambda, std::size_t cell, Modes (&m)[3],
+                                   Modes (&g)[3]) noexcept
+{
+    law.cuts.toMiddle(cell, m);
+    law(law.cuts.spread(cell), mu, lambda, cell, m, g);
+    law.cuts.fromMiddle(cell, g);
+}
+
+// The gradient g of the energy of W cells by their modes m. Few cells are cut: those have their code to themselves, so that
+// all others have the registers.
+template <typename Law>
+[[gnu::always_inline]] inline void energyOf(Law& law, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
                                             Modes (&g)[3]) noexcept
 {
     if (!law.cuts.isAny(cell)) {
         law(Whole{}, mu, lambda, cell, m, g);
         return;
     }
-    law.cuts.toMiddle(cell, m);
-    law(law.cuts.spread(cell), mu, lambda, cell, m, g);
-    law.cuts.fromMiddle(cell, g);
+    Modes within[3] = {m[0], m[1], m[2]};
+    Modes slope[3];
+    energyOfCut(law, mu, lambda, cell, within, slope);
+    for (int i = 0; i < 3; ++i) {
+        g[i] = slope[i];
+    }
 }
 
 // What becomes of A u at a node: it is stored,
