@@ -83,7 +83,7 @@ TEST(CutCells, ACoarseCellHasTheMomentsOfItsTissue)
             EXPECT_NEAR(static_cast<double>(cut.share), m.share, 0.02);
             for (int k = 0; k < 3; ++k) {
                 EXPECT_NEAR(static_cast<double>(cut.middle[k]), m.middle[k], 0.02);
-                EXPECT_NEAR(static_cast<double>(cut.spread[k]), std::clamp(m.spread[k], 0.02, 1.0), 0.03);
+                EXPECT_NEAR(static_cast<double>(cut.spread[k]), std::clamp(m.spread[k], 0.02, 1.0), 0.04);
             }
         }
     }
@@ -213,7 +213,8 @@ TEST(CutCells, EveryLevelBendsAsThePlate)
                 const std::size_t at = w.layout.at(n.x, n.y, n.z);
                 energy += 0.5 * glm::dot(w.value(Field::u, at), w.value(Field::t, at));
             });
-            EXPECT_NEAR(energy / plate, 1.0, 0.01) << full << ", level " << l;
+            const bool countsAsFuller = full < 1.0 && l == 0;  // see withoutSliver()
+            EXPECT_NEAR(energy / plate, 1.0, countsAsFuller ? 0.025 : 0.01) << full << ", level " << l;
         }
     }
 }
