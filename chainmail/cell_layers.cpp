@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <unordered_map>
 
 namespace palpate::chainmail {
@@ -165,17 +164,7 @@ void addLayers(const FinestLevel& finest, const std::vector<float>& held, const 
             level.lambda[at] *= static_cast<float>(left);
         }
     });
-    indexLayers(level);
-}
-
-void indexLayers(CellLevel& level)
-{
-    const Index3 size = level.nodes.size;
-    level.layerRows.assign(static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z) + 1, 0);
-    for (const CellLayer& l : level.layers) {
-        ++level.layerRows[static_cast<std::size_t>(l.cell.y + l.cell.z * size.y) + 1];
-    }
-    std::partial_sum(level.layerRows.begin(), level.layerRows.end(), level.layerRows.begin());
+    level.layerRows = rowsOf(level.layers, level.nodes.size, &CellLayer::cell);
 }
 
 }  // namespace palpate::chainmail

@@ -17,7 +17,4 @@ bool atSurface(const CellLevel& level, Index3 low, Index3 high);
 void addLayers(const FinestLevel& finest, const std::vector<float>& held, const volume::DistanceField& surface,
                CellLevel& level);
 
-/// Finds where each row of cells begins in `layers`, which are by z, then y, then x.
-void indexLayers(CellLevel& level);
-
 }  // namespace palpate::chainmail

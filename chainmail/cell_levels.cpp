@@ -365,7 +365,7 @@ void takeWhole(CellLevel whole, CellLevel& level)
     if (!level.fragments.cells.empty()) {
         std::erase_if(whole.layers,
                       [&](const CellLayer& l) { return !level.fragments.in(l.cell, level.nodes.size.y).empty(); });
-        indexLayers(whole);
+        whole.layerRows = rowsOf(whole.layers, whole.nodes.size, &CellLayer::cell);
     }
     whole.fragments = std::move(level.fragments);
     level = std::move(whole);

@@ -211,18 +211,6 @@ std::vector<std::uint8_t> octantsOf(const volume::NodeGrid& cells, const std::ve
     return octants;
 }
 
-void indexRows(ElasticBody& body)
-{
-    const Index3 size = body.levels.front().nodes.size;
-    body.rows.assign(static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z) + 1, 0);
-    for (const auto& c : body.cells) {
-        ++body.rows[static_cast<std::size_t>(c.cell.y + c.cell.z * size.y) + 1];
-    }
-    for (std::size_t i = 1; i < body.rows.size(); ++i) {
-        body.rows[i] += body.rows[i - 1];
-    }
-}
-
 }  // namespace
 
 ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume::CellMaterial>& materials,
@@ -237,7 +225,7 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     all.octants = octantsOf(cells, materials, all.level);
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
-    indexRows(body);
+    body.rows = rowsOf(body.cells, body.levels.front().nodes.size, &SurfaceCell::cell);
     return body;
 }
 

@@ -29,8 +29,7 @@ struct CellLevel {
     std::vector<std::uint8_t> fixed;  // not 0 for nodes that are held in space                         (count x 1)
     std::array<std::vector<float>, volume::relaxationTerms> relaxing;  // weights of each cell [-]; none: does not relax
     std::vector<CellLayer> layers;                                     // by z, then y, then x
-    std::vector<std::uint32_t>
-        layerRows;                // first of `layers` in row (y, z) of cells, at y + z * nodes along y; none: no layers
+    std::vector<std::uint32_t> layerRows;                              // of these, see rowsOf()
     std::vector<float> diagonal;  // of the operator at each node, 0 where there is no tissue [N/m]  (count x 1)
     Fragments fragments;          // of cells that gaps run through
     double radius = 1;            // largest eigenvalue of D^-1 A, D the diagonal of the operator A: no window has a larger

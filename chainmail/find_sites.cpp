@@ -137,9 +137,8 @@ private:
     void addRow(const ElasticTool& tool, const occupancy::ShapeDistance& shape, std::size_t index, std::size_t row,
                 int first, int last) noexcept
     {
-        for (std::uint32_t c = body_.rows[row]; c < body_.rows[row + 1]; ++c) {
-            const SurfaceCell& cell = body_.cells[c];
-            if (cell.cell.x >= first && cell.cell.x <= last && mayTouch(shape, cell)) {
+        for (const SurfaceCell& cell : inRow(body_.cells, body_.rows, row, first, last, &SurfaceCell::cell)) {
+            if (mayTouch(shape, cell)) {
                 addCell(tool, shape, index, cell);
             }
         }

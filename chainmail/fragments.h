@@ -1,9 +1,9 @@
 #pragma once
 
+#include <chainmail/cell_rows.h>
 #include <volume/geometry.h>
 #include <volume/tissue.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -68,10 +68,7 @@ struct Fragments {
     std::vector<std::uint32_t> linkRows;  // the same of `links`
 
     /// Those of one cell. @param sizeY  the level's nodes along y
-    std::span<const CellFragment> in(Index3 cell, int sizeY) const noexcept
-    {
-        return inRow(cells, rows, cell.y + cell.z * sizeY, cell.x, cell.x, [](const CellFragment& f) { return f.cell.x; });
-    }
+    std::span<const CellFragment> in(Index3 cell, int sizeY) const noexcept { return cellsOf(cell, cell.x, sizeY); }
     /// Index of the one in which a cell of the next finer level lies, without its fragments; noFragment: none.
     std::uint32_t holding(Index3 child, int sizeY) const noexcept
     {
@@ -85,27 +82,15 @@ struct Fragments {
     /// Those of the cells from `low` on of a row. @param last  along x
     std::span<const CellFragment> cellsOf(Index3 low, int last, int sizeY) const noexcept
     {
-        return inRow(cells, rows, low.y + low.z * sizeY, low.x, last, [](const CellFragment& f) { return f.cell.x; });
+        return inRow(cells, rows, rowOf(low, sizeY), low.x, last, &CellFragment::cell);
     }
     std::span<const NodeLink> linksOf(Index3 low, int last, int sizeY) const noexcept
     {
-        return inRow(links, linkRows, low.y + low.z * sizeY, low.x, last, [](const NodeLink& l) { return l.at.x; });
+        return inRow(links, linkRows, rowOf(low, sizeY), low.x, last, &NodeLink::at);
     }
 
 private:
-    template <typename T, typename Place>
-    static std::span<const T> inRow(const std::vector<T>& all, const std::vector<std::uint32_t>& rows, int row, int low,
-                                    int high, Place&& place) noexcept
-    {
-        if (rows.empty()) {
-            return {};
-        }
-        const T* first = all.data() + rows[static_cast<std::size_t>(row)];
-        const T* last = all.data() + rows[static_cast<std::size_t>(row) + 1];
-        first = std::partition_point(first, last, [&](const T& t) { return place(t) < low; });
-        last = std::partition_point(first, last, [&](const T& t) { return place(t) <= high; });
-        return {first, last};
-    }
+    static std::size_t rowOf(Index3 cell, int sizeY) noexcept { return static_cast<std::size_t>(cell.y + cell.z * sizeY); }
 };
 
 }  // namespace palpate::chainmail

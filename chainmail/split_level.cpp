@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <numeric>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -379,20 +378,6 @@ private:
         if (any && linked_.insert(node).second) {
             out_.links.push_back(one);
         }
-    }
-
-    template <typename T>
-    static std::vector<std::uint32_t> rowsOf(const std::vector<T>& all, Index3 size, Index3 T::*place)
-    {
-        if (all.empty()) {
-            return {};
-        }
-        std::vector<std::uint32_t> rows(static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z) + 1, 0);
-        for (const T& t : all) {
-            ++rows[static_cast<std::size_t>((t.*place).y + (t.*place).z * size.y) + 1];
-        }
-        std::partial_sum(rows.begin(), rows.end(), rows.begin());
-        return rows;
     }
 
     const FineCells fine_;

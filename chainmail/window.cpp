@@ -27,11 +27,9 @@ void LayerFields::place(const CellLevel& level, Index3 at) noexcept
     for (int r = 0; r < rows; ++r) {
         const Index3 first = at + Index3(0, r % (box_.y - 1), r / (box_.y - 1));
         const auto row = static_cast<std::size_t>(first.y + first.z * level.nodes.size.y);
-        for (std::uint32_t i = level.layerRows[row]; i < level.layerRows[row + 1]; ++i) {
-            const Index3 cell = level.layers[i].cell - at;
-            if (cell.x >= 0 && cell.x + 1 < box_.x) {
-                set(layout_.at(cell.x, cell.y, cell.z), level.layers[i], static_cast<float>(level.nodes.spacing / 32.0));
-            }
+        for (const CellLayer& l : inRow(level.layers, level.layerRows, row, at.x, at.x + box_.x - 2, &CellLayer::cell)) {
+            const Index3 cell = l.cell - at;
+            set(layout_.at(cell.x, cell.y, cell.z), l, static_cast<float>(level.nodes.spacing / 32.0));
         }
     }
 }

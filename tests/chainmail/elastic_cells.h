@@ -58,7 +58,7 @@ struct Cells {
         chainmail::CellLevel level;
         level.nodes = {nodes(), Vec3(0.0), 1.0};
         level.layers = std::move(of);
-        chainmail::indexLayers(level);
+        level.layerRows = chainmail::rowsOf(level.layers, level.nodes.size, &chainmail::CellLayer::cell);
         layers.place(level, Index3(0));
     }
     /// Moduli between 1 and 100 Pa, one cell in ten empty, one of the others in three with a layer of any direction.
