@@ -109,11 +109,14 @@ Stretch StretchAt::operator()(const ContactSite& site) noexcept
         const Window& w = stack_.windows()[site.level];
         const double quarter = 0.25 / stack_.body().levels[site.level].nodes.spacing;
         std::array<Vec3, 3> f{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
+        const Vec3 middle(w.cuts.at(site.node).middle);
         for (int c = 0; c < 8; ++c) {
+            const Vec3 side((c & 1) != 0 ? 1 : -1, (c & 2) != 0 ? 1 : -1, (c & 4) != 0 ? 1 : -1);
+            const Vec3 at = 1.0 + side * middle;
             const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
-            f[0] += (c & 1) != 0 ? u : -u;
-            f[1] += (c & 2) != 0 ? u : -u;
-            f[2] += (c & 4) != 0 ? u : -u;
+            f[0] += side.x * at.y * at.z * u;
+            f[1] += side.y * at.z * at.x * u;
+            f[2] += side.z * at.x * at.y * u;
         }
         cofactor_ = {glm::cross(f[1], f[2]), glm::cross(f[2], f[0]), glm::cross(f[0], f[1])};
         const double change = glm::dot(f[0], cofactor_[0]) - 1.0;

@@ -191,7 +191,8 @@ std::size_t findTies(const ElasticBody& body, std::span<const Window> windows, s
 
 /// The surface around a site now, over that at rest.
 struct Stretch {
-    double area = 1;  // |cof(F) N|, F the cell's mean deformation gradient and N the normal at rest (Nanson's formula) [-]
+    double area = 1;     // |cof(F) N|, F the deformation gradient at the middle of the cell's tissue, N the normal at rest
+                         // (Nanson's formula) [-]
     double modulus = 1;  // shear modulus, by the law of material at F [-]
 };
 
