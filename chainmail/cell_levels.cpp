@@ -275,8 +275,8 @@ public:
     }
 
     // Holds the nodes on the plane or behind it, where the body meets it, and gives the cells that it cuts the stiffness of
-    // the layer that is left of them. What tips a body is the width of what holds it, to the third power: so each level
-    // looks for itself, and does not inherit the rim of a finer one.
+    // the layer that is left of them, as if it were the whole cell. What tips a body is the width of what holds it, to the
+    // third power: so each level looks for itself, and does not inherit the rim of a finer one.
     void hold(CellLevel& level) const
     {
         constexpr int fewest = 4;  // nodes that hold a body in every direction
@@ -292,7 +292,10 @@ public:
             const float factor = static_cast<float>(layerFactor(level, f.cell));
             f.mu *= factor;
             f.lambda *= factor;
+            f.cut = factor == 1.0F ? f.cut : Cut{};
         }
+        std::erase_if(level.cuts, [&](const CutCell& c) { return layerFactor(level, c.cell) != 1.0; });
+        level.cutRows = rowsOf(level.cuts, level.nodes.size, &CutCell::cell);
     }
 
 private:

@@ -126,6 +126,34 @@ TEST(CutCells, WhereTheSurfacePassesByEighthsCount)
     EXPECT_EQ(cutBy(nowhere, Vec3(0.0), 1.0, material).middle, Vec3f(0.0F));
 }
 
+// The tissue of a cell that the surface runs through turns around its own middle, which is not the cell's: there nothing is
+// stretched, and so is no contact.
+TEST(CutCells, AContactStretchesAsTheTissueOfItsCell)
+{
+    tests::ElasticBlock block = tests::heldBlock({12, 8, 12}, 2e-3, 1e4, 0.45);
+    block.full = 0.6;
+    block.air = 4;
+    const ElasticBody body = tests::bodyOf(block);
+    WindowStack stack(body, 15, tests::focusUnder({12e-3, 0.0, 12e-3}));
+    int cut = 0;
+    for (std::uint32_t i = 0; i < body.points.size(); i += 7) {
+        ContactSite site;
+        site.point = i;
+        locate(body, stack.windows(), Vec3(body.points[i].anchor), site);
+        const Vec3 middle(stack[site.level].cuts.at(site.node).middle);
+        cut += middle != Vec3(0.0) ? 1 : 0;
+        const auto& grid = body.levels[site.level].nodes;
+        const Index3 cell(glm::floor((Vec3(body.points[i].anchor) - grid.origin) / grid.spacing));
+        const Vec3 at = grid.position(cell) + 0.5 * grid.spacing * (1.0 + middle);
+        tests::setField(stack, Field::u, [&](Vec3 rest) {
+            const Vec3 x = (rest - at) / grid.spacing;
+            return 3.0 * grid.spacing * Vec3(x.x * x.y, x.y * x.z, x.z * x.x);
+        });
+        EXPECT_NEAR(StretchAt(stack, volume::NeoHookean{})(site).area, 1.0, 1e-4) << i;
+    }
+    EXPECT_GT(cut, 5);
+}
+
 // Tissue in the lower part of a cell, bent by the curvature K along x and L along z around its own middle: a plate of its
 // thickness t, (K^2 + L^2 + 2 nu K L) E t^3 / 24 (1 - nu^2). Around the middle of the cell it is stretched as well.
 TEST(CutCells, ASlabInACellBendsAsAPlate)

@@ -178,7 +178,7 @@ TEST(ElasticFriction, BallThatIsDrawnBackInTicksKeepsItsGrip)
             drag.go(Vec3(0, -90e-6, 0), 1);
             drag.go(Vec3(0, -60e-6, 0) - 30e-6 * alongTop(20.0), 1);
         }
-        EXPECT_LT(drag.step, 0.12) << mu;
+        EXPECT_LT(drag.step, 0.11) << mu;
     }
 }
 

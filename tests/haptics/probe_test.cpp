@@ -201,6 +201,29 @@ TEST(Probe, PressingAllocatesNothing)
     EXPECT_EQ(tests::allocations(), before);
 }
 
+// A whole biopsy beside the probe: the windows of fine cells follow the needle, and go away from the probe with it. Where
+// wider cells had the probe, those with a corner of the tissue threw it back with 1e5 N.
+TEST(Probe, ANeedleThatComesAndGoesLeavesItsForce)
+{
+    for (const char* setting : {"fast", "default"}) {
+        std::string scene = datasets::builtInScene("us-core-biopsy")->text;
+        scene.insert(scene.find("level = "), std::string("setting = \"") + setting + "\"\n");
+        const auto model = tests::modelOf(scene);
+        Simulation simulation(model);
+        Trainee trainee(model, skillCalled("novice"), 3, 5e-3);
+        double pressed = 0.0;
+        for (int i = 0; i < 9000 && !trainee.finished(); ++i) {
+            const TickRecord& r = simulation.tick(trainee.read());
+            trainee.write(r.total);
+            trainee.observe(r);
+            pressed = std::max(pressed, glm::length(r.probeForce));
+            ASSERT_LT(pressed, 5.0) << setting << ", tick " << i;
+        }
+        EXPECT_GT(pressed, 0.5) << setting;
+        EXPECT_TRUE(trainee.finished()) << setting;
+    }
+}
+
 // The hands of a trainee, live: everything that the record has of the probe comes again bit for bit, and so does the score.
 TEST(Probe, ARecordHasItAndAReplayGivesItAgain)
 {

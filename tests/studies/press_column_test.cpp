@@ -59,8 +59,7 @@ std::pair<double, double> forces(const haptics::SessionModel& model, const Mat3&
 
 // A body that bends as a whole above what holds it, beside finite elements (quadratic, neo-Hookean, edges of 2.5 mm at the
 // contact: `palpate-reference --looks 5,10`), 14.5 and 31.9 mN of fat alone, 65.3 and 141.6 mN under 2 mm of skin. Cells of
-// 4 mm are coarser than skin and a sixth of the column's width. One grid of 1 mm is 7 % off without skin, `default` 4 to 7
-// %, and 12 to 14 % where the column is turned in the grid.
+// 4 mm are coarser than skin and a sixth of the column's width.
 TEST(PressColumn, BendsAboveItsSupportAsFiniteElementsDo)
 {
     const Mat3 turned(glm::rotate(glm::rotate(glm::dmat4(1.0), 0.5, Vec3(1, 0, 0)), 0.3, Vec3(0, 0, 1)));
@@ -68,7 +67,7 @@ TEST(PressColumn, BendsAboveItsSupportAsFiniteElementsDo)
         const char* setting;
         double bound;
     };
-    for (const auto& [setting, bound] : {Case{"default", 0.15}, Case{"fine", 0.15}, Case{"fast", 0.25}}) {
+    for (const auto& [setting, bound] : {Case{"default", 0.10}, Case{"fine", 0.15}, Case{"fast", 0.25}}) {
         for (const Mat3& turn : {Mat3(1.0), turned}) {
             const auto [soft5, soft10] = forces(column(0.0, setting, turn), turn);
             EXPECT_NEAR(soft5 / 14.51e-3, 1.0, bound) << setting;

@@ -208,10 +208,10 @@ TEST(Press, ForcesAreThoseOfASessionWithoutEncoder)
         const PosePath& path;
         double bound;
     };
-    for (const auto& [tool, path, bound] : {Case{ball, down, 4e-3},
-                                            {finger, flat, 4e-3},
-                                            {finger, back, 4e-3},
-                                            {finger, middle, 4e-3},
+    for (const auto& [tool, path, bound] : {Case{ball, down, 3e-3},
+                                            {finger, flat, 3e-3},
+                                            {finger, back, 3e-3},
+                                            {finger, middle, 3e-3},
                                             {finger, turning, 0.015}}) {
         haptics::SessionModel small = smallBlock("[safety]\ndevice = \"ideal\"\n");
         small.scene.model.level = datasets::ModelLevel::elastic;
