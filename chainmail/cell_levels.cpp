@@ -474,8 +474,13 @@ double spectralRadius(const CellLevel& level)
             break;
         }
         fragments.share(z.data(), l.count);
-        k.apply(l, {.mu = mu.data(), .lambda = lambda.data(), .layers = layers.view(), .cuts = cuts.view()}, z.data(),
-                az.data(), scratch.data());
+        k.apply(l,
+                {.mu = mu.data(),
+                 .lambda = lambda.data(),
+                 .layers = layers.view(),
+                 .cuts = cuts.view(),
+                 .filling = cuts.filling()},
+                z.data(), az.data(), scratch.data());
         fragments.collect(az.data(), l.count);
         k.smoothFirst(static_cast<float>(1.0 / before), inverse.data(), az.data(), z.data(), l.count);
         radius = norm();

@@ -48,17 +48,20 @@ struct CellLayers {
 struct CutCells {
     std::array<const float*, 3> middle{};
     std::array<const float*, 3> spread{};
-    const std::uint8_t* any = nullptr;  // not 0 where one of Layout::lanes cells in a row is cut (count / lanes x 1)
 };
+
+/// What is in Layout::lanes cells in a row: whole cells, of which some may be empty; at least one that is cut; no tissue.
+enum class Filling : std::uint8_t { whole, cut, empty };
 
 /// Stiffness of each cell (count x 1), both moduli scaled by spacing / 32, zero where there is no tissue; and the law that
 /// they belong to.
 struct CellStiffness {
-    const float* mu = nullptr;                               // Lame's second parameter, times h / 32 [N/m]
-    const float* lambda = nullptr;                           // Lame's first parameter, times h / 32 [N/m]
-    const float* stiffening = nullptr;                       // b of finite strain [-]; none: 0
-    CellLayers layers{};                                     // without mu: no cell has one
-    CutCells cuts{};                                         // without `any`: no cell is cut
+    const float* mu = nullptr;          // Lame's second parameter, times h / 32 [N/m]
+    const float* lambda = nullptr;      // Lame's first parameter, times h / 32 [N/m]
+    const float* stiffening = nullptr;  // b of finite strain [-]; none: 0
+    CellLayers layers{};                // without mu: no cell has one
+    CutCells cuts{};
+    const Filling* filling = nullptr;                        // (count / lanes x 1); none: whole cells
     std::size_t law = volume::lawIndex<volume::NeoHookean>;  // of applyFinite(), in volume::laws
 };
 

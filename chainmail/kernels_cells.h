@@ -106,30 +106,35 @@ struct Finite {
     }
 };
 
+// Modes that come in `at` become their gradient. Within, they have registers.
 template <typename Law>
-[[gnu::noinline]] void energyOfCut(Law& law, Lanes mu, Lanes lambda, std::size_t cell, Modes (&m)[3],
-                                   Modes (&g)[3]) noexcept
+[[gnu::noinline, gnu::flatten]] void energyOfCut(Law& law, Lanes mu, Lanes lambda, std::size_t cell,
+                                                 Modes (&at)[3]) noexcept
 {
+    Modes m[3] = {at[0], at[1], at[2]};
+    Modes g[3];
     law.cuts.toMiddle(cell, m);
     law(law.cuts.spread(cell), mu, lambda, cell, m, g);
     law.cuts.fromMiddle(cell, g);
+    for (int i = 0; i < 3; ++i) {
+        at[i] = g[i];
+    }
 }
 
 // The gradient g of the energy of W cells by their modes m. Few cells are cut: those have their code to themselves, so that
 // all others have the registers.
 template <typename Law>
-[[gnu::always_inline]] inline void energyOf(Law& law, Lanes mu, Lanes lambda, std::size_t cell, const Modes (&m)[3],
-                                            Modes (&g)[3]) noexcept
+[[gnu::always_inline]] inline void energyOf(Law& law, Filling filling, Lanes mu, Lanes lambda, std::size_t cell,
+                                            const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
-    if (!law.cuts.isAny(cell)) {
+    if (filling == Filling::whole) {
         law(Whole{}, mu, lambda, cell, m, g);
         return;
     }
     Modes within[3] = {m[0], m[1], m[2]};
-    Modes slope[3];
-    energyOfCut(law, mu, lambda, cell, within, slope);
+    energyOfCut(law, mu, lambda, cell, within);
     for (int i = 0; i < 3; ++i) {
-        g[i] = slope[i];
+        g[i] = within[i];
     }
 }
 
@@ -247,6 +252,23 @@ struct Sweep {
         }
     }
 
+    static Filling fillingAt(const CellStiffness& stiffness, std::size_t cell) noexcept
+    {
+        return stiffness.filling != nullptr ? stiffness.filling[cell / Layout::lanes] : Filling::whole;
+    }
+
+    // What cells without tissue do: the plane above them becomes the one below, and nodes get what others gave.
+    void passOn(std::size_t above, std::size_t inPlane, std::size_t i, RowSum<Keeper> (&sum)[3]) noexcept
+    {
+#pragma GCC unroll 3
+        for (int c = 0; c < 3; ++c) {
+            storePlane(component(planes, c) + inPlane, layout.plane, planeAt(c, above));
+            float* wait = component(pending, c) + inPlane;
+            sum[c].add(i, loadPlane(wait, layout.plane));
+            storePlane(wait, layout.plane, Plane{});
+        }
+    }
+
     template <typename Law>
     void layer(int k, CellStiffness stiffness, Law& law) noexcept
     {
@@ -257,6 +279,11 @@ struct Sweep {
             const std::size_t inPlane = static_cast<std::size_t>(j) * layout.row;
             RowSum<Keeper> sum[3] = {{carryOf(0), keep, 0, at}, {carryOf(1), keep, 1, at}, {carryOf(2), keep, 2, at}};
             for (std::size_t i = 0; i < layout.row; i += W) {
+                const Filling filling = fillingAt(stiffness, at + i);
+                if (filling == Filling::empty) {
+                    passOn(above + inPlane + i, inPlane + i, i, sum);
+                    continue;
+                }
                 Modes m[3];
                 Modes g[3];
 #pragma GCC unroll 3
@@ -265,7 +292,7 @@ struct Sweep {
                     m[c] = modesOf(loadPlane(component(planes, c) + inPlane + i, layout.plane), high);
                     storePlane(component(planes, c) + inPlane + i, layout.plane, high);
                 }
-                energyOf(law, load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
+                energyOf(law, filling, load(stiffness.mu + at + i), load(stiffness.lambda + at + i), at + i, m, g);
 #pragma GCC unroll 3
                 for (int c = 0; c < 3; ++c) {
                     float* wait = component(pending, c) + inPlane + i;

@@ -12,7 +12,6 @@ class Cuts {
 public:
     explicit Cuts(const CutCells& cuts) noexcept : cuts_(cuts) {}
 
-    bool isAny(std::size_t cell) const noexcept { return cuts_.any != nullptr && cuts_.any[cell / Layout::lanes] != 0; }
     Spread spread(std::size_t cell) const noexcept
     {
         return {load(cuts_.spread[0] + cell), load(cuts_.spread[1] + cell), load(cuts_.spread[2] + cell)};

@@ -77,7 +77,7 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
 CutFields::CutFields(const Layout& layout, Index3 box) : layout_(layout), box_(box)
 {
     const std::size_t room = layout.count + Layout::lanes;
-    any_.assign(room / Layout::lanes, 0);
+    filling_.assign(room / Layout::lanes, Filling::whole);
     for (std::size_t c = 0; c < 3; ++c) {
         middle_[c].assign(room, 0.0F);
         spread_[c].assign(room, 1.0F);
@@ -86,12 +86,11 @@ CutFields::CutFields(const Layout& layout, Index3 box) : layout_(layout), box_(b
 
 void CutFields::place(const CellLevel& level, Index3 at) noexcept
 {
-    std::fill(any_.begin(), any_.end(), std::uint8_t{0});
-    for (std::size_t c = 0; c < 3 && some_; ++c) {
+    std::fill(filling_.begin(), filling_.end(), Filling::whole);
+    for (std::size_t c = 0; c < 3; ++c) {
         std::fill(middle_[c].begin(), middle_[c].end(), 0.0F);
         std::fill(spread_[c].begin(), spread_[c].end(), 1.0F);
     }
-    some_ = false;
     forEachIn(level.cuts, level.cutRows, level.nodes.size.y, at, box_, &CutCell::cell, [&](const CutCell& c) {
         const Index3 cell = c.cell - at;
         set(layout_.at(cell.x, cell.y, cell.z), c.cut);
@@ -107,26 +106,28 @@ void CutFields::set(std::size_t cell, const Cut& cut) noexcept
         middle_[static_cast<std::size_t>(c)][cell] = cut.middle[c];
         spread_[static_cast<std::size_t>(c)][cell] = cut.spread[c];
     }
-    any_[cell / Layout::lanes] = 1;
-    some_ = true;
+    filling_[cell / Layout::lanes] = Filling::cut;
 }
 
 Cut CutFields::at(std::size_t cell) const noexcept
 {
-    if (!some_) {
-        return {};
-    }
     return {{middle_[0][cell], middle_[1][cell], middle_[2][cell]}, {spread_[0][cell], spread_[1][cell], spread_[2][cell]}};
+}
+
+void CutFields::findEmpty(const Floats& mu) noexcept
+{
+    for (std::size_t i = 0; i < filling_.size(); ++i) {
+        const auto first = mu.begin() + static_cast<std::ptrdiff_t>(i * Layout::lanes);
+        if (std::all_of(first, first + Layout::lanes, [](float m) { return m == 0.0F; })) {
+            filling_[i] = Filling::empty;
+        }
+    }
 }
 
 CutCells CutFields::view() const noexcept
 {
-    if (!some_) {
-        return {};
-    }
     return {{middle_[0].data(), middle_[1].data(), middle_[2].data()},
-            {spread_[0].data(), spread_[1].data(), spread_[2].data()},
-            any_.data()};
+            {spread_[0].data(), spread_[1].data(), spread_[2].data()}};
 }
 
 bool Window::anyTissue(const Floats& cells, Index3 first, Index3 last) const noexcept
@@ -184,6 +185,7 @@ void Window::place(const CellLevel& level, Index3 at, bool coarsest) noexcept
     placeNodes(level);
     placeBorder(coarsest);
     placeFragments(level, coarsest);
+    cuts.findEmpty(mu);
 }
 
 void Window::placeBorder(bool coarsest) noexcept

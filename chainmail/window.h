@@ -79,7 +79,7 @@ private:
     bool some_ = false;
 };
 
-/// The cut cells in a box, and those behind it.
+/// How cells are filled, in a box and behind it.
 class CutFields {
 public:
     CutFields(const Layout& layout, Index3 box);
@@ -87,15 +87,17 @@ public:
     void place(const CellLevel& level, Index3 at) noexcept;
     void set(std::size_t cell, const Cut& cut) noexcept;
     Cut at(std::size_t cell) const noexcept;
-    /// What the kernels take; without `any` where no cell is cut.
+    /// Takes cells without a modulus for empty; until then none is. Those that are set later are not.
+    void findEmpty(const Floats& mu) noexcept;
+    /// What the kernels take.
     CutCells view() const noexcept;
+    const Filling* filling() const noexcept { return filling_.data(); }
 
 private:
     Layout layout_;
     Index3 box_{0};
     std::array<Floats, 3> middle_, spread_;
-    std::vector<std::uint8_t> any_;
-    bool some_ = false;
+    std::vector<Filling> filling_;
 };
 
 /// A box of nodes of one level that follows the tool. Windows are nested; together they are one finite-element space:
@@ -137,15 +139,16 @@ struct Window {
     const float* field(Field f) const noexcept { return fields[static_cast<std::size_t>(f)].data(); }
     CellStiffness stiffness() const noexcept
     {
-        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view()};
+        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling()};
     }
     CellStiffness uncovered() const noexcept
     {
-        return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data(), layers.view(), cuts.view()};
+        return {uncoveredMu.data(), uncoveredLambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling()};
     }
     CellStiffness term(std::size_t i) const noexcept
     {
-        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer), cuts.view()};
+        return {terms[i].mu.data(), terms[i].lambda.data(), stiffening.data(), layers.with(terms[i].layer),
+                cuts.view(),        cuts.filling()};
     }
     Index3 size() const noexcept { return box; }
     /// Node (0, 0, 0) of this window in the next coarser one.

@@ -51,7 +51,7 @@ struct Cells {
     Index3 nodes() const { return {layout.nx, layout.ny, layout.nz}; }
     chainmail::CellStiffness stiffness() const
     {
-        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view()};
+        return {mu.data(), lambda.data(), stiffening.data(), layers.view(), cuts.view(), cuts.filling()};
     }
 
     /// Moduli of one cell [Pa].
