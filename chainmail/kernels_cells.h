@@ -106,23 +106,7 @@ struct Finite {
     }
 };
 
-// Modes that come in `at` become their gradient. Within, they have registers.
-template <typename Law>
-[[gnu::noinline, gnu::flatten]] void energyOfCut(Law& law, Lanes mu, Lanes lambda, std::size_t cell,
-                                                 Modes (&at)[3]) noexcept
-{
-    Modes m[3] = {at[0], at[1], at[2]};
-    Modes g[3];
-    law.cuts.toMiddle(cell, m);
-    law(law.cuts.spread(cell), mu, lambda, cell, m, g);
-    law.cuts.fromMiddle(cell, g);
-    for (int i = 0; i < 3; ++i) {
-        at[i] = g[i];
-    }
-}
-
-// The gradient g of the energy of W cells by their modes m. Few cells are cut: those have their code to themselves, so that
-// all others have the registers.
+// The gradient g of the energy of W cells by their modes m.
 template <typename Law>
 [[gnu::always_inline]] inline void energyOf(Law& law, Filling filling, Lanes mu, Lanes lambda, std::size_t cell,
                                             const Modes (&m)[3], Modes (&g)[3]) noexcept
@@ -132,10 +116,9 @@ template <typename Law>
         return;
     }
     Modes within[3] = {m[0], m[1], m[2]};
-    energyOfCut(law, mu, lambda, cell, within);
-    for (int i = 0; i < 3; ++i) {
-        g[i] = within[i];
-    }
+    law.cuts.toMiddle(cell, within);
+    law(law.cuts.spread(cell), mu, lambda, cell, within, g);
+    law.cuts.fromMiddle(cell, g);
 }
 
 // What becomes of A u at a node: it is stored,
