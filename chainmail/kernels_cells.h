@@ -111,7 +111,7 @@ template <typename Law>
 [[gnu::always_inline]] inline void energyOf(Law& law, Filling filling, Lanes mu, Lanes lambda, std::size_t cell,
                                             const Modes (&m)[3], Modes (&g)[3]) noexcept
 {
-    if (filling == Filling::whole) {
+    if (filling == Filling::whole) [[likely]] {
         law(Whole{}, mu, lambda, cell, m, g);
         return;
     }

@@ -29,7 +29,8 @@ def largest_loop(body):
     place = {int(m[1], 16): i for i, line in enumerate(body) if (m := re.match(r"\s*([0-9a-f]+):", line))}
     most = (0, 0)
     for i, line in enumerate(body):
-        jump = re.search(r"\bj\w+\s+([0-9a-f]+)\b", line)
+        # A jump that is always taken comes back from cells that are cut, which are not counted.
+        jump = re.search(r"\bj(?!mp)\w+\s+([0-9a-f]+)\b", line)
         target = place.get(int(jump[1], 16), i) if jump else i
         if target < i:
             loop = body[target : i + 1]
