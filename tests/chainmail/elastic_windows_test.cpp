@@ -281,6 +281,33 @@ TEST(ElasticWindows, FollowingWithSmallWindowsKeepsAnAffineFieldExactly)
     EXPECT_LT(offAfterJumps(9), 2e-9);
 }
 
+// A surface at every second node, so that wider cells are half full: their nodes over the surface have tissue where those
+// of the finer window at the same places have none, and whatever displacement.
+TEST(ElasticWindows, FollowingTakesNothingFromNodesWithoutTissue)
+{
+    auto block = tests::heldBlock({40, 24, 40}, spacing, modulus, 0.3);
+    block.air = 3;
+    const ElasticBody body = tests::bodyOf(block);
+    WindowStack stack(body, 13, tests::focusUnder({10e-3, 0.0, 20e-3}));
+    tests::setField(stack, Field::u, affine);
+    int spoilt = 0;
+    tests::forEachNode(stack, [&](std::size_t level, Window& w, std::size_t node, Vec3) {
+        if (w.tissue[node] == 0.0F) {
+            tests::setAt(w, node, Field::u, spacing * Vec3(1.0, -2.0, 3.0));
+            spoilt += level == 0 ? 1 : 0;
+        }
+    });
+    EXPECT_GT(spoilt, 100);
+    ASSERT_TRUE(stack.follow(tests::focusUnder({30e-3, 0.0, 20e-3}), true));
+    double most = 0.0;
+    tests::forEachNode(stack, [&](std::size_t, Window& w, std::size_t node, Vec3 rest) {
+        if (w.dof[node] != 0.0F) {
+            most = std::max(most, glm::distance(tests::valueAt(w, node, Field::u), affine(rest)));
+        }
+    });
+    EXPECT_LT(most, 1e-6 * spacing);
+}
+
 // Windows stay nested and inside the body wherever the focus is, far outside too.
 TEST(ElasticWindows, WindowsStayNested)
 {
