@@ -111,7 +111,7 @@ Stretch StretchAt::operator()(const ContactSite& site) noexcept
         std::array<Vec3, 3> f{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
         const Vec3 middle(w.cuts.at(site.node).middle);
         for (int c = 0; c < 8; ++c) {
-            const Vec3 side((c & 1) != 0 ? 1 : -1, (c & 2) != 0 ? 1 : -1, (c & 4) != 0 ? 1 : -1);
+            const Vec3 side(sideOf(c));
             const Vec3 at = 1.0 + side * middle;
             const Vec3 u = quarter * w.value(Field::u, w.layout.corner(site.node, c));
             f[0] += side.x * at.y * at.z * u;

@@ -210,7 +210,7 @@ void inject(const Window& fine, Window& coarse, Field field) noexcept
     volume::forEachIndex(Index3(0), (fine.size() - 1) / 2, [&](Index3 n) {
         const std::size_t target = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
         const std::size_t source = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
-        const bool own = hasGaps || fine.open[source] == 0.0F || holdsTissue(fine, 2 * n);
+        const bool own = hasGaps || coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holdsTissue(fine, 2 * n);
         coarse.set(field, target, own ? fine.value(field, source) : continued(fine, field, 2 * n));
     });
     Followers followers(fine, coarse);
