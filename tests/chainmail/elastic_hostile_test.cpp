@@ -128,9 +128,17 @@ int standStill(Elastic& elastic, const ElasticLoad& load, const volume::Law& law
     return rises;
 }
 
-// Every number stays finite, and calls do not raise the energy, but for one in 20,000 at finite strain (60 such hands of
-// each b and law: 7 of 225,000).
-void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes)
+// What raised the energy, of the calls at loads that stand still.
+struct Rises {
+    int calls = 0, rises = 0;
+
+    // At finite strain single calls do: of 40 such hands 1 in 3,600, up to 1 in 560 with b = 100 and neo-hookean. The bound
+    // is over all bodies of a test, so that chance does not meet it.
+    void expectFew() const { EXPECT_LE(rises, 1 + calls / 500) << "of " << calls; }
+};
+
+// Every number stays finite. Counts into `counted`.
+void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes, Rises& counted)
 {
     ElasticOptions options;
     options.window = 9;
@@ -138,7 +146,7 @@ void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes
     options.period = 20e-3;
     Elastic elastic(body, options, tests::focusAt(0.5 * size));
     HostileHand hand(size);
-    int contacts = 0, calls = 0, rises = 0;
+    int contacts = 0;
     double peak = 0.0;  // of the energy since the body was at rest: its sums are rounded to that
     for (int i = 0; i < pushes; ++i) {
         hand.next();
@@ -155,8 +163,8 @@ void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes
         }
         if (hand.random() % 10 == 0) {
             SCOPED_TRACE(fmt::format("push {}", i));
-            calls += 4;
-            rises += standStill(elastic, load, law, result, peak);
+            counted.calls += 4;
+            counted.rises += standStill(elastic, load, law, result, peak);
         }
         if (i % 100 == 0) {
             ASSERT_TRUE(allFinite(elastic)) << "push " << i;
@@ -169,11 +177,11 @@ void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes
     }
     elastic.relax({});
     EXPECT_TRUE(elastic.atRest());
-    EXPECT_LE(rises, 1) << "of " << calls;
 }
 
 TEST(ElasticHostile, TissueThatRelaxesStaysFiniteAndComesBack)
 {
+    Rises rises;
     auto block = tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45);
     block.material = [](Index3 c) {
         volume::CellMaterial m = tests::tissue(1e4, 0.45, c.y == 13);
@@ -182,25 +190,31 @@ TEST(ElasticHostile, TissueThatRelaxesStaysFiniteAndComesBack)
     };
     const ElasticBody body = tests::bodyOf(block, 0.4999, true);
     for (const volume::Law& law : {volume::Law(volume::SmallStrain{}), volume::Law(volume::NeoHookean{})}) {
-        push(body, Vec3(20e-3, 14e-3, 17e-3), law, 3000);
+        push(body, Vec3(20e-3, 14e-3, 17e-3), law, 3000, rises);
     }
+    rises.expectFew();
 }
 
 TEST(ElasticHostile, TenThousandPushesStayFiniteAndNeverRaiseTheEnergy)
 {
+    Rises rises;
     const Vec3 size(20e-3, 14e-3, 17e-3);
-    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, volume::SmallStrain{}, 10000);
+    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, volume::SmallStrain{}, 10000, rises);
+    rises.expectFew();
 }
 
 TEST(ElasticHostile, FiniteStrainStaysFiniteAndDoesNotRaiseTheEnergy)
 {
+    Rises rises;
     const Vec3 size(20e-3, 14e-3, 17e-3);
-    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, volume::NeoHookean{}, 1500);
+    push(tests::bodyOf(tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45)), size, volume::NeoHookean{}, 1500, rises);
+    rises.expectFew();
 }
 
 // Tissue that softens, that stiffens as the tissue table's tumours do, and further than the exponential law lets it.
 TEST(ElasticHostile, TissueThatStiffensStaysFiniteAndDoesNotRaiseTheEnergy)
 {
+    Rises rises;
     for (const volume::Law& law : {volume::Law(volume::NeoHookean{}), volume::Law(volume::Exponential{})}) {
         for (const float b : {-0.25F, 7.0F, 18.0F, 100.0F}) {
             auto block = tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45);
@@ -210,14 +224,16 @@ TEST(ElasticHostile, TissueThatStiffensStaysFiniteAndDoesNotRaiseTheEnergy)
                 return m;
             };
             SCOPED_TRACE(fmt::format("{}, b = {}", volume::nameOf(law), b));
-            push(tests::bodyOf(block), Vec3(20e-3, 14e-3, 17e-3), law, 700);
+            push(tests::bodyOf(block), Vec3(20e-3, 14e-3, 17e-3), law, 700, rises);
         }
     }
+    rises.expectFew();
 }
 
 // Membranes are turned, folded and torn at by the same hand.
 TEST(ElasticHostile, SkinThinnerThanACellStaysFiniteAndDoesNotRaiseTheEnergy)
 {
+    Rises rises;
     auto block = tests::heldBlock({20, 14, 17}, 1e-3, 1e4, 0.45);
     block.material = [](Index3 c) {
         volume::CellMaterial m = tests::tissue(1e4, 0.45, c.y == 13);
@@ -233,9 +249,10 @@ TEST(ElasticHostile, SkinThinnerThanACellStaysFiniteAndDoesNotRaiseTheEnergy)
         const ElasticBody body = tests::bodyOf(block, 0.4999, relaxes);
         ASSERT_GT(body.levels.front().layers.size(), 300u);
         for (const volume::Law& law : {volume::Law(volume::SmallStrain{}), volume::Law(volume::NeoHookean{})}) {
-            push(body, Vec3(20e-3, 14e-3, 17e-3), law, 1500);
+            push(body, Vec3(20e-3, 14e-3, 17e-3), law, 1500, rises);
         }
     }
+    rises.expectFew();
 }
 
 }  // namespace
