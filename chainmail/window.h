@@ -9,6 +9,7 @@
 #include <array>
 #include <cstdlib>
 #include <new>
+#include <span>
 #include <vector>
 
 namespace palpate::chainmail {
@@ -246,8 +247,8 @@ void keepWhereFree(const Window& w, float* force) noexcept;
 /// next to nothing would hold against it.
 void handDown(Window& coarse, Field field, Window& fine) noexcept;
 
-/// coarse = fine where the coarse window has a node that the fine one covers. Uses up Field::t of the coarse one.
-void inject(const Window& fine, Window& coarse, Field field) noexcept;
+/// coarse = fine where the coarse window has a node that the fine one covers. Uses up Field::t of both.
+void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcept;
 
 /// Moves what a field holds to a window's new place; `to` keeps what it has where the old window was not.
 /// @param oldCount  Layout::count then

@@ -4,6 +4,7 @@
 #include <glm/vector_relational.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -14,6 +15,8 @@ namespace {
 // Nodes between where a window is and where it should be at which it moves: it moves by steps of two, so that coarse nodes
 // stay nodes, and a hand that trembles between two places should not move it.
 constexpr double slack = 1.3;
+
+constexpr std::array displacements{Field::u, Field::d};
 
 // A window is as deep as asked for and half as wide again: what a tool moves spreads along the surface. Along x it is as
 // wide as whole vectors allow at about the same cost.
@@ -138,9 +141,7 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
     }
     if (carry) {
         for (std::size_t l = 0; l + 1 < windows_.size(); ++l) {
-            for (const Field f : {Field::u, Field::d}) {
-                inject(windows_[l], windows_[l + 1], f);
-            }
+            inject(windows_[l], windows_[l + 1], displacements);
         }
     }
     const bool remembers = carry && body_->relaxes;
@@ -150,8 +151,9 @@ bool WindowStack::follow(const Focus& focus, bool carry) noexcept
     place();
     dropFields(carry);
     if (carry) {
-        transfer(Field::u);
-        transfer(Field::d);
+        for (const Field f : displacements) {
+            transfer(f);
+        }
     }
     for (std::size_t i = 0; i < volume::relaxationTerms && remembers; ++i) {
         handOutForces(history(i));

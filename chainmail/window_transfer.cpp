@@ -3,6 +3,7 @@
 
 #include <glm/common.hpp>
 
+#include <algorithm>
 #include <cstring>
 
 namespace palpate::chainmail {
@@ -167,32 +168,41 @@ void handDown(Window& coarse, Field field, Window& fine) noexcept
 
 namespace {
 
-// Whether the tissue around a node moves with it: by how much, at the middle of a cell's tissue, over that in a full cell.
-bool holdsTissue(const Window& w, Index3 n) noexcept
+// Which nodes move tissue: by how much, at the middle of a cell's tissue, over that in a full cell. In Field::t, 1 or 0.
+const float* markHolding(Window& w) noexcept
 {
     constexpr float least = 0.1F;
-    bool holds = false;
-    for (int c = 0; c < 8 && !holds; ++c) {
-        const Index3 cell = n - octant(c);
-        if (isBetween(cell, Index3(0), w.box - 2)) {
-            const std::size_t at = w.layout.at(cell.x, cell.y, cell.z);
-            const Vec3f share = 1.0F + sideOf(c) * w.cuts.at(at).middle;
-            holds = w.mu[at] > 0.0F && share.x * share.y * share.z >= least;
+    float* holds = w.field(Field::t);
+    std::fill_n(holds, w.layout.count, 0.0F);
+    volume::forEachIndex(Index3(0), w.box - 2, [&](Index3 cell) {
+        const std::size_t at = w.layout.at(cell.x, cell.y, cell.z);
+        if (w.mu[at] <= 0.0F) {
+            return;
         }
-    }
+        const bool isWhole = w.cuts.filling()[at / Layout::lanes] == Filling::whole;
+        for (int c = 0; c < 8; ++c) {
+            const Vec3f share = isWhole ? Vec3f(1.0F) : 1.0F + sideOf(c) * w.cuts.at(at).middle;
+            if (share.x * share.y * share.z >= least) {
+                holds[w.layout.corner(at, c)] = 1.0F;
+            }
+        }
+    });
     return holds;
 }
 
 // What the tissue beside a node does, in a straight line up to the node; what the node itself does where there is none.
-Vec3 continued(const Window& w, Field field, Index3 n) noexcept
+Vec3 continued(const Window& w, Field field, const float* holds, Index3 n) noexcept
 {
     Vec3 sum(0.0);
     int lines = 0;
     volume::forEachIndex(Index3(-1), Index3(1), [&](Index3 way) {
         const Index3 near = n + way, far = near + way;
-        if (way != Index3(0) && isBetween(far, Index3(0), w.box - 1) && holdsTissue(w, near) && holdsTissue(w, far)) {
-            sum += 2.0 * w.value(field, w.layout.at(near.x, near.y, near.z)) -
-                   w.value(field, w.layout.at(far.x, far.y, far.z));
+        if (way == Index3(0) || !isBetween(far, Index3(0), w.box - 1)) {
+            return;
+        }
+        const std::size_t nearAt = w.layout.at(near.x, near.y, near.z), farAt = w.layout.at(far.x, far.y, far.z);
+        if (holds[nearAt] > 0.0F && holds[farAt] > 0.0F) {
+            sum += 2.0 * w.value(field, nearAt) - w.value(field, farAt);
             ++lines;
         }
     });
@@ -203,22 +213,27 @@ Vec3 continued(const Window& w, Field field, Index3 n) noexcept
 
 // Nodes that hold no tissue in the fine window, but may in the coarse one, have no displacement of their own. Beside a gap
 // they keep what they have: a line would lead across it.
-void inject(const Window& fine, Window& coarse, Field field) noexcept
+void inject(Window& fine, Window& coarse, std::span<const Field> fields) noexcept
 {
     const bool hasGaps = !fine.fragments.placed().empty() || !coarse.fragments.placed().empty();
+    const float* holds = hasGaps ? nullptr : markHolding(fine);
     const Index3 o = fine.offsetIn(coarse);
     volume::forEachIndex(Index3(0), (fine.size() - 1) / 2, [&](Index3 n) {
         const std::size_t target = coarse.layout.at(o.x + n.x, o.y + n.y, o.z + n.z);
         const std::size_t source = fine.layout.at(2 * n.x, 2 * n.y, 2 * n.z);
-        const bool own = hasGaps || coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holdsTissue(fine, 2 * n);
-        coarse.set(field, target, own ? fine.value(field, source) : continued(fine, field, 2 * n));
+        const bool own = hasGaps || coarse.tissue[target] == 0.0F || fine.open[source] == 0.0F || holds[source] > 0.0F;
+        for (const Field field : fields) {
+            coarse.set(field, target, own ? fine.value(field, source) : continued(fine, field, holds, 2 * n));
+        }
     });
     Followers followers(fine, coarse);
-    followers.forEachParent([&](std::size_t parent, std::size_t, double) { coarse.set(field, parent, Vec3(0.0)); });
-    followers.forEachParent([&](std::size_t parent, std::size_t node, double share) {
-        coarse.add(field, parent, share * fine.value(field, node));
-    });
-    coarse.share(field);
+    for (const Field field : fields) {
+        followers.forEachParent([&](std::size_t parent, std::size_t, double) { coarse.set(field, parent, Vec3(0.0)); });
+        followers.forEachParent([&](std::size_t parent, std::size_t node, double share) {
+            coarse.add(field, parent, share * fine.value(field, node));
+        });
+        coarse.share(field);
+    }
 }
 
 void carryOver(const Window& window, Index3 oldLow, std::size_t oldCount, const float* from, float* to) noexcept
