@@ -35,16 +35,13 @@ public:
         const std::size_t at = g_.offset(cell);
         const Vec3 centre = g_.position(cell) + 0.5 * g_.spacing;
         const double distance = surface_.at(centre);
-        if (distance < -deepest * g_.spacing) {
-            return {1.0, {}};
-        }
         const MixedCell* m = mixedAt(at);
         if (m == nullptr && distance < -g_.spacing) {
             return {1.0, {}};
         }
-        const Vec3 normal = surface_.normal(centre);
-        const bool top = atSurface(level_, cell, cell);
-        if (!top && (m == nullptr || glm::dot(Vec3(m->middle), normal) < aligned * glm::length(Vec3(m->middle)))) {
+        const bool top = distance >= -deepest * g_.spacing && atSurface(level_, cell, cell);
+        const Vec3 normal = normalIn(m, top, distance, centre);
+        if (normal == Vec3(0.0)) {
             return {1.0, {}};
         }
         const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
@@ -66,6 +63,14 @@ private:
     {
         const auto found = mixed_.find(at);
         return found != mixed_.end() ? found->second : nullptr;
+    }
+
+    // Across the layers of a cell: the surface's normal where they run along it, their own elsewhere; 0 where there are none.
+    Vec3 normalIn(const MixedCell* m, bool top, double distance, Vec3 centre) const
+    {
+        const Vec3 own = m != nullptr ? Vec3(m->normal) : Vec3(0.0);
+        const Vec3 outward = distance >= -deepest * g_.spacing ? surface_.normal(centre) : Vec3(0.0);
+        return top || glm::abs(glm::dot(own, outward)) >= aligned ? outward : own;
     }
 
     struct Mean {

@@ -16,6 +16,7 @@ struct MixedCell {
     float along = 1;
     float share = 0;
     Vec3f middle{0.0F};
+    Vec3f normal{0.0F};
 };
 
 /// The finest level, and what coarser ones need to know of its cells.

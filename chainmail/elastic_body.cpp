@@ -87,7 +87,7 @@ FinestLevel finest(const volume::NodeGrid& cells, const std::vector<volume::Cell
         level.stiffening[at] = m.stiffening;
         all.held[at] = m.fixed;
         if (m.along > 1.0F) {
-            all.mixed.push_back({c, m.along, m.share, m.middle});
+            all.mixed.push_back({c, m.along, m.share, m.middle, m.normal});
         }
         if (m.fixed >= whollyHeld) {
             volume::forEachIndex(c, c + 1, [&](Index3 n) { level.fixed[level.nodes.offset(n)] = 1; });

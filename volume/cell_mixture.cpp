@@ -1,5 +1,8 @@
 #include <volume/cell_mixture.h>
 
+#include <Eigen/Eigenvalues>
+#include <glm/matrix.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,10 +14,17 @@ void CellMixture::Sums::add(double weight, double modulus, Vec3 at) noexcept
     fraction += weight;
     stiffness += weight * modulus;
     compliance += weight / modulus;
-    place += weight * at;
-    stiffest += weight * modulus * at;
+    byWeight.add(weight, at);
+    byStiffness.add(weight * modulus, at);
     square += weight * modulus * modulus;
     softest = std::min(softest, modulus);
+    stiffest = std::max(stiffest, modulus);
+}
+
+void CellMixture::Places::add(double weight, Vec3 at) noexcept
+{
+    first += weight * at;
+    second += weight * glm::outerProduct(at, at);
 }
 
 double CellMixture::Sums::arithmetic() const noexcept
@@ -27,14 +37,36 @@ double CellMixture::Sums::mean() const noexcept
     return std::sqrt(stiffness / compliance);
 }
 
-std::pair<Vec3, double> CellMixture::Sums::layer() const noexcept
+CellMixture::Layer CellMixture::Sums::layer() const noexcept
 {
     const double more = stiffness - fraction * softest;
     if (!(more > 1e-6 * stiffness)) {
-        return {Vec3(0.0), 0.0};
+        return {};
     }
     const double squares = square - 2.0 * softest * stiffness + softest * softest * fraction;
-    return {(stiffest - softest * place) / more, std::min(more * more / (squares * fraction), 1.0)};
+    const double share = std::min(more * more / (squares * fraction), 1.0);
+    const Places stiff = byStiffness.minus(byWeight.times(softest)).times(1.0 / more);
+    const double less = fraction * stiffest - stiffness;
+    const Places soft = byWeight.times(stiffest).minus(byStiffness).times(1.0 / less);
+    return {stiff.first, share <= 0.5 ? normalOf(stiff) : normalOf(soft), share};
+}
+
+// A part is off the cell's middle along a layer's normal, and thin along it. Of a layer as wide as the cell, t of it thick
+// and m off its middle, the difference of the largest value from the next is m^2 + (1 - t^2) / 3.
+Vec3 CellMixture::normalOf(const Places& part) noexcept
+{
+    constexpr double least = 0.2;  // of that; between tissues that lie in no layers there is no normal
+    const Mat3 off = 2.0 * glm::outerProduct(part.first, part.first) - part.second;
+    Eigen::Matrix3d matrix;
+    for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+            matrix(i, j) = off[i][j];
+        }
+    }
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;
+    axes.computeDirect(matrix);
+    const Eigen::Vector3d values = axes.eigenvalues(), normal = axes.eigenvectors().col(2);
+    return values(2) - values(1) >= least ? Vec3(normal(0), normal(1), normal(2)) : Vec3(0.0);
 }
 
 void CellMixture::add(const TissueRow& row, double weight, double scale, bool held, Vec3 place) noexcept
@@ -53,7 +85,7 @@ CellMaterial CellMixture::material() const noexcept
     if (tissue <= 0.0) {
         return {};
     }
-    const auto [middle, share] = free_.layer();
+    const Layer layer = free_.layer();
     const double rigid = held_.fraction > 0.0 ? held_.mean() : std::numeric_limits<double>::infinity();
     const double modulus = free_.fraction > 0.0 ? std::min(free_.mean() * tissue / free_.fraction, rigid) : rigid;
     CellMaterial material{static_cast<float>(tissue * modulus),
@@ -63,8 +95,9 @@ CellMaterial CellMixture::material() const noexcept
                           static_cast<float>(stiffening_.mean()),
                           {},
                           free_.fraction > 0.0 ? static_cast<float>(free_.arithmetic() / free_.mean()) : 1.0F,
-                          Vec3f(middle),
-                          static_cast<float>(share)};
+                          Vec3f(layer.middle),
+                          static_cast<float>(layer.share),
+                          Vec3f(layer.normal)};
     for (std::size_t i = 0; i < relaxing_.size() && free_.fraction > 0.0; ++i) {
         material.relaxing[i] = static_cast<float>(relaxing_[i] / free_.fraction);
     }

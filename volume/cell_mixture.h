@@ -5,7 +5,6 @@
 
 #include <array>
 #include <limits>
-#include <utility>
 
 namespace palpate::volume {
 
@@ -51,16 +50,29 @@ public:
     double fraction() const noexcept { return free_.fraction + held_.fraction; }
 
 private:
+    // Sums over places in the cell.
+    struct Places {
+        Vec3 first{0.0};
+        Mat3 second{0.0};
+        void add(double weight, Vec3 at) noexcept;
+        Places times(double factor) const noexcept { return {factor * first, factor * second}; }
+        Places minus(const Places& other) const noexcept { return {first - other.first, second - other.second}; }
+    };
+    // What the modulus has over the softest's: see CellMaterial.
+    struct Layer {
+        Vec3 middle{0.0}, normal{0.0};
+        double share = 0.0;  // that an even layer of it would take
+    };
+    static Vec3 normalOf(const Places& part) noexcept;
     struct Sums {
         double fraction = 0.0, stiffness = 0.0, compliance = 0.0;
         double square = 0.0;  // of moduli
-        double softest = std::numeric_limits<double>::infinity();
-        Vec3 place{0.0}, stiffest{0.0};  // of places, by weight, and by stiffness
+        double softest = std::numeric_limits<double>::infinity(), stiffest = 0.0;
+        Places byWeight, byStiffness;
         void add(double weight, double modulus, Vec3 at) noexcept;
         double arithmetic() const noexcept;
         double mean() const noexcept;
-        /// What the modulus has over the softest's: its middle, and the share that an even layer of it would take.
-        std::pair<Vec3, double> layer() const noexcept;
+        Layer layer() const noexcept;
     } free_, held_;
     double poisson_ = 0.0;
     StiffeningMean stiffening_;

@@ -70,6 +70,8 @@ struct CellMaterial {
     /// softest tissue's.
     Vec3f middle{0.0F};
     float share = 0;  // of what is not held: that part [-]
+    /// Across the layers in which its tissues lie, a unit vector of either sign; 0 where they lie in none.
+    Vec3f normal{0.0F};
     /// Which of its eighths are mostly tissue, a bit for each, x fastest; none may be where little of it is tissue.
     std::uint8_t octants = 0xFF;
 };
