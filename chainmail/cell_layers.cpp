@@ -13,10 +13,11 @@ namespace palpate::chainmail {
 
 namespace {
 
-constexpr double deepest = 2.0;   // cells under the surface that may have layers along it
-constexpr double aligned = 0.8;   // cosine from which on a layer that is not at the surface runs along it
-constexpr double flat = 0.95;     // slope of the distance field from which on there is no edge in the cell
-constexpr double thinnest = 0.2;  // of a layer's modulus in the cell's, from which on it counts
+constexpr double deepest = 2.0;         // cells under the surface that may have layers along it
+constexpr double aligned = 0.8;         // cosine from which on a layer that is not at the surface runs along it
+constexpr double flat = 0.95;           // slope of the distance field from which on there is no edge in the cell
+constexpr double thinnest = 0.2;        // of a layer's modulus in the cell's, from which on it counts
+constexpr double thinnestInside = 1.0;  // the same for layers that do not run along the surface: softer ones are not felt
 
 // The material of a cell as a layer on something soft.
 class Layering {
@@ -40,7 +41,12 @@ public:
             return {1.0, {}};
         }
         const bool top = distance >= -deepest * g_.spacing && atSurface(level_, cell, cell);
-        const Vec3 normal = normalIn(m, top, distance, centre);
+        const Vec3 outward = distance >= -deepest * g_.spacing ? surface_.normal(centre) : Vec3(0.0);
+        const Vec3 own = m != nullptr ? Vec3(m->normal) : Vec3(0.0);
+        // The surface's normal is the finer one. Under it bending counts; inside the body the tissue on both sides bears
+        // it.
+        const bool alongSurface = top || glm::abs(glm::dot(own, outward)) >= aligned;
+        const Vec3 normal = alongSurface ? outward : own;
         if (normal == Vec3(0.0)) {
             return {1.0, {}};
         }
@@ -48,14 +54,14 @@ public:
         const bool isCut = top && glm::length(surface_.gradient(centre)) > flat;
         const double full = isCut ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
         const Mean mean = meanOf(at, full, centre - g_.spacing * normal, normal);
-        if (mean.layer <= thinnest * mean.across) {
+        if (mean.layer <= (alongSurface ? thinnest : thinnestInside) * mean.across) {
             return {1.0, {}};
         }
         const double share = full * (m != nullptr ? static_cast<double>(m->share) : 1.0);
         const Vec3f middle = m != nullptr ? m->middle : Vec3f((full - 1.0) * wide * normal);
-        return {
-            mean.across / static_cast<double>(level_.mu[at]),
-            {cell, static_cast<float>(mean.layer), Vec3f(normal), middle, Vec3f(share * wide / std::sqrt(3.0) * normal)}};
+        const double thick = alongSurface ? share * wide : 0.0;
+        return {mean.across / static_cast<double>(level_.mu[at]),
+                {cell, static_cast<float>(mean.layer), Vec3f(normal), middle, Vec3f(thick / std::sqrt(3.0) * normal)}};
     }
 
 private:
@@ -63,14 +69,6 @@ private:
     {
         const auto found = mixed_.find(at);
         return found != mixed_.end() ? found->second : nullptr;
-    }
-
-    // Across the layers of a cell: the surface's normal where they run along it, their own elsewhere; 0 where there are none.
-    Vec3 normalIn(const MixedCell* m, bool top, double distance, Vec3 centre) const
-    {
-        const Vec3 own = m != nullptr ? Vec3(m->normal) : Vec3(0.0);
-        const Vec3 outward = distance >= -deepest * g_.spacing ? surface_.normal(centre) : Vec3(0.0);
-        return top || glm::abs(glm::dot(own, outward)) >= aligned ? outward : own;
     }
 
     struct Mean {

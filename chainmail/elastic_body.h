@@ -17,7 +17,7 @@ struct CellLayer {
     float mu = 0;        // what its shear modulus has over the cell's, times its share of the cell [Pa]
     Vec3f normal{0.0F};  // unit vector across it
     Vec3f middle{0.0F};  // of it, -1 to 1 along each edge of the cell
-    Vec3f half{0.0F};    // from there to the two places that stand for its thickness, in the same measure
+    Vec3f half{0.0F};    // from there to the two places that stand for its thickness, in the same measure; 0: one place
 };
 
 /// A cell that its tissue fills in part.

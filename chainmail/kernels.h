@@ -41,7 +41,9 @@ struct CellLayers {
     std::array<const float*, 3> normal{};
     std::array<const float*, 3> middle{};
     std::array<const float*, 3> half{};
-    const std::uint8_t* any = nullptr;  // not 0 where one of Layout::lanes cells in a row has a layer (count / lanes x 1)
+    /// At how many places the layers of Layout::lanes cells in a row are taken, the most of them: 0 to 2 (count / lanes x
+    /// 1).
+    const std::uint8_t* places = nullptr;
 };
 
 /// Where the tissue of cells lies that it fills in part (count x 1 each), see Cut.

@@ -6,14 +6,14 @@ namespace palpate::chainmail {
 
 namespace {
 
-// One of the two places that stand for a layer's thickness: a membrane of half its stiffness that moves with the cell. The
-// displacement's gradient there is D / (4 h), D of the modes; in the plane across the normal n, with Q = I - n n^T, the
+// One of the places that stand for a layer's thickness: a membrane of its share of the stiffness that moves with the cell.
+// The displacement's gradient there is D / (4 h), D of the modes; in the plane across the normal n, with Q = I - n n^T, the
 // strain is e = Q sym(D) Q. No stress across it, as in a cell that bends: its stress is 2 mu (e + s tr(e) Q). Adds to g the
 // gradient of its energy.
 class Sheet {
 public:
-    Sheet(const CellLayers& layers, std::size_t cell, float side) noexcept
-        : mu_(0.5F * load(layers.mu + cell)),
+    Sheet(const CellLayers& layers, std::size_t cell, float side, float share) noexcept
+        : mu_(share * load(layers.mu + cell)),
           n_{load(layers.normal[0] + cell), load(layers.normal[1] + cell), load(layers.normal[2] + cell)},
           c_{load(layers.middle[0] + cell) + side * load(layers.half[0] + cell),
              load(layers.middle[1] + cell) + side * load(layers.half[1] + cell),
@@ -176,26 +176,27 @@ public:
 
     void small(std::size_t cell, Lanes s, const Modes (&m)[3], Modes (&g)[3]) const noexcept
     {
-        for (const float side : {-1.0F, 1.0F}) {
-            if (layers_.any[cell / Layout::lanes] != 0) {
-                Sheet(layers_, cell, side).small(s, m, g);
-            }
-        }
+        forEachSheet(cell, [&](const Sheet& sheet) { sheet.small(s, m, g); });
     }
 
     // Returns the energy, in the scaled modulus.
     Lanes finite(std::size_t cell, Lanes s, float factor, float h8, const Modes (&m)[3], Modes (&g)[3]) const noexcept
     {
         Lanes energy{};
-        for (const float side : {-1.0F, 1.0F}) {
-            if (layers_.any[cell / Layout::lanes] != 0) {
-                energy += Sheet(layers_, cell, side).finite(s, factor, h8, m, g);
-            }
-        }
+        forEachSheet(cell, [&](const Sheet& sheet) { energy += sheet.finite(s, factor, h8, m, g); });
         return energy;
     }
 
 private:
+    template <typename Visit>
+    [[gnu::always_inline]] void forEachSheet(std::size_t cell, const Visit& visit) const noexcept
+    {
+        const int places = layers_.places[cell / Layout::lanes];
+        for (int i = 0; i < places; ++i) {
+            visit(Sheet(layers_, cell, i == 0 ? -1.0F : 1.0F, places == 1 ? 1.0F : 0.5F));
+        }
+    }
+
     const CellLayers& layers_;
 };
 

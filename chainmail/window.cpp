@@ -29,7 +29,7 @@ LayerFields::LayerFields(const Layout& layout, Index3 box, bool any) : layout_(l
 {
     const std::size_t room = any ? layout.count + Layout::lanes : 0;
     mu_.assign(room, 0.0F);
-    any_.assign(room / Layout::lanes, 0);
+    places_.assign(room / Layout::lanes, 0);
     for (std::size_t c = 0; c < 3; ++c) {
         normal_[c].assign(room, 0.0F);
         middle_[c].assign(room, 0.0F);
@@ -42,7 +42,7 @@ void LayerFields::place(const CellLevel& level, Index3 at) noexcept
 {
     some_ = false;
     std::fill(mu_.begin(), mu_.end(), 0.0F);
-    std::fill(any_.begin(), any_.end(), std::uint8_t{0});
+    std::fill(places_.begin(), places_.end(), std::uint8_t{0});
     forEachIn(level.layers, level.layerRows, level.nodes.size.y, at, box_, &CellLayer::cell, [&](CellLayer layer) {
         const Index3 cell = layer.cell - at;
         layer.middle -= cutOf(level, layer.cell).middle;
@@ -58,7 +58,8 @@ void LayerFields::set(std::size_t cell, const CellLayer& layer, float scale) noe
         middle_[static_cast<std::size_t>(c)][cell] = layer.middle[c];
         half_[static_cast<std::size_t>(c)][cell] = layer.half[c];
     }
-    any_[cell / Layout::lanes] = 1;
+    std::uint8_t& places = places_[cell / Layout::lanes];
+    places = std::max<std::uint8_t>(places, layer.half == Vec3f(0.0F) ? 1 : 2);
     some_ = true;
 }
 
@@ -71,7 +72,7 @@ CellLayers LayerFields::with(const Floats& mu) const noexcept
             {normal_[0].data(), normal_[1].data(), normal_[2].data()},
             {middle_[0].data(), middle_[1].data(), middle_[2].data()},
             {half_[0].data(), half_[1].data(), half_[2].data()},
-            any_.data()};
+            places_.data()};
 }
 
 CutFields::CutFields(const Layout& layout, Index3 box) : layout_(layout), box_(box)

@@ -76,7 +76,7 @@ private:
     Index3 box_{0};
     Floats mu_;
     std::array<Floats, 3> normal_, middle_, half_;
-    std::vector<std::uint8_t> any_;
+    std::vector<std::uint8_t> places_;
     bool some_ = false;
 };
 
