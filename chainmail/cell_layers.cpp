@@ -45,7 +45,7 @@ public:
         const Vec3 own = m != nullptr ? Vec3(m->normal) : Vec3(0.0);
         // The surface's normal is the finer one. Under it bending counts; inside the body the tissue on both sides bears
         // it.
-        const bool alongSurface = top || glm::abs(glm::dot(own, outward)) >= aligned;
+        const bool alongSurface = own == Vec3(0.0) ? top : glm::abs(glm::dot(own, outward)) >= aligned;
         const Vec3 normal = alongSurface ? outward : own;
         if (normal == Vec3(0.0)) {
             return {1.0, {}};
@@ -53,7 +53,8 @@ public:
         const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
         const bool isCut = top && glm::length(surface_.gradient(centre)) > flat;
         const double full = isCut ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
-        const Mean mean = meanOf(at, full, centre - g_.spacing * normal, normal);
+        const Vec3 under = alongSurface ? centre - g_.spacing * normal : centre;
+        const Mean mean = meanOf(at, full, under, normal);
         if (mean.layer <= (alongSurface ? thinnest : thinnestInside) * mean.across) {
             return {1.0, {}};
         }
@@ -87,7 +88,7 @@ private:
         add(whole, full * own.share, own.stiff);
         add(whole, full * (1.0 - own.share), own.soft);
         const Index3 below(glm::floor((under - g_.origin) / g_.spacing));
-        if (g_.contains(below) && level_.mu[g_.offset(below)] > 0.0F) {
+        if (g_.contains(below) && g_.offset(below) != at && level_.mu[g_.offset(below)] > 0.0F) {
             const Phases next = phasesOf(g_.offset(below), 1.0);
             const double depth = 1.0 - full;
             const bool stiffFirst = glm::dot(next.middle, normal) > 0.0;

@@ -234,5 +234,57 @@ TEST(ElasticLayers, SkinOnFatIsAsStiffAsFiniteElementsSay)
     }
 }
 
+// A block of fat with thin walls that stand across it, thirty times as stiff, in cells of h: a wall every 10 mm.
+ElasticBody walled(double h, double wall)
+{
+    constexpr double gap = 10e-3, first = 4e-3;
+    volume::TissueRow fat, stiff;
+    fat.youngsModulus = 3.25e3;
+    stiff.youngsModulus = 97.5e3;
+    fat.poissonRatio = stiff.poissonRatio = 0.49;
+    const int width = static_cast<int>(std::lround(60e-3 / h)), floor = static_cast<int>(std::lround(24e-3 / h));
+    tests::ElasticBlock block;
+    block.cells = {width, floor + 1, width};
+    block.spacing = h;
+    block.air = 4;
+    block.material = [=](Index3 c) {
+        if (c.y == floor) {
+            return tests::tissue(fat.youngsModulus, fat.poissonRatio, true);
+        }
+        volume::CellMixture mixture;
+        volume::forEachIndex(Index3(0), Index3(3), [&](Index3 sample) {
+            const Vec3 at = 0.5 * Vec3(sample) - 0.75;
+            const double beyond = std::fmod((c.x + 0.5 + 0.5 * at.x) * h - first + gap, gap);
+            mixture.add(beyond < wall ? stiff : fat, 1.0 / 64.0, 1.0, false, at);
+        });
+        return mixture.material();
+    };
+    return tests::bodyOf(block);
+}
+
+// Beside cells as thin as the walls, in one window that holds the tool's surroundings. One material per cell was 5 to 26 %
+// too soft.
+TEST(ElasticLayers, WallsInsideTheBodyAreAsStiffAsInCellsOfTheirThickness)
+{
+    const auto force = [](const ElasticBody& body, int window, double x, double depth) {
+        const double r = 10e-3;
+        const Vec3 entry(x, 0.0, 30e-3);
+        Elastic elastic(body, {.window = window, .law = volume::NeoHookean{}}, tests::focusUnder(entry));
+        std::array tools{tests::ball(entry + Vec3(0.0, depth - r, 0.0), r)};
+        tools[0].pushed = Vec3(0.0, depth, 0.0);
+        tests::settle(elastic, tests::loadOf(tools, {}, entry), 1e-3);
+        return -elastic.toolForce(0).y;
+    };
+    const ElasticBody thin = walled(1e-3, 1e-3), wide = walled(2e-3, 1e-3);
+    ASSERT_TRUE(thin.levels.front().layers.empty());
+    ASSERT_FALSE(wide.levels.front().layers.empty());
+    for (const double x : {28e-3, 30e-3, 32e-3}) {
+        for (const double depth : {2e-3, 5e-3, 8e-3}) {
+            const double expected = force(thin, 41, x, depth);
+            EXPECT_NEAR(force(wide, 15, x, depth) / expected, 1.0, 0.05) << x << " " << depth;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace palpate::chainmail

@@ -135,5 +135,39 @@ TEST(CellMixture, KnowsWhereItsLayerLies)
     EXPECT_EQ(plain.material().along, 1.0F);
 }
 
+// A layer at any place and angle, thin or thick, stiff or soft, has its own normal; tissues that are mixed have none.
+TEST(CellMixture, KnowsTheNormalOfItsLayers)
+{
+    TissueRow fat, stiff;
+    fat.youngsModulus = 3e3;
+    stiff.youngsModulus = 60e3;
+    constexpr int perEdge = 8;
+    const auto fill = [&](const auto& isStiff) {
+        CellMixture mixture;
+        forEachIndex(Index3(0), Index3(perEdge - 1), [&](Index3 n) {
+            const Vec3 at = (2.0 * Vec3(n) + 1.0) / static_cast<double>(perEdge) - 1.0;
+            mixture.add(isStiff(at) ? stiff : fat, std::pow(perEdge, -3.0), 1.0, false, at);
+        });
+        return Vec3(mixture.material().normal);
+    };
+    for (const Vec3 n : {Vec3(1, 0, 0), Vec3(0, 0, 1), glm::normalize(Vec3(1, 2, 0)), glm::normalize(Vec3(-1, 1, 2))}) {
+        for (const double middle : {0.0, 0.3, -0.6}) {
+            for (const double half : {0.2, 0.35}) {
+                const auto isInside = [&](Vec3 at) { return std::abs(glm::dot(at, n) - middle) < half; };
+                EXPECT_GT(std::abs(glm::dot(fill(isInside), n)), std::cos(0.15)) << middle << " " << half;
+                const auto isOutside = [&](Vec3 at) { return !isInside(at); };
+                EXPECT_GT(std::abs(glm::dot(fill(isOutside), n)), std::cos(0.15)) << middle << " " << half;
+            }
+        }
+        EXPECT_GT(std::abs(glm::dot(fill([&](Vec3 at) { return glm::dot(at, n) > 0.1; }), n)), std::cos(0.15));
+    }
+    std::minstd_rand random(4);
+    for (int i = 0; i < 20; ++i) {
+        EXPECT_EQ(fill([&](Vec3) { return random() % 3 == 0; }), Vec3(0.0));
+    }
+    EXPECT_EQ(fill([](Vec3) { return true; }), Vec3(0.0));
+    EXPECT_EQ(fill([](Vec3 at) { return glm::length(at) < 0.6; }), Vec3(0.0));
+}
+
 }  // namespace
 }  // namespace palpate::volume
