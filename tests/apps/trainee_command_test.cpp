@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
 namespace palpate::apps {
 namespace {
 
@@ -34,14 +37,22 @@ TEST(TraineeCommand, BehindARibTheWayInIsAslant)
     EXPECT_GT(trained.at("nearest_mm").at("rib").get<double>(), 0.0);
 }
 
-// The lump lies 11 mm beside the planned line and is 14 mm across: half of that, by the force alone.
+// The lump lies 11 mm beside the planned line and is 14 mm across: half of that, by the force alone. Of 22 experts three
+// missed by more; so the middle one of three.
 TEST(TraineeCommand, ALumpIsFoundByItsForce)
 {
-    const auto f = figures({"train", "--task", "find-lump", "--trainee", "expert", "--seed", "1", "--unpaced", "--headless",
-                            "--setting", "fast"});
-    EXPECT_EQ(f.at("score").at("marks"), 4);
-    EXPECT_LT(f.at("score").at("mark_error_mm").get<double>(), 7.0);
-    EXPECT_LT(f.at("score").at("mark_size_error_mm").get<double>(), 7.0);
+    std::vector<double> place, size;
+    for (const char* seed : {"1", "2", "3"}) {
+        const auto f = figures({"train", "--task", "find-lump", "--trainee", "expert", "--seed", seed, "--unpaced",
+                                "--headless", "--setting", "fast"});
+        EXPECT_EQ(f.at("score").at("marks"), 4) << seed;
+        place.push_back(f.at("score").at("mark_error_mm").get<double>());
+        size.push_back(f.at("score").at("mark_size_error_mm").get<double>());
+    }
+    std::ranges::sort(place);
+    std::ranges::sort(size);
+    EXPECT_LT(place[1], 7.0);
+    EXPECT_LT(size[1], 7.0);
 }
 
 TEST(TraineeCommand, WhatDoesNotGoTogetherIsRefused)
