@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <unordered_map>
 
 namespace palpate::chainmail {
@@ -40,11 +41,11 @@ public:
         if (m == nullptr && distance < -g_.spacing) {
             return {1.0, {}};
         }
-        const bool top = distance >= -deepest * g_.spacing && atSurface(level_, cell, cell);
-        const Vec3 outward = distance >= -deepest * g_.spacing ? surface_.normal(centre) : Vec3(0.0);
+        const bool isNear = distance >= -deepest * g_.spacing;
+        const bool top = isNear && atSurface(level_, cell, cell);
+        const Vec3 outward = isNear ? surface_.normal(centre) : Vec3(0.0);
         const Vec3 own = m != nullptr ? Vec3(m->normal) : Vec3(0.0);
-        // The surface's normal is the finer one. Under it bending counts; inside the body the tissue on both sides bears
-        // it.
+        // The surface's normal is the finer one. Along it bending counts; elsewhere tissue on both sides bears that.
         const bool alongSurface = own == Vec3(0.0) ? top : glm::abs(glm::dot(own, outward)) >= aligned;
         const Vec3 normal = alongSurface ? outward : own;
         if (normal == Vec3(0.0)) {
@@ -53,8 +54,8 @@ public:
         const double wide = glm::abs(normal.x) + glm::abs(normal.y) + glm::abs(normal.z);
         const bool isCut = top && glm::length(surface_.gradient(centre)) > flat;
         const double full = isCut ? std::clamp(0.5 - distance / (wide * g_.spacing), 0.05, 1.0) : 1.0;
-        const Vec3 under = alongSurface ? centre - g_.spacing * normal : centre;
-        const Mean mean = meanOf(at, full, under, normal);
+        const auto below = alongSurface ? std::optional(cellAt(centre - g_.spacing * normal)) : std::nullopt;
+        const Mean mean = meanOf(at, full, below, normal);
         if (mean.layer <= (alongSurface ? thinnest : thinnestInside) * mean.across) {
             return {1.0, {}};
         }
@@ -72,6 +73,8 @@ private:
         return found != mixed_.end() ? found->second : nullptr;
     }
 
+    Index3 cellAt(Vec3 point) const { return Index3(glm::floor((point - g_.origin) / g_.spacing)); }
+
     struct Mean {
         double across = 0.0;
         double layer = 0.0;
@@ -81,15 +84,14 @@ private:
     // much as it is empty. Else a layer that the cell's border cuts would bend as if it were as thick as the cell. It is
     // between the harmonic mean, which is exact for layers thinner than all else, and the geometric one of both bounds, by
     // the square of the layer's share: a thick layer bears what presses it by its own shear, too.
-    Mean meanOf(std::size_t at, double full, Vec3 under, Vec3 normal) const
+    Mean meanOf(std::size_t at, double full, std::optional<Index3> below, Vec3 normal) const
     {
         volume::CellMixture whole;
         const Phases own = phasesOf(at, full);
         add(whole, full * own.share, own.stiff);
         add(whole, full * (1.0 - own.share), own.soft);
-        const Index3 below(glm::floor((under - g_.origin) / g_.spacing));
-        if (g_.contains(below) && g_.offset(below) != at && level_.mu[g_.offset(below)] > 0.0F) {
-            const Phases next = phasesOf(g_.offset(below), 1.0);
+        if (below && g_.contains(*below) && level_.mu[g_.offset(*below)] > 0.0F) {
+            const Phases next = phasesOf(g_.offset(*below), 1.0);
             const double depth = 1.0 - full;
             const bool stiffFirst = glm::dot(next.middle, normal) > 0.0;
             const double stiff = stiffFirst ? std::min(next.share, depth) : std::max(depth - (1.0 - next.share), 0.0);

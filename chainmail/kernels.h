@@ -41,8 +41,7 @@ struct CellLayers {
     std::array<const float*, 3> normal{};
     std::array<const float*, 3> middle{};
     std::array<const float*, 3> half{};
-    /// At how many places the layers of Layout::lanes cells in a row are taken, the most of them: 0 to 2 (count / lanes x
-    /// 1).
+    /// The most places that stand for the thickness of a layer in Layout::lanes cells of a row, 0 to 2 (count / lanes x 1).
     const std::uint8_t* places = nullptr;
 };
 

@@ -46,9 +46,11 @@ CellMixture::Layer CellMixture::Sums::layer() const noexcept
     const double squares = square - 2.0 * softest * stiffness + softest * softest * fraction;
     const double share = std::min(more * more / (squares * fraction), 1.0);
     const Places stiff = byStiffness.minus(byWeight.times(softest)).times(1.0 / more);
+    if (share <= 0.5) {
+        return {stiff.first, normalOf(stiff), share};
+    }
     const double less = fraction * stiffest - stiffness;
-    const Places soft = byWeight.times(stiffest).minus(byStiffness).times(1.0 / less);
-    return {stiff.first, share <= 0.5 ? normalOf(stiff) : normalOf(soft), share};
+    return {stiff.first, normalOf(byWeight.times(stiffest).minus(byStiffness).times(1.0 / less)), share};
 }
 
 // A part is off the cell's middle along a layer's normal, and thin along it. Of a layer as wide as the cell, t of it thick
