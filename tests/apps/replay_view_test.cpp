@@ -68,7 +68,8 @@ TEST(ReplayView, AnUnpacedSessionHasPicturesOfItsEvents)
     const Folder folder;
     for (const bool recorded : {false, true}) {
         const fs::path to = folder / (recorded ? "second" : "first");
-        std::vector<std::string> command = {"train", "layered", "--unpaced", "--no-view", "--pictures", to};
+        std::vector<std::string> command = {"train",     "layered",   "--setting",  "fast",
+                                            "--unpaced", "--no-view", "--pictures", to};
         if (recorded)
             command.insert(command.end(), {"--record", folder / "s.db"});
         const Outcome outcome = palpate(command);

@@ -120,8 +120,8 @@ class Shards(InFolder):
         self.assertEqual([row["case"] for row in palpate.SweepResult(parts).rows], [0, 1])
 
 
-class Managers(InFolder):
-    """The lines of docs/sweeps.md."""
+class Managed(InFolder):
+    """A folder with the plan, in which a command is to make the whole table."""
 
     def setUp(self):
         super().setUp()
@@ -133,14 +133,14 @@ class Managers(InFolder):
         self.assertEqual(done.returncode, 0, done.stderr + done.stdout)
         self.assertEqual(without_timing(self.folder / "lump" / "table.csv"), whole())
 
+
+class Managers(Managed):
+    """The lines of docs/sweeps.md; snakemake_test.py has Snakemake's."""
+
     def test_gnu_parallel(self):
         text = (SOURCE / "docs" / "sweeps.md").read_text(encoding="utf-8")
         line = next(line.strip() for line in text.splitlines() if line.startswith("    parallel "))
         self.run_here("bash", "-c", line)
-
-    def test_snakemake(self):
-        shutil.copy(SOURCE / "examples" / "sweeps" / "Snakefile", self.folder)
-        self.run_here("/usr/bin/snakemake", "--cores", "2", "--config", "plan=lump.toml", "folder=lump", "shards=3")
 
     def test_dask(self):
         shutil.copy(SOURCE / "examples" / "sweeps" / "dask_sweep.py", self.folder)

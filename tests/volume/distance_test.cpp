@@ -156,7 +156,7 @@ TEST(Distance, OfAFaceAlongVoxelsIsThereWhereverItLiesInTheGrid)
         LabelImage image = voxelise(size, centred(straight(Vec3(voxel)), size), inBox);
         const Vec3 origin = image.affine.origin;
         const NodeGrid grid = coveringGrid({Vec3(-half), Vec3(half + 2e-3)}, spacing, 2 * spacing);
-        for (double shift = 0.0; shift <= 2e-3; shift += 0.13e-3) {
+        for (double shift = 0.0; shift <= 2e-3; shift += 0.27e-3) {
             for (int axis = 0; axis < 3; ++axis) {
                 Vec3 n(0.0);
                 n[axis] = 1.0;
