@@ -1,8 +1,7 @@
 #pragma once
 
+#include <volume/grids.h>
 #include <volume/tissue.h>
-
-#include <openvdb/openvdb.h>
 
 #include <optional>
 #include <vector>

@@ -1,10 +1,10 @@
 // OpenVDB files of other programs.
+#include <volume/grids.h>
 #include <volume/import.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 #include <unistd.h>
 #include <glm/geometric.hpp>
 

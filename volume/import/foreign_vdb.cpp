@@ -1,8 +1,8 @@
+#include <volume/grids.h>
 #include <volume/import/dicom.h>
 #include <volume/import/label_sink.h>
 
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 #include <mutex>
