@@ -2,8 +2,8 @@
 
 #include <openvdb/openvdb.h>
 
-// Inside volume/ only. The code of these grids is in OpenVDB's library, which does not say so in its headers: without this,
-// every source that makes a grid compiles some megabytes of it again, which takes three quarters of the source's time.
+// Inside volume/ only. The code of these trees is in OpenVDB's library, which does not say so in its headers: without this,
+// every source that makes a grid compiles it again, which takes up to two thirds of the source's time.
 #if OPENVDB_LIBRARY_MAJOR_VERSION_NUMBER == 10
 
 namespace openvdb::OPENVDB_VERSION_NAME {
