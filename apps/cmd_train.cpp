@@ -33,6 +33,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <optional>
@@ -249,6 +250,16 @@ haptics::SessionModel openModel(TrainArguments& o)
     return model;
 }
 
+// Only a session that keeps time needs ticks that fit in it. `fitted` says what was taken and why, once the scene is open.
+std::function<std::string(const datasets::Scene&)> fitToMachine(std::string& fitted)
+{
+    return [&fitted](const datasets::Scene& scene) {
+        const session::FittingSetting fitting = session::fittingHere(session::machineCache(), session::loadOf(scene));
+        fitted = fmt::format("setting {}: {}", fitting.setting, fitting.reason);
+        return fitting.setting;
+    };
+}
+
 void applyTraining(TrainArguments& o, Training& training)
 {
     if (const std::string scene = training.scene(); !scene.empty()) {
@@ -354,15 +365,8 @@ void train(TrainArguments o)
     if (const auto arm = session::deviceKind(o.device).arm; !arm.empty()) {
         o.changes.arm = o.changes.arm.value_or(std::string(arm));
     }
-    // Only a session that keeps time needs ticks that fit in it.
     std::string fitted;
-    if (!o.unpaced) {
-        o.changes.fit = [&fitted](const datasets::Scene& scene) {
-            const session::FittingSetting fitting = session::fittingHere(session::machineCache(), session::loadOf(scene));
-            fitted = fmt::format("setting {}: {}", fitting.setting, fitting.reason);
-            return fitting.setting;
-        };
-    }
+    o.changes.fit = o.unpaced ? nullptr : fitToMachine(fitted);
     const auto model = openModel(o);
     auto info = session::describeSession(model, o.scene, deviceInWords(o));
     info.name = sessionName(o);
@@ -390,11 +394,12 @@ void train(TrainArguments o)
     session::TrainResult result = runToItsEnd(model, info, options);
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     training.markCut(result, o.record);
+    const std::string next = fitted.empty() ? "" : session::learnFrom(session::machineCache(), model.scene, result.timing);
     const auto written = writeOutputs(o, info, model, viewers, took, result);
     const auto kept = training.conclude(info, result, record);
 
     if (o.json != "-" && !o.tryout) {
-        summarise(result, info, model);
+        summarise(result, info, model, next);
         tell(fitted, written, kept);
     }
     if (resultFolder && result.signal == 0) {

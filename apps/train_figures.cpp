@@ -4,6 +4,7 @@
 #include <haptics/posed.h>
 #include <haptics/score.h>
 #include <session/figures.h>
+#include <session/machine.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -26,19 +27,20 @@ std::string missesInWords(const haptics::ServoTiming& timing)
 }
 
 // What to do about a machine that is too slow for the tissue model, or nothing.
-std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model)
+std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSettings& model, const std::string& next)
 {
-    constexpr double bearable = 0.01;  // of the ticks
-    const double fraction =
-        static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
-    if (fraction <= bearable) {
+    const double overruns = session::overrunsOf(timing);
+    if (overruns <= session::bearableOverruns) {
         return "";
     }
     const bool coarser =
         model.level == datasets::ModelLevel::elastic && model.setting != datasets::elasticSettings().front();
+    const std::string cure = !next.empty() ? fmt::format("the next session takes setting {}", next)
+                             : coarser     ? "try --setting fast, or see palpate plan"
+                                           : "palpate plan finds one that it can hold";
     return fmt::format(
-        "{:.0f} % of the ticks took over 1 ms: this machine is too slow or too busy for the tissue model; {}\n",
-        100 * fraction, coarser ? "try --setting fast, or see palpate plan" : "palpate plan finds one that it can hold");
+        "{:.1f} % of the ticks took over 1 ms: this machine is too slow or too busy for the tissue model; {}\n",
+        100 * overruns, cure);
 }
 
 }  // namespace
@@ -81,7 +83,8 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
     return figures;
 }
 
-void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model)
+void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model,
+               const std::string& next)
 {
     const auto tick = result.timing.work.percentiles();
     const auto late = result.timing.lateness.percentiles();
@@ -89,7 +92,7 @@ void summarise(const session::TrainResult& result, const haptics::SessionInfo& i
         "{} ticks, {} missed{}; a tick takes {:.0f} us (p50), {:.0f} us (p99); late by {:.1f} us (p50), {:.0f} us (p99)\n",
         result.timing.ticks, result.timing.missed, missesInWords(result.timing), 1e6 * tick.p50, 1e6 * tick.p99,
         1e6 * late.p50, 1e6 * late.p99);
-    fmt::print("{}", slowness(result.timing, model.scene.model));
+    fmt::print("{}", slowness(result.timing, model.scene.model, next));
     if (model.posture) {
         fmt::print("gravity: {}\n", haptics::textOf(*model.posture));
     }

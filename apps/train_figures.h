@@ -12,6 +12,8 @@ namespace palpate::apps {
 nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
                          const haptics::SessionModel& model);
 /// The same for people, on standard output.
-void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model);
+/// @param next  setting that the next session takes because this one was too slow; empty: the same
+void summarise(const session::TrainResult& result, const haptics::SessionInfo& info, const haptics::SessionModel& model,
+               const std::string& next);
 
 }  // namespace palpate::apps

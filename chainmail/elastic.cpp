@@ -19,11 +19,9 @@ constexpr double forgets = 10.0;    // longest times of relaxation after which n
 constexpr int callsPerTurn = 2;     // from one term of the history to the next
 constexpr int callsOfGiven = 20;    // in which windows that take over find their displacement
 constexpr double maxBalance = 1.5;  // of forces that are far from balanced: these are taken as they are
-constexpr double afterMove = 3.0;   // a second cycle in a tick in which windows move: for so much more out of balance
 // Way along the surface from which a ball slips as a whole, in friction times depth: (2 - nu) / (2 - 2 nu), at nu = 0.5.
 // Source: R. D. Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949.
 constexpr double slipsWhole = 1.5;
-constexpr int refreshPeriod = 256;  // calls after which forces that are carried along are computed anew
 
 }  // namespace
 
@@ -270,141 +268,6 @@ Focus Elastic::whereItSticks(const ElasticLoad& load) noexcept
     focus.point += length > most ? most / length * back : back;
     stuck_ = focus.point;
     return focus;
-}
-
-ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
-{
-    if (atRest_ || !follow(load)) {
-        return relaxWhile(load, part());
-    }
-    // To move the windows is work enough for a call.
-    refreshForces();
-    sinceRefresh_ = 0;
-    const int lost = waiting_ ? waiting_->periods : 0;
-    waiting_ = load;
-    waiting_->periods += lost;
-    return {.moved = true};
-}
-
-ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) noexcept
-{
-    ElasticResult result;
-    ElasticLoad load = all;
-    const bool hasMoved = waiting_.has_value();
-    load.periods += hasMoved ? waiting_->periods : 0;  // of a load that was never solved
-    waiting_.reset();
-    load.tools = heldTools(load.tools.first(std::min(load.tools.size(), maxTools)), effort.isTick);
-    const bool moves = follow(load);
-    result.moved = moves || hasMoved;
-    meet(load, result.moved);
-    const bool isTouched = touched();
-    untouchedFor_ = isTouched ? 0.0 : untouchedFor_ + load.periods * options_.period;
-    if (!isTouched && !springsBack()) {
-        settle();
-        return result;
-    }
-    const bool hasLain = !std::exchange(atRest_, false);
-    if (moves || (!hasMoved && ++sinceRefresh_ >= refreshPeriod)) {
-        refreshForces();
-        sinceRefresh_ = 0;
-    }
-    if (hasLain) {
-        remember(load.periods);
-    }
-    course_ = {.effort = effort, .start = energy_ + contactEnergy()};
-    result.start = course_.start;
-    startEnergy_ = energy_;
-    if (hasIncrement_) {
-        course_.hasGone = warmStart(result);
-        course_.isOpen = course_.hasGone && !volume::isSmall(options_.law);
-    } else {
-        forgetIncrement();
-    }
-    hasIncrement_ = options_.warmStart;
-    // No hand feels tissue that springs back.
-    course_.usual = isTouched ? effort.cycles : 1;
-    course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
-    // A call that has only a part of the cycles has none beside a search for surface points.
-    solve(effort.inParts ? (sinceFound_ == 0 && course_.hasGone ? 0 : 1) : course_.last, result);
-    finish(result);
-    blendMoves(effort.isTick && !effort.inParts, result.moved);
-    return result;
-}
-
-ElasticResult Elastic::goOn() noexcept
-{
-    if (waiting_) {
-        const ElasticLoad load = *waiting_;
-        waiting_->periods = 0;  // it is this one
-        return relaxWhile(load, part());
-    }
-    ElasticResult result;
-    if (atRest_ || course_.next >= course_.last) {
-        return result;
-    }
-    result.start = energy_ + contactEnergy();
-    result.cycles = static_cast<std::uint32_t>(course_.next);
-    solve(1, result);
-    finish(result);
-    return result;
-}
-
-bool Elastic::isBalanced(double residual, double tolerance) const noexcept
-{
-    const double unfelt = course_.next < course_.usual ? 0.0 : options_.unfelt;
-    return tolerance > 0.0 && residual <= std::max(tolerance * loadForce(), unfelt);
-}
-
-// Cycles until the forces are balanced, `most` at most. The force is evaluated where that ends.
-void Elastic::solve(int most, ElasticResult& result) noexcept
-{
-    Course& c = course_;
-    for (int i = 0; c.next < c.last && i < most; ++c.next, ++i) {
-        const double further = (result.moved && c.effort.isTick ? afterMove : 1.0) * c.effort.further;
-        const double tolerance = c.next == 0 ? c.effort.first : c.next < c.usual ? further : c.effort.far;
-        result.residual = refreshResidual(c.hasGone);
-        if (isBalanced(result.residual, tolerance)) {
-            if (!c.isOpen || c.effort.isTick) {
-                c.isKnown = !c.isOpen;
-                c.next = c.last;
-                break;
-            }
-            // The force was carried along; it may be another where the tissue is now.
-            c.isOpen = c.hasGone = false;
-            if (confirm(c.start)) {
-                refreshForces();
-            } else {
-                again(result);
-            }
-            continue;
-        }
-        ++result.cycles;
-        c.hasGone = oneCycle(c.isOpen ? c.start : noLimit, result);
-        if (!c.hasGone && c.isOpen && !confirm(c.start)) {
-            again(result);
-        } else if (!c.hasGone) {
-            refreshForces();
-            forgetStep();
-        }
-        c.isOpen = false;
-    }
-    if (c.isOpen && !confirm(c.start)) {
-        again(result);
-        c.hasGone = false;
-    }
-    c.isOpen = false;
-}
-
-void Elastic::finish(ElasticResult& result) noexcept
-{
-    if (!std::isfinite(energy_ + contactEnergy())) {
-        startAnew();
-        return;
-    }
-    letSlip();
-    balance();
-    measure(result);
-    findLag();
 }
 
 // Virtual work along the displacement itself: the tissue's own, over that of the contacts.

@@ -75,13 +75,15 @@ public:
     /// Goes on towards the equilibrium under this load; without a load the body is at rest. What the load refers to must
     /// live until the next call. Cost O(nodes of the windows); allocates nothing, never throws.
     ElasticResult relax(const ElasticLoad& load) noexcept { return relaxWhile(load, tick()); }
-    /// As relax(), in parts, for a load whose force nobody waits for: here at most one cycle, a search for surface points,
-    /// or a move of the windows; goOn() has the rest. Without friction, moves, searches and steps that are shortened twice,
-    /// the parts end with the bits of relax().
+    /// As relax(), in parts, for a load whose force nobody waits for. Here it moves the windows, or meets the load and goes
+    /// along the last increment; goOn() has the rest. Without friction, moves and steps that are shortened twice, enough
+    /// parts end with the bits of relax().
     ElasticResult begin(const ElasticLoad& load) noexcept;
-    /// Goes on with the last load by at most one cycle, and by none where relax() would have stopped by now. After a move
-    /// of the windows it meets the contacts and goes along the last increment. What the load refers to must still live.
-    ElasticResult goOn() noexcept;
+    /// Goes on with the last load by half a cycle: the correction of the forces out of balance, or the step along it. None
+    /// where relax() would have stopped by now. After a move of the windows it meets the load. What the load refers to must
+    /// still live.
+    /// @param isLast  part of this load: it leaves no half, and has a whole cycle if there was none
+    ElasticResult goOn(bool isLast = false) noexcept;
     /// As relax(), for at most `cycles`, until the residual is under `tolerance` times the contacts' forces. No tool is
     /// held back.
     ElasticResult relax(const ElasticLoad& load, int cycles, double tolerance) noexcept
@@ -155,7 +157,7 @@ private:
         int cycles;
         double first, further, far;
         bool isTick = true;  // tools are held back where the body does not bear them, and a warm start may be the last step
-        bool inParts = false;  // one cycle in this call, and goOn() has the others
+        bool inParts = false;  // this call meets the load, and goOn() has the cycles
     };
     Effort tick() const noexcept
     {
@@ -178,11 +180,16 @@ private:
         bool isOpen = false;   // the tissue's force was not evaluated where it is
         bool hasGone = false;  // r is a, or the residual
         bool isKnown = false;  // r is the residual: it ended balanced
+        bool isHalf = false;   // z is its correction, and the step along it is left
     };
     ElasticResult relaxWhile(const ElasticLoad& load, const Effort& effort) noexcept;
     bool follow(const ElasticLoad& load) noexcept;
     Focus whereItSticks(const ElasticLoad& load) noexcept;
     void solve(int most, ElasticResult& result) noexcept;
+    double toleranceOf(const ElasticResult& result) const noexcept;
+    void endBalanced() noexcept;
+    void endCycle(ElasticResult& result) noexcept;
+    void close(ElasticResult& result) noexcept;
     bool isBalanced(double residual, double tolerance) const noexcept;
     void finish(ElasticResult& result) noexcept;
     std::span<const ElasticTool> heldTools(std::span<const ElasticTool> tools, bool holdsBack) noexcept;
@@ -219,7 +226,7 @@ private:
     void keepStep(const Direction& to, KeptStep step) noexcept;
     void forgetIncrement() noexcept;
     void forgetStep() noexcept;
-    bool oneCycle(double limit, ElasticResult& result) noexcept;
+    bool step(double limit, ElasticResult& result) noexcept;
     double contactForce() const noexcept;
     double loadForce() const noexcept;
     void balance() noexcept;

@@ -211,12 +211,11 @@ void Elastic::keepStep(const Direction& to, KeptStep step) noexcept
     last_ = {to.field, again ? Field::e : Field::q, to.tissue.from(length)};
 }
 
-// One step of preconditioned conjugate gradients, conjugate to the last.
-bool Elastic::oneCycle(double limit, ElasticResult& result) noexcept
+// One step of preconditioned conjugate gradients, conjugate to the last: along the correction z of the forces out of
+// balance.
+bool Elastic::step(double limit, ElasticResult& result) noexcept
 {
     double& nearness = nearness_[std::min<std::size_t>(result.cycles, nearness_.size()) - 1];
-    prepareContacts();
-    multigrid_.solve();
     const auto product = stack_.dots(Field::z, Field::a, last_.image);
     double own = last_.tissue.curvature;
     double mixed = -product[1];

@@ -165,28 +165,34 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
     const bool inParts = isShapeOnly && period_ > 1, takesTurns = inParts && isShapeOnly_;
     isShapeOnly_ = isShapeOnly;
     turn_ = takesTurns ? (turn_ + 1) % period_ : 0;
-    const bool wasAtRest = elastic_.atRest();
+    const bool wasAtRest = elastic_.atRest(), isFirst = std::exchange(isFirst_, false);
+    bool isMet = !takesTurns;
     ++since_;
     if (turn_ == 0) {
         ElasticLoad all = load(grip);
         all.periods = std::exchange(since_, 0);
-        // A tip that is in tissue at rest takes over from another level: its shape is asked for at once.
-        const bool takesOver = wasAtRest && grip.kind == Grip::Kind::point && grip.inside;
+        // A tip that is in tissue in the first call takes over from another level: its shape is asked for at once.
+        const bool takesOver = isFirst && grip.kind == Grip::Kind::point && grip.inside;
+        const bool begins = inParts && !takesOver;
         const double residual = last_.residual;
-        last_ = inParts && !takesOver ? elastic_.begin(all) : elastic_.relax(all);
-        last_.residual = last_.moved && last_.cycles == 0 ? residual : last_.residual;
-    } else if (const ElasticResult further = elastic_.goOn(); further.cycles > 0) {
-        last_ = further;
+        last_ = begins ? elastic_.begin(all) : elastic_.relax(all);
+        last_.residual = last_.residual > 0.0 || elastic_.atRest() ? last_.residual : residual;
+        isMet = isMet || !begins || !last_.moved;
+    } else {
+        const ElasticResult further = elastic_.goOn(turn_ == period_ - 1);
+        last_ = further.residual > 0.0 ? further : last_;
+        isMet = further.moved;
     }
-    const int fractions = takesTurns ? period_ : 1;
-    if ((!takesTurns || turn_ == 1) && !(wasAtRest && elastic_.atRest())) {
-        writeFinest(grip.proxy, fractions * layersPerCall);
-    }
-    for (int i = 0; i < fractions && (!takesTurns || turn_ == period_ - 1); ++i) {
-        for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
-            writeByTurns(l);
+    // Of a pose in parts the shape is written where it is met, along the last increment: no other part has less to do.
+    if (isMet) {
+        const int calls = takesTurns ? period_ : 1;
+        if (!(wasAtRest && elastic_.atRest())) {
+            writeFinest(grip.proxy, calls * layersPerCall);
         }
-        revisitMoved();
+        for (int i = 0; i < calls; ++i) {
+            writeWider();
+            revisitMoved();
+        }
     }
     Reaction reaction{static_cast<std::uint32_t>(shape_.moved().size()), last_.residual, std::nullopt};
     const std::size_t others = std::min(grip.others.size(), maxOthers);
@@ -199,6 +205,13 @@ Reaction ElasticLevel::deform(const Grip& grip) noexcept
         reaction.othersForce += elastic_.toolForce(i);
     }
     return reaction;
+}
+
+void ElasticLevel::writeWider() noexcept
+{
+    for (std::size_t l = 1; l < std::min(turns_.size(), windowsShown) && !elastic_.atRest(); ++l) {
+        writeByTurns(l);
+    }
 }
 
 // The finest window: around the tool in every call, elsewhere a few layers of nodes at a time.

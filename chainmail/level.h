@@ -106,6 +106,7 @@ private:
     void takeFragments(Index3 first, std::size_t count, Vec3f* out) const noexcept;
     void writeBox(Index3 low, Index3 high) noexcept;
     void write(Node n, Index3 at) noexcept;
+    void writeWider() noexcept;
     void writeByTurns(std::size_t level) noexcept;
     void revisitMoved() noexcept;
     bool keepsOrientation(Index3 low, Index3 high) noexcept;
@@ -120,6 +121,7 @@ private:
     int period_;  // calls from one solution to the next while a tip holds the tissue
     int turn_ = 0;
     int since_ = 0;                                 // calls since the last solution
+    bool isFirst_ = true;                           // no call yet
     bool isShapeOnly_ = false;                      // the last call's force on the hand was not from here
     std::array<ElasticTool, maxOthers + 1> tools_;  // the others, then the hand's: so each keeps its place
     std::array<Tie, 1 + maxShaftTies> ties_;        // the tip's, then the shaft's

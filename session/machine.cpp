@@ -14,9 +14,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstdint>
+#include <exception>
 #include <fstream>
+#include <iterator>
 #include <memory>
-#include <string_view>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -28,8 +31,8 @@ using nlohmann::json;
 
 constexpr int warmUp = 40;  // ticks before those that count
 constexpr int counted = 160;
-constexpr int countedOfNeedle = 640;  // its ticks take less, and one in two hundred moves windows
-constexpr double needleStep = 20e-6;  // way of a needle in a tick [m]
+constexpr int countedOfNeedle = 400;
+constexpr double needleStep = 40e-6;  // way of a needle in a tick [m]: windows move in more than one of a hundred
 constexpr double probeAside = 15e-3;  // of the ball, and how deep it presses [m]
 constexpr double probePress = 4e-3;
 
@@ -101,6 +104,64 @@ std::string key()
     return fmt::format("{};{};{}", base::build(), processor(), std::thread::hardware_concurrency());
 }
 
+using Clock = std::chrono::system_clock;
+
+// What is known of this machine, by nameOf() a load.
+json readCache(const std::filesystem::path& cache)
+{
+    json known;
+    if (std::ifstream in(cache); in) {
+        known = json::parse(in, nullptr, false);
+    }
+    const std::string here = key();
+    return known.is_object() && known.value("machine", json()) == here ? known : json{{"machine", here}};
+}
+
+std::string nameOf(const TissueLoad& load)
+{
+    return std::string(load.needle ? "needle" : "tool") + (load.probe ? " and probe" : "");
+}
+
+std::int64_t secondsOf(Clock::time_point time)
+{
+    return std::chrono::duration_cast<std::chrono::seconds>(time.time_since_epoch()).count();
+}
+
+std::optional<FittingSetting> keptIn(const json& known, const TissueLoad& load, Clock::time_point now)
+{
+    const auto found = known.find(nameOf(load));
+    if (found == known.end() || !found->is_object()) {
+        return std::nullopt;
+    }
+    const json setting = found->value("setting", json()), reason = found->value("reason", json());
+    const json at = found->value("at", json());
+    if (!setting.is_string() || !reason.is_string() || !at.is_number_integer()) {
+        return std::nullopt;
+    }
+    const auto age = static_cast<double>(secondsOf(now)) - at.get<double>();
+    const auto names = datasets::elasticSettings();
+    const bool isName = std::find(names.begin(), names.end(), setting.get<std::string>()) != names.end();
+    return isName && age >= 0.0 && age <= fittingKept ? std::optional(FittingSetting{setting, reason}) : std::nullopt;
+}
+
+// False where it cannot be written: the next session measures again.
+bool keep(const std::filesystem::path& cache, json& known, const TissueLoad& load, const FittingSetting& fitting,
+          Clock::time_point now)
+{
+    if (cache.empty()) {
+        return false;
+    }
+    known[nameOf(load)] = {{"setting", fitting.setting}, {"reason", fitting.reason}, {"at", secondsOf(now)}};
+    std::error_code none;
+    std::filesystem::create_directories(cache.parent_path(), none);
+    try {
+        base::writeWhole(cache, known.dump());
+    } catch (const std::exception&) {
+        return false;
+    }
+    return true;
+}
+
 }  // namespace
 
 FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>& timeOf)
@@ -151,41 +212,39 @@ TickTime measureSetting(const std::string& setting, const TissueLoad& load)
     return {p.p50, p.p99};
 }
 
-FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad& load)
+FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad& load, Clock::time_point now)
 {
-    json known;
-    if (std::ifstream in(cache); in) {
-        known = json::parse(in, nullptr, false);
-    }
-    const std::string here = key();
-    if (!known.is_object() || known.value("machine", json()) != here) {
-        known = json{{"machine", here}};
-    }
-    const std::string what = std::string(load.needle ? "needle" : "tool") + (load.probe ? " and probe" : "");
-    const json kept = known.value(what, json::object());
-    const auto text = [&kept](const char* name) {
-        const auto found = kept.is_object() ? kept.find(name) : kept.end();
-        return kept.is_object() && found != kept.end() && found->is_string() ? found->get<std::string>() : "";
-    };
-    const auto names = datasets::elasticSettings();
-    if (std::find(names.begin(), names.end(), text("setting")) != names.end()) {
-        return {text("setting"), text("reason")};
+    json known = readCache(cache);
+    if (auto kept = keptIn(known, load, now)) {
+        return *kept;
     }
     FittingSetting found = fittingSetting([&load](const std::string& setting) { return measureSetting(setting, load); });
     found.reason =
         fmt::format("{}{}{}", load.needle ? "with a needle " : "",
                     load.probe ? (load.needle ? "and a probe " : "with a probe beside the tool ") : "", found.reason);
-    if (!cache.empty()) {
-        std::error_code none;
-        std::filesystem::create_directories(cache.parent_path(), none);
-        known[what] = {{"setting", found.setting}, {"reason", found.reason}};
-        try {
-            base::writeWhole(cache, known.dump());
-        } catch (const std::exception&) {
-            // The next session measures again.
-        }
-    }
+    keep(cache, known, load, found, now);
     return found;
+}
+
+double overrunsOf(const haptics::ServoTiming& timing) noexcept
+{
+    return static_cast<double>(timing.overruns) / static_cast<double>(std::max<std::uint64_t>(timing.ticks, 1));
+}
+
+std::string learnFrom(const std::filesystem::path& cache, const datasets::Scene& scene, const haptics::ServoTiming& timing,
+                      Clock::time_point now)
+{
+    const double overruns = overrunsOf(timing);
+    const auto settings = datasets::elasticSettings();
+    const auto at = std::find(settings.begin(), settings.end(), scene.model.setting);
+    if (overruns <= bearableOverruns || at == settings.begin() || at == settings.end()) {
+        return "";
+    }
+    const FittingSetting next{
+        *std::prev(at),
+        fmt::format("in the session before, {:.1f} % of the ticks of {} took over 1 ms", 100.0 * overruns, *at)};
+    json known = readCache(cache);
+    return keep(cache, known, loadOf(scene), next, now) ? next.setting : "";
 }
 
 std::filesystem::path machineCache()

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <datasets/scene.h>
+#include <haptics/timing.h>
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -42,11 +44,29 @@ FittingSetting fittingSetting(const std::function<TickTime(const std::string&)>&
 /// @param load     which tools
 TickTime measureSetting(const std::string& setting, const TissueLoad& load = {});
 
+/// For so long a measurement is good: a machine becomes slower on its battery, or when others use it [s].
+inline constexpr double fittingKept = 3600.0;
+
 /// fittingSetting() of this machine and build, from `cache` where it is known; else it is measured, and written there. A
 /// cache that cannot be read or written costs the measurement and nothing else.
 /// @param cache  the file
 /// @param load   each has its own measurement
-FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad& load = {});
+/// @param now    time of day; a measurement is kept for `fittingKept`
+FittingSetting fittingHere(const std::filesystem::path& cache, const TissueLoad& load = {},
+                           std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
+
+/// Fraction of a session's ticks that took over 1 ms [-], and what of it is bearable.
+double overrunsOf(const haptics::ServoTiming& timing) noexcept;
+inline constexpr double bearableOverruns = 0.005;
+
+/// Corrects a fitted setting that a session was too slow with: within `fittingKept`, fittingHere() gives the next faster
+/// one, with the reason.
+/// @param cache   as of fittingHere()
+/// @param scene   of the session, with the fitted setting
+/// @param timing  of the session
+/// @returns       the setting of the next session, or nothing where it remains
+std::string learnFrom(const std::filesystem::path& cache, const datasets::Scene& scene, const haptics::ServoTiming& timing,
+                      std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
 
 /// machine.json of base::UserFolder::cache; empty where there is none.
 std::filesystem::path machineCache();

@@ -3,10 +3,12 @@
 #include <datasets/scene.h>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <tests/folder.h>
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
 #include <map>
 #include <string>
@@ -91,6 +93,51 @@ TEST(FittingSetting, IsMeasuredWithTheToolsOfTheScene)
     EXPECT_TRUE(loadOf(*datasets::builtInScene("us-core-biopsy")).probe);
     EXPECT_FALSE(loadOf(*datasets::builtInScene("find-lump")).needle);
     EXPECT_FALSE(loadOf(*datasets::builtInScene("breast")).probe);
+}
+
+// A laptop on its battery, a virtual machine with new neighbours.
+TEST(FittingSetting, IsMeasuredAnewAfterAnHour)
+{
+    const tests::Folder folder;
+    const std::filesystem::path cache = folder / "machine.json";
+    const auto noon = std::chrono::system_clock::time_point(std::chrono::hours(500000));
+    fittingHere(cache, {}, noon);
+    const auto ask = [&](std::chrono::seconds later) {
+        auto text = nlohmann::json::parse(std::ifstream(cache));
+        text["tool"]["reason"] = "kept";
+        std::ofstream(cache) << text;
+        return fittingHere(cache, {}, noon + later).reason == "kept";
+    };
+    EXPECT_TRUE(ask(std::chrono::seconds(3600)));
+    EXPECT_FALSE(ask(std::chrono::seconds(3601)));
+    EXPECT_FALSE(ask(std::chrono::seconds(-1))) << "the clock was set back";
+}
+
+TEST(FittingSetting, LearnsFromASessionThatWasTooSlow)
+{
+    const tests::Folder folder;
+    const std::filesystem::path cache = folder / "machine.json";
+    const auto noon = std::chrono::system_clock::time_point(std::chrono::hours(500000));
+    datasets::Scene scene = *datasets::builtInScene("find-lump");
+    const auto learn = [&](const std::filesystem::path& file, const char* setting, std::uint64_t overruns) {
+        scene.model.setting = setting;
+        haptics::ServoTiming timing;
+        timing.ticks = 1000;
+        timing.overruns = overruns;
+        return learnFrom(file, scene, timing, noon);
+    };
+    EXPECT_EQ(learn(cache, "default", 5), "") << "bearable";
+    EXPECT_FALSE(std::filesystem::exists(cache));
+    EXPECT_EQ(learn(cache, "default", 37), "fast");
+    const FittingSetting next = fittingHere(cache, loadOf(scene), noon + std::chrono::minutes(5));
+    EXPECT_EQ(next.setting, "fast");
+    EXPECT_EQ(next.reason, "in the session before, 3.7 % of the ticks of default took over 1 ms");
+    EXPECT_EQ(fittingHere(cache, {true, false}, noon).reason.find("session before"), std::string::npos)
+        << "nothing is known of needles";
+    EXPECT_EQ(learn(cache, "fine", 20), "default");
+    EXPECT_EQ(learn(cache, "fast", 500), "") << "nothing is faster";
+    EXPECT_EQ(learn({}, "default", 500), "") << "there is no cache to write to";
+    EXPECT_NE(fittingHere(cache, loadOf(scene), noon + std::chrono::hours(2)).reason.find("a tick of"), std::string::npos);
 }
 
 TEST(FittingSetting, NeedsNoCache)
