@@ -19,10 +19,12 @@ ElasticResult Elastic::begin(const ElasticLoad& load) noexcept
     if (!follow(load)) {
         return relaxWhile(load, part());
     }
-    // To move the windows is work enough for a call.
-    refreshForces();
+    // To move the windows is work enough for a call. Tissue at rest has no forces.
     course_.isOpen = false;
-    sinceRefresh_ = 0;
+    if (!atRest_) {
+        refreshForces();
+        sinceRefresh_ = 0;
+    }
     const int lost = waiting_ ? waiting_->periods : 0;
     waiting_ = load;
     waiting_->periods += lost;
@@ -70,14 +72,10 @@ ElasticResult Elastic::relaxWhile(const ElasticLoad& all, const Effort& effort) 
     // No hand feels tissue that springs back.
     course_.usual = isTouched ? effort.cycles : 1;
     course_.last = course_.usual + (isTouched && effort.far > 0.0 ? 1 : 0);
-    if (effort.inParts && course_.hasGone) {
-        letSlip();
-        balance();
-        measure(result);
-    } else {
+    if (!effort.inParts || !course_.hasGone) {
         solve(effort.inParts ? 1 : course_.last, result);
-        finish(result);
     }
+    finish(result);
     blendMoves(effort.isTick && !effort.inParts, result.moved);
     return result;
 }
@@ -199,7 +197,9 @@ void Elastic::finish(ElasticResult& result) noexcept
     letSlip();
     balance();
     measure(result);
-    findLag();
+    if (!course_.isOpen) {
+        findLag();
+    }
 }
 
 }  // namespace palpate::chainmail

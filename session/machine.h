@@ -64,6 +64,7 @@ inline constexpr double bearableOverruns = 0.005;
 /// @param cache   as of fittingHere()
 /// @param scene   of the session, with the fitted setting
 /// @param timing  of the session
+/// @param now     time of day
 /// @returns       the setting of the next session, or nothing where it remains
 std::string learnFrom(const std::filesystem::path& cache, const datasets::Scene& scene, const haptics::ServoTiming& timing,
                       std::chrono::system_clock::time_point now = std::chrono::system_clock::now());
