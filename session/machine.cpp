@@ -32,8 +32,9 @@ using nlohmann::json;
 constexpr int warmUp = 40;  // ticks before those that count
 constexpr int counted = 160;
 constexpr int countedOfNeedle = 400;
-constexpr double needleStep = 40e-6;  // way of a needle in a tick [m]: windows move in more than one of a hundred
-constexpr double probeAside = 15e-3;  // of the ball, and how deep it presses [m]
+constexpr double needleStep = 40e-6;         // way of a needle in a tick [m]: of a fast hand, for which windows move often
+constexpr std::uint64_t fewestTicks = 1000;  // of a session that tells
+constexpr double probeAside = 15e-3;         // of the ball, and how deep it presses [m]
 constexpr double probePress = 4e-3;
 
 // Streams through more memory than caches hold, on another core if there is one.
@@ -237,7 +238,7 @@ std::string learnFrom(const std::filesystem::path& cache, const datasets::Scene&
     const double overruns = overrunsOf(timing);
     const auto settings = datasets::elasticSettings();
     const auto at = std::find(settings.begin(), settings.end(), scene.model.setting);
-    if (overruns <= bearableOverruns || at == settings.begin() || at == settings.end()) {
+    if (timing.ticks < fewestTicks || overruns <= bearableOverruns || at == settings.begin() || at == settings.end()) {
         return "";
     }
     const FittingSetting next{

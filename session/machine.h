@@ -60,7 +60,7 @@ double overrunsOf(const haptics::ServoTiming& timing) noexcept;
 inline constexpr double bearableOverruns = 0.005;
 
 /// Corrects a fitted setting that a session was too slow with: within `fittingKept`, fittingHere() gives the next faster
-/// one, with the reason.
+/// one, with the reason. A session of under a second tells nothing.
 /// @param cache   as of fittingHere()
 /// @param scene   of the session, with the fitted setting
 /// @param timing  of the session

@@ -119,10 +119,11 @@ TEST(FittingSetting, LearnsFromASessionThatWasTooSlow)
     const std::filesystem::path cache = folder / "machine.json";
     const auto noon = std::chrono::system_clock::time_point(std::chrono::hours(500000));
     datasets::Scene scene = *datasets::builtInScene("find-lump");
+    std::uint64_t ticks = 1000;
     const auto learn = [&](const std::filesystem::path& file, const char* setting, std::uint64_t overruns) {
         scene.model.setting = setting;
         haptics::ServoTiming timing;
-        timing.ticks = 1000;
+        timing.ticks = ticks;
         timing.overruns = overruns;
         return learnFrom(file, scene, timing, noon);
     };
@@ -137,6 +138,8 @@ TEST(FittingSetting, LearnsFromASessionThatWasTooSlow)
     EXPECT_EQ(learn(cache, "fine", 20), "default");
     EXPECT_EQ(learn(cache, "fast", 500), "") << "nothing is faster";
     EXPECT_EQ(learn({}, "default", 500), "") << "there is no cache to write to";
+    ticks = 999;
+    EXPECT_EQ(learn(cache, "default", 500), "") << "under a second";
     EXPECT_NE(fittingHere(cache, loadOf(scene), noon + std::chrono::hours(2)).reason.find("a tick of"), std::string::npos);
 }
 
