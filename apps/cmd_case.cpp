@@ -2,6 +2,7 @@
 #include <apps/viewers.h>
 #include <base/child_process.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -98,7 +99,7 @@ void show(const CaseArguments& o)
     if (!c.source.empty()) {
         fmt::print("source: {}\n", c.source);
     }
-    fmt::print("palpate train --case {}\n", o.id);
+    fmt::print("palpate train --case {}\n", base::shellWord(o.id));
 }
 
 void check(const CaseArguments& o)

@@ -30,16 +30,16 @@ struct ImportArguments : prepare::ImportRequest {
 
 void readLengths(ImportArguments& o)
 {
-    const auto set = [](double& target, const std::string& option, const std::string& text, double least, double most) {
-        target = text.empty() ? target : base::lengthFrom(option, text, least, most);
+    const auto set = [](double& target, const std::string& text, const prepare::LengthBounds& bounds) {
+        target = text.empty() ? target : base::lengthFrom(bounds.option, text, bounds.least, bounds.most);
     };
-    set(o.steps.voxel, "--voxel", o.voxel, 0.05e-3, 50e-3);
-    set(o.steps.addSkin, "--add-skin", o.addSkin, 0.05e-3, 50e-3);
-    set(o.hull, "--body-from-hull", o.bodyFromHull, 2e-3, 0.2);
-    set(o.steps.pad, "--pad", o.pad, 0.05e-3, 0.5);
-    set(o.steps.cropMargin, "--crop-margin", o.cropMargin, 0, 1);
+    set(o.steps.voxel, o.voxel, prepare::voxelBounds);
+    set(o.steps.addSkin, o.addSkin, prepare::skinBounds);
+    set(o.hull, o.bodyFromHull, prepare::hullBounds);
+    set(o.steps.pad, o.pad, prepare::padBounds);
+    set(o.steps.cropMargin, o.cropMargin, prepare::cropBounds);
     if (o.steps.closeSkinHoles) {
-        set(*o.steps.closeSkinHoles, "--close-skin-holes", o.closeSkinHoles, 0.05e-3, 0.5);
+        set(*o.steps.closeSkinHoles, o.closeSkinHoles, prepare::holesBounds);
     }
 }
 

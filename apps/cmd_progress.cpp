@@ -81,27 +81,48 @@ PersonProgress progressOf(const training::ProfileStore& store, const training::P
     return out;
 }
 
-// "experts=anna,bert": all sessions of these people that the filters let through.
-report::ScoredGroup groupOf(const ProgressArguments& o, const std::string& text, const training::ProfileStore& store)
+// A name that holds a comma is one name where somebody has it.
+std::vector<std::string> namesIn(const std::string& text, const training::ProfileStore& store)
+{
+    const auto people = store.people();
+    const bool isOne = std::ranges::find(people, text, &training::Person::name) != people.end();
+    return isOne ? std::vector{text} : CLI::detail::split(text, ',');
+}
+
+// "experts=anna,bert": all sessions of these people that the filters let through, added to the group of this name.
+void addToGroup(const ProgressArguments& o, const std::string& text, const training::ProfileStore& store,
+                std::vector<report::ScoredGroup>& groups)
 {
     const std::size_t equals = text.find('=');
     if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
         throw std::runtime_error("--group " + text + ": give a name and profiles, as in --group residents=anna,bert");
     }
-    report::ScoredGroup group{text.substr(0, equals), {}};
-    for (const std::string& name : CLI::detail::split(text.substr(equals + 1), ',')) {
+    const std::string called = text.substr(0, equals);
+    auto group = std::ranges::find(groups, called, &report::ScoredGroup::name);
+    group = group != groups.end() ? group : groups.insert(groups.end(), {called, {}});
+    for (const std::string& name : namesIn(text.substr(equals + 1), store)) {
         for (const auto& s : store.sessions(store.find(name))) {
             const bool wanted = (o.caseId.empty() || s.caseId == o.caseId) &&
                                 (o.exercise.empty() || s.curriculum + "/" + s.exercise == o.exercise);
             if (wanted) {
-                group.sessions.push_back(training::rowOf(s));
+                group->sessions.push_back(training::rowOf(s));
             }
         }
     }
-    if (group.sessions.empty()) {
-        throw std::runtime_error("--group " + text + ": these people have no such sessions");
+}
+
+std::vector<report::ScoredGroup> groupsOf(const ProgressArguments& o, const training::ProfileStore& store)
+{
+    std::vector<report::ScoredGroup> groups;
+    for (const std::string& text : o.groups) {
+        addToGroup(o, text, store, groups);
     }
-    return group;
+    for (const report::ScoredGroup& g : groups) {
+        if (g.sessions.empty()) {
+            throw std::runtime_error("--group " + g.name + ": these people have no such sessions");
+        }
+    }
+    return groups;
 }
 
 void printPerson(const PersonProgress& p)
@@ -159,10 +180,7 @@ void run(const ProgressArguments& o)
             people.push_back(progressOf(store, person, asked, curricula));
         }
     }
-    std::vector<report::ScoredGroup> groups;
-    for (const std::string& text : o.groups) {
-        groups.push_back(groupOf(o, text, store));
-    }
+    const std::vector<report::ScoredGroup> groups = groupsOf(o, store);
     if (people.empty() && groups.empty()) {
         throw std::runtime_error("progress: give a profile's name, --all, or --group NAME=PROFILE,PROFILE");
     }
@@ -205,7 +223,8 @@ void addProgress(CLI::App& app)
         app.add_subcommand("progress", "Show learning curves, exercises reached and the next exercise; compare groups");
     c->add_option("NAME", o->names, "Profiles to show");
     c->add_flag("--all", o->all, "Show all profiles")->excludes("NAME");
-    c->add_option("--group", o->groups, "Group to compare, as NAME=PROFILE,PROFILE; repeat the option for each group")
+    c->add_option("--group", o->groups,
+                  "Group to compare, as NAME=PROFILE,PROFILE; repeat the option for each group, or to add to one")
         ->allow_extra_args(false);
     c->add_option("--curriculum", o->curricula, "Show this curriculum also if it was not begun; may be repeated")
         ->allow_extra_args(false);

@@ -82,11 +82,12 @@ struct ReplayPlayer::Impl {
           record(recordFile),
           model(session::reopenSession(recordFile, record.info())),
           period(1.0 / record.info().rate),
-          film(ticksOf(record, recordFile)),
+          length(ticksOf(record, recordFile)),
+          film(length),
           session(fmt::format("replay-{}", getpid())),
           publisher(publisherOf(session, model))
     {
-        playback.length = static_cast<double>(record.ticks() - 1) * period;
+        playback.length = static_cast<double>(length - 1) * period;
         computing = std::thread([this] { compute(); });
         showing = std::thread([this] { show(); });
     }
@@ -124,7 +125,7 @@ struct ReplayPlayer::Impl {
             channel::State state;
             TickComparison comparison(record);
             record.each([&](const TickRecord& then) {
-                if (stop) {
+                if (stop || then.tick >= length) {
                     return;
                 }
                 if (then.tick != film.ticks()) {
@@ -206,7 +207,8 @@ struct ReplayPlayer::Impl {
     std::string file;
     Record record;
     SessionModel model;
-    double period;  // of its ticks [s]
+    double period;         // of its ticks [s]
+    std::uint64_t length;  // ticks when it was opened: a session may still write more
     Film film;
     std::string session;
     channel::Publisher publisher;

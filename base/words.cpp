@@ -7,6 +7,7 @@
 
 #include <clocale>
 #include <cstdlib>
+#include <utility>
 
 // glibc's: a change of LANGUAGE counts from the next look on (gettext's manual, "Changing the language at runtime").
 extern "C" int _nl_msg_cat_cntr;  // NOLINT
@@ -47,7 +48,16 @@ std::string asked()
     return "en";
 }
 
+thread_local bool isEnglish = false;
+
 }  // namespace
+
+English::English() noexcept : before_(std::exchange(isEnglish, true)) {}
+
+English::~English()
+{
+    isEnglish = before_;
+}
 
 void useLanguage(const std::string& language, const fs::path& folder)
 {
@@ -63,21 +73,24 @@ void useLanguage(const std::string& language, const fs::path& folder)
 
 std::string language()
 {
-    return asked();
+    return isEnglish ? "en" : asked();
 }
 
 const char* tr(const char* text) noexcept
 {
-    return ::dgettext(domain, text);
+    return isEnglish ? text : ::dgettext(domain, text);
 }
 
 std::string tr(const std::string& text)
 {
-    return text.empty() ? std::string() : std::string(::dgettext(domain, text.c_str()));
+    return text.empty() ? std::string() : std::string(tr(text.c_str()));
 }
 
 const char* trn(const char* one, const char* many, unsigned long count) noexcept
 {
+    if (isEnglish) {
+        return count == 1 ? one : many;
+    }
     return ::dngettext(domain, one, many, count);
 }
 

@@ -22,6 +22,18 @@ const char* tr(const char* text) noexcept;
 std::string tr(const std::string& text);
 /// Of two forms of a text the one for `count` things; a language may have other forms than one and many.
 const char* trn(const char* one, const char* many, unsigned long count) noexcept;
+/// While it lives, this thread's words and numbers are English: for pages and tables that are English throughout.
+class English {
+public:
+    English() noexcept;
+    ~English();
+    English(const English&) = delete;
+    English& operator=(const English&) = delete;
+
+private:
+    bool before_;
+};
+
 /// Marks a text that is translated where it is shown.
 constexpr const char* marked(const char* text) noexcept
 {

@@ -18,6 +18,7 @@ constexpr double maxSink = 0.25;       // but not over this fraction of the radi
 constexpr double onBone = 3.0;         // sinks into a contact that is as stiff as may be: in load over stiffness,
 constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius: from one on it would slip around the tool
 constexpr double ease = 0.02;        // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
+constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
 constexpr int maxSteps = 256;        // along a way through the tissue
 
 bool isHeld(const CellLevel& level, Vec3 at) noexcept
@@ -57,6 +58,7 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
     const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
+    deeper = 1.0 + behind / std::max(given, leastGiven * radius);
     friction = tool.friction;
     inward = wanted > 0.0 ? tool.pushed / wanted : Vec3(0.0);
     stopped = 0.0;
@@ -73,7 +75,7 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bo
 
 Vec3 HeldTool::ownForce(Vec3 felt) const noexcept
 {
-    return outward((given > 0.0 ? std::pow(1.0 + behind / given, 1.5) : 1.0) * (felt - lag) - stopped * inward);
+    return outward(std::pow(deeper, 1.5) * (felt - lag) - stopped * inward);
 }
 
 Vec3 HeldTool::outward(Vec3 force) const noexcept

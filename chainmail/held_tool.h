@@ -19,6 +19,7 @@ namespace palpate::chainmail {
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
+    double deeper = 1;    // the real one's depth over that, from a least one on [-]
     double depth = 0;     // to which the surface sank into it in the last call [m]
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]
     double load = 0;      // sum of the sizes of its contacts' forces in the last call [N]

@@ -117,6 +117,19 @@ bool roomFor(const Tissue& tissue, const Tissue::Reader& reader, const Insert& l
     return true;
 }
 
+// The one after the highest in use, else the lowest that is free.
+std::uint16_t freeLabel(const std::vector<bool>& used, const std::string& insert)
+{
+    const std::ptrdiff_t afterHighest = std::find(used.rbegin(), used.rend(), true).base() - used.begin();
+    const auto next =
+        used.begin() + afterHighest < used.end() ? used.begin() + afterHighest : std::ranges::find(used, false);
+    if (next == used.end()) {
+        throw std::runtime_error(
+            fmt::format("insert '{}': every label value from 1 to 65535 is in use: save the labels with fewer", insert));
+    }
+    return static_cast<std::uint16_t>(next - used.begin());
+}
+
 Vec3 parsePoint(const std::string& line, const std::string& where)
 {
     Vec3 p(0.0);
@@ -142,10 +155,11 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
     LabelImage image = tissue.labels();
     std::vector<volume::LabelName> names = namesOf(tissue);
     std::vector<char> inside(65536, 0);
-    std::uint16_t next = 1;
+    std::vector<bool> used(65536, false);
+    used[0] = true;  // air
     for (const volume::Structure& s : tissue.structures()) {
         inside[s.value] = tissue.table().rows[s.tissue].role == Role::air ? 0 : 1;
-        next = std::max<std::uint16_t>(next, static_cast<std::uint16_t>(s.value + 1));
+        used[s.value] = true;
     }
     auto provenance = tissue.provenance();
     for (const Insert& insert : inserts) {
@@ -158,13 +172,15 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
             throw std::runtime_error(
                 fmt::format("insert '{}': the volume has a structure of this name: choose another name", insert.name));
         }
-        if (draw(image, Shape(insert), inside, next) == 0) {
+        const std::uint16_t label = freeLabel(used, insert.name);
+        if (draw(image, Shape(insert), inside, label) == 0) {
             const Vec3 c = insert.centre * 1e3;
             throw std::runtime_error(fmt::format("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume",
                                                  insert.name, c.x, c.y, c.z));
         }
-        names.push_back({next, insert.name, insert.tissue});
-        inside[next++] = 1;
+        names.push_back({label, insert.name, insert.tissue});
+        used[label] = true;
+        inside[label] = 1;
         provenance.emplace_back("insert", insert.name);
     }
     return rebuilt(tissue, image, tissue.table(), names, std::move(provenance));

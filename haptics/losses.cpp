@@ -91,12 +91,10 @@ void LossWatch::add(const TickRecord& record) noexcept
             touched_ = event.structure;
         }
     }
-    const bool down = (record.device.buttons & buttonMark) != 0;
-    if (down && !markDown_) {
+    if (now.marks > before_.marks) {
         marks_ += record.device.position;
         at_[mark] = seconds;
     }
-    markDown_ = down;
     before_ = now;
 }
 

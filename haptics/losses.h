@@ -69,7 +69,6 @@ private:
     CoreSample core_;                   // the best
     std::uint8_t touched_ = 0xFF;       // the vital structure that was touched first
     Vec3 marks_{0.0};                   // sum of the marks' places [m]
-    bool markDown_ = false;
     std::optional<TargetShape> target_;
 };
 

@@ -39,6 +39,18 @@ double ofTask(const Score& s, datasets::SessionTask task, double value)
     return s.aim.task == task ? value : none;
 }
 
+// Nothing where nothing is to be marked, and nothing was.
+double ofMarks(const Score& s, double value)
+{
+    return s.marks > 0 || judgedBy(s) == Judged::marks ? value : none;
+}
+
+// Nothing where no needle was inside, or nothing vital is.
+double ofMargin(const Score& s, double value)
+{
+    return std::isfinite(s.vitalMargin) ? value : none;
+}
+
 constexpr std::array<Measure, 36> all{{
     {"total", "total", "Total", "of 100", 0, Listed::never, [](const Score& s) { return s.total; }},
     {"passes", "passes", "Passes", "", 0, Listed::always, [](const Score& s) { return static_cast<double>(s.passes); }},
@@ -55,7 +67,7 @@ constexpr std::array<Measure, 36> all{{
     {"vital_depth_mm", "vital mm", "Depth in vital structures", "mm", 1, Listed::always,
      [](const Score& s) { return s.vitalDepth * 1e3; }},
     {"vital_margin_mm", "margin mm", "Nearest to a vital structure", "mm", 1, Listed::always,
-     [](const Score& s) { return s.vitalMargin * 1e3; }},
+     [](const Score& s) { return ofMargin(s, s.vitalMargin * 1e3); }},
     {"warnings", "warnings", "Warnings", "", 0, Listed::always,
      [](const Score& s) { return static_cast<double>(s.warnings); }},
     {"skin_contacts", "skin", "Skin contacts", "", 0, Listed::always,
@@ -77,9 +89,9 @@ constexpr std::array<Measure, 36> all{{
     {"mean_force_n", "mean N", "Mean force in contact", "N", 2, Listed::always, [](const Score& s) { return s.meanForce; }},
     {"marks", "marks", "Marks", "", 0, Listed::never, [](const Score& s) { return static_cast<double>(s.marks); }},
     {"mark_error_mm", "mark mm", "Marked beside the middle by", "mm", 1, Listed::ifMarked,
-     [](const Score& s) { return s.markError * 1e3; }},
+     [](const Score& s) { return ofMarks(s, s.markError * 1e3); }},
     {"mark_size_error_mm", "size mm", "Size marked wrong by", "mm", 1, Listed::ifMarked,
-     [](const Score& s) { return s.markSizeError * 1e3; }},
+     [](const Score& s) { return ofMarks(s, s.markSizeError * 1e3); }},
     {"probe_s", "probe s", "Probe on the skin", "s", 1, Listed::ifProbe,
      [](const Score& s) { return ofProbe(s, s.probeSeconds); }},
     {"needle_in_beam_mm", "beam mm", "Needle in the picture (mean)", "mm", 1, Listed::ifProbe,

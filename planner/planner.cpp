@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <stdexcept>
 
 namespace palpate::planner {
 
@@ -302,6 +303,11 @@ double predictedTime(const PlanCandidate& c, const PlanCosts& costs) noexcept
 Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
                const std::function<void(const std::string&)>& progress)
 {
+    // What the spring takes, every model does.
+    if (1e6 * request.budget < request.costs.usPerTick) {
+        throw std::runtime_error(fmt::format("--budget: {:g} us: every model takes over {:g} us per tick: give more",
+                                             1e6 * request.budget, request.costs.usPerTick));
+    }
     return Planner(model, request, progress).run();
 }
 

@@ -11,6 +11,8 @@
 #include <pybind11/stl/filesystem.h>
 #include <nlohmann/json.hpp>
 
+#include <mutex>
+
 namespace palpate::python {
 
 namespace {
@@ -20,14 +22,23 @@ struct RecordBox {
 
     std::string file;
     haptics::Record record;
+    mutable std::mutex guard;  // of the record, which is one connection to its file
 };
+
+// Works with the record while no other thread does, and without Python's lock: who waits stops nobody else.
+template <class Work>
+auto alone(const RecordBox& box, Work&& work)
+{
+    const py::gil_scoped_release others;
+    const std::lock_guard mine(box.guard);
+    return work();
+}
 
 py::tuple readTicks(const RecordBox& box)
 {
     std::vector<TickRow> rows;
     std::vector<EventRow> happened;
-    {
-        const py::gil_scoped_release others;
+    alone(box, [&] {
         rows.reserve(box.record.ticks());
         box.record.each([&](const haptics::TickRecord& tick) {
             rows.push_back(rowOf(tick));
@@ -35,7 +46,7 @@ py::tuple readTicks(const RecordBox& box)
                 happened.push_back(rowOf(tick.tick, tick.events[i]));
             }
         });
-    }
+    });
     py::array ticks = rowsOf(tickType(box.record.info().structures.size()), rows.size());
     std::copy(rows.begin(), rows.end(), static_cast<TickRow*>(ticks.mutable_data()));
     py::array events = rowsOf(eventType(), happened.size());
@@ -64,11 +75,8 @@ py::dict infoOf(const RecordBox& box)
 
 py::dict replay(const RecordBox& box)
 {
-    haptics::ReplayResult result;
-    {
-        const py::gil_scoped_release others;
-        result = haptics::replay(box.record, session::reopenSession(box.file, box.record.info()));
-    }
+    const haptics::ReplayResult result =
+        alone(box, [&] { return haptics::replay(box.record, session::reopenSession(box.file, box.record.info())); });
     py::dict out;
     out["ticks"] = result.ticks;
     out["identical"] = result.identical;
@@ -84,12 +92,11 @@ py::dict score(const RecordBox& box)
     haptics::Score found;
     std::vector<haptics::Loss> losses;
     haptics::RecordCheck check;
-    {
-        const py::gil_scoped_release others;
+    alone(box, [&] {
         found = haptics::scoreOf(box.record);
         losses = haptics::lossesOf(box.record);
         check = haptics::checkRecord(box.record, base::build());
-    }
+    });
     py::dict out = toPython(session::scoreFigures(found, losses));
     out["doubts"] = check.warnings;
     return out;
@@ -98,7 +105,7 @@ py::dict score(const RecordBox& box)
 py::dict resultsOf(const RecordBox& box)
 {
     py::dict out;
-    for (const auto& [key, value] : box.record.results()) {
+    for (const auto& [key, value] : alone(box, [&] { return box.record.results(); })) {
         out[py::str(key)] = value;
     }
     return out;
@@ -119,7 +126,8 @@ void bindRecord(py::module_& module)
         .def_property_readonly("file", [](const RecordBox& box) { return box.file; })
         .def_property_readonly("info", &infoOf)
         .def_property_readonly("scene_text", [](const RecordBox& box) { return box.record.info().sceneText; })
-        .def_property_readonly("complete", [](const RecordBox& box) { return box.record.complete(); })
+        .def_property_readonly("complete",
+                               [](const RecordBox& box) { return alone(box, [&] { return box.record.complete(); }); })
         .def_property_readonly("results", &resultsOf)
         .def("read_ticks", &readTicks)
         .def("replay", &replay)

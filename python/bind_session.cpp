@@ -50,6 +50,7 @@ Vec3 unit(Vec3 axis)
     return std::abs(length - 1) < 1e-12 ? axis : axis / length;
 }
 
+constexpr double farthestFace = 10.0;  // of an ultrasound probe [m]
 constexpr py::ssize_t withProbe = 12;  // numbers of a pose that has the probe's move, too
 
 bool isPoseOf(py::ssize_t numbers)
@@ -79,9 +80,9 @@ TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, boo
             "pose: give (x, y, z) or (x, y, z, axis x, axis y, axis z), in metres; or these and the six numbers of the "
             "probe's move");
     }
+    const LiveSession::Use use(box.live);
     const auto sample = sampleOf(numbers.data(), numbers.shape(0), box.live.axis(), buttons, fresh);
     const py::gil_scoped_release others;
-    const LiveSession::Use use(box.live);
     return {rowOf(box.live.step(sample))};
 }
 
@@ -113,34 +114,44 @@ std::vector<DeviceSample> samplesOf(const Doubles& poses, const Buttons& buttons
     return samples;
 }
 
-// Runs a device to its end, or to a KeyboardInterrupt, which is then set.
+// Runs a device to its end, or to a KeyboardInterrupt, which is then set. The session must be in use.
 bool runDevice(SessionBox& box, haptics::Device& device, double seconds,
                const std::function<void(const haptics::TickRecord&)>& each)
 {
     const py::gil_scoped_release others;
-    const LiveSession::Use use(box.live);
     return box.live.run(device, seconds, each, [] {
         const py::gil_scoped_acquire mine;
         return PyErr_CheckSignals() == 0;
     });
 }
 
+// Throws the exception that ended a run. Its rows are made beside it: what runs Python clears an exception that is set.
+[[noreturn]] void throwInterrupted(SessionBox& box, const std::function<py::object()>& rows)
+{
+    {
+        const py::error_scope kept;
+        box.interrupted = rows();
+    }
+    throw py::error_already_set();
+}
+
 py::array run(SessionBox& box, const Doubles& poses, const Buttons& buttons, const Flags& fresh)
 {
+    const LiveSession::Use use(box.live);
     const auto samples = samplesOf(poses, buttons, fresh, box.live.axis());
     py::array out = rowsOf(tickType(box.live.modelled().info.structures.size()), samples.size());
     auto* const rows = static_cast<TickRow*>(out.mutable_data());
     std::size_t done = 0;
     PosesDevice device(samples);
     if (!runDevice(box, device, 0, [&](const haptics::TickRecord& tick) { rows[done++] = rowOf(tick); })) {
-        box.interrupted = out[py::slice(0, static_cast<py::ssize_t>(done), 1)];
-        throw py::error_already_set();
+        throwInterrupted(box, [&] { return out[py::slice(0, static_cast<py::ssize_t>(done), 1)]; });
     }
     return out;
 }
 
 std::size_t advance(SessionBox& box, const Doubles& poses, const Buttons& buttons, const Flags& fresh)
 {
+    const LiveSession::Use use(box.live);
     const auto samples = samplesOf(poses, buttons, fresh, box.live.axis());
     PosesDevice device(samples);
     if (!runDevice(box, device, 0, {})) {
@@ -151,6 +162,7 @@ std::size_t advance(SessionBox& box, const Doubles& poses, const Buttons& button
 
 py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t seed, double seconds)
 {
+    const LiveSession::Use use(box.live);
     session::DeviceRequest request;
     request.trainee = trainee == "script" ? "" : trainee;
     request.seed = seed;
@@ -158,17 +170,22 @@ py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t see
     std::vector<TickRow> rows;
     const bool whole =
         runDevice(box, *device, seconds, [&](const haptics::TickRecord& tick) { rows.push_back(rowOf(tick)); });
-    py::array out = rowsOf(tickType(box.live.modelled().info.structures.size()), rows.size());
-    std::copy(rows.begin(), rows.end(), static_cast<TickRow*>(out.mutable_data()));
+    const auto all = [&] {
+        py::array out = rowsOf(tickType(box.live.modelled().info.structures.size()), rows.size());
+        std::copy(rows.begin(), rows.end(), static_cast<TickRow*>(out.mutable_data()));
+        return out;
+    };
     if (!whole) {
-        box.interrupted = out;
-        throw py::error_already_set();
+        throwInterrupted(box, all);
     }
-    return out;
+    return all();
 }
 
-py::array eventsOf(const SessionBox& box)
+using Purpose = LiveSession::Purpose;
+
+py::array eventsOf(SessionBox& box)
 {
+    const LiveSession::Use use(box.live, Purpose::look);
     py::array out = rowsOf(eventType(), box.live.events().size());
     auto* row = static_cast<EventRow*>(out.mutable_data());
     for (const auto& [tick, event] : box.live.events()) {
@@ -180,7 +197,8 @@ py::array eventsOf(const SessionBox& box)
 // Nodes lie x fastest, so that index (i, j, k, axis) has strides of 1, nx and nx ny nodes.
 py::array displacementOf(const py::object& self)
 {
-    const auto& box = self.cast<SessionBox&>();
+    auto& box = self.cast<SessionBox&>();
+    const LiveSession::Use use(box.live, Purpose::look);
     const chainmail::DisplacedLattice& shape = box.live.session().simulation().shape();
     const Index3 size = shape.lattice().grid.size;
     const py::ssize_t node = sizeof(Vec3f), row = node * size.x, slice = row * size.y;
@@ -188,8 +206,9 @@ py::array displacementOf(const py::object& self)
                         shape.u().data(), self);
 }
 
-py::list coresOf(const SessionBox& box)
+py::list coresOf(SessionBox& box)
 {
+    const LiveSession::Use use(box.live, Purpose::look);
     py::list out;
     for (const haptics::CoreSample& core : box.live.session().figures().cores) {
         py::dict fractions, one;
@@ -221,11 +240,15 @@ py::object ultrasoundOf(SessionBox& box, int width, int height, const py::object
         throw py::value_error("depth: has to be 0 or more, in metres");
     }
     if (!face.is_none()) {
+        const Vec3 at = vec3Of(face, "face");
+        if (!(glm::length(at) <= farthestFace)) {
+            throw py::value_error("face: has to be three numbers in metres, within 10 m");
+        }
         const Vec3 inwards = vec3Of(direction, "direction"), along = vec3Of(lateral, "lateral");
         if (!(glm::length(glm::cross(inwards, along)) > 1e-6 * glm::length(inwards) * glm::length(along))) {
             throw py::value_error("direction, lateral: have to be two directions with lengths");
         }
-        request.pose = ultrasound::poseOf(vec3Of(face, "face"), unit(inwards), unit(along));
+        request.pose = ultrasound::poseOf(at, unit(inwards), unit(along));
     }
     UltrasoundPicture picture;
     {
@@ -259,17 +282,27 @@ py::object vectorField(const std::array<T, 3>& v)
     return vectorOf({v[0], v[1], v[2]});
 }
 
+template <std::size_t n>
+py::array_t<double> numbersOf(const std::array<double, n>& values)
+{
+    return py::array_t<double>(n, values.data());
+}
+
 void bindTick(py::module_& module)
 {
     py::class_<TickBox>(module, "Tick")
         .def_property_readonly("tick", [](const TickBox& t) { return t.row.tick; })
         .def_property_readonly("position", [](const TickBox& t) { return vectorField(t.row.position); })
         .def_property_readonly("axis", [](const TickBox& t) { return vectorField(t.row.axis); })
+        .def_property_readonly("buttons", [](const TickBox& t) { return t.row.buttons; })
+        .def_property_readonly("fresh", [](const TickBox& t) { return t.row.fresh != 0; })
         .def_property_readonly("proxy", [](const TickBox& t) { return vectorField(t.row.proxy); })
         .def_property_readonly("tissue_force", [](const TickBox& t) { return vectorField(t.row.tissueForce); })
         .def_property_readonly("basic", [](const TickBox& t) { return vectorField(t.row.basic); })
         .def_property_readonly("additional", [](const TickBox& t) { return vectorField(t.row.additional); })
         .def_property_readonly("total", [](const TickBox& t) { return vectorField(t.row.total); })
+        .def_property_readonly("energy", [](const TickBox& t) { return t.row.energy; })
+        .def_property_readonly("damped", [](const TickBox& t) { return t.row.damped; })
         .def_property_readonly("deflection", [](const TickBox& t) { return vectorField(t.row.deflection); })
         .def_property_readonly("phase", [](const TickBox& t) { return haptics::phaseNames[t.row.phase]; })
         .def_property_readonly("warning", [](const TickBox& t) { return haptics::warningNames[t.row.warning]; })
@@ -279,11 +312,18 @@ void bindTick(py::module_& module)
         .def_property_readonly("tip_in_beam", [](const TickBox& t) { return t.row.tipInBeam != 0; })
         .def_property_readonly("contacts", [](const TickBox& t) { return t.row.contacts; })
         .def_property_readonly("penetration", [](const TickBox& t) { return t.row.penetration; })
+        .def_property_readonly("moved", [](const TickBox& t) { return t.row.moved; })
+        .def_property_readonly("residual", [](const TickBox& t) { return t.row.residual; })
         .def_property_readonly("ahead", [](const TickBox& t) { return t.row.ahead; })
+        .def_property_readonly("ahead_tissue", [](const TickBox& t) { return t.row.aheadTissue; })
+        .def_property_readonly("ahead_speed", [](const TickBox& t) { return t.row.aheadSpeed; })
         .def_property_readonly("distance_to_target", [](const TickBox& t) { return t.row.distance[0]; })
         .def_property_readonly("nearest_vital", [](const TickBox& t) { return t.row.nearestVital; })
-        .def_property_readonly(
-            "distance", [](const TickBox& t) { return py::array_t<double>(t.row.distance.size(), t.row.distance.data()); })
+        .def_property_readonly("warned", [](const TickBox& t) { return t.row.warned; })
+        .def_property_readonly("probe_move", [](const TickBox& t) { return numbersOf(t.row.probeMove); })
+        .def_property_readonly("probe_face", [](const TickBox& t) { return vectorField(t.row.probeFace); })
+        .def_property_readonly("probe_force", [](const TickBox& t) { return vectorField(t.row.probeForce); })
+        .def_property_readonly("distance", [](const TickBox& t) { return numbersOf(t.row.distance); })
         .def_property_readonly("events", [](const TickBox& t) { return t.row.events; })
         .def_property_readonly("fired", [](const TickBox& t) { return t.row.fired != 0; })
         .def_property_readonly("faulted", [](const TickBox& t) { return t.row.faulted != 0; });
@@ -332,7 +372,8 @@ void bindSession(py::module_& module)
                  box.live.close();
              })
         .def("score",
-             [](const SessionBox& box) {
+             [](SessionBox& box) {
+                 const LiveSession::Use use(box.live, Purpose::look);
                  const session::SessionFigures figures = box.live.session().figures();
                  return toPython(session::scoreFigures(figures.score, figures.losses));
              })
@@ -347,7 +388,8 @@ void bindSession(py::module_& module)
                                [](const SessionBox& box) { return std::const_pointer_cast<Modelled>(box.live.shared()); })
         .def_property_readonly("ticks", [](const SessionBox& box) { return box.live.ticks(); })
         .def_property_readonly("closed", [](const SessionBox& box) { return box.live.closed(); })
-        .def_property_readonly("force_hash", [](const SessionBox& box) {
+        .def_property_readonly("force_hash", [](SessionBox& box) {
+            const LiveSession::Use use(box.live, Purpose::look);
             return session::hexadecimal(box.live.session().figures().forceHash);
         });
 }

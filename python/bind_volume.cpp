@@ -102,7 +102,11 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
     std::vector<volume::LabelName> names;
     for (const auto& [value, said] : tissues) {
         volume::LabelName name;
-        name.value = value.cast<std::uint16_t>();
+        try {
+            name.value = value.cast<std::uint16_t>();
+        } catch (const py::cast_error&) {
+            throw py::value_error("tissues: keys are label values, 0 to 65535, not " + py::repr(value).cast<std::string>());
+        }
         if (py::isinstance<py::str>(said)) {
             name.name = name.tissue = said.cast<std::string>();
         } else {
@@ -124,11 +128,11 @@ Labels labelArray(const py::array& given)
         throw py::value_error("labels: give an array of three dimensions, indexed (i, j, k)");
     }
     if (given.size() > 0 && kind != 'b') {
-        const auto low = given.attr("min")().cast<std::int64_t>();
-        const auto high = given.attr("max")().cast<std::int64_t>();
-        if (low < 0 || high > std::numeric_limits<std::uint16_t>::max()) {
-            throw py::value_error("labels: values are 0 to 65535, and here " + std::to_string(low) + " to " +
-                                  std::to_string(high));
+        // Of any width, 64 bits with or without a sign.
+        const py::object low = given.attr("min")(), high = given.attr("max")();
+        if (low.cast<double>() < 0 || high.cast<double>() > std::numeric_limits<std::uint16_t>::max()) {
+            throw py::value_error("labels: values are 0 to 65535, and here " + py::str(low).cast<std::string>() + " to " +
+                                  py::str(high).cast<std::string>());
         }
     }
     return Labels(given);

@@ -62,12 +62,15 @@ LiveSession::~LiveSession()
     }
 }
 
-LiveSession::Use::Use(LiveSession& session) : session_(session)
+LiveSession::Use::Use(LiveSession& session, Purpose purpose) : session_(session)
 {
     if (session.busy_.test_and_set()) {
         throw std::runtime_error("the session is at work in another thread: give each thread a session of its own");
     }
     std::string problem;
+    if (purpose == Purpose::look) {
+        return;
+    }
     if (session.closed_) {
         problem = "the session is closed: open another one";
     } else if (session.recorder_ && getpid() != session.process_) {
@@ -139,10 +142,10 @@ bool LiveSession::run(haptics::Device& device, double seconds, const std::functi
 
 void LiveSession::close()
 {
-    if (closed_) {
+    const Use alone(*this, Purpose::look);
+    if (closed_.exchange(true)) {
         return;
     }
-    closed_ = true;
     // In a process that was forked the recorder's thread is not there: the file is its owner's.
     if (recorder_ && getpid() != process_) {
         static_cast<void>(recorder_.release());

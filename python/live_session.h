@@ -41,11 +41,14 @@ public:
     LiveSession(const LiveSession&) = delete;
     LiveSession& operator=(const LiveSession&) = delete;
 
-    /// While it lives no other thread can work with the session. Throws std::runtime_error when one does, when the session
-    /// is closed, and for one with a record in another process than that which opened it.
+    /// What a session is used for: to look at what happened, also after its end, or for more ticks.
+    enum class Purpose : std::uint8_t { look, work };
+
+    /// While it lives no other thread can use the session. Throws std::runtime_error when one does; and to work, when the
+    /// session is closed, and for one with a record in another process than that which opened it.
     class Use {
     public:
-        explicit Use(LiveSession& session);
+        explicit Use(LiveSession& session, Purpose purpose = Purpose::work);
         ~Use() { session_.busy_.clear(); }
         Use(const Use&) = delete;
         Use& operator=(const Use&) = delete;
@@ -61,7 +64,8 @@ public:
     /// @returns        true when it was not stopped by `goOn`
     bool run(haptics::Device& device, double seconds, const std::function<void(const haptics::TickRecord&)>& each,
              const std::function<bool()>& keepGoing);
-    /// Ends the record. Further ticks are errors. Throws std::runtime_error where the record is not whole.
+    /// Ends the record. Further ticks are errors. Throws std::runtime_error where the record is not whole, and while
+    /// another thread uses the session, which then goes on.
     void close();
 
     const Modelled& modelled() const noexcept { return *modelled_; }
@@ -72,6 +76,7 @@ public:
     const haptics::TickRecord& last() const noexcept { return last_; }
     /// What a viewer has been shown of the ticks so far, the last included.
     channel::State shown() const noexcept;
+    /// These two may be asked for at any time.
     std::uint64_t ticks() const noexcept { return ticks_; }
     bool closed() const noexcept { return closed_; }
     const std::string& recordFile() const noexcept { return recordFile_; }
@@ -87,11 +92,11 @@ private:
     std::string recordFile_;
     pid_t process_;
     std::atomic_flag busy_;
-    bool closed_ = false;
+    std::atomic<bool> closed_ = false;
     std::vector<std::pair<std::uint64_t, haptics::Event>> events_;
     haptics::TickRecord last_;
     channel::State cores_;  // as of the last tick in which the gun was fired
-    std::uint64_t ticks_ = 0;
+    std::atomic<std::uint64_t> ticks_ = 0;
     Vec3 axis_{0, 1, 0};
 };
 

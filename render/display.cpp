@@ -77,10 +77,7 @@ std::string readNumber(int from)
 
 bool displayWorks()
 {
-    if (std::getenv("DISPLAY") == nullptr || glfwInit() == GLFW_FALSE)
-        return false;
-    glfwTerminate();
-    return true;
+    return std::getenv("DISPLAY") != nullptr && glfwInit() == GLFW_TRUE;
 }
 
 // Starts a server. Its number is empty when it did not come up; then `status` is that which it ended with, and its process

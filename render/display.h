@@ -6,7 +6,8 @@
 
 namespace palpate::render {
 
-/// True when the display that the environment names can be opened.
+/// True when the display that the environment names can be opened. It stays open: a server that ends or begins anew with
+/// its last client would be gone before the window comes.
 bool displayWorks();
 
 /// A display without a screen (Xvfb) for pictures that go to files; it ends with this process, however that ends. Only its

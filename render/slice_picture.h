@@ -49,6 +49,7 @@ public:
 private:
     Point2 pixel(glm::dvec3 p) const;
     void drawMarks(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const;
+    void drawOutline(Canvas& canvas, Point2 from, Point2 to, double radius) const;
     void drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const;
     void drawWindow(Canvas& canvas, const GreyImage& grey, double font, double above, double below) const;
 

@@ -80,10 +80,11 @@ ViewerFigures runViewer(const ViewerOptions& options)
     std::signal(SIGTERM, onInterrupt);
     standBack();
     const bool window = options.offscreen.empty() && options.movie.empty();
-    if (window && !options.hidden && !displayWorks())
+    const bool works = !options.hidden && displayWorks();
+    if (window && !options.hidden && !works)
         throw std::runtime_error("no display: set DISPLAY, or use --offscreen DIR");
     std::optional<PrivateDisplay> display;
-    if (options.hidden || !displayWorks())
+    if (!works)
         display.emplace();
     ViewerFigures figures = window ? showInWindow(options, interruptedBy) : writePictures(options, interruptedBy);
     figures.signal = interruptedBy;

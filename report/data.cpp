@@ -1,5 +1,6 @@
 #include <report/data.h>
 
+#include <base/words.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -269,6 +270,7 @@ ReportData collect(const haptics::Record& record)
     Collector c(record.info(), record.ticks());
     record.each([&](const haptics::TickRecord& tick) { c.add(tick); });
     c.data.score = c.watch.score();
+    const base::English page;  // all of it is
     c.data.losses = c.watch.losses(record.info());
     c.data.forces = c.forces.finish();
     c.data.distances = c.distances.finish();

@@ -2,6 +2,7 @@
 
 #include <base/outputs.h>
 #include <base/spoken.h>
+#include <datasets/scene.h>
 #include <report/data.h>
 #include <report/html.h>
 #include <report/path.h>
@@ -11,8 +12,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <exception>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -25,7 +27,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t shownVitals = 7;  // at first; the legend switches the others on
-constexpr double thesisCap = 8.5;       // [N]
 
 // Four decimals are under a tenth of what a chart can show, and halve the page.
 json columnsOf(const std::vector<std::vector<double>>& columns)
@@ -46,25 +47,24 @@ json axis(std::string_view name, std::string_view unit)
     return {{"name", name}, {"unit", unit}, {"label", std::string(name) + " [" + std::string(unit) + "]"}};
 }
 
-double capOf(const haptics::SessionInfo& info)
+// Nothing where the scene cannot be read.
+std::optional<double> capOf(const haptics::SessionInfo& info)
 {
-    for (const auto& [key, value] : info.extra) {
-        const double cap = key == "force_cap_n" ? std::strtod(value.c_str(), nullptr) : 0;
-        if (cap > 0) {
-            return cap;
-        }
+    try {
+        return datasets::parseScene(info.sceneText, info.sceneOrigin).forceCap;
+    } catch (const std::exception&) {
+        return std::nullopt;
     }
-    return thesisCap;
 }
 
 // The cap, where forces come anywhere near it: on a chart of small ones it would leave them no room.
-json capLine(const ReportData& d, double cap)
+json capLine(const ReportData& d, std::optional<double> cap)
 {
-    const bool near = d.score.peakForce > 0.5 * cap;
-    return near ? json::array({{{"at", cap}, {"label", "cap"}, {"colour", "c4"}}}) : json::array();
+    const bool near = cap && d.score.peakForce > 0.5 * *cap;
+    return near ? json::array({{{"at", *cap}, {"label", "cap"}, {"colour", "c4"}}}) : json::array();
 }
 
-json forceChart(const ReportData& d, double cap)
+json forceChart(const ReportData& d, std::optional<double> cap)
 {
     return {{"columns", columnsOf(d.forces)},
             {"x", axis("time", "s")},
@@ -86,7 +86,7 @@ void bridgeGaps(json& chart)
     }
 }
 
-json depthChart(const ReportData& d, double cap)
+json depthChart(const ReportData& d, std::optional<double> cap)
 {
     json chart = {{"columns", columnsOf({d.profile.depth, d.profile.in, d.profile.peak, d.profile.out})},
                   {"x", axis("inserted", "mm")},
@@ -191,7 +191,7 @@ std::string sessionPage(const haptics::Record& record, const std::filesystem::pa
 {
     const ReportData d = collect(record);
     const haptics::SessionInfo& info = record.info();
-    const double cap = capOf(info);
+    const std::optional<double> cap = capOf(info);
     json events = json::array();
     for (const MarkedEvent& e : d.events) {
         events.push_back(

@@ -33,6 +33,16 @@ constexpr double answerTime = 30;  // of a short command, on a machine that has 
 
 struct Errands::Impl {
     Impl(fs::path where, ResultSink& to) : programs(std::move(where)), sink(to) {}
+    ~Impl()
+    {
+        if (film) {
+            film.reset();  // ends it
+            std::error_code none;
+            fs::remove_all(making, none);
+        }
+    }
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
 
     void startSession(State& state)
     {
@@ -255,15 +265,30 @@ struct Errands::Impl {
         state.ghost = record;
         state.ghosting = true;
     }
-    // With ffmpeg a film, without it pictures.
+    // With ffmpeg a film, without it pictures. It has its name when it is whole: what is cut off does not look like one.
     void makeFilm(State& state)
     {
         const bool can = ::access("/usr/bin/ffmpeg", X_OK) == 0;
         made = fs::path(state.files.record).replace_extension(can ? ".mp4" : ".pictures");
+        making = fs::path(made).replace_extension(".part" + made.extension().string());
         film.emplace(programs / "palpate-view",
-                     std::vector<std::string>{"--replay", state.files.record, can ? "--movie" : "--offscreen", made},
+                     std::vector<std::string>{"--replay", state.files.record, can ? "--movie" : "--offscreen", making},
                      scratch / "film.log");
         state.filming = true;
+    }
+    void takeFilm(State& state)
+    {
+        std::error_code failed;
+        if (film->failed()) {
+            state.notice = film->message();
+            fs::remove_all(making, failed);
+        } else {
+            fs::remove_all(made, failed);
+            fs::rename(making, made, failed);
+            state.notice = failed ? made.string() + ": " + failed.message() : made.string();
+        }
+        state.filming = false;
+        film.reset();
     }
     void keepSettings(State& state)
     {
@@ -320,14 +345,12 @@ struct Errands::Impl {
             return ended;
         });
         if (over(film)) {
-            state.notice = film->failed() ? film->message() : made.string();
-            state.filming = false;
-            film.reset();
+            takeFilm(state);
         }
         return changed;
     }
 
-    fs::path made;  // film or pictures
+    fs::path made, making;  // film or pictures: when they are whole, and until then
     fs::path programs;
     const base::TemporaryFolder scratch{tr("what the commands print")};  // goes after those that run
     ResultSink& sink;

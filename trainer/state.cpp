@@ -288,18 +288,15 @@ std::vector<std::string> comparisonArguments(const State& state)
     std::vector<std::string> words{"progress"};
     const Instructor& of = state.instructor;
     for (int group = 1; group <= 2; ++group) {
-        std::string text = said(tr("group {}"), group) + "=";
-        bool some = false;
+        const std::size_t before = words.size();
         for (std::size_t i = 0; i < std::min(of.groupOf.size(), state.people.size()); ++i) {
-            if (of.groupOf[i] == group) {
-                text += (some ? "," : "") + state.people[i].name;
-                some = true;
+            if (of.groupOf[i] == group) {  // one by one: a name may have a comma
+                words.insert(words.end(), {"--group", said(tr("group {}"), group) + "=" + state.people[i].name});
             }
         }
-        if (!some) {
+        if (words.size() == before) {
             return {};
         }
-        words.insert(words.end(), {"--group", text});
     }
     if (!of.caseId.empty()) {
         words.insert(words.end(), {"--case", of.caseId});

@@ -49,10 +49,11 @@ bool maybeRecord(const fs::path& file)
     return file.extension() == ".db" || file.extension() == ".part";
 }
 
+// A file, or a folder of pictures.
 void removeOne(const fs::path& file, Erased& erased)
 {
     std::error_code failed;
-    fs::remove(file, failed);
+    fs::remove_all(file, failed);
     if (failed) {
         erased.stuck.push_back(file);
     }
@@ -65,7 +66,10 @@ void removeRecord(const fs::path& file, Erased& erased)
         removeOne(file.string() + suffix, erased);
     }
     if (file.extension() == ".db") {
-        removeOne(fs::path(file).replace_extension(".json"), erased);
+        // Its figures, and what the trainer's window made of it: a film or pictures, whole or cut off.
+        for (const char* extension : {".json", ".mp4", ".part.mp4", ".pictures", ".part.pictures"}) {
+            removeOne(fs::path(file).replace_extension(extension), erased);
+        }
     }
     removeOne(file, erased);
 }

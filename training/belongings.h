@@ -21,7 +21,8 @@ struct Belongings {
 };
 
 /// Removes from the folders every record that a session of the person names or whose operator the person is, also of
-/// sessions that were cut off, with their logs and figures, and the pages of progress that the trainer's window wrote.
+/// sessions that were cut off, with their logs, figures, films and pictures, and the pages of progress that the trainer's
+/// window wrote.
 Erased removeBelongings(const Belongings& of);
 
 }  // namespace palpate::training

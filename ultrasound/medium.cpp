@@ -146,24 +146,26 @@ void Medium::finish(glm::ivec3 low, glm::ivec3 high)
             }
 }
 
+// Whether the voxels from `low` to `high` are there, those of the border not counted. Before a number becomes an index: a
+// place may be anywhere.
+bool Medium::holds(glm::vec3 low, glm::vec3 high) const noexcept
+{
+    const glm::vec3 end(size_ - border);
+    return low.x >= border && low.y >= border && low.z >= border && high.x < end.x && high.y < end.y && high.z < end.z;
+}
+
 std::uint8_t Medium::label(glm::vec3 v) const noexcept
 {
-    if (!(v.x >= border && v.y >= border && v.z >= border))
-        return unknown;
-    const glm::ivec3 n(v + 0.5F);
-    if (n.x >= size_.x - border || n.y >= size_.y - border || n.z >= size_.z - border)
-        return unknown;
-    return labels_[offset(n)];
+    const glm::vec3 voxel = v + 0.5F;
+    return holds(v, voxel) ? labels_[offset(glm::ivec3(voxel))] : unknown;
 }
 
 // Linear along each axis.
 Medium::Impedance Medium::impedanceAt(glm::vec3 v) const noexcept
 {
-    if (!(v.x >= border && v.y >= border && v.z >= border))
+    if (!holds(v, v))
         return {pureImpedance(unknown), glm::vec3(0)};
     const glm::ivec3 n(v);
-    if (n.x >= size_.x - border || n.y >= size_.y - border || n.z >= size_.z - border)
-        return {pureImpedance(unknown), glm::vec3(0)};
     const glm::vec3 t = v - glm::vec3(n);
     const std::int16_t* q = &lnZ_[offset(n)];
     const auto y = static_cast<std::size_t>(size_.x), z = y * static_cast<std::size_t>(size_.y);

@@ -50,6 +50,7 @@ public:
     bool punch(std::span<const channel::Hole> holes, double radius);
 
 private:
+    bool holds(glm::vec3 low, glm::vec3 high) const noexcept;
     static constexpr float codes = 4096;  // of ln Z in steps
 
     struct Saved {

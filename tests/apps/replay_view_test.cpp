@@ -83,6 +83,27 @@ TEST(ReplayView, AnUnpacedSessionHasPicturesOfItsEvents)
     }
 }
 
+// While the viewer makes its body, the session writes on: what is shown are the ticks that there were when it was opened.
+TEST(ReplayView, ARecordThatIsStillWrittenIsShownAsFarAsItWas)
+{
+    if (!canDraw())
+        GTEST_SKIP() << "needs palpate-view and Xvfb (package xvfb)";
+    const Folder folder;
+    Program session("palpate", {"train", "find-lump", "--model", "spring", "--headless", "--no-view", "--seconds", "60",
+                                "--record", folder / "s.db"});
+    for (int i = 0; i < 600 && palpate({"score", folder / "s.db"}).status != 0; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    ASSERT_TRUE(session.running());
+    const Outcome outcome = Program("palpate-view", {"--replay", folder / "s.db", "--offscreen", folder / "pictures",
+                                                     "--frames", "2", "--size", "320x320"})
+                                .wait();
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(pictures(folder / "pictures").size(), 2U);
+    EXPECT_TRUE(session.running()) << "it ended before the viewer did: nothing was tested";
+    session.send(SIGINT);
+    EXPECT_EQ(session.wait().status, 130);
+}
+
 // There is nothing between two ticks: every tick is one picture, and then it ends.
 TEST(ReplayView, WritesEveryTickOnceWhereNoTimeBetweenPicturesIsAskedFor)
 {

@@ -82,6 +82,24 @@ TEST_F(TrainingCommands, ARecordFromAnotherMachineCountsAsWhatItWas)
     expectRefusal({"progress", "anna"}, "there is no such profile");
 }
 
+// "Surname, name" is how clinics write people.
+TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
+{
+    for (const char* const name : {"Smith", "Jane", "Smith,Jane", "bert"}) {
+        ASSERT_EQ(palpate({"profile", "new", name}).status, 0);
+    }
+    for (const char* const name : {"Smith,Jane", "bert"}) {
+        ASSERT_EQ(
+            palpate({"train", "--profile", name, "--case", "layered", "--headless", "--unpaced", "--seconds", "2"}).status,
+            0);
+    }
+    const Outcome two = palpate({"progress", "--group", "a=Smith,Jane", "--group", "b=bert"});
+    EXPECT_NE(two.out.find("a (n=1)"), std::string::npos) << two.out << two.err;
+    const Outcome one = palpate({"progress", "--group", "a=Smith,Jane", "--group", "a=bert"});
+    EXPECT_NE(one.out.find("a (n=2)"), std::string::npos) << one.out << one.err;
+    expectRefusal({"progress", "--group", "a=Smith,bert,nobody"}, "nobody: there is no such profile");
+}
+
 // What the note asks for: the numbers are the file's, so that of a person's first session need not be 1.
 TEST_F(TrainingCommands, ProgressListsTheSessionsThatANoteCanBeOf)
 {

@@ -179,6 +179,26 @@ void push(const ElasticBody& body, Vec3 size, const volume::Law& law, int pushes
     EXPECT_TRUE(elastic.atRest());
 }
 
+// The force goes on by Hertz's law from where the tool is held back, F = F(d) (D / d)^(3/2). Friction and relaxation leave
+// a force where d comes to nothing, which that law has none for: there it goes on from a tenth of the radius.
+TEST(ElasticHostile, AForceAtNoDepthIsNotRaisedBeyondBounds)
+{
+    const auto body = tests::bodyOf(tests::heldBlock(Index3(12), 2e-3, 5e3, 0.45));
+    constexpr double radius = 6e-3, whole = 20e-3;
+    ElasticTool tool = tests::ball({0, 0, 0}, radius, 1e4);
+    tool.pushed = {0, whole, 0};
+    tool.friction = 0.5;
+    for (const double given : {0.0, 0.05 * radius, 0.2 * radius, 1.0 * radius}) {
+        HeldTool held;
+        held.given = given;
+        held.stretch = 6.5;  // no further
+        held.place(tool, body.levels.front(), false, true);
+        EXPECT_EQ(held.given, given);
+        const double from = std::max(given, 0.1 * radius);
+        EXPECT_NEAR(glm::length(held.force({0, -1, 0})), std::pow(1.0 + (whole - given) / from, 1.5), 1e-9) << given;
+    }
+}
+
 TEST(ElasticHostile, TissueThatRelaxesStaysFiniteAndComesBack)
 {
     Rises rises;

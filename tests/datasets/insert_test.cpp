@@ -55,6 +55,29 @@ TEST(Insert, HasTheVolumeOfItsShape)
     EXPECT_NEAR(volumeOf(withInserts(block(), {&spiky, 1}), "lesion"), pi * d * d * d / 6, 0.1 * pi * d * d * d / 6);
 }
 
+// A volume may have labels up to the largest there is: inserts take free ones, and where there is none they are refused.
+TEST(Insert, TakesALabelThatIsFree)
+{
+    volume::LabelImage image;
+    image.size = {40, 40, 40};
+    image.affine = {Mat3(1e-3), Vec3(-20e-3, 0, -20e-3)};
+    image.values.assign(64000, 65534);
+    image.values[image.offset({20, 20, 20})] = 65535;
+    const std::vector<volume::LabelName> names{{65534, "fat", "fat"}, {65535, "aim", "gland"}};
+    const volume::Tissue all = volume::Tissue::fromLabels(image, defaultTissues(), names, {});
+    std::vector<Insert> two{ball({-8e-3, 20e-3, 0}, 8e-3), ball({8e-3, 20e-3, 0}, 8e-3)};
+    two[1].name = "second";
+    const volume::Tissue made = withInserts(all, two);
+    EXPECT_DOUBLE_EQ(volumeOf(made, "aim"), 1e-9);
+    EXPECT_NEAR(volumeOf(made, "lesion"), volumeOf(made, "second"), 1e-9);
+    EXPECT_GT(volumeOf(made, "second"), 200e-9);
+    double sum = 0;
+    for (const auto& s : made.structures()) {
+        sum += s.volume;
+    }
+    EXPECT_NEAR(sum, 64e-6, 1e-12);
+}
+
 TEST(Insert, ChangesOnlyTissueUnderIt)
 {
     const volume::Tissue before = block();

@@ -111,6 +111,30 @@ TEST(Losses, APalpationThatMissesKeepsNoMoreThanABiopsyThatMisses)
     EXPECT_EQ(parts(s).technique, 25);
 }
 
+// The middle of the marks that count is the score's: of marks after the 32nd no loss speaks.
+TEST(Losses, MarksThatDoNotCountTurnNoDirection)
+{
+    SessionInfo info = synthetic::info();
+    info.sceneText = "task = \"find\"\n[tool]\nkind = \"capsule\"\n";
+    info.extra.emplace_back(targetShapeKey, toText({{0, 0, 0}, {0, 1, 0}, 0.010}));
+    LossWatch watch(info);
+    TickRecord tick;
+    tick.distance = {1, 1, 1};
+    tick.phase = Phase::contact;
+    for (std::uint64_t i = 0; i < 120; ++i) {
+        tick.tick = i;
+        tick.device.buttons = i % 2 == 0 ? buttonMark : 0;
+        tick.device.position = i < 64 ? Vec3(12 * oneMillimetre, 0, 0) : Vec3(0, 0, -50 * oneMillimetre);
+        watch.add(tick);
+    }
+    EXPECT_EQ(watch.score().marks, 32U);
+    const std::vector<Loss> losses = watch.losses(info);
+    const auto place = std::ranges::find(losses, "mark_error_mm", &Loss::measure);
+    ASSERT_NE(place, losses.end());
+    EXPECT_TRUE(place->words.ends_with("12.0 mm beside that of the tumour, towards the patient's left")) << place->words;
+    EXPECT_DOUBLE_EQ(place->at.value(), 0.062);
+}
+
 // Ticks at rest on the skin, or inside at a depth, between two seconds of air.
 struct Stay {
     double seconds = 0, depth = 0;  // [s], [m]; 0: on the skin

@@ -3,6 +3,7 @@
 #include <studies/accuracy/references.h>
 #include <studies/kernel/kernel_rivals.h>
 
+#include <tests/error_of.h>
 #include <tests/studies/small_block.h>
 
 #include <gtest/gtest.h>
@@ -144,6 +145,12 @@ TEST(Planner, SaysTheNearestWhenNothingHoldsBoth)
     const Plan plan = planned(1e-5, 3e-5);
     EXPECT_FALSE(plan.choice);
     EXPECT_TRUE(plan.candidates[plan.nearest].tried);
+}
+
+TEST(Planner, ABudgetUnderEveryModelIsRefused)
+{
+    const std::string error = tests::errorOf([] { planned(0.04, 1e-6); });
+    EXPECT_EQ(error, "--budget: 1 us: every model takes over 20 us per tick: give more");
 }
 
 TEST(Planner, TheSameSceneGetsTheSamePlan)

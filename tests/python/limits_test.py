@@ -101,6 +101,42 @@ class Threads(unittest.TestCase):
             self.assertIn("another thread", message)
 
 
+    def test_no_thread_looks_into_a_session_that_runs_or_closes_it(self):
+        session = palpate.Session(small_block())
+        looks = [lambda: session.events, lambda: session.cores, session.score, lambda: session.force_hash,
+                 lambda: session.displacement, session.close]
+        refused = [0] * len(looks)
+        results = []
+        thread = threading.Thread(target=lambda: results.append(session.run(wander(6000))))
+        thread.start()
+        while session.ticks < 10:
+            time.sleep(1e-3)
+        while thread.is_alive() and session.ticks < 5900:
+            for i, look in enumerate(looks):
+                try:
+                    look()
+                except palpate.Error as error:
+                    self.assertIn("another thread", str(error))
+                    refused[i] += 1
+        thread.join()
+        self.assertGreater(min(refused), 0)
+        self.assertEqual(len(results[0]), 6000)
+        self.assertFalse(session.closed)
+        self.assertGreater(len(session.events), 0)
+        session.close()
+        self.assertGreaterEqual(session.score()["seconds"], 0)
+
+    def test_a_with_block_that_is_left_while_a_thread_runs_says_so(self):
+        with self.assertRaisesRegex(palpate.Error, "another thread"):
+            with palpate.Session(small_block()) as session:
+                thread = threading.Thread(target=session.run, args=(wander(6000),))
+                thread.start()
+                while session.ticks == 0:
+                    time.sleep(1e-3)
+        thread.join()
+        self.assertEqual(session.ticks, 6000)
+
+
 def _child(model, session, pipe):
     fresh = palpate.Session(model).run(wander(800))["total"]
     gone_on = session.run(wander(1600)[800:])["total"]
@@ -158,6 +194,15 @@ class Interrupts(unittest.TestCase):
         rest = session.run(poses[done:done + 500])
         whole = palpate.Session(small_block()).run(poses[:done + 500])
         np.testing.assert_array_equal(np.concatenate([session.interrupted, rest]), whole)
+
+    def test_an_interrupted_hand_has_done_whole_ticks(self):
+        session = palpate.Session("layered")
+        threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            session.perform("novice")
+        self.assertGreater(session.ticks, 0)
+        self.assertEqual(len(session.interrupted), session.ticks)
+        np.testing.assert_array_equal(session.interrupted["tick"], np.arange(session.ticks))
 
     def test_an_exception_of_a_signal_handler_ends_a_run_too(self):
         class Enough(Exception):

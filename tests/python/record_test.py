@@ -1,3 +1,4 @@
+import threading
 import unittest
 
 import numpy as np
@@ -66,6 +67,24 @@ lateral = [1, 0, 0]
         self.assertGreater(compared, 20)
         self.assertEqual(record.score()["total"], score["total"])
         self.assertEqual(self.total["total"], score["total"])
+
+    def test_threads_may_share_it(self):
+        record = palpate.Record(self.file)
+        totals, rows = [], []
+
+        def read():
+            for _ in range(4):
+                totals.append(record.score()["total"])
+                rows.append(len(palpate.Record(self.file).ticks))
+                self.assertTrue(record.complete)
+
+        threads = [threading.Thread(target=read) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(totals, [self.total["total"]] * 16)
+        self.assertEqual(rows, [2000] * 16)
 
     def test_it_says_who_and_what(self):
         record = palpate.Record(self.file)

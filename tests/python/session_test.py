@@ -96,6 +96,21 @@ class Run(InFolder):
 
 
 class Shape(unittest.TestCase):
+    def test_a_step_has_the_fields_of_a_run(self):
+        poses = wander(400)
+        row = palpate.Session(small_block()).run(poses)[-1]
+        session = palpate.Session(small_block())
+        session.advance(poses[:-1])
+        tick = session.step(poses[-1])
+        words = {"phase": palpate.PHASES, "warning": palpate.WARNINGS}
+        for field in row.dtype.names:
+            value = getattr(tick, field)
+            if field in words:
+                value = words[field].index(value)
+            elif field == "distance":
+                value = value[:len(row[field])]
+            np.testing.assert_array_equal(value, row[field], field)
+
     def test_displacement_is_a_view_of_what_the_tissue_does(self):
         session = palpate.Session(small_block())
         field = session.displacement
@@ -125,7 +140,8 @@ class Shape(unittest.TestCase):
         self.assertGreater(pictures[0]["pixels"].std(), 10)
         deeper = session.ultrasound(320, 320, depth=0.03)
         self.assertAlmostEqual(deeper["depth"], 0.03, places=6)
-        for wrong in ({"depth": -1}, {"face": [0, 0, 0], "direction": [0, 0, 0]},
+        for wrong in ({"depth": -1}, {"face": [1e9, 0, 0]}, {"face": [np.nan, 0, 0]}, {"face": [np.inf, 0, 0]},
+                      {"face": [0, 0, 0], "direction": [np.nan, 1, 0]}, {"face": [0, 0, 0], "direction": [0, 0, 0]},
                       {"face": [0, 0, 0], "direction": [0, 1, 0], "lateral": [0, 2, 0]}):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 session.ultrasound(320, 320, **wrong)

@@ -57,6 +57,9 @@ class FromNumpy(InFolder):
             ("whole numbers", cube().astype(float), AFFINE, TISSUES),
             ("three dimensions", cube()[0], AFFINE, TISSUES),
             ("0 to 65535", cube().astype(int) - 1, AFFINE, TISSUES),
+            ("0 to 65535", cube().astype(np.uint64) + np.uint64(2**63), AFFINE, TISSUES),
+            ("keys are label values", cube(), AFFINE, {"1": "fat", 2: "fat"}),
+            ("keys are label values", cube(), AFFINE, {1: "fat", 70000: "fat"}),
             ("4 x 4", cube(), np.eye(3), TISSUES),
             ("no volume", cube(), np.zeros((4, 4)), TISSUES),
             ("label 2", cube(), AFFINE, {1: "fat"}),
@@ -106,6 +109,12 @@ class Files(InFolder):
         np.testing.assert_array_equal(ours.labels, theirs.labels)
         self.assertEqual(ours.info["labels"], theirs.info["labels"])
         np.testing.assert_allclose(ours.affine, AFFINE, atol=1e-9)
+
+    def test_lengths_out_of_bounds_are_refused(self):
+        for wrong in ({"voxel": 1.0}, {"voxel": -1e-3}, {"voxel": np.nan}, {"body_from_hull": -5.0},
+                      {"body_from_hull": np.nan}, {"body_from_hull": 1e-4}):
+            with self.subTest(wrong), self.assertRaisesRegex(palpate.Error, "must be a length from"):
+                palpate.Volume.import_(self.folder / "none.nii", **wrong)
 
     def test_errors_name_the_file(self):
         with self.assertRaisesRegex(palpate.Error, "nothing.vdb"):

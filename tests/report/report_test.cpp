@@ -189,7 +189,7 @@ TEST(Report, ChartsHoldTheRecord)
     const synthetic::Folder folder;
     haptics::SessionInfo info = synthetic::info();
     info.structures[1] = "</script><script>alert(1)</script>";
-    info.extra = {{"force_cap_n", "6.5"}};
+    info.sceneText = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n[safety]\ncap_n = 6.5\n";
     auto ticks = synthetic::procedure(10, 0.3, 1);
     ticks[3000].additional = {0, 0, 7.25};
     ticks[3000].distance[1] = std::numeric_limits<double>::infinity();
@@ -205,6 +205,25 @@ TEST(Report, ChartsHoldTheRecord)
     EXPECT_EQ(data["charts"]["distances"]["series"][2]["label"], info.structures[1]);
     EXPECT_EQ(data["charts"]["distances"]["columns"].size(), 5U);
     EXPECT_TRUE(std::ranges::any_of(data["events"], [](const auto& e) { return e["kind"] == "fire"; }));
+}
+
+// Half of the scene's cap is near it; of a scene that cannot be read none is known.
+TEST(Report, TheCapIsTheScenes)
+{
+    const synthetic::Folder folder;
+    for (const auto& [cap, lines] : {std::pair("cap_n = 5\n", 1U), {"cap_n = 20\n", 0U}, {"cap_n = \"5\"\n", 0U}}) {
+        haptics::SessionInfo info = synthetic::info();
+        info.sceneText = "[volume]\nphantom = \"block\"\n[target]\nstructure = \"tumour\"\n[safety]\n" + std::string(cap);
+        auto ticks = synthetic::procedure(4, 0.3, 1);
+        ticks[2000].additional = {0, 0, 4.5};
+        synthetic::record(folder / cap, info, ticks);
+        writeReport(folder / "r.html", Record(folder / cap));
+        const auto data = nlohmann::json::parse(between(textOf(folder / "r.html"), "id=\"data\">", "</script>"));
+        ASSERT_EQ(data["charts"]["forces"]["lines"].size(), lines) << cap;
+        if (lines > 0) {
+            EXPECT_DOUBLE_EQ(data["charts"]["depth"]["lines"][0]["at"].get<double>(), 5.0);
+        }
+    }
 }
 
 // A fast push leaves bins of the depth without a tick; the force of one between two such stands beside nothing that a line

@@ -201,8 +201,9 @@ TEST(State, GroupsAreCompared)
     EXPECT_TRUE(comparisonArguments(state).empty()) << "nobody in the second group";
     state.instructor.groupOf[2] = 2;
     state.instructor.caseId = "first";
-    EXPECT_EQ(comparisonArguments(state), (std::vector<std::string>{"progress", "--group", "group 1=Ada,Bert", "--group",
-                                                                    "group 2=Carla", "--case", "first"}));
+    EXPECT_EQ(comparisonArguments(state),
+              (std::vector<std::string>{"progress", "--group", "group 1=Ada", "--group", "group 1=Bert", "--group",
+                                        "group 2=Carla", "--case", "first"}));
 }
 
 TEST(State, TheCommandIsWhatAShellUnderstands)

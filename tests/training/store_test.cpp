@@ -219,13 +219,19 @@ TEST(ProfileStore, ErasingLeavesNoFileOfThePersonAndAllOfOthers)
     for (const char* const name : {"progress-anna.html", "progress-anna-2.html", "groups.html", "damaged.db"}) {
         std::ofstream(window / name) << std::string(5000, 'x');
     }
+    fs::create_directories(window / "kept.pictures");
+    fs::create_directories(window / "of-bert.pictures");
+    for (const char* const name :
+         {"kept.mp4", "kept.pictures/kept.png", "killed.part.mp4", "of-bert.mp4", "of-bert.pictures/of-bert.png"}) {
+        std::ofstream(window / name) << "x";
+    }
     for (const auto& entry : fs::recursive_directory_iterator(folder.path())) {
         const std::string name = entry.path().filename().string();
         const bool hers = name.starts_with("kept.") || name.starts_with("pseudonym.") || name.starts_with("killed.") ||
                           name == "progress-anna.html";
         (hers ? gone : stay).push_back(entry.path());
     }
-    ASSERT_EQ(gone.size(), 4 * 3 + 3 + 1U);
+    ASSERT_EQ(gone.size(), 4 * 3 + 3 + 1 + 4U);
 
     const Erased erased = store.erase(anna);
     for (const fs::path& file : gone) {

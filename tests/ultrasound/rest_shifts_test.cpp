@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -81,6 +82,26 @@ TEST(RestShifts, SidesOfASlitAreSolvedByThemselves)
 {
     const Box box([](glm::dvec3 x) { return glm::dvec3(0, 0, x.x < 20.5e-3 ? 0.0 : 3e-3); });
     EXPECT_LT(box.worst(), RestShifts::apart / 4 * 2 + 0.03);
+}
+
+// A probe may be anywhere, and no place is an index before it is known to be one.
+TEST(Medium, FarAwayNothingIsKnown)
+{
+    channel::Scenery scenery;
+    scenery.fine = {{side, side, side}, 0, {0, 0, 0}, 1e-3};
+    const std::vector<std::uint8_t> labels(static_cast<std::size_t>(side) * side * side, 1);
+    const Medium medium(scenery, {}, labels);
+    constexpr float far = 1e12F;
+    for (const float x : {-far, -1.0F, 41.0F, 70000.0F, 3e9F, far, std::numeric_limits<float>::infinity(),
+                          std::numeric_limits<float>::quiet_NaN()}) {
+        for (int axis = 0; axis < 3; ++axis) {
+            glm::vec3 v(20.0F);
+            v[axis] = x;
+            EXPECT_EQ(medium.label(v), unknown) << x;
+            EXPECT_EQ(medium.impedanceAt(v).slope, glm::vec3(0)) << x;
+        }
+    }
+    EXPECT_EQ(medium.label(glm::vec3(20.0F)), 1 | pureBit);
 }
 
 }  // namespace

@@ -227,6 +227,25 @@ TEST_F(ImportFile, PairsOfFilesAndImagesComeIn)
     expectRefused(write("pair.nii", header.bytes + std::string(4, '\0')), "its magic is missing");
 }
 
+// The first two bytes of every zlib stream are also two labels.
+TEST_F(ImportFile, AnUnpackedPairMayBeginLikeAPackedOne)
+{
+    Nifti header(2, 8);
+    header.put(108, 0.0F);
+    std::memcpy(header.bytes.data() + 344, "ni1", 4);
+    header.bytes.resize(348);
+    write("pair.hdr", header.bytes);
+    for (const int second : {1, 94, 156, 218}) {
+        auto labels = ramp<std::uint8_t>();
+        labels[0] = 120;
+        labels[1] = static_cast<std::uint8_t>(second);
+        write("pair.img", bytesOf(labels));
+        const ImportedLabels found = importLabels(folder / "pair.hdr");
+        EXPECT_EQ(found.image.values[0], 120);
+        EXPECT_EQ(found.image.values[1], second);
+    }
+}
+
 TEST_F(ImportFile, VoxelsThatAreNotNumbersTakeTheSmallestOfAnImage)
 {
     auto floats = ramp<float>();

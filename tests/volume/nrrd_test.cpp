@@ -139,6 +139,12 @@ TEST_F(Nrrd, WhatTheHeaderLeavesOpenIsAssumedAndSaid)
     const ImportedLabels spaced = importLabels(write("a.nrrd", bare + "endian: little\nspacings: 1 2 3\n\n" + raw));
     ASSERT_EQ(spaced.warnings.size(), 1U);
     EXPECT_NEAR(spaced.image.affine.linear[2].z, 3e-3, 1e-15);
+    const ImportedLabels part = importLabels(write("a.nrrd", bare + "endian: little\nspacings: 2 nan nan\n\n" + raw));
+    ASSERT_EQ(part.warnings.size(), 2U);
+    EXPECT_TRUE(std::ranges::any_of(part.warnings, [](const std::string& w) {
+        return w.find("no spacing along y and z: 1 mm is assumed") != std::string::npos;
+    }));
+    EXPECT_EQ(part.image.affine.spacing(), Vec3(2e-3, 1e-3, 1e-3));
     const ImportedLabels scanner = importLabels(
         write("a.nrrd", bare +
                             "endian: little\nspace: RAS\nspace units: \"um\" \"um\" \"um\"\n"

@@ -157,6 +157,11 @@ TEST_F(ReadingRules, AnSformOfZerosGivesWayToAGoodQform)
     EXPECT_TRUE(warns(labels, "its sform is all zero, though it has a code: the qform is used"));
     EXPECT_NEAR(glm::length(labels.image.affine.origin - Vec3(-5e-3, 0, 0)), 0, 1e-9);
     EXPECT_NEAR(labels.image.affine.voxelVolume(), 6e-9, 1e-15);
+    // An edge has no sign, and readers differ in what they make of one.
+    NiftiFields negative = header;
+    negative.put(80, -1.0F);
+    EXPECT_NE(reason(write("a.nii", negative.bytes + data)).find("pixdim[1] = -1: it is not known which way"),
+              std::string::npos);
     // Without a qform nothing is left to use.
     header.put<std::int16_t>(252, 0);
     EXPECT_NE(reason(write("a.nii", header.bytes + data)).find("the spacing in its header is wrong"), std::string::npos);

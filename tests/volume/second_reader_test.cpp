@@ -4,6 +4,7 @@
 #include <volume/import.h>
 
 #include <gtest/gtest.h>
+#include <tests/folder.h>
 #include <tests/volume/itk_compiler.h>
 
 #include <itkGDCMImageIO.h>
@@ -14,6 +15,7 @@
 #include <glm/matrix.hpp>
 
 #include <filesystem>
+#include <fstream>
 #include <functional>
 
 namespace palpate::volume {
@@ -129,6 +131,32 @@ TEST(SecondReader, AgreesOnNrrdFiles)
 }
 
 // dcmqi's segmentations and the NRRD files that they were made of or became: a segment is where its label is.
+// A negative spacing turns its axis round; without a matrix, too.
+TEST(SecondReader, AgreesOnNegativeSpacings)
+{
+    const tests::Folder folder;
+    const std::string voxels("abcdefghijklmnopqrstuvwx");
+    const auto compare = [&](itk::ImageIOBase& io, const std::string& name, const std::string& text) {
+        const fs::path file = folder / name;
+        std::ofstream(file) << text << voxels;
+        const ImportedLabels ours = importLabels(file);
+        const Second theirs = read(io, file);
+        for (int axis = 0; axis < 3; ++axis) {
+            EXPECT_LT(glm::distance(ours.image.affine.linear[axis], theirs.affine.linear[axis]), 1e-12) << text << axis;
+        }
+        EXPECT_LT(glm::distance(ours.image.affine.origin, theirs.affine.origin), 1e-12) << text;
+    };
+    const std::string meta = "ObjectType = Image\nNDims = 3\nDimSize = 2 3 4\nElementType = MET_UCHAR\n",
+                      local = "ElementDataFile = LOCAL\n";
+    const std::string nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 3 4\nencoding: raw\n";
+    for (const std::string spacing : {"1.2 -0.7 2.5", "-1.2 0.7 2.5", "1.2 0.7 -2.5", "-1 -2 -3"}) {
+        for (const std::string matrix : {"", "TransformMatrix = 0 1 0 -1 0 0 0 0 1\nOffset = 3 4 5\n"}) {
+            compare(*itk::MetaImageIO::New(), "a.mha", meta + "ElementSpacing = " + spacing + "\n" + matrix + local);
+        }
+        compare(*itk::NrrdImageIO::New(), "a.nrrd", nrrd + "spacings: " + spacing + "\n\n");
+    }
+}
+
 TEST(SecondReader, SegmentationsAreWhereTheirNrrdFilesAre)
 {
     const fs::path data = manifest::folder() / "dcmqi_seg";

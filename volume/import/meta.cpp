@@ -122,7 +122,8 @@ void place(const Fields& fields, std::size_t dimensions, Source& source)
         const auto at = static_cast<std::size_t>(k);
         const double* axis = direction.data() + at * dimensions;
         source.affine.origin[k] = 1e-3 * origin[at];
-        source.affine.linear[k] = 1e-3 * std::abs(spacing[at]) * Vec3(axis[0], axis[1], axis[2]);
+        // A negative spacing turns the axis round, as ITK has it, whose format this is.
+        source.affine.linear[k] = 1e-3 * spacing[at] * Vec3(axis[0], axis[1], axis[2]);
     }
 }
 

@@ -108,7 +108,10 @@ void locateData(const NiftiHeader& header, Source& source)
             refuse(source.header, fmt::format("its voxels, {}.img, are not there: put that file beside it", stem));
         }
     }
-    source.encoding = looksLike(source.data, 0);
+    // The first voxels of a file of its own may look like the beginning of a packed stream.
+    const std::uint64_t whole = source.skip + source.elements() * bytesOf(source.component);
+    const bool exact = !single && unpackedSize(source.data, 0, Encoding::raw, 0) == whole;
+    source.encoding = exact ? Encoding::raw : looksLike(source.data, 0);
 }
 
 // Label names of TotalSegmentator and Caret: <Label Key="5" ...><![CDATA[liver]]></Label> in a header extension.

@@ -112,6 +112,14 @@ void placeNifti(const NiftiHeader& header, Source& source)
         return;
     }
     if (hasQ) {
+        // The format allows no negative edge, and readers differ in what they make of one: a mirrored axis, or none.
+        for (const std::size_t k : {1, 2, 3}) {
+            if (header.pixdim(k) < 0) {
+                refuse(source.header,
+                       fmt::format("pixdim[{}] = {:g}: it is not known which way this axis runs, save it again", k,
+                                   header.pixdim(k)));
+            }
+        }
         source.affine = q;
         return;
     }

@@ -188,16 +188,20 @@ void placeNrrd(const NrrdHeader& header, Source& source)
 
     const double unit = unitOf(header);
     const Vec3 flip = unit * flipOf(header, source.oriented);
-    bool given = false;
+    std::string without;
     for (int k = 0; k < 3; ++k) {
         const Axis& axis = axes[space[static_cast<std::size_t>(k)]];
         Vec3 step(0.0);
-        step[k] = std::isnan(axis.spacing) ? 1.0 : std::abs(axis.spacing);
-        given = given || axis.direction || !std::isnan(axis.spacing);
+        step[k] = std::isnan(axis.spacing) ? 1.0 : axis.spacing;  // a negative one turns the axis round, as ITK has it
+        if (!axis.direction && std::isnan(axis.spacing)) {
+            without += fmt::format("{}{}", without.empty() ? "" : " and ", "xyz"[k]);
+        }
         source.affine.linear[k] = flip * axis.direction.value_or(step);
     }
-    if (!given) {
-        source.warnings.emplace_back("its header gives no spacing: voxels of 1 mm are assumed");
+    if (!without.empty()) {
+        source.warnings.push_back(without == "x and y and z"
+                                      ? "its header gives no spacing: voxels of 1 mm are assumed"
+                                      : fmt::format("its header gives no spacing along {}: 1 mm is assumed", without));
     }
     const std::string origin = header.field("space origin");
     if (!origin.empty()) {

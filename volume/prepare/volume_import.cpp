@@ -160,10 +160,24 @@ void noteOverlaps(const volume::ImportedLabels& labels, bool verbose, std::vecto
     }
 }
 
+void checkLength(const LengthBounds& bounds, double length)
+{
+    if (length != 0.0 && !(length >= bounds.least && length <= bounds.most)) {
+        throw std::runtime_error(fmt::format("{} {:g}mm: must be a length from {:g}mm to {:g}mm", bounds.option,
+                                             1e3 * length, 1e3 * bounds.least, 1e3 * bounds.most));
+    }
+}
+
 }  // namespace
 
 void checkRequest(const ImportRequest& o)
 {
+    checkLength(voxelBounds, o.steps.voxel);
+    checkLength(skinBounds, o.steps.addSkin);
+    checkLength(hullBounds, o.hull);
+    checkLength(padBounds, o.steps.pad);
+    checkLength(cropBounds, o.steps.cropMargin);
+    checkLength(holesBounds, o.steps.closeSkinHoles.value_or(0.0));
     if (!o.stiffness.empty() && o.image.empty()) {
         throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
     }

@@ -27,7 +27,17 @@ struct ImportRequest {
     bool bodyFromImage = false;     // find the body around the labels in the image, which is CT
 };
 
-/// Throws std::runtime_error for a request that contradicts itself, by the options of `palpate import`.
+/// The lengths of an import, by the options of `palpate import`, with their bounds [m]. 0 stands for none.
+struct LengthBounds {
+    const char* option;
+    double least, most;
+};
+inline constexpr LengthBounds voxelBounds{"--voxel", 0.05e-3, 50e-3}, skinBounds{"--add-skin", 0.05e-3, 50e-3},
+    hullBounds{"--body-from-hull", 2e-3, 0.2}, padBounds{"--pad", 0.05e-3, 0.5}, cropBounds{"--crop-margin", 0, 1},
+    holesBounds{"--close-skin-holes", 0.05e-3, 0.5};
+
+/// Throws std::runtime_error for a request that contradicts itself, or has a length out of its bounds, by the options of
+/// `palpate import`.
 void checkRequest(const ImportRequest& request);
 
 /// Told what is going on, and the fraction of it that is done where that is known.
