@@ -197,18 +197,23 @@ Point2 SlicePicture::pixel(glm::dvec3 p) const
     return {area_.x + 0.5 * area_.width + glm::dot(d, frame_.right), area_.y + 0.5 * area_.height + glm::dot(d, frame_.up)};
 }
 
-// Of a stick with round ends.
-void SlicePicture::drawOutline(Canvas& canvas, Point2 from, Point2 to, double radius) const
+std::vector<Point2> stickOutline(Point2 from, Point2 to, double radius)
 {
     constexpr int pieces = 24;  // of half a circle
     constexpr double halfTurn = std::numbers::pi;
     const double first = std::atan2(to[1] - from[1], to[0] - from[0]) + 0.5 * halfTurn;
     std::vector<Point2> corners;
-    for (const Point2 end : {from, to})
-        for (int i = 0; i <= pieces; ++i) {
-            const double angle = first + halfTurn * ((end == from ? 0 : 1) + static_cast<double>(i) / pieces);
-            corners.push_back({end[0] + radius * std::cos(angle), end[1] + radius * std::sin(angle)});
-        }
+    for (int i = 0; i <= 2 * pieces + 1; ++i) {
+        const Point2 end = i <= pieces ? from : to;
+        const double angle = first + halfTurn * (i <= pieces ? i : i - 1) / pieces;
+        corners.push_back({end[0] + radius * std::cos(angle), end[1] + radius * std::sin(angle)});
+    }
+    return corners;
+}
+
+void SlicePicture::drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius) const
+{
+    const std::vector<Point2> corners = stickOutline(from, to, radius);
     for (const bool border : {true, false})
         for (std::size_t i = 0; i < corners.size(); ++i)
             if (const auto part = clipped(corners[i], corners[(i + 1) % corners.size()], area_))
@@ -230,7 +235,7 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
     constexpr double inPlane = 2e-3;  // [m]
     const channel::NeedleShape shape = needleShape(scenery, state);
     if (scenery.tool == channel::ToolKind::capsule)
-        return drawOutline(canvas, pixel(shape.front()), pixel(shape.back()), width / 2);
+        return drawFingertip(canvas, pixel(shape.front()), pixel(shape.back()), width / 2);
     const auto off = [&](glm::dvec3 p) { return std::abs(glm::dot(p - frame_.centre, frame_.towards)) > inPlane; };
     for (const bool border : {true, false})
         for (std::size_t i = 0; i + 1 < shape.size(); ++i) {

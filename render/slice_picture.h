@@ -14,6 +14,7 @@
 #include <vtkRenderer.h>
 
 #include <optional>
+#include <vector>
 
 namespace palpate::render {
 
@@ -49,7 +50,7 @@ public:
 private:
     Point2 pixel(glm::dvec3 p) const;
     void drawMarks(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const;
-    void drawOutline(Canvas& canvas, Point2 from, Point2 to, double radius) const;
+    void drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius) const;
     void drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const;
     void drawWindow(Canvas& canvas, const GreyImage& grey, double font, double above, double below) const;
 
@@ -63,5 +64,9 @@ private:
     SliceLook look_ = SliceLook::tissue;
     std::uint32_t window_ = 0;
 };
+
+/// Corners of the outline of a stick with round ends, counterclockwise; a circle where both ends are one point.
+/// @param radius  of the stick, and of its ends [as the points]
+std::vector<Point2> stickOutline(Point2 from, Point2 to, double radius);
 
 }  // namespace palpate::render

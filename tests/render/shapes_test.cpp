@@ -3,12 +3,15 @@
 #include <render/events.h>
 #include <render/screen_plan.h>
 #include <render/shift_field.h>
+#include <render/slice_picture.h>
 #include <render/tool_picture.h>
 #include <render/traces.h>
 #include <tests/render/body.h>
 
 #include <gtest/gtest.h>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -228,6 +231,30 @@ TEST(ScreenPlan, PartsFitTheWindowAndDoNotOverlap)
         }
         EXPECT_GE(plan.view.width + 1, plan.width / 4);
         EXPECT_GE(plan.font, 10.0 * (1 + i % 3));
+    }
+}
+
+// Every corner is as far from the segment as the stick is thick, and the outline is as long and encloses as much as one of
+// 2 l + 2 pi r and 2 l r + pi r^2 does: to what 48 corners miss of a circle. Seen from its end it is a circle.
+TEST(StickOutline, IsAsFarFromTheStickAllAround)
+{
+    constexpr double radius = 12, pi = 3.14159265358979;
+    for (const Point2 to : {Point2{130, 40}, {-30, 250}, {40, 40}, {40, -20}}) {
+        const Point2 from{40, 40};
+        const auto corners = stickOutline(from, to, radius);
+        const glm::dvec2 a(from[0], from[1]), b(to[0], to[1]);
+        const double along = glm::distance(a, b);
+        double length = 0, area = 0;
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            const Point2 &c = corners[i], &next = corners[(i + 1) % corners.size()];
+            const glm::dvec2 p(c[0], c[1]), q(next[0], next[1]);
+            const double t = along > 0 ? std::clamp(glm::dot(p - a, b - a) / (along * along), 0.0, 1.0) : 0.0;
+            EXPECT_NEAR(glm::distance(p, glm::mix(a, b, t)), radius, 1e-9);
+            length += glm::distance(p, q);
+            area += 0.5 * (p.x * q.y - p.y * q.x);
+        }
+        EXPECT_NEAR(length, 2 * along + 2 * pi * radius, 0.01 * pi * radius);
+        EXPECT_NEAR(area, 2 * along * radius + pi * radius * radius, 0.01 * pi * radius * radius);
     }
 }
 
