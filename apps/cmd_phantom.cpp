@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/memory.h>
+#include <base/outputs.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <datasets/phantom.h>
@@ -111,6 +112,8 @@ void runPhantom(PhantomArguments& options)
             fmt::format("phantom: give a phantom ({}) and a file, -o V.vdb; --list shows the parameters",
                         fmt::join(datasets::phantomNames(), ", ")));
     }
+    base::checkNames({options.output});
+    base::checkOutputs({options.output, options.json}, {options.tissues});
     options.spec.voxel = options.voxel * 1e-3;
     if (!options.anyway) {
         options.spec.memory = base::availableMemory();

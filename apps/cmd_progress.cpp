@@ -165,6 +165,7 @@ void printSessionsOf(const PersonProgress& p)
 void run(const ProgressArguments& o)
 {
     const training::ProfileStore store(o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles);
+    base::checkNames({o.html, o.csv, o.xapi});
     base::checkOutputs({o.html, o.csv, o.xapi, o.json}, {store.file()});
     Curricula curricula;
     std::vector<std::string> asked;

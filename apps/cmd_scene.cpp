@@ -249,6 +249,7 @@ void printWays(const Scene& scene, const FoundWays& found, const SceneArguments&
 
 void runScene(const SceneArguments& o)
 {
+    base::checkNames({o.output});
     base::checkOutputs({o.output, o.json}, {o.volume});
     std::optional<double> margin;
     if (!o.margin.empty()) {

@@ -207,6 +207,7 @@ void scoreRecord(const ScoreArguments& options)
     }
     std::vector<std::filesystem::path> read;
     std::ranges::transform(sessions, std::back_inserter(read), &Session::file);
+    base::checkNames({options.report});
     base::checkOutputs({options.json, options.report}, read);
     warn(sessions);
     std::vector<report::ScoredGroup> all;

@@ -172,6 +172,7 @@ void applyTask(TrainArguments& o)
 // Everything that would fail at the end of a session for a reason that is there at its beginning.
 void checkOutputs(const TrainArguments& o)
 {
+    base::checkNames({o.report, o.record});
     base::checkOutputs({o.json, o.report}, {o.scene});
     base::checkOutputFolder(o.pictures);
     if (drawsLater(o)) {

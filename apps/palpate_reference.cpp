@@ -288,10 +288,7 @@ void run(const ReferenceArguments& o)
     if (o.scene.empty()) {
         throw std::runtime_error("no scene: give one, or --verify");
     }
-    base::checkOutput(o.vtu);
-    base::checkOutput(o.json);
-    base::checkOutput(o.save);
-    base::checkOutput(o.ccx);
+    base::checkOutputs({o.vtu, o.json, o.save, o.ccx}, {o.scene, o.pathOf});
     if (o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty()) {
         throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
     }

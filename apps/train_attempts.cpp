@@ -1,5 +1,7 @@
 #include <apps/train_attempts.h>
 
+#include <training/progress.h>
+
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -8,7 +10,7 @@ namespace palpate::apps {
 
 namespace fs = std::filesystem;
 
-session::TrainResult runToItsEnd(const haptics::SessionModel& model, const haptics::SessionInfo& info,
+session::TrainResult runToItsEnd(const haptics::SessionModel& model, haptics::SessionInfo& info,
                                  const session::TrainOptions& options)
 {
     for (;;) {
@@ -22,6 +24,7 @@ session::TrainResult runToItsEnd(const haptics::SessionModel& model, const hapti
             }
         }
         fmt::print(stderr, "palpate: the session starts again\n");
+        info.started = training::utcNow();
     }
 }
 

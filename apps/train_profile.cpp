@@ -61,6 +61,10 @@ std::string Training::scene() const
 
 void Training::change(session::SceneChanges& changes) const
 {
+    if (changes.dffb && (options_.test || exercise_ != nullptr)) {
+        throw std::runtime_error(options_.test ? "--dffb: a test is without guidance: leave it out"
+                                               : "--dffb: the exercise says how much guidance there is: leave it out");
+    }
     if (changes.dffb) {
         return;  // the user says it
     }

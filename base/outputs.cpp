@@ -69,6 +69,13 @@ bool areOneFile(const fs::path& a, const fs::path& b)
 
 }  // namespace
 
+void checkNames(const std::vector<fs::path>& outputs)
+{
+    if (std::ranges::find(outputs, fs::path("-")) != outputs.end()) {
+        throw std::runtime_error("-: this output goes to a file: give its name (./- for one that is called so)");
+    }
+}
+
 void checkOutputs(const std::vector<fs::path>& outputs, const std::vector<fs::path>& inputs)
 {
     for (auto file = outputs.begin(); file != outputs.end(); ++file) {
@@ -143,7 +150,7 @@ void writeWhole(const fs::path& file, std::string_view bytes)
     const bool direct = takesBytes(file);
     const fs::path place = direct ? file : replaceable(file);
     fs::path half = place;
-    half += direct ? "" : ".part";
+    half += direct ? "" : fmt::format(".{}.part", getpid());  // another process may write the same file
     std::ofstream out(half, std::ios::binary);
     out << bytes;
     out.close();

@@ -14,6 +14,9 @@ void checkOutput(const std::filesystem::path& file);
 /// files that are read, `inputs` ("" = none): it would be replaced, and gone. Throws std::runtime_error.
 void checkOutputs(const std::vector<std::filesystem::path>& outputs, const std::vector<std::filesystem::path>& inputs);
 
+/// Refuses "-" among outputs that only go to files. Throws std::runtime_error.
+void checkNames(const std::vector<std::filesystem::path>& outputs);
+
 /// As checkOutput() for a folder that is made, with those above it, when it is not there.
 void checkOutputFolder(const std::filesystem::path& folder);
 

@@ -94,6 +94,15 @@ const char* trn(const char* one, const char* many, unsigned long count) noexcept
     return ::dngettext(domain, one, many, count);
 }
 
+const char* nameOfCore(std::string_view judged) noexcept
+{
+    return judged == "marks"  ? marked("Place and size")
+           : judged == "rest" ? marked("Rest on the skin")
+           : judged == "way"  ? marked("Way to the target")
+           : judged == "core" ? marked("Core")
+                              : marked("Touch");
+}
+
 const std::locale& numbers()
 {
     static const std::locale plain = std::locale::classic(), comma(std::locale::classic(), new Comma);

@@ -40,6 +40,9 @@ constexpr const char* marked(const char* text) noexcept
     return text;
 }
 
+/// What the part `core` of a total is called, by `judged` of its figures (haptics::judgedNames).
+const char* nameOfCore(std::string_view judged) noexcept;
+
 /// Numbers as the language in use writes them.
 const std::locale& numbers();
 

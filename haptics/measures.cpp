@@ -1,5 +1,7 @@
 #include <haptics/measures.h>
 
+#include <base/words.h>
+
 #include <fmt/format.h>
 
 #include <array>
@@ -144,9 +146,7 @@ bool isListed(Listed listed, const Score& score)
 
 const char* labelOfCore(const Score& score) noexcept
 {
-    constexpr std::array labels{"Core", "Place and size", "Rest on the skin", "Way to the target", "Touch"};
-    static_assert(labels.size() == judgedNames.size());
-    return labels[static_cast<std::size_t>(judgedBy(score))];
+    return base::nameOfCore(judgedNames[static_cast<std::size_t>(judgedBy(score))]);
 }
 
 std::span<const Measure> measures() noexcept

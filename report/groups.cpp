@@ -38,6 +38,20 @@ std::vector<double> rounded(std::vector<double> values, const haptics::Measure& 
     return values;
 }
 
+// By characters of UTF-8, of which one byte does not continue another.
+std::string shortened(const std::string& name, std::size_t most)
+{
+    std::string out;
+    std::size_t characters = 0;
+    for (const char c : name) {
+        characters += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1 : 0;
+        if (characters < most) {
+            out += c;
+        }
+    }
+    return characters <= most ? name : out + ".";
+}
+
 bool without(const std::vector<double>& values)
 {
     return std::ranges::none_of(values, [](double v) { return std::isfinite(v); });
@@ -114,7 +128,7 @@ std::string strip(const std::vector<ScoredGroup>& groups, const haptics::Measure
     double y = rowHeight / 2;
     for (std::size_t i = 0; i < groups.size(); ++i) {
         const auto values = rounded(valuesOf(groups[i], measure), measure);
-        const std::string name = groups[i].name.size() > 14 ? groups[i].name.substr(0, 13) + "." : groups[i].name;
+        const std::string name = shortened(groups[i].name, 14);
         out += fmt::format("<text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>", nameWidth - 6, y + 4,
                            escape(name));
         if (values.empty()) {

@@ -136,6 +136,13 @@ void dryRun(const SweepArguments& o)
     }
     const double all = seconds * static_cast<double>(plan.cases()) / o.jobs;
     const double disk = bytes * static_cast<double>(plan.cases());
+    if (!o.json.empty()) {
+        command::writeJson(o.json,
+                           {{"cases", plan.cases()}, {"case_s", seconds}, {"estimated_s", all}, {"disk_mb", disk / 1e6}});
+    }
+    if (o.json == "-") {
+        return;
+    }
     fmt::print("{}: {} = {} x {}; axes: ", plan.name, plural(plan.cases(), "case"), plural(plan.points.size(), "point"),
                plural(plan.repeats, "repeat"));
     for (const Axis& a : plan.axes) {
@@ -144,10 +151,6 @@ void dryRun(const SweepArguments& o)
     fmt::print("\nabout {:.3g} s a case, measured on {}: {} on {}; {:.3g} MB on the disk\n", seconds,
                plural(measured.size(), "case"), duration(all),
                o.jobs == 1 ? std::string("one process") : fmt::format("{} processes", o.jobs), disk / 1e6);
-    if (!o.json.empty()) {
-        command::writeJson(o.json,
-                           {{"cases", plan.cases()}, {"case_s", seconds}, {"estimated_s", all}, {"disk_mb", disk / 1e6}});
-    }
 }
 
 bool isPart(const SweepArguments& o)
@@ -158,9 +161,8 @@ bool isPart(const SweepArguments& o)
 // A part of a sweep works in a folder of its own.
 fs::path placeOf(const SweepArguments& o)
 {
-    constexpr std::size_t any = std::size_t{1} << 40U;  // the plan is not known yet
     return !o.shard.empty()   ? shardFolder(o.folder, o.shard)
-           : !o.cases.empty() ? casesFolder(o.folder, casesOfList(o.cases, any))
+           : !o.cases.empty() ? casesFolder(o.folder, casesOfList(o.cases, maxCases))  // the plan is not known yet
                               : fs::path(o.folder);
 }
 

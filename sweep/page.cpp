@@ -15,7 +15,7 @@ using nlohmann::json;
 
 namespace {
 
-constexpr std::size_t maxRows = 50000;  // in the page: of more, every n-th
+constexpr std::size_t maxRows = 50000;  // in the page: of more, some at random
 constexpr std::size_t maxErrors = 20;   // listed
 
 json valueOf(const KeyValue& value)
@@ -38,12 +38,19 @@ json axesOf(const SweepPlan& plan)
     return out;
 }
 
+// Of so many cases the page holds one.
+std::size_t stepOf(const std::vector<std::optional<SweepRow>>& rows)
+{
+    return std::max<std::size_t>((rows.size() + maxRows - 1) / maxRows, 1);
+}
+
 json rowsOf(const SweepPlan& plan, const std::vector<std::optional<SweepRow>>& rows)
 {
     json out = json::array();
-    const std::size_t step = (rows.size() + maxRows - 1) / maxRows;
-    for (std::size_t i = 0; i < rows.size(); i += step) {
-        if (!rows[i] || rows[i]->failed()) {
+    const std::size_t step = stepOf(rows);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        // At random: every n-th case of a grid has the same levels again and again.
+        if (mixedSeed({i}) % step != 0 || !rows[i] || rows[i]->failed()) {
             continue;
         }
         json row = json::array();
@@ -100,6 +107,10 @@ std::string header(const SweepPlan& plan, const std::vector<std::optional<SweepR
         report::escape(plan.base.name), designNames[static_cast<std::size_t>(plan.design)], report::escape(plan.name),
         report::escape(plan.about), there, rows.size(), failed, plan.points.size(), plan.repeats,
         plan.repeats == 1 ? "" : "s", plan.seed);
+    if (stepOf(rows) > 1) {
+        out +=
+            fmt::format("<p class=\"note\">This page holds one case in {}, at random; table.csv has all</p>", stepOf(rows));
+    }
     for (const std::string& build : builds) {
         out += fmt::format("<p class=\"note\">{}</p>", report::escape(build));
     }

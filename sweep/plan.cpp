@@ -24,7 +24,6 @@ using datasets::Section;
 namespace {
 
 constexpr std::int64_t maxSamples = 1'000'000;
-constexpr std::int64_t maxCases = 10'000'000;
 constexpr std::int64_t maxSteps = 100'000;
 constexpr double furthest = 1e12;
 constexpr std::size_t probes = 60;  // cases whose scene is tried before a sweep begins

@@ -65,6 +65,9 @@ struct SlurmSettings {
     std::int64_t chunk = 0;            // cases per task; 0: about a hundred tasks
 };
 
+/// A plan has no more cases.
+inline constexpr std::int64_t maxCases = 10'000'000;
+
 /// A sweep as its file says it, checked. docs/sweeps.md explains the file.
 struct SweepPlan {
     std::string name, about;

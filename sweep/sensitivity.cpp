@@ -9,6 +9,15 @@ namespace palpate::sweep {
 
 namespace {
 
+constexpr double rounding = 1e-12;  // of what does not vary: what a mean is off, as a fraction
+
+// What does not vary depends on nothing. Its variance need not be 0, as its mean is rounded.
+bool varies(std::span<const double> values)
+{
+    const auto [low, high] = std::ranges::minmax(values);
+    return high - low > rounding * std::max(std::abs(low), std::abs(high));
+}
+
 constexpr int resamples = 200;  // of the bootstrap
 constexpr double z95 = 1.96;
 
@@ -43,7 +52,7 @@ std::vector<SobolIndex> indicesOf(const std::vector<Sample>& samples, std::span<
         index.first /= variance;
         index.total /= variance;
     }
-    return variance > 0 ? out : std::vector<SobolIndex>();
+    return variance > rounding * rounding * mean * mean ? out : std::vector<SobolIndex>();
 }
 
 // Mean ranks from 1 up.
@@ -157,7 +166,7 @@ double mainEffect(std::span<const double> outputs, std::span<const std::size_t> 
     for (std::size_t l = 0; l < sum.size(); ++l) {
         between += count[l] > 0 ? sum[l] * sum[l] / count[l] : 0.0;
     }
-    return variance > 0 ? between / variance : std::numeric_limits<double>::quiet_NaN();
+    return varies(outputs) ? between / variance : std::numeric_limits<double>::quiet_NaN();
 }
 
 double rankCorrelation(std::span<const double> x, std::span<const double> y)

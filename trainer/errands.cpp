@@ -60,6 +60,15 @@ struct Errands::Impl {
         state.notice.clear();
         state.replaying = true;
     }
+    // The body of a case may have changed since its expert's session was made: the next one is new.
+    static void forgetExpert(State& state)
+    {
+        std::error_code none;
+        if (!state.ghost.empty()) {
+            fs::remove(state.ghost, none);
+        }
+        state.ghost.clear();
+    }
     // What a short command writes as JSON; null where it fails, and the state says why.
     nlohmann::json answerOf(State& state, std::vector<std::string> arguments)
     {
@@ -262,7 +271,8 @@ struct Errands::Impl {
         const fs::path part = record.string() + ".part";
         fs::remove(part);
         expert.emplace(programs / "palpate", expertArguments(state, part), scratch / "expert.log");
-        state.ghost = record;
+        expertOf = record;
+        besideExpert = state.files.record;
         state.ghosting = true;
     }
     // With ffmpeg a film, without it pictures. It has its name when it is whole: what is cut off does not look like one.
@@ -331,7 +341,11 @@ struct Errands::Impl {
             state.notice = expert->failed() ? expert->message() : "";
             state.ghosting = false;
             if (!expert->failed()) {
-                fs::rename(state.ghost.string() + ".part", state.ghost);
+                fs::rename(expertOf.string() + ".part", expertOf);
+            }
+            // Whoever has gone on in the meantime did not ask for this any more.
+            if (!expert->failed() && state.screen == Screen::result && state.files.record == besideExpert && !replay) {
+                state.ghost = expertOf;
                 startDebrief(state);
             }
             expert.reset();
@@ -350,7 +364,8 @@ struct Errands::Impl {
         return changed;
     }
 
-    fs::path made, making;  // film or pictures: when they are whole, and until then
+    fs::path expertOf, besideExpert;  // record of the expert that is made, and of the session that it is for
+    fs::path made, making;            // film or pictures: when they are whole, and until then
     fs::path programs;
     const base::TemporaryFolder scratch{tr("what the commands print")};  // goes after those that run
     ResultSink& sink;
@@ -468,6 +483,7 @@ bool Errands::look(State& state)
     if (impl_->replay && impl_->replay->ended()) {
         if (impl_->replay->failed()) {
             state.notice = impl_->replay->message();
+            impl_->forgetExpert(state);
         }
         impl_->replay.reset();
         state.replaying = false;

@@ -71,7 +71,9 @@ std::string titleOf(const State& state, const KeptSession& s)
 // When it was, what it came to.
 std::string factsOf(const Instructor& i, const KeptSession& s)
 {
-    std::string line = s.started.substr(0, 10) + " " + s.started.substr(11, 5) + " UTC";
+    constexpr std::size_t toMinutes = 16;  // of 2026-11-22T09:14:05Z; records of sweeps have no date
+    std::string line =
+        s.started.size() < toMinutes ? "-" : s.started.substr(0, 10) + " " + s.started.substr(11, 5) + " UTC";
     line += s.total ? said(tr(", {:.0f} points"), *s.total) : "";
     line += s.rating > 0 ? said(tr(", rated {} of 5"), s.rating) : "";
     line += hasDraft(i, s) ? tr(", note not kept yet") : "";

@@ -70,15 +70,6 @@ std::string judgedBy(const nlohmann::json& score)
     return score.value("judged", marks != score.end() && marks->is_number() ? "marks" : "core");
 }
 
-const char* nameOfPart(const std::string& judged)
-{
-    return judged == "marks"  ? marked("Place and size")
-           : judged == "rest" ? marked("Rest on the skin")
-           : judged == "way"  ? marked("Way to the target")
-           : judged == "core" ? marked("Core")
-                              : marked("Touch");
-}
-
 // Where a session left no figures, its record may be there: also of one that was killed.
 std::string whyNoScore(const fs::path& figures)
 {
@@ -100,7 +91,7 @@ Result readResult(const fs::path& figures)
         const auto& score = json.at("score");
         result.total = score.at("total").get<double>();
         const std::string judged = judgedBy(score);
-        for (const auto& [key, name, most] : {std::tuple{"core", nameOfPart(judged), 50.0},
+        for (const auto& [key, name, most] : {std::tuple{"core", base::nameOfCore(judged), 50.0},
                                               {"vital", marked("Vital structures"), 25.0},
                                               {"technique", marked("Technique"), 25.0}}) {
             result.parts.push_back({tr(name), score.at("points").at(key).get<double>(), most});

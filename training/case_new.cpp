@@ -51,7 +51,8 @@ Case makeCase(const NewCase& wanted)
         throw std::runtime_error(wanted.volume.string() + ": a case is made of a volume (.vdb): palpate import makes one");
     }
     const volume::Tissue tissue = session::loadVolume(wanted.volume);
-    const fs::path folder = fs::absolute(wanted.folder).lexically_normal();
+    const fs::path normal = fs::absolute(wanted.folder).lexically_normal();
+    const fs::path folder = normal.has_filename() ? normal : normal.parent_path();  // of "name/"
     const fs::path part = folder.string() + fmt::format(".{}.part", ::getpid());
     datasets::Scene scene = datasets::sceneForVolume(wanted.volume, tissue, wanted.target);
     const auto ways = datasets::proposeApproaches(scene, tissue, 1);

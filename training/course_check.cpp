@@ -21,6 +21,7 @@ namespace palpate::training {
 namespace {
 
 constexpr double negligible = 1e-12;  // chance
+constexpr int longestWindow = 12;     // of a gate: what is followed doubles with each session in it
 
 // What a chain is at: the sessions that the gate looks at, a bit each, and the chart's value in units of `cusumTie`.
 using Place = std::pair<std::uint64_t, std::int64_t>;
@@ -207,6 +208,13 @@ double expectedSignals(const CusumPlan& plan, const Gate& gate, const LearningLa
 
 CourseCheck checkCourses(const Curriculum& curriculum, int people, std::uint64_t seed, int most)
 {
+    for (const Exercise& e : curriculum.exercises) {
+        if (e.gate.of > longestWindow) {
+            throw std::runtime_error(
+                fmt::format("exercise {}: its gate looks at the last {} sessions; verify follows {} at most", e.id,
+                            e.gate.of, longestWindow));
+        }
+    }
     CourseCheck check;
     for (const LearningLaw& law : learningLaws()) {
         SignalCount alarms{law.name, CusumChart::alarm, 0, 0}, learnt{law.name, CusumChart::learning, 0, 0};

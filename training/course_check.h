@@ -32,7 +32,7 @@ struct CourseCheck {
 };
 
 /// Sends `people` of each of learningLaws() through a curriculum. When a gate should open is counted anew from what was
-/// drawn.
+/// drawn. Throws std::runtime_error for a gate that looks at over 12 sessions.
 /// @param most  sessions of each person, at most
 CourseCheck checkCourses(const Curriculum& curriculum, int people, std::uint64_t seed, int most);
 

@@ -60,7 +60,20 @@ std::string now()
     return fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
 }
 
-// SQLite makes its own files beside this one with this one's mode.
+// Whether a file is one of profiles, by the application's number in SQLite's header, or empty.
+bool isStore(int descriptor)
+{
+    constexpr std::size_t at = 68;  // of the number, four bytes, big endian (sqlite.org/fileformat.html)
+    std::array<unsigned char, at + 4> header{};
+    const auto length = ::pread(descriptor, header.data(), header.size(), 0);
+    std::int64_t number = 0;
+    for (std::size_t i = at; i < header.size(); ++i) {
+        number = 256 * number + header[i];
+    }
+    return length == 0 || (length == static_cast<ssize_t>(header.size()) && number == applicationId);
+}
+
+// SQLite makes its own files beside this one with this one's mode. A file of another kind stays as it is.
 void makePrivate(const fs::path& file)
 {
     if (!file.parent_path().empty() && base::makeFolders(file.parent_path())) {
@@ -71,7 +84,9 @@ void makePrivate(const fs::path& file)
         throw std::runtime_error(
             fmt::format("{}: cannot be opened: {}", file.string(), errno == ELOOP ? "is a link" : std::strerror(errno)));
     }
-    ::fchmod(descriptor, 0600);
+    if (isStore(descriptor)) {
+        ::fchmod(descriptor, 0600);
+    }
     ::close(descriptor);
 }
 

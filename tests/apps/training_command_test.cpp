@@ -98,6 +98,12 @@ TEST_F(TrainingCommands, ANameWithACommaIsOnePersonOfAGroup)
     const Outcome one = palpate({"progress", "--group", "a=Smith,Jane", "--group", "a=bert"});
     EXPECT_NE(one.out.find("a (n=2)"), std::string::npos) << one.out << one.err;
     expectRefusal({"progress", "--group", "a=Smith,bert,nobody"}, "nobody: there is no such profile");
+    for (const char* const option : {"--html", "--csv", "--xapi"}) {
+        expectRefusal({"progress", "bert", option, "-"}, "this output goes to a file");
+    }
+    expectRefusal({"train", "--case", "layered", "--test", "--dffb", "field", "--headless"}, "a test is without guidance");
+    expectRefusal({"train", "--exercise", "breast-core-biopsy/touch", "--dffb", "off", "--headless"},
+                  "the exercise says how much guidance");
 }
 
 // What the note asks for: the numbers are the file's, so that of a person's first session need not be 1.
@@ -303,6 +309,8 @@ TEST_F(TrainingCommands, ACaseIsMadeOfAVolumeAndTrained)
     ASSERT_EQ(palpate({"phantom", "layered", "-o", volume}).status, 0);
     ASSERT_EQ(palpate({"case", "new", volume, "-o", folder_ / "mine", "--licence", "CC0-1.0"}).status, 0);
     expectRefusal({"case", "new", volume, "-o", folder_ / "mine"}, "exists already");
+    ASSERT_EQ(palpate({"case", "new", volume, "-o", (folder_ / "slash").string() + "/", "--licence", "CC0-1.0"}).status, 0);
+    EXPECT_TRUE(fs::exists(folder_ / "slash/scene.toml"));
     const Outcome checked = palpate({"case", "check", folder_ / "mine"});
     EXPECT_EQ(checked.status, 1);
     EXPECT_NE(checked.out.find("picture: there is none"), std::string::npos) << checked.out;

@@ -1,8 +1,12 @@
+#include <render/result_file.h>
+#include <tests/folder.h>
 #include <tests/render/studio.h>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
+#include <utility>
 
 namespace palpate::render {
 namespace {
@@ -135,6 +139,22 @@ TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
     picture.setSteps(false, 0, false);
     picture.setDisplayScale(1);
     studio->resize(width, height);
+}
+
+// What was asked for is named, and not always a core.
+TEST(ResultFile, NamesWhatWasJudged)
+{
+    const tests::Folder folder;
+    const std::string points = R"("total": 90, "points": {"core": 50, "vital": 25, "technique": 15})";
+    for (const auto& [more, name] : {std::pair(R"("judged": "rest")", "Rest on the skin 50 of 50"),
+                                     {R"("judged": "way")", "Way to the target 50 of 50"},
+                                     {R"("judged": "core")", "Core 50 of 50"},
+                                     {R"("mark_error_mm": 3.0)", "Place and size 50 of 50"}}) {
+        std::ofstream(folder / "r.json") << "{\"score\": {" << points << ", " << more << "}}";
+        const auto card = readResult(folder / "r.json");
+        ASSERT_TRUE(card) << more;
+        EXPECT_EQ(card->parts.front(), name);
+    }
 }
 
 }  // namespace

@@ -208,6 +208,23 @@ TEST(MainEffect, OfAnAdditiveFunctionIsItsShareOfTheVariance)
     EXPECT_NEAR(mainEffect(outputs, i2), variance2 / (variance1 + variance2), 1e-12);
 }
 
+// The mean of equal values is off by a rounding, and what is left of them is no variance.
+TEST(MainEffect, WhatDoesNotVaryDependsOnNothing)
+{
+    std::vector<std::size_t> levels;
+    for (std::size_t i = 0; i < 9; ++i) {
+        levels.push_back(i % 3);
+    }
+    for (const double value : {0.0, 0.1, 1.1, -3e7, 1e-200}) {
+        const std::vector<double> same(9, value);
+        EXPECT_TRUE(std::isnan(mainEffect(same, levels))) << value;
+        EXPECT_TRUE(sobolIndices(std::vector<double>(4 * 9, value), 2).empty()) << value;
+    }
+    std::vector<double> little(9, 0.1);
+    little[0] = 0.1 + 1e-9;
+    EXPECT_GT(mainEffect(little, levels), 0.0);
+}
+
 TEST(RankCorrelation, SeesOrderOnlyAndSharesTies)
 {
     std::vector<double> x, rising, falling;

@@ -1,5 +1,6 @@
 #include <training/course_check.h>
 
+#include <tests/error_of.h>
 #include <tests/folder.h>
 #include <tests/training/courses.h>
 
@@ -32,6 +33,15 @@ TEST(ExpectedSignals, OfCertainSessionsAreCounted)
     const LearningLaw sure{"sure", 1, 1, 1};
     EXPECT_NEAR(expectedSignals(plan, never, sure, CusumChart::learning, 50), 5, 1e-12);
     EXPECT_EQ(expectedSignals(plan, never, sure, CusumChart::alarm, 50), 0);
+}
+
+TEST(CourseCheck, AGateThatLooksTooFarBackIsRefused)
+{
+    Curriculum course = breastCourse();
+    course.exercises[1].gate.pass = 10;
+    course.exercises[1].gate.of = 16;
+    EXPECT_NE(tests::errorOf([&] { checkCourses(course, 1, 1, 10); }).find("looks at the last 16 sessions"),
+              std::string::npos);
 }
 
 // What the command does with many people: gates open when they should, signals come as often as theory says.

@@ -246,6 +246,28 @@ TEST(ProfileStore, ErasingLeavesNoFileOfThePersonAndAllOfOthers)
     EXPECT_EQ(store.sessions(bert).size(), 2U);
 }
 
+// A mistyped name: a file of another kind is refused and stays as it is, a store that others may read does not.
+TEST(ProfileStore, OnlyAStoreBecomesPrivate)
+{
+    const Folder folder;
+    const auto modeOf = [](const fs::path& file) { return fs::status(file).permissions() & fs::perms::all; };
+    constexpr auto shared = static_cast<fs::perms>(0644), own = static_cast<fs::perms>(0600);
+    std::ofstream(folder / "notes.txt") << std::string(5000, 'x');
+    recordOfKilled(folder / "r.db", "anna");
+    {
+        ProfileStore(folder / "p.db").add("anna", Hand::right);
+    }
+    for (const char* const name : {"notes.txt", "r.db", "p.db"}) {
+        fs::permissions(folder / name, shared);
+    }
+    EXPECT_THROW(ProfileStore(folder / "notes.txt"), std::runtime_error);
+    EXPECT_THROW(ProfileStore(folder / "r.db"), std::runtime_error);
+    EXPECT_EQ(modeOf(folder / "notes.txt"), shared);
+    EXPECT_EQ(modeOf(folder / "r.db"), shared);
+    EXPECT_EQ(ProfileStore(folder / "p.db").people().size(), 1U);
+    EXPECT_EQ(modeOf(folder / "p.db"), own);
+}
+
 // Names that differ in signs only have the same pages, which then tell of somebody who stays.
 TEST(ProfileStore, ErasingKeepsPagesThatTwoPeopleShare)
 {
