@@ -1,6 +1,7 @@
 #include <haptics/contact_law.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -8,8 +9,9 @@ namespace palpate::haptics {
 
 namespace {
 
-constexpr double tanConeAngle = 1.33;  // 53 degrees
-constexpr double springDepth = 5e-3;   // level `spring` takes the secant of the needle's law at this depth [m]
+constexpr double tanConeAngle = 1.33;   // 53 degrees
+constexpr double stiffestLayer = 12.0;  // that a contact feels, over the layers in series
+constexpr double springDepth = 5e-3;    // level `spring` takes the secant of the needle's law at this depth [m]
 
 double planeStrain(const LocalTissue& t) noexcept
 {
@@ -21,19 +23,24 @@ double planeStrain(const LocalTissue& t) noexcept
 LocalTissue tissueUnder(const SessionModel& model, const volume::Tissue::Reader& reader, Vec3 point, Vec3 inward,
                         double radius) noexcept
 {
-    constexpr int samples = 8;
+    constexpr std::size_t samples = 8;
     const double reach = std::max(5.0 * radius, 10e-3);
+    std::array<double, samples> weight{}, modulus{};
     double weights = 0.0;
     double arithmetic = 0.0;
     double harmonic = 0.0;
-    for (int i = 0; i < samples; ++i) {
-        const double s = reach * (i + 0.5) / samples;
+    for (std::size_t i = 0; i < samples; ++i) {
+        const double s = reach * (static_cast<double>(i) + 0.5) / samples;
         const double fall = s / std::max(radius, 2e-3);
-        const double w = 1.0 / (1.0 + fall * fall);
-        const double e = std::max(model.youngsModulus.at(point + s * inward), 1.0);
-        weights += w;
-        arithmetic += w * e;
-        harmonic += w / e;
+        weight[i] = 1.0 / (1.0 + fall * fall);
+        modulus[i] = std::max(model.youngsModulus.at(point + s * inward), 1.0);
+        weights += weight[i];
+        arithmetic += weight[i] * modulus[i];
+        harmonic += weight[i] / modulus[i];
+    }
+    const double most = stiffestLayer * weights / harmonic;
+    for (std::size_t i = 0; i < samples; ++i) {
+        arithmetic -= weight[i] * std::max(modulus[i] - most, 0.0);
     }
     const auto row = reader.tissue(point + 1e-3 * inward);
     const double nu = row != 0 ? model.tissue->table().rows[row].poissonRatio : 0.45;

@@ -12,7 +12,8 @@ struct LocalTissue {
 
 /// Effective tissue under a contact at `point` [m]: Young's modulus along `inward` to a depth of five radii (at least
 /// 10 mm), weighted as the stress under a punch falls off, 1 / (1 + (s / a)^2), and mixed as the root of arithmetic times
-/// harmonic mean. Where tissue relaxes, the modulus right after a step.
+/// harmonic mean. In the arithmetic one no layer counts for more than 12 times the harmonic one: bone under fat is a floor
+/// for it, and no part of what is pressed. Where tissue relaxes, the modulus right after a step.
 LocalTissue tissueUnder(const SessionModel& model, const volume::Tissue::Reader& reader, Vec3 point, Vec3 inward,
                         double radius) noexcept;
 

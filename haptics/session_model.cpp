@@ -5,8 +5,10 @@
 #include <haptics/probe_placement.h>
 
 #include <fmt/format.h>
+#include <glm/common.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace palpate::haptics {
@@ -15,6 +17,8 @@ namespace {
 
 // Fields finer than this are not felt: half the width of a 14 G needle.
 constexpr double finestField = 0.75e-3;
+constexpr double finestSurface = 0.5e-3;  // where it is a whole number of voxels
+constexpr double equalEdges = 1e-6;       // relative
 constexpr std::size_t surfaceNodes = 4U << 20;
 constexpr std::size_t structureNodes = 1U << 20;
 constexpr std::size_t latticeNodes = 4U << 20;
@@ -25,6 +29,44 @@ volume::NodeGrid fieldGrid(const volume::Tissue& tissue, std::size_t nodes)
     const double wanted = std::max(finestField, std::min({voxel.x, voxel.y, voxel.z}));
     const double margin = 4.0 * wanted;
     return volume::coveringGrid(tissue.box(), volume::affordableSpacing(tissue.box(), wanted, margin, nodes), margin);
+}
+
+// The edge of voxels that are cubes along the axes of the body; 0 for others [m].
+double cubeEdge(const volume::Affine& affine)
+{
+    const double edge = affine.spacing().x;
+    for (int k = 0; k < 3; ++k) {
+        const Vec3 along = glm::abs(affine.linear[k]);
+        const double longest = std::max({along.x, along.y, along.z});
+        if (std::abs(longest - edge) > equalEdges * edge || along.x + along.y + along.z - longest > equalEdges * edge) {
+            return 0.0;
+        }
+    }
+    return edge;
+}
+
+// Of the surface: faces of voxels lie at the same places of its cells everywhere. Else the surface is up to a tenth of a
+// millimetre off, by where the volume's origin is.
+volume::NodeGrid surfaceGrid(const volume::Tissue& tissue)
+{
+    const double edge = cubeEdge(tissue.affine());
+    if (edge <= 0.0) {
+        return fieldGrid(tissue, surfaceNodes);
+    }
+    const Vec3 corner = tissue.affine().origin - 0.5 * edge;
+    for (double times = std::max(1.0, std::ceil(finestSurface / edge - equalEdges));; ++times) {
+        const double spacing = times * edge;
+        Vec3 shift = corner - spacing * glm::round(corner / spacing);
+        for (int k = 0; k < 3; ++k) {
+            shift[k] = std::abs(shift[k]) > equalEdges * spacing ? shift[k] : 0.0;
+        }
+        const volume::Box box = tissue.box();
+        auto grid = volume::coveringGrid({box.low - shift, box.high - shift}, spacing, 4.0 * spacing);
+        if (grid.count() <= surfaceNodes) {
+            grid.origin += shift;
+            return grid;
+        }
+    }
 }
 
 chainmail::Lattice latticeOf(const datasets::Scene& scene, const volume::Tissue& tissue)
@@ -146,7 +188,7 @@ SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tis
     if (scene.target.empty() && posture.aim) {
         scene.target = structureAt(*tissue, *posture.aim, scene.name);
     }
-    const auto grid = fieldGrid(*tissue, surfaceNodes);
+    const auto grid = surfaceGrid(*tissue);
     const auto coarse = fieldGrid(*tissue, structureNodes);
     std::vector<GuardedStructure> structures;
     structures.push_back(guarded(*tissue, coarse, scene.target, "target", scene.name));

@@ -116,8 +116,8 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
       stabiliserOptions_{options.device ? *options.device : deviceParameters(model.scene.device), options.period,
                          model.scene.forceCap}
 {
+    placeProbe();
     if (level_ == datasets::ModelLevel::elastic) {
-        placeProbe();
         const double touched = touchedByAll(model, probe_.tools());
         const int window = model.scene.model.elastic.window;
         elastic_[0] = elasticLevel(model, deformation_.shape(), window, stabiliserOptions_, touched);

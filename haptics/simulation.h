@@ -43,6 +43,8 @@ public:
     /// H3 collide, H4 basic force, deform, H6 monitor, H7 additional force, stabilise. H2 and H5 are the servo loop's.
     const TickRecord& tick(const DeviceSample& device) noexcept;
 
+    /// What the last tick computed; before the first, where the scene's probe is.
+    const TickRecord& record() const noexcept { return record_; }
     /// Nodes that are not at rest after the last tick, and the displacement of every node.
     const chainmail::DisplacedLattice& shape() const noexcept { return deformation_.shape(); }
     /// The level in use: the scene's, or a lower one that it stepped down to.

@@ -47,6 +47,7 @@ LiveSession::LiveSession(std::shared_ptr<const Modelled> modelled, const std::st
     if (!record.empty()) {
         recorder_ = std::make_unique<haptics::Recorder>(record, infoFor(*modelled_, operatorName));
     }
+    last_ = session_.simulation().record();
     const Vec3 line = modelled_->model.approach.aim - modelled_->model.approach.entry;
     if (glm::length(line) > 0) {
         axis_ = glm::normalize(line);

@@ -12,6 +12,8 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -65,6 +67,11 @@ toml::table& elementOf(toml::array& list, std::string_view part, const std::stri
     throw std::runtime_error(fmt::format("key '{}': there is no {}; there are: {}", key, part, fmt::join(names, ", ")));
 }
 
+bool isAxis(std::string_view part)
+{
+    return part == "x" || part == "y" || part == "z";
+}
+
 void setCoordinate(toml::array& point, std::string_view part, const std::string& key, const KeyValue& value)
 {
     const std::size_t axis = part == "x" ? 0 : part == "y" ? 1 : part == "z" ? 2 : 3;
@@ -77,7 +84,10 @@ void setCoordinate(toml::array& point, std::string_view part, const std::string&
                   number != nullptr ? *number : static_cast<double>(*whole));
 }
 
-void setKey(toml::table& root, const std::string& key, const KeyValue& value)
+// Points that the scene left open, and which coordinates of them were set.
+using NewPoints = std::map<std::string, std::set<std::string>>;
+
+void setKey(toml::table& root, const std::string& key, const KeyValue& value, NewPoints& points)
 {
     if (key == "model.setting") {
         // The three keys that a setting gives: written out, they would win over it.
@@ -88,9 +98,16 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value)
     toml::table* table = &root;
     const auto parts = base::splitAt('.', key);
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
-        toml::node* const next = table->get(parts[i]);
+        toml::node* next = table->get(parts[i]);
         if (next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script")) {
             throw std::runtime_error(fmt::format("key '{}': the scene has no [[{}]]", key, parts[i]));
+        }
+        const std::string point = key.substr(0, key.rfind('.'));
+        if (i + 2 == parts.size() && isAxis(parts.back()) && (next == nullptr || points.contains(point))) {
+            points[point].emplace(parts.back());
+        }
+        if (next == nullptr && points.contains(point)) {
+            next = &*table->insert(parts[i], toml::array(0.0, 0.0, 0.0)).first->second.as_array();
         }
         if (next == nullptr) {
             table = table->insert(parts[i], toml::table()).first->second.as_table();
@@ -112,6 +129,7 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value)
 // A setting of the model first: keys of the same level win over it, in whichever order they stand.
 void apply(toml::table& root, const std::vector<Setting>& settings, const std::map<std::string, double>& variables)
 {
+    NewPoints points;
     for (const bool model : {true, false}) {
         for (const Setting& s : settings) {
             const auto* const text = std::get_if<std::string>(&s.value);
@@ -119,10 +137,15 @@ void apply(toml::table& root, const std::vector<Setting>& settings, const std::m
                 continue;
             }
             if (text != nullptr && text->starts_with('=')) {
-                setKey(root, s.key, evaluate(text->substr(1), variables));
+                setKey(root, s.key, evaluate(text->substr(1), variables), points);
             } else {
-                setKey(root, s.key, s.value);
+                setKey(root, s.key, s.value, points);
             }
+        }
+    }
+    for (const auto& [point, axes] : points) {
+        if (axes.size() != 3) {
+            throw std::runtime_error(fmt::format("key '{}': the scene leaves this point open: set its x, y and z", point));
         }
     }
 }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace palpate::haptics {
@@ -69,6 +71,29 @@ TEST(TissueUnder, FeelsTheInclusion)
     const auto beside = tissueUnder(model, reader, {0.035, 0, 0}, inward, 10e-3);
     EXPECT_NEAR(beside.youngsModulus, 3250.0, 50.0);
     EXPECT_GT(over.youngsModulus, 1.2 * beside.youngsModulus);
+}
+
+// Bone under fat is a floor. Under a punch of radius a, a layer of h = 5 a or 2.5 a over one is 1.25 or 1.6 times as stiff as
+// a half space (W. C. Hayes et al., J. Biomechanics 5, 1972, nu = 0.45). The mean of the moduli alone was 8 to 30 times.
+TEST(ContactLaw, BoneUnderFatIsAFloor)
+{
+    const auto modulusOver = [](double thick) {
+        const auto model =
+            tests::modelOf(fmt::format("name = \"floor\"\n[volume]\nphantom = \"block\"\n[volume.parameters]\n"
+                                       "thickness_mm = {}\ntumours = 0\n[target]\nentry_mm = [0, 0, 0]\n"
+                                       "aim_mm = [0, 3, 0]\n",
+                                       thick));
+        const volume::Tissue::Reader reader(*model.tissue);
+        return tissueUnder(model, reader, {0, 0, 0}, {0, 1, 0}, 4e-3).youngsModulus;
+    };
+    const double deep = modulusOver(40);
+    double before = 1.0;
+    for (const double thick : {18.0, 15.0, 12.0, 10.0}) {
+        const double times = modulusOver(thick) / deep;
+        EXPECT_GE(times, before - 1e-9) << thick;
+        EXPECT_LE(times, 2.5) << thick;
+        before = times;
+    }
 }
 
 }  // namespace

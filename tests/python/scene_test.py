@@ -86,5 +86,17 @@ class Models(InFolder):
         np.testing.assert_array_equal(model.volume.labels, made.labels)
 
 
+class OpenPoints(unittest.TestCase):
+    def test_a_point_that_the_scene_leaves_open_is_set_as_a_whole(self):
+        scene = palpate.Scene("layered").changed({"target.entry_mm": [1, 0, 2.5]})
+        self.assertIn("entry_mm = [1.0, 0.0, 2.5]", scene.text.replace("[1, 0,", "[1.0, 0.0,"))
+        whole = {"target.entry_mm.x": 1, "target.entry_mm.y": 0, "target.entry_mm.z": 2.5}
+        self.assertEqual(palpate.Scene("layered").changed(whole).text, scene.text)
+        for axis in "xyz":
+            part = {key: value for key, value in whole.items() if not key.endswith(axis)}
+            with self.subTest(axis), self.assertRaisesRegex(palpate.Error, "set its x, y and z"):
+                palpate.Scene("layered").changed(part)
+
+
 if __name__ == "__main__":
     unittest.main()

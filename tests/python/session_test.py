@@ -149,6 +149,16 @@ class Shape(unittest.TestCase):
         self.assertGreater(np.count_nonzero(elsewhere["pixels"] != pictures[0]["pixels"]), 1000)
 
 
+    def test_the_first_picture_is_where_the_scene_has_the_probe(self):
+        session = palpate.Session(palpate.Scene("us-core-biopsy").changed({"model.setting": "fast"}))
+        before = session.ultrasound(160, 160)
+        session.step(session.model.entry - 0.02 * np.array([0, 1, 0]))
+        after = session.ultrasound(160, 160)
+        for key in ("face", "direction", "lateral"):
+            np.testing.assert_array_equal(before[key], after[key])
+        self.assertGreater(np.linalg.norm(before["face"]), 1e-3)
+
+
 class Hands(InFolder):
     def test_a_scripted_hand_does_what_palpate_train_does(self):
         figure = figures("train", "layered", "--unpaced", "--setting", "fast", "--seed", 1)
