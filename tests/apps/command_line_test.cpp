@@ -219,6 +219,8 @@ TEST(CommandLine, AnOutputThatCannotBeWrittenIsRefusedOnOneLine)
     }
     expectRefusal({"phantom", "block", "-o", below + ".vdb"}, below);
     expectRefusal({"phantom", "block", "-o", folder / "block.vdb", "--json", below}, below);
+    EXPECT_FALSE(std::filesystem::exists(folder / "block.vdb")) << "what cannot be written is looked at first";
+    ASSERT_EQ(palpate({"phantom", "block", "-o", folder / "block.vdb"}).status, 0);
     expectRefusal({"info", folder / "block.vdb", "--json", below}, below);
 }
 
