@@ -76,7 +76,12 @@ double parseTime(const std::string& option, const std::string& text)
 double lengthFrom(const std::string& option, const std::string& text, double least, double most)
 {
     const auto plain = lengthOf(text + "mm");
-    const auto length = plain ? plain : lengthOf(text);
+    return lengthWithin(option, text, plain ? plain : lengthOf(text), least, most);
+}
+
+double lengthWithin(const std::string& option, const std::string& text, std::optional<double> length, double least,
+                    double most)
+{
     if (!length || !(*length >= least && *length <= most)) {
         throw std::runtime_error(
             fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));

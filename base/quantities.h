@@ -22,4 +22,8 @@ double parseTime(const std::string& option, const std::string& text);
 /// that names the option.
 double lengthFrom(const std::string& option, const std::string& text, double least, double most);
 
+/// A length [m] that was said as `text`, from `least` to `most`; nothing is none. Throws as lengthFrom().
+double lengthWithin(const std::string& option, const std::string& text, std::optional<double> length, double least,
+                    double most);
+
 }  // namespace palpate::base

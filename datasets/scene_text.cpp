@@ -1,6 +1,7 @@
 #include <datasets/scene_text.h>
 
 #include <base/units.h>
+#include <base/utf8.h>
 #include <datasets/embedded.h>
 #include <datasets/toml_fields.h>
 
@@ -319,10 +320,10 @@ void replaceString(std::string& text, const toml::node* node, const std::string&
         for (toml::source_index line = 1; line < position.line; ++line) {
             begin = text.find('\n', begin) + 1;
         }
-        // Columns count code points; the second and later bytes of one begin with the bits 10.
+        // Columns count code points.
         for (toml::source_index column = 1; column < position.column && begin < text.size();) {
             ++begin;
-            column += begin == text.size() || (static_cast<unsigned char>(text[begin]) & 0xC0U) != 0x80U ? 1U : 0U;
+            column += begin == text.size() || base::beginsCharacter(text[begin]) ? 1U : 0U;
         }
         return begin;
     };

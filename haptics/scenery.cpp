@@ -1,5 +1,6 @@
 #include <haptics/scenery.h>
 
+#include <base/utf8.h>
 #include <channel/bounds.h>
 #include <datasets/tables.h>
 #include <haptics/display_image.h>
@@ -18,8 +19,7 @@ channel::Name nameOf(const std::string& text) noexcept
 {
     channel::Name name{};
     std::size_t bytes = std::min(text.size(), name.size() - 1);
-    const auto within = [&](std::size_t at) { return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U; };
-    while (bytes > 0 && bytes < text.size() && within(bytes)) {
+    while (bytes > 0 && bytes < text.size() && !base::beginsCharacter(text[bytes])) {
         --bytes;
     }
     std::copy_n(text.begin(), bytes, name.begin());

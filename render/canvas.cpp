@@ -1,5 +1,7 @@
 #include <render/canvas.h>
 
+#include <base/utf8.h>
+
 #include <vtkCellData.h>
 #include <vtkPolyDataMapper2D.h>
 #include <vtkProperty2D.h>
@@ -200,8 +202,7 @@ std::string shortened(const Canvas& canvas, const std::string& words, double siz
     const std::string ellipsis = "...";
     std::string kept = words;
     do {
-        // The second and later bytes of a character begin with the bits 10.
-        while (kept.size() > 1 && (static_cast<unsigned char>(kept.back()) & 0xC0U) == 0x80U)
+        while (kept.size() > 1 && !base::beginsCharacter(kept.back()))
             kept.pop_back();
         kept.pop_back();
         while (!kept.empty() && kept.back() == ' ')

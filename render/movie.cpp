@@ -31,32 +31,15 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     std::signal(SIGPIPE, SIG_IGN);
     const int* size = window.GetSize();
     const std::string extent = std::to_string(size[0]) + "x" + std::to_string(size[1]);
+    const std::string output = "file:" + partial_.string();  // what stands before a colon is no protocol
     // OpenGL counts rows from below; the codec wants even sides.
-    base::Program ffmpeg{{"ffmpeg",
-                          "-loglevel",
-                          "error",
-                          "-y",
-                          "-f",
-                          "rawvideo",
-                          "-pix_fmt",
-                          "rgb24",
-                          "-s",
-                          extent,
-                          "-r",
-                          std::to_string(static_cast<int>(rate)),
-                          "-i",
-                          "-",
-                          "-vf",
-                          "vflip,pad=ceil(iw/2)*2:ceil(ih/2)*2",
-                          "-c:v",
-                          "libx264",
-                          "-preset",
-                          "veryfast",
-                          "-pix_fmt",
-                          "yuv420p",
-                          "-f",
-                          "mp4",
-                          "file:" + partial_.string()}};
+    base::Program ffmpeg{{"ffmpeg",   "-loglevel", "error",    "-y",
+                          "-f",       "rawvideo",  "-pix_fmt", "rgb24",
+                          "-s",       extent,      "-r",       std::to_string(static_cast<int>(rate)),
+                          "-i",       "-",         "-vf",      "vflip,pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                          "-c:v",     "libx264",   "-preset",  "veryfast",
+                          "-pix_fmt", "yuv420p",   "-f",       "mp4",
+                          output}};
     ffmpeg.streams[0] = ends[0];
     ffmpeg.ownGroup = true;  // Ctrl-C ends this program, which then finishes the film
     const auto [pid, error] = base::start(ffmpeg);

@@ -2,6 +2,7 @@
 
 #include <base/counted.h>
 #include <base/outputs.h>
+#include <base/utf8.h>
 #include <report/html.h>
 
 #include <fmt/format.h>
@@ -38,13 +39,12 @@ std::vector<double> rounded(std::vector<double> values, const haptics::Measure& 
     return values;
 }
 
-// By characters of UTF-8, of which one byte does not continue another.
 std::string shortened(const std::string& name, std::size_t most)
 {
     std::string out;
     std::size_t characters = 0;
     for (const char c : name) {
-        characters += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1 : 0;
+        characters += base::beginsCharacter(c) ? 1 : 0;
         if (characters < most) {
             out += c;
         }

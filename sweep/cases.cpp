@@ -67,14 +67,15 @@ toml::table& elementOf(toml::array& list, std::string_view part, const std::stri
     throw std::runtime_error(fmt::format("key '{}': there is no {}; there are: {}", key, part, fmt::join(names, ", ")));
 }
 
-bool isAxis(std::string_view part)
+// 3: no axis.
+std::size_t axisOf(std::string_view part)
 {
-    return part == "x" || part == "y" || part == "z";
+    return part == "x" ? 0 : part == "y" ? 1 : part == "z" ? 2 : 3;
 }
 
 void setCoordinate(toml::array& point, std::string_view part, const std::string& key, const KeyValue& value)
 {
-    const std::size_t axis = part == "x" ? 0 : part == "y" ? 1 : part == "z" ? 2 : 3;
+    const std::size_t axis = axisOf(part);
     const auto* const number = std::get_if<double>(&value);
     const auto* const whole = std::get_if<std::int64_t>(&value);
     if (axis == 3 || point.size() != 3 || (number == nullptr && whole == nullptr)) {
@@ -86,6 +87,11 @@ void setCoordinate(toml::array& point, std::string_view part, const std::string&
 
 // Points that the scene left open, and which coordinates of them were set.
 using NewPoints = std::map<std::string, std::set<std::string>>;
+
+std::string pointOf(const std::string& key)
+{
+    return key.substr(0, key.rfind('.'));
+}
 
 void setKey(toml::table& root, const std::string& key, const KeyValue& value, NewPoints& points)
 {
@@ -102,12 +108,9 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value, Ne
         if (next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script")) {
             throw std::runtime_error(fmt::format("key '{}': the scene has no [[{}]]", key, parts[i]));
         }
-        const std::string point = key.substr(0, key.rfind('.'));
-        if (i + 2 == parts.size() && isAxis(parts.back()) && (next == nullptr || points.contains(point))) {
-            points[point].emplace(parts.back());
-        }
-        if (next == nullptr && points.contains(point)) {
-            next = &*table->insert(parts[i], toml::array(0.0, 0.0, 0.0)).first->second.as_array();
+        if (next == nullptr && i + 2 == parts.size() && axisOf(parts.back()) < 3) {
+            next = table->insert(parts[i], toml::array(0.0, 0.0, 0.0)).first->second.as_array();
+            points.try_emplace(pointOf(key));
         }
         if (next == nullptr) {
             table = table->insert(parts[i], toml::table()).first->second.as_table();
@@ -118,6 +121,9 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value, Ne
             ++i;
         } else if (next->is_array() && !next->is_array_of_tables() && i + 2 == parts.size()) {
             setCoordinate(*next->as_array(), parts[i + 1], key, value);
+            if (const auto open = points.find(pointOf(key)); open != points.end()) {
+                open->second.emplace(parts[i + 1]);
+            }
             return;
         } else {
             throw std::runtime_error(fmt::format("key '{}': {} has no keys in it", key, parts[i]));

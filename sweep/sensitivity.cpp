@@ -14,6 +14,9 @@ constexpr double rounding = 1e-12;  // of what does not vary: what a mean is off
 // What does not vary depends on nothing. Its variance need not be 0, as its mean is rounded.
 bool varies(std::span<const double> values)
 {
+    if (values.empty()) {
+        return false;
+    }
     const auto [low, high] = std::ranges::minmax(values);
     return high - low > rounding * std::max(std::abs(low), std::abs(high));
 }

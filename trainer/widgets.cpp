@@ -1,5 +1,6 @@
 #include <trainer/widgets.h>
 
+#include <base/utf8.h>
 #include <base/words.h>
 
 #include <imgui_internal.h>
@@ -66,10 +67,9 @@ std::string shortened(const std::string& text, float wide)
 {
     std::string out = text;
     for (std::size_t end = text.size(); end > 0 && ImGui::CalcTextSize(out.c_str()).x > wide;) {
-        // To where a character begins, in UTF-8.
         do {
             --end;
-        } while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U);
+        } while (end > 0 && !base::beginsCharacter(text[end]));
         out = text.substr(0, end) + "...";
     }
     return out;

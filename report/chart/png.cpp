@@ -1,5 +1,6 @@
 #include <base/outputs.h>
 #include <base/process.h>
+#include <base/utf8.h>
 #include <report/chart/axis.h>
 #include <report/chart/chart.h>
 #include <report/chart/labels.h>
@@ -44,8 +45,7 @@ std::string tidy(std::string_view text, std::size_t most)
     std::string out;
     std::size_t letters = 0;
     for (const char c : valid) {
-        const bool begins = (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
-        if (begins && ++letters > most) {
+        if (base::beginsCharacter(c) && ++letters > most) {
             return out + "…";
         }
         out += static_cast<unsigned char>(c) < 0x20 || c == 0x7F ? ' ' : c;
@@ -55,8 +55,7 @@ std::string tidy(std::string_view text, std::size_t most)
 
 std::size_t letters(std::string_view utf8)
 {
-    return static_cast<std::size_t>(
-        std::ranges::count_if(utf8, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+    return static_cast<std::size_t>(std::ranges::count_if(utf8, base::beginsCharacter));
 }
 
 // A string of gnuplot's. All but letters, digits and spaces are numbers in it, so that nothing is left to expand or to end

@@ -1,6 +1,7 @@
 #include <volume/prepare/volume_import.h>
 
 #include <base/build.h>
+#include <base/quantities.h>
 #include <datasets/label_map.h>
 #include <volume/fnv.h>
 #include <volume/prepare/body.h>
@@ -162,9 +163,8 @@ void noteOverlaps(const volume::ImportedLabels& labels, bool verbose, std::vecto
 
 void checkLength(const LengthBounds& bounds, double length)
 {
-    if (length != 0.0 && !(length >= bounds.least && length <= bounds.most)) {
-        throw std::runtime_error(fmt::format("{} {:g}mm: must be a length from {:g}mm to {:g}mm", bounds.option,
-                                             1e3 * length, 1e3 * bounds.least, 1e3 * bounds.most));
+    if (length != 0.0) {
+        base::lengthWithin(bounds.option, fmt::format("{:g}mm", 1e3 * length), length, bounds.least, bounds.most);
     }
 }
 
