@@ -73,8 +73,8 @@ TEST(TissueUnder, FeelsTheInclusion)
     EXPECT_GT(over.youngsModulus, 1.2 * beside.youngsModulus);
 }
 
-// Bone under fat is a floor. Under a punch of radius a, a layer of h = 5 a or 2.5 a over one is 1.25 or 1.6 times as stiff as
-// a half space (W. C. Hayes et al., J. Biomechanics 5, 1972, nu = 0.45). The mean of the moduli alone was 8 to 30 times.
+// Bone under fat is a floor. Under a punch of radius a, a layer of h = 5 a or 2.5 a over one is 1.25 or 1.6 times as stiff
+// as a half space (W. C. Hayes et al., J. Biomechanics 5, 1972, nu = 0.45). The mean of the moduli alone was 8 to 30 times.
 TEST(ContactLaw, BoneUnderFatIsAFloor)
 {
     const auto modulusOver = [](double thick) {
