@@ -2,6 +2,8 @@
 
 #include <chainmail/quasi_newton.h>
 
+#include <glm/geometric.hpp>
+
 #include <algorithm>
 #include <cmath>
 
@@ -11,7 +13,9 @@ namespace {
 
 constexpr int whole = (1 << 20) + 1;  // nodes of a window that holds any level whole
 constexpr QuasiNewton::Limits limits{8, 16};
-constexpr double balanced = 1e-3;  // fraction of the load
+constexpr double balanced = 1e-3;    // fraction of the load
+constexpr double atMost = 0.03;      // the same where displacements are too coarse for it
+constexpr double lastBit = 0x1p-24;  // of a number in single precision
 
 }  // namespace
 
@@ -92,6 +96,26 @@ void LoadedBody::precondition(std::vector<double>& values)
     }
 }
 
+// What rounding alone leaves out of balance: a displacement's last bit, and that of a strain in a cell, times the
+// stiffness.
+double LoadedBody::rounding() const noexcept
+{
+    const Window& w = stack_.windows()[0];
+    const CellLevel& level = body_.levels.front();
+    double shaken = 0.0, all = 0.0;
+    volume::forEachIndex(Index3(0), level.nodes.size - 1, [&](Index3 n) {
+        const std::size_t at = w.at(n);
+        if (w.dof[at] > 0.0F) {
+            const double moved = level.nodes.spacing + glm::length(displacement(n));
+            shaken += std::pow(static_cast<double>(level.diagonal[level.nodes.offset(n)]) * lastBit * moved, 2);
+            for (std::size_t i = at; i < load_.size(); i += w.layout.count) {
+                all += load_[i] * load_[i];
+            }
+        }
+    });
+    return all > 0.0 ? std::sqrt(shaken / all) : 0.0;
+}
+
 LoadedBody::Outcome LoadedBody::solve(double tolerance, int most)
 {
     evaluate();
@@ -104,7 +128,8 @@ LoadedBody::Outcome LoadedBody::solve(double tolerance, int most)
         const double length = newton.step();
         out.lastStep = length * newton.largest();
         out.residual = residual_;
-        out.balanced = length >= 1.0 && out.lastStep <= tolerance && residual_ <= balanced;
+        out.balanced =
+            length >= 1.0 && out.lastStep <= tolerance && residual_ <= std::max(balanced, std::min(atMost, rounding()));
     }
     return out;
 }
