@@ -305,6 +305,7 @@ void Scorer::addDepth(const TickRecord& record) noexcept
         withdrawing_ = false;
         nearest_ = std::numeric_limits<double>::infinity();
         furthest_ = 0;
+        shot_.reset();
         return;
     }
     addBeyond(record);
@@ -331,6 +332,7 @@ void Scorer::addBeyond(const TickRecord& record) noexcept
     if (record.inserted < furthest_ - redirectLength) {
         nearest_ = std::numeric_limits<double>::infinity();
         furthest_ = record.inserted;
+        shot_.reset();
     }
     furthest_ = std::max(furthest_, record.inserted);
     const double distance = std::max(0.0, record.distance[0]);
@@ -339,13 +341,21 @@ void Scorer::addBeyond(const TickRecord& record) noexcept
         nearest_ = std::min(nearest_, distance);
         atTarget_ = record.inserted;
     }
-    // What the gun took of it lay ahead of the tip, and does no more: the tissue lets go of the shaft, which slides on.
+    // What the gun took of it lay ahead of the tip, and does no more.
     if (record.fired && record.core.targetLength > 0.0) {
         nearest_ = 0.0;
         atTarget_ = record.inserted + record.core.targetLength;
     }
     // No tip is farther beyond the target than from it.
-    score_.beyondTarget = std::max(score_.beyondTarget, std::min(record.inserted - atTarget_, distance));
+    double beyond = std::min(record.inserted - atTarget_, distance);
+    if (record.fired) {
+        shot_.emplace(record.device.position, beyond);
+    }
+    // The tissue lets go of the shaft, which slides on while the hand stands.
+    if (shot_) {
+        beyond = std::min(beyond, std::max(0.0, shot_->second) + glm::distance(record.device.position, shot_->first));
+    }
+    score_.beyondTarget = std::max(score_.beyondTarget, beyond);
 }
 
 void Scorer::addVital(const TickRecord& record) noexcept

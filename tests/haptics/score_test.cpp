@@ -348,24 +348,28 @@ TEST(Score, WhatIsStillAheadOfTheTipIsNotBehindIt)
         }
         return scorer.score().beyondTarget / millimetre;
     };
-    // A core with 11 mm of target, after which the shaft slides on by 4 mm, and is pushed by another 20.
-    Scorer scorer(synthetic::info());
-    TickRecord fires;
-    fires.phase = Phase::inserted;
-    fires.distance.fill(1);
-    const auto at = [&](double inserted, double from) {
-        fires.inserted = inserted * millimetre;
-        fires.distance[0] = from * millimetre;
-        scorer.add(fires);
-        ++fires.tick;
-        fires.fired = false;
+    // After a shot the shaft slides on by 4 mm, and is pushed by another 20.
+    const auto afterShot = [](double targetLength, double pushed) {
+        Scorer scorer(synthetic::info());
+        TickRecord tick;
+        tick.phase = Phase::inserted;
+        tick.fired = true;
+        tick.core.targetLength = targetLength * millimetre;
+        tick.distance.fill(1);
+        for (const auto& [inserted, hand] : {std::pair(43.0, 0.0), {47.0, 0.0}, {47.0 + pushed, pushed}}) {
+            tick.inserted = inserted * millimetre;
+            tick.distance[0] = (inserted - 36.0) * millimetre;
+            tick.device.position = {0, 0, -hand * millimetre};
+            scorer.add(tick);
+            ++tick.tick;
+            tick.fired = false;
+        }
         return scorer.score().beyondTarget / millimetre;
     };
-    fires.fired = true;
-    fires.core.targetLength = 11 * millimetre;
-    EXPECT_NEAR(at(43, 3.6), 0.0, 1e-9);
-    EXPECT_NEAR(at(47, 3.6), 0.0, 1e-9);
-    EXPECT_NEAR(at(67, 12.0), 12.0, 1e-9);
+    EXPECT_NEAR(afterShot(11.0, 0.0), 0.0, 1e-9);
+    EXPECT_NEAR(afterShot(11.0, 20.0), 13.0, 1e-9);
+    EXPECT_NEAR(afterShot(0.0, 0.0), 0.0, 1e-9) << "a miss";
+    EXPECT_NEAR(afterShot(0.0, 20.0), 20.0, 1e-9) << "a miss";
 
     constexpr double nowhere = std::numeric_limits<double>::infinity();
     EXPECT_NEAR(beyond(3.8, 3.0), 0.0, 1e-9);
