@@ -58,10 +58,12 @@ struct SurfaceCell {
     std::uint32_t count = 0;
 };
 
-/// Young's modulus of soft tissue with this shear modulus [Pa]: E = 2 mu (1 + nu) at nu = 0.45.
+constexpr double softPoisson = 0.45;  // of soft tissue
+
+/// Young's modulus of soft tissue with this shear modulus [Pa]: E = 2 mu (1 + nu).
 inline double youngsModulusOf(float mu) noexcept
 {
-    return 2.9 * static_cast<double>(mu);
+    return 2.0 * (1.0 + softPoisson) * static_cast<double>(mu);
 }
 
 /// How the tissue lies in a cell.
@@ -99,6 +101,15 @@ inline float muAt(const CellLevel& level, Vec3 at) noexcept
         sum += f.mu;
     }
     return sum;
+}
+
+/// Poisson's ratio of the level's cell that a place lies in; that of soft tissue where it is empty or divided.
+inline double poissonAt(const CellLevel& level, Vec3 at) noexcept
+{
+    const Index3 cell(glm::floor((at - level.nodes.origin) / level.nodes.spacing));
+    const std::size_t i = level.nodes.contains(cell) ? level.nodes.offset(cell) : 0;
+    const auto lambda = static_cast<double>(level.lambda[i]), mu = static_cast<double>(level.mu[i]);
+    return level.nodes.contains(cell) && mu > 0.0 ? 0.5 * lambda / (lambda + mu) : softPoisson;
 }
 
 /// An elastic body: const while a session runs. Every level covers the whole body; each is twice as coarse as the one

@@ -147,7 +147,7 @@ Between betweenNodes(const volume::NodeGrid& grid, const ElasticTool& tool) noex
     return {glm::mix(mean.b, glm::dot(across, f), isRound), glm::mix(mean.square, glm::dot(across, f * f), isRound)};
 }
 
-double resolvedShare(double radiusInCells, const Between& across, double coarser) noexcept
+double resolvedShare(double radiusInCells, const Between& across, double more) noexcept
 {
     const Between mean;
     const auto above = std::lower_bound(lacking.begin() + 1, lacking.end() - 1, radiusInCells,
@@ -158,7 +158,7 @@ double resolvedShare(double radiusInCells, const Between& across, double coarser
     const Lacking &to = *above, &from = *(above - 1);
     const double t = std::clamp((radiusInCells - from.radius) / (to.radius - from.radius), 0.0, 1.0);
     const double lacks = glm::mix(lacksAt(from), lacksAt(to), t);
-    return 1.0 / (1.0 + penalty * coarser * std::max(lacks, 0.0));
+    return 1.0 / (1.0 + penalty * more * std::max(lacks, 0.0));
 }
 
 Vec3 gather(std::span<const Window> windows, const ContactSite& site, Field field) noexcept

@@ -161,7 +161,7 @@ void Elastic::spreadPressure() noexcept
         const Stretch now = volume::isSmall(options_.law) ? Stretch{}
                             : s.stretch > 0.0             ? Stretch{s.stretch, static_cast<double>(s.stiffer)}
                                                           : stretchAt(s);
-        const double share = resolvedShare(patch, across, static_cast<double>(s.coarser));
+        const double share = resolvedShare(patch, across, static_cast<double>(s.lacks));
         s.resolved = s.level > 0 ? static_cast<float>(share) : 1.0F;
         s.stiffness = share * now.area * std::min(now.modulus * s.atRest, stiffened * most * static_cast<double>(s.area));
     }

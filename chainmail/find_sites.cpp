@@ -17,6 +17,7 @@ namespace {
 constexpr double coarse = 0.11;          // area of a surface point that is quartered, in that of a cell's face,
 constexpr double close = 0.3;            // and how far from the tool it may be [cells]
 constexpr double lengthRounding = 1e-6;  // of a rod, in cells
+constexpr double compressible = 4.2;     // how fast compliance that cells lack grows as nu falls
 
 double touchedAtFirst(double radius) noexcept
 {
@@ -29,12 +30,14 @@ double siteStiffness(const SurfacePoint& p, double spacing, const ElasticTool& t
     return std::min(penalty * youngsModulusOf(p.mu) / spacing, stiffestPerArea(tool)) * static_cast<double>(p.area);
 }
 
-// How much more compliance than the finest cells those around a site lack, over its own. What is as stiff as may be gives
-// way less than that in cells of any size.
-double coarserThanFinest(const ContactSite& site, const SurfacePoint& p, double spacing) noexcept
+// How much more compliance than the finest cells of soft tissue those around a site lack, over its own. What is as stiff as
+// may be gives way less than that in cells of any size.
+double lacksOver(const ElasticBody& body, const ContactSite& site, const SurfacePoint& p) noexcept
 {
-    const double uncapped = penalty * youngsModulusOf(p.mu) / spacing * static_cast<double>(site.area);
-    return 1.0 + (std::ldexp(1.0, site.level) - 1.0) * site.atRest / uncapped;
+    const CellLevel& finest = body.levels.front();
+    const double uncapped = penalty * youngsModulusOf(p.mu) / finest.nodes.spacing * static_cast<double>(site.area);
+    const double gives = 1.0 + compressible * std::max(0.0, softPoisson - poissonAt(finest, site.anchor));
+    return 1.0 + (std::ldexp(gives, site.level) - 1.0) * site.atRest / uncapped;
 }
 
 // A unit vector across a unit vector.
@@ -214,7 +217,7 @@ private:
             return false;
         }
         const SurfacePoint& point = body_.points[site.point];
-        site.coarser = static_cast<float>(coarserThanFinest(site, point, body_.levels.front().nodes.spacing));
+        site.lacks = static_cast<float>(lacksOver(body_, site, point));
         ++count_;
         return true;
     }
