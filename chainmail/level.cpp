@@ -221,6 +221,9 @@ void ElasticLevel::writeFinest(Vec3 around, int layers) noexcept
     const auto& grid = shape_.lattice().grid;
     const Index3 low = glm::max(window.low, Index3(1));
     const Index3 high = glm::min(window.low + window.size() - 2, grid.size - 2);
+    if (glm::any(glm::lessThan(high, low))) {
+        return;  // the elastic body's nodes go on beyond the lattice, and a tool that is there takes the window along
+    }
     const Index3 middle(glm::round((around - grid.origin) / grid.spacing));
     writeBox(glm::clamp(middle - nearNodes, low, high), glm::clamp(middle + nearNodes, low, high));
     int& layer = turns_.front().z;
@@ -429,6 +432,9 @@ void ElasticLevel::writeByTurns(std::size_t level) noexcept
     const int scale = 1 << level;
     const Index3 low = glm::max(scale * window.low, Index3(1));
     const Index3 high = glm::min(scale * (window.low + window.size() - 1) - 1, grid.size - 2);
+    if (glm::any(glm::lessThan(high, low))) {
+        return;
+    }
     Index3& at = turns_[level];
     for (int i = 0; i < turnsPerCall; ++i) {
         if (at.x < low.x || at.x > high.x || at.y < low.y || at.y > high.y || at.z < low.z || at.z > high.z) {

@@ -7,8 +7,10 @@
 namespace palpate::channel {
 namespace {
 
-constexpr double furthest = 100;   // of a place [m]
-constexpr double strongest = 1e4;  // force [N]
+constexpr double furthest = 100;                // of a place [m]
+constexpr float furthestMoved = 1;              // of a node, from where it is at rest [m]
+constexpr std::uint64_t mostNodes = 1U << 24U;  // of a lattice; viewers keep some 64 bytes of each
+constexpr double strongest = 1e4;               // force [N]
 constexpr double largestValue = 1e12;
 constexpr std::array<std::int32_t, 3> noNodes{};  // of a body that does not deform, or without fine labels
 constexpr std::uint32_t maxSlices = 99;           // of a CT scan
@@ -104,7 +106,8 @@ std::uint64_t voxelsOf(const Grid& grid) noexcept
 
 bool sound(const Scenery& s) noexcept
 {
-    if (!ended(s.scene) || !sound(s.labels) || !(s.lattice.size == noNodes || sound(s.lattice)) || s.tissues > maxTissues ||
+    if (!ended(s.scene) || !sound(s.labels) ||
+        !(s.lattice.size == noNodes || (sound(s.lattice) && voxelsOf(s.lattice) <= mostNodes)) || s.tissues > maxTissues ||
         s.structures > maxStructures || s.windows > maxWindows || s.tool > ToolKind::capsule || s.task > Task::advance ||
         !ended(s.imageUnit) || !ended(s.who))
         return false;
@@ -147,8 +150,7 @@ bool sound(const Input& input) noexcept
 
 bool sound(const Displacement& d, std::uint64_t nodes) noexcept
 {
-    return d.node < nodes &&
-           std::all_of(d.u.begin(), d.u.end(), [](float u) { return upTo(static_cast<double>(u), furthest); });
+    return d.node < nodes && std::all_of(d.u.begin(), d.u.end(), [](float u) { return std::abs(u) <= furthestMoved; });
 }
 
 }  // namespace palpate::channel

@@ -3,6 +3,7 @@
 #include <channel/lanes.h>
 
 #include <glm/common.hpp>
+#include <glm/ext/vector_int3_sized.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vector_relational.hpp>
@@ -14,7 +15,8 @@
 namespace palpate::channel {
 namespace {
 
-constexpr float flat = 0.05F;         // a cell whose volume anywhere falls under this share counts as folded
+constexpr float flat = 0.05F;  // a cell whose volume anywhere falls under this share counts as folded
+constexpr std::size_t mostBins = 1U << 22U;
 constexpr float edgeWithout = 0.57F;  // no cell is folded whose edges change by less (a root of a third) [spacings]
 
 glm::vec3 vec(Lanes v) noexcept
@@ -188,7 +190,8 @@ void Inverse::forEachCellNear(const Box& place, Visit&& visit) const
 
 std::size_t Inverse::bin(glm::ivec3 n) const noexcept
 {
-    return static_cast<std::size_t>((n.z * bins_.y + n.y) * bins_.x + n.x);
+    const glm::i64vec3 all(bins_), at(n);
+    return static_cast<std::size_t>((at.z * all.y + at.y) * all.x + at.x);
 }
 
 Inverse::Answer Inverse::searched(glm::vec3 g) const noexcept
@@ -261,7 +264,12 @@ void Inverse::indexCells()
     folded_.high += close;
     binLow_ = glm::ivec3(glm::floor(folded_.low));
     bins_ = glm::ivec3(glm::floor(folded_.high)) - binLow_ + 1;
-    first_.assign(bin({0, 0, bins_.z}) + 2, 0);
+    const std::size_t all = bin({0, 0, bins_.z});
+    if (all > mostBins) {
+        folded_ = {};  // no tissue folds so widely: searched cell by cell
+        return;
+    }
+    first_.assign(all + 2, 0);
     const auto visitBins = [&](auto&& visit) {
         forEachCellNear(folded_, [&](glm::ivec3 cell) {
             const Box box = seen(cell);

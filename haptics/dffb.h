@@ -12,7 +12,7 @@ namespace palpate::haptics {
 /// One structure as the tool sees it now.
 struct Proximity {
     double distance = 0;  // tip to the structure's surface in the deformed tissue, negative inside [m]
-    Vec3 away{0, 0, 1};   // unit vector from the structure to the tip
+    Vec3 away{0, 0, 1};   // unit vector from the structure to the tip; inside, shorter where no side is the nearest
     double gain = 1;
     bool vital = true;      // false for the target
     bool touching = false;  // by the tool's surface

@@ -24,6 +24,8 @@ constexpr int shaftSamples = 16;
 constexpr double minShaftStiffness = 20.0;  // [N/m]
 constexpr double speedBand = 30.0;          // the shaft's speed passes a low-pass at this frequency [Hz]
 constexpr double steel = 200e9;             // Young's modulus [Pa]
+constexpr double airStep = 0.5e-3;          // [m]
+constexpr int mostAirSteps = 400;
 
 // Inside, tissue resists on all sides: a rigid disc in an infinite medium is twice as stiff as a punch on its surface
 // (Selvadurai, "The displacement of a rigid disc inclusion embedded in an infinite elastic medium", 1979; nu = 0.5). It
@@ -63,11 +65,24 @@ struct Needle {
 
     std::uint8_t tissueLeft(Vec3 rest) const noexcept { return taken(state.cuts, rest) ? 0 : reader.tissue(rest); }
 
+    bool inAir(Vec3 rest, double outside = 0.0) const noexcept
+    {
+        return reader.tissue(rest) == 0 && model.surface.distance(rest) > outside;
+    }
+
+    // The tissue that a tip is in that gets there. Holes are in what is around them; out of the body it is a voxel away, by
+    // more than its surface and its voxels may differ.
+    std::uint8_t tissueFor(Vec3 rest) const noexcept
+    {
+        const auto here = tissueLeft(rest);
+        const Vec3 voxel = model.tissue->affine().spacing();
+        return here != 0 || inAir(rest, std::max({voxel.x, voxel.y, voxel.z})) ? here : tip.tissue;
+    }
+
     void moveProxy(double way) noexcept
     {
         tip.proxy += way * tool.axis;
-        const auto here = tissueLeft(tip.proxy);
-        tip.tissue = here != 0 ? here : tip.tissue;
+        tip.tissue = tissueFor(tip.proxy);
         state.lobe = way != 0.0 ? lobeOf(model, tip.tissue, tip.proxy) : state.lobe;
     }
 
@@ -97,12 +112,12 @@ struct Needle {
     double cutOn(const DepthLaw& law, double ahead) noexcept
     {
         const double force = law.force(ahead) - state.tipLost.lost();
-        const auto next = tissueLeft(tip.proxy + cutStep * tool.axis);
-        const bool boundary = next != tip.tissue && next != 0;
+        const auto next = tissueFor(tip.proxy + cutStep * tool.axis);
+        const bool boundary = next != tip.tissue;
         const double cutting = row(tip.tissue).cuttingForce;
         const std::uint64_t lobe = lobeOf(model, boundary ? next : tip.tissue, tip.proxy + cutStep * tool.axis);
         const bool wall = !boundary && lobe != state.lobe;
-        const double holds = boundary ? std::max(cutting, row(next).punctureForce)
+        const double holds = boundary ? std::max(cutting, next != 0 ? row(next).punctureForce : 0.0)
                              : wall   ? cutting + wallForce(state.lobe, lobe, row(tip.tissue).wallForce)
                                       : cutting;
         if (force <= holds) {
@@ -114,12 +129,15 @@ struct Needle {
         tip.proxy += step * tool.axis;
         const double left = law.force(ahead - step);
         state.tipLost.renew(ruptures ? left : left - holds);
-        cutPath(state.cuts, from, tip.proxy, model.scene.tool.radius);
+        if (tip.tissue != 0) {
+            cutPath(state.cuts, from, tip.proxy, model.scene.tool.radius);
+        }
         state.lobe = ruptures ? lobe : state.lobe;
-        if (boundary) {
-            tip.tissue = next;
+        if (boundary && next != 0) {
             addEvent(record, {EventKind::puncture, 0xFF, next, force});
         }
+        tip.tissue = next;
+        state.wentThrough = state.wentThrough || next == 0;
         bend(step);
         return step;
     }
@@ -139,7 +157,7 @@ struct Needle {
     // stored never grows by itself.
     Vec3 holdSideways(const DepthLaw& law) noexcept
     {
-        const double k = std::min(stiffestContact, law.linear * (1.0 + std::max(state.inserted, 0.0) / sidewaysDepth));
+        const double k = std::min(stiffestContact, law.linear * (1.0 + std::max(state.inTissue(), 0.0) / sidewaysDepth));
         const double before = std::exchange(state.sideStiffness, k);
         Vec3 away = tool.position - tip.proxy;
         Vec3 across = away - glm::dot(away, tool.axis) * tool.axis;
@@ -159,6 +177,20 @@ struct Needle {
         return -force / way * across;
     }
 
+    // Looked at in steps, which is rare: only where the tip has been out of the body.
+    double lengthInAir() const noexcept
+    {
+        if (!state.wentThrough) {
+            return 0.0;
+        }
+        const int steps = std::clamp(static_cast<int>(std::ceil(state.inserted / airStep)), 1, mostAirSteps);
+        int air = 0;
+        for (int i = 0; i < steps; ++i) {
+            air += inAir(glm::mix(state.entry, tip.proxy, (i + 0.5) / steps)) ? 1 : 0;
+        }
+        return state.inserted * air / steps;
+    }
+
     ShaftHold shaftHold() const noexcept
     {
         ShaftHold hold;
@@ -166,6 +198,9 @@ struct Needle {
         const double piece = std::max(state.inserted, 0.0) / shaftSamples;
         for (int i = 0; i < shaftSamples; ++i) {
             const Vec3 at = glm::mix(state.entry, tip.proxy, (i + 0.5) / shaftSamples);
+            if (state.wentThrough && inAir(at)) {
+                continue;
+            }
             const auto& tissue = row(tissueLeft(at));
             hold.sliding += piece * tissue.frictionPerMetre;
             hold.stiction += piece * std::max(tissue.frictionPerMetre, tissue.stictionPerMetre);
@@ -187,8 +222,7 @@ struct Needle {
     // @param advance  of the proxy along the needle in this tick [m]
     double shaftFriction(double advance) noexcept
     {
-        const double depth = glm::dot(tool.position - state.entry, tool.axis);
-        const double way = depth - std::exchange(state.depth, depth);
+        const double way = glm::dot(tool.position - std::exchange(state.last, tool.position), tool.axis);
         const double blend = 1.0 - 1.0 / (1.0 + 2.0 * std::numbers::pi * speedBand * dt);
         state.speed += blend * (way / dt - state.speed);
         const ShaftHold hold = shaftHold();
@@ -230,7 +264,7 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
     NeedleState& needle = tip.needle;
     tip.phase = Phase::inserted;
     needle = NeedleState{.entry = tip.proxy, .tipLost = std::exchange(tip.lost, {}), .cuts = needle.cuts};
-    needle.depth = glm::dot(tool.position - tip.proxy, tool.axis);
+    needle.last = tool.position;
     needle.lobe = lobeOf(model, tip.tissue, tip.proxy);
     const Vec3 other = std::abs(tool.axis.x) < 0.7 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
     const Vec3 right = glm::normalize(glm::cross(tool.axis, other));
@@ -249,10 +283,14 @@ Vec3 moveNeedle(const SessionModel& model, const volume::Tissue::Reader& reader,
     const double ahead = needle.cut(law);
     const double advance = glm::dot(tip.proxy, tool.axis) - before;
     const Vec3 sideways = needle.holdSideways(law);
-    state.inserted = glm::dot(tip.proxy - state.entry, tool.axis);
+    // A needle that turns about its tip keeps its length inside.
+    const Vec3 inside = tip.proxy - state.entry;
+    const double along = glm::dot(inside, tool.axis);
+    state.inserted = along < 0.0 ? along : glm::length(inside);
     if (state.inserted < 0.0) {
         return Vec3(0.0);
     }
+    state.through = needle.lengthInAir();
     const double pushed = law.force(ahead);
     const double atTip = std::max(pushed - state.tipLost.lost(), 0.0);
     state.tipLost.hold(pushed, relaxationOf(model, tip.tissue), dt);

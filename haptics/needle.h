@@ -12,8 +12,10 @@ struct TipState;
 /// A needle that is inside, and what needles have left behind.
 struct NeedleState {
     Vec3 entry{0.0};               // where it went in, at rest [m]
-    double inserted = 0;           // length of the shaft inside, at rest [m]
-    double depth = 0;              // of the tool's tip from `entry` along the needle, in the tick before [m]
+    double inserted = 0;           // length of the shaft from `entry` to the tip, at rest [m]
+    double through = 0;            // of it in air, where the needle went out of the tissue again [m]
+    bool wentThrough = false;      // its tip has been in air since `entry`
+    Vec3 last{0.0};                // the tool's tip in the tick before [m]
     double speed = 0;              // of the shaft along the needle, low-passed [m/s]
     double shaftForce = 0;         // of the shaft on the tissue around it, along the needle [N]
     double shaftStiffness = 0;     // of that tissue [N/m]
@@ -28,6 +30,8 @@ struct NeedleState {
 
     /// How far the tissue is carried along with the shaft [m].
     double drag() const noexcept { return shaftStiffness > 0.0 ? shaftForce / shaftStiffness : 0.0; }
+    /// Length of the shaft in tissue, at rest [m].
+    double inTissue() const noexcept { return inserted - through; }
 };
 
 /// The needle breaks into the tissue at the proxy.
@@ -37,9 +41,9 @@ void enterNeedle(const SessionModel& model, const DeviceSample& tool, TipState& 
 /// Returns the force on the hand [N]; leaves `tip.needle.inserted` negative when it is out.
 ///
 /// Cutting: the tip's force stays at the cutting force of the tissue, and a boundary to another tissue holds until that
-/// one's puncture force is reached, an inner wall until what it has beyond the cutting force is. Where it was cut before
-/// nothing holds. What a rupture sets free goes into the tissue: the proxy catches up with the tip, and the hand's force
-/// only falls.
+/// one's puncture force is reached, an inner wall until what it has beyond the cutting force is. Where it was cut before,
+/// and in air, nothing holds. What a rupture sets free goes into the tissue: the proxy catches up with the tip, and the
+/// hand's force only falls.
 ///
 /// Friction: Karnopp's model with the velocity window of Okamura, Simone and O'Leary, "Force modeling for needle insertion
 /// into soft tissue", IEEE Trans. Biomed. Eng. 51, 2004. A shaft that sticks carries the tissue with it against that

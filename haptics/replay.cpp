@@ -34,6 +34,11 @@ ReplayDevice::ReplayDevice(const Record& record)
 
 DeviceSample ReplayDevice::read() noexcept
 {
+    if (finished()) {  // who reads on has the last, as of a device that stands
+        DeviceSample last = samples_.empty() ? DeviceSample{} : samples_.back();
+        last.fresh = false;
+        return last;
+    }
     return samples_[next_++];
 }
 

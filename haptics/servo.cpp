@@ -194,6 +194,7 @@ ServoTiming runServo(Device& device, Simulation& simulation, const ServoOptions&
             stale = std::min(stale + 1, longestStale);
         }
     }
+    device.write(Vec3(0.0));
     return timing;
 }
 

@@ -159,7 +159,7 @@ const TickRecord& Simulation::tick(const DeviceSample& device) noexcept
     record_.proxy = tip_.proxy;
     record_.phase = tip_.phase;
     record_.tissue = tip_.tissue;
-    record_.inserted = tip_.needle.inserted;
+    record_.inserted = tip_.needle.inTissue();
     record_.deflection = tool_.position - hand_.position;
     record_.tissueForce = tissue;
     record_.basic = sent.basic;

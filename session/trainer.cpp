@@ -107,6 +107,9 @@ struct Trainer::Impl {
         };
         options.servo.pause.standing = [this](bool elsewhere) {
             broadcast.stand(elsewhere ? channel::Standing::toolElsewhere : channel::Standing::paused);
+            if (broadcast.torn()) {
+                EndInOrder::asked() = true;
+            }
         };
         const RunOptions run{options.servo, recorder ? &*recorder : nullptr, &EndInOrder::asked()};
         timing = session.run(*device, run, [this](const TickRecord& record, const ServoTiming& soFar) {

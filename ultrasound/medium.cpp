@@ -71,9 +71,10 @@ void Medium::refine(const channel::Scenery& scenery, std::span<const std::uint8_
     int factor = 1;
     while (factor < 3 && grid.spacing / factor > fineEnough && countOf((factor + 1) * sizeOf(grid)) <= affordable)
         ++factor;
-    origin_ = channel::vec(grid.origin);
+    // As many to each voxel as to the next: between two voxels a node would always belong to the upper one.
     spacing_ = grid.spacing / factor;
-    size_ = factor * (sizeOf(grid) - 1) + 1;
+    origin_ = channel::vec(grid.origin) - 0.5 * (factor - 1) * spacing_;
+    size_ = factor * sizeOf(grid);
     labels_.resize(countOf(size_));
     channel::Scenery still = scenery;
     still.lattice = {{1, 1, 1}, 0, grid.origin, grid.spacing};  // nothing of it is asked for

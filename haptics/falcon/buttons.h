@@ -26,6 +26,29 @@ private:
     bool begun_ = false;
 };
 
+/// One button for what reads it all the time: it changes once all readings have said so for a while.
+class SteadyButton {
+public:
+    explicit SteadyButton(double settled = Presses::settled) : settled_(settled) {}
+    /// @param down    of a reading
+    /// @param period  since the one before [s]
+    /// @returns       whether it is down
+    bool take(bool down, double period) noexcept
+    {
+        since_ = down == down_ ? 0.0 : since_ + period;
+        if (since_ >= settled_) {
+            down_ = down;
+            since_ = 0.0;
+        }
+        return down_;
+    }
+
+private:
+    double settled_;    // [s]
+    double since_ = 0;  // [s]
+    bool down_ = false;
+};
+
 /// "right", "forward", "centre" or "left".
 /// @param button  one of buttonRight, ...
 std::string_view nameOf(std::uint8_t button) noexcept;

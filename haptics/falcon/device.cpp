@@ -36,8 +36,9 @@ DeviceSample FalconDevice::read() noexcept
     sample.fresh = driver_->now() - pose_.time <= fresh;
     const auto down = [this](std::uint8_t button) { return (pose_.buttons & button) != 0U; };
     sample.buttons = down(buttonCentre) ? buttonDeadMan : 0U;
-    sample.buttons |= down(buttonForward) ? buttonFire : 0U;
-    sample.buttons |= down(buttonRight) ? buttonMark : 0U;
+    // A packet has no checksum, and contacts bounce: neither may fire the gun.
+    sample.buttons |= fire_.take(down(buttonForward), period_) ? buttonFire : 0U;
+    sample.buttons |= mark_.take(down(buttonRight), period_) ? buttonMark : 0U;
     leftHeld_ = down(buttonLeft) ? leftHeld_ + period_ : 0.0;
     ending_ = ending_ || leftHeld_ >= endHeld;
     return sample;

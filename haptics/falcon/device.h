@@ -1,6 +1,7 @@
 #pragma once
 
 #include <haptics/device.h>
+#include <haptics/falcon/buttons.h>
 #include <haptics/falcon/driver.h>
 #include <haptics/session_model.h>
 
@@ -39,6 +40,7 @@ private:
     GripPose pose_;
     Vec3 origin_{0.0};  // grip at the start, Falcon's frame [m]
     bool started_ = false;
+    SteadyButton fire_, mark_;
     double leftHeld_ = 0;  // [s]
     bool ending_ = false;
 };

@@ -237,7 +237,7 @@ void Emulator::answer(const Command& command)
             }
         }
     }
-    for (const std::uint8_t byte : encode(Reading{count_, hand.buttons, homed_})) {
+    for (const std::uint8_t byte : encode(Reading{count_, hand.buttons, mishaps.homeless ? std::uint8_t{0} : homed_})) {
         reply(byte, thinking + mishaps.latency);
     }
     ++packets_;

@@ -18,7 +18,7 @@ struct Mishaps {
     bool mute = false;         // nothing but status comes back
     bool stalled = false;      // the processor stops answering packets; torque stays
     bool frozen = false;       // encoders keep their counts
-    bool homeless = false;     // no leg ever finds its zero
+    bool homeless = false;     // no leg finds its zero, and readings say so
     bool neverRuns = false;    // the firmware is taken and does not begin
     bool leadingZero = false;  // before the loader's greeting
     bool wrongGreeting = false;

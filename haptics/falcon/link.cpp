@@ -237,7 +237,7 @@ bool Link::accept(const Reading& reading) noexcept
 {
     const double now = wire_.now();
     // Before the homing is done counts may begin anew at any time.
-    const bool tied = heard_ > 0.0 && reading_.homed == allHomed;
+    const bool tied = heard_ > 0.0 && wasHomed_;
     if (tied && !follows(reading_.count, reading.count, now - heard_)) {
         ++counts_.implausible;
         const bool again = candidates_ > 0 && follows(candidate_.count, reading.count, 0.0);
@@ -250,7 +250,7 @@ bool Link::accept(const Reading& reading) noexcept
     }
     candidates_ = 0;
     candidate_ = reading;
-    const bool begins = heard_ == 0.0 || (reading_.homed != allHomed && reading.homed == allHomed);
+    const bool begins = heard_ == 0.0 || (!wasHomed_ && reading.homed == allHomed);
     if (begins && reading.homed != allHomed) {
         least_ = most_ = reading.count;
     }
@@ -264,6 +264,9 @@ bool Link::accept(const Reading& reading) noexcept
         if (posture_) {
             pose_ = {posture_->position, reading.buttons, now, posture_->margin};
         }
+        wasHomed_ = true;
+    } else {
+        posture_.reset();
     }
     return true;
 }

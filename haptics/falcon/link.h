@@ -105,7 +105,8 @@ private:
     GripPose pose_;
     std::optional<Posture> posture_;
     Command command_;
-    double sent_ = 0;          // [s]
+    double sent_ = 0;  // [s]
+    bool wasHomed_ = false;
     double forcesOff_ = 0;     // when they were off last [s]
     Triple least_{}, most_{};  // counts since the start
     Reading still_;            // the counts, and since when they stand still [s]

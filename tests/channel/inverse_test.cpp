@@ -130,6 +130,18 @@ TEST(Inverse, UndoesTheDragOfANeedle)
         expectInverse(dragged(drag), 2);
 }
 
+// What another process has written wrongly costs no memory.
+TEST(Inverse, ANodeThatIsFarAwayIsSearchedWithoutAnIndex)
+{
+    for (const float far : {2e3F, 5e4F}) {
+        const Field field([=](glm::vec3 p) { return p == glm::vec3(13) ? glm::vec3(far, -far, far) : glm::vec3(0); });
+        EXPECT_GT(field.inverse.folds(), 0U);
+        glm::vec3 shift(0);
+        field.inverse.follow(glm::vec3(3), shift);
+        EXPECT_LT(glm::length(shift), halfVoxel);
+    }
+}
+
 TEST(Inverse, UndoesRandomDeformations)
 {
     int folded = 0;

@@ -87,5 +87,22 @@ TEST(FalconButtons, AFalconThatIsGoneIsNotWatchedForEver)
     EXPECT_LT(rig.wire.now(), begun + enough);
 }
 
+// One packet in a hundred that lies, and contacts that bounce for 15 ms, are one press.
+TEST(FalconButtons, ASteadyButtonIsPressedOnce)
+{
+    SteadyButton button;
+    int presses = 0;
+    bool before = false;
+    for (int tick = 0; tick < 1000; ++tick) {
+        const bool bounces = tick >= 400 && tick < 415;
+        const bool down = tick % 100 == 50 ? tick < 400 : bounces ? tick % 4 < 2 : tick >= 415 && tick < 800;
+        const bool now = button.take(down, 1e-3);
+        presses += now && !before ? 1 : 0;
+        before = now;
+    }
+    EXPECT_EQ(presses, 1);
+    EXPECT_FALSE(before);
+}
+
 }  // namespace
 }  // namespace palpate::falcon

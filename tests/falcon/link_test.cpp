@@ -147,6 +147,26 @@ TEST(FalconLink, AFaultThatPassesIsOvercomeByReopening)
     }
 }
 
+// While it says that its legs are not at home nobody knows where the grip is: no force, and none at once when it is back.
+TEST(FalconLink, AFalconThatIsNotHomedAnyMoreHasNoForce)
+{
+    Rig rig(LinkOptions{});
+    rig.device.makeReady();
+    rig.link.connect(rig.stop);
+    const auto exchange = [&](double seconds) {
+        for (const double until = rig.wire.now() + seconds; rig.wire.now() < until;) {
+            rig.link.exchange({{0, 0, 3}, rig.wire.now(), 1});
+        }
+        return glm::length(rig.device.motorForce());
+    };
+    EXPECT_GT(exchange(1.0), 2.5);
+    rig.device.mishaps.homeless = true;
+    EXPECT_LT(exchange(0.02), 0.05);
+    rig.device.mishaps.homeless = false;
+    EXPECT_LT(exchange(0.02), 1.0);
+    EXPECT_GT(exchange(1.0), 2.5);
+}
+
 TEST(FalconLink, UserCanInterruptTheWait)
 {
     Rig rig;

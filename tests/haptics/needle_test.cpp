@@ -69,6 +69,55 @@ TEST(Needle, ForceAgainstDepthShowsEveryBoundary)
     EXPECT_EQ(names, (std::vector<std::string>{"skin", "fat", "gland", "idc_high_grade", "gland", "muscle"}));
 }
 
+// Two slabs of fat of 10 mm with 20 mm of air between: beyond the first only friction holds, over what is in it, and the
+// second is pierced like the first.
+TEST(Needle, BeyondTheFarSideOnlyTheShaftIsHeld)
+{
+    const auto model = tests::boxOf(
+        [](Vec3 p) {
+            const bool target = p.x > 20e-3 && p.y > 50e-3;
+            return std::string(target ? "bone" : p.y < 10e-3 || (p.y > 30e-3 && p.y < 40e-3) ? "fat" : "air");
+        },
+        "bone", tests::chainmailOnly);
+    const auto& fat = rowOf(model, "fat");
+    constexpr double speed = 20e-3, slab = 10e-3;
+    LoneNeedle needle(model);
+    int punctures = 0;
+    const auto count = [&](Vec3, Vec3) { punctures += needle.punctures(); };
+    needle.go({0, -2e-3, 0}, {0, 26e-3, 0}, speed, count);
+    EXPECT_EQ(punctures, 1);
+    EXPECT_EQ(needle.tip.tissue, 0);
+    EXPECT_NEAR(needle.tip.needle.inTissue(), slab, 0.5e-3);
+    const double held = slab * (fat.frictionPerMetre + fat.frictionDamping * speed);
+    EXPECT_NEAR(-needle.at({0, 26.02e-3, 0}).y, held, 0.15 * held);
+    needle.go({0, 26e-3, 0}, {0, 48e-3, 0}, speed, count);
+    EXPECT_EQ(punctures, 2);
+    EXPECT_NEAR(needle.tip.needle.inTissue(), 2.0 * slab, 0.8e-3);
+    needle.go({0, 48e-3, 0}, {0, 5e-3, 0}, speed, count);
+    EXPECT_EQ(punctures, 2);
+    EXPECT_EQ(needle.tip.tissue, *model.tissue->table().find("fat"));
+    EXPECT_NEAR(needle.tip.needle.inTissue(), needle.tip.proxy.y, 0.3e-3);
+}
+
+// A needle that turns about its resting tip is as deep as before, and nothing pulls at its shaft. The tip's own push turns
+// with it.
+TEST(Needle, ATurnAboutTheTipMovesNothingAlongTheShaft)
+{
+    const auto model = blockOf("fat");
+    LoneNeedle needle(model);
+    const Vec3 deep(0, 30e-3, 0);
+    needle.go({0, -2e-3, 0}, deep, 0.02);
+    const double inserted = needle.tip.needle.inserted, before = needle.at(deep).y;
+    double most = 0.0;
+    for (int i = 0; i <= 1000; ++i) {
+        const double angle = std::numbers::pi / 6.0 * i / 1000.0;
+        const Vec3 axis(std::sin(angle), std::cos(angle), 0.0);
+        most = std::max(most, std::abs(glm::dot(needle.at(deep, axis), axis) - before));
+        EXPECT_NEAR(needle.tip.needle.inserted, inserted, 0.02e-3) << angle;
+    }
+    EXPECT_LT(most, 0.1 * std::abs(before));
+}
+
 // Bovine liver as Simone and Okamura (2002) and Okamura et al. (2004) found it, in the figures of docs/score.md's sources:
 // 0.0020 z + 0.0023 z^2 N before the capsule breaks, then about 0.94 N and 10 to 19 N per metre; a model is good when it is
 // within 0.2 N (Barnett 2015). Their liver is 2 kPa under the depth law for a needle 1 mm across.
