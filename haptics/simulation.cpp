@@ -116,6 +116,12 @@ Simulation::Simulation(const SessionModel& model, const SimulationOptions& optio
       stabiliserOptions_{options.device ? *options.device : deviceParameters(model.scene.device), options.period,
                          model.scene.forceCap}
 {
+    // Until there is a pose, the tool is outside: before the planned line, farther away than the body is wide.
+    const volume::Box body = model.tissue->box();
+    const Vec3 inward =
+        model.approach.isPlanned ? glm::normalize(model.approach.aim - model.approach.entry) : Vec3(0, 1, 0);
+    record_.device.axis = inward;
+    record_.device.position = model.approach.entry - glm::distance(body.low, body.high) * inward;
     placeProbe();
     if (level_ == datasets::ModelLevel::elastic) {
         const double touched = touchedByAll(model, probe_.tools());

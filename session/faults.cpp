@@ -190,6 +190,10 @@ haptics::DeviceSample FaultyDevice::read() noexcept
         advance(gapAfter(faults_, tick_ - 1));
     }
     ++tick_;
+    if (device_->finished()) {
+        last_.fresh = false;
+        return last_;
+    }
     haptics::DeviceSample sample = device_->read();
     if (active(FaultKind::unplug) != nullptr) {
         last_.fresh = false;

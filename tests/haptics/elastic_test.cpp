@@ -61,6 +61,28 @@ std::vector<DeviceSample> pressAndDrag(double depth, double radius = ballRadius)
     return samples;
 }
 
+// A ball that is lifted while the tissue is not at rest, and goes on beyond the body on each side: where the lattice ends,
+// and the windows that follow it go on.
+TEST(ElasticTick, AToolBesideTheBodyIsBesideTheLatticeToo)
+{
+    const auto model =
+        tests::modelOf(tests::sphereOnBlock("structure = \"base\"\naim_mm = [0, 55, 0]\n[model]\nrelaxation = "
+                                            "true\n[volume.parameters]\ntumours = 0\nwidth_mm = 250\n"));
+    for (const Vec3 way : {Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 0, 1), Vec3(0, 1, 0)}) {
+        Simulation simulation(model);
+        for (int i = 0; i < 300; ++i) {
+            simulation.tick(at(4e-3 * std::min(1.0, i / 100.0)));
+        }
+        DeviceSample sample = at(-40e-3);
+        for (int i = 0; i < 300; ++i) {
+            sample.position += 1e-3 * way;
+            sample.position.y = way.y > 0.0 && i > 100 ? sample.position.y : std::min(sample.position.y, -40e-3);
+            sample.position.x = way.y > 0.0 ? 150e-3 : sample.position.x;
+            ASSERT_TRUE(std::isfinite(glm::length(simulation.tick(sample).total))) << i;
+        }
+    }
+}
+
 // Hertz, and the first term of what a base at depth H adds: F = 4/3 E / (1 - nu^2) sqrt(R) d^1.5 (1 - 2 a0 chi / pi) with
 // chi = sqrt(R d) / H. Within 10 %: the ball is 2 to 4 % of its depth inside the tissue.
 // Source: E. K. Dimitriadis and others, "Determination of elastic moduli of thin layers of soft material using the atomic

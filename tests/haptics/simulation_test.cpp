@@ -430,6 +430,21 @@ TEST(Simulation, ImpossiblePoseSwitchesTheForceOff)
     }
 }
 
+// Before there is a pose the tool is nowhere near the body, not at the patient's origin, which is in it.
+TEST(Simulation, AnImpossibleFirstPoseTouchesNothing)
+{
+    Simulation simulation(tests::blockSphere());
+    auto sample = at({0, 20e-3, 0});
+    sample.position.x = std::numeric_limits<double>::quiet_NaN();
+    for (int i = 0; i < 5; ++i) {
+        const TickRecord& r = simulation.tick(sample);
+        EXPECT_TRUE(r.faulted);
+        EXPECT_EQ(r.phase, Phase::free);
+        EXPECT_EQ(r.tissueForce, Vec3(0.0));
+        EXPECT_EQ(r.total, Vec3(0.0));
+    }
+}
+
 // Turning DFFB off changes the additional channel and nothing else: with the same poses the basic force, events, phases and
 // tissue of every tick are the same, and so are the displaced nodes, the distances and the core. In every tick the parts
 // make the total (equation 1).

@@ -136,5 +136,27 @@ TEST(Faults, TheHandGoesOnThroughAGapAndADelay)
     EXPECT_DOUBLE_EQ(late.at(104).position.y, 0.111);
 }
 
+// A record that a gap takes beyond its end.
+TEST(Faults, AGapBeyondTheEndOfARecordIsTheEnd)
+{
+    struct Short final : haptics::Device {
+        haptics::DeviceSample read() noexcept override
+        {
+            haptics::DeviceSample sample;
+            sample.position.y = 1e-3 * ++reads;
+            return sample;
+        }
+        void write(Vec3) noexcept override {}
+        bool finished() const noexcept override { return reads >= 20; }
+        int reads = 0;
+    };
+    FaultyDevice faulty(std::make_unique<Short>(), parseFaults("gap=50ms@5ms"));
+    for (int i = 0; i < 10; ++i) {
+        EXPECT_LE(faulty.read().position.y, 20.5e-3);
+    }
+    EXPECT_TRUE(faulty.finished());
+    EXPECT_FALSE(faulty.read().fresh);
+}
+
 }  // namespace
 }  // namespace palpate::session
