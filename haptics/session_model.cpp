@@ -1,6 +1,7 @@
 #include <haptics/session_model.h>
 
 #include <chainmail/deformation.h>
+#include <chainmail/loose_pieces.h>
 #include <haptics/posed.h>
 #include <haptics/probe_placement.h>
 
@@ -84,9 +85,10 @@ std::shared_ptr<const chainmail::ElasticBody> elasticOf(const datasets::Scene& s
         return nullptr;
     }
     const double presses = scene.tool.kind == datasets::ToolKind::needle ? 0.0 : scene.tool.radius;
-    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(cells, tissue.materialOn(cells, surface),
-                                                                           surface, scene.model.elastic.poissonCap, presses,
-                                                                           scene.model.relaxation, tissue.support()));
+    auto materials = tissue.materialOn(cells, surface);
+    chainmail::holdLoosePieces(cells, materials, tissue.support());
+    return std::make_shared<chainmail::ElasticBody>(chainmail::elasticBody(
+        cells, materials, surface, scene.model.elastic.poissonCap, presses, scene.model.relaxation, tissue.support()));
 }
 
 bool anyWalls(const volume::Tissue& tissue)
