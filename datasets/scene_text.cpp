@@ -459,6 +459,15 @@ std::optional<Scene> builtInScene(const std::string& name)
     return text.empty() ? std::nullopt : std::optional(parseScene(std::string(text), name));
 }
 
+std::string volumeText(const Scene& scene)
+{
+    Scene alone;
+    alone.source = scene.source;
+    alone.tissues = scene.tissues;
+    alone.tissueChanges = scene.tissueChanges;
+    return sceneText(alone);
+}
+
 std::string sceneText(const Scene& scene)
 {
     std::string out = fmt::format("name = {}\n", tomlString(scene.name));

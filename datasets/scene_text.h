@@ -33,5 +33,7 @@ std::string gravityText(const GravitySpec& gravity);
 
 /// A scene as TOML text with every field, for scenes that no one wrote. parseScene() reads it back.
 std::string sceneText(const Scene& scene);
+/// What the volume of a scene follows from, as text: scenes with the same text have the same sceneVolume().
+std::string volumeText(const Scene& scene);
 
 }  // namespace palpate::datasets

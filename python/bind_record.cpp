@@ -114,7 +114,10 @@ py::dict resultsOf(const RecordBox& box)
 std::shared_ptr<Modelled> modelOfRecord(const RecordBox& box)
 {
     const py::gil_scoped_release others;
-    return std::make_shared<Modelled>(session::reopenSession(box.file, box.record.info()), box.record.info().sceneOrigin);
+    auto made =
+        std::make_shared<Modelled>(session::reopenSession(box.file, box.record.info()), box.record.info().sceneOrigin);
+    made->given = made->model.posture ? nullptr : made->model.tissue;
+    return made;
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <python/scene_box.h>
 
+#include <datasets/insert.h>
 #include <datasets/scene_text.h>
 #include <datasets/tables.h>
 #include <haptics/arm.h>
@@ -53,6 +54,38 @@ sweep::KeyValue keyValueOf(const std::string& key, const py::object& value)
 }
 #endif
 
+#ifdef PALPATE_SWEEP
+// What a volume in memory cannot follow: its tissue table is left out.
+std::string sourceText(datasets::Scene scene)
+{
+    scene.tissueChanges.clear();
+    return datasets::volumeText(scene);
+}
+
+// A box with another scene. A loaded volume that does not follow from it is dropped, so that it is made again; one in
+// memory gets the scene's tissue table.
+SceneBox withScene(SceneBox box, datasets::Scene scene)
+{
+    const datasets::Scene before = std::exchange(box.scene, std::move(scene));
+    if (!box.volume || datasets::volumeText(before) == datasets::volumeText(box.scene)) {
+        return box;
+    }
+    if (!box.inMemory) {
+        box.volume = nullptr;
+        return box;
+    }
+    if (sourceText(before) != sourceText(box.scene)) {
+        throw std::runtime_error(
+            "volume: the volume of this scene is in memory alone and stays as it is: make another one, or save it "
+            "(Volume.save) and make the scene of that file");
+    }
+    auto table = datasets::withChanges(box.volume->table(), box.scene.tissueChanges);
+    const py::gil_scoped_release others;
+    box.volume = std::make_shared<const volume::Tissue>(datasets::withTable(*box.volume, std::move(table)));
+    return box;
+}
+#endif
+
 SceneBox changed(const SceneBox& box, const py::dict& tables)
 {
 #ifdef PALPATE_SWEEP
@@ -68,7 +101,7 @@ SceneBox changed(const SceneBox& box, const py::dict& tables)
         }
     }
     try {
-        return {sweep::sceneWith(box.scene, settings), box.origin, box.volume, box.inMemory};
+        return withScene(box, sweep::sceneWith(box.scene, settings));
     } catch (const std::runtime_error& e) {
         throwSceneError(e.what());
     }
@@ -122,6 +155,14 @@ py::dict latticeOf(const Modelled& modelled)
     return out;
 }
 
+// The file that holds the very volume of a model; empty: none does.
+std::filesystem::path fileOf(const Modelled& modelled)
+{
+    const datasets::Scene& scene = modelled.model.scene;
+    const bool asInFile = scene.source.inserts.empty() && scene.tissueChanges.empty() && !modelled.model.posture;
+    return asInFile && !modelled.inMemory ? scene.source.file : std::filesystem::path();
+}
+
 void bindModel(py::module_& module)
 {
     py::class_<Modelled, std::shared_ptr<Modelled>>(module, "Model")
@@ -129,12 +170,13 @@ void bindModel(py::module_& module)
              py::arg("scene"))
         .def_property_readonly("scene",
                                [](const Modelled& m) {
-                                   return SceneBox{m.model.scene, m.info.sceneOrigin, m.model.tissue, m.inMemory};
+                                   return SceneBox{m.model.scene, m.info.sceneOrigin, m.given, m.inMemory};
                                })
         .def_property_readonly("volume",
                                [](const Modelled& m) {
                                    auto box = std::make_unique<VolumeBox>();
                                    box->tissue = m.model.tissue;
+                                   box->file = fileOf(m);
                                    return box;
                                })
         .def_property_readonly("structures", structuresOf)
@@ -209,7 +251,8 @@ std::shared_ptr<const Modelled> modelOf(const py::object& what)
     SceneBox box = sceneOf(what);
     const py::gil_scoped_release others;
     auto tissue = box.volume ? box.volume : std::make_shared<const volume::Tissue>(datasets::sceneVolume(box.scene));
-    auto made = std::make_shared<Modelled>(haptics::buildModel(std::move(box.scene), std::move(tissue)), box.origin);
+    auto made = std::make_shared<Modelled>(haptics::buildModel(std::move(box.scene), tissue), box.origin);
+    made->given = std::move(tissue);
     made->inMemory = box.inMemory;
     return made;
 }

@@ -40,7 +40,7 @@ volume::TissueTable tableOf(const Path& file)
 std::unique_ptr<VolumeBox> open(const Path& file)
 {
     const py::gil_scoped_release others;
-    return boxed(session::loadVolume(file), file);
+    return boxed(session::loadVolume(file), std::filesystem::absolute(file));
 }
 
 std::unique_ptr<VolumeBox> phantom(const std::string& name, std::uint64_t seed, double voxel, const Path& tissues,
@@ -289,7 +289,7 @@ void bindVolume(py::module_& module)
             [](VolumeBox& box, const Path& file) {
                 const py::gil_scoped_release others;
                 box.tissue->save(file);
-                box.file = file;
+                box.file = std::filesystem::absolute(file);
             },
             py::arg("file"))
         .def_property_readonly("labels",

@@ -27,7 +27,8 @@ struct Modelled {
 
     haptics::SessionModel model;
     haptics::SessionInfo info;
-    bool inMemory = false;  // its volume is in no file, so that a record could not be replayed
+    std::shared_ptr<const volume::Tissue> given;  // the scene's volume, before gravity; null: not loaded
+    bool inMemory = false;                        // its volume is in no file, so that a record could not be replayed
 };
 
 /// One session. Its methods may be called from any thread, from one at a time.

@@ -55,11 +55,7 @@ CaseRunner::~CaseRunner() = default;
 
 std::shared_ptr<const volume::Tissue> CaseRunner::volumeOf(const datasets::Scene& scene)
 {
-    datasets::Scene alone;
-    alone.source = scene.source;
-    alone.tissues = scene.tissues;
-    alone.tissueChanges = scene.tissueChanges;
-    return kept(volumes_, datasets::sceneText(alone), modelsKept,
+    return kept(volumes_, datasets::volumeText(scene), modelsKept,
                 [&] { return std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene)); });
 }
 

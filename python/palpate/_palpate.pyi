@@ -126,7 +126,7 @@ class Volume:
         """Rows of the tissue table: name, role, youngs_modulus [Pa], poisson_ratio, density [kg/m^3], puncture_force [N], fixed, source."""
     @property
     def file(self) -> str | None:
-        """That it was read from or saved to; None: it is in memory alone."""
+        """That it was read from or saved to, absolute; None: it is in memory alone."""
 
 class Scene:
     """What a session is of: volume, tool, tissue model, target. docs/scenes.md has all keys."""
@@ -145,7 +145,8 @@ class Scene:
     def for_volume(volume: Volume | _Path, target: str = "") -> Scene:
         """The standard biopsy of a volume's first tumour, or of the structure `target`. Raises palpate.Error."""
     def changed(self, keys: Mapping[str, Any]) -> Scene:
-        """The scene with keys set, written with dots or nested: {"tissue.fat.youngs_kpa": 10, "tool": {"radius_mm": 7}}.
+        """The scene with keys set, written with dots or nested: {"tissue.fat.youngs_kpa": 10, "tool": {"radius_mm": 7}}. Where they
+        change the volume, it is read or made again. One in memory alone follows keys of tissues, and no others.
         Raises palpate.SceneError."""
     def to_dict(self) -> dict[str, Any]: ...
     @property
@@ -166,7 +167,8 @@ class Model:
     @property
     def scene(self) -> Scene: ...
     @property
-    def volume(self) -> Volume: ...
+    def volume(self) -> Volume:
+        """In the scene's posture. Its `file` is None where the file holds another body: before gravity, inserts or keys of tissues."""
     @property
     def structures(self) -> list[str]:
         """Target first, then the vital structures: the columns of `distance`."""

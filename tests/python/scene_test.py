@@ -55,6 +55,78 @@ class Scenes(InFolder):
             palpate.Scene.parse("name = ")
 
 
+def lump_in_fat():
+    """A volume in memory, 66 x 45 x 66 mm, with its skin at y = 0."""
+    labels = np.zeros((44, 32, 44), np.uint16)
+    labels[5:-5, 2:-2, 5:-5] = 1
+    labels[19:25, 12:18, 19:25] = 2
+    affine = np.diag([1.5e-3, 1.5e-3, 1.5e-3, 1.0])
+    affine[:3, 3] = -33e-3, -3e-3, -33e-3
+    return palpate.Volume.from_numpy(labels, affine, {1: "fat", 2: ("lump", "idc_high_grade")})
+
+
+def stiffness(scene):
+    """Young's modulus of fat in the scene's model [Pa]."""
+    return palpate.Model(scene).volume.stiffness[22, 8, 22]
+
+
+class ChangedVolumes(InFolder):
+    quick = {"model.level": "spring"}
+
+    def test_a_volume_that_is_loaded_follows_the_keys_that_change_it(self):
+        volume = lump_in_fat()
+        volume.save(self.folder / "v.vdb")
+        file = palpate.Scene(self.folder / "v.vdb").changed(self.quick)
+        scenes = {
+            "file": file,
+            "model": palpate.Model(file).scene,
+            "open": palpate.Scene(palpate.Volume.open(self.folder / "v.vdb")).changed(self.quick),
+            "memory": palpate.Scene.for_volume(lump_in_fat()).changed(self.quick),
+        }
+        for name, scene in scenes.items():
+            with self.subTest(name):
+                soft = scene.changed({"tissue.fat.youngs_kpa": 30})
+                self.assertAlmostEqual(stiffness(soft), 30e3, delta=1)
+                self.assertAlmostEqual(stiffness(soft.changed({"tissue.fat.youngs_kpa": 100})), 100e3, delta=1)
+                self.assertAlmostEqual(stiffness(palpate.Scene(soft, tissue={"fat": {"youngs_kpa": 50}})), 50e3, delta=1)
+        self.assertAlmostEqual(stiffness(palpate.Scene(str(self.folder / "v.vdb"), **{
+            "tissue": {"fat": {"youngs_kpa": 40}}, "model": {"level": "spring"}})), 40e3, delta=1)
+
+    def test_a_record_of_a_changed_file_can_be_replayed(self):
+        lump_in_fat().save(self.folder / "v.vdb")
+        scene = palpate.Scene(self.folder / "v.vdb").changed(self.quick).changed({"tissue.fat.youngs_kpa": 100})
+        with palpate.Session(scene, record=self.folder / "r.db") as session:
+            session.run(np.tile([0, -0.02, 0], (5, 1)))
+        self.assertTrue(palpate.Record(self.folder / "r.db").replay()["identical"])
+
+    def test_a_models_phantom_follows_its_parameters(self):
+        coarse = palpate.Model(palpate.Scene("block").changed({"volume.voxel_mm": 4, "model.level": "spring"}))
+        fine = palpate.Model(coarse.scene.changed({"volume.voxel_mm": 3}))
+        np.testing.assert_allclose(fine.volume.spacing, 3e-3)
+
+    def test_keys_that_a_volume_in_memory_cannot_follow_are_refused(self):
+        scene = palpate.Scene.for_volume(lump_in_fat())
+        for keys in ({"volume.file": str(self.folder / "v.vdb")}, {"tissue.nofat.youngs_kpa": 1}):
+            with self.subTest(keys), self.assertRaises(palpate.SceneError):
+                scene.changed(keys)
+
+    def test_a_models_scene_gives_the_model_again_under_gravity(self):
+        keys = {"volume.voxel_mm": 5, "gravity.posture": "supine", "gravity.shape": "prone", "model.level": "spring"}
+        model = palpate.Model(palpate.Scene("breast").changed(keys))
+        again = palpate.Model(model.scene)
+        self.assertEqual(again.hash, model.hash)
+        np.testing.assert_array_equal(again.aim, model.aim)
+
+    def test_a_models_volume_is_of_the_file_that_holds_it(self):
+        file = self.folder / "v.vdb"
+        lump_in_fat().save(file)
+        scene = palpate.Scene(file).changed(self.quick)
+        self.assertEqual(palpate.Model(scene).volume.file, str(file))
+        self.assertIsNone(palpate.Model(scene.changed({"tissue.fat.youngs_kpa": 9})).volume.file)
+        self.assertIsNone(palpate.Model(palpate.Scene.for_volume(lump_in_fat()).changed(self.quick)).volume.file)
+        self.assertIsNone(small_block().volume.file)
+
+
 class Models(InFolder):
     def test_a_volume_in_memory_is_pressed_like_its_file(self):
         labels = np.zeros((44, 34, 44), np.uint16)

@@ -1,4 +1,5 @@
 import gc
+import os
 import unittest
 
 import numpy as np
@@ -94,6 +95,18 @@ class Views(unittest.TestCase):
 
 
 class Files(InFolder):
+    def test_a_file_stays_where_it_is_when_the_working_directory_changes(self):
+        before = os.getcwd()
+        self.addCleanup(os.chdir, before)
+        os.chdir(self.folder)
+        volume = palpate.Volume.from_numpy(cube(), AFFINE, TISSUES)
+        volume.save("v.vdb")
+        opened = palpate.Volume.open("v.vdb")
+        os.chdir(before)
+        for one in (volume, opened):
+            self.assertEqual(one.file, str(self.folder / "v.vdb"))
+            self.assertEqual(palpate.Scene.for_volume(one).to_dict()["volume"]["file"], str(self.folder / "v.vdb"))
+
     def test_a_phantom_is_that_of_the_program(self):
         program("phantom", "layered", "--voxel", "3", "-o", self.folder / "p.vdb")
         theirs = palpate.Volume.open(self.folder / "p.vdb")
