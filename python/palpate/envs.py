@@ -7,6 +7,7 @@
 Where gymnasium is installed, the classes are gymnasium.Env and the spaces are gymnasium.spaces.Box.
 """
 
+import contextlib
 import multiprocessing
 import os
 
@@ -51,16 +52,35 @@ except ImportError:
 
 
 _VITAL_TOUCH = 1 << _palpate.EVENTS.index("vital touch")
-_models = {}  # of scenes by their text: models are constant, and all environments of a process share them
+_models = {}  # models are constant, and the environments of a process share them; the one that was used last is last
+_MODELS_KEPT = 4
 
 
-def _model_of(scene):
-    if isinstance(scene, _palpate.Model):
-        return scene
-    scene = _palpate.Scene(scene)
-    if scene.text not in _models:
-        _models[scene.text] = _palpate.Model(scene)
-    return _models[scene.text]
+def _key_of(source, scene):
+    """What says which model a scene has; None where nothing does: its volume may be in memory alone, or of a file's former
+    content."""
+    volume = scene.to_dict()
+    files = [name for name in (volume.get("tissues"), volume["volume"].get("file")) if name]
+    if files and not isinstance(source, (str, os.PathLike)):
+        return None
+    try:
+        states = [os.stat(name) for name in files]
+    except OSError:
+        return None
+    return scene.text, *((s.st_dev, s.st_ino, s.st_size, s.st_mtime_ns) for s in states)
+
+
+def _model_of(source):
+    if isinstance(source, _palpate.Model):
+        return source
+    scene = _palpate.Scene(source)
+    key = _key_of(source, scene)
+    model = _models.pop(key, None) or _palpate.Model(scene)
+    if key is not None:
+        _models[key] = model
+    while len(_models) > _MODELS_KEPT:
+        del _models[next(iter(_models))]
+    return model
 
 
 class Biopsy(_Env):
@@ -97,12 +117,15 @@ class Biopsy(_Env):
     "score", a dict by the keys of docs/score.md.
 
     Args:
-        scene: a built-in scene, a file, a palpate.Scene or a palpate.Model; of a biopsy, with a needle.
-        max_seconds: of an episode [s].
-        max_speed: of the tip [m/s].
-        entry_error: standard deviation of where the needle is set on the skin, each way across it [m].
+        scene: a built-in scene, a file, a palpate.Volume, a palpate.Scene or a palpate.Model; of a biopsy, with a needle.
+            Environments share the model of a built-in scene, a phantom or an unchanged file. Of a Scene or Volume of a file or
+            in memory each makes its own: give them one Model.
+        max_seconds: of an episode [s], a step at least.
+        max_speed: of the tip [m/s], above 0 and 10 at most.
+        entry_error: standard deviation of where the needle is set on the skin, each way across it [m], 0 to 1.
 
-    Same seed and actions, same episode, bit for bit. Raises palpate.Error for a scene whose tool is no needle.
+    Same seed and actions, same episode, bit for bit. Raises palpate.Error for a scene whose tool is no needle, and
+    ValueError for a number out of its range.
     """
 
     metadata = {"render_modes": ["ultrasound"], "render_fps": 50}
@@ -110,6 +133,13 @@ class Biopsy(_Env):
     lead = 5e-3  # the tip begins so far outside the body [m]
 
     def __init__(self, scene="breast", *, max_seconds=20.0, max_speed=0.05, entry_error=2e-3, render_mode=None):
+        step_seconds = self.ticks_per_step * _palpate.TICK_SECONDS
+        if not step_seconds / 2 < max_seconds < 1e6:
+            raise ValueError(f"max_seconds: has to be a step, {step_seconds:g} s, at least, and below 1e6, not {max_seconds}")
+        if not 0 < max_speed <= 10:
+            raise ValueError(f"max_speed: has to be above 0 and 10 m/s at most, not {max_speed}")
+        if not 0 <= entry_error <= 1:
+            raise ValueError(f"entry_error: has to be 0 to 1 m, not {entry_error}")
         self.model = _model_of(scene)
         tool = self.model.scene.to_dict().get("tool", {})
         if tool.get("kind", "needle") != "needle":
@@ -117,7 +147,7 @@ class Biopsy(_Env):
         if render_mode not in (None, "ultrasound"):
             raise ValueError(f"render_mode: is None or 'ultrasound', not {render_mode!r}")
         self.render_mode = render_mode
-        self.max_steps = int(round(max_seconds / (self.ticks_per_step * _palpate.TICK_SECONDS)))
+        self.max_steps = int(round(max_seconds / step_seconds))
         self.max_speed, self.entry_error = float(max_speed), float(entry_error)
         self.action_space = _Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = _Box(-np.inf, np.inf, (16,), np.float32)
@@ -212,7 +242,7 @@ def _serve(pipe, make, numbers, seed):
         envs = [make() for _ in numbers]
         children = np.random.SeedSequence(seed)
         streams = [np.random.SeedSequence(children.entropy, spawn_key=(n,)) for n in numbers]
-        pipe.send(None)
+        pipe.send(envs[0].action_space.shape)
         while True:
             what, argument = pipe.recv()
             if what == "reset":
@@ -225,8 +255,9 @@ def _serve(pipe, make, numbers, seed):
                 return
     except (EOFError, KeyboardInterrupt):
         pass
-    except Exception as error:  # told to who waits for it
-        pipe.send(error)
+    except Exception as error:  # told to who waits for it, if anybody still does
+        with contextlib.suppress(OSError):
+            pipe.send(error)
 
 
 def _step(env, action):
@@ -237,6 +268,9 @@ def _step(env, action):
     return observation, reward, terminated, truncated, info
 
 
+_ENDED = "a process of the environments has ended: see what it printed"
+
+
 class Vector:
     """Many environments at once, over processes. An episode that ends begins anew by itself; its last observation is in
     infos[i]["final_observation"].
@@ -245,7 +279,8 @@ class Vector:
             observations = envs.reset()
             observations, rewards, terminated, truncated, infos = envs.step(actions)     # actions: 8 x 4
 
-    The episodes of environment i follow from the seed and i alone, whatever the number of processes.
+    The episodes of environment i follow from the seed and i alone, whatever the number of processes. An exception while the
+    processes work, in one of them or here (Ctrl-C), closes all; reset() and step() then raise palpate.Error.
 
     Args:
         count: how many environments.
@@ -265,6 +300,7 @@ class Vector:
         self.count = count
         self._parts = np.array_split(np.arange(count), processes)
         self._pipes, self._processes = [], []
+        self._closed = None  # why the processes are gone
         try:
             for part in self._parts:
                 here, there = start.Pipe()
@@ -273,17 +309,14 @@ class Vector:
                 there.close()
                 self._pipes.append(here)
                 self._processes.append(process)
-            for pipe in self._pipes:
-                self._answer(pipe)
+            self._action_shape = (count, *[self._answer(pipe) for pipe in self._pipes][0])
         except BaseException:
             self.close()
             raise
 
     def reset(self, *, seed=None):
         """Begins all episodes. Returns count x 16 observations."""
-        for pipe in self._pipes:
-            pipe.send(("reset", seed))
-        return np.stack([observation for pipe in self._pipes for observation, _ in self._answer(pipe)])
+        return np.stack([observation for observation, _ in self._ask([("reset", seed)] * len(self._parts))])
 
     def step(self, actions):
         """One step of each.
@@ -295,11 +328,10 @@ class Vector:
             observations (count x 16), rewards, terminated, truncated (count each), infos (list of dict)
         """
         actions = np.asarray(actions)
-        if len(actions) != self.count:
-            raise ValueError(f"actions: give {self.count}, one for each environment")
-        for pipe, part in zip(self._pipes, self._parts):
-            pipe.send(("step", actions[part]))
-        results = [result for pipe in self._pipes for result in self._answer(pipe)]
+        if actions.shape != self._action_shape or actions.dtype.kind not in "biuf":
+            shape = " x ".join(map(str, self._action_shape))
+            raise ValueError(f"actions: give {shape} numbers, a row for each environment")
+        results = self._ask([("step", actions[part]) for part in self._parts])
         observations, rewards, terminated, truncated, infos = zip(*results)
         return np.stack(observations), np.array(rewards), np.array(terminated), np.array(truncated), list(infos)
 
@@ -314,6 +346,7 @@ class Vector:
         for process in self._processes:
             process.join()
         self._pipes, self._processes = [], []
+        self._closed = self._closed or "the environments are closed: make new ones"
 
     def __enter__(self):
         return self
@@ -321,12 +354,33 @@ class Vector:
     def __exit__(self, *_):
         self.close()
 
+    def _ask(self, requests):
+        """Sends each process its request and gives all answers. After an exception in between, answers would be left over
+        that the next request took for its own."""
+        if self._closed:
+            raise Error(self._closed)
+        try:
+            for pipe, request in zip(self._pipes, requests):
+                self._send(pipe, request)
+            return [answer for pipe in self._pipes for answer in self._answer(pipe)]
+        except BaseException as error:
+            self._closed = f"the environments were closed by an error ({type(error).__name__}): make new ones"
+            self.close()
+            raise
+
+    @staticmethod
+    def _send(pipe, request):
+        try:
+            pipe.send(request)
+        except ConnectionError:
+            raise Error(_ENDED) from None
+
     @staticmethod
     def _answer(pipe):
         try:
             answer = pipe.recv()
-        except EOFError:
-            raise Error("a process of the environments has ended: see what it printed") from None
+        except (EOFError, ConnectionError):
+            raise Error(_ENDED) from None
         if isinstance(answer, Exception):
             raise answer
         return answer

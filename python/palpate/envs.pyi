@@ -1,10 +1,11 @@
+import os
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._palpate import Model, Scene, Session
+from ._palpate import Model, Scene, Session, Volume
 
 class Biopsy:
     model: Model
@@ -15,7 +16,7 @@ class Biopsy:
     max_speed: float
     def __init__(
         self,
-        scene: str | Scene | Model = "breast",
+        scene: str | os.PathLike[str] | Volume | Scene | Model = "breast",
         *,
         max_seconds: float = 20.0,
         max_speed: float = 0.05,

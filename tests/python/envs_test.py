@@ -1,9 +1,13 @@
 import functools
+import os
+import signal
+import time
 import unittest
 
 import numpy as np
 
 import palpate
+from common import InFolder
 from palpate import envs
 
 
@@ -100,6 +104,13 @@ class Biopsy(unittest.TestCase):
         self.assertAlmostEqual(reward, (before - env._distance) / 0.05 - 0.005 - 0.1 * max(force - 4, 0), places=6)
         self.assertAlmostEqual(before - env._distance, 0.02 * env.max_speed, places=4)
 
+    def test_numbers_out_of_range_are_refused(self):
+        for name, values in {"max_seconds": (0, -1, np.nan, np.inf), "max_speed": (0, -1, np.nan, 1e6),
+                             "entry_error": (-1, np.nan, np.inf)}.items():
+            for value in values:
+                with self.subTest(name, value=value), self.assertRaisesRegex(ValueError, name):
+                    envs.Biopsy(layered(), **{name: value})
+
     def test_a_scene_without_a_needle_is_refused(self):
         with self.assertRaisesRegex(palpate.Error, "no needle"):
             envs.Biopsy("block")
@@ -110,6 +121,113 @@ class Biopsy(unittest.TestCase):
         picture = env.render()
         self.assertEqual(picture.shape, (640, 640, 3))
         self.assertGreater(picture.std(), 5)
+
+
+def volume_with_lump(shift):
+    labels = np.zeros((60, 40, 60), np.uint8)
+    labels[5:-5, 5:-5, 5:-5] = 1
+    labels[26 + shift:34 + shift, 16:24, 26:34] = 2
+    affine = np.diag([1.5e-3, 1.5e-3, 1.5e-3, 1])
+    return palpate.Volume.from_numpy(labels, affine, {1: "fat", 2: ("lump", "idc_high_grade")})
+
+
+class SharedModels(InFolder):
+    def check(self, body):
+        """An environment of `body` has the body's aim, and those of before another one."""
+        aim = palpate.Model(body).aim
+        np.testing.assert_array_equal(envs.Biopsy(body).model.aim, aim)
+        return tuple(aim)
+
+    def test_volumes_in_memory_and_files_that_change_are_told_apart(self):
+        file = self.folder / "v.vdb"
+        scene = self.folder / "scene.toml"
+        scene.write_text('[volume]\nfile = "v.vdb"\n[target]\nstructure = "lump"\n[model]\nlevel = "spring"\n')
+        quick = {"model.level": "spring"}
+        memory, files = set(), set()
+        for shift in (-6, 6):
+            volume = volume_with_lump(shift)
+            memory.add(self.check(palpate.Scene.for_volume(volume).changed(quick)))
+            volume.save(file)
+            files |= {self.check(str(scene)), self.check(palpate.Scene(file).changed(quick))}
+        self.assertEqual((len(memory), len(files)), (2, 2))
+
+    def test_an_unchanged_file_is_read_once_and_few_models_are_kept(self):
+        volume_with_lump(0).save(self.folder / "v.vdb")
+        file = self.folder / "scene.toml"
+        file.write_text('[volume]\nfile = "v.vdb"\n[target]\nstructure = "lump"\n[model]\nlevel = "spring"\n')
+        self.assertIs(envs.Biopsy(file).model, envs.Biopsy(file).model)
+        base = palpate.Scene("layered").changed({"model.level": "spring", "volume.voxel_mm": 2})
+        scenes = [base.changed({"tissue.fat.youngs_kpa": 3 + k}) for k in range(6)]
+        first = [envs.Biopsy(scene).model for scene in scenes]
+        self.assertIs(envs.Biopsy(scenes[-1]).model, first[-1])
+        self.assertLess(len(envs._models), len(scenes))
+
+
+class Stopped(Exception):
+    pass
+
+
+def stop(*_):
+    raise Stopped
+
+
+class Slow(envs.Biopsy):
+    """Stops the process that waits for it while it works."""
+
+    def step(self, action):
+        os.kill(os.getppid(), signal.SIGUSR1)
+        time.sleep(0.1)
+        return super().step(action)
+
+
+def make_slow():
+    return Slow(layered(), max_seconds=0.4)
+
+
+class Failing(envs.Biopsy):
+    def step(self, action):
+        raise ArithmeticError("no step")
+
+
+def make_failing():
+    return Failing(layered())
+
+
+class BrokenVectors(unittest.TestCase):
+    def test_wrong_actions_are_refused_before_any_process_sees_them(self):
+        with envs.Vector(2, make, processes=2, seed=1) as vector:
+            vector.reset()
+            for wrong in (np.zeros((2, 3)), np.zeros((3, 4)), np.zeros(4), 0.0, np.full((2, 4), "x"), [[None] * 4] * 2):
+                with self.subTest(wrong), self.assertRaisesRegex(ValueError, "give 2 x 4 numbers"):
+                    vector.step(wrong)
+            self.assertEqual(vector.step(np.zeros((2, 4)))[0].shape, (2, 16))
+
+    def test_after_an_exception_no_answer_is_taken_for_another(self):
+        before = signal.signal(signal.SIGUSR1, stop)
+        self.addCleanup(signal.signal, signal.SIGUSR1, before)
+        vector = envs.Vector(2, make_slow, processes=2, seed=1)
+        vector.reset()
+        with self.assertRaises(Stopped):
+            vector.step(np.zeros((2, 4)))
+        for call in (vector.reset, lambda: vector.step(np.zeros((2, 4)))):
+            with self.assertRaisesRegex(palpate.Error, "closed by an error .Stopped.: make new ones"):
+                call()
+        vector.close()
+
+    def test_an_error_in_an_environment_closes_all(self):
+        vector = envs.Vector(2, make_failing, processes=2, seed=1)
+        vector.reset()
+        with self.assertRaisesRegex(ArithmeticError, "no step"):
+            vector.step(np.zeros((2, 4)))
+        with self.assertRaisesRegex(palpate.Error, "make new ones"):
+            vector.step(np.zeros((2, 4)))
+
+    def test_closed_environments_say_so(self):
+        vector = envs.Vector(1, make, processes=1, seed=1)
+        vector.close()
+        for call in (vector.reset, lambda: vector.step(np.zeros((1, 4)))):
+            with self.assertRaisesRegex(palpate.Error, "are closed"):
+                call()
 
 
 class Vectors(unittest.TestCase):
