@@ -42,7 +42,13 @@ sweep::KeyValue keyValueOf(const std::string& key, const py::object& value)
         return plain.cast<bool>();
     }
     if (py::isinstance<py::int_>(plain)) {
-        return plain.cast<std::int64_t>();
+        int overflow = 0;
+        const std::int64_t whole = PyLong_AsLongLongAndOverflow(plain.ptr(), &overflow);
+        if (overflow != 0) {
+            throwSceneError("key '" + key + "': " + py::str(plain).cast<std::string>() +
+                            " is out of range: whole numbers have 63 bits and a sign");
+        }
+        return whole;
     }
     if (py::isinstance<py::float_>(plain)) {
         return plain.cast<double>();
@@ -91,7 +97,8 @@ SceneBox changed(const SceneBox& box, const py::dict& tables)
 #ifdef PALPATE_SWEEP
     std::vector<sweep::Setting> settings;
     for (const auto& [key, value] : flattened(tables)) {
-        if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
+        const bool isVector = py::isinstance<py::array>(value) && py::reinterpret_borrow<py::array>(value).size() != 1;
+        if (isVector || py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
             const Vec3 point = vec3Of(value, key.c_str());
             for (const auto& [axis, coordinate] : {std::pair{".x", point.x}, {".y", point.y}, {".z", point.z}}) {
                 settings.push_back({key + axis, coordinate});

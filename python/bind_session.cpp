@@ -12,6 +12,8 @@
 
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <string_view>
 
 namespace palpate::python {
 
@@ -19,8 +21,6 @@ namespace {
 
 using haptics::DeviceSample;
 using Doubles = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Buttons = py::array_t<std::uint32_t, py::array::c_style | py::array::forcecast>;
-using Flags = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
 /// A session, what of it is made when first asked for, and what an interrupted run has done.
 struct SessionBox {
@@ -86,29 +86,59 @@ TickBox step(SessionBox& box, const py::handle& pose, std::uint32_t buttons, boo
     return {rowOf(box.live.step(sample))};
 }
 
-template <class Array>
-void checkColumn(const Array& column, py::ssize_t rows, const char* name)
+// Numbers as Python's caller gave them, none of which are words.
+Doubles doublesOf(const py::object& given, const char* name, const char* wanted)
 {
+    const auto array = py::array::ensure(given);
+    const bool isNumbers = array && std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
+    auto numbers = isNumbers ? Doubles::ensure(array) : Doubles();
+    if (!isNumbers || !numbers) {
+        PyErr_Clear();
+        throw py::value_error(std::string(name) + ": " + wanted);
+    }
+    return numbers;
+}
+
+// Whole numbers from 0 to `most`, one or `rows` of them.
+Doubles columnOf(const py::object& given, py::ssize_t rows, const char* name, double most, const char* wanted)
+{
+    auto column = doublesOf(given, name, wanted);
     if (column.ndim() > 1 || (column.ndim() == 1 && column.shape(0) != rows)) {
         throw py::value_error(std::string(name) + ": give one value, or one for each of the " + std::to_string(rows) +
                               " poses");
     }
+    for (py::ssize_t i = 0; i < column.size(); ++i) {
+        const double value = column.data()[i];
+        if (!(value >= 0 && value <= most && value == std::floor(value))) {
+            throw py::value_error(std::string(name) + ": " + wanted);
+        }
+    }
+    return column;
 }
 
-std::vector<DeviceSample> samplesOf(const Doubles& poses, const Buttons& buttons, const Flags& fresh, Vec3 axis)
+/// What run() and advance() take, as Python's caller gave it.
+struct Given {
+    const py::object &poses, &buttons, &fresh;
+};
+
+std::vector<DeviceSample> samplesOf(const Given& given, Vec3 axis)
 {
+    constexpr const char* shapes =
+        "give an array of n x 3 (positions), n x 6 (and axes) or n x 12 (and the probe's moves), in metres";
+    constexpr double buttonBits = std::numeric_limits<std::uint32_t>::max();
+    const Doubles poses = doublesOf(given.poses, "poses", shapes);
     if (poses.ndim() != 2 || !isPoseOf(poses.shape(1))) {
-        throw py::value_error(
-            "poses: give an array of n x 3 (positions), n x 6 (and axes) or n x 12 (and the probe's moves), in metres");
+        throw py::value_error(std::string("poses: ") + shapes);
     }
     const py::ssize_t rows = poses.shape(0);
-    checkColumn(buttons, rows, "buttons");
-    checkColumn(fresh, rows, "fresh");
+    const Doubles buttons = columnOf(given.buttons, rows, "buttons", buttonBits,
+                                     "give sums of DEADMAN, FIRE and MARK, whole numbers below 2**32");
+    const Doubles fresh = columnOf(given.fresh, rows, "fresh", 1, "give True or False");
     std::vector<DeviceSample> samples;
     samples.reserve(static_cast<std::size_t>(rows));
     for (py::ssize_t i = 0; i < rows; ++i) {
-        const std::uint32_t pressed = buttons.data()[buttons.ndim() == 0 ? 0 : i];
-        const bool isFresh = fresh.data()[fresh.ndim() == 0 ? 0 : i];
+        const auto pressed = static_cast<std::uint32_t>(buttons.data()[buttons.ndim() == 0 ? 0 : i]);
+        const bool isFresh = fresh.data()[fresh.ndim() == 0 ? 0 : i] != 0;
         samples.push_back(sampleOf(poses.data() + i * poses.shape(1), poses.shape(1), axis, pressed, isFresh));
     }
     return samples;
@@ -135,10 +165,10 @@ bool runDevice(SessionBox& box, haptics::Device& device, double seconds,
     throw py::error_already_set();
 }
 
-py::array run(SessionBox& box, const Doubles& poses, const Buttons& buttons, const Flags& fresh)
+py::array run(SessionBox& box, const py::object& poses, const py::object& buttons, const py::object& fresh)
 {
     const LiveSession::Use use(box.live);
-    const auto samples = samplesOf(poses, buttons, fresh, box.live.axis());
+    const auto samples = samplesOf({poses, buttons, fresh}, box.live.axis());
     py::array out = rowsOf(tickType(box.live.modelled().info.structures.size()), samples.size());
     auto* const rows = static_cast<TickRow*>(out.mutable_data());
     std::size_t done = 0;
@@ -149,10 +179,10 @@ py::array run(SessionBox& box, const Doubles& poses, const Buttons& buttons, con
     return out;
 }
 
-std::size_t advance(SessionBox& box, const Doubles& poses, const Buttons& buttons, const Flags& fresh)
+std::size_t advance(SessionBox& box, const py::object& poses, const py::object& buttons, const py::object& fresh)
 {
     const LiveSession::Use use(box.live);
-    const auto samples = samplesOf(poses, buttons, fresh, box.live.axis());
+    const auto samples = samplesOf({poses, buttons, fresh}, box.live.axis());
     PosesDevice device(samples);
     if (!runDevice(box, device, 0, {})) {
         throw py::error_already_set();
@@ -162,6 +192,9 @@ std::size_t advance(SessionBox& box, const Doubles& poses, const Buttons& button
 
 py::array perform(SessionBox& box, const std::string& trainee, std::uint64_t seed, double seconds)
 {
+    if (!(seconds >= 0)) {
+        throw py::value_error("seconds: has to be 0 or more");
+    }
     const LiveSession::Use use(box.live);
     session::DeviceRequest request;
     request.trainee = trainee == "script" ? "" : trainee;
@@ -346,9 +379,8 @@ void bindSession(py::module_& module)
 {
     bindConstants(module);
     bindTick(module);
-    const auto held = py::arg("buttons") = Buttons(std::vector<py::ssize_t>{}, &haptics::buttonDeadMan);
-    static constexpr bool yes = true;
-    const auto isFresh = py::arg("fresh") = Flags(std::vector<py::ssize_t>{}, &yes);
+    const auto held = py::arg("buttons") = haptics::buttonDeadMan;
+    const auto isFresh = py::arg("fresh") = true;
     py::class_<SessionBox>(module, "Session")
         .def(py::init([](const py::object& scene, const std::optional<std::filesystem::path>& record,
                          const std::string& operatorName) {

@@ -4,6 +4,7 @@
 #include <datasets/tables.h>
 #include <report/volume.h>
 #include <session/open.h>
+#include <volume/image_check.h>
 #include <volume/prepare/volume_import.h>
 
 #include <pybind11/stl.h>
@@ -12,6 +13,7 @@
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
 
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 
@@ -54,8 +56,11 @@ std::unique_ptr<VolumeBox> phantom(const std::string& name, std::uint64_t seed, 
         const auto parameter = py::str(key).cast<std::string>();
         if (py::isinstance<py::str>(value)) {
             spec.words[parameter] = value.cast<std::string>();
+        } else if (const double number = PyFloat_AsDouble(value.ptr()); PyErr_Occurred() == nullptr) {
+            spec.numbers[parameter] = number;
         } else {
-            spec.numbers[parameter] = value.cast<double>();
+            PyErr_Clear();
+            throw py::type_error(parameter + ": give a number or a word, not " + py::repr(value).cast<std::string>());
         }
     }
     const py::gil_scoped_release others;
@@ -65,13 +70,21 @@ std::unique_ptr<VolumeBox> phantom(const std::string& name, std::uint64_t seed, 
 // RAS and LPS differ in the sign of x and y.
 volume::Affine affineOf(const Matrix& matrix, const std::string& frame)
 {
-    if (matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4) {
+    if (!matrix) {
+        PyErr_Clear();
+    }
+    if (!matrix || matrix.ndim() != 2 || matrix.shape(0) != 4 || matrix.shape(1) != 4) {
         throw py::value_error("affine: give 4 x 4 numbers, voxel index to patient, in metres");
     }
     if (frame != "LPS" && frame != "RAS") {
         throw py::value_error("frame: is LPS or RAS, not " + frame);
     }
     const auto at = matrix.unchecked<2>();
+    for (int column = 0; column < 4; ++column) {
+        if (at(3, column) != (column < 3 ? 0.0 : 1.0)) {
+            throw py::value_error("affine: its last row has to be 0 0 0 1");
+        }
+    }
     volume::Affine affine;
     for (int row = 0; row < 3; ++row) {
         const double sign = frame == "RAS" && row < 2 ? -1.0 : 1.0;
@@ -81,6 +94,20 @@ volume::Affine affineOf(const Matrix& matrix, const std::string& frame)
         affine.origin[row] = sign * at(row, 3);
     }
     return affine;
+}
+
+// The importer refuses sheared labels, too: fields on them assume axes at right angles.
+void checkGrid(const volume::LabelImage& map)
+{
+    try {
+        volume::checkImage(map);
+    } catch (const std::runtime_error& e) {
+        throw py::value_error(std::string("labels, affine: ") + e.what());
+    }
+    if (std::sin(volume::shearOf(map.affine)) > volume::maxShear) {
+        throw py::value_error(
+            "affine: its axes are not at right angles to each other: resample the labels to a straight grid");
+    }
 }
 
 py::array_t<double> matrixOf(const volume::Affine& affine)
@@ -110,11 +137,32 @@ std::vector<volume::LabelName> namesOf(const py::dict& tissues)
         if (py::isinstance<py::str>(said)) {
             name.name = name.tissue = said.cast<std::string>();
         } else {
-            std::tie(name.name, name.tissue) = said.cast<std::pair<std::string, std::string>>();
+            try {
+                std::tie(name.name, name.tissue) = said.cast<std::pair<std::string, std::string>>();
+            } catch (const py::cast_error&) {
+                throw py::value_error("tissues: label " + std::to_string(name.value) +
+                                      ": give a tissue or (structure's name, tissue), not " +
+                                      py::repr(said).cast<std::string>());
+            }
         }
         names.push_back(std::move(name));
     }
     return names;
+}
+
+// An array of what Python's caller gave. One with a mask is refused: its masked values would count.
+py::array arrayOf(const py::object& what, const char* name)
+{
+    const py::object masked = py::module_::import("numpy").attr("ma").attr("MaskedArray");
+    if (py::isinstance(what, masked)) {
+        throw py::value_error(std::string(name) + ": give an array without a mask: fill its masked values (filled)");
+    }
+    auto array = py::array::ensure(what);
+    if (!array) {
+        PyErr_Clear();
+        throw py::value_error(std::string(name) + ": give an array of numbers");
+    }
+    return array;
 }
 
 Labels labelArray(const py::array& given)
@@ -138,18 +186,23 @@ Labels labelArray(const py::array& given)
     return Labels(given);
 }
 
-std::unique_ptr<VolumeBox> fromNumpy(const py::array& given, const Matrix& affine, const py::dict& tissues,
+std::unique_ptr<VolumeBox> fromNumpy(const py::object& given, const py::object& affine, const py::dict& tissues,
                                      const py::object& image, const std::string& unit, const std::string& frame,
                                      const Path& table)
 {
-    const Labels labels = labelArray(given);
+    const Labels labels = labelArray(arrayOf(given, "labels"));
     volume::LabelImage map;
     map.size = {static_cast<int>(labels.shape(0)), static_cast<int>(labels.shape(1)), static_cast<int>(labels.shape(2))};
-    map.affine = affineOf(affine, frame);
+    map.affine = affineOf(Matrix::ensure(arrayOf(affine, "affine")), frame);
     map.values.assign(labels.data(), labels.data() + labels.size());
+    checkGrid(map);
     std::optional<volume::CompanionImage> companion;
     if (!image.is_none()) {
-        const Image values = image.cast<Image>();
+        const auto values = Image::ensure(arrayOf(image, "image"));
+        if (!values) {
+            PyErr_Clear();
+            throw py::value_error("image: give an array of numbers");
+        }
         if (values.ndim() != 3 || !std::equal(values.shape(), values.shape() + 3, labels.shape())) {
             throw py::value_error("image: has to have the shape of the labels");
         }

@@ -2,6 +2,8 @@
 
 #include <haptics/broadcast.h>
 
+#include <fmt/format.h>
+
 #include <stdexcept>
 
 namespace palpate::python {
@@ -26,6 +28,12 @@ UltrasoundPicture LiveUltrasound::picture(const haptics::Simulation& simulation,
     body_.apply(*shape_);
     ultrasound::Settings settings = examination_.settings;
     if (request.depth > 0) {
+        const auto depth = static_cast<float>(request.depth);
+        if (depth < examination_.transducer.shallowest || depth > examination_.transducer.deepest) {
+            throw std::runtime_error(fmt::format("ultrasound: a depth of {:g} m: the probe has {:g} to {:g} m",
+                                                 request.depth, examination_.transducer.shallowest,
+                                                 examination_.transducer.deepest));
+        }
         settings.depth = static_cast<float>(request.depth);
         settings = ultrasound::within(settings, examination_.transducer);
     }

@@ -32,7 +32,7 @@ public:
     explicit LiveUltrasound(const haptics::SessionModel& model);
 
     /// The body as `simulation` has it after its last tick, the tool and the cores as `state` has them: a function of those
-    /// and of the request, bit for bit. Throws std::runtime_error for a size that no picture has.
+    /// and of the request, bit for bit. Throws std::runtime_error for a size that no picture and a depth that no probe has.
     UltrasoundPicture picture(const haptics::Simulation& simulation, const channel::State& state,
                               const UltrasoundRequest& request);
 

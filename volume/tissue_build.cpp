@@ -1,3 +1,4 @@
+#include <volume/image_check.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
@@ -141,21 +142,6 @@ typename Grid::Ptr gridOf(const LabelImage& image, const ValueAt& valueAt, typen
     openvdb::tools::pruneTiles(tree);
     grid->setTransform(transformOf(image.affine));
     return grid;
-}
-
-void checkImage(const LabelImage& image)
-{
-    if (image.size.x < 1 || image.size.y < 1 || image.size.z < 1) {
-        throw std::runtime_error(
-            fmt::format("a label map of {} x {} x {} voxels is empty", image.size.x, image.size.y, image.size.z));
-    }
-    if (image.values.size() != image.offset({0, 0, image.size.z})) {
-        throw std::runtime_error(fmt::format("a label map of {} x {} x {} voxels has {} values", image.size.x, image.size.y,
-                                             image.size.z, image.values.size()));
-    }
-    if (!(image.affine.voxelVolume() > 0)) {
-        throw std::runtime_error("a label map's voxels have no volume: its directions are dependent or its spacing is 0");
-    }
 }
 
 void checkTable(const TissueTable& table)

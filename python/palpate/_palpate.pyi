@@ -84,7 +84,8 @@ class Volume:
 
         Args:
             labels: whole numbers, 0 to 65535, (i, j, k); 0 without a tissue is outside.
-            affine: 4 x 4, voxel index to patient [m]. nibabel's is in mm: multiply its first three rows by 1e-3.
+            affine: 4 x 4, voxel index to patient [m]. nibabel's is in mm: multiply its first three rows by 1e-3. Axes are at right
+                angles, voxels of 1 um to 10 m, and all places within 10 m of the origin.
             tissues: {value: tissue} or {value: (structure's name, tissue)} for every value that is there.
             image: intensities on the same voxels.
             image_unit: "HU" or "".
@@ -92,7 +93,7 @@ class Volume:
             table: tissue table (.toml) in place of the built-in one.
 
         Raises:
-            ValueError: shapes, types or the frame are not right.
+            ValueError: shapes, types, the affine or the frame are not right; an array has a mask.
             palpate.Error: a value without a tissue, a tissue that the table does not have.
         """
     def save(self, file: _Path) -> None:
@@ -297,13 +298,13 @@ class Session:
 
         Args:
             poses: n x 3, n x 6 [m], or n x 12 as step().
-            buttons, fresh: one value, or n.
+            buttons, fresh: one value, or n; whole numbers below 2**32, and True or False.
 
         Returns:
             structured array of n; docs/python.md lists the fields.
 
         Raises:
-            ValueError: shapes are not right; nothing was done. palpate.Error: as step().
+            ValueError: shapes or values are not right; nothing was done. palpate.Error: as step().
             KeyboardInterrupt: after a whole tick; `interrupted` has the rows so far and the session may go on.
         """
     def advance(self, poses: ArrayLike, buttons: ArrayLike = ..., fresh: ArrayLike = ...) -> int:
@@ -311,8 +312,11 @@ class Session:
     def perform(self, trainee: str = "script", seed: int = 1, seconds: float = 120.0) -> NDArray[np.void]:
         """A simulated hand does the scene's task: "script", or a trainee ("novice", "resident", "expert"), as `palpate train`.
 
+        Args:
+            seconds: at most; 0: until the hand is done.
+
         Returns:
-            rows as run(). Raises palpate.Error where tool, task and trainee do not go together.
+            rows as run(). Raises palpate.Error where tool, task and trainee do not go together, ValueError for seconds below 0.
         """
     def close(self) -> None:
         """Ends the record. Raises palpate.Error when it is not whole (a full disk)."""
@@ -336,14 +340,15 @@ class Session:
             width, height: pixels, 16 to 8192.
             face: middle of the probe's face (3) [m]; None: where the scene has the probe, else as the viewer places it.
             direction, lateral: into the body, and along the face (3 each).
-            depth: of the picture [m]; 0: the probe's own.
+            depth: of the picture [m], what the probe has; 0: its own.
 
         Returns:
             pixels (height x width, uint8), lines (samples x lines, uint8, before scan conversion), metres_per_pixel,
             depth [m], frequency [Hz], face, direction, lateral, tick.
 
         Raises:
-            ValueError: a direction without length, both along each other, a depth below 0. palpate.Error: the size.
+            ValueError: a direction without length, both along each other, a depth below 0. palpate.Error: the size, a depth that
+                the probe does not have.
         """
     @property
     def events(self) -> NDArray[np.void]:

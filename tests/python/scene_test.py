@@ -47,6 +47,9 @@ class Scenes(InFolder):
         with self.assertRaises(palpate.SceneError) as caught:
             palpate.Scene("block", tool={"radius_mm": -1})
         self.assertEqual(caught.exception.key, "tool.radius_mm")
+        with self.assertRaisesRegex(palpate.SceneError, "out of range") as caught:
+            palpate.Scene("block").changed({"volume.seed": 2**63})
+        self.assertEqual(caught.exception.key, "volume.seed")
         with self.assertRaisesRegex(palpate.SceneError, "unknown key"):
             palpate.Scene("block", tool={"radus_mm": 1})
         with self.assertRaisesRegex(palpate.SceneError, "built-in scenes are"):
@@ -164,6 +167,8 @@ class OpenPoints(unittest.TestCase):
         self.assertIn("entry_mm = [1.0, 0.0, 2.5]", scene.text.replace("[1, 0,", "[1.0, 0.0,"))
         whole = {"target.entry_mm.x": 1, "target.entry_mm.y": 0, "target.entry_mm.z": 2.5}
         self.assertEqual(palpate.Scene("layered").changed(whole).text, scene.text)
+        array = palpate.Scene("layered").changed({"target": {"entry_mm": np.array([1, 0, 2.5])}})
+        self.assertEqual(array.text, scene.text)
         for axis in "xyz":
             part = {key: value for key, value in whole.items() if not key.endswith(axis)}
             with self.subTest(axis), self.assertRaisesRegex(palpate.Error, "set its x, y and z"):

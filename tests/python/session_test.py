@@ -86,6 +86,14 @@ class Run(InFolder):
             ("no length", lambda: session.run(np.zeros((4, 6)))),
             ("buttons", lambda: session.run(np.zeros((4, 3)), buttons=[1, 1])),
             ("fresh", lambda: session.run(np.zeros((4, 3)), fresh=[True])),
+            ("poses", lambda: session.run("abc")),
+            ("poses", lambda: session.run([[0, 0, 0], [1, 2]])),
+            ("poses", lambda: session.advance(np.zeros((4, 3), complex))),
+            *(("buttons", lambda b=b: session.run(np.zeros((4, 3)), buttons=b))
+              for b in (2**40, -1, 1.7, np.nan, "1", None, [1, 1, 1, 2**32], 2**70)),
+            *(("fresh", lambda f=f: session.run(np.zeros((4, 3)), fresh=f)) for f in ("False", np.nan, 2, None)),
+            ("seconds", lambda: session.perform(seconds=np.nan)),
+            ("seconds", lambda: session.perform(seconds=-1)),
             ("pose", lambda: session.step([1, 2])),
             ("pose", lambda: session.step("abc")),
         ]:
@@ -145,6 +153,9 @@ class Shape(unittest.TestCase):
                       {"face": [0, 0, 0], "direction": [0, 1, 0], "lateral": [0, 2, 0]}):
             with self.subTest(wrong), self.assertRaises(ValueError):
                 session.ultrasound(320, 320, **wrong)
+        for wrong in (1e9, 1e-9):
+            with self.subTest(depth=wrong), self.assertRaisesRegex(palpate.Error, "the probe has"):
+                session.ultrasound(320, 320, depth=wrong)
         elsewhere = session.ultrasound(320, 320, face=[0.01, 0, 0])
         self.assertGreater(np.count_nonzero(elsewhere["pixels"] != pictures[0]["pixels"]), 1000)
 

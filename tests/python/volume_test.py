@@ -19,6 +19,18 @@ TISSUES = {1: "fat", 2: ("lump", "idc_high_grade")}
 AFFINE = np.diag([1e-3, 2e-3, 3e-3, 1.0])
 
 
+def placed(affine, origin):
+    out = affine.copy()
+    out[:3, 3] = origin
+    return out
+
+
+def sheared(affine):
+    out = affine.copy()
+    out[0, 1] = 1e-3
+    return out
+
+
 class FromNumpy(InFolder):
     def test_labels_come_back_as_they_were(self):
         labels = cube()
@@ -29,7 +41,7 @@ class FromNumpy(InFolder):
 
     def test_any_order_and_type_of_numbers_gives_the_same_labels(self):
         labels = cube()
-        for given in (labels.astype(np.int64), np.asfortranarray(labels), labels[::-1][::-1], labels.astype(">u2")):
+        for given in (labels.tolist(), labels.astype(np.int64), np.asfortranarray(labels), labels[::-1][::-1], labels.astype(">u2")):
             np.testing.assert_array_equal(palpate.Volume.from_numpy(given, AFFINE, TISSUES).labels, labels)
 
     def test_the_program_counts_the_same_voxels(self):
@@ -61,13 +73,37 @@ class FromNumpy(InFolder):
             ("0 to 65535", cube().astype(np.uint64) + np.uint64(2**63), AFFINE, TISSUES),
             ("keys are label values", cube(), AFFINE, {"1": "fat", 2: "fat"}),
             ("keys are label values", cube(), AFFINE, {1: "fat", 70000: "fat"}),
+            ("label 1: give a tissue", cube(), AFFINE, {1: None, 2: "fat"}),
+            ("label 1: give a tissue", cube(), AFFINE, {1: ("a", "fat", "c"), 2: "fat"}),
+            ("without a mask", np.ma.masked_array(cube(), mask=cube() == 1), AFFINE, TISSUES),
+            ("labels: give an array", [[[1]], [[1, 2]]], AFFINE, TISSUES),
+            ("affine: give 4 x 4", cube(), "abc", TISSUES),
             ("4 x 4", cube(), np.eye(3), TISSUES),
-            ("no volume", cube(), np.zeros((4, 4)), TISSUES),
+            ("0 0 0 1", cube(), np.vstack([AFFINE[:3], [[0, 0, 1, 1]]]), TISSUES),
+            ("not finite", cube(), placed(AFFINE, [np.nan] * 3), TISSUES),
+            ("not finite", cube(), placed(AFFINE, [0, np.inf, 0]), TISSUES),
+            ("not finite", cube(), np.diag([1e200, 2e-3, 3e-3, 1]), TISSUES),
+            ("no patient", cube(), np.diag([1e19, 2e-3, 3e-3, 1]), TISSUES),
+            ("no patient", cube(), np.diag([1e-9, 2e-3, 3e-3, 1]), TISSUES),
+            ("reaches 18[0-9.]* m .* 10 m is the most", cube(), placed(AFFINE, [18, 0, 0]), TISSUES),
+            ("right angles", cube(), sheared(AFFINE), TISSUES),
+            ("no volume", cube(), np.diag([0, 0, 0, 1]), TISSUES),
             ("label 2", cube(), AFFINE, {1: "fat"}),
             ("no tissue 'cheese'", cube(), AFFINE, {1: "fat", 2: "cheese"}),
         ]:
             with self.subTest(wrong), self.assertRaisesRegex((ValueError, palpate.Error), wrong):
                 palpate.Volume.from_numpy(labels, affine, tissues)
+
+    def test_an_affine_that_is_none_is_a_value_error(self):
+        for origin in ([np.nan] * 3, [18, 0, 0]):
+            with self.subTest(origin), self.assertRaises(ValueError):
+                palpate.Volume.from_numpy(cube(), placed(AFFINE, origin), TISSUES)
+
+    def test_a_phantoms_parameter_without_a_number_is_named(self):
+        with self.assertRaisesRegex(TypeError, "width_mm: give a number or a word, not None"):
+            palpate.Volume.phantom("block", width_mm=None)
+        self.assertEqual(palpate.Volume.phantom("block", voxel=4e-3, width_mm=np.float32(60)).shape,
+                         palpate.Volume.phantom("block", voxel=4e-3, width_mm=60).shape)
 
 
 class Views(unittest.TestCase):

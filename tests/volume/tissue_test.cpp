@@ -11,6 +11,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <random>
 
 namespace palpate::volume {
@@ -190,6 +191,34 @@ TEST(Tissue, LabelsWithoutNameOrTissueAreRefused)
 }
 
 // A named 0 is tissue like any other; outside the volume there is still air.
+TEST(Tissue, LabelMapsThatCanBeNoBodyAreRefused)
+{
+    const double infinite = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
+    const auto refused = [](Vec3 spacing, Vec3 origin) {
+        LabelImage image{{2, 2, 2}, {}, std::vector<std::uint16_t>(8, 1)};
+        for (int axis = 0; axis < 3; ++axis) {
+            image.affine.linear[axis] *= spacing[axis];
+        }
+        image.affine.origin = origin;
+        try {
+            Tissue::fromLabels(image, table(), names(), {});
+            return false;
+        } catch (const std::runtime_error&) {
+            return true;
+        }
+    };
+    EXPECT_FALSE(refused(Vec3(1e-3), Vec3(0.0)));
+    EXPECT_FALSE(refused(Vec3(1e-3), Vec3(9.9, 0.0, 0.0)));
+    EXPECT_TRUE(refused(Vec3(1e-3), Vec3(10.1, 0.0, 0.0))) << "no pose is there";
+    for (const double wrong : {nan, infinite}) {
+        EXPECT_TRUE(refused(Vec3(1e-3), Vec3(0.0, wrong, 0.0)));
+        EXPECT_TRUE(refused(Vec3(1e-3, wrong, 1e-3), Vec3(0.0)));
+    }
+    for (const double wrong : {0.0, 1e-9, 11.0, 1e19, 1e200}) {
+        EXPECT_TRUE(refused(Vec3(1e-3, 1e-3, wrong), Vec3(0.0))) << wrong;
+    }
+}
+
 TEST(Tissue, ANamedZeroIsTissue)
 {
     const LabelImage image = randomImage(10);

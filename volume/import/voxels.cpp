@@ -1,3 +1,4 @@
+#include <volume/image_check.h>
 #include <volume/import/source.h>
 
 #include <base/units.h>
@@ -17,8 +18,6 @@ namespace {
 constexpr std::uint64_t maxVoxels = 0xffffffff;  // of one volume
 constexpr std::uint64_t maxPadding = 16;         // [bytes]
 constexpr std::uint64_t maxBefore = 1 << 30;     // unpacked, in front of voxels that are the last bytes [bytes]
-constexpr double minSpacing = 0.999e-6;          // below a cell, and units were mistaken [m]
-constexpr double maxShear = 2e-3;                // cosine between voxel axes
 using units::degree;
 
 template <typename T>
@@ -174,16 +173,6 @@ void decode(const Source& source, const std::function<void(double)>& progress,
     }
 }
 
-double shearOf(const Affine& affine) noexcept
-{
-    const Mat3& m = affine.linear;
-    const Vec3 spacing = affine.spacing();
-    const double cosine = std::max({std::abs(glm::dot(m[0], m[1])) / (spacing.x * spacing.y),
-                                    std::abs(glm::dot(m[1], m[2])) / (spacing.y * spacing.z),
-                                    std::abs(glm::dot(m[0], m[2])) / (spacing.x * spacing.z)});
-    return std::asin(std::min(1.0, cosine));
-}
-
 void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings)
 {
     const Vec3 spacing = affine.spacing();
@@ -192,7 +181,8 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
         refuse(file, fmt::format("its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again",
                                  1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
     }
-    if (std::max({spacing.x, spacing.y, spacing.z}) > 10 || std::min({spacing.x, spacing.y, spacing.z}) < minSpacing) {
+    if (std::max({spacing.x, spacing.y, spacing.z}) > maxSpacing ||
+        std::min({spacing.x, spacing.y, spacing.z}) < minSpacing) {
         refuse(file, fmt::format("its voxels are {} x {} x {} mm: that is no patient, check the units in its header",
                                  1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
     }
