@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -35,12 +36,19 @@ constexpr std::size_t ticksPerTransaction = 4096;  // bounds the write-ahead log
 
 using Results = std::vector<std::pair<std::string, std::string>>;
 
+void removeLogs(const std::string& file) noexcept
+{
+    std::error_code ignored;
+    for (const char* suffix : {"-wal", "-shm", "-journal"}) {
+        std::filesystem::remove(file + suffix, ignored);
+    }
+}
+
 void removeFile(const std::string& file) noexcept
 {
     std::error_code ignored;
-    for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
-        std::filesystem::remove(file + suffix, ignored);
-    }
+    std::filesystem::remove(file, ignored);
+    removeLogs(file);
 }
 
 void insertPair(Database& database, const char* table, std::string_view key, const auto& value)
@@ -129,10 +137,26 @@ void makeFile(const std::string& file, const SessionInfo& info)
     }
     try {
         giveName(part, file);
+        removeLogs(file);  // of a record that was removed while it was written: they would be taken for this one's
     } catch (const std::exception&) {
         removeFile(part);
         throw;
     }
+}
+
+/// Which file a name is, so that it can be told whether the name still is that file's.
+struct FileId {
+    bool there = false;
+    dev_t device{};
+    ino_t inode{};
+
+    bool operator==(const FileId&) const = default;
+};
+
+FileId fileId(const std::filesystem::path& file) noexcept
+{
+    struct stat s {};
+    return ::stat(file.c_str(), &s) == 0 ? FileId{true, s.st_dev, s.st_ino} : FileId{};
 }
 
 // Binds fields one after another, in the order of format::eachColumn.
@@ -282,6 +306,8 @@ private:
 
 struct Recorder::Impl {
     std::string file;
+    std::filesystem::path place;  // absolute: the working directory may change
+    FileId written;               // the file that was made there
     boost::lockfree::spsc_queue<TickRecord> ring;
     std::atomic<std::uint64_t> lost{0};
     std::optional<Database> database;
@@ -302,6 +328,8 @@ struct Recorder::Impl {
         }
         ring.reset();
         makeFile(file, info);
+        place = std::filesystem::absolute(file);
+        written = fileId(place);
         try {
             database.emplace(file, SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
             // A killed process loses nothing that was committed, so no commit has to wait for the disk. NORMAL syncs when a
@@ -390,6 +418,15 @@ struct Recorder::Impl {
         database->execute("COMMIT");
     }
 
+    // Writing to a file that has lost its name succeeds, and nobody finds it.
+    void checkPlace()
+    {
+        const std::scoped_lock lock(mutex);
+        if (error.empty() && fileId(place) != written) {
+            error = file + ": was removed or moved while it was written: its session is not there";
+        }
+    }
+
     void request(std::optional<Results> values)
     {
         std::unique_lock lock(mutex);
@@ -452,6 +489,7 @@ void Recorder::flush()
 void Recorder::finish(const Results& results)
 {
     impl_->request(results);
+    impl_->checkPlace();
 }
 
 std::uint64_t Recorder::lost() const noexcept

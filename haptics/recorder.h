@@ -68,7 +68,8 @@ public:
     /// score, and marks the session complete.
     void finish(const std::vector<std::pair<std::string, std::string>>& results);
     std::uint64_t lost() const noexcept;
-    /// Empty, or what went wrong in writing (a full disk): the session goes on, and the user is told at its end.
+    /// Empty, or what went wrong in writing (a full disk, a file that was removed or moved; the latter after finish()): the
+    /// session goes on, and the user is told at its end.
     std::string error() const;
 
 private:

@@ -319,7 +319,7 @@ class Session:
             rows as run(). Raises palpate.Error where tool, task and trainee do not go together, ValueError for seconds below 0.
         """
     def close(self) -> None:
-        """Ends the record. Raises palpate.Error when it is not whole (a full disk)."""
+        """Ends the record. Raises palpate.Error when it is not whole (a full disk) or not there (removed or moved)."""
     def __enter__(self) -> Session: ...
     def __exit__(self, *_: object) -> None: ...
     def score(self) -> dict[str, Any]:

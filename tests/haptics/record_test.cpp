@@ -359,6 +359,34 @@ TEST(Recorder, FullDiskEndsTheRecordButNotTheSession)
 }
 
 // Format 2 had no force of the tissue alone: everything else of it is read.
+TEST(Recorder, SaysWhenTheFileIsNotThereAnyMore)
+{
+    const synthetic::Folder folder;
+    const auto file = folder / "a.palpate";
+    enum class Fate { stays, removed, moved, replaced };
+    for (const Fate fate : {Fate::stays, Fate::removed, Fate::moved, Fate::replaced}) {
+        std::filesystem::remove_all(file);
+        Recorder recorder(file, synthetic::info());
+        recorder.push({});
+        recorder.flush();
+        if (fate == Fate::removed) {
+            std::filesystem::remove(file);
+        } else if (fate != Fate::stays) {
+            std::filesystem::rename(file, folder / "b.palpate");
+        }
+        if (fate == Fate::replaced) {
+            std::ofstream(file) << "another";
+        }
+        recorder.finish({});
+        const std::string error = recorder.error();
+        if (fate == Fate::stays) {
+            EXPECT_EQ(error, "");
+        } else {
+            EXPECT_TRUE(error.starts_with(file.string() + ": was removed or moved while it was written")) << error;
+        }
+    }
+}
+
 TEST(Record, OfTheFormatBeforeIsRead)
 {
     const synthetic::Folder folder;

@@ -106,5 +106,14 @@ lateral = [1, 0, 0]
             palpate.Record(self.folder / "no.db")
 
 
+class Removed(InFolder):
+    def test_a_record_that_was_removed_is_missed(self):
+        session = palpate.Session(small_block(), record=self.folder / "r.db")
+        session.run(wander(10))
+        (self.folder / "r.db").unlink()
+        with self.assertRaisesRegex(palpate.Error, "r.db: was removed or moved while it was written"):
+            session.close()
+
+
 if __name__ == "__main__":
     unittest.main()
