@@ -72,7 +72,9 @@ void ViewersHand::release() noexcept
 {
     if (page_ == nullptr)
         return;
-    blockAt(page_).holder.store(0, std::memory_order_release);
+    // A process that was forked has a copy, and the hand stays the parent's.
+    std::uint64_t mine = handOf(static_cast<std::uint64_t>(::getpid()));
+    blockAt(page_).holder.compare_exchange_strong(mine, 0, std::memory_order_acq_rel);
     guard_ = {};
     ::munmap(page_, sizeof(InputBlock));
     page_ = nullptr;

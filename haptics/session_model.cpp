@@ -176,6 +176,9 @@ datasets::Approach approachIfAny(datasets::Scene& scene, const Posed& posture, c
 
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession)
 {
+    if (!tissue) {
+        throw std::runtime_error(scene.name + ": a model needs the scene's volume, and there is none");
+    }
     if (tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures) {
         throw std::runtime_error(fmt::format("{}: at most {} tissues and {} vital structures are supported", scene.name,
                                              maxTissues, maxStructures - 1));

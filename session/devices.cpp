@@ -84,7 +84,9 @@ private:
 
 std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceRequest& request, const Broadcast* broadcast)
 {
-    assert(request.falcon);
+    if (!request.falcon) {
+        throw std::runtime_error("device 'falcon': there is nothing that opens it (DeviceRequest::falcon)");
+    }
     auto device = falcon::falconBefore(model, request.falcon, startDistance);
     const bool guided = model.scene.probe.kind != datasets::ProbeKind::none || model.scene.ct.given();
     if (broadcast == nullptr || !guided) {

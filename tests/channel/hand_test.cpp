@@ -76,6 +76,23 @@ TEST(ViewersHand, IsOneViewersAtATimeAndOnlyWhereTheSessionHasNoneOfItsOwn)
     EXPECT_TRUE(ViewersHand::take(*subscriber)) << "given back";
 }
 
+TEST(ViewersHand, OfAParentIsNotGivenBackByItsChild)
+{
+    const std::string session = sessionNamed("forked-hand");
+    const Publisher publisher(session, mouseScenery(), smallLabels());
+    const auto subscriber = Subscriber::attach(session);
+    auto hand = ViewersHand::take(*subscriber);
+    const pid_t child = ::fork();
+    if (child == 0) {
+        hand.reset();
+        ::_exit(0);
+    }
+    ::waitpid(child, nullptr, 0);
+    EXPECT_FALSE(ViewersHand::take(*subscriber));
+    hand.reset();
+    EXPECT_TRUE(ViewersHand::take(*subscriber));
+}
+
 // Killed where it hurts most: inside a write.
 TEST(ViewersHand, OfAKilledViewerIsFreeAndItsLastWriteDisturbsNobody)
 {

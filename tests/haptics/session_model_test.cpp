@@ -25,6 +25,11 @@ TEST(SessionModel, AnAimAloneSamplesTheStructureThatItLiesIn)
     EXPECT_EQ(tests::modelOf(tests::sphereOnBlock("aim_mm = [20, 10, 5]\n")).scene.target, "fat");
 }
 
+TEST(SessionModel, OfNoVolumeIsRefused)
+{
+    EXPECT_THROW(buildModel(*datasets::builtInScene("block"), nullptr), std::runtime_error);
+}
+
 TEST(SessionModel, AnAimInTheAirIsRefused)
 {
     try {

@@ -9,6 +9,7 @@
 
 #include <atomic>
 #include <bit>
+#include <stdexcept>
 #include <vector>
 
 namespace palpate::session {
@@ -31,6 +32,13 @@ protected:
 private:
     static inline haptics::SessionModel* model_ = nullptr;
 };
+
+TEST_F(SessionTest, AFalconThatNothingOpensIsRefused)
+{
+    DeviceRequest request;
+    request.name = "falcon";
+    EXPECT_THROW(openDevice(model(), request, nullptr), std::runtime_error);
+}
 
 constexpr double length = 4.0;  // the scripted hand has punctured and fired by then [s]
 
