@@ -165,6 +165,18 @@ class Files(InFolder):
             with self.subTest(wrong), self.assertRaisesRegex(palpate.Error, "must be a length from"):
                 palpate.Volume.import_(self.folder / "none.nii", **wrong)
 
+    def test_labels_where_no_pose_is_are_refused(self):
+        file = self.folder / "far.nrrd"
+        header = ("NRRD0004\ntype: uint8\ndimension: 3\nspace: left-posterior-superior\nsizes: 4 4 4\nencoding: raw\n"
+                  "space directions: (1,0,0) (0,1,0) (0,0,1)\nspace origin: ({},0,0)\n\n")
+        for origin, wrong in ((20, None), (20000, "far.nrrd: a label map reaches 20.0035 m")):
+            file.write_bytes(header.format(origin).encode() + bytes([1] * 64))
+            if wrong is None:
+                palpate.Volume.import_(file, set={"1": "fat"})
+            else:
+                with self.assertRaisesRegex(palpate.Error, wrong):
+                    palpate.Volume.import_(file, set={"1": "fat"})
+
     def test_errors_name_the_file(self):
         with self.assertRaisesRegex(palpate.Error, "nothing.vdb"):
             palpate.Volume.open(self.folder / "nothing.vdb")

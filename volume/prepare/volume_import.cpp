@@ -4,6 +4,7 @@
 #include <base/quantities.h>
 #include <datasets/label_map.h>
 #include <volume/fnv.h>
+#include <volume/image_check.h>
 #include <volume/prepare/body.h>
 #include <volume/prepare/name_table.h>
 #include <volume/provenance.h>
@@ -210,6 +211,19 @@ NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
     return read;
 }
 
+namespace {
+
+void checkBody(const ImportRequest& request, const volume::LabelImage& image)
+{
+    try {
+        volume::checkImage(image);
+    } catch (const std::runtime_error& e) {
+        throw std::runtime_error(request.input.string() + ": " + e.what());
+    }
+}
+
+}  // namespace
+
 ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTable& table, const ImportProgress& tell)
 {
     checkRequest(request);
@@ -233,6 +247,7 @@ ImportedVolume importVolume(const ImportRequest& request, const volume::TissueTa
         image.reset();
     }
     tell("making tissue", {});
+    checkBody(request, labels.image);
     volume::Provenance provenance = provenanceOf(request, labels.image, notes, steps);
     auto tissue =
         volume::Tissue::fromLabels(labels.image, table, named, std::move(provenance), companion ? &*companion : nullptr);
