@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <new>
 #include <string_view>
 
 namespace palpate::python {
@@ -92,6 +93,9 @@ Doubles doublesOf(const py::object& given, const char* name, const char* wanted)
     const auto array = py::array::ensure(given);
     const bool isNumbers = array && std::string_view("biufO").find(array.dtype().kind()) != std::string_view::npos;
     auto numbers = isNumbers ? Doubles::ensure(array) : Doubles();
+    if (isNumbers && !numbers && array.dtype().kind() != 'O') {
+        throw std::bad_alloc();  // nothing else can go wrong with numbers
+    }
     if (!isNumbers || !numbers) {
         PyErr_Clear();
         throw py::value_error(std::string(name) + ": " + wanted);
