@@ -256,5 +256,29 @@ TEST(Monitor, DistanceIsContinuousThroughTheStructure)
     EXPECT_LT(most, 1.2e-3);
 }
 
+// Across the middle of a structure the side that is nearer changes: the way out shrinks and grows again, over the cells of
+// the distance field and not from one place to the next.
+TEST(Proximity, TurnsRoundSmoothlyAcrossTheMiddleOfAStructure)
+{
+    const SessionModel& model = withArtery();
+    LoneNeedle needle(model);
+    TipState tip;
+    MonitorState state;
+    TickRecord record;
+    tip.phase = Phase::inserted;
+    Vec3 before(0.0);
+    double largest = 0.0, longest = 0.0;
+    for (double y = -3e-3; y <= 3e-3; y += 0.02e-3) {
+        tip.proxy = middle + Vec3(0.1e-3, y, 0.0);
+        const Vec3 away = monitor(model, needle.body, tip, tip.proxy, state, record)[1].away;
+        largest = y > -3e-3 ? std::max(largest, glm::distance(away, before)) : 0.0;
+        longest = std::max(longest, glm::length(away));
+        before = away;
+    }
+    EXPECT_LE(longest, 1.0 + 1e-12);
+    EXPECT_GT(longest, 0.9);
+    EXPECT_LT(largest, 0.1);
+}
+
 }  // namespace
 }  // namespace palpate::haptics
