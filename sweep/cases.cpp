@@ -9,11 +9,14 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 
@@ -156,6 +159,35 @@ void apply(toml::table& root, const std::vector<Setting>& settings, const std::m
     }
 }
 
+constexpr std::array<std::string_view, 4> sessionKeys{"trainee", "seed", "delay_ms", "seconds"};
+constexpr std::array<std::string_view, 4> pressKeys{"depth_mm", "speed_mm_s", "hold_ms", "aside_mm"};
+constexpr std::array<std::string_view, 3> needleKeys{"depth_mm", "speed_mm_s", "hold_ms"};
+
+std::span<const std::string_view> keysOf(ProcedureKind kind)
+{
+    switch (kind) {
+        case ProcedureKind::session:
+            return sessionKeys;
+        case ProcedureKind::press:
+            return pressKeys;
+        case ProcedureKind::needle:
+            break;
+    }
+    return needleKeys;
+}
+
+// Refuses keys that only another kind of procedure has: they would do nothing.
+void checkKind(const Section& section, ProcedureKind kind)
+{
+    const auto keys = keysOf(kind);
+    for (const std::string& key : section.keys()) {
+        if (key != "kind" && std::ranges::find(keys, key) == keys.end()) {
+            section.refuse(key, fmt::format("a procedure of kind {} has the keys {}",
+                                            procedureNames[static_cast<std::size_t>(kind)], fmt::join(keys, ", ")));
+        }
+    }
+}
+
 Procedure readProcedure(toml::table& root)
 {
     Procedure procedure;
@@ -175,6 +207,7 @@ Procedure readProcedure(toml::table& root)
             procedure.seed = static_cast<std::uint64_t>(*seed);
         }
         section->finish();
+        checkKind(*section, procedure.kind);
     }
     root.erase("procedure");
     return procedure;

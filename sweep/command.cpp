@@ -109,31 +109,50 @@ void listAll()
     }
 }
 
-// What a case costs, by some that are run: the first one also builds what all share.
+// What a case costs, by some that are run.
+struct CaseCost {
+    double seconds = 0, bytes = fileBlock;
+    std::size_t measured = 0;
+};
+
+// The first case that is done also builds what all share: it counts where no other one is done.
+CaseCost costOf(const SweepPlan& plan)
+{
+    CaseRunner runner(plan, std::string(base::build()));
+    const fs::path record =
+        plan.records ? fs::temp_directory_path() / fmt::format("palpate-sweep-{}.db", getpid()) : fs::path();
+    CaseCost cost;
+    std::vector<std::string> errors;
+    for (const std::size_t i : std::set<std::size_t>{0, plan.cases() / 2, plan.cases() - 1}) {
+        const auto begin = Clock::now();
+        try {
+            runner.run(i, record);
+            const double took = std::chrono::duration<double>(Clock::now() - begin).count();
+            cost.seconds = cost.measured < 2 ? took : std::max(took, cost.seconds);
+            ++cost.measured;
+        } catch (const std::runtime_error& e) {
+            errors.push_back(fmt::format("case {} fails: {}", i, withoutPlace(e.what())));
+        }
+        std::error_code none;
+        const auto size = record.empty() ? 0 : fs::file_size(record, none);
+        cost.bytes = std::max(cost.bytes, fileBlock + (none ? 0.0 : static_cast<double>(size)));
+        fs::remove(record, none);
+    }
+    if (cost.measured == 0) {
+        throw std::runtime_error("every case that was tried failed: " + errors.front());
+    }
+    for (const std::string& error : errors) {
+        fmt::print(stderr, "palpate: {}\n", error);
+    }
+    return cost;
+}
+
 void dryRun(const SweepArguments& o)
 {
     const auto [text, origin] = o.plan.empty() ? planText((fs::path(o.folder) / "plan.toml").string()) : planText(o.plan);
     const bool own = o.plan.empty();
     const SweepPlan plan = own ? SweepFolder(o.folder, "", false).plan() : parsePlan(text, origin, namedScene);
-    CaseRunner runner(plan, std::string(base::build()));
-    const fs::path record =
-        plan.records ? fs::temp_directory_path() / fmt::format("palpate-sweep-{}.db", getpid()) : fs::path();
-    double seconds = 0, bytes = fileBlock;
-    std::set<std::size_t> measured{0, plan.cases() / 2, plan.cases() - 1};
-    for (const std::size_t i : measured) {
-        const auto begin = Clock::now();
-        try {
-            runner.run(i, record);
-        } catch (const std::runtime_error& e) {
-            fmt::print(stderr, "palpate: case {} fails: {}\n", i, e.what());
-        }
-        const double took = std::chrono::duration<double>(Clock::now() - begin).count();
-        seconds = i == 0 ? took : std::max(took, i == plan.cases() / 2 ? 0.0 : seconds);
-        std::error_code none;
-        const auto size = record.empty() ? 0 : fs::file_size(record, none);
-        bytes = std::max(bytes, fileBlock + (none ? 0.0 : static_cast<double>(size)));
-        fs::remove(record, none);
-    }
+    const auto [seconds, bytes, measured] = costOf(plan);
     const double all = seconds * static_cast<double>(plan.cases()) / o.jobs;
     const double disk = bytes * static_cast<double>(plan.cases());
     if (!o.json.empty()) {
@@ -149,7 +168,7 @@ void dryRun(const SweepArguments& o)
         fmt::print("{}{}", &a == &plan.axes[0] ? "" : ", ", a.name);
     }
     fmt::print("\nabout {:.3g} s a case, measured on {}: {} on {}; {:.3g} MB on the disk\n", seconds,
-               plural(measured.size(), "case"), duration(all),
+               plural(measured, "case"), duration(all),
                o.jobs == 1 ? std::string("one process") : fmt::format("{} processes", o.jobs), disk / 1e6);
 }
 
@@ -273,7 +292,7 @@ void merge(const SweepArguments& o)
 {
     base::checkOutput(o.json);
     const std::vector<fs::path> from(o.merged.begin(), o.merged.end());
-    const std::size_t came = mergeShards(o.folder, from);
+    const std::size_t came = mergeShards(o.folder, from, o.anyBuild);
     const SweepFolder folder(o.folder, o.plan, true);
     PoolResult result;
     result.done = came;
@@ -380,7 +399,7 @@ void addSweep(CLI::App& app)
         c->get_option(part)->excludes(slurm);
     }
     c->add_flag("--retry", o->retry, "Run failed cases again");
-    c->add_flag("--any-build", o->anyBuild, "Resume a sweep of another build");
+    c->add_flag("--any-build", o->anyBuild, "Resume or merge a sweep of other builds");
     c->add_option("--report", o->report, "Write report.html into this folder of a sweep");
     c->add_flag("--list", o->list, "List ready plans, and outputs of each procedure");
     c->add_option("--work", o->work, "Work of a task of a job array")->group("");

@@ -274,9 +274,11 @@ void SweepFolder::forget(std::size_t index) const
 void SweepFolder::clean() const
 {
     std::error_code none;
-    for (const auto& entry : fs::recursive_directory_iterator(folder_ / "cases", none)) {
-        if (entry.path().extension() == unfinished) {
-            fs::remove(entry.path(), none);
+    for (const char* const inside : {"cases", "records"}) {
+        for (const auto& entry : fs::recursive_directory_iterator(folder_ / inside, none)) {
+            if (entry.path().extension() == unfinished) {
+                fs::remove(entry.path(), none);
+            }
         }
     }
 }

@@ -6,6 +6,7 @@
 #include <datasets/toml_section.h>
 #include <haptics/trainee.h>
 #include <sweep/formula.h>
+#include <sweep/plan_checks.h>
 #include <volume/tissue.h>
 
 #include <fmt/format.h>
@@ -26,7 +27,6 @@ namespace {
 constexpr std::int64_t maxSamples = 1'000'000;
 constexpr std::int64_t maxSteps = 100'000;
 constexpr double furthest = 1e12;
-constexpr std::size_t probes = 60;  // cases whose scene is tried before a sweep begins
 
 KeyValue valueOf(Section& section, std::string_view key, const toml::node& node)
 {
@@ -249,22 +249,6 @@ void readOutputs(Section& top, ProcedureKind kind, SweepPlan& plan)
     }
 }
 
-void checkColumns(Section& top, const SweepPlan& plan)
-{
-    std::set<std::string> columns{"case",  "point", "repeat",  "seed",    "status",
-                                  "error", "build", "machine", "tick_us", "case_s"};
-    for (const Axis& a : plan.axes) {
-        if (!columns.insert(a.name).second) {
-            top.refuse("axis", fmt::format("'{}' is a column already: give it another name", a.name));
-        }
-    }
-    for (const SweepOutput& o : plan.outputs) {
-        if (!columns.insert(o.name).second) {
-            top.refuse("outputs", fmt::format("'{}' is a column already: give it another name", o.name));
-        }
-    }
-}
-
 UnitPoints gridPoints(const std::vector<Axis>& axes, Section& top)
 {
     double count = 1;
@@ -322,6 +306,25 @@ UnitPoints pointsOf(const SweepPlan& plan, Section& top)
     return gridPoints(plan.axes, top);
 }
 
+// "depth_mm = 3, d = 10".
+std::string namedPoint(const SweepPlan& plan, const SweepCase& c)
+{
+    std::vector<std::string> out;
+    for (std::size_t a = 0; a < plan.axes.size(); ++a) {
+        out.push_back(fmt::format("{} = {}", plan.axes[a].name, toText(c.parameters[a])));
+    }
+    return fmt::format("{}", fmt::join(out, ", "));
+}
+
+bool holds(const std::string& constraint, const SweepPlan& plan, const SweepCase& c)
+{
+    const double value = evaluate(constraint, c.variables);
+    if (!std::isfinite(value)) {
+        throw std::runtime_error(fmt::format("formula '{}' gives no finite number at {}", constraint, namedPoint(plan, c)));
+    }
+    return value != 0;
+}
+
 void applyConstraints(SweepPlan& plan, Section& top)
 {
     if (plan.constraints.empty()) {
@@ -334,10 +337,10 @@ void applyConstraints(SweepPlan& plan, Section& top)
     const UnitPoints all = std::move(plan.points);
     for (const auto& point : all) {
         plan.points = {point};
-        const auto variables = sweepPoint(plan, 0).variables;
+        const SweepCase c = sweepPoint(plan, 0);
         try {
-            const bool meets = std::ranges::all_of(
-                plan.constraints, [&](const std::string& formula) { return evaluate(formula, variables) != 0; });
+            const bool meets =
+                std::ranges::all_of(plan.constraints, [&](const auto& formula) { return holds(formula, plan, c); });
             if (meets) {
                 kept.push_back(point);
             }
@@ -348,44 +351,6 @@ void applyConstraints(SweepPlan& plan, Section& top)
     plan.points = std::move(kept);
     if (plan.points.empty()) {
         top.refuse("constraints", "no point is left");
-    }
-}
-
-// Formulas see all that the first case has; 1 stands for what it would measure.
-void probeOutputs(const SweepPlan& plan, const SweepCase& first, const std::string& file)
-{
-    std::map<std::string, double> numbers = first.variables;
-    for (const OutputInfo& o : outputsOf(first.procedure.kind)) {
-        numbers[o.name] = 1;
-        if (!plan.reference.empty()) {
-            numbers["reference_" + o.name] = numbers[o.name + "_change_pct"] = 1;
-        }
-    }
-    for (const SweepOutput& output : plan.outputs) {
-        try {
-            numbers[output.name] = output.formula.empty() ? 1 : evaluate(output.formula, numbers);
-        } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("{}: outputs: {}", file, e.what()));
-        }
-    }
-}
-
-// A wrong key or value is known before the first case runs.
-void probe(const SweepPlan& plan, const std::string& file)
-{
-    const std::size_t count = std::min(plan.cases(), probes);
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::size_t index = count > 1 ? i * (plan.cases() - 1) / (count - 1) : 0;
-        try {
-            const SweepCase c = sweepCase(plan, index);
-            if (i == 0 && c.scene.source.file.empty()) {
-                const auto& table = c.scene.tissues;
-                datasets::withChanges(table.empty() ? datasets::defaultTissues() : datasets::loadTissues(table),
-                                      c.scene.tissueChanges);
-            }
-        } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("{}: case {}: {}", file, index, withoutPlace(e.what())));
-        }
     }
 }
 
@@ -431,13 +396,14 @@ SweepPlan parsePlan(const std::string& text, const std::filesystem::path& origin
     readSlurm(top, plan.slurm);
     top.finish();
     checkColumns(top, plan);
+    checkKeys(top, plan);
     plan.points = pointsOf(plan, top);
     applyConstraints(plan, top);
     if (static_cast<double>(plan.points.size()) * static_cast<double>(plan.repeats) > static_cast<double>(maxCases)) {
         top.refuse("repeats", fmt::format("over {} cases", maxCases));
     }
-    probe(plan, origin.string());
-    probeOutputs(plan, sweepCase(plan, 0), origin.string());
+    probeCases(plan, origin.string());
+    probeOutputs(plan, origin.string());
     return plan;
 }
 

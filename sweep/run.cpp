@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -54,12 +55,62 @@ void checkSamePlan(const SweepFolder& to, const SweepFolder& from)
     }
 }
 
-// Of plans that keep records.
-void copyRecord(const SweepFolder& from, const SweepFolder& to, std::size_t index)
+// Of plans that keep records. Whole or not at all: there is no row of it yet.
+void copyRecord(const fs::path& from, const SweepFolder& to, std::size_t index)
 {
-    const fs::path file = from.path() / "records" / fmt::format("{}.db", index);
+    const fs::path file = from / "records" / fmt::format("{}.db", index);
     if (fs::exists(file)) {
-        fs::copy_file(file, to.record(index));
+        const fs::path whole = to.record(index), half = whole.string() + ".part";
+        fs::copy_file(file, half, fs::copy_options::overwrite_existing);
+        fs::rename(half, whole);
+    }
+}
+
+// A row that comes from a shard.
+struct MergedRow {
+    fs::path shard;
+    SweepRow row;
+};
+
+// Rows that the folder lacks, or has only with an error; by case.
+std::map<std::size_t, MergedRow> rowsToMerge(const SweepFolder& to, const std::vector<std::optional<SweepRow>>& there,
+                                             const std::vector<fs::path>& shards)
+{
+    std::map<std::size_t, MergedRow> out;
+    for (const fs::path& part : shards) {
+        const SweepFolder shard(part, "", false);
+        checkSamePlan(to, shard);
+        for (const auto& row : shard.rows()) {
+            const auto before = row ? out.find(row->index) : out.end();
+            const SweepRow* const old = before != out.end()        ? &before->second.row
+                                        : row && there[row->index] ? &*there[row->index]
+                                                                   : nullptr;
+            if (row && (old == nullptr || (old->failed() && !row->failed()))) {
+                out[row->index] = {shard.path(), *row};
+            }
+        }
+    }
+    return out;
+}
+
+// The merged table is of one build.
+void checkOneBuild(const SweepFolder& to, const std::vector<std::optional<SweepRow>>& there,
+                   const std::map<std::size_t, MergedRow>& come)
+{
+    std::set<std::string> builds;
+    for (const auto& row : there) {
+        if (row && !come.contains(row->index)) {
+            builds.insert(row->build);
+        }
+    }
+    for (const auto& [index, merged] : come) {
+        builds.insert(merged.row.build);
+    }
+    if (builds.size() > 1 && !come.empty()) {
+        throw std::runtime_error(
+            fmt::format("{}: the shards are of different builds, {}: compute them with one build, or add --any-build (the "
+                        "table names the build of each case)",
+                        to.path().string(), fmt::join(builds, " and ")));
     }
 }
 
@@ -169,7 +220,7 @@ fs::path casesFolder(const fs::path& folder, const std::vector<std::size_t>& cas
     return folder / "shards" / ("cases-" + name);
 }
 
-std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& from)
+std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& from, bool anyBuild)
 {
     std::vector<fs::path> parts = from;
     std::error_code none;
@@ -191,21 +242,16 @@ std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& fro
     }
     const SweepFolder to(folder, "", true);
     to.clean();
-    auto rows = to.rows();
-    std::size_t came = 0;
-    for (const fs::path& part : parts) {
-        const SweepFolder shard(part, "", false);
-        checkSamePlan(to, shard);
-        for (const auto& row : shard.rows()) {
-            if (row && (!rows[row->index] || (rows[row->index]->failed() && !row->failed()))) {
-                to.write(*row);
-                copyRecord(shard, to, row->index);
-                rows[row->index] = row;
-                ++came;
-            }
-        }
+    const auto there = to.rows();
+    const auto come = rowsToMerge(to, there, parts);
+    if (!anyBuild) {
+        checkOneBuild(to, there, come);
     }
-    return came;
+    for (const auto& [index, merged] : come) {
+        copyRecord(merged.shard, to, index);
+        to.write(merged.row);
+    }
+    return come.size();
 }
 
 }  // namespace palpate::sweep

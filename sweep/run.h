@@ -45,6 +45,7 @@ std::filesystem::path casesFolder(const std::filesystem::path& folder, const std
 /// held while this goes on. A case that is done in several places is the same in all; one that failed here and is done
 /// there is taken. Throws std::runtime_error where the folders are not of one plan and scene.
 /// @returns  how many rows came
-std::size_t mergeShards(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& from);
+std::size_t mergeShards(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& from,
+                        bool anyBuild = false);
 
 }  // namespace palpate::sweep

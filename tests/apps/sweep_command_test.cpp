@@ -199,6 +199,23 @@ TEST_F(Sweep, DryRunSaysWhatItTakesAndLeavesNothing)
     EXPECT_EQ(said.find(": 0 s on"), std::string::npos) << said;
 }
 
+// Case 0 of three has its lump outside the body: what the others take is estimated. Where all fail there is no estimate.
+TEST_F(Sweep, ADryRunLeavesFailedCasesOut)
+{
+    const auto text = [](const std::string& values) {
+        return "scene = \"find-lump\"\noutputs = [\"force_n\"]\n[procedure]\nkind = \"press\"\nspeed_mm_s = 80\nhold_ms = "
+               "25\n[set]\nvolume.voxel_mm = 4\nvolume.parameters.width_mm = 40\nmodel.setting = \"fast\"\n"
+               "insert.lump.centre_mm.x = 0\ninsert.lump.centre_mm.z = 0\n"
+               "[[axis]]\nkey = \"insert.lump.centre_mm.y\"\nvalues = " +
+               values + "\n";
+    };
+    const Outcome some = palpate({"sweep", plan("some.toml", text("[400, 12, 500]")), "--dry-run"});
+    EXPECT_EQ(some.status, 0);
+    EXPECT_NE(some.out.find("measured on 1 case:"), std::string::npos) << some.out;
+    expectRefusal({"sweep", plan("none.toml", text("[400, 500, 600]")), "--dry-run"},
+                  "every case that was tried failed: case 0 fails: ");
+}
+
 TEST_F(Sweep, RecordsReplay)
 {
     std::string text = shortPlan(1, "records = true\n");

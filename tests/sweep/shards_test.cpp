@@ -1,11 +1,15 @@
+#include <sweep/folder.h>
 #include <sweep/plan.h>
 #include <sweep/run.h>
 
 #include <tests/error_of.h>
+#include <tests/folder.h>
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <string>
 #include <vector>
@@ -49,6 +53,60 @@ TEST(Shards, ATextOfCasesGivesTheCasesAgain)
         EXPECT_EQ(casesOfList(listOfCases(cases), 60), cases);
     }
     EXPECT_EQ(listOfCases({0, 1, 2, 7, 9, 10}), "0-2,7,9-10");
+}
+
+// The folder of two cases with records, case 0 of build "one" and case 1 of `build` in two shards.
+void makeShards(const std::filesystem::path& folder, const std::string& build)
+{
+    std::ofstream(folder / "p.toml") << "scene = \"block\"\nrecords = true\noutputs = [\"seconds\"]\n"
+                                        "[[axis]]\nkey = \"dffb.gain\"\nvalues = [0.1, 0.5]\n";
+    for (const std::size_t i : {0U, 1U}) {
+        const SweepFolder shard(folder / "s/shards" / std::to_string(i), folder / "p.toml", true);
+        SweepRow row;
+        row.index = i;
+        row.outputs = {1.0};
+        row.build = i == 0 ? "one" : build;
+        row.machine = "here";
+        shard.write(row);
+        std::ofstream(shard.record(i)) << "record of case " << i;
+    }
+}
+
+TEST(Shards, AreMergedWithTheirRecords)
+{
+    const palpate::tests::Folder home;
+    makeShards(home.path(), "one");
+    EXPECT_EQ(mergeShards(home / "s", {}), 2U);
+    EXPECT_TRUE(SweepFolder(home / "s", "", false).has(1));
+    EXPECT_TRUE(std::filesystem::exists(home / "s/records/0.db"));
+    EXPECT_TRUE(std::filesystem::exists(home / "s/records/1.db"));
+    EXPECT_EQ(mergeShards(home / "s", {}), 0U);
+}
+
+// A record that cannot be copied: its row does not come either, so that merging again brings both.
+TEST(Shards, ARowComesAfterItsRecord)
+{
+    const palpate::tests::Folder home;
+    makeShards(home.path(), "one");
+    const auto record = home / "s/shards/1/records/1.db";
+    std::filesystem::remove(record);
+    std::filesystem::create_directories(record / "no file");
+    EXPECT_ANY_THROW(mergeShards(home / "s", {}));
+    EXPECT_FALSE(SweepFolder(home / "s", "", false).has(1));
+    std::filesystem::remove_all(record);
+    std::ofstream(record) << "record";
+    EXPECT_EQ(mergeShards(home / "s", {}), 1U);
+    EXPECT_TRUE(std::filesystem::exists(home / "s/records/1.db"));
+}
+
+TEST(Shards, OfDifferentBuildsAreMergedOnRequestOnly)
+{
+    const palpate::tests::Folder home;
+    makeShards(home.path(), "two");
+    const std::string error = palpate::tests::errorOf([&] { mergeShards(home / "s", {}); });
+    EXPECT_NE(error.find("different builds, one and two"), std::string::npos) << error;
+    EXPECT_FALSE(SweepFolder(home / "s", "", false).has(0));
+    EXPECT_EQ(mergeShards(home / "s", {}, true), 2U);
 }
 
 // Point i has value i of every axis.

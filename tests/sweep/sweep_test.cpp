@@ -147,6 +147,24 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         {scene + "constraints = [\"dffb_gain > 2\"]\n[design]\nkind = \"morris\"\nsamples = 2\n" + axis("dffb.gain", "[1]"),
          "whole or none"},
         {"scene = \"moon\"\n" + axis("dffb.gain", "[1]"), "built-in scenes are"},
+        {scene + axis("dffb.gain", "[1]") + "[[axis]]\nname = \"g\"\nkey = \"dffb.gain\"\nvalues = [1]\n",
+         "key 'dffb.gain' is set twice"},
+        {scene + axis("dffb.gain", "[1]") + "[set]\ndffb.gain = 0.5\n", "key 'dffb.gain' is set twice"},
+        {scene + axis("dffb.range_mm", "[9]") + "[set]\ndffb.gain = 0.5\n\"dffb.gain\" = 1\n",
+         "key 'dffb.gain' is set twice"},
+        {scene + axis("procedure.seconds", "[9]") + "[procedure]\nseconds = 5\n", "key 'procedure.seconds' is set twice"},
+        {scene + "outputs = [\"Gain = 1\"]\n[[axis]]\nname = \"gain\"\nkey = \"dffb.gain\"\nvalues = [1]\n",
+         "'Gain' is a column already"},
+        {scene + "[[axis]]\nname = \"Seed\"\nvalues = [1]\n", "'Seed' is a column already"},
+        {scene + "constraints = [\"0 / (1 - dffb_gain)\"]\n" + axis("dffb.gain", "[0, 1]"),
+         "gives no finite number at dffb_gain = 1"},
+        {scene + axis("procedure.delay_ms", "[1]") + "[procedure]\nkind = \"press\"\n",
+         "a procedure of kind press has the keys depth_mm"},
+        {scene + axis("procedure.aside_mm", "[1]") + "[procedure]\nkind = \"needle\"\n",
+         "a procedure of kind needle has the keys depth_mm"},
+        {scene + axis("dffb.gain", "[1]") + "[procedure]\ntrainee = \"novice\"\nkind = \"press\"\n",
+         "a procedure of kind press has the keys depth_mm"},
+        {scene + axis("procedure.depth_mm", "[1]"), "a procedure of kind session has the keys trainee"},
     };
     for (const auto& [text, hint] : wrong) {
         const std::string error = refusal(text);
@@ -154,6 +172,24 @@ TEST(SweepPlan, RefusesWhatCannotBe)
         EXPECT_TRUE(error.starts_with("plan.toml")) << error;
         EXPECT_EQ(error.find('\n'), std::string::npos) << error;
     }
+}
+
+// 61 x 61 cases, of which 60 are tried evenly, every 63rd: none of them has the one wrong value.
+TEST(SweepPlan, TriesEachValueOfAListOnce)
+{
+    std::string gains = "0", masses = "0.1";
+    for (int i = 1; i < 61; ++i) {
+        gains += i == 7 ? ", 7" : ", 0.5";
+        masses += ", " + std::to_string(0.1 + 0.001 * i);
+    }
+    const std::string error = refusal("scene = \"block\"\n[[axis]]\nname = \"m\"\nvalues = [" + masses +
+                                      "]\n[[axis]]\nkey = \"dffb.gain\"\nvalues = [" + gains + "]\n");
+    EXPECT_NE(error.find("case 7: "), std::string::npos) << error;
+    EXPECT_NE(error.find("must be 0 to 1"), std::string::npos) << error;
+    EXPECT_NE(refusal("scene = \"block\"\n[[axis]]\nname = \"m\"\nvalues = [" + masses +
+                      "]\n[[axis]]\nkey = \"tissue.fatt.youngs_kpa\"\nvalues = [3]\n")
+                  .find("it has: skin, fat"),
+              std::string::npos);
 }
 
 TEST(SweepPlan, ReadyPlansAreWhole)

@@ -1,0 +1,157 @@
+#include <sweep/plan_checks.h>
+
+#include <datasets/tables.h>
+#include <sweep/formula.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace palpate::sweep {
+
+using datasets::Section;
+
+namespace {
+
+constexpr std::size_t evenProbes = 60;    // cases whose scene is tried before a sweep begins
+constexpr std::size_t valueProbes = 600;  // and those beside them that have a value of a list for the first time
+
+std::string lowerCase(std::string name)
+{
+    std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return name;
+}
+
+void insertKey(Section& top, const char* where, const std::string& key, std::set<std::string>& keys)
+{
+    if (!key.empty() && !keys.insert(key).second) {
+        top.refuse(where, fmt::format("key '{}' is set twice: leave one out", key));
+    }
+}
+
+// By axis: the values that are tried one by one; of a range of a grid its ends.
+std::vector<std::set<KeyValue>> valuesOf(const SweepPlan& plan)
+{
+    std::vector<std::set<KeyValue>> out;
+    for (const Axis& a : plan.axes) {
+        std::set<KeyValue>& values = out.emplace_back(a.values.begin(), a.values.end());
+        if (a.values.empty() && plan.design == DesignKind::grid) {
+            values = {a.level(0), a.level(a.steps - 1)};
+        }
+    }
+    return out;
+}
+
+// The first case with each value that an axis lists.
+std::set<std::size_t> casesOfValues(const SweepPlan& plan)
+{
+    auto values = valuesOf(plan);
+    const bool byNumber = plan.design == DesignKind::grid || plan.design == DesignKind::list;
+    std::set<std::size_t> cases;
+    for (std::size_t p = 0; p < plan.points.size() && cases.size() < valueProbes; ++p) {
+        for (std::size_t a = 0; a < plan.axes.size(); ++a) {
+            const double x = plan.points[p][a];
+            const Axis& axis = plan.axes[a];
+            if (!values[a].empty() &&
+                values[a].erase(byNumber ? axis.level(static_cast<std::size_t>(x)) : axis.at(x)) > 0) {
+                cases.insert(p * plan.repeats);
+            }
+        }
+    }
+    return cases;
+}
+
+// Of a phantom's scene: of a volume's own table nothing is known before it is read.
+void checkTissues(const datasets::Scene& scene, std::map<std::string, volume::TissueTable>& tables)
+{
+    if (!scene.source.file.empty()) {
+        return;
+    }
+    auto at = tables.find(scene.tissues);
+    if (at == tables.end()) {
+        at = tables
+                 .emplace(scene.tissues,
+                          scene.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(scene.tissues))
+                 .first;
+    }
+    datasets::withChanges(at->second, scene.tissueChanges);
+}
+
+}  // namespace
+
+void checkColumns(Section& top, const SweepPlan& plan)
+{
+    std::set<std::string> columns{"case",  "point", "repeat",  "seed",    "status",
+                                  "error", "build", "machine", "tick_us", "case_s"};
+    const auto insert = [&](const char* where, const std::string& name) {
+        if (!columns.insert(lowerCase(name)).second) {
+            top.refuse(where,
+                       fmt::format("'{}' is a column already (letter case does not count): give it another name", name));
+        }
+    };
+    for (const Axis& a : plan.axes) {
+        insert("axis", a.name);
+    }
+    for (const SweepOutput& o : plan.outputs) {
+        insert("outputs", o.name);
+    }
+}
+
+void checkKeys(Section& top, const SweepPlan& plan)
+{
+    std::set<std::string> keys, ofReference;
+    for (const Setting& s : plan.settings) {
+        insertKey(top, s.key.starts_with("procedure.") && top.has("procedure") ? "procedure" : "set", s.key, keys);
+    }
+    for (const Axis& a : plan.axes) {
+        insertKey(top, "axis", a.key, keys);
+    }
+    for (const Setting& s : plan.reference) {
+        insertKey(top, "reference", s.key, ofReference);
+    }
+}
+
+void probeCases(const SweepPlan& plan, const std::string& file)
+{
+    std::set<std::size_t> cases = casesOfValues(plan);
+    const std::size_t count = std::min(plan.cases(), evenProbes);
+    for (std::size_t i = 0; i < count; ++i) {
+        cases.insert(count > 1 ? i * (plan.cases() - 1) / (count - 1) : 0);
+    }
+    std::map<std::string, volume::TissueTable> tables;
+    for (const std::size_t index : cases) {
+        try {
+            checkTissues(sweepCase(plan, index).scene, tables);
+        } catch (const std::runtime_error& e) {
+            throw std::runtime_error(fmt::format("{}: case {}: {}", file, index, withoutPlace(e.what())));
+        }
+    }
+}
+
+// Formulas see all that the first case has; 1 stands for what it would measure.
+void probeOutputs(const SweepPlan& plan, const std::string& file)
+{
+    const SweepCase first = sweepCase(plan, 0);
+    std::map<std::string, double> numbers = first.variables;
+    for (const OutputInfo& o : outputsOf(first.procedure.kind)) {
+        numbers[o.name] = 1;
+        if (!plan.reference.empty()) {
+            numbers["reference_" + o.name] = numbers[o.name + "_change_pct"] = 1;
+        }
+    }
+    for (const SweepOutput& output : plan.outputs) {
+        try {
+            numbers[output.name] = output.formula.empty() ? 1 : evaluate(output.formula, numbers);
+        } catch (const std::runtime_error& e) {
+            throw std::runtime_error(fmt::format("{}: outputs: {}", file, e.what()));
+        }
+    }
+}
+
+}  // namespace palpate::sweep

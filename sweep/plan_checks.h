@@ -1,0 +1,21 @@
+#pragma once
+
+#include <datasets/toml_section.h>
+#include <sweep/plan.h>
+
+#include <string>
+
+namespace palpate::sweep {
+
+// What is wrong in a plan is known before its first case runs. Each throws std::runtime_error ("FILE: what is wrong").
+
+/// No two columns of the table have one name: small and capital letters are the same, as for SQLite.
+void checkColumns(datasets::Section& top, const SweepPlan& plan);
+/// No key is set twice: by two axes, or by an axis and [procedure] or [set].
+void checkKeys(datasets::Section& top, const SweepPlan& plan);
+/// The scenes of some cases, spread evenly, and of one with each value of each list.
+void probeCases(const SweepPlan& plan, const std::string& file);
+/// The formulas of the outputs, on the first case.
+void probeOutputs(const SweepPlan& plan, const std::string& file);
+
+}  // namespace palpate::sweep
