@@ -159,11 +159,27 @@ void checkVerdicts(const std::vector<Experiment>& experiments)
     }
 }
 
+// Files that an experiment may read.
+std::vector<std::filesystem::path> inputsOf(const ValidateArguments& o)
+{
+    std::vector<std::filesystem::path> inputs{o.tissues};
+    for (const auto& folder : measurementFolders(o.data)) {
+        std::error_code none;
+        for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
+            inputs.push_back(entry.path());
+        }
+    }
+    return inputs;
+}
+
 void validateCommand(const ValidateArguments& o)
 {
-    base::checkOutput(o.json);
-    base::checkOutput(o.csv);
+    base::checkOutputs({o.json, o.csv}, inputsOf(o));
     base::checkOutputFolder(o.folder);
+    if (!o.tissues.empty() && !o.names.empty() && std::ranges::find(o.names, "ultrasound") == o.names.end()) {
+        throw std::runtime_error(
+            "--tissues: only the experiment ultrasound reads a tissue table: name it too, or leave this out");
+    }
     if (!o.data.empty() && !std::filesystem::is_directory(o.data)) {
         throw std::runtime_error(o.data.string() + ": is no folder: name the one with the measurements");
     }

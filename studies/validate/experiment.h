@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -44,7 +45,13 @@ struct Experiment {
     void judge() noexcept { verdict = error <= bound ? Verdict::holds : Verdict::fails; }
 };
 
-/// Root of the mean square, and the largest size.
+/// The larger of two errors; one that is no number wins, so that it is not lost.
+inline double largerError(double a, double b) noexcept
+{
+    return std::isnan(a) || a >= b ? a : b;
+}
+
+/// Root of the mean square, and the largest size; no numbers where one of the errors is none.
 struct ErrorSummary {
     double rms = 0, worst = 0;
 };

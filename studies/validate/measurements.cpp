@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -79,7 +78,7 @@ double Measurements::number(std::size_t row, std::string_view column) const
     const std::string& cell = text(row, column);
     char* end = nullptr;
     const double value = std::strtod(cell.c_str(), &end);
-    if (cell.empty() || *end != '\0') {
+    if (cell.empty() || *end != '\0' || !std::isfinite(value)) {
         throw std::runtime_error(
             fmt::format("{}, line {}: {} is '{}', which is no number", file_.string(), lines_[row], column, cell));
     }
@@ -116,7 +115,7 @@ ErrorSummary summaryOf(const std::vector<double>& errors) noexcept
     ErrorSummary out;
     for (const double e : errors) {
         out.rms += e * e;
-        out.worst = std::max(out.worst, std::abs(e));
+        out.worst = largerError(out.worst, std::abs(e));
     }
     out.rms = errors.empty() ? NAN : std::sqrt(out.rms / static_cast<double>(errors.size()));
     return out;

@@ -22,7 +22,7 @@ public:
 
     std::size_t rows() const noexcept { return cells_.size(); }
     const std::string& text(std::size_t row, std::string_view column) const;
-    /// Throws std::runtime_error for a cell that is no number; "nan" is one.
+    /// Throws std::runtime_error for a cell that is no number, or none that is finite.
     double number(std::size_t row, std::string_view column) const;
 
 private:

@@ -14,6 +14,7 @@ namespace palpate::studies {
 namespace {
 
 constexpr double strokeTravel = 85.3e-3;  // of the stage [m]
+constexpr double longestTravel = 1.0;     // travel in a file [m]
 constexpr int insertions = 10;            // of ours, at as many places
 constexpr double placesApart = 12e-3;     // [m]
 const char* const needleSource =
@@ -37,7 +38,12 @@ std::map<int, Curve> curvesIn(const std::filesystem::path& file)
         const int curve = static_cast<int>(table.number(row, "curve"));
         const bool in = table.text(row, "phase") == "ins";
         const double force = table.number(row, "F_mean_N");
-        const auto bin = static_cast<std::size_t>(millimetre * table.number(row, "x_mm") / strokeStep);
+        const double x = millimetre * table.number(row, "x_mm");
+        if (x < 0.0 || x > longestTravel) {
+            throw std::runtime_error(fmt::format("{}: curve {}: x_mm = {:g}: must be 0 to {:g}", file.string(), curve,
+                                                 1e3 * x, 1e3 * longestTravel));
+        }
+        const auto bin = static_cast<std::size_t>(x / strokeStep);
         auto& [sum, count] = bins[{curve, in}][bin];
         sum += in ? force : -force;
         ++count;
@@ -149,8 +155,8 @@ struct Corridor {
     std::vector<double> low, high, mean;
 };
 
-// 5 and 95 % of the curves in each bin.
-Corridor corridorOf(const std::vector<std::vector<double>>& curves)
+// 5 and 95 % of the curves in each bin. Throws std::runtime_error for a bin that no curve reaches.
+Corridor corridorOf(const std::vector<std::vector<double>>& curves, const std::filesystem::path& file)
 {
     Corridor c;
     for (std::size_t bin = 0; bin < curves.front().size(); ++bin) {
@@ -159,6 +165,11 @@ Corridor corridorOf(const std::vector<std::vector<double>>& curves)
             if (bin < curve.size() && std::isfinite(curve[bin])) {
                 here.push_back(curve[bin]);
             }
+        }
+        if (here.empty()) {
+            throw std::runtime_error(fmt::format("{}: no curve with an odd number has a force at {:g} to {:g} mm of travel",
+                                                 file.string(), 1e3 * strokeStep * static_cast<double>(bin),
+                                                 1e3 * strokeStep * static_cast<double>(bin + 1)));
         }
         std::ranges::sort(here);
         const auto at = [&](double fraction) {
@@ -174,9 +185,9 @@ Corridor corridorOf(const std::vector<std::vector<double>>& curves)
     return c;
 }
 
-// Fraction of the predicted bins that lie in the corridor of the measured ones.
+// Fraction of the predicted bins that lie in the corridor of the measured ones. No number lies outside.
 Experiment corridorExperiment(const char* name, const char* what, const std::vector<double>& predicted,
-                              const std::vector<std::vector<double>>& measured)
+                              const Corridor& corridor)
 {
     Experiment e;
     e.name = name;
@@ -186,7 +197,6 @@ Experiment corridorExperiment(const char* name, const char* what, const std::vec
     e.fittedOn = split;
     e.predicted = fmt::format("{} of the curves with odd numbers", what);
     e.bound = 20.0;
-    const Corridor corridor = corridorOf(measured);
     const std::size_t bins = std::min(predicted.size(), corridor.low.size());
     std::size_t outside = 0;
     ValidateCurve ours{"predicted", {}, {}, true}, low{"5 %, held back", {}, {}, true},
@@ -194,11 +204,11 @@ Experiment corridorExperiment(const char* name, const char* what, const std::vec
     double meanSpread = 0.0, meanOff = 0.0, level = 0.0;
     for (std::size_t i = 0; i < bins; ++i) {
         const double off = predicted[i] - corridor.mean[i];
-        outside += predicted[i] < corridor.low[i] || predicted[i] > corridor.high[i] ? 1 : 0;
+        outside += predicted[i] >= corridor.low[i] && predicted[i] <= corridor.high[i] ? 0 : 1;
         meanOff += off / static_cast<double>(bins);
         level += corridor.mean[i] / static_cast<double>(bins);
         meanSpread += 0.5 * (corridor.high[i] - corridor.low[i]) / static_cast<double>(bins);
-        e.worst = std::max(e.worst, std::abs(off));
+        e.worst = largerError(e.worst, std::abs(off));
         for (auto [curve, value] : {std::pair(&ours, predicted[i]), std::pair(&low, corridor.low[i]),
                                     std::pair(&high, corridor.high[i]), std::pair(&mean, corridor.mean[i])}) {
             curve->x.push_back(1e3 * (static_cast<double>(i) + 0.5) * strokeStep);
@@ -273,13 +283,20 @@ std::map<double, std::vector<double>> holdRatios(const std::filesystem::path& fi
 {
     const Measurements table(file);
     std::map<double, std::vector<double>> ratios;
-    double start = NAN;
+    std::map<int, double> starts;  // by curve [N]
     for (std::size_t row = 0; row < table.rows(); ++row) {
+        const int curve = static_cast<int>(table.number(row, "curve"));
         const double seconds = table.number(row, "t_hold_s");
         const double force = table.number(row, "F_N");
-        start = seconds == 0.0 ? force : start;
-        if ((static_cast<int>(table.number(row, "curve")) % 2 == 0) == even) {
-            ratios[seconds].push_back(force / start);
+        if (seconds == 0.0) {
+            starts[curve] = force;
+        }
+        if (!starts.contains(curve) || starts[curve] <= 0.0) {
+            throw std::runtime_error(
+                fmt::format("{}: curve {} must begin with a force above 0 at t_hold_s = 0", file.string(), curve));
+        }
+        if ((curve % 2 == 0) == even) {
+            ratios[seconds].push_back(force / starts[curve]);
         }
     }
     return ratios;
@@ -317,14 +334,14 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
         const double wanted = meanFrom(found->second, 0);
         const double off = ours.held[i] / ours.held.front() - wanted;
         if (heldAt[i] == 1.0 || heldAt[i] == 10.0) {
-            e.error = std::max(e.error, 1e2 * std::abs(off));
+            e.error = largerError(e.error, 1e2 * std::abs(off));
         }
         std::vector<double> apart;
         for (const double r : found->second) {
             apart.push_back(1e2 * (r - wanted));
         }
-        spread = std::max(spread, summaryOf(apart).rms);
-        e.worst = std::max(e.worst, 1e2 * std::abs(off));
+        spread = largerError(spread, summaryOf(apart).rms);
+        e.worst = largerError(e.worst, 1e2 * std::abs(off));
         mean.x.push_back(heldAt[i]);
         mean.y.push_back(wanted);
         line.x.push_back(heldAt[i]);
@@ -403,6 +420,12 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
         throw std::runtime_error(curves.string() + ": needs three curves with even numbers and three with odd ones");
     }
     const Fit fit = fitted(fitCurves);
+    std::vector<std::vector<double>> measuredTip, measuredIn;
+    for (const Curve& c : heldBack) {
+        measuredTip.push_back(tipForce(c));
+        measuredIn.push_back(c.in);
+    }
+    const Corridor tipCorridor = corridorOf(measuredTip, curves), inCorridor = corridorOf(measuredIn, curves);
     progress("needle");
     const std::vector<double> heldAt{0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0};
     const double surface = static_cast<double>(fit.surface) * strokeStep;
@@ -418,15 +441,12 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     for (std::size_t i = 0; static_cast<double>(i + 1) * strokeStep < strokeTravel; ++i) {
         const bool cuts = i >= fit.surface && i - fit.surface < ourTip.size();
         tip.push_back(cuts ? ourTip[i - fit.surface] : 0.0);
-        insertion.push_back(i < fit.friction.size() ? fit.friction[i] + tip.back() : NAN);
+        if (i < fit.friction.size()) {  // beyond, nothing is predicted
+            insertion.push_back(fit.friction[i] + tip.back());
+        }
     }
-    std::vector<std::vector<double>> measuredTip, measuredIn;
-    for (const Curve& c : heldBack) {
-        measuredTip.push_back(tipForce(c));
-        measuredIn.push_back(c.in);
-    }
-    std::vector<Experiment> out{corridorExperiment("needle-tip", "tip force", tip, measuredTip),
-                                corridorExperiment("needle-insertion", "force on the way in", insertion, measuredIn),
+    std::vector<Experiment> out{corridorExperiment("needle-tip", "tip force", tip, tipCorridor),
+                                corridorExperiment("needle-insertion", "force on the way in", insertion, inCorridor),
                                 ruptureExperiment(ours, heldBack, liver),
                                 holdExperiment(ours.front(), liver.relaxation, heldAt, hold)};
     out[0].fittedOn = "curves with even numbers: cutting force, inner walls, and where the tissue begins";

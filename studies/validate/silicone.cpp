@@ -179,8 +179,8 @@ Experiment loadExperiment(const std::vector<Material>& all, const LoadCurves& cu
         const double b = yeoh ? stiffeningWithout(all, i, curves) : 0.0;
         const Prediction p = predict(all[i], curves(b));
         const ErrorSummary own = summaryOf(p.errors);
-        e.error = std::max(e.error, own.rms);
-        e.worst = std::max(e.worst, own.worst);
+        e.error = largerError(e.error, own.rms);
+        e.worst = largerError(e.worst, own.worst);
         everything.insert(everything.end(), p.errors.begin(), p.errors.end());
         atForty.push_back(1e2 * (p.load.back() / all[i].load.back() - 1.0));
         e.parameters.emplace_back(all[i].name + "_shear_kpa", 1e-3 * p.shear);

@@ -65,6 +65,13 @@ TEST(ValidateCommand, DamagedMeasurementsAreRefused)
     expectRefusal({"validate", "beam", "--data", folder.path()}, "silicone_cantilever_static.csv, line 2");
     expectRefusal({"validate", "--data", folder / "none"}, "is no folder");
     expectRefusal({"validate", "bean"}, "bean");
+    expectRefusal({"validate", "palpation", "--tissues", "/nonexistent.toml"}, "only the experiment ultrasound");
+    const std::string twice = folder / "v", table = folder / "t.toml";
+    expectRefusal({"validate", "beam", "--json", twice, "--csv", twice}, "would be written twice");
+    writeText(table, "");
+    expectRefusal({"validate", "ultrasound", "--tissues", table, "--json", table}, "is a file that is read");
+    const std::string measured = folder / "silicone_cantilever_static.csv";
+    expectRefusal({"validate", "beam", "--data", folder.path(), "--csv", measured}, "is a file that is read");
 }
 
 // One page with a picture per experiment, beside its figures.

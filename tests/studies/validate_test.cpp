@@ -6,6 +6,7 @@
 #include <studies/validate/silicone.h>
 #include <studies/validate/yeoh.h>
 
+#include <tests/error_of.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -187,7 +188,7 @@ TEST(Measurements, MissingAndDamagedFilesSaySo)
     EXPECT_THROW(Measurements(folder / "none.csv"), NoMeasurement);
     EXPECT_THROW(measurementFile({folder.path()}, "none.csv"), NoMeasurement);
     std::ofstream(folder / "short.csv") << "# what\na,b\n1,2\n3\n";
-    std::ofstream(folder / "words.csv") << "a,b\n1,soft\n\"2\",nan\n";
+    std::ofstream(folder / "words.csv") << "a,b\n1,soft\n\"2\",nan\n3,inf\n";
     try {
         Measurements(folder / "short.csv");
         FAIL();
@@ -196,9 +197,61 @@ TEST(Measurements, MissingAndDamagedFilesSaySo)
     }
     const Measurements words(folder / "words.csv");
     EXPECT_EQ(words.number(1, "a"), 2.0);
-    EXPECT_TRUE(std::isnan(words.number(1, "b")));
+    EXPECT_THROW(words.number(1, "b"), std::runtime_error);
+    EXPECT_THROW(words.number(2, "b"), std::runtime_error);
     EXPECT_THROW(words.number(0, "b"), std::runtime_error);
     EXPECT_THROW(words.number(0, "c"), std::runtime_error);
+}
+
+// An error that is no number is not lost in a maximum, and no experiment with it holds.
+TEST(Experiment, AnErrorThatIsNoNumberFails)
+{
+    EXPECT_EQ(largerError(1.0, 2.0), 2.0);
+    EXPECT_EQ(largerError(2.0, 1.0), 2.0);
+    EXPECT_TRUE(std::isnan(largerError(NAN, 1.0)));
+    EXPECT_TRUE(std::isnan(largerError(1.0, NAN)));
+    const ErrorSummary summary = summaryOf({1.0, NAN, 2.0});
+    EXPECT_TRUE(std::isnan(summary.rms));
+    EXPECT_TRUE(std::isnan(summary.worst));
+    Experiment e;
+    e.error = summary.worst;
+    e.bound = 100.0;
+    e.judge();
+    EXPECT_EQ(e.verdict, Verdict::fails);
+}
+
+// Six curves of 20 mm in and out, and what they hold; `gap`: no curve has a force from 10 to 12 mm; `start`: curve 1 has
+// one at 0 s.
+void writeNeedleCurves(const tests::Folder& folder, bool gap, bool start)
+{
+    std::ofstream curves(folder / "curves.csv"), hold(folder / "hold.csv");
+    curves << "curve,phase,x_mm,F_mean_N,F_max_N,F_min_N\n";
+    hold << "curve,t_hold_s,F_N\n";
+    for (int curve = 0; curve < 6; ++curve) {
+        for (double x = 0.25; x < 20.0; x += 0.5) {
+            if (!gap || x < 10.0 || x > 12.0) {
+                curves << curve << ",ins," << x << ",0.5,0.6,0.4\n" << curve << ",ret," << x << ",-0.1,0,-0.2\n";
+            }
+        }
+        for (const double seconds : {0.0, 1.0, 10.0}) {
+            if (start || curve != 1 || seconds > 0.0) {
+                hold << curve << "," << seconds << "," << 1.0 - 0.05 * seconds << "\n";
+            }
+        }
+    }
+}
+
+TEST(NeedleInLiver, RefusesCurvesWithoutAStartOrWithABinThatNoneReaches)
+{
+    const tests::Folder folder;
+    const auto error = [&] {
+        return tests::errorOf(
+            [&] { needleInLiver(folder / "curves.csv", folder / "hold.csv", [](const std::string&) {}); });
+    };
+    writeNeedleCurves(folder, true, true);
+    EXPECT_NE(error().find("no curve with an odd number has a force at 10 to 12 mm"), std::string::npos) << error();
+    writeNeedleCurves(folder, false, false);
+    EXPECT_NE(error().find("curve 1 must begin with a force above 0 at t_hold_s = 0"), std::string::npos) << error();
 }
 
 }  // namespace
