@@ -113,6 +113,20 @@ TrialModel limited(TrialModel model, double maxSeconds)
     return model;
 }
 
+// Throws where a look's errors are no numbers: the method has come apart.
+void checkFinite(std::span<const TrialResult> results)
+{
+    for (const TrialResult& result : results) {
+        for (const TrialErrors& e : result.looks) {
+            for (const double figure : {e.rms, e.near, e.max, e.force, e.volume}) {
+                if (!std::isfinite(figure)) {
+                    throw std::runtime_error("its displacements or forces are no finite numbers");
+                }
+            }
+        }
+    }
+}
+
 // Level spring where the tool is the path's sphere: the force of equation 2, out of the surface at rest.
 TrialModel springModel(const haptics::SessionModel& model, const TrialPath& path)
 {
@@ -211,7 +225,9 @@ AccuracyRun runAccuracy(const Baseline& method, const AccuracySubject& subject,
         const TrialModel model = limited(method.build(), maxSeconds);
         run.buildSeconds = secondsSince(start);
         run.hasForce = static_cast<bool>(model.force);
-        run.results = runTrials(model, subject.path, subject.speed, references);
+        auto results = runTrials(model, subject.path, subject.speed, references);
+        checkFinite(results);
+        run.results = std::move(results);
     } catch (const std::runtime_error& e) {
         run.failure = e.what();
     } catch (const std::bad_alloc&) {

@@ -44,7 +44,7 @@ struct AccuracyRun {
 };
 
 /// Builds the method and drives it along the subject's path. One that throws std::runtime_error, or whose ticks take
-/// longer than `maxSeconds` in all, has failed.
+/// longer than `maxSeconds` in all, or whose errors are no finite numbers, has failed.
 AccuracyRun runAccuracy(const Baseline& method, const AccuracySubject& subject,
                         std::span<const Reference* const> references, double maxSeconds);
 

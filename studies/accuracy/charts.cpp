@@ -149,7 +149,7 @@ report::Chart chartOf(const json& figures, const View& view)
 {
     report::Chart chart;
     chart.title = fmt::format("{}{}: error against time, {} reference", view.scene, view.title,
-                              view.law == "linear" ? "linear" : "neo-Hookean");
+                              view.law == "neo-hookean" ? "neo-Hookean" : view.law);
     chart.xLabel = "processor time per update [us]";
     chart.yLabel = "error within 30 mm of the contact [% of the largest displacement]";
     chart.logX = chart.logY = true;
@@ -167,7 +167,7 @@ report::Chart chartOf(const json& figures, const View& view)
     chart.series.push_back(frontOf(chart));
     chart.series.push_back(deadlineOf(chart));
     for (const json& f : figures.at("floors")) {
-        if (f.at("scene") == view.scene && view.law == "neo-hookean") {
+        if (f.at("scene") == view.scene && f.at("law") == view.law) {
             const double error = partOf(f, view).at("near_pct");
             chart.bounds.push_back({fmt::format("linear law, solved exactly: {:.1f} %", error), error});
         }

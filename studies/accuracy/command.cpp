@@ -217,15 +217,15 @@ AccuracyRun run(const Solved& s, const Case& what, std::span<const Reference* co
                     fmt::format("{}-{:g}mm", s.scene, 1e3 * what.spacing));
 }
 
-// Runs a case against those references that the log does not have, and logs it. Returns how many. A rival that has failed
-// may have been mended.
+// Runs a case against those references that the log does not have, and logs it. Returns how many. What has failed may have
+// been mended, or has another limit now.
 std::size_t runMissing(const Solved& s, const Case& what, const AccuracyArguments& o, AccuracyLog& log)
 {
     std::vector<const SolvedReference*> missing;
     std::vector<const Reference*> references;
     for (const SolvedReference& r : s.references) {
         const json* const done = log.find(what.key(r.second), what.method.method, what.method.setting);
-        if (done == nullptr || (what.rival != nullptr && done->contains("failure"))) {
+        if (done == nullptr || done->contains("failure")) {
             missing.push_back(&r);
             references.push_back(&r.first);
         }
@@ -248,9 +248,8 @@ std::size_t runMissing(const Solved& s, const Case& what, const AccuracyArgument
 
 void addScene(const Solved& s, const std::vector<Case>& cases, const AccuracyLog& log, json& figures)
 {
-    const SolvedReference* laws[2]{};
+    const auto linear = std::ranges::find(s.references, "linear", [](const SolvedReference& r) { return r.second.law; });
     for (const SolvedReference& r : s.references) {
-        laws[r.second.law == "linear" ? 0 : 1] = &r;
         json entry = referenceEntry(r.second);
         entry["scene"] = s.scene;
         figures["references"].push_back(entry);
@@ -260,10 +259,10 @@ void addScene(const Solved& s, const std::vector<Case>& cases, const AccuracyLog
                 figures["chart"].back()["scene"] = s.scene;
             }
         }
-    }
-    if (laws[0] != nullptr && laws[1] != nullptr) {
-        figures["floors"].push_back(
-            floorEntry(s.scene, errorsBetween(laws[0]->first, laws[1]->first, s.subject.path, s.subject.speed)));
+        if (linear != s.references.end() && r.second.law != "linear") {
+            figures["floors"].push_back(
+                floorEntry(s.scene, r.second.law, errorsBetween(linear->first, r.first, s.subject.path, s.subject.speed)));
+        }
     }
 }
 
@@ -427,11 +426,17 @@ void addAccuracy(CLI::App& app)
         ->capture_default_str();
     accuracy->add_option("--json", o->json, "Write figures to this file (- = standard output)");
     accuracy->add_flag("--quick", o->quick, "Only few methods, scenes block and plate: a minute");
-    accuracy->add_flag("--verify", o->verify, "No charts: compare kernel and reference with closed forms")->excludes(rival);
+    auto* verify = accuracy->add_flag("--verify", o->verify, "No charts: compare kernel and reference with closed forms");
     auto* depth = accuracy->add_flag(
         "--depth", o->depth,
         "Compare the force alone, from first touch to two radii deep and back, with stored finite elements");
-    depth->excludes(rival);
+    for (const char* const charts : {"--rival", "--volume", "--methods", "--law", "--references", "--limit"}) {
+        depth->excludes(accuracy->get_option(charts));
+        verify->excludes(accuracy->get_option(charts));
+    }
+    for (const char* const written : {"--output", "--scenes", "--depth"}) {
+        verify->excludes(accuracy->get_option(written));
+    }
     accuracy->add_option("--settings", o->settings, "With --depth: settings of level elastic")
         ->delimiter(',')
         ->capture_default_str()

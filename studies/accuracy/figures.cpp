@@ -171,11 +171,12 @@ json accuracyEntry(const std::string& scene, const std::string& law, const Basel
     return out;
 }
 
-json floorEntry(const std::string& scene, std::span<const TrialErrors> looks)
+json floorEntry(const std::string& scene, const std::string& law, std::span<const TrialErrors> looks)
 {
     json out = lookFigures(looks, true);
     addParts(out, looks, true);
     out["scene"] = scene;
+    out["law"] = law;
     return out;
 }
 
@@ -218,7 +219,7 @@ void printAccuracy(const json& figures)
             }
         }
         for (const json& f : figures.at("floors")) {
-            if (f.at("scene") == group.front()->at("scene") && group.front()->at("law") == "neo-hookean") {
+            if (f.at("scene") == group.front()->at("scene") && f.at("law") == group.front()->at("law")) {
                 fmt::print("  the linear law itself is {} % off\n", cell(f, "near_pct", 2));
             }
         }

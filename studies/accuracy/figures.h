@@ -18,8 +18,8 @@ namespace palpate::studies {
 nlohmann::json accuracyEntry(const std::string& scene, const std::string& law, const Baseline& method,
                              const AccuracyRun& run, const TrialResult* result);
 
-/// The error of the linear law itself, an entry of floors[].
-nlohmann::json floorEntry(const std::string& scene, std::span<const TrialErrors> looks);
+/// The error of the linear law itself against `law`, an entry of floors[].
+nlohmann::json floorEntry(const std::string& scene, const std::string& law, std::span<const TrialErrors> looks);
 /// An entry of references[].
 nlohmann::json referenceEntry(const ReferenceInfo& info);
 

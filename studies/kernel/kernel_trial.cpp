@@ -328,8 +328,10 @@ Spread spreadOf(std::span<const TrialErrors> looks, double TrialErrors::*figure)
     std::vector<double> values;
     Spread spread;
     for (const TrialErrors& look : looks) {
-        values.push_back(look.*figure);
-        spread.worst = std::max(spread.worst, look.*figure);
+        const double value = look.*figure;
+        values.push_back(value);
+        const bool worse = std::isnan(value) || std::abs(value) > std::abs(spread.worst);
+        spread.worst = worse ? value : spread.worst;
     }
     spread.median = median(std::move(values));
     return spread;
@@ -344,6 +346,9 @@ double median(std::vector<double> values)
 {
     if (values.empty()) {
         return 0.0;
+    }
+    if (std::ranges::any_of(values, [](double v) { return std::isnan(v); })) {
+        return std::numeric_limits<double>::quiet_NaN();
     }
     std::ranges::sort(values);
     const std::size_t n = values.size();

@@ -101,16 +101,16 @@ std::vector<TrialResult> runTrials(const TrialModel& model, const TrialPath& pat
 /// The times and counts alone.
 TrialResult timeTrial(const TrialModel& model, const TrialPath& path, double speed);
 
-/// Median and worst over looks of one figure.
+/// Median and worst over looks of one figure. No numbers where one of the looks has none.
 struct Spread {
     double median = 0;
-    double worst = 0;
+    double worst = 0;  // of the largest size, with its sign
 };
 Spread spreadOf(std::span<const TrialErrors> looks, double TrialErrors::*figure);
 /// Of the look at rest.
 TrialErrors atRest(const TrialResult& result);
 
-/// Median of values in any order; 0 of none.
+/// Median of values in any order; 0 of none, no number where one is none.
 double median(std::vector<double> values);
 
 /// What ticks take [s].

@@ -143,7 +143,7 @@ TrialErrors errorsOf(std::span<const Vec3> u, const std::optional<Vec3>& force, 
         const Vec3 off = u[i] - Vec3(state.u[i]);
         const double square = glm::dot(off, off);
         all += square;
-        worst = std::max(worst, square);
+        worst = std::isnan(square) || square > worst ? square : worst;
         if (glm::distance(Vec3(reference.position[i]), state.focus) < nearField) {
             near += square;
             ++nearCount;

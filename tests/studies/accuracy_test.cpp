@@ -412,6 +412,14 @@ TEST(Accuracy, AMethodThatFailsOrIsTooSlowSaysWhy)
     const AccuracyRun slow = runAccuracy({"nothing", "", nothingModel}, p.subject, references, 0.0);
     EXPECT_TRUE(slow.results.empty());
     EXPECT_NE(slow.failure.find("per tick"), std::string::npos) << slow.failure;
+    const auto apart = [] {
+        TrialModel model = nothingModel();
+        model.displacement = [](Vec3) { return Vec3(NAN); };
+        return model;
+    };
+    const AccuracyRun nowhere = runAccuracy({"apart", "", apart}, p.subject, references, 10.0);
+    EXPECT_TRUE(nowhere.results.empty());
+    EXPECT_NE(nowhere.failure.find("no finite numbers"), std::string::npos) << nowhere.failure;
 }
 
 // Level spring pushes straight out of the surface, with a force that is proportional to the depth.

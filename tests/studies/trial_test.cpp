@@ -1,9 +1,13 @@
 #include <studies/kernel/kernel_rivals.h>
+#include <studies/kernel/trial_errors.h>
 
 #include <tests/studies/small_block.h>
 
 #include <gtest/gtest.h>
 #include <glm/geometric.hpp>
+
+#include <cmath>
+#include <vector>
 
 namespace palpate::studies {
 namespace {
@@ -133,6 +137,29 @@ TEST(KernelTrial, ErrorsAreSharesOfTheLargestDisplacement)
         EXPECT_LT(halved.looks[i].force, 10.0 + 1e-9);
     }
     EXPECT_NEAR(halved.looks.back().force, 10.0, 1e-6);
+}
+
+// The worst look has the largest error, on whichever side of the reference it is; one that is no number is not lost.
+TEST(KernelTrial, TheWorstLookKeepsItsSignAndNoNumberWins)
+{
+    const auto spread = [](std::vector<double> energies) {
+        std::vector<TrialErrors> looks;
+        for (const double e : energies) {
+            looks.push_back({});
+            looks.back().energy = e;
+        }
+        return spreadOf(looks, &TrialErrors::energy);
+    };
+    EXPECT_EQ(spread({-1.0, -5.0, 2.0}).worst, -5.0);
+    EXPECT_EQ(spread({-1.0, -5.0, 2.0}).median, -1.0);
+    for (const auto& looks : {std::vector{1.0, NAN, 2.0}, std::vector{NAN, 1.0}, std::vector{1.0, NAN}}) {
+        EXPECT_TRUE(std::isnan(spread(looks).worst));
+        EXPECT_TRUE(std::isnan(spread(looks).median));
+    }
+    const auto& p = trialPressed();
+    std::vector<Vec3> u(p.reference.position.size(), Vec3(0.0));
+    u[0].x = NAN;
+    EXPECT_TRUE(std::isnan(errorsOf(u, {}, p.reference, {}, p.reference.states.back()).max));
 }
 
 TEST(KernelTrial, WindowsAreBetterThanChainMailAndChainMailIsBetterThanNothing)
