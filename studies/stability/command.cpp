@@ -61,12 +61,12 @@ json runFuzz(const StabilityArguments& o, StabilityModels& models, command::Prog
     return fuzzEntry(fuzz(models, o.seed, o.fuzz, o.jobs, told));
 }
 
-// Cells of the default method that fail, and hostile sessions that do.
-void checkOurs(const json& figures, const StabilityModels& models)
+// Throws for cells of the default method that fail.
+void checkCells(const json& cells, const StabilityModels& models)
 {
     const std::string& ours = models.methods().front().name;
     std::vector<std::string> failed;
-    for (const json& cell : figures.at("cells")) {
+    for (const json& cell : cells) {
         if (cell.at("method") == ours && !cell.at("pass").get<bool>()) {
             failed.push_back(cell.at("id"));
         }
@@ -78,7 +78,11 @@ void checkOurs(const json& figures, const StabilityModels& models)
         throw std::runtime_error(fmt::format("{} cell{} of the default method failed: {}{}", count, count == 1 ? "" : "s",
                                              fmt::join(failed, ", "), more));
     }
-    const json& fuzzed = figures.at("fuzz");
+}
+
+// Throws for hostile sessions that fail.
+void checkFuzz(const json& fuzzed)
+{
     for (const char* const key : {"crashes", "over_cap", "over_slew", "non_finite", "pulled"}) {
         if (fuzzed.at(key) != 0) {
             throw std::runtime_error(fmt::format("hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
@@ -90,21 +94,26 @@ void checkOurs(const json& figures, const StabilityModels& models)
 void recordOne(const StabilityArguments& o, StabilityModels& models)
 {
     const Cell cell = cellOf(models, o.cell);
-    base::checkOutput(o.record);
     models.prepare({cell});
     const CellResult r = o.record.empty() ? runCell(cell, models) : recordCell(cell, models, o.record);
+    const json cells = json::array({cellEntry(r)});
     if (!o.json.empty()) {
-        command::writeJson(o.json, {{"cells", json::array({cellEntry(r)})}});
+        command::writeJson(o.json, {{"cells", cells}});
     }
     if (o.json != "-") {
         fmt::print("{}: {} {:.4g} {}, bound {:g}: {}\n", o.cell, name(r.bounded.figure), r.figure, unit(r.bounded.figure),
                    r.bounded.bound, r.pass() ? "pass" : "FAIL");
     }
+    checkCells(cells, models);
 }
 
 void stabilityCommand(const StabilityArguments& o)
 {
-    base::checkOutput(o.json);
+    std::vector<std::filesystem::path> outputs{o.json};
+    if (!o.record.empty()) {
+        outputs.insert(outputs.end(), {o.record, volumeBeside(o.record)});
+    }
+    base::checkOutputs(outputs, {});
     base::checkOutputFolder(o.folder);
     if (o.cell.empty() && !o.record.empty()) {
         throw std::runtime_error("--record: needs a cell: add --case SCENE/METHOD/DEVICE/GRIP/RATE");
@@ -141,7 +150,8 @@ void stabilityCommand(const StabilityArguments& o)
     if (!o.json.empty()) {
         command::writeJson(o.json, figures);
     }
-    checkOurs(figures, models);
+    checkCells(figures.at("cells"), models);
+    checkFuzz(figures.at("fuzz"));
 }
 
 }  // namespace
@@ -168,7 +178,11 @@ void addStability(CLI::App& app)
     c->add_option("--seed", o->seed, "Seed of the hostile sessions")
         ->capture_default_str()
         ->check(command::seedFault, "a whole number");
-    c->add_option("--case", o->cell, "Run one cell, by its id");
+    auto* one = c->add_option("--case", o->cell, "Run one cell, by its id");
+    for (const char* const ofMatrix :
+         {"--output", "--scenes", "--methods", "--devices", "--rates", "--quick", "--fuzz", "--fuzz-only", "--seed"}) {
+        one->excludes(c->get_option(ofMatrix));
+    }
     c->add_option("--record", o->record, "With --case: record it as a session (.db), its volume beside it (.vdb)");
     c->add_option("--jobs", o->jobs, "Number of threads (default: all cores); the figures do not depend on it")
         ->check(CLI::Range(1, 1024))

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -190,15 +191,20 @@ Cell cellOf(const StabilityModels& models, const std::string& id)
     const auto found = base::splitAt('/', id);
     const std::vector<std::string> parts(found.begin(), found.end());
     const bool grip = parts.size() == 5 && (parts[3] == "grip" || parts[3] == "released");
-    const int rate = grip ? std::atoi(parts[4].c_str()) : 0;
-    if (rate < 100 || rate > 20000) {
+    int rate = 0;
+    const char* end = grip ? parts[4].data() + parts[4].size() : nullptr;
+    const bool whole = grip && std::from_chars(parts[4].data(), end, rate).ptr == end;
+    if (!whole || rate < 100 || rate > 20000) {
         throw std::runtime_error(
             fmt::format("--case {}: is no cell: give SCENE/METHOD/DEVICE/grip or released/RATE, such as "
                         "plate-1mm/elastic/premium/grip/1000",
                         id));
     }
-    models.scene(parts[0]);
-    models.method(parts[1]);
+    if (models.scene(parts[0]).pierced && !models.method(parts[1]).pierces) {
+        throw std::runtime_error(fmt::format(
+            "--case {}: the needle pierces tissue in this scene, and {} does not support that: choose another method", id,
+            parts[1]));
+    }
     haptics::deviceParameters(parts[2]);
     return {parts[0], parts[1], parts[2], parts[3] == "grip", rate};
 }

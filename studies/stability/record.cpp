@@ -30,12 +30,20 @@ haptics::SessionModel modelIn(const StabilityScene& scene, const std::string& de
 
 }  // namespace
 
+std::filesystem::path volumeBeside(const std::filesystem::path& record)
+{
+    if (record.extension() != ".db") {
+        throw std::runtime_error(record.string() + ": is no name of a record: it must end in .db");
+    }
+    auto volume = std::filesystem::absolute(record).lexically_normal();
+    return volume.replace_extension(".vdb");
+}
+
 CellResult recordCell(const Cell& cell, const StabilityModels& models, const std::filesystem::path& file)
 {
     const auto& scene = models.scene(cell.scene);
     const auto& method = models.method(cell.method);
-    auto volume = std::filesystem::absolute(file).lexically_normal();
-    volume.replace_extension(".vdb");
+    const auto volume = volumeBeside(file);
     for (const auto& there : {file, volume}) {
         if (std::filesystem::exists(there)) {
             throw std::runtime_error(there.string() + ": exists already; choose another name or remove it");

@@ -81,6 +81,16 @@ TEST(StabilityCommand, RefusesWhatThereIsNot)
     expectRefusal({"stability", "--methods", "magic"}, "there are elastic");
     expectRefusal({"stability", "--case", "plate-1mm/elastic"}, "is no cell");
     expectRefusal({"stability", "--record", "x.db"}, "--case");
+    const std::string cell = "plate-1mm/elastic/touch/grip/";
+    expectRefusal({"stability", "--case", cell + "1000x"}, "is no cell");
+    expectRefusal({"stability", "--case", cell + "1000", "--record", "r.vdb"}, "it must end in .db");
+    EXPECT_FALSE(std::filesystem::exists("r.vdb"));
+    expectRefusal({"stability", "--case", cell + "1000", "--record", "q.db", "--json", "q.db"}, "would be written twice");
+    expectRefusal({"stability", "--case", cell + "1000", "--record", "q.db", "--json", "q.vdb"}, "would be written twice");
+    expectRefusal({"stability", "--case", "puncture-kick/god_object/touch/grip/1000"}, "god_object does not support that");
+    for (const char* const option : {"--output", "--scenes", "--methods", "--devices", "--rates", "--fuzz"}) {
+        expectRefusal({"stability", "--case", cell + "1000", option, "500"}, option);
+    }
 }
 
 }  // namespace
