@@ -184,7 +184,10 @@ void addBench(CLI::App& app)
     auto o = std::make_shared<BenchArguments>();
     auto* tick = bench->add_subcommand("tick", "Measure the time per tick and task, for phantoms of growing resolution");
     tick->add_option("SCENE", o->scene, "Scene with a phantom")->capture_default_str();
-    tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")->delimiter(',')->capture_default_str();
+    tick->add_option("--voxels", o->sides, "Voxels along each side of the phantom")
+        ->delimiter(',')
+        ->check(CLI::Range(16, 1024))
+        ->capture_default_str();
     command::addModel(*tick, o->changes);
     tick->add_flag("--paced", o->paced, "Run one tick per millisecond (default: as fast as possible)");
     tick->add_option("--json", o->json, "Write figures to this file (- = standard output)");

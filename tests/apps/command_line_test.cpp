@@ -59,6 +59,7 @@ TEST(CommandLine, WhatIsNotThereIsRefusedOnOneLine)
     expectRefusal({"train", "--nosuch"}, "--nosuch");
     expectRefusal({"train", "--model", "nosuch"}, "nosuch");
     expectRefusal({"bench", "tick", "--model", "nosuch"}, "nosuch");
+    expectRefusal({"bench", "tick", "--voxels", "0"}, "--voxels");
     expectRefusal({"train", "--setting", "nosuch"}, "nosuch");
     expectRefusal({"train", "block", "--headless", "--model", "spring", "--setting", "fine"},
                   "block: the tissue model is spring: --setting changes nothing");
