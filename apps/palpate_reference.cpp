@@ -188,14 +188,14 @@ reference::BodyMesh bodyOf(const ReferenceArguments& o, const reference::PressPr
 }
 
 // The last state as a problem that CalculiX can solve: what touches the tool goes where it is, the rest follows.
-void exportLast(const std::string& file, const reference::PressProblem& problem, const reference::BodyMesh& body,
-                const reference::Solver& solver, studies::TrialPose pose)
+std::string lastAsCcx(const reference::PressProblem& problem, const reference::BodyMesh& body,
+                      const reference::Solver& solver, studies::TrialPose pose)
 {
     constexpr double touching = 2e-5;  // [m]
     const reference::RigidTool tool = toolAt(problem, pose);
     const auto at = [&](Vec3 rest) { return solver.displacement(std::span(&rest, 1)).front(); };
     const auto touches = [&](Vec3 rest) { return tool.distance(rest + at(rest)) < touching; };
-    exportCcx(body.mesh, materialsOf(problem, body), problem.solve, {touches, at}, file);
+    return ccxText(body.mesh, materialsOf(problem, body), problem.solve, {touches, at});
 }
 
 // What a run leaves: written when all of it is there.
@@ -222,6 +222,9 @@ Results solveScene(const ReferenceArguments& o, const haptics::SessionModel& mod
          .mirrored = planesOf(o)},
         posesOf(o, path)};
     const reference::BodyMesh body = bodyOf(o, problem);
+    if (!o.ccx.empty()) {
+        reference::checkCcx(body.mesh, materialsOf(problem, body), problem.solve.law, o.ccx);
+    }
     const double meshed = cpuSeconds();
     say("{}: {} tetrahedra, {} mixtures, smallest angle {:.1f} degrees, {:.1f} s\n", model.scene.name,
         body.mesh.tets.size(), body.mixtures.size(), body.sharpest, meshed);
@@ -238,7 +241,7 @@ Results solveScene(const ReferenceArguments& o, const haptics::SessionModel& mod
             out.files.emplace_back(o.all ? numbered(o.vtu, look) : o.vtu, reference::vtuText(body.mesh, solver));
         }
         if (!o.ccx.empty() && look + 1 == looks) {
-            exportLast(o.ccx, problem, body, solver, state.pose);
+            out.files.emplace_back(o.ccx, lastAsCcx(problem, body, solver, state.pose));
         }
     };
     out.reference = reference::solvePath(problem, body, sink);

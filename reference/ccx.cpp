@@ -1,5 +1,6 @@
 #include <reference/ccx.h>
 
+#include <base/outputs.h>
 #include <base/units.h>
 
 #include <fmt/format.h>
@@ -339,16 +340,6 @@ void writeSteps(std::ostream& out, const CcxPress& press)
     }
 }
 
-void checkStiffening(std::span<const Material> materials, Law law, const std::filesystem::path& file)
-{
-    for (const Material& m : materials) {
-        if (!volume::isSmall(law) && m.stiffening != 0.0) {
-            throw std::runtime_error(
-                fmt::format("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0", file.string(), m.stiffening));
-        }
-    }
-}
-
 // Points that are held, and the middles of edges between two of them.
 std::set<std::uint32_t> heldNodes(std::span<const std::uint32_t> held, const CcxMesh& quadratic)
 {
@@ -371,13 +362,22 @@ std::vector<Vec3> quadraticNodes(const TetMesh& mesh)
     return CcxMesh(mesh).nodes;
 }
 
-void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
-               const std::filesystem::path& file)
+void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law, const std::filesystem::path& file)
 {
-    checkStiffening(materials, options.law, file);
+    for (const auto row : mesh.tissue) {
+        if (!volume::isSmall(law) && materials[row].stiffening != 0.0) {
+            throw std::runtime_error(fmt::format("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0",
+                                                 file.string(), materials[row].stiffening));
+        }
+    }
+}
+
+std::string ccxText(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options,
+                    const Patch& patch)
+{
     CcxMesh quadratic(mesh);
     const Fixed fixed = fixedNodes(mesh, options, patch, quadratic);
-    std::ofstream out(file);
+    std::ostringstream out;
     writeElements(out, mesh, quadratic);
     writeMaterials(out, mesh, materials, options.law);
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -398,10 +398,14 @@ void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const S
         }
     }
     out << "*END STEP\n";
-    out.close();
-    if (!out) {
-        throw std::runtime_error(fmt::format("{}: cannot be written", file.string()));
-    }
+    return out.str();
+}
+
+void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
+               const std::filesystem::path& file)
+{
+    checkCcx(mesh, materials, options.law, file);
+    base::writeWhole(file, ccxText(mesh, materials, options, patch));
 }
 
 bool hasCcx()
@@ -428,7 +432,7 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
                     const std::filesystem::path& file)
 {
     constexpr double pressurePer = 50.0;  // mm of overclosure, in the softest modulus
-    checkStiffening(materials, NeoHookean{}, file);
+    checkCcx(mesh, materials, NeoHookean{}, file);
     const CcxMesh quadratic(mesh);
     const ShellMesh shell(press.start, press.radius, glm::normalize(press.centres.front() - press.start),
                           quadratic.nodes.size());

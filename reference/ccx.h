@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace palpate::reference {
@@ -12,12 +13,19 @@ namespace palpate::reference {
 /// from 1.
 std::vector<Vec3> quadraticNodes(const TetMesh& mesh);
 
+/// Whether CalculiX can take this: throws std::runtime_error ("FILE: ..") for tissue of the mesh that stiffens with finite
+/// strain. To be asked before something is solved for `file`.
+void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law, const std::filesystem::path& file);
+
 /// Writes what Solver::prescribe() solves with P2 elements as input of CalculiX: C3D10, mm and kPa, `*ELASTIC`, or
 /// `*HYPERELASTIC, NEO HOOKE` with `NLGEOM`, whose energy is ours where nothing stiffens: C10 = mu/2, D1 = 2/K. Throws
 /// std::runtime_error for tissue that stiffens with finite strain, or a file that cannot be written.
 /// Source: G. Dhondt, "CalculiX CrunchiX User's Manual", version 2.20.
 void exportCcx(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options, const Patch& patch,
                const std::filesystem::path& file);
+/// The text of that file. @pre checkCcx()
+std::string ccxText(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options,
+                    const Patch& patch);
 
 struct CcxSolution {
     std::vector<Vec3> u;  // at quadraticNodes() [m]

@@ -1,5 +1,6 @@
 #include <reference/box_mesh.h>
 #include <reference/ccx.h>
+#include <tests/error_of.h>
 #include <tests/folder.h>
 
 #include <gtest/gtest.h>
@@ -7,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 
 namespace palpate::reference {
@@ -87,6 +89,21 @@ TEST(Ccx, AgreesOnAStiffBall)
 TEST(Ccx, AgreesOnABlockPressedDeep)
 {
     expectAgreement(pressedBlock(NeoHookean{}, 4e-3));
+}
+
+// Tissue that stiffens is refused with finite strain where the mesh has it; rows that it has not do not matter.
+TEST(Ccx, RefusesTissueOfTheMeshThatStiffens)
+{
+    const tests::Folder folder;
+    const auto file = folder.path() / "problem.inp";
+    Problem problem = pressedBlock(NeoHookean{}, 1e-3);
+    problem.materials.push_back({3e3, 0.45, 2.0});
+    exportCcx(problem.mesh, problem.materials, problem.options, problem.patch, file);
+    EXPECT_TRUE(std::filesystem::exists(file));
+    problem.materials[0].stiffening = 2.0;
+    EXPECT_NE(tests::errorOf([&] { checkCcx(problem.mesh, problem.materials, NeoHookean{}, file); }).find("stiffens by 2"),
+              std::string::npos);
+    EXPECT_EQ(tests::errorOf([&] { checkCcx(problem.mesh, problem.materials, SmallStrain{}, file); }), "");
 }
 
 // A sphere pressed into a block and sideways, by their contact and by ours, on one mesh of quadratic tetrahedra: 3 % apart,
