@@ -11,6 +11,7 @@
 #include <training/store.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -93,6 +94,10 @@ void checkCurriculum(const CurriculumArguments& o)
         fmt::print("  fails {:.0f} % of the time: {} to an alarm, {} to \"has learnt it\" (means)\n", 100 * p,
                    sessionsInWords(averageRunLength(plan, CusumChart::alarm, p)),
                    sessionsInWords(averageRunLength(plan, CusumChart::learning, p)));
+    }
+    const std::vector<std::string> faults = training::faultsOf(c);
+    if (!faults.empty()) {
+        throw std::runtime_error(fmt::format("{}", fmt::join(faults, "; ")));
     }
     fmt::print("good\n");
 }

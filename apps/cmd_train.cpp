@@ -193,7 +193,8 @@ void checkOutputs(const TrainArguments& o)
 // is now, as it is told.
 std::vector<std::pair<const char*, std::string>> writeOutputs(const TrainArguments& o, const haptics::SessionInfo& info,
                                                               const haptics::SessionModel& model, Viewers& viewers,
-                                                              double sessionTook, session::TrainResult& result)
+                                                              double sessionTook, const Conclusion& conclusion,
+                                                              session::TrainResult& result)
 {
     const auto blame = [&result](const std::string& what) {
         result.problem += result.problem.empty() ? what : "; " + what;
@@ -218,14 +219,14 @@ std::vector<std::pair<const char*, std::string>> writeOutputs(const TrainArgumen
     if (drawsLater(o)) {
         attempt([&] { drawRecord(recordFile(o), o.pictures, laterTimeout + 10 * sessionTook); });
     }
-    if (!o.json.empty()) {
-        attempt([&] { command::writeJson(o.json, figuresOf(result, info, model)); });
-    }
     if (!o.report.empty()) {
         const fs::path pictures = fs::is_directory(o.pictures) ? o.pictures : "";  // not there when the viewer failed
         if (attempt([&] { report::writeReport(o.report, haptics::Record(recordFile(o)), pictures, recordFile(o)); })) {
             there.emplace_back("report", o.report);
         }
+    }
+    if (!o.json.empty()) {
+        attempt([&] { command::writeJson(o.json, figuresOf(result, info, model, conclusion)); });
     }
     for (const auto& [name, file] :
          {std::pair<const char*, std::string>{"record", o.ownRecord ? recordFile(o).string() : ""},
@@ -304,6 +305,7 @@ ViewersWanted viewersFor(const TrainArguments& o, const Training& training, cons
     wanted.session = sessionName(o);
     wanted.layout = o.layout;
     wanted.pictures = drawsLater(o) ? "" : o.pictures;
+    wanted.images = !o.ownRecord || recordFile(o).empty() ? fs::path() : recordFile(o).replace_extension(".ultrasound");
     wanted.result = result;
     wanted.hidden = o.showTarget ? std::vector<std::string>() : tissuesToFind(model);
     wanted.test = o.training.test;
@@ -397,15 +399,15 @@ void train(TrainArguments o)
     training.markCut(result, o.record);
     const bool learns = !fitted.empty() && o.faults.empty();  // ticks that were made late say nothing of the machine
     const std::string next = !learns ? "" : session::learnFrom(session::machineCache(), model.scene, result.timing);
-    const auto written = writeOutputs(o, info, model, viewers, took, result);
-    const auto kept = training.conclude(info, result, record);
+    const Conclusion conclusion = training.conclude(info, result, record);
+    const auto written = writeOutputs(o, info, model, viewers, took, conclusion, result);
 
     if (o.json != "-" && !o.tryout) {
         summarise(result, info, model, next);
-        tell(fitted, written, kept);
+        tell(fitted, written, conclusion.lines);
     }
     if (resultFolder && result.signal == 0) {
-        command::writeJson(toShow, figuresOf(result, info, model));
+        command::writeJson(toShow, figuresOf(result, info, model, conclusion));
         std::fflush(stdout);
         viewers.waitForWindow();
     }

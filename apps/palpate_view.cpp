@@ -81,7 +81,7 @@ void addOptions(CLI::App& app, palpate::render::ViewerOptions& options, Words& w
     app.add_option("--movie", options.movie, "Write an MP4 film to this file (needs ffmpeg)");
     app.add_option("--replay", words.replay, "Show a record (train --record) instead of a running session")
         ->excludes("--session");
-    app.add_option("--at", words.at, "With --replay: start at this session time, paused [s]")
+    app.add_option("--at", words.at, "With --replay: start at this session time; a window stands still there [s]")
         ->check(CLI::Range(0.0, 86400.0));
     app.add_option("--ghost", words.ghost,
                    "With --replay: also show the tool of this record in the same body, e.g. an expert's");
@@ -152,7 +152,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         options.session = player->session();
         options.playback = &player->playback();
         if (words.at >= 0)
-            player->startAt(words.at);
+            player->startAt(options.from = words.at);
         if (!words.ghost.empty())
             options.ghost = player->ghostOf(words.ghost);
     } else if (words.at >= 0 || !words.ghost.empty()) {

@@ -5,6 +5,7 @@
 #include <haptics/broadcast.h>
 #include <haptics/replay.h>
 #include <haptics/simulation.h>
+#include <render/events.h>
 #include <session/open.h>
 
 #include <fmt/format.h>
@@ -13,6 +14,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -74,6 +76,18 @@ std::uint64_t ticksOf(const Record& record, const std::string& file)
     return ticks;
 }
 
+// The servo loop's result; a session that was cut off has none.
+std::uint64_t missedIn(const Record& record)
+{
+    for (const auto& [key, value] : record.results()) {
+        std::uint64_t missed = 0;
+        if (key == "missed_ticks" && std::from_chars(value.data(), value.data() + value.size(), missed).ec == std::errc()) {
+            return missed;
+        }
+    }
+    return render::notCounted;
+}
+
 }  // namespace
 
 struct ReplayPlayer::Impl {
@@ -116,13 +130,27 @@ struct ReplayPlayer::Impl {
         }
     }
 
+    void noteWhatHappened(const channel::State& before, const channel::State& now, const Simulation& simulation,
+                          channel::Displaced& buffer)
+    {
+        for (render::Event event : render::eventsBetween(before, now)) {
+            event.time = static_cast<double>(now.tick) * period;
+            playback.recorded.add(event);
+        }
+        if (now.pictures > before.pictures) {
+            showShape(simulation, buffer);
+            playback.recorded.add(now, {buffer.nodes.data(), buffer.count});
+        }
+    }
+
     void compute()
     {
         try {
             Simulation simulation(model, {period, {}});
             const auto buffer = std::make_unique<channel::Displaced>();
-            const ServoTiming timing;
-            channel::State state;
+            ServoTiming timing;
+            timing.missed = missedIn(record);
+            channel::State state, before;
             TickComparison comparison(record);
             record.each([&](const TickRecord& then) {
                 if (stop || then.tick >= length) {
@@ -144,6 +172,8 @@ struct ReplayPlayer::Impl {
                 }
                 noteMoments(now);
                 showTick(now, timing, state);
+                noteWhatHappened(before, state, simulation, *buffer);
+                before = state;
                 film.add(state, simulation, *buffer);
                 playback.ready = static_cast<double>(then.tick) * period;
             });

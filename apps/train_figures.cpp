@@ -43,10 +43,29 @@ std::string slowness(const haptics::ServoTiming& timing, const datasets::ModelSe
         100 * overruns, cure);
 }
 
+// What the case is about, and what the exercise asks for.
+nlohmann::json askedFor(const Conclusion& conclusion, const haptics::Score& score)
+{
+    auto asked = nlohmann::json::array();
+    for (const haptics::Measure& m : haptics::measures()) {
+        const auto level = std::ranges::find(conclusion.levels, m.key, &training::Level::measure);
+        const bool has = level != conclusion.levels.end();
+        if (!has && std::ranges::find(conclusion.measures, m.key) == conclusion.measures.end()) {
+            continue;
+        }
+        asked.push_back({{"measure", m.key}, {"label", m.label}, {"unit", m.unit}, {"decimals", m.decimals}});
+        auto& one = asked.back();
+        one["at_least"] = has && level->atLeast ? nlohmann::json(*level->atLeast) : nlohmann::json();
+        one["at_most"] = has && level->atMost ? nlohmann::json(*level->atMost) : nlohmann::json();
+        one["met"] = has ? nlohmann::json(level->met(m.value(score))) : nlohmann::json();
+    }
+    return asked;
+}
+
 }  // namespace
 
 nlohmann::json figuresOf(const session::TrainResult& result, const haptics::SessionInfo& info,
-                         const haptics::SessionModel& model)
+                         const haptics::SessionModel& model, const Conclusion& conclusion)
 {
     auto figures = session::timingFigures(result.timing);
     figures["scene"] = info.scene;
@@ -80,6 +99,9 @@ nlohmann::json figuresOf(const session::TrainResult& result, const haptics::Sess
     figures["lost_records"] = result.lostRecords;
     figures["pauses"] = {{"count", result.timing.pauses}, {"seconds", result.timing.paused}};
     figures["warnings"] = result.warnings;
+    figures["asked"] = askedFor(conclusion, result.score);
+    figures["kept"] = conclusion.kept;
+    figures["problem"] = conclusion.why + (conclusion.why.empty() || result.problem.empty() ? "" : "; ") + result.problem;
     return figures;
 }
 

@@ -106,6 +106,8 @@ void Training::markCut(session::TrainResult& result, std::string& record) const
     for (const char* log : {"-wal", "-shm"}) {
         fs::rename(own_.string() + log, marked.string() + log, failed);  // not there where all is in the record itself
     }
+    const fs::path images = fs::path(own_).replace_extension(".ultrasound");
+    fs::rename(images, fs::path(marked).replace_extension(".ultrasound"), failed);  // there may be none
     record = marked.string();
     result.problem += "; its name is now " + record;
 }
@@ -131,13 +133,16 @@ void Training::describe(haptics::SessionInfo& info) const
     }
 }
 
-std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
-                                        const fs::path& record)
+Conclusion Training::keep(const haptics::SessionInfo& info, const session::SessionFigures& figures, const fs::path& record)
 {
     // Somebody who looked and left has not tried.
     if (figures.contacts == 0) {
-        return {fmt::format("the tool never touched the body: this session does not count{}",
-                            person_ ? " and is not kept" : "")};
+        const std::string why = "the tool never touched the body";
+        return {false,
+                person_ ? why : "",
+                {fmt::format("{}: this session does not count{}", why, person_ ? " and is not kept" : "")},
+                {},
+                {}};
     }
     constexpr std::size_t shown = 3;
     std::vector<std::string> lines;
@@ -152,7 +157,7 @@ std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const 
                                     training::meets(exercise_->gate, values) ? "reached" : "did not reach"));
     }
     if (!person_) {
-        return lines;
+        return {false, "", lines, {}, {}};
     }
     training::StoredSession s;
     s.started = info.started;
@@ -178,20 +183,24 @@ std::vector<std::string> Training::keep(const haptics::SessionInfo& info, const 
         lines.push_back(next == nullptr ? "all exercises are reached"
                                         : fmt::format("{} {}", next->exercise->title, training::reasonFor(*next)));
     }
-    return lines;
+    return {true, "", lines, {}, {}};
 }
 
-std::vector<std::string> Training::notKept(const std::string& why, const fs::path& record) const
+Conclusion Training::notKept(const std::string& why, const fs::path& record) const
 {
     if (!person_) {
         return {};
     }
-    return {fmt::format("not kept for {}: {}{}", person_->name, why,
-                        record.empty() ? "" : "; palpate profile add-record adds its record")};
+    return {false,
+            why,
+            {fmt::format("not kept for {}: {}{}", person_->name, why,
+                         record.empty() ? "" : "; palpate profile add-record adds its record")},
+            {},
+            {}};
 }
 
-std::vector<std::string> Training::conclude(const haptics::SessionInfo& info, session::TrainResult& result,
-                                            const fs::path& record)
+// A session without its record cannot be scored or replayed again, so it would count as what nobody can check.
+Conclusion Training::outcome(const haptics::SessionInfo& info, session::TrainResult& result, const fs::path& record)
 {
     if (result.recordCut) {
         return notKept("the record of the session is not whole", {});
@@ -205,6 +214,14 @@ std::vector<std::string> Training::conclude(const haptics::SessionInfo& info, se
         result.problem += (result.problem.empty() ? "" : "; ") + std::string(e.what());
         return notKept("the profile could not be written", record);
     }
+}
+
+Conclusion Training::conclude(const haptics::SessionInfo& info, session::TrainResult& result, const fs::path& record)
+{
+    Conclusion conclusion = outcome(info, result, record);
+    conclusion.measures = case_ ? case_->measures : std::vector<std::string>();
+    conclusion.levels = exercise_ != nullptr ? exercise_->gate.levels : std::vector<training::Level>();
+    return conclusion;
 }
 
 void addTrainingOptions(CLI::App& command, TrainingOptions& o)

@@ -24,6 +24,15 @@ struct TrainingOptions {
     std::string hand;  // "right" or "left"; empty: as the profile says
 };
 
+/// What became of a session in the profile.
+struct Conclusion {
+    bool kept = false;
+    std::string why;                      // why it is not kept; empty: it is, or there is no profile
+    std::vector<std::string> lines;       // there are to say
+    std::vector<std::string> measures;    // that the case is about
+    std::vector<training::Level> levels;  // of the exercise
+};
+
 /// A session that is trained for something: a case, an exercise, a person's progress.
 class Training {
 public:
@@ -42,18 +51,19 @@ public:
     /// What the record says of it.
     void describe(haptics::SessionInfo& info) const;
     /// Keeps a session that counts in the profile. A profile that cannot be written is added to the problem of `result`.
-    /// @returns  what there is to say, a line each: the largest losses of points first
-    std::vector<std::string> conclude(const haptics::SessionInfo& info, session::TrainResult& result,
-                                      const std::filesystem::path& record);
+    /// Its lines have the largest losses of points first.
+    Conclusion conclude(const haptics::SessionInfo& info, session::TrainResult& result,
+                        const std::filesystem::path& record);
     /// Whether who trains holds needle and mouse in the left hand.
     bool leftHanded() const noexcept;
     const std::string& profile() const noexcept { return options_.profile; }
 
 private:
-    std::vector<std::string> keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
-                                  const std::filesystem::path& record);
+    Conclusion outcome(const haptics::SessionInfo& info, session::TrainResult& result, const std::filesystem::path& record);
+    Conclusion keep(const haptics::SessionInfo& info, const session::SessionFigures& figures,
+                    const std::filesystem::path& record);
     // What there is to say where a session is not kept.
-    std::vector<std::string> notKept(const std::string& why, const std::filesystem::path& record) const;
+    Conclusion notKept(const std::string& why, const std::filesystem::path& record) const;
 
     TrainingOptions options_;
     std::optional<training::Case> case_;

@@ -82,6 +82,9 @@ void Viewers::openWindow()
     if (wanted_.tryout > 0) {
         arguments.insert(arguments.end(), {"--tryout", fmt::format("{:g}", wanted_.tryout)});
     }
+    if (!wanted_.images.empty()) {
+        arguments.insert(arguments.end(), {"--images", wanted_.images.string()});
+    }
     if (!wanted_.result.empty()) {
         arguments.insert(arguments.end(), {"--result", wanted_.result.string()});
     }

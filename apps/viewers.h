@@ -17,6 +17,7 @@ struct ViewersWanted {
     std::string session;               // its name
     std::string layout;                // of the window
     std::string pictures;              // folder of pictures to write; empty: none
+    std::filesystem::path images;      // folder of the ultrasound pictures that its user stores; empty: the current one
     std::filesystem::path result;      // figures that will be there at the end, for the window; empty: none
     std::vector<std::string> hidden;   // tissues that the window does not show
     bool test = false;                 // no hints in the window

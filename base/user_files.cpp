@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 
 namespace palpate::base {
@@ -45,7 +47,15 @@ std::string plainName(std::string text)
 
 std::string progressPages(const std::string& person)
 {
-    return plainName("progress-" + person);
+    const std::string plain = plainName(person);
+    // "a b" and "a-b" are two people; FNV-1a tells them apart.
+    std::uint32_t sum = 2166136261U;
+    for (const char c : person) {
+        sum = (sum ^ static_cast<unsigned char>(c)) * 16777619U;
+    }
+    std::array<char, 10> digits{};
+    std::snprintf(digits.data(), digits.size(), "-%08x", sum);
+    return "progress-" + plain + (plain == person ? "" : digits.data());
 }
 
 }  // namespace palpate::base

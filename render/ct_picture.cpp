@@ -58,8 +58,17 @@ void CtPicture::take(bool wait)
     due_ = true;
 }
 
+void CtPicture::see(const channel::State& state, const channel::Displaced& shape, const Recorded* recorded)
+{
+    const auto taken = recorded != nullptr ? recorded->takenAt(state.tick) : nullptr;
+    if (taken)
+        scan(taken->state, taken->shape);
+    else
+        scan(state, {shape.nodes.data(), shape.count});
+}
+
 // In a thread of its own: a scan takes longer than a picture of the window may.
-void CtPicture::see(const channel::State& state, const channel::Displaced& shape)
+void CtPicture::scan(const channel::State& state, std::span<const channel::Displacement> shape)
 {
     if (!scanner_ || state.pictures == taken_)
         return;
@@ -71,7 +80,8 @@ void CtPicture::see(const channel::State& state, const channel::Displaced& shape
         due_ = true;
         return;
     }
-    *shape_ = shape;
+    shape_->count = static_cast<std::uint32_t>(shape.size());
+    std::ranges::copy(shape, shape_->nodes.begin());
     coming_ = std::async(std::launch::async, [this, state] {
         body_->apply(*shape_);
         return scanner_->scan(state, *body_);

@@ -4,6 +4,7 @@
 #include <channel/layout.h>
 #include <ct/scanner.h>
 #include <render/canvas.h>
+#include <render/recorded.h>
 #include <render/screen_plan.h>
 
 #include <vtkActor2D.h>
@@ -30,8 +31,9 @@ public:
     void open(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image);
     void close();
     bool opened() const noexcept { return scanner_.has_value(); }
-    /// Begins a scan when the hand has asked for one since the last look. `shape`: the last that came.
-    void see(const channel::State& state, const channel::Displaced& shape);
+    /// Begins a scan when the hand has asked for one since the last look. `shape`: the last that came. In a record the scan
+    /// is of the tick at which it was asked for.
+    void see(const channel::State& state, const channel::Displaced& shape, const Recorded* recorded = nullptr);
     /// `exact`: waits for a scan that has begun.
     void draw(Canvas& canvas, const Area& area, const Area& around, double font, bool exact);
     void hide();
@@ -39,6 +41,7 @@ public:
 
 private:
     void take(bool wait);
+    void scan(const channel::State& state, std::span<const channel::Displacement> shape);
     Area tile(std::size_t slice) const;
     void paint();
     std::vector<std::string> caption(const Canvas& canvas, double wide, double font) const;

@@ -39,8 +39,14 @@ void MouseHand::keep(const Follower& follower)
         hand_.reset();
     else if (follower.known() && (attached_ != follower.attached() || (!hand_ && Clock::now() - tried_ > again)))
         take(follower);
-    if (hand_)
-        hand_->set(input_);
+    if (!hand_)
+        return;
+    // After a slow picture.
+    const bool silent = Clock::now() - told_ > std::chrono::duration<double>(longestSilence);
+    if (silent && held())
+        press(follower.state());
+    hand_->set(input_);
+    told_ = Clock::now();
 }
 
 void MouseHand::press(const channel::State& state)

@@ -43,6 +43,8 @@ public:
     void end() noexcept { input_.ended = 1; }
     /// Lets the tool go and makes the session stand still, or go on.
     void togglePause() noexcept;
+    /// The simulation takes the tool anew where it is, after so long without a beat [s]: as in haptics/mouse.h.
+    static constexpr double longestSilence = 0.5;
     bool paused() const noexcept { return commands() && input_.paused != 0; }
     /// Of a session that is paused, and only then: ends it, to begin anew.
     void beginAnew() noexcept;
@@ -54,7 +56,7 @@ private:
     channel::Input input_;
     bool holds_ = false;
     std::uint64_t attached_ = 0;
-    Clock::time_point tried_{};
+    Clock::time_point tried_{}, told_{};  // the simulation, last
 };
 
 }  // namespace palpate::render

@@ -176,7 +176,7 @@ void writeAll(const ViewerOptions& options, const std::atomic<int>& stop, Pictur
             const double length = options.playback->length;
             if (length < (any ? before.time + Outputs::early : 0.0))
                 return;
-            next = std::min({outputs.nextDue(), before.time + (any ? look : 0.0), length});
+            next = any ? std::min({outputs.nextDue(), before.time + look, length}) : std::min(options.from, length);
         }
         const bool there = options.playback == nullptr || askFor(*options.playback, next, follower);
         if (!follower.known() || !there || (any && follower.state().tick == before.tick)) {
@@ -221,6 +221,7 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>
     Picture picture(*window);
     picture.setPalette(options.palette);
     picture.setGhost(options.ghost);
+    picture.setRecorded(options.playback != nullptr ? &options.playback->recorded : nullptr);
     picture.conceal(options.concealed);
     picture.show(options.layout);
     picture.show(options.slices);

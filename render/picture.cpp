@@ -204,7 +204,7 @@ void Picture::update(const channel::State& told, const channel::Displaced* displ
     if (displaced != nullptr)
         session_->shape = *displaced;
     ultrasound_.see(state, displaced);
-    ct_.see(state, session_->shape);
+    ct_.see(state, session_->shape, recorded_);
     session_->state = state;
     session_->health = health;
     session_->known = true;
@@ -375,7 +375,8 @@ void Picture::drawFlat(const ScreenPlan& plan)
     const bool covered = !help_.empty() && drawHelp(canvas_, plan, help_);
     if (!covered) {
         drawFigures(canvas_, plan, s.scenery, s.state, s.health, !concealed_.tissues.empty());
-        drawEvents(canvas_, plan, s.scenery, s.history.events);
+        drawEvents(canvas_, plan, s.scenery,
+                   recorded_ != nullptr ? recorded_->eventsUntil(s.state.time) : s.history.events);
     }
     const bool apart = !plan.events.empty(), free = words_.empty() && help_.empty();
     double below = plan.height;

@@ -9,6 +9,7 @@
 #include <render/header.h>
 #include <render/overlay.h>
 #include <render/palette.h>
+#include <render/recorded.h>
 #include <render/screen_plan.h>
 #include <render/slice_picture.h>
 #include <render/tool_picture.h>
@@ -48,6 +49,8 @@ public:
     void setPalette(Palette palette) noexcept { palette_ = palette; }
     /// Another session's tool beside this one's, at the same time of it; see GhostPose.
     void setGhost(Ghost ghost) { ghost_ = std::move(ghost); }
+    /// The session is a record: what is known of it beyond the states that are shown. Must outlive this; null: it is none.
+    void setRecorded(const Recorded* recorded) noexcept { recorded_ = recorded; }
     /// From the next session on: what is not shown.
     void conceal(Concealment what) { concealed_ = std::move(what); }
     /// Shows what has come. `displaced` is null when there is nothing newer.
@@ -141,6 +144,7 @@ private:
     std::string words_, smaller_, caption_;
     Palette palette_ = Palette::standard;
     Ghost ghost_;
+    const Recorded* recorded_ = nullptr;
     Concealment concealed_;
     std::optional<ResultCard> result_;
     CoachView coached_;

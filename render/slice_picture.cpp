@@ -78,6 +78,12 @@ Pixel outside(float image)
     return {std::max(airPixel[0], grey), std::max(airPixel[1], grey), std::max(airPixel[2], grey)};
 }
 
+// Of what is not in the plane.
+Colour farOf(const Colour& colour)
+{
+    return {0.5 * colour[0], 0.5 * colour[1], 0.5 * colour[2]};
+}
+
 double pixelsPerMetre(const ViewFrame& frame, const Area& area)
 {
     return std::min(area.width, area.height) / frame.extent;
@@ -191,6 +197,12 @@ void SlicePicture::hide()
     area_ = {};
 }
 
+bool SlicePicture::isAway(glm::dvec3 p) const
+{
+    constexpr double inPlane = 2e-3;  // [m]
+    return std::abs(glm::dot(p - frame_.centre, frame_.towards)) > inPlane;
+}
+
 Point2 SlicePicture::pixel(glm::dvec3 p) const
 {
     const glm::dvec3 d = (p - frame_.centre) * pixelsPerMetre(frame_, area_);
@@ -232,15 +244,13 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
         }
         return;
     }
-    constexpr double inPlane = 2e-3;  // [m]
     const channel::NeedleShape shape = needleShape(scenery, state);
     if (scenery.tool == channel::ToolKind::capsule)
         return drawFingertip(canvas, pixel(shape.front()), pixel(shape.back()), width / 2);
-    const auto off = [&](glm::dvec3 p) { return std::abs(glm::dot(p - frame_.centre, frame_.towards)) > inPlane; };
     for (const bool border : {true, false})
         for (std::size_t i = 0; i + 1 < shape.size(); ++i) {
             const auto part = clipped(pixel(shape[i]), pixel(shape[i + 1]), area_);
-            const bool away = off(0.5 * (shape[i] + shape[i + 1]));
+            const bool away = isAway(0.5 * (shape[i] + shape[i + 1]));
             if (part && border)
                 canvas.line(part->first, part->second, (away ? 0.6 : 1.0) * width + 2, outline);
             else if (part)
@@ -259,22 +269,27 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
     constexpr int dashes = 10;
     for (int i = 0; i < dashes && planned; ++i) {
         const double a = static_cast<double>(i) / dashes, b = a + 0.5 / dashes;
-        if (const auto dash = clipped(pixel(glm::mix(entry, aim, a)), pixel(glm::mix(entry, aim, b)), area_)) {
-            canvas.line(dash->first, dash->second, 0.36 * font, {0, 0, 0});
-            canvas.line(dash->first, dash->second, 0.18 * font, planColour);
+        const glm::dvec3 from = glm::mix(entry, aim, a), to = glm::mix(entry, aim, b);
+        if (const auto dash = clipped(pixel(from), pixel(to), area_)) {
+            const bool away = isAway(0.5 * (from + to));
+            canvas.line(dash->first, dash->second, (away ? 0.24 : 0.36) * font, {0, 0, 0});
+            canvas.line(dash->first, dash->second, (away ? 0.1 : 0.18) * font, away ? farOf(planColour) : planColour);
         }
     }
     if (planned && inside(pixel(aim), area_)) {
-        canvas.ring(pixel(aim), 0.55 * font, 0.36 * font, {0, 0, 0});
-        canvas.ring(pixel(aim), 0.55 * font, 0.18 * font, planColour);
+        const bool away = isAway(aim);
+        canvas.ring(pixel(aim), 0.55 * font, (away ? 0.24 : 0.36) * font, {0, 0, 0});
+        canvas.ring(pixel(aim), 0.55 * font, (away ? 0.1 : 0.18) * font, away ? farOf(planColour) : planColour);
     }
     for (std::size_t i = 0; i < std::min<std::size_t>(state.holes, channel::maxHoles); ++i) {
         const auto seen = [&](const std::array<float, 3>& p) {
-            return pixel(anatomy.deformation.seen(glm::dvec3(p[0], p[1], p[2])));
+            return anatomy.deformation.seen(glm::dvec3(p[0], p[1], p[2]));
         };
-        if (const auto core = clipped(seen(state.hole[i].from), seen(state.hole[i].to), area_)) {
-            canvas.line(core->first, core->second, 0.6 * font, {0, 0, 0});
-            canvas.line(core->first, core->second, 0.4 * font, coreColour);
+        const glm::dvec3 from = seen(state.hole[i].from), to = seen(state.hole[i].to);
+        if (const auto core = clipped(pixel(from), pixel(to), area_)) {
+            const bool away = isAway(0.5 * (from + to));
+            canvas.line(core->first, core->second, (away ? 0.3 : 0.6) * font, {0, 0, 0});
+            canvas.line(core->first, core->second, (away ? 0.15 : 0.4) * font, away ? farOf(coreColour) : coreColour);
         }
     }
     drawMarks(canvas, scenery, state, font);

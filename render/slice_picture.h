@@ -49,6 +49,8 @@ public:
 
 private:
     Point2 pixel(glm::dvec3 p) const;
+    /// Not in the plane, but before or behind it.
+    bool isAway(glm::dvec3 p) const;
     void drawMarks(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state, double font) const;
     void drawFingertip(Canvas& canvas, Point2 from, Point2 to, double radius) const;
     void drawTool(Canvas& canvas, const channel::Scenery& scenery, const channel::State& state) const;

@@ -372,12 +372,15 @@ void UltrasoundPicture::store(const std::filesystem::path& folder)
     constexpr int width = 800, height = 600;
     ultrasound::BeamImage stored = *image;
     stored.mirrored = mirrored_;
+    std::error_code none;  // what cannot be made cannot be written to, which is said below
+    std::filesystem::create_directories(folder, none);
     std::filesystem::path file;
     for (int n = 0; file.empty() || std::filesystem::exists(file); ++n)
         file = folder / fmt::format("{}-us-{:07}{}.png", session_, image->tick, n > 0 ? fmt::format("-{}", n) : "");
     try {
         base::writeWhole(file, ultrasound::storedImage(stored, width, height));
-        message_ = base::said(base::tr("stored {}"), file.filename().string());
+        message_ = base::said(base::tr("stored {}"),
+                              folder == "." ? file.filename().string() : (folder.filename() / file.filename()).string());
     } catch (const std::exception& e) {
         message_ = e.what();
     }

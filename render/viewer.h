@@ -3,6 +3,7 @@
 #include <render/concealment.h>
 #include <render/ghost.h>
 #include <render/palette.h>
+#include <render/recorded.h>
 #include <render/screen_plan.h>
 
 #include <atomic>
@@ -39,6 +40,7 @@ struct Playback {
     std::atomic<double> ready{0};                                        // computed so far [s]
     std::atomic<double> length{0};                                       // [s]; negative when there is nothing to show
     Moments moments;                                                     // of what was computed so far
+    Recorded recorded;                                                   // ... in it
     std::atomic<const char*> fault{nullptr};                             // what is wrong with the record, in a few words
 };
 
@@ -64,6 +66,7 @@ struct ViewerOptions {
     std::filesystem::path images = ".";    // folder for ultrasound pictures that are stored
     int width = 1280, height = 960;        // [pixels]
     double every = 0.5;                    // offscreen: session time from one picture to the next [s]
+    double from = 0;                       // offscreen and movie, of a record: the first picture [s]
     double wait = 10;                      // how long without a session before giving up [s]
     std::uint64_t frames = 0;              // end after so many pictures; 0 = no limit
     Playback* playback = nullptr;          // of the session, when it is a record

@@ -187,6 +187,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<int>&
     Picture picture(*target);
     picture.setPalette(options.palette);
     picture.setGhost(options.ghost);
+    picture.setRecorded(options.playback != nullptr ? &options.playback->recorded : nullptr);
     picture.conceal(options.concealed);
     picture.show(options.layout);
     picture.show(options.slices);

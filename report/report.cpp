@@ -64,6 +64,7 @@ json capLine(const ReportData& d, std::optional<double> cap)
     return near ? json::array({{{"at", *cap}, {"label", "cap"}, {"colour", "c4"}}}) : json::array();
 }
 
+// The colours of the viewer (render/overlay.h): blue, violet, green.
 json forceChart(const ReportData& d, std::optional<double> cap)
 {
     return {{"columns", columnsOf(d.forces)},
@@ -73,9 +74,9 @@ json forceChart(const ReportData& d, std::optional<double> cap)
             {"events", true},
             {"lines", capLine(d, cap)},
             {"series",
-             {{{"label", "basic"}, {"colour", "c1"}},
-              {{"label", "additional"}, {"colour", "c2"}},
-              {{"label", "total"}, {"colour", "c0"}, {"width", 2}}}}};
+             {{{"label", "basic"}, {"colour", "c0"}},
+              {{"label", "additional"}, {"colour", "c3"}},
+              {{"label", "total"}, {"colour", "c1"}, {"width", 2}}}}};
 }
 
 // A fast push leaves bins of the depth out: the values beside them are joined.

@@ -38,7 +38,10 @@ CaseEntry entryOf(const json& one)
                                        "forward, or Page down, presses.")
                                   : tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
                                        "hold the needle. The wheel "
-                                       "forward, or Page down, pushes it in by 1 mm; Space fires."));
+                                       "forward, or Page down, pushes it in by 1 mm."));
+    if (c.core) {
+        c.steps.back() += " " + std::string(tr("Space fires."));
+    }
     for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
         c.steps.push_back(tr(step));
     }

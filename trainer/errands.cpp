@@ -471,6 +471,7 @@ bool Errands::look(State& state)
             const std::string said = impl_->session->message();
             result.problem = said.empty() || result.untouched ? result.problem : said;
         } else {
+            result.fault = result.fault.empty() && impl_->session->failed() ? impl_->session->message() : result.fault;
             impl_->sink.keep(chosenCase(state), state.files, result);
         }
         impl_->session.reset();

@@ -13,6 +13,9 @@ namespace {
 // The package fonts-dejavu-core; without it ImGui's own font, which has no sizes.
 constexpr const char* fontFile = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
 constexpr float lineHeight = 18;  // [pixels]
+// Names of people: Latin of all of Europe and Vietnam, Greek, Cyrillic; and signs of texts. ImGui reads it until the end.
+constexpr std::array<ImWchar, 13> letters{0x20,   0x24F,  0x370,  0x3FF,  0x400,  0x52F, 0x1E00,
+                                          0x1EFF, 0x2010, 0x205E, 0x20A0, 0x20BF, 0};
 
 void setColours(ImGuiStyle& style)
 {
@@ -27,7 +30,7 @@ void setColours(ImGuiStyle& style)
     set(ImGuiCol_HeaderHovered, 0.19F, 0.25F, 0.34F);
     set(ImGuiCol_HeaderActive, 0.20F, 0.35F, 0.52F);
     set(ImGuiCol_NavHighlight, 0.90F, 0.62F, 0.00F);
-    set(ImGuiCol_PlotHistogram, 0.34F, 0.71F, 0.91F);
+    set(ImGuiCol_PlotHistogram, 0.10F, 0.47F, 0.69F);  // white words on it: 4.8 to 1
     set(ImGuiCol_FrameBg, 0.19F, 0.21F, 0.26F);
 }
 
@@ -47,7 +50,7 @@ void setLook(float scale)
     io.Fonts->Clear();
     std::error_code none;
     if (std::filesystem::exists(fontFile, none)) {
-        io.Fonts->AddFontFromFileTTF(fontFile, lineHeight * scale);  // Latin-1: English, German
+        io.Fonts->AddFontFromFileTTF(fontFile, lineHeight * scale, nullptr, letters.data());
         io.FontGlobalScale = 1;
     } else {
         io.Fonts->AddFontDefault();

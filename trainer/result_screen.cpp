@@ -110,6 +110,11 @@ Errand drawResult(State& state)
     beginPart("result", 0, -(two ? 6.6F : 3.4F) * em);
     heading(said(tr("{:.0f} of 100 points"), result.total), two ? 1.9F : 1.45F);
     words(chosenCase(state).title, quiet);
+    if (result.notKept && !state.person.empty()) {
+        words(said(tr("This session is not kept for {} and does not count: {}"), state.person, result.fault), orange);
+    } else if (!result.fault.empty()) {
+        words(result.fault, orange);
+    }
     ImGui::Columns(two ? 2 : 1, "halves", false);
     drawParts(result);
     ImGui::Spacing();

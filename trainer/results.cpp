@@ -12,7 +12,10 @@
 #include <array>
 #include <ctime>
 #include <fstream>
+#include <map>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <system_error>
 #include <tuple>
 #include <utility>
@@ -32,8 +35,51 @@ nlohmann::json parsed(const fs::path& file)
     return nlohmann::json::parse(in, nullptr, false);
 }
 
+// What a level asks for, and whether it was met; empty: there is none.
+std::string levelInWords(const nlohmann::json& asked)
+{
+    const auto bound = [&asked](const char* key) {
+        const auto at = asked.find(key);
+        return at != asked.end() && at->is_number() ? std::optional(at->get<double>()) : std::nullopt;
+    };
+    const auto met = asked.find("met");
+    if (met == asked.end() || !met->is_boolean()) {
+        return "";
+    }
+    std::string words;
+    if (const auto least = bound("at_least")) {
+        words += ", " + said(tr("at least {:Lg}"), *least);
+    }
+    if (const auto most = bound("at_most")) {
+        words += ", " + said(tr("at most {:Lg}"), *most);
+    }
+    return words + ": " + (met->get<bool>() ? tr("met") : tr("not met"));
+}
+
+// What the case is about, and the levels of the exercise. Labels of those that are shown already stay.
+void addAsked(const nlohmann::json& asked, const nlohmann::json& score, std::map<std::string, std::size_t>& rows,
+              Result& result)
+{
+    for (const auto& one : asked) {
+        const auto key = one.at("measure").get<std::string>();
+        const std::string level = levelInWords(one);
+        const auto value = score.find(key);
+        const bool known = value != score.end() && value->is_number();
+        if (!rows.contains(key) && (known || !level.empty())) {
+            rows[key] = result.measures.size();
+            const std::string unit = tr(one.at("unit").get<std::string>());
+            result.measures.emplace_back(
+                tr(one.at("label").get<std::string>()),
+                known ? said("{:.{}Lf} {}", value->get<double>(), one.at("decimals").get<int>(), unit) : "-");
+        }
+        if (rows.contains(key)) {
+            result.measures[rows[key]].second += level;
+        }
+    }
+}
+
 // Those that tell beginners from experts (docs/score.md), and the rest on request: palpate score.
-void addMeasures(const nlohmann::json& score, const std::string& judged, Result& result)
+void addMeasures(const nlohmann::json& asked, const nlohmann::json& score, const std::string& judged, Result& result)
 {
     const bool noCore = judged != "core" && score.value("passes", 0.0) == 0;
     constexpr std::array shown{std::tuple{"targeting_error_mm", marked("Targeting error"), "mm", 1},
@@ -51,6 +97,7 @@ void addMeasures(const nlohmann::json& score, const std::string& judged, Result&
                                std::tuple{"inserted_path_mm", marked("Path of the tip inside"), "mm", 0},
                                std::tuple{"peak_force_n", marked("Largest force"), "N", 2},
                                std::tuple{"seconds", marked("Time"), "s", 1}};
+    std::map<std::string, std::size_t> rows;
     for (const auto& [key, label, unit, decimals] : shown) {
         const auto value = score.find(key);
         const bool ofCores = std::string_view(key).starts_with("best_target") || std::string_view(key) == "passes";
@@ -58,9 +105,11 @@ void addMeasures(const nlohmann::json& score, const std::string& judged, Result&
             continue;
         }
         if (value != score.end() && value->is_number()) {
+            rows[key] = result.measures.size();
             result.measures.emplace_back(tr(label), said("{:.{}Lf} {}", value->get<double>(), decimals, unit));
         }
     }
+    addAsked(asked, score, rows, result);
 }
 
 // What the points of `core` are for. Figures of older programs do not say it.
@@ -107,7 +156,9 @@ Result readResult(const fs::path& figures)
             }
             result.losses.push_back(std::move(lost));
         }
-        addMeasures(score, judged, result);
+        addMeasures(json.value("asked", nlohmann::json::array()), score, judged, result);
+        result.fault = json.value("problem", "");
+        result.notKept = !json.value("kept", true);
         if (json.value("contacts", 1) == 0) {
             result = {};
             result.untouched = true;

@@ -231,7 +231,7 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     const float em = ImGui::GetFontSize(), wide = ImGui::GetContentRegionAvail().x;
     beginPart("briefing", 0, -3.4F * em);
     words(c.trains, skyBlue);
-    const Texture texture = textureOf(c.picture);
+    const Texture texture = state.test ? Texture() : textureOf(c.picture);  // which shows the planned line
     const bool beside = wide > 40 * em && texture.id != 0;
     if (beside) {
         ImGui::BeginGroup();
@@ -246,6 +246,9 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     besideIfRoom(std::string(tr("Test: without hints")) + "    ");
     if (radio(tr("Test: without hints"), state.test)) {
         state.test = true;
+    }
+    if (state.test && !c.palpation) {
+        words(tr("In a test nothing shows the planned entry and line: choose the way yourself."));
     }
     words(said(tr("As a command: {}"), asTyped("palpate", trainArguments(state, {"SESSION.db", "SESSION.json"}))), quiet);
     if (!beside && texture.id != 0) {

@@ -81,6 +81,7 @@ Errand advance(State& state)
                 return Errand::none;
             }
             state.exercise.clear();
+            state.test = false;  // that of the case before
             turnTo(state, Screen::devices);
             return Errand::checkDevices;
         case Screen::progress:
@@ -251,7 +252,8 @@ void sessionEnded(State& state, Result result)
     state.running = false;
     state.result = std::move(result);
     state.screen = Screen::result;
-    if (state.result.problem.empty() && !state.cases.empty()) {
+    const bool counts = state.result.problem.empty() && (state.person.empty() || !state.result.notKept);
+    if (counts && !state.cases.empty()) {
         auto& best = state.cases[std::min(state.chosen, state.cases.size() - 1)].best;
         best = std::max(best.value_or(0), state.result.total);
     }
@@ -306,7 +308,10 @@ std::vector<std::string> comparisonArguments(const State& state)
 
 std::vector<std::string> debriefArguments(const State& state)
 {
-    std::vector<std::string> words{"--replay", state.files.record.string(), "--layout", "trainee"};
+    std::vector<std::string> words{
+        "--replay", state.files.record.string(),
+        "--layout", "trainee",
+        "--images", std::filesystem::path(state.files.record).replace_extension(".ultrasound").string()};
     addLook(state, words);
     if (state.from) {
         words.insert(words.end(), {"--at", fmt::format("{:.2f}", *state.from)});

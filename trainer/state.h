@@ -45,6 +45,8 @@ struct LossOfPoints {
 /// What a session came to, or why it did not.
 struct Result {
     std::string problem;     // not empty: the session failed, and there is no score
+    std::string fault;       // what else went wrong, e.g. with the record; empty: nothing
+    bool notKept = false;    // and so the session is not in the person's profile
     bool untouched = false;  // and that is why: the tool never touched the body
     double total = 0;        // of 100
     std::vector<PartOfScore> parts;

@@ -66,8 +66,9 @@ void removeRecord(const fs::path& file, Erased& erased)
         removeOne(file.string() + suffix, erased);
     }
     if (file.extension() == ".db") {
-        // Its figures, and what the trainer's window made of it: a film or pictures, whole or cut off.
-        for (const char* extension : {".json", ".mp4", ".part.mp4", ".pictures", ".part.pictures"}) {
+        // Its figures, what the trainer's window made of it (a film or pictures, whole or cut off), and ultrasound
+        // pictures.
+        for (const char* extension : {".json", ".mp4", ".part.mp4", ".pictures", ".part.pictures", ".ultrasound"}) {
             removeOne(fs::path(file).replace_extension(extension), erased);
         }
     }

@@ -210,7 +210,40 @@ const char* taskInWords(datasets::SessionTask task)
     }
 }
 
+// A volume alone has the standard biopsy on it.
+datasets::Scene sceneOf(const Case& made)
+{
+    auto builtIn = datasets::builtInScene(made.scene);
+    const bool volume = fs::path(made.scene).extension() == ".vdb";
+    return builtIn ? *builtIn : volume ? datasets::Scene() : datasets::loadScene(made.scene);
+}
+
+// Empty, or what a scene is that its sessions never have this measure.
+std::string lackOf(const datasets::Scene& scene, const std::string& key)
+{
+    using Task = datasets::SessionTask;
+    using Listed = haptics::Measure::Listed;
+    const auto measures = haptics::measures();
+    const Listed listed = std::ranges::find(measures, key, &haptics::Measure::key)->listed;
+    const bool ofMarks = key.starts_with("mark"), ofCores = listed == Listed::ifFired || key == "passes";
+    if ((ofMarks && scene.task != Task::find) || (ofCores && scene.task != Task::biopsy) ||
+        (listed == Listed::ifTouch && scene.task != Task::touch) ||
+        (listed == Listed::ifAdvance && scene.task != Task::advance)) {
+        return taskInWords(scene.task);
+    }
+    if (listed == Listed::ifProbe && scene.probe.kind == datasets::ProbeKind::none) {
+        return "scene without [probe]";
+    }
+    return listed == Listed::ifCt && scene.ct.slices == 0 ? "scene without [ct]" : "";
+}
+
 }  // namespace
+
+std::string measureFault(const Case& of, const std::string& measure)
+{
+    const std::string lack = lackOf(sceneOf(of), measure);
+    return lack.empty() ? "" : fmt::format("{} has no value in case {}: it is a {}", measure, of.id, lack);
+}
 
 std::vector<std::string> faultsOf(const Case& made)
 {
@@ -231,21 +264,12 @@ std::vector<std::string> faultsOf(const Case& made)
     }
     try {
         const haptics::SessionModel model = session::openSession(made.scene, {});
-        using Task = datasets::SessionTask;
-        const Task task = model.scene.task;
         if (made.picture.empty()) {
             add("picture: there is none; palpate case picture makes one");
         }
         for (const std::string& key : made.measures) {
-            const auto measures = haptics::measures();
-            const auto m = std::ranges::find(measures, key, &haptics::Measure::key);
-            using Listed = haptics::Measure::Listed;
-            const bool ofMarks = key.starts_with("mark");
-            const bool ofCores = m->listed == Listed::ifFired || key == "passes";
-            if ((ofMarks && task != Task::find) || (ofCores && task != Task::biopsy) ||
-                (m->listed == Listed::ifTouch && task != Task::touch) ||
-                (m->listed == Listed::ifAdvance && task != Task::advance)) {
-                add(fmt::format("measures: {} has no value in a {}", key, taskInWords(task)));
+            if (const std::string lack = lackOf(model.scene, key); !lack.empty()) {
+                add(fmt::format("measures: {} has no value in a {}", key, lack));
             }
         }
     } catch (const std::runtime_error& e) {

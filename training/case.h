@@ -40,6 +40,10 @@ Case findCase(const std::string& id);
 /// Whether `what` is a folder with a case in it.
 bool isCaseFolder(const std::filesystem::path& what);
 
+/// Empty, or why sessions of a case never have this measure (a key of haptics::measures()). Reads the case's scene alone.
+/// Throws std::runtime_error for a scene that cannot be read.
+std::string measureFault(const Case& of, const std::string& measure);
+
 /// What is wrong with a case beyond what loadCase() refuses, a line each, as for its errors. Builds its session: seconds.
 std::vector<std::string> faultsOf(const Case& made);
 

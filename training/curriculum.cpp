@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <stdexcept>
+#include <utility>
 
 namespace palpate::training {
 
@@ -32,8 +33,10 @@ Level readLevel(Section& section)
     }
     level.measure = *measure;
     checkMeasure(section, "measure", level.measure);
-    level.atLeast = section.number("at_least", "", -1e9, 1e9);
-    level.atMost = section.number("at_most", "", -1e9, 1e9);
+    const bool ofHundred = level.measure == "total" || level.measure.ends_with("_pct");
+    const auto [low, high] = ofHundred ? std::pair(0.0, 100.0) : std::pair(-1e9, 1e9);
+    level.atLeast = section.number("at_least", "", low, high);
+    level.atMost = section.number("at_most", "", low, high);
     if (!level.atLeast && !level.atMost) {
         section.missing("at_most", "or at_least: what the measure has to be");
     }
@@ -156,6 +159,21 @@ Curriculum loadCurriculum(const fs::path& file)
     }
     top.finish();
     return c;
+}
+
+std::vector<std::string> faultsOf(const Curriculum& curriculum)
+{
+    std::vector<std::string> faults;
+    for (const Exercise& e : curriculum.exercises) {
+        const Case its = findCase(e.caseId);
+        for (const Level& level : e.gate.levels) {
+            if (const std::string fault = measureFault(its, level.measure); !fault.empty()) {
+                faults.push_back(
+                    fmt::format("{}: exercise {}: its gate never opens: {}", curriculum.file.string(), e.id, fault));
+            }
+        }
+    }
+    return faults;
 }
 
 std::vector<Curriculum> allCurricula(std::vector<std::string>* faults)

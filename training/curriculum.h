@@ -42,6 +42,10 @@ struct Curriculum {
 /// measures that are not there, levels that nothing can meet, and exercises that wait for one another.
 Curriculum loadCurriculum(const std::filesystem::path& file);
 
+/// What is wrong with a curriculum beyond what loadCurriculum() refuses, a line each: measures that an exercise's case
+/// never gives. Reads the scenes of its cases.
+std::vector<std::string> faultsOf(const Curriculum& curriculum);
+
 /// Those of the user and those that come along, by title; `faults` gets the errors of those that cannot be read.
 std::vector<Curriculum> allCurricula(std::vector<std::string>* faults = nullptr);
 

@@ -2,6 +2,7 @@
 
 #include <base/nearest.h>
 #include <base/outputs.h>
+#include <base/utf8.h>
 #include <haptics/measures.h>
 #include <haptics/record_format.h>
 #include <training/belongings.h>
@@ -165,8 +166,8 @@ void checkLine(const std::string& what, const std::string& text, std::size_t mos
 {
     const bool control =
         std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-    if (text.empty() || text.size() > most || control) {
-        throw std::runtime_error(fmt::format("{}: must be 1 to {} bytes of text in one line", what, most));
+    if (text.empty() || text.size() > most || control || !base::isUtf8(text)) {
+        throw std::runtime_error(fmt::format("{}: must be 1 to {} bytes of text (UTF-8) in one line", what, most));
     }
 }
 

@@ -170,11 +170,16 @@ TEST_F(TrainingCommands, ASessionWhoseDiskWasFullIsNotKept)
     ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
     const std::string record = folder_ / "cut.db";
     const Outcome cut = palpate({"train", "layered", "--profile", "anna", "--headless", "--unpaced", "--setting", "fast",
-                                 "--record", record, "--inject", "disk-full@1500ms"});
+                                 "--record", record, "--inject", "disk-full@1500ms", "--json", folder_ / "cut.json"});
     EXPECT_EQ(cut.status, 1);
     EXPECT_EQ(std::ranges::count(cut.err, '\n'), 1) << cut.err;
     EXPECT_NE(cut.err.find(record + ": recording stopped: "), std::string::npos) << cut.err;
     EXPECT_NE(cut.out.find("not kept for anna: the record of the session is not whole"), std::string::npos) << cut.out;
+    const auto told = nlohmann::json::parse(std::ifstream(folder_ / "cut.json"));
+    EXPECT_FALSE(told["kept"]);
+    EXPECT_NE(told["problem"].get<std::string>().find("the record of the session is not whole; " + record),
+              std::string::npos)
+        << told["problem"];
     EXPECT_TRUE(figures({"progress", "anna"})["sessions"].empty());
     expectRefusal({"profile", "add-record", "anna", record}, "was not closed");
 }
@@ -336,6 +341,19 @@ TEST_F(TrainingCommands, RefuseWhatIsNotThere)
 {
     expectRefusal({"case", "show", "near-vesel"}, "did you mean near-vessel?");
     expectRefusal({"curriculum", "check", "palpaton"}, "did you mean palpation?");
+    const std::string course = folder_ / "course.toml";
+    const auto courseWith = [&](const char* level) {
+        std::ofstream(course)
+            << "title = \"A course\"\n[[exercise]]\nid = \"touch\"\ntitle = \"Touch\"\ncase = \"first-touch\"\n"
+               "[[exercise.level]]\n"
+            << level;
+        return course;
+    };
+    EXPECT_EQ(palpate({"curriculum", "check", courseWith("measure = \"rest_s\"\nat_least = 2\n")}).status, 0);
+    expectRefusal({"curriculum", "check", courseWith("measure = \"total\"\nat_least = 140\n")}, "must be 0 to 100");
+    expectRefusal({"curriculum", "check", courseWith("measure = \"best_target_pct\"\nat_least = 40\n")},
+                  "exercise touch: its gate never opens: best_target_pct has no value in case first-touch");
+    expectRefusal({"curriculum", "check", courseWith("measure = \"ct_scans\"\nat_most = 4\n")}, "without [ct]");
     expectRefusal({"train", "--profile", "nobody", "--headless", "--unpaced"}, "there is no such profile");
     expectRefusal({"train", "layered", "--case", "layered", "--headless", "--unpaced"}, "a case has a scene of its own");
     expectRefusal({"progress"}, "give a profile's name");

@@ -1,4 +1,5 @@
 #include <base/user_files.h>
+#include <base/utf8.h>
 
 #include <gtest/gtest.h>
 
@@ -53,7 +54,23 @@ TEST(UserFiles, PlainNamesHaveNoSignsButKeepLetters)
 {
     EXPECT_EQ(plainName("Ada L. (2)"), "Ada-L---2-");
     EXPECT_EQ(plainName("J\xc3\xb6rg/../x"), "J\xc3\xb6rg----x");
-    EXPECT_EQ(progressPages("A b"), "progress-A-b");
+    EXPECT_EQ(progressPages("A-b"), "progress-A-b");
+    EXPECT_EQ(progressPages("ada"), "progress-ada");
+}
+
+// The second page would lie over the first.
+TEST(UserFiles, NamesThatDifferInSignsHaveTheirOwnPages)
+{
+    EXPECT_NE(progressPages("A b"), progressPages("A-b"));
+    EXPECT_TRUE(progressPages("A b").starts_with("progress-A-b-")) << progressPages("A b");
+}
+
+TEST(Utf8, IsWhatTheStandardSays)
+{
+    for (const char* text : {"", "ada", "J\xc3\xb6rg", "\xe1\xbb\x87", "\xf0\x9f\x98\x80"})
+        EXPECT_TRUE(isUtf8(text)) << text;
+    for (const char* text : {"bad\xff", "\xc3", "\xc0\xaf", "\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80", "\xe0\x80\x80"})
+        EXPECT_FALSE(isUtf8(text)) << text;
 }
 
 }  // namespace

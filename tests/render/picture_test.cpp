@@ -2,6 +2,7 @@
 
 #include <channel/needle_shape.h>
 #include <render/display.h>
+#include <render/mouse_hand.h>
 #include <tests/render/studio.h>
 
 #include <gtest/gtest.h>
@@ -25,6 +26,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace palpate::render {
@@ -336,6 +338,98 @@ TEST_F(PictureTest, WordsOfACtScanLieOnNothingElse)
     const Area left{scan.x, scan.y + scan.height / 4, 20, scan.height / 2};
     EXPECT_GT(scanned.count(left, {115, 115, 115}, 8), 40);
     EXPECT_GT(scanned.count(left, {255, 255, 255}, 4), left.width * left.height / 2);
+}
+
+// Moments that nobody looked at: the event at 0.5 s, the scan at 0.6 s.
+TEST_F(PictureTest, ARecordsEventsAndScansAreOfTheirOwnTime)
+{
+    channel::Scenery scenery = studio->scenery;
+    scenery.ctSlices = 3;
+    scenery.ctWidth = 5e-3;
+    scenery.ctDoseIndex = 10;
+    scenery.ctDoseLength = 7.5;
+    Recorded recorded;
+    channel::State taken = storyState(scenery, 0.6);
+    taken.tick = 600;
+    taken.pictures = 1;
+    recorded.add({0.5, EventKind::contact, 0, 0});
+    recorded.add(taken, {});
+    Picture& picture = studio->picture();
+    picture.setRecorded(&recorded);
+    picture.open(scenery, studio->labels, "story");
+    channel::State state = storyState(scenery, 1.4);
+    state.tick = 1400;
+    state.pictures = 1;
+    state.missed = notCounted;
+    std::string words;
+    for (const auto& [layout, name] : layouts) {
+        picture.show(layout);
+        picture.update(state, nullptr, {30, 0.02, 1000});
+        picture.render(Quality::still);
+        for (const Written& one : picture.written())
+            words += one.words + "\n";
+    }
+    picture.setRecorded(nullptr);
+    EXPECT_NE(words.find("touches the body\n0.5 s"), std::string::npos) << words;
+    EXPECT_NE(words.find("CT scan 1 at 0.6 s"), std::string::npos) << words;
+    EXPECT_EQ(words.find("missed"), std::string::npos) << "nobody has counted them: " << words;
+}
+
+// Of what is 10 mm before or behind a slice nothing looks as if it was in it.
+TEST_F(PictureTest, TheTargetsRingIsBrightInItsOwnPlaneOnly)
+{
+    const ScreenPlan plan(width, height, Layout::instructor);
+    const channel::Scenery& scenery = studio->scenery;
+    Picture& picture = studio->picture();
+    picture.open(scenery, studio->labels, "story");
+    picture.show(Layout::instructor);
+    channel::State state = storyState(scenery, 0.05);
+    const auto whiteAt = [&](std::size_t slice, glm::dvec3 tip) {
+        state.tip = {tip.x, tip.y, tip.z};
+        picture.update(state, nullptr, {30, 0.02, 1000});
+        picture.render(Quality::still);
+        const ViewFrame frame = orthogonalFrames(viewFrame(scenery), tip)[slice];
+        const Area& area = plan.slices[slice];
+        const glm::dvec3 d = (vec(scenery.aim) - frame.centre) * (std::min(area.width, area.height) / frame.extent);
+        const int half = static_cast<int>(0.8 * plan.font);
+        const Area around{area.x + area.width / 2 + static_cast<int>(glm::dot(d, frame.right)) - half,
+                          area.y + area.height / 2 + static_cast<int>(glm::dot(d, frame.up)) - half, 2 * half, 2 * half};
+        return studio->grab().count(around, {255, 255, 255}, 60);
+    };
+    for (std::size_t slice = 0; slice < 3; ++slice) {
+        const glm::dvec3 towards = orthogonalFrames(viewFrame(scenery), {})[slice].towards;
+        const glm::dvec3 away = vec(scenery.aim) + glm::dvec3(10e-3);
+        EXPECT_EQ(whiteAt(slice, away), 0) << slice;
+        EXPECT_GT(whiteAt(slice, away - glm::dot(glm::dvec3(10e-3), towards) * towards), 10) << slice;
+    }
+}
+
+// The simulation does so too after a picture that took longer than longestSilence: else the drawn hand would be ahead of
+// the tip by what the hand did before.
+TEST_F(PictureTest, AfterASlowPictureTheHandBeginsWhereTheToolIs)
+{
+    channel::Scenery scenery = studio->scenery;
+    scenery.viewersHand = channel::handIsViewers;
+    channel::Publisher publisher("slow-picture", scenery, studio->labels);
+    const channel::State state = storyState(scenery, 0.1);
+    publisher.setState(state);
+    Follower follower("slow-picture", 10);
+    MouseHand hand;
+    const auto look = [&] {
+        follower.poll(studio->picture());
+        hand.keep(follower);
+    };
+    for (int i = 0; i < 1000 && !hand.is(); ++i)
+        look();
+    ASSERT_TRUE(hand.is());
+    hand.press(follower.state());
+    hand.move({0, 5e-3, 0});
+    look();
+    EXPECT_NEAR(glm::distance(hand.target(), vec(state.tip)), 5e-3, 1e-9);
+    std::this_thread::sleep_for(std::chrono::duration<double>(1.1 * MouseHand::longestSilence));
+    look();
+    EXPECT_EQ(hand.target(), vec(state.tip));
+    EXPECT_TRUE(hand.held());
 }
 
 // under() is the inverse of the projection.

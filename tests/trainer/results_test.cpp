@@ -51,6 +51,44 @@ TEST(Results, ASessionThatTouchedNothingHasNone)
     EXPECT_EQ(readResult(folder / "a.json").problem, "");
 }
 
+// A case of ultrasound is about the picture, which the general list does not have.
+TEST(Results, WhatTheCaseIsAboutAndTheLevelsAreShown)
+{
+    const Folder folder;
+    std::string text = figures;
+    const std::string asked = R"({"asked": [
+        {"measure": "peak_force_n", "label": "Peak force", "unit": "N", "decimals": 2, "at_most": 2, "met": false},
+        {"measure": "ct_scans", "label": "CT scans", "unit": "", "decimals": 0, "at_least": null, "met": null},
+        {"measure": "tip_in_beam_pct", "label": "Tip in the picture", "unit": "%", "decimals": 0, "at_least": 60, "met": true}], )";
+    text.replace(text.find("\"passes\""), 0, R"("tip_in_beam_pct": 71.2, "ct_scans": 3, )");
+    write(folder / "a.json", text.replace(0, 1, asked));
+    const Result r = readResult(folder / "a.json");
+    ASSERT_EQ(r.measures.size(), 4U) << r.problem;
+    EXPECT_EQ(r.measures[1].second, "2.04 N, at most 2: not met");
+    EXPECT_EQ(r.measures[2], std::pair(std::string("CT scans"), std::string("3 ")));
+    EXPECT_EQ(r.measures[3].second, "71 %, at least 60: met");
+}
+
+// Its score is whole; that it was lost is not to be seen from the points.
+TEST(Results, ASessionThatWasNotKeptSaysWhy)
+{
+    const Folder folder;
+    write(folder / "a.json", figures);
+    EXPECT_EQ(readResult(folder / "a.json").fault, "") << "of an older program";
+    EXPECT_FALSE(readResult(folder / "a.json").notKept);
+    write(folder / "a.json",
+          std::string(figures).replace(0, 1, R"({"kept": false, "problem": "the record is not whole", )"));
+    const Result r = readResult(folder / "a.json");
+    EXPECT_EQ(r.problem, "");
+    EXPECT_EQ(r.fault, "the record is not whole");
+    EXPECT_TRUE(r.notKept);
+    State state;
+    state.cases.resize(1);
+    state.person = "ada";
+    sessionEnded(state, r);
+    EXPECT_FALSE(state.cases[0].best);
+}
+
 // "100 of 100 points" and a loss of one contradict each other.
 TEST(Results, ALossThatTheTotalDoesNotShowIsNotTold)
 {

@@ -9,6 +9,9 @@
 #include <imgui.h>
 #include <imgui_internal.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -86,6 +89,40 @@ protected:
 
     const float width, height;
 };
+
+// WCAG 2, the contrast of two colours.
+double contrast(const ImVec4& a, const ImVec4& b)
+{
+    const auto light = [](const ImVec4& c) {
+        const auto linear = [](double v) { return v <= 0.03928 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4); };
+        return 0.2126 * linear(c.x) + 0.7152 * linear(c.y) + 0.0722 * linear(c.z);
+    };
+    return (std::max(light(a), light(b)) + 0.05) / (std::min(light(a), light(b)) + 0.05);
+}
+
+TEST(Look, WordsOnBarsCanBeRead)
+{
+    ImGui::CreateContext();
+    setLook(1);
+    const ImVec4* const colours = ImGui::GetStyle().Colors;
+    for (const ImGuiCol behind : {ImGuiCol_PlotHistogram, ImGuiCol_FrameBg, ImGuiCol_Button, ImGuiCol_Header})
+        EXPECT_GE(contrast(colours[ImGuiCol_Text], colours[behind]), 4.5) << behind;
+    ImGui::DestroyContext();
+}
+
+TEST(Look, NamesHaveTheirLetters)
+{
+    ImGui::CreateContext();
+    setLook(1);
+    unsigned char* pixels = nullptr;
+    int wide = 0, high = 0;
+    ImGui::GetIO().Fonts->GetTexDataAsRGBA32(&pixels, &wide, &high);
+    const ImFont& font = *ImGui::GetIO().Fonts->Fonts[0];
+    const bool own = font.FindGlyphNoFallback(0xE4) == nullptr;  // ImGui's, where DejaVu is not installed
+    constexpr std::array<ImWchar, 5> letters{0x141, 0x159, 0x3A9, 0x416, 0x1EC7};
+    EXPECT_TRUE(own || std::ranges::all_of(letters, [&](ImWchar c) { return font.FindGlyphNoFallback(c) != nullptr; }));
+    ImGui::DestroyContext();
+}
 
 // Nothing lies over the window's side; what is too long has a bar to roll it by.
 TEST_P(Screens, NothingIsCutOff)
