@@ -220,7 +220,7 @@ void drawHealth(Canvas& canvas, const ScreenPlan& plan, const channel::State& st
     const std::string brief =
         state.missed == notCounted ? "" : said(trn("{} tick missed", "{} ticks missed", state.missed), state.missed);
     std::string simulation = brief, viewer;
-    if (health.tickRate > 0 && state.tickP99 > 0)
+    if (health.tickRate > 0 && state.tickP99 > 0 && !brief.empty())
         simulation = said(tr("{:.0f} ticks/s, 99 % within {:.0f} us, {} missed"), health.tickRate, state.tickP99 * 1e6,
                           state.missed);
     if (health.framesPerSecond > 0)
