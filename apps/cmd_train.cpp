@@ -397,11 +397,10 @@ void train(TrainArguments o)
     session::TrainResult result = runToItsEnd(model, info, options);
     const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
     training.markCut(result, o.record);
-    const bool learns = !fitted.empty() && o.faults.empty();  // ticks that were made late say nothing of the machine
-    const std::string next = !learns ? "" : session::learnFrom(session::machineCache(), model.scene, result.timing);
+    const bool learns = !fitted.empty() && o.faults.empty();  // delays that were asked for are not the machine's
+    const auto next = learns ? session::learnFrom(session::machineCache(), model.scene, result.timing) : std::string();
     const Conclusion conclusion = training.conclude(info, result, record);
     const auto written = writeOutputs(o, info, model, viewers, took, conclusion, result);
-
     if (o.json != "-" && !o.tryout) {
         summarise(result, info, model, next);
         tell(fitted, written, conclusion.lines);
