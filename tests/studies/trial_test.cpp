@@ -152,7 +152,8 @@ TEST(KernelTrial, TheWorstLookKeepsItsSignAndNoNumberWins)
     };
     EXPECT_EQ(spread({-1.0, -5.0, 2.0}).worst, -5.0);
     EXPECT_EQ(spread({-1.0, -5.0, 2.0}).median, -1.0);
-    for (const auto& looks : {std::vector{1.0, NAN, 2.0}, std::vector{NAN, 1.0}, std::vector{1.0, NAN}}) {
+    for (const auto& looks :
+         {std::vector<double>{1.0, NAN, 2.0}, std::vector<double>{NAN, 1.0}, std::vector<double>{1.0, NAN}}) {
         EXPECT_TRUE(std::isnan(spread(looks).worst));
         EXPECT_TRUE(std::isnan(spread(looks).median));
     }
