@@ -65,18 +65,16 @@ struct Needle {
 
     std::uint8_t tissueLeft(Vec3 rest) const noexcept { return taken(state.cuts, rest) ? 0 : reader.tissue(rest); }
 
-    bool inAir(Vec3 rest, double outside = 0.0) const noexcept
-    {
-        return reader.tissue(rest) == 0 && model.surface.distance(rest) > outside;
-    }
-
     // The tissue that a tip is in that gets there. Holes are in what is around them; out of the body it is a voxel away, by
     // more than its surface and its voxels may differ.
     std::uint8_t tissueFor(Vec3 rest) const noexcept
     {
-        const auto here = tissueLeft(rest);
+        const auto here = reader.tissue(rest);
+        if (here != 0) {
+            return taken(state.cuts, rest) ? tip.tissue : here;
+        }
         const Vec3 voxel = model.tissue->affine().spacing();
-        return here != 0 || inAir(rest, std::max({voxel.x, voxel.y, voxel.z})) ? here : tip.tissue;
+        return model.surface.distance(rest) > std::max({voxel.x, voxel.y, voxel.z}) ? 0 : tip.tissue;
     }
 
     void moveProxy(double way) noexcept
@@ -186,7 +184,7 @@ struct Needle {
         const int steps = std::clamp(static_cast<int>(std::ceil(state.inserted / airStep)), 1, mostAirSteps);
         int air = 0;
         for (int i = 0; i < steps; ++i) {
-            air += inAir(glm::mix(state.entry, tip.proxy, (i + 0.5) / steps)) ? 1 : 0;
+            air += reader.tissue(glm::mix(state.entry, tip.proxy, (i + 0.5) / steps)) == 0 ? 1 : 0;
         }
         return state.inserted * air / steps;
     }
@@ -198,7 +196,7 @@ struct Needle {
         const double piece = std::max(state.inserted, 0.0) / shaftSamples;
         for (int i = 0; i < shaftSamples; ++i) {
             const Vec3 at = glm::mix(state.entry, tip.proxy, (i + 0.5) / shaftSamples);
-            if (state.wentThrough && inAir(at)) {
+            if (state.wentThrough && reader.tissue(at) == 0) {
                 continue;
             }
             const auto& tissue = row(tissueLeft(at));

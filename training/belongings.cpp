@@ -75,15 +75,20 @@ void removeRecord(const fs::path& file, Erased& erased)
     removeOne(file, erased);
 }
 
-// People whose names differ in signs only share their pages, which then stay.
+// Older versions gave people whose names differ in signs only the same pages, which then stay.
+std::string olderPages(const std::string& name)
+{
+    return base::plainName("progress-" + name);
+}
+
 void removePages(const Belongings& of, Erased& erased)
 {
-    const std::string pages = base::progressPages(of.name);
-    const bool shared =
-        std::ranges::any_of(of.otherNames, [&](const std::string& other) { return base::progressPages(other) == pages; });
+    const std::string older = olderPages(of.name);
+    const bool shared = std::ranges::any_of(of.otherNames, [&](const std::string& n) { return olderPages(n) == older; });
     for (const fs::path& folder : of.folders) {
         for (const char* suffix : {".html", ".csv", ".xapi.json"}) {
-            const fs::path file = folder / (pages + suffix);
+            removeOne(folder / (base::progressPages(of.name) + suffix), erased);
+            const fs::path file = folder / (older + suffix);
             std::error_code none;
             if (!shared) {
                 removeOne(file, erased);

@@ -166,7 +166,9 @@ std::vector<std::filesystem::path> inputsOf(const ValidateArguments& o)
     for (const auto& folder : measurementFolders(o.data)) {
         std::error_code none;
         for (const auto& entry : std::filesystem::directory_iterator(folder, none)) {
-            inputs.push_back(entry.path());
+            if (entry.path().extension() == ".csv") {
+                inputs.push_back(entry.path());
+            }
         }
     }
     return inputs;

@@ -268,7 +268,7 @@ TEST(ProfileStore, OnlyAStoreBecomesPrivate)
     EXPECT_EQ(modeOf(folder / "p.db"), own);
 }
 
-// Names that differ in signs only have the same pages, which then tell of somebody who stays.
+// Names that differ in signs only had the same pages in older versions, which then tell of somebody who stays.
 TEST(ProfileStore, ErasingKeepsPagesThatTwoPeopleShare)
 {
     const Folder folder;
