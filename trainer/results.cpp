@@ -56,7 +56,8 @@ std::string levelInWords(const nlohmann::json& asked)
     return words + ": " + (met->get<bool>() ? tr("met") : tr("not met"));
 }
 
-// What the case is about, and the levels of the exercise. Labels of those that are shown already stay.
+// What the case is about, and the levels of the exercise. Labels of those that are shown already stay; the total, in large
+// letters, is one of them.
 void addAsked(const nlohmann::json& asked, const nlohmann::json& score, std::map<std::string, std::size_t>& rows,
               Result& result)
 {
@@ -65,7 +66,8 @@ void addAsked(const nlohmann::json& asked, const nlohmann::json& score, std::map
         const std::string level = levelInWords(one);
         const auto value = score.find(key);
         const bool known = value != score.end() && value->is_number();
-        if (!rows.contains(key) && (known || !level.empty())) {
+        const bool isShown = key == "total" && level.empty();
+        if (!isShown && !rows.contains(key) && (known || !level.empty())) {
             rows[key] = result.measures.size();
             const std::string unit = tr(one.at("unit").get<std::string>());
             result.measures.emplace_back(
