@@ -27,9 +27,9 @@ Proximity proximityOf(const GuardedStructure& s, const occupancy::Body& body, co
     const Vec3 normal = s.distance.normal(tip.proxy);
     if (d <= 0.0) {
         // Where no side is nearer the field is flat, and nothing pushes: across the middle the push turns round in steps
-        // that a hand can follow.
-        const Vec3 slope = s.distance.gradient(tip.proxy);
-        return {d, slope / std::max(1.0, glm::length(slope)), s.gain, true, false};
+        // that a hand can follow. At the surface it is whole.
+        const double steep = std::min(1.0, glm::length(s.distance.gradient(tip.proxy)));
+        return {d, glm::mix(1.0, steep, std::min(1.0, -d / s.distance.grid.spacing)) * normal, s.gain, true, false};
     }
     // The lattice follows the tip closely and not exactly. Near the structure the tip counts as where the tissue is that it
     // has hold of, so that the distance goes through zero where the tip goes into the structure.

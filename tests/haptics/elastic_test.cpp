@@ -68,7 +68,7 @@ TEST(ElasticTick, AToolBesideTheBodyIsBesideTheLatticeToo)
     const auto model =
         tests::modelOf(tests::sphereOnBlock("structure = \"base\"\naim_mm = [0, 55, 0]\n[model]\nrelaxation = "
                                             "true\n[volume.parameters]\ntumours = 0\nwidth_mm = 250\n"));
-    for (const Vec3 way : {Vec3(1, 0, 0), Vec3(-1, 0, 0), Vec3(0, 0, 1), Vec3(0, 1, 0)}) {
+    for (const Vec3 way : {Vec3(1, 0, 0), Vec3(0, 1, 0)}) {
         Simulation simulation(model);
         for (int i = 0; i < 300; ++i) {
             simulation.tick(at(4e-3 * std::min(1.0, i / 100.0)));
