@@ -32,6 +32,15 @@
 namespace palpate::render {
 namespace {
 
+channel::Scenery inAScanner(channel::Scenery scenery)
+{
+    scenery.ctSlices = 3;
+    scenery.ctWidth = 5e-3;
+    scenery.ctDoseIndex = 10;
+    scenery.ctDoseLength = 7.5;
+    return scenery;
+}
+
 class PictureTest : public testing::Test {
 protected:
     static void SetUpTestSuite()
@@ -306,11 +315,7 @@ TEST_F(PictureTest, ShowsAnImageInTheSliceOnly)
 // In a small window the caption of a scan has a place of its own, and the side letters are read on tissue that is white.
 TEST_F(PictureTest, WordsOfACtScanLieOnNothingElse)
 {
-    channel::Scenery scenery = studio->scenery;
-    scenery.ctSlices = 3;
-    scenery.ctWidth = 5e-3;
-    scenery.ctDoseIndex = 10;
-    scenery.ctDoseLength = 7.5;
+    channel::Scenery scenery = inAScanner(studio->scenery);
     for (channel::TissueSound& sound : scenery.sound)
         sound.density = 3000;
     constexpr int wide = 500, high = 400;
@@ -343,11 +348,7 @@ TEST_F(PictureTest, WordsOfACtScanLieOnNothingElse)
 // Moments that nobody looked at: the event at 0.5 s, the scan at 0.6 s.
 TEST_F(PictureTest, ARecordsEventsAndScansAreOfTheirOwnTime)
 {
-    channel::Scenery scenery = studio->scenery;
-    scenery.ctSlices = 3;
-    scenery.ctWidth = 5e-3;
-    scenery.ctDoseIndex = 10;
-    scenery.ctDoseLength = 7.5;
+    channel::Scenery scenery = inAScanner(studio->scenery);
     Recorded recorded;
     channel::State taken = storyState(scenery, 0.6);
     taken.tick = 600;
