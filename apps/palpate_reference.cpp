@@ -151,10 +151,12 @@ std::string numbered(const std::string& file, std::size_t look)
     return path.parent_path() / fmt::format("{}-{:02}{}", path.stem().string(), look + 1, path.extension().string());
 }
 
-json lookFigures(const reference::Solver& solver, const studies::ReferenceState& state, double gap)
+json lookFigures(const reference::Solver& solver, const studies::ReferenceState& state, const studies::TrialPath& path)
 {
+    const Vec3 at = 1e3 * path.at(state.pose);
     return {{"pressed_mm", 1e3 * state.pose.pressed},
-            {"depth_mm", 1e3 * (state.pose.pressed - gap)},
+            {"depth_mm", 1e3 * (state.pose.pressed - path.gap)},
+            {"position_mm", {at.x, at.y, at.z}},
             {"dragged_mm", 1e3 * state.pose.dragged},
             {"force_n", {state.force.x, state.force.y, state.force.z}},
             {"energy_j", state.energy},
@@ -235,7 +237,7 @@ Results solveScene(const ReferenceArguments& o, const haptics::SessionModel& mod
         say("{}: look {} of {}: {:.2f} mm in, {:.2f} mm along: {:.5f} {:.5f} {:.5f} N, {} Newton steps, {:.0f} s\n",
             model.scene.name, look + 1, looks, 1e3 * state.pose.pressed, 1e3 * state.pose.dragged, state.force.x,
             state.force.y, state.force.z, solver.newtonSteps(), cpuSeconds() - meshed);
-        out.looks.push_back(lookFigures(solver, state, path.gap));
+        out.looks.push_back(lookFigures(solver, state, path));
         out.info.unknowns = solver.unknowns();
         if (!o.vtu.empty() && (o.all || look + 1 == looks)) {
             out.files.emplace_back(o.all ? numbered(o.vtu, look) : o.vtu, reference::vtuText(body.mesh, solver));

@@ -44,6 +44,12 @@ TEST(ReferenceCommand, PressesWhereAnotherReferenceDoes)
     };
     const auto over = solved({}), beside = solved({"--path-of", pressBeside(folder, "sphere_10mm", true)});
     EXPECT_NE(over.at("key"), beside.at("key"));
+    for (const auto& [place, right] : {std::pair{over, 0.0}, {beside, 4.0}}) {  // the ball's middle, 3 mm deep
+        const auto at = place.at("looks")[0].at("position_mm").get<std::vector<double>>();
+        EXPECT_NEAR(at[0], right, 1e-3);
+        EXPECT_NEAR(at[1], -7.0, 1e-3);
+        EXPECT_NEAR(at[2], 0.0, 1e-3);
+    }
     const auto force = [](const nlohmann::json& r, std::size_t i) {
         return r.at("looks")[0].at("force_n")[i].get<double>();
     };
