@@ -7,7 +7,6 @@
 #include <cstring>
 #include <stdexcept>
 #include <thread>
-#include <utility>
 
 namespace palpate::base {
 

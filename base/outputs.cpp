@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <base/inputs.h>
 #include <base/outputs.h>
 
@@ -37,17 +38,13 @@ void checkOutput(const fs::path& file)
     }
     refuseCircle(file);
     std::error_code none;
-    if (fs::is_directory(file, none) || !file.has_filename()) {
-        throw std::runtime_error(file.string() + ": is a folder: give the name of a file");
-    }
+    base::failIf(fs::is_directory(file, none) || !file.has_filename(), "{}: is a folder: give the name of a file",
+                 file.native());
     const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
-    if (!fs::is_directory(folder, none)) {
-        throw std::runtime_error(
-            fmt::format("{}: cannot be written: there is no folder {}: make it first", file.string(), folder.string()));
-    }
+    base::failIf(!fs::is_directory(folder, none), "{}: cannot be written: there is no folder {}: make it first",
+                 file.native(), folder.native());
     if (access(fs::exists(file, none) ? file.c_str() : folder.c_str(), W_OK) != 0) {
-        throw std::runtime_error(
-            fmt::format("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno)));
+        throw base::error("{}: cannot be written ({}): choose another place", file.string(), std::strerror(errno));
     }
 }
 
@@ -71,9 +68,8 @@ bool areOneFile(const fs::path& a, const fs::path& b)
 
 void checkNames(const std::vector<fs::path>& outputs)
 {
-    if (std::ranges::find(outputs, fs::path("-")) != outputs.end()) {
-        throw std::runtime_error("-: this output goes to a file: give its name (./- for one that is called so)");
-    }
+    base::failIf(std::ranges::find(outputs, fs::path("-")) != outputs.end(),
+                 "-: this output goes to a file: give its name (./- for one that is called so)");
 }
 
 void checkOutputs(const std::vector<fs::path>& outputs, const std::vector<fs::path>& inputs)
@@ -102,12 +98,9 @@ void checkOutputFolder(const fs::path& folder)
     while (!fs::exists(there, none) && there != there.root_path()) {
         there = there.parent_path();
     }
-    if (!fs::is_directory(there, none)) {
-        throw std::runtime_error(fmt::format("{}: cannot be made: {} is no folder", folder.string(), there.string()));
-    }
+    base::failIf(!fs::is_directory(there, none), "{}: cannot be made: {} is no folder", folder.native(), there.native());
     if (access(there.c_str(), W_OK) != 0) {
-        throw std::runtime_error(
-            fmt::format("{}: cannot be written ({}): choose another place", folder.string(), std::strerror(errno)));
+        throw base::error("{}: cannot be written ({}): choose another place", folder.native(), std::strerror(errno));
     }
 }
 
@@ -116,8 +109,7 @@ bool makeFolders(const fs::path& folder)
     std::error_code failed;
     const bool made = fs::create_directories(folder, failed);
     if (failed) {
-        throw std::runtime_error(
-            fmt::format("{}: this folder cannot be made ({}): choose another place", folder.string(), failed.message()));
+        throw base::error("{}: this folder cannot be made ({}): choose another place", folder.string(), failed.message());
     }
     return made;
 }
@@ -136,9 +128,7 @@ bool takesBytes(const fs::path& file)
 
 fs::path replaceable(const fs::path& file)
 {
-    if (takesBytes(file)) {
-        throw std::runtime_error(file.string() + ": is no file: give the name of a file");
-    }
+    base::failIf(takesBytes(file), "{}: is no file: give the name of a file", file.native());
     refuseCircle(file);
     std::error_code none;
     const fs::path target = fs::is_symlink(file, none) ? fs::weakly_canonical(file, none) : file;

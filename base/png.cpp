@@ -1,9 +1,10 @@
 #include <base/png.h>
 
+#include <base/error.h>
+
 #include <zlib.h>
 
 #include <array>
-#include <stdexcept>
 
 namespace palpate::base {
 
@@ -35,10 +36,9 @@ std::string deflated(int width, int height, std::span<const std::uint8_t> grey)
     }
     uLongf size = compressBound(static_cast<uLong>(raw.size()));
     std::string out(size, '\0');
-    if (compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(raw.data()),
-                 static_cast<uLong>(raw.size())) != Z_OK) {
-        throw std::runtime_error("a picture cannot be compressed: out of memory");
-    }
+    base::failIf(compress(reinterpret_cast<Bytef*>(out.data()), &size, reinterpret_cast<const Bytef*>(raw.data()),
+                          static_cast<uLong>(raw.size())) != Z_OK,
+                 "a picture cannot be compressed: out of memory");
     out.resize(size);
     return out;
 }

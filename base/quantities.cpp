@@ -1,14 +1,12 @@
 #include <base/quantities.h>
 
+#include <base/error.h>
 #include <base/split.h>
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <initializer_list>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::base {
@@ -61,7 +59,7 @@ double parseShare(const std::string& option, const std::string& text)
             return fraction;
         }
     }
-    throw std::runtime_error(fmt::format("{}: {}: must be over 0 % and under 100 %, as 3% or 0.03", option, text));
+    throw base::error("{}: {}: must be over 0 % and under 100 %, as 3% or 0.03", option, text);
 }
 
 double parseTime(const std::string& option, const std::string& text)
@@ -70,7 +68,7 @@ double parseTime(const std::string& option, const std::string& text)
     if (seconds && *seconds > 0.0 && *seconds <= 1.0) {
         return *seconds;
     }
-    throw std::runtime_error(fmt::format("{}: {}: must be over 0 and up to 1 s, as 400us or 0.4ms", option, text));
+    throw base::error("{}: {}: must be over 0 and up to 1 s, as 400us or 0.4ms", option, text);
 }
 
 double lengthFrom(const std::string& option, const std::string& text, double least, double most)
@@ -82,10 +80,8 @@ double lengthFrom(const std::string& option, const std::string& text, double lea
 double lengthWithin(const std::string& option, const std::string& text, std::optional<double> length, double least,
                     double most)
 {
-    if (!length || !(*length >= least && *length <= most)) {
-        throw std::runtime_error(
-            fmt::format("{} {}: must be a length from {:g}mm to {:g}mm", option, text, 1e3 * least, 1e3 * most));
-    }
+    base::failIf(!length || !(*length >= least && *length <= most), "{} {}: must be a length from {:g}mm to {:g}mm", option,
+                 text, 1e3 * least, 1e3 * most);
     return *length;
 }
 
