@@ -1,5 +1,6 @@
 #include <volume/export.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <volume/export_source.h>
 #include <volume/runs.h>
@@ -16,7 +17,6 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <limits>
 #include <map>
 
 namespace palpate::volume {
@@ -86,9 +86,7 @@ void writeAny(const std::filesystem::path& file, const VoxelStream& voxels, std:
 void refuseSegmentation(const std::filesystem::path& file)
 {
     checkExportName(file);
-    if (isSegmentation(file)) {
-        refuse(file, "a segmentation holds labels, not numbers: name it .nrrd");
-    }
+    refuseIf(isSegmentation(file), file, "a segmentation holds labels, not numbers: name it .nrrd");
 }
 
 template <typename T>
@@ -111,8 +109,7 @@ struct OutputFile::Impl {
     [[noreturn]] void fail()
     {
         const std::string why = errno != 0 ? std::strerror(errno) : "unknown error";
-        throw std::runtime_error(
-            fmt::format("{}: cannot be written ({}): check the folder and the space on the disk", file.string(), why));
+        throw base::error("{}: cannot be written ({}): check the folder and the space on the disk", file.string(), why);
     }
     void put(const std::byte* bytes, std::size_t count)
     {

@@ -1,7 +1,5 @@
 #include <volume/export_source.h>
 
-#include <glm/geometric.hpp>
-
 namespace palpate::volume {
 
 namespace {

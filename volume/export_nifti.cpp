@@ -191,9 +191,8 @@ void writeNifti(const std::filesystem::path& file, const VoxelStream& voxels, st
                 const ExportOptions& options)
 {
     const Index3 size = voxels.grid.size;
-    if (!options.nifti2 && std::max({size.x, size.y, size.z}) > 32767) {
-        refuse(file, "NIfTI-1 has no more than 32767 voxels along a side: write NIfTI-2 (--nifti2), or .nrrd");
-    }
+    refuseIf(!options.nifti2 && std::max({size.x, size.y, size.z}) > 32767, file,
+             "NIfTI-1 has no more than 32767 voxels along a side: write NIfTI-2 (--nifti2), or .nrrd");
     OutputFile out(file);
     std::string ending = file.extension().string();
     std::transform(ending.begin(), ending.end(), ending.begin(),

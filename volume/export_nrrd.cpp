@@ -1,7 +1,5 @@
 #include <volume/export_source.h>
 
-#include <algorithm>
-
 namespace palpate::volume {
 
 namespace {

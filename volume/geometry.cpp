@@ -1,6 +1,5 @@
 #include <volume/geometry.h>
 
-#include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include <cmath>

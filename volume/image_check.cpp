@@ -1,12 +1,11 @@
 #include <volume/image_check.h>
 
-#include <fmt/format.h>
-#include <glm/common.hpp>
+#include <base/error.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::volume {
 
@@ -28,25 +27,19 @@ void checkPlace(const LabelImage& image)
     const Affine& affine = image.affine;
     const Vec3 s = affine.spacing();
     const double volume = affine.voxelVolume();
-    if (!std::isfinite(volume) || !std::isfinite(glm::dot(affine.origin, Vec3(1.0))) || !std::isfinite(s.x + s.y + s.z)) {
-        throw std::runtime_error("a label map's affine has numbers that are not finite, or far too large");
-    }
-    if (!(s.x > 0 && s.y > 0 && s.z > 0)) {
-        throw std::runtime_error("a label map's voxels have no volume: its spacing is 0");
-    }
-    if (std::max({s.x, s.y, s.z}) > maxSpacing || std::min({s.x, s.y, s.z}) < minSpacing) {
-        throw std::runtime_error(
-            fmt::format("a label map's voxels are {:g} x {:g} x {:g} mm: that is no patient, check the units of its affine",
-                        1e3 * s.x, 1e3 * s.y, 1e3 * s.z));
-    }
-    if (volume < 1e-6 * s.x * s.y * s.z) {
-        throw std::runtime_error("a label map's voxels have no volume: its directions are dependent");
-    }
+    base::failIf(
+        !std::isfinite(volume) || !std::isfinite(glm::dot(affine.origin, Vec3(1.0))) || !std::isfinite(s.x + s.y + s.z),
+        "a label map's affine has numbers that are not finite, or far too large");
+    base::failIf(!(s.x > 0 && s.y > 0 && s.z > 0), "a label map's voxels have no volume: its spacing is 0");
+    base::failIf(std::max({s.x, s.y, s.z}) > maxSpacing || std::min({s.x, s.y, s.z}) < minSpacing,
+                 "a label map's voxels are {:g} x {:g} x {:g} mm: that is no patient, check the units of its affine",
+                 1e3 * s.x, 1e3 * s.y, 1e3 * s.z);
+    base::failIf(volume < 1e-6 * s.x * s.y * s.z, "a label map's voxels have no volume: its directions are dependent");
     if (const double reach = reachOf(image); reach >= farthestPlace) {
-        throw std::runtime_error(fmt::format(
+        throw base::error(
             "a label map reaches {:g} m from the origin of the patient frame, and {:g} m is the most: check the "
             "units of its affine, or move its origin",
-            reach, farthestPlace));
+            reach, farthestPlace);
     }
 }
 
@@ -64,14 +57,11 @@ double shearOf(const Affine& affine) noexcept
 
 void checkImage(const LabelImage& image)
 {
-    if (image.size.x < 1 || image.size.y < 1 || image.size.z < 1) {
-        throw std::runtime_error(
-            fmt::format("a label map of {} x {} x {} voxels is empty", image.size.x, image.size.y, image.size.z));
-    }
-    if (image.values.size() != image.offset({0, 0, image.size.z})) {
-        throw std::runtime_error(fmt::format("a label map of {} x {} x {} voxels has {} values", image.size.x, image.size.y,
-                                             image.size.z, image.values.size()));
-    }
+    base::failIf(image.size.x < 1 || image.size.y < 1 || image.size.z < 1, "a label map of {} x {} x {} voxels is empty",
+                 image.size.x, image.size.y, image.size.z);
+    base::failIf(image.values.size() != image.offset({0, 0, image.size.z}),
+                 "a label map of {} x {} x {} voxels has {} values", image.size.x, image.size.y, image.size.z,
+                 image.values.size());
     checkPlace(image);
 }
 

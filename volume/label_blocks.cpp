@@ -2,10 +2,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <glm/common.hpp>
 #include <glm/vector_relational.hpp>
-
-#include <algorithm>
 
 namespace palpate::volume {
 

@@ -1,9 +1,9 @@
+#include <base/error.h>
 #include <volume/pieces.h>
 #include <volume/runs.h>
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
 
 namespace palpate::volume {
 
@@ -23,9 +23,8 @@ Pieces::Pieces(const LabelImage& image, const std::vector<std::uint16_t>& groupO
             runs_.push_back({first, last, static_cast<std::uint32_t>(runs_.size()), group});
         }
     });
-    if (runs_.size() > std::numeric_limits<std::uint32_t>::max() / 2) {
-        throw std::runtime_error("a label map with over two thousand million runs is noise, not anatomy");
-    }
+    base::failIf(runs_.size() > std::numeric_limits<std::uint32_t>::max() / 2,
+                 "a label map with over two thousand million runs is noise, not anatomy");
     rows_.push_back(static_cast<std::uint32_t>(runs_.size()));
     for (int z = 0; z < size_.z; ++z) {
         for (int y = 0; y < size_.y; ++y) {

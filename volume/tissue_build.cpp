@@ -1,8 +1,8 @@
+#include <base/error.h>
 #include <volume/image_check.h>
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
-#include <fmt/format.h>
 #include <openvdb/tools/Prune.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::volume {
 
@@ -146,29 +145,19 @@ typename Grid::Ptr gridOf(const LabelImage& image, const ValueAt& valueAt, typen
 
 void checkTable(const TissueTable& table)
 {
-    if (table.rows.empty() || table.rows.front().role != Role::air) {
-        throw std::runtime_error(fmt::format("tissue table '{}': row 0 must be air, the outside", table.name));
-    }
-    if (table.rows.size() > 256) {
-        throw std::runtime_error(
-            fmt::format("tissue table '{}' has {} rows; 256 is the most", table.name, table.rows.size()));
-    }
+    base::failIf(table.rows.empty() || table.rows.front().role != Role::air,
+                 "tissue table '{}': row 0 must be air, the outside", table.name);
+    base::failIf(table.rows.size() > 256, "tissue table '{}' has {} rows; 256 is the most", table.name, table.rows.size());
 }
 
 std::uint8_t rowOf(const TissueTable& table, const LabelName& label)
 {
-    if (label.tissue.empty()) {
-        throw std::runtime_error(fmt::format("label {} '{}' has no tissue: map it to one", label.value, label.name));
-    }
-    if (label.tissue.starts_with('?')) {
-        throw std::runtime_error(fmt::format("label {} '{}': no tissue '{}': write in the label map which one it is",
-                                             label.value, label.name, label.tissue));
-    }
+    base::failIf(label.tissue.empty(), "label {} '{}' has no tissue: map it to one", label.value, label.name);
+    base::failIf(label.tissue.starts_with('?'), "label {} '{}': no tissue '{}': write in the label map which one it is",
+                 label.value, label.name, label.tissue);
     const auto row = table.find(label.tissue);
-    if (!row) {
-        throw std::runtime_error(fmt::format("label {} '{}': no tissue '{}' in the tissue table '{}'", label.value,
-                                             label.name, label.tissue, table.name));
-    }
+    base::failIf(!row, "label {} '{}': no tissue '{}' in the tissue table '{}'", label.value, label.name, label.tissue,
+                 table.name);
     return *row;
 }
 
@@ -192,7 +181,7 @@ void addStructures(TissueData& tissue, const Census& census, std::span<const Lab
             s.colour = found->second->colour;
             s.terminology = found->second->terminology;
         } else if (value != 0) {
-            throw std::runtime_error(fmt::format("label {} ({} voxels) has no name: map it to a tissue", value, s.voxels));
+            throw base::error("label {} ({} voxels) has no name: map it to a tissue", value, s.voxels);
         }
         tissue.structures.push_back(std::move(s));
         tissue.extents.push_back(census.extent[v]);
@@ -217,10 +206,9 @@ std::vector<bool> scaledLabels(const TissueData& tissue)
 void addImage(TissueData& tissue, const LabelImage& labels, const CompanionImage& companion,
               const std::vector<float>& stiffnessOf)
 {
-    if (companion.values.size() != labels.values.size()) {
-        throw std::runtime_error(fmt::format("an image of {} values does not fit a label map of {} voxels",
-                                             companion.values.size(), labels.values.size()));
-    }
+    base::failIf(companion.values.size() != labels.values.size(),
+                 "an image of {} values does not fit a label map of {} voxels", companion.values.size(),
+                 labels.values.size());
     const auto background = static_cast<float>(valueOfAir(companion.unit));
     tissue.imageUnit = companion.unit;
     tissue.stiffnessMap = companion.stiffness;

@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <volume/cell_mixture.h>
 #include <volume/cell_sampler.h>
 #include <volume/distance.h>
@@ -15,7 +16,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace palpate::volume {
 
@@ -286,10 +286,9 @@ DistanceField distanceToMarked(const TissueData& tissue, const NodeGrid& grid, c
 
 void checkGrid(const NodeGrid& grid)
 {
-    if (grid.size.x < 2 || grid.size.y < 2 || grid.size.z < 2 || !(grid.spacing > 0)) {
-        throw std::runtime_error(fmt::format("a grid of {} x {} x {} nodes, {} m apart, cannot hold a field", grid.size.x,
-                                             grid.size.y, grid.size.z, grid.spacing));
-    }
+    base::failIf(grid.size.x < 2 || grid.size.y < 2 || grid.size.z < 2 || !(grid.spacing > 0),
+                 "a grid of {} x {} x {} nodes, {} m apart, cannot hold a field", grid.size.x, grid.size.y, grid.size.z,
+                 grid.spacing);
 }
 
 // Root of arithmetic times harmonic mean of the modulus over the tissue in a cell [Pa]; 0 without tissue.
@@ -407,8 +406,8 @@ DistanceField Tissue::distanceTo(std::span<const std::uint16_t> labels, const No
     }
     const auto& all = impl_->structures;
     if (std::none_of(all.begin(), all.end(), [&](const Structure& s) { return wanted[s.value] != 0; })) {
-        throw std::runtime_error(fmt::format(
-            "no voxel has {}", labels.size() == 1 ? fmt::format("label {}", labels[0]) : "one of the labels asked for"));
+        throw base::error("no voxel has {}",
+                          labels.size() == 1 ? fmt::format("label {}", labels[0]) : "one of the labels asked for");
     }
     return distanceToMarked(*impl_, grid, wanted);
 }
@@ -416,9 +415,7 @@ DistanceField Tissue::distanceTo(std::span<const std::uint16_t> labels, const No
 DistanceField Tissue::distanceToBody(const NodeGrid& grid) const
 {
     checkGrid(grid);
-    if (impl_->extentOf(impl_->lookup.solid).empty()) {
-        throw std::runtime_error("the volume holds no tissue, only air");
-    }
+    base::failIf(impl_->extentOf(impl_->lookup.solid).empty(), "the volume holds no tissue, only air");
     return distanceToMarked(*impl_, grid, impl_->lookup.solid);
 }
 

@@ -1,6 +1,7 @@
 #include <volume/tissue.h>
 #include <volume/tissue_impl.h>
 
+#include <base/error.h>
 #include <base/inputs.h>
 #include <base/outputs.h>
 
@@ -16,7 +17,6 @@
 #include <cstring>
 #include <fstream>
 #include <mutex>
-#include <stdexcept>
 
 namespace palpate::volume {
 
@@ -73,9 +73,7 @@ Acoustics acousticsFrom(const json& j)
     a.echoVariation = j.at("echo_variation_db").get<double>();
     const auto pattern = j.at("echo_pattern").get<std::string>();
     const auto* const found = std::find(echoPatterns.begin(), echoPatterns.end(), pattern);
-    if (found == echoPatterns.end()) {
-        throw std::runtime_error(fmt::format("unknown echo pattern '{}'", pattern));
-    }
+    base::failIf(found == echoPatterns.end(), "unknown echo pattern '{}'", pattern);
     a.pattern = static_cast<EchoPattern>(found - echoPatterns.begin());
     a.source = j.at("source").get<std::string>();
     return a;
@@ -121,7 +119,7 @@ TissueRow rowFrom(const json& j)
 {
     const auto role = roleNamed(j.at("role").get<std::string>());
     if (!role) {
-        throw std::runtime_error(fmt::format("unknown role '{}'", j.at("role").get<std::string>()));
+        throw base::error("unknown role '{}'", j.at("role").get<std::string>());
     }
     const json& colour = j.at("colour");
     TissueRow row;
@@ -198,9 +196,7 @@ void readStructures(const json& list, TissueData& t)
     for (const json& j : list) {
         const auto tissue = j.at("tissue").get<std::string>();
         const auto row = t.table.find(tissue);
-        if (!row) {
-            throw std::runtime_error(fmt::format("structure of unknown tissue '{}'", tissue));
-        }
+        base::failIf(!row, "structure of unknown tissue '{}'", tissue);
         const auto voxels = j.at("voxels").get<std::uint64_t>();
         t.structures.push_back({j.at("value").get<std::uint16_t>(), j.at("name").get<std::string>(), *row, voxels,
                                 static_cast<double>(voxels) * t.affine.voxelVolume()});
@@ -215,10 +211,8 @@ void readStructures(const json& list, TissueData& t)
 void readDescription(const json& j, TissueData& t)
 {
     const int version = j.at("format").get<int>();
-    if (version > formatVersion) {
-        throw std::runtime_error(
-            fmt::format("format {} is newer than this program reads ({}): use a newer palpate", version, formatVersion));
-    }
+    base::failIf(version > formatVersion, "format {} is newer than this program reads ({}): use a newer palpate", version,
+                 formatVersion);
     t.size = index3(j.at("size"));
     const json& steps = j.at("steps_m");
     t.affine.linear = Mat3(vec3(steps.at(0)), vec3(steps.at(1)), vec3(steps.at(2)));
@@ -268,17 +262,14 @@ openvdb::GridPtrVecPtr readGrids(const std::filesystem::path& file, json& descri
     std::ifstream in(file, std::ios::binary);
     std::uint32_t magic = 0;
     in.read(reinterpret_cast<char*>(&magic), sizeof magic);
-    if (!in || magic != static_cast<std::uint32_t>(openvdb::OPENVDB_MAGIC)) {
-        throw std::runtime_error("is not an OpenVDB file: import a label map with 'palpate import' first");
-    }
+    base::failIf(!in || magic != static_cast<std::uint32_t>(openvdb::OPENVDB_MAGIC),
+                 "is not an OpenVDB file: import a label map with 'palpate import' first");
     in.seekg(0);
     in.exceptions(std::ios::failbit | std::ios::badbit);
     openvdb::io::Stream stream(in, false);
     const openvdb::MetaMap::Ptr meta = stream.getMetadata();
     const auto text = meta ? meta->getMetadata<openvdb::StringMetadata>(metadataKey) : nullptr;
-    if (!text) {
-        throw std::runtime_error("is an OpenVDB file, but not one of palpate: make it with 'palpate import' or 'phantom'");
-    }
+    base::failIf(!text, "is an OpenVDB file, but not one of palpate: make it with 'palpate import' or 'phantom'");
     description = json::parse(text->value());
     return stream.getGrids();
 }
@@ -291,7 +282,7 @@ typename Grid::Ptr gridNamed(const openvdb::GridPtrVec& grids, const std::string
             return openvdb::gridPtrCast<Grid>(grid);
         }
     }
-    throw std::runtime_error(fmt::format("has no grid '{}': it is damaged", name));
+    throw base::error("has no grid '{}': it is damaged", name);
 }
 
 // The counts in the description against the voxels that were read.
@@ -307,9 +298,8 @@ void checkCounts(const TissueData& t)
     }
     const auto count =
         static_cast<std::uint64_t>(t.size.x) * static_cast<std::uint64_t>(t.size.y) * static_cast<std::uint64_t>(t.size.z);
-    if (described != count || nonzero != t.label->activeVoxelCount() || solid != t.occupancy->activeVoxelCount()) {
-        throw std::runtime_error("its voxels do not add up to what its table says: it is damaged, make it again");
-    }
+    base::failIf(described != count || nonzero != t.label->activeVoxelCount() || solid != t.occupancy->activeVoxelCount(),
+                 "its voxels do not add up to what its table says: it is damaged, make it again");
 }
 
 std::string reasonOf(const std::exception& e)
@@ -338,8 +328,7 @@ void Tissue::save(const std::filesystem::path& file) const
         const std::string why = errno != 0 ? std::strerror(errno) : e.what();
         std::error_code ignored;
         std::filesystem::remove(beside, ignored);
-        throw std::runtime_error(
-            fmt::format("{}: cannot be written ({}): check the folder and the space on the disk", file.string(), why));
+        throw base::error("{}: cannot be written ({}): check the folder and the space on the disk", file.string(), why);
     }
 }
 
@@ -347,7 +336,7 @@ Tissue Tissue::load(const std::filesystem::path& file)
 {
     initialise();
     if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
+        throw base::error("{}: {}", file.string(), why);
     }
     auto impl = std::make_unique<Impl>();
     try {
@@ -363,7 +352,7 @@ Tissue Tissue::load(const std::filesystem::path& file)
         impl->derive();
         checkCounts(*impl);
     } catch (const std::exception& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), reasonOf(e)));
+        throw base::error("{}: {}", file.string(), reasonOf(e));
     }
     return Tissue(std::move(impl));
 }

@@ -1,7 +1,6 @@
 #include <volume/tissue_table.h>
 
 #include <algorithm>
-#include <array>
 
 namespace palpate::volume {
 

@@ -25,7 +25,7 @@ public:
     explicit Sender(int to) : to_(to) {}
 
     // The parent is gone or wants no more where the pipe is closed: SIGPIPE ends this process.
-    void bytes(const void* data, std::size_t count) const
+    bool bytes(const void* data, std::size_t count) const
     {
         const auto* at = static_cast<const char*>(data);
         while (count > 0) {
@@ -36,28 +36,7 @@ public:
             at += written > 0 ? written : 0;
             count -= static_cast<std::size_t>(written > 0 ? written : 0);
         }
-    }
-    template <typename T>
-    requires std::is_trivially_copyable_v<T>
-    void put(const T& value) const { bytes(&value, sizeof value); }
-    template <typename T>
-    requires std::is_trivially_copyable_v<T>
-    void put(const std::vector<T>& values) const
-    {
-        put(values.size());
-        bytes(values.data(), values.size() * sizeof(T));
-    }
-    void put(const std::string& text) const
-    {
-        put(text.size());
-        bytes(text.data(), text.size());
-    }
-    void put(const std::vector<std::string>& texts) const
-    {
-        put(texts.size());
-        for (const std::string& text : texts) {
-            put(text);
-        }
+        return true;
     }
 
 private:
@@ -102,94 +81,73 @@ public:
         }
         return true;
     }
-    template <typename T>
-    requires std::is_trivially_copyable_v<T>
-    bool take(T& value) const { return bytes(&value, sizeof value); }
-    template <typename T>
-    requires std::is_trivially_copyable_v<T>
-    bool take(std::vector<T>& values) const
-    {
-        std::size_t count = 0;
-        if (!take(count)) {
-            return false;
-        }
-        values.resize(count);
-        return bytes(values.data(), count * sizeof(T));
-    }
-    bool take(std::string& text) const
-    {
-        std::size_t count = 0;
-        if (!take(count)) {
-            return false;
-        }
-        text.resize(count);
-        return bytes(text.data(), count);
-    }
-    bool take(std::vector<std::string>& texts) const
-    {
-        std::size_t count = 0;
-        bool whole = take(count);
-        for (std::size_t i = 0; whole && i < count; ++i) {
-            whole = take(texts.emplace_back());
-        }
-        return whole;
-    }
 
 private:
     pid_t child_;
     int from_;
 };
 
-void send(const Sender& to, const ImportedLabels& labels)
+// Both ends pass on the same parts in the same order: the child's writes them, the parent's reads them. False where the
+// child has ended before all of it came.
+template <class End, typename T>
+requires std::is_trivially_copyable_v<T>
+bool pass(const End& end, T& value)
 {
-    to.put(labels.image.size);
-    to.put(labels.image.affine);
-    to.put(labels.image.values);
-    to.put(labels.names.size());
-    for (const LabelName& n : labels.names) {
-        to.put(n.value);
-        to.put(n.name);
-        to.put(n.tissue);
-        to.put(n.colour.has_value());
-        to.put(n.colour.value_or(std::array<std::uint8_t, 3>{}));
-        to.put(n.terminology);
+    return end.bytes(&value, sizeof value);
+}
+
+template <class End, typename List>
+bool passBytes(const End& end, List& list)
+{
+    std::size_t count = list.size();
+    if (!pass(end, count)) {
+        return false;
     }
-    to.put(labels.overlaps);
-    to.put(labels.warnings);
-    to.put(labels.renumbered);
+    list.resize(count);
+    return end.bytes(list.data(), count * sizeof list[0]);
 }
 
-bool receive(const Receiver& from, ImportedLabels& labels)
+template <class End>
+bool pass(const End& end, std::string& text)
 {
-    std::size_t names = 0;
-    bool whole = from.take(labels.image.size) && from.take(labels.image.affine) && from.take(labels.image.values) &&
-                 from.take(names);
-    for (std::size_t i = 0; whole && i < names; ++i) {
-        LabelName& n = labels.names.emplace_back();
-        bool coloured = false;
-        std::array<std::uint8_t, 3> colour{};
-        whole = from.take(n.value) && from.take(n.name) && from.take(n.tissue) && from.take(coloured) &&
-                from.take(colour) && from.take(n.terminology);
-        if (coloured) {
-            n.colour = colour;
-        }
+    return passBytes(end, text);
+}
+
+template <class End>
+bool pass(const End& end, LabelName& n)
+{
+    return pass(end, n.value) && pass(end, n.name) && pass(end, n.tissue) && pass(end, n.colour) &&
+           pass(end, n.terminology);
+}
+
+template <class End, typename T>
+bool pass(const End& end, std::vector<T>& list)
+{
+    if constexpr (std::is_trivially_copyable_v<T>) {
+        return passBytes(end, list);
     }
-    return whole && from.take(labels.overlaps) && from.take(labels.warnings) && from.take(labels.renumbered);
+    std::size_t count = list.size();
+    bool whole = pass(end, count);
+    list.resize(whole ? count : 0);
+    for (T& one : list) {
+        whole = whole && pass(end, one);
+    }
+    return whole;
 }
 
-void send(const Sender& to, const ImportedImage& image)
+template <class End>
+bool pass(const End& end, ImportedLabels& labels)
 {
-    to.put(image.size);
-    to.put(image.affine);
-    to.put(image.values);
-    to.put(image.what);
-    to.put(image.warnings);
+    return pass(end, labels.image.size) && pass(end, labels.image.affine) && pass(end, labels.image.values) &&
+           pass(end, labels.names) && pass(end, labels.overlaps) && pass(end, labels.warnings) &&
+           pass(end, labels.renumbered);
 }
 
-bool receive(const Receiver& from, ImportedImage& image)
+template <class End>
+bool pass(const End& end, ImportedImage& image)
 {
-    return from.take(image.size) && from.take(image.affine) && from.take(image.values) && from.take(image.what) &&
-           from.take(image.warnings);
+    return pass(end, image.size) && pass(end, image.affine) && pass(end, image.values) && pass(end, image.what) &&
+           pass(end, image.warnings);
 }
 
 // A failed assertion leaves neither text nor a core behind; ours is the one line that is thrown.
@@ -202,25 +160,18 @@ void becomeQuiet()
 template <typename Result, typename Read>
 [[noreturn]] void readAndSend(const Sender& to, const std::filesystem::path& path, ImportOptions options, const Read& read)
 {
+    const auto send = [&to](Message kind, auto what) { return pass(to, kind) && pass(to, what); };
     if (options.progress) {
-        options.progress = [&to](double fraction) {
-            to.put(Message::progress);
-            to.put(fraction);
-        };
+        options.progress = [&send](double fraction) { send(Message::progress, fraction); };
     }
     try {
-        const Result result = read(options);
-        to.put(Message::result);
-        send(to, result);
+        send(Message::result, read(options));
     } catch (const std::bad_alloc&) {
-        to.put(Message::refusal);
-        to.put(path.string() + ": needs more memory than there is: crop or resample it first");
+        send(Message::refusal, path.string() + ": needs more memory than there is: crop or resample it first");
     } catch (const std::runtime_error& e) {
-        to.put(Message::refusal);
-        to.put(std::string(e.what()));
+        send(Message::refusal, std::string(e.what()));
     } catch (const std::exception& e) {
-        to.put(Message::fault);
-        to.put(std::string(e.what()));
+        send(Message::fault, std::string(e.what()));
     }
     ::_exit(0);
 }
@@ -231,20 +182,17 @@ template <typename Result, typename Read>
         throw std::logic_error(fmt::format("{}: {} ended with status {} while it read the file", path.string(), library,
                                            WIFEXITED(status) ? WEXITSTATUS(status) : -1));
     }
-    if (WTERMSIG(status) == SIGKILL) {
-        refuse(path, "reading was ended by the system, which mostly means that memory ran out: crop or resample it first");
-    }
-    refuse(path,
-           fmt::format("{} broke down on it ({}): it is damaged, get it again", library, ::strsignal(WTERMSIG(status))));
+    refuseIf(WTERMSIG(status) == SIGKILL, path,
+             "reading was ended by the system, which mostly means that memory ran out: crop or resample it first");
+    refuse(path, "{} broke down on it ({}): it is damaged, get it again", library, ::strsignal(WTERMSIG(status)));
 }
 
 template <typename Result, typename Read>
 Result apart(const std::filesystem::path& path, const char* library, const ImportOptions& options, const Read& read)
 {
     int ends[2];
-    if (::pipe2(ends, O_CLOEXEC) != 0) {
-        refuse(path, fmt::format("no pipe for reading it can be made ({}): try again", std::strerror(errno)));
-    }
+    refuseIf(::pipe2(ends, O_CLOEXEC) != 0, path, "no pipe for reading it can be made ({}): try again",
+             std::strerror(errno));
     const pid_t child = ::fork();
     if (child == 0) {
         ::close(ends[0]);
@@ -253,23 +201,21 @@ Result apart(const std::filesystem::path& path, const char* library, const Impor
     }
     ::close(ends[1]);
     Receiver from(child, ends[0]);
-    if (child < 0) {
-        refuse(path, fmt::format("no process for reading it can be started ({}): try again", std::strerror(errno)));
-    }
+    refuseIf(child < 0, path, "no process for reading it can be started ({}): try again", std::strerror(errno));
     ::fcntl(ends[0], F_SETPIPE_SZ, 1 << 20);
     Message said{};
-    while (from.take(said)) {
+    while (pass(from, said)) {
         double fraction = 0;
         Result result;
         std::string reason;
-        if (said == Message::progress && from.take(fraction)) {
+        if (said == Message::progress && pass(from, fraction)) {
             options.progress(fraction);
-        } else if (said == Message::result && receive(from, result)) {
+        } else if (said == Message::result && pass(from, result)) {
             from.ended();
             return result;
-        } else if (said == Message::refusal && from.take(reason)) {
+        } else if (said == Message::refusal && pass(from, reason)) {
             throw std::runtime_error(reason);
-        } else if (said == Message::fault && from.take(reason)) {
+        } else if (said == Message::fault && pass(from, reason)) {
             throw std::logic_error(reason);
         }
     }

@@ -1,10 +1,10 @@
 #include <volume/import/source.h>
 
+#include <base/error.h>
+
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 
 namespace palpate::volume {
@@ -39,12 +39,10 @@ Mat3 frameOf(const std::string& axes)
             frame[static_cast<int>(k)][direction->first] = direction->second;
         }
     }
-    if (!sound) {
-        throw std::runtime_error(
-            fmt::format("--axes {}: must be three letters, one of L R, one of P A, one of S I: the sides of the patient to "
-                        "which the axes of the file run, as LPS or RAS",
-                        axes));
-    }
+    base::failIf(!sound,
+                 "--axes {}: must be three letters, one of L R, one of P A, one of S I: the sides of the patient to "
+                 "which the axes of the file run, as LPS or RAS",
+                 axes);
     return frame;
 }
 
@@ -57,10 +55,8 @@ Index3 checkedVolumes(const std::filesystem::path& file, std::vector<std::int64_
     }
     std::uint64_t volumes = 1;
     for (std::size_t i = 3; i < sizes.size(); ++i) {
-        if (sizes[i] < 1 || sizes[i] > 32767 || volumes > 32767) {
-            refuse(file,
-                   fmt::format("its size is {}: each side must be 1 to 32767, save it again", fmt::join(sizes, " x ")));
-        }
+        refuseIf(sizes[i] < 1 || sizes[i] > 32767 || volumes > 32767, file,
+                 "its size is {}: each side must be 1 to 32767, save it again", fmt::join(sizes, " x "));
         volumes *= static_cast<std::uint64_t>(sizes[i]);
     }
     source.dimensions = fmt::format("{}", fmt::join(sizes, " x "));
@@ -81,16 +77,13 @@ void chooseVolume(Source& source, const ImportOptions& options)
                       [&](const SegmentName& s) { return s.layer + 1 != static_cast<std::uint64_t>(options.volume); });
     }
     if (static_cast<std::uint64_t>(options.volume) > source.volumes) {
-        refuse(source.header, fmt::format("--volume {}: it holds {}", options.volume,
-                                          source.volumes == 1 ? "one volume" : fmt::format("{} volumes", source.volumes)));
+        refuse(source.header, "--volume {}: it holds {}", options.volume,
+               source.volumes == 1 ? "one volume" : fmt::format("{} volumes", source.volumes));
     }
-    if (source.volumes > 1 && options.volume == 0) {
-        refuse(source.header,
-               fmt::format(
-                   "holds {} volumes, or as many values per voxel ({}): choose one with --volume N, or --image-volume N "
-                   "where it is the image",
-                   source.volumes, source.dimensions));
-    }
+    refuseIf(source.volumes > 1 && options.volume == 0, source.header,
+             "holds {} volumes, or as many values per voxel ({}): choose one with --volume N, or --image-volume N "
+             "where it is the image",
+             source.volumes, source.dimensions);
     source.volume = source.volumes > 1 ? static_cast<std::uint64_t>(options.volume) - 1 : 0;
 }
 
@@ -98,9 +91,8 @@ void placeAxes(const std::filesystem::path& file, bool oriented, const ImportOpt
                std::vector<std::string>& warnings)
 {
     if (oriented) {
-        if (!options.axes.empty()) {
-            refuse(file, fmt::format("--axes {}: it says itself where its axes run: leave --axes out", options.axes));
-        }
+        refuseIf(!options.axes.empty(), file, "--axes {}: it says itself where its axes run: leave --axes out",
+                 options.axes);
         return;
     }
     if (options.axes.empty()) {

@@ -40,23 +40,19 @@ Objects chosen(const std::filesystem::path& path, const Files& files, const std:
         if (object.pixels) {
             series[object.series].push_back(std::move(object));
         } else if (files.size() == 1) {
-            refuse(path, fmt::format("is DICOM without pixels (modality '{}'): name the series, or a DICOM SEG",
-                                     object.modality));
+            refuse(path, "is DICOM without pixels (modality '{}'): name the series, or a DICOM SEG", object.modality);
         }
     }
-    if (series.empty()) {
-        refuse(path, "holds DICOM files, but none with pixels: name a folder with one series");
-    }
+    refuseIf(series.empty(), path, "holds DICOM files, but none with pixels: name a folder with one series");
     if (!wanted.empty()) {
         const auto found = series.find(wanted);
         if (found == series.end()) {
-            refuse(path, fmt::format("--series {} is not there: name one of these: {}", wanted, listOf(series)));
+            refuse(path, "--series {} is not there: name one of these: {}", wanted, listOf(series));
         }
         return std::move(found->second);
     }
     if (series.size() > 1) {
-        refuse(path, fmt::format("holds {} series: say which with --series, or name one file: {}", series.size(),
-                                 listOf(series)));
+        refuse(path, "holds {} series: say which with --series, or name one file: {}", series.size(), listOf(series));
     }
     return std::move(series.begin()->second);
 }
@@ -66,12 +62,10 @@ void checkNoImage(const std::filesystem::path& path, const DicomObject& object, 
 {
     constexpr std::array<const char*, 10> imaging = {"CT", "MR", "PT", "NM", "US", "XA", "MG", "CR", "DX", "RF"};
     const bool image = std::any_of(imaging.begin(), imaging.end(), [&](const char* m) { return object.modality == m; });
-    if (image && !options.dicomLabels) {
-        refuse(path,
-               fmt::format("is a DICOM series of modality {}, so an image: give the segmentation that was made of it, "
-                           "or add --dicom-labels if its values are labels",
-                           object.modality));
-    }
+    refuseIf(image && !options.dicomLabels, path,
+             "is a DICOM series of modality {}, so an image: give the segmentation that was made of it, "
+             "or add --dicom-labels if its values are labels",
+             object.modality);
 }
 
 }  // namespace
@@ -82,9 +76,7 @@ ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files
     const auto segmentations =
         std::count_if(objects.begin(), objects.end(), [](const DicomObject& o) { return !o.segmentationType.empty(); });
     if (segmentations > 0) {
-        if (objects.size() > 1) {
-            refuse(path, fmt::format("holds {} DICOM SEG files of one series: name one of them", objects.size()));
-        }
+        refuseIf(objects.size() > 1, path, "holds {} DICOM SEG files of one series: name one of them", objects.size());
         return readSegmentation(objects[0], options);
     }
     checkNoImage(path, objects[0], options);
@@ -109,9 +101,8 @@ ImportedLabels dicomLabels(const std::filesystem::path& path, const Files& files
 ImportedImage dicomImage(const std::filesystem::path& path, const Files& files, const ImportOptions& options)
 {
     const Objects objects = chosen(path, files, options.series);
-    if (!objects[0].segmentationType.empty()) {
-        refuse(path, "is a DICOM SEG, not an image: name the series that it was made of");
-    }
+    refuseIf(!objects[0].segmentationType.empty(), path,
+             "is a DICOM SEG, not an image: name the series that it was made of");
     DicomVolume volume = readSeries(path, objects, true, options.progress);
     ImportedImage out;
     out.size = volume.size;

@@ -109,10 +109,9 @@ void addFrame(Placing place, DicomObject& object)
     const double a = glm::length(frame.alongRow);
     const double b = glm::length(frame.alongColumn);
     frame.placed = place.position && place.directions && place.spacing;
-    if (frame.placed && (!(std::abs(a - 1) < 0.01) || !(std::abs(b - 1) < 0.01) ||
-                         !(std::abs(glm::dot(frame.alongRow, frame.alongColumn)) < 0.01))) {
-        refuse(object.file, "its ImageOrientationPatient is not two unit vectors at a right angle: get the file again");
-    }
+    refuseIf(frame.placed && (!(std::abs(a - 1) < 0.01) || !(std::abs(b - 1) < 0.01) ||
+                              !(std::abs(glm::dot(frame.alongRow, frame.alongColumn)) < 0.01)),
+             object.file, "its ImageOrientationPatient is not two unit vectors at a right angle: get the file again");
     frame.alongRow /= a > 0 ? a : 1;
     frame.alongColumn /= b > 0 ? b : 1;
     frame.file = object.file;
@@ -135,11 +134,8 @@ void readFrames(DcmDataset& data, DicomObject& object)
     DcmSequenceOfItems* each = nullptr;
     data.findAndGetSequence(DCM_PerFrameFunctionalGroupsSequence, each);
     const auto described = each == nullptr ? 0 : static_cast<Sint32>(each->card());
-    if (frames < 1 || (described != 0 && described != frames) || (described == 0 && frames > 1)) {
-        refuse(object.file,
-               fmt::format("has {} frames, but says of {} where they are: export it again, or as one file per slice",
-                           frames, described));
-    }
+    refuseIf(frames < 1 || (described != 0 && described != frames) || (described == 0 && frames > 1), object.file,
+             "has {} frames, but says of {} where they are: export it again, or as one file per slice", frames, described);
     if (described == 0) {
         addFrame(common, object);
         return;
@@ -213,9 +209,8 @@ void readSegments(DcmDataset& data, DicomObject& object)
     object.maxFractional = whole(data, DCM_MaximumFractionalValue, 255);
     object.padding = whole(data, DCM_PixelPaddingValue, -1);
     DcmSequenceOfItems* sequence = nullptr;
-    if (data.findAndGetSequence(DCM_SegmentSequence, sequence).bad() || sequence == nullptr) {
-        refuse(object.file, "is a DICOM SEG without a list of segments: export it again");
-    }
+    refuseIf(data.findAndGetSequence(DCM_SegmentSequence, sequence).bad() || sequence == nullptr, object.file,
+             "is a DICOM SEG without a list of segments: export it again");
     for (DcmObject* entry = sequence->nextInContainer(nullptr); entry != nullptr;
          entry = sequence->nextInContainer(entry)) {
         auto& item = dynamic_cast<DcmItem&>(*entry);
@@ -238,20 +233,14 @@ void readSegments(DcmDataset& data, DicomObject& object)
 void checkPixelFormat(DicomObject& object)
 {
     const bool known = object.bitsAllocated == 1 || object.bitsAllocated == 8 || object.bitsAllocated == 16;
-    if (object.columns < 1 || object.rows < 1 || object.columns > 8192 || object.rows > 8192) {
-        refuse(object.file, fmt::format("its slices are {} x {} pixels: each side must be 1 to 8192, export it again",
-                                        object.columns, object.rows));
-    }
-    if (!known || object.bitsStored < 1 || object.bitsStored > object.bitsAllocated ||
-        object.highBit + 1 < object.bitsStored || object.highBit >= object.bitsAllocated) {
-        refuse(object.file,
-               fmt::format("its pixels have {} bits, of which {} are used: only 1, 8 and 16 are read, export it again",
-                           object.bitsAllocated, object.bitsStored));
-    }
-    if (object.samples != 1) {
-        refuse(object.file, fmt::format("has {} values per pixel, so it is a picture in colours: give the original series",
-                                        object.samples));
-    }
+    refuseIf(object.columns < 1 || object.rows < 1 || object.columns > 8192 || object.rows > 8192, object.file,
+             "its slices are {} x {} pixels: each side must be 1 to 8192, export it again", object.columns, object.rows);
+    refuseIf(!known || object.bitsStored < 1 || object.bitsStored > object.bitsAllocated ||
+                 object.highBit + 1 < object.bitsStored || object.highBit >= object.bitsAllocated,
+             object.file, "its pixels have {} bits, of which {} are used: only 1, 8 and 16 are read, export it again",
+             object.bitsAllocated, object.bitsStored);
+    refuseIf(object.samples != 1, object.file,
+             "has {} values per pixel, so it is a picture in colours: give the original series", object.samples);
 }
 
 }  // namespace

@@ -66,17 +66,15 @@ void loadDicom(const std::filesystem::path& file, DcmFileFormat& format)
 {
     const std::string uid = transferSyntaxOf(file);
     if (uid == deflatedFrames) {
-        if (loadAsJpeg(file, format).bad()) {
-            refuse(file, "its DICOM with deflated frames cannot be read: get the file again, or decompress it");
-        }
+        refuseIf(loadAsJpeg(file, format).bad(), file,
+                 "its DICOM with deflated frames cannot be read: get the file again, or decompress it");
         return;
     }
-    if (!uid.empty() && DcmXfer(uid.c_str()).getXfer() == EXS_Unknown) {
-        refuse(file, fmt::format("its transfer syntax {}{} is not read: decompress it", uid, nameOf(uid)));
-    }
+    refuseIf(!uid.empty() && DcmXfer(uid.c_str()).getXfer() == EXS_Unknown, file,
+             "its transfer syntax {}{} is not read: decompress it", uid, nameOf(uid));
     const OFCondition status = format.loadFile(file.c_str());
     if (status.bad()) {
-        refuse(file, fmt::format("its DICOM cannot be read ({}): get the file again", trimmedText(status.text())));
+        refuse(file, "its DICOM cannot be read ({}): get the file again", trimmedText(status.text()));
     }
 }
 

@@ -47,7 +47,7 @@ struct DicomPixels::Data {
 
     explicit Data(const DicomObject& o) : object(o) {}
 
-    [[noreturn]] void fail(const std::string& why) const { refuse(object.file, why + ": get the file again"); }
+    [[noreturn]] void fail(const std::string& why) const { refuse(object.file, "{}: get the file again", why); }
 
     std::uint64_t frameBits() const { return object.pixelsPerFrame() * static_cast<std::uint64_t>(object.bitsAllocated); }
 
@@ -179,7 +179,7 @@ std::vector<std::int32_t> DicomPixels::Data::jpeg2000(std::span<const std::byte>
     try {
         return decodeJpeg2000(stream, object.columns, object.rows);
     } catch (const std::runtime_error& e) {
-        refuse(object.file, e.what());
+        refuse(object.file, "{}", e.what());
     }
 }
 
@@ -223,8 +223,8 @@ void DicomPixels::Data::readCompressedBits(std::size_t index)
         std::transform(values.begin(), values.end(), values.begin(), [](std::int32_t v) { return v != 0 ? 1 : 0; });
         return;
     } else {
-        refuse(object.file, fmt::format("its pixels of one bit are compressed as {} ({}), which is not read: decompress it",
-                                        DcmXfer(syntax).getXferName(), object.syntax));
+        refuse(object.file, "its pixels of one bit are compressed as {} ({}), which is not read: decompress it",
+               DcmXfer(syntax).getXferName(), object.syntax);
     }
     if (packed.size() < wanted) {
         fail(fmt::format("frame {} has {} bytes of pixels of one bit, but needs {}", index + 1, packed.size(), wanted));

@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <volume/import/dicom_file.h>
 #include <volume/import/segments.h>
 
@@ -25,21 +26,18 @@ struct Grid {
 
 void checkFrames(const DicomObject& object)
 {
-    if (object.frames.empty()) {
-        refuse(object.file, "has no frames, so no voxel is set: give a segmentation that holds something");
-    }
+    refuseIf(object.frames.empty(), object.file,
+             "has no frames, so no voxel is set: give a segmentation that holds something");
     const DicomFrame& first = object.frames[0];
     for (const DicomFrame& f : object.frames) {
-        if (!f.placed) {
-            refuse(object.file, fmt::format("frame {} does not say where it is: export it again", f.index + 1));
-        }
-        if (glm::length(f.alongRow - first.alongRow) + glm::length(f.alongColumn - first.alongColumn) > 1e-4 ||
-            std::abs(f.rowSpacing - first.rowSpacing) + std::abs(f.columnSpacing - first.columnSpacing) > samePlace) {
-            refuse(object.file,
-                   fmt::format("frames 1 and {} lie in different directions or have different pixels: export it "
-                               "again on one grid",
-                               f.index + 1));
-        }
+        refuseIf(!f.placed, object.file, "frame {} does not say where it is: export it again", f.index + 1);
+        refuseIf(
+            glm::length(f.alongRow - first.alongRow) + glm::length(f.alongColumn - first.alongColumn) > 1e-4 ||
+                std::abs(f.rowSpacing - first.rowSpacing) + std::abs(f.columnSpacing - first.columnSpacing) > samePlace,
+            object.file,
+            "frames 1 and {} lie in different directions or have different pixels: export it "
+            "again on one grid",
+            f.index + 1);
     }
 }
 
@@ -53,9 +51,7 @@ double spacingOf(const DicomObject& object, const std::vector<double>& heights)
     }
     const double said = object.betweenSlices > 0 ? object.betweenSlices : object.thickness;
     if (smallest == 0) {
-        if (!(said > 0)) {
-            refuse(object.file, "is one slice and does not say how thick: export it again");
-        }
+        refuseIf(!(said > 0), object.file, "is one slice and does not say how thick: export it again");
         return said;
     }
     const double steps = smallest / said;
@@ -75,31 +71,25 @@ Grid gridOf(const DicomObject& object)
     const auto height = [&](const Placed& p) { return glm::dot(normal, p.frame->position); };
     std::stable_sort(grid.frames.begin(), grid.frames.end(),
                      [&](const Placed& a, const Placed& b) { return height(a) < height(b); });
-    std::vector<double> heights;
-    for (const Placed& p : grid.frames) {
-        heights.push_back(height(p));
-    }
+    const auto heights = base::mapped<double>(grid.frames, [&](const Placed& p) { return height(p); });
     const double spacing = spacingOf(object, heights);
     const Vec3 origin = grid.frames[0].frame->position;
     for (Placed& p : grid.frames) {
         const double steps = (height(p) - heights[0]) / spacing;
         if (!(steps < 32767)) {
-            refuse(object.file,
-                   fmt::format("its frames are up to {:.4g} mm apart: the positions are wrong, export it again",
-                               1e3 * (heights.back() - heights[0])));
+            refuse(object.file, "its frames are up to {:.4g} mm apart: the positions are wrong, export it again",
+                   1e3 * (heights.back() - heights[0]));
         }
         p.slice = std::llround(steps);
         const Vec3 expected = origin + static_cast<double>(p.slice) * spacing * normal;
         if (glm::length(p.frame->position - expected) > std::max(2e-5, 0.05 * spacing)) {
-            refuse(object.file, fmt::format("frame {} is {:.3g} mm off the grid of the others: export it again on one grid",
-                                            p.frame->index + 1, 1e3 * glm::length(p.frame->position - expected)));
+            refuse(object.file, "frame {} is {:.3g} mm off the grid of the others: export it again on one grid",
+                   p.frame->index + 1, 1e3 * glm::length(p.frame->position - expected));
         }
     }
     const std::int64_t slices = grid.frames.back().slice + 1;
-    if (slices > 64 * (static_cast<std::int64_t>(object.frames.size()) + 16)) {
-        refuse(object.file, fmt::format("has {} frames spread over {} slices: the positions are wrong, export it again",
-                                        object.frames.size(), slices));
-    }
+    refuseIf(slices > 64 * (static_cast<std::int64_t>(object.frames.size()) + 16), object.file,
+             "has {} frames spread over {} slices: the positions are wrong, export it again", object.frames.size(), slices);
     grid.size = checkedSize(object.file, {object.columns, object.rows, slices});
     grid.affine.linear = Mat3(any.alongRow * any.columnSpacing, any.alongColumn * any.rowSpacing, normal * spacing);
     grid.affine.origin = origin;
@@ -110,9 +100,8 @@ LabelName nameOf(const DicomObject& object, std::uint16_t value)
 {
     const auto found =
         std::find_if(object.segments.begin(), object.segments.end(), [&](const LabelName& n) { return n.value == value; });
-    if (found == object.segments.end()) {
-        refuse(object.file, fmt::format("has voxels of segment {}, which its list does not hold: export it again", value));
-    }
+    refuseIf(found == object.segments.end(), object.file,
+             "has voxels of segment {}, which its list does not hold: export it again", value);
     return *found;
 }
 
@@ -120,10 +109,7 @@ LabelName nameOf(const DicomObject& object, std::uint16_t value)
 std::vector<Segment> separateSegments(const DicomObject& object, const Grid& grid, const ImportOptions& options,
                                       std::vector<std::string>& warnings)
 {
-    std::vector<Segment> segments;
-    for (const LabelName& name : object.segments) {
-        segments.push_back({name, {}, 0});
-    }
+    auto segments = base::mapped<Segment>(object.segments, [&](const LabelName& name) { return Segment{name, {}, 0}; });
     const bool fractional = object.segmentationType == "FRACTIONAL";
     const double threshold = fractional ? static_cast<double>(options.fractionalThreshold) * object.maxFractional : 0.5;
     std::uint64_t between = 0;
@@ -132,10 +118,8 @@ std::vector<Segment> separateSegments(const DicomObject& object, const Grid& gri
     double done = 0;
     for (const Placed& placed : grid.frames) {
         const LabelName name = nameOf(object, placed.frame->segment);
-        if (!seen.emplace(std::pair(name.value, placed.slice), placed.frame->index).second) {
-            refuse(object.file,
-                   fmt::format("has two frames of segment {} ('{}') in one place: export it again", name.value, name.name));
-        }
+        refuseIf(!seen.emplace(std::pair(name.value, placed.slice), placed.frame->index).second, object.file,
+                 "has two frames of segment {} ('{}') in one place: export it again", name.value, name.name);
         Segment& segment =
             *std::find_if(segments.begin(), segments.end(), [&](const Segment& s) { return s.label.value == name.value; });
         const auto values = pixels.frame(placed.frame->index);
@@ -168,9 +152,7 @@ void labelMap(const DicomObject& object, const Grid& grid, const ImportOptions& 
     std::int64_t last = -1;
     for (std::size_t n = 0; n < grid.frames.size(); ++n) {
         const Placed& placed = grid.frames[n];
-        if (placed.slice == last) {
-            refuse(object.file, "has two frames in one place: export it again");
-        }
+        refuseIf(placed.slice == last, object.file, "has two frames in one place: export it again");
         last = placed.slice;
         const auto values = pixels.frame(placed.frame->index);
         const std::size_t first = static_cast<std::size_t>(placed.slice) * values.size();
@@ -183,9 +165,8 @@ void labelMap(const DicomObject& object, const Grid& grid, const ImportOptions& 
             options.progress(static_cast<double>(n + 1) / static_cast<double>(grid.frames.size()));
         }
     }
-    if (std::count(seen.begin() + 1, seen.end(), true) == 0) {
-        refuse(object.file, "no voxel is set in any of its segments: give a segmentation that holds something");
-    }
+    refuseIf(std::count(seen.begin() + 1, seen.end(), true) == 0, object.file,
+             "no voxel is set in any of its segments: give a segmentation that holds something");
     for (std::size_t v = 1; v < seen.size(); ++v) {
         if (seen[v]) {
             out.names.push_back(nameOf(object, static_cast<std::uint16_t>(v)));
@@ -199,14 +180,10 @@ ImportedLabels readSegmentation(const DicomObject& object, const ImportOptions& 
 {
     const std::string& type = object.segmentationType;
     const bool bits = object.bitsAllocated == 1;
-    if (type != "BINARY" && type != "FRACTIONAL" && type != "LABELMAP") {
-        refuse(object.file,
-               fmt::format("its type of segmentation, '{}', is not BINARY, FRACTIONAL or LABELMAP: export it again", type));
-    }
-    if ((type == "BINARY") != bits) {
-        refuse(object.file, fmt::format("is a DICOM SEG of type {}, but has {} bits per voxel: export it again", type,
-                                        object.bitsAllocated));
-    }
+    refuseIf(type != "BINARY" && type != "FRACTIONAL" && type != "LABELMAP", object.file,
+             "its type of segmentation, '{}', is not BINARY, FRACTIONAL or LABELMAP: export it again", type);
+    refuseIf((type == "BINARY") != bits, object.file,
+             "is a DICOM SEG of type {}, but has {} bits per voxel: export it again", type, object.bitsAllocated);
     const Grid grid = gridOf(object);
     ImportedLabels out;
     out.image.size = grid.size;

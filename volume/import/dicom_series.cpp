@@ -34,32 +34,30 @@ void checkAlike(const std::filesystem::path& path, const std::vector<Slice>& sli
     const DicomFrame& first = *slices[0].frame;
     for (const Slice& slice : slices) {
         const DicomFrame& f = *slice.frame;
-        if (!f.placed) {
-            refuse(path,
-                   fmt::format("{} does not say where its slice is (position, orientation or pixel spacing is missing): "
-                               "export it again, or leave the file out",
-                               nameOf(slice)));
-        }
+        refuseIf(!f.placed, path,
+                 "{} does not say where its slice is (position, orientation or pixel spacing is missing): "
+                 "export it again, or leave the file out",
+                 nameOf(slice));
         if (slice.object->columns != slices[0].object->columns || slice.object->rows != slices[0].object->rows) {
-            refuse(path, fmt::format(
-                             "its slices have different sizes: {} x {} in {}, {} x {} in {}: put each series into a folder "
-                             "of its own",
-                             slices[0].object->columns, slices[0].object->rows, nameOf(slices[0]), slice.object->columns,
-                             slice.object->rows, nameOf(slice)));
+            refuse(path,
+                   "its slices have different sizes: {} x {} in {}, {} x {} in {}: put each series into a folder "
+                   "of its own",
+                   slices[0].object->columns, slices[0].object->rows, nameOf(slices[0]), slice.object->columns,
+                   slice.object->rows, nameOf(slice));
         }
         if (glm::length(f.alongRow - first.alongRow) > sameDirection ||
             glm::length(f.alongColumn - first.alongColumn) > sameDirection) {
             refuse(path,
-                   fmt::format("its slices lie in different directions ({} and {}; a localiser among them?): put each "
-                               "direction into a folder of its own",
-                               nameOf(slices[0]), nameOf(slice)));
+                   "its slices lie in different directions ({} and {}; a localiser among them?): put each "
+                   "direction into a folder of its own",
+                   nameOf(slices[0]), nameOf(slice));
         }
         if (std::abs(f.rowSpacing - first.rowSpacing) > 1e-3 * first.rowSpacing ||
             std::abs(f.columnSpacing - first.columnSpacing) > 1e-3 * first.columnSpacing) {
             refuse(path,
-                   fmt::format("its slices have different pixel spacings ({} and {}): put each series into a folder of its "
-                               "own",
-                               nameOf(slices[0]), nameOf(slice)));
+                   "its slices have different pixel spacings ({} and {}): put each series into a folder of its "
+                   "own",
+                   nameOf(slices[0]), nameOf(slice));
         }
     }
 }
@@ -77,12 +75,10 @@ void dropDoubles(const std::filesystem::path& path, std::vector<Slice>& slices, 
         const Slice& there = kept.back();
         const bool same = slice.object != there.object && slice.object->instance == there.object->instance &&
                           !slice.object->instance.empty() && slice.frame->index == there.frame->index;
-        if (!same) {
-            refuse(path,
-                   fmt::format("has two slices in one place ({} and {}: several time points, or a series exported twice): "
-                               "keep one of them",
-                               nameOf(there), nameOf(slice)));
-        }
+        refuseIf(!same, path,
+                 "has two slices in one place ({} and {}: several time points, or a series exported twice): "
+                 "keep one of them",
+                 nameOf(there), nameOf(slice));
         ++dropped;
     }
     if (dropped > 0) {
@@ -97,9 +93,7 @@ Vec3 stepOf(const std::filesystem::path& path, const std::vector<Slice>& slices,
     const DicomObject& object = *slices[0].object;
     if (slices.size() == 1) {
         const double thickness = object.betweenSlices > 0 ? object.betweenSlices : object.thickness;
-        if (!(thickness > 0)) {
-            refuse(path, "is one slice and does not say how thick: name the folder that holds its series");
-        }
+        refuseIf(!(thickness > 0), path, "is one slice and does not say how thick: name the folder that holds its series");
         return thickness * normal;
     }
     std::vector<double> gaps;
@@ -113,9 +107,9 @@ Vec3 stepOf(const std::filesystem::path& path, const std::vector<Slice>& slices,
         const double steps = gaps[i] / usual;
         if (steps > 1.5 && std::abs(steps - std::round(steps)) < 0.1) {
             const double missing = std::round(steps) - 1;
-            refuse(path, fmt::format("{} missing between {} and {}, they are {} apart, others {}: get the whole series",
-                                     missing == 1 ? "a slice is" : fmt::format("{:.0f} slices are", missing),
-                                     nameOf(slices[i]), nameOf(slices[i + 1]), lengthText(gaps[i]), lengthText(usual)));
+            refuse(path, "{} missing between {} and {}, they are {} apart, others {}: get the whole series",
+                   missing == 1 ? "a slice is" : fmt::format("{:.0f} slices are", missing), nameOf(slices[i]),
+                   nameOf(slices[i + 1]), lengthText(gaps[i]), lengthText(usual));
         }
     }
     const Vec3 step =
@@ -124,10 +118,9 @@ Vec3 stepOf(const std::filesystem::path& path, const std::vector<Slice>& slices,
     for (std::size_t i = 0; i < slices.size(); ++i) {
         const Vec3 expected = slices.front().frame->position + static_cast<double>(i) * step;
         if (glm::length(slices[i].frame->position - expected) > tolerance) {
-            refuse(path,
-                   fmt::format("its slices are uneven: from {} to {} apart, {} is {} off: resample it to even slices first",
-                               lengthText(sorted.front()), lengthText(sorted.back()), nameOf(slices[i]),
-                               lengthText(glm::length(slices[i].frame->position - expected))));
+            refuse(path, "its slices are uneven: from {} to {} apart, {} is {} off: resample it to even slices first",
+                   lengthText(sorted.front()), lengthText(sorted.back()), nameOf(slices[i]),
+                   lengthText(glm::length(slices[i].frame->position - expected)));
         }
     }
     return step;

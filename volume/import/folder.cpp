@@ -45,12 +45,10 @@ Segment readMask(const Source& source, std::uint16_t value, const std::function<
         for (const double v : values) {
             if (v != 0) {
                 inside = inside == 0 ? v : inside;
-                if (v != inside) {
-                    refuse(source.header,
-                           fmt::format("holds the values {} and {} beside 0, but in a folder of masks each file is "
-                                       "one structure: name this file alone if it is a label map",
-                                       inside, v));
-                }
+                refuseIf(v != inside, source.header,
+                         "holds the values {} and {} beside 0, but in a folder of masks each file is "
+                         "one structure: name this file alone if it is a label map",
+                         inside, v);
                 segment.add(voxel);
             }
             ++voxel;
@@ -70,10 +68,10 @@ void checkSameGrid(const Source& first, const Source& other)
     }
     if (!sameSize || !(apart < 0.01)) {
         refuse(other.header,
-               fmt::format("is not on the grid of {} (sizes {} x {} x {} and {} x {} x {}, up to {:.2g} voxels "
-                           "apart): masks of one folder must share a grid, resample it or leave it out",
-                           first.header.filename().string(), other.size.x, other.size.y, other.size.z, first.size.x,
-                           first.size.y, first.size.z, apart));
+               "is not on the grid of {} (sizes {} x {} x {} and {} x {} x {}, up to {:.2g} voxels "
+               "apart): masks of one folder must share a grid, resample it or leave it out",
+               first.header.filename().string(), other.size.x, other.size.y, other.size.z, first.size.x, first.size.y,
+               first.size.z, apart);
     }
 }
 
@@ -128,9 +126,7 @@ Files dicomFilesIn(const std::filesystem::path& folder)
 {
     Files files = filesIn(folder);
     std::erase_if(files, [](const std::filesystem::path& f) { return !isDicom(f); });
-    if (files.empty()) {
-        refuse(folder, "holds no DICOM files: name a folder with one series, or a file");
-    }
+    refuseIf(files.empty(), folder, "holds no DICOM files: name a folder with one series, or a file");
     return files;
 }
 
@@ -149,24 +145,18 @@ ImportedLabels folderLabels(const std::filesystem::path& folder, const ImportOpt
             dicom.push_back(file);
         }
     }
-    if (!volumes.empty() && !dicom.empty()) {
-        refuse(folder,
-               fmt::format("holds {} volume files and {} DICOM files: name one of the files, or a folder with one kind",
-                           volumes.size(), dicom.size()));
-    }
+    refuseIf(!volumes.empty() && !dicom.empty(), folder,
+             "holds {} volume files and {} DICOM files: name one of the files, or a folder with one kind", volumes.size(),
+             dicom.size());
     if (!dicom.empty()) {
         return labelsApart(folder, dicomLibrary, options,
                            [&](const ImportOptions& o) { return dicomLabels(folder, dicom, o); });
     }
-    if (volumes.empty()) {
-        refuse(folder,
-               fmt::format("holds {} files, but no DICOM and no masks (NIfTI, NRRD, MetaImage): name a file, or the "
-                           "folder that holds them itself",
-                           all.size()));
-    }
-    if (volumes.size() > 65535) {
-        refuse(folder, "holds more than 65535 masks: name a folder with fewer");
-    }
+    refuseIf(volumes.empty(), folder,
+             "holds {} files, but no DICOM and no masks (NIfTI, NRRD, MetaImage): name a file, or the "
+             "folder that holds them itself",
+             all.size());
+    refuseIf(volumes.size() > 65535, folder, "holds more than 65535 masks: name a folder with fewer");
     return masks(folder, volumes, options);
 }
 

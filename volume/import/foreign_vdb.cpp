@@ -4,7 +4,6 @@
 
 #include <openvdb/io/File.h>
 
-#include <cmath>
 #include <mutex>
 
 namespace palpate::volume {
@@ -24,16 +23,14 @@ openvdb::GridBase::Ptr onlyGrid(const std::filesystem::path& file)
     std::call_once(once, [] { openvdb::initialize(); });
     openvdb::io::File vdb(file.string());
     vdb.open(false);
-    if ((*vdb.getMetadata())["palpate_volume"]) {
-        refuse(file, "is a volume already: 'palpate info' shows it");
-    }
+    refuseIf((*vdb.getMetadata())["palpate_volume"] != nullptr, file, "is a volume already: 'palpate info' shows it");
     const openvdb::GridPtrVecPtr grids = vdb.readAllGridMetadata();
     if (grids->size() != 1) {
         std::string names;
         for (const auto& grid : *grids) {
             names += (names.empty() ? "" : ", ") + grid->getName();
         }
-        refuse(file, fmt::format("holds {} grids ({}): save it with the one that holds the labels", grids->size(), names));
+        refuse(file, "holds {} grids ({}): save it with the one that holds the labels", grids->size(), names);
     }
     return vdb.readGrid(grids->front()->getName());
 }
@@ -44,16 +41,14 @@ void fill(const std::filesystem::path& file, const Grid& grid, const ImportOptio
           Label&& label)
 {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
-    if (box.empty()) {
-        refuse(file, "no voxel is set, the grid has no active voxels: save the one that holds the labels");
-    }
+    refuseIf(box.empty(), file, "no voxel is set, the grid has no active voxels: save the one that holds the labels");
     const openvdb::Coord dim = box.dim();
     LabelImage& image = out.image;
     image.size = checkedSize(file, {dim.x(), dim.y(), dim.z()});
     // Two voxels far apart make a box that nobody has memory for.
     constexpr std::size_t maxVoxels = std::size_t{1} << 30;
     if (image.offset({0, 0, image.size.z}) > maxVoxels) {
-        refuse(file, fmt::format("its active voxels spread over {} x {} x {}: crop it first", dim.x(), dim.y(), dim.z()));
+        refuse(file, "its active voxels spread over {} x {} x {}: crop it first", dim.x(), dim.y(), dim.z());
     }
     const openvdb::math::Transform& to = grid.transform();
     const openvdb::Vec3d first = box.min().asVec3d();
@@ -98,23 +93,20 @@ ImportedLabels vdbLabels(const std::filesystem::path& file, const ImportOptions&
 {
     try {
         const openvdb::GridBase::Ptr grid = onlyGrid(file);
-        if (!grid->transform().isLinear()) {
-            refuse(file, "its grid is bent (a frustum): resample it to a straight grid first");
-        }
+        refuseIf(!grid->transform().isLinear(), file, "its grid is bent (a frustum): resample it to a straight grid first");
         ImportedLabels out;
         if (!fillIf<openvdb::Int32Grid>(file, *grid, options, out) &&
             !fillIf<openvdb::Int64Grid>(file, *grid, options, out) &&
             !fillIf<openvdb::FloatGrid>(file, *grid, options, out) &&
             !fillIf<openvdb::DoubleGrid>(file, *grid, options, out)) {
-            refuse(file,
-                   fmt::format("its grid holds {}, not labels: save it as a grid of int32 or float", grid->valueType()));
+            refuse(file, "its grid holds {}, not labels: save it as a grid of int32 or float", grid->valueType());
         }
         checkAffine(file, out.image.affine, false, out.warnings);
         placeAxes(file, false, options, out.image.affine, out.warnings);
         out.warnings.emplace_back("OpenVDB files do not say their unit: millimetres are assumed");
         return out;
     } catch (const openvdb::Exception& e) {
-        refuse(file, fmt::format("OpenVDB cannot read it ({}): get the file again", e.what()));
+        refuse(file, "OpenVDB cannot read it ({}): get the file again", e.what());
     }
 }
 

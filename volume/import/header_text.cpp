@@ -2,6 +2,7 @@
 #include <volume/import/source.h>
 
 #include <base/inputs.h>
+#include <base/split.h>
 
 #include <algorithm>
 #include <cctype>
@@ -23,10 +24,8 @@ std::vector<T> parsed(const std::filesystem::path& file, const std::string& what
         const char* first = token.data() + (token[0] == '+' ? 1 : 0);
         const auto [end, error] = std::from_chars(first, token.data() + token.size(), value);
         const bool whole = error == std::errc() && end == token.data() + token.size();
-        if (!whole || !std::isfinite(static_cast<double>(value)) || out.size() > 100) {
-            refuse(file, fmt::format("{}: '{}' is not a list of numbers: its header is wrong, save it again", what,
-                                     text.substr(0, 60)));
-        }
+        refuseIf(!whole || !std::isfinite(static_cast<double>(value)) || out.size() > 100, file,
+                 "{}: '{}' is not a list of numbers: its header is wrong, save it again", what, text.substr(0, 60));
         out.push_back(value);
     }
     return out;
@@ -75,8 +74,7 @@ std::string printable(const std::string& text)
 
 std::string trimmed(const std::string& text)
 {
-    const auto first = text.find_first_not_of(" \t\r");
-    return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+    return std::string(base::trimmed(text));
 }
 
 std::string lowerCase(std::string text)
@@ -99,10 +97,8 @@ std::vector<std::int64_t> integers(const std::filesystem::path& file, const std:
 std::int64_t integer(const std::filesystem::path& file, const std::string& what, const std::string& text)
 {
     const std::vector<std::int64_t> values = integers(file, what, text);
-    if (values.size() != 1) {
-        refuse(file, fmt::format("{}: '{}' must be one whole number: its header is wrong, save it again", what,
-                                 text.substr(0, 60)));
-    }
+    refuseIf(values.size() != 1, file, "{}: '{}' must be one whole number: its header is wrong, save it again", what,
+             text.substr(0, 60));
     return values[0];
 }
 
@@ -110,9 +106,7 @@ std::filesystem::path besides(const std::filesystem::path& header, const std::st
                               std::vector<std::string>& warnings)
 {
     const std::string shown = name.substr(0, 200);
-    if (name.size() > 4000) {
-        refuse(header, fmt::format("its data file {} is not there: put it beside the header", shown));
-    }
+    refuseIf(name.size() > 4000, header, "its data file {} is not there: put it beside the header", shown);
     const std::filesystem::path data = header.parent_path() / name;
     const std::string why = base::whyNoFile(data);
     if (why.empty()) {
@@ -125,10 +119,9 @@ std::filesystem::path besides(const std::filesystem::path& header, const std::st
         warnings.push_back(fmt::format("its data file {} is not there: {}.gz beside it is read", shown, shown));
         return packed;
     }
-    if (!std::filesystem::exists(std::filesystem::symlink_status(data, error))) {
-        refuse(header, fmt::format("its data file {} is not there: put it beside the header", shown));
-    }
-    refuse(header, fmt::format("its data file {} {}", shown, why));
+    refuseIf(!std::filesystem::exists(std::filesystem::symlink_status(data, error)), header,
+             "its data file {} is not there: put it beside the header", shown);
+    refuse(header, "its data file {} {}", shown, why);
 }
 
 }  // namespace palpate::volume

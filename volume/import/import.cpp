@@ -49,17 +49,16 @@ SourceReader readerFor(const std::filesystem::path& file)
 void checkFile(const std::filesystem::path& file)
 {
     if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        refuse(file, why);
+        refuse(file, "{}", why);
     }
     std::ifstream in(file, std::ios::binary);
     std::string start(23, '\0');
     in.read(start.data(), static_cast<std::streamsize>(start.size()));
     if (in.gcount() == 0) {
-        refuse(file, in.is_open() ? "is empty: get the file again" : "cannot be opened: check the permissions");
+        refuse(file, "{}", in.is_open() ? "is empty: get the file again" : "cannot be opened: check the permissions");
     }
-    if (start.rfind("version https://git-lfs", 0) == 0) {
-        refuse(file, "is a git-LFS pointer, not the data: run 'git lfs pull' where it came from");
-    }
+    refuseIf(start.rfind("version https://git-lfs", 0) == 0, file,
+             "is a git-LFS pointer, not the data: run 'git lfs pull' where it came from");
 }
 
 ImportedLabels labelsOf(Source source, const ImportOptions& options)
@@ -135,11 +134,9 @@ Source readSource(const std::filesystem::path& file)
 {
     checkFile(file);
     const SourceReader reader = readerFor(file);
-    if (reader == nullptr) {
-        refuse(file,
-               "is no format that is read: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), "
-               "FreeSurfer (.mgz), DICOM or OpenVDB (.vdb)");
-    }
+    refuseIf(reader == nullptr, file,
+             "is no format that is read: NIfTI (.nii, .nii.gz, .hdr/.img), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), "
+             "FreeSurfer (.mgz), DICOM or OpenVDB (.vdb)");
     return reader(file);
 }
 
@@ -161,17 +158,13 @@ ImportedImage importImage(const std::filesystem::path& path, const ImportOptions
     if (!folder) {
         checkFile(path);
     }
-    if (!folder && isVdb(path)) {
-        refuse(path, "is OpenVDB, of which only labels are read: save the image as NIfTI");
-    }
+    refuseIf(!folder && isVdb(path), path, "is OpenVDB, of which only labels are read: save the image as NIfTI");
     if (folder || isDicom(path)) {
         const Files files = folder ? dicomFilesIn(path) : Files{path};
         return imageApart(path, dicomLibrary, options, [&](const ImportOptions& o) { return dicomImage(path, files, o); });
     }
     Source source = checkedSource(path, options, true);
-    if (source.layers > 1) {
-        refuse(path, fmt::format("has {} layers: an image has one, choose it with --image-volume N", source.layers));
-    }
+    refuseIf(source.layers > 1, path, "has {} layers: an image has one, choose it with --image-volume N", source.layers);
     ImportedImage out;
     out.size = source.size;
     out.affine = source.affine;

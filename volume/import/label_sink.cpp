@@ -22,16 +22,18 @@ double allowed(const LabelRules& rules, double value)
 
 [[noreturn]] void refuseNan(const std::filesystem::path& file, const std::string& voxel, double value)
 {
-    refuse(file, fmt::format("{} is not a number ({}): a label map holds whole numbers from 0 to 65535, give the "
-                             "segmentation",
-                             voxel, value));
+    refuse(file,
+           "{} is not a number ({}): a label map holds whole numbers from 0 to 65535, give the "
+           "segmentation",
+           voxel, value);
 }
 
 [[noreturn]] void refuseFraction(const std::filesystem::path& file, const std::string& voxel, double value, bool scaled)
 {
-    refuse(file, fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, this is an image or a "
-                             "probability{}: give the segmentation",
-                             voxel, value, scaled ? " (its slope is applied)" : ""));
+    refuse(file,
+           "{} is {:.7g}: a label map holds whole numbers from 0 to 65535, this is an image or a "
+           "probability{}: give the segmentation",
+           voxel, value, scaled ? " (its slope is applied)" : "");
 }
 
 }  // namespace
@@ -56,12 +58,10 @@ std::uint16_t LabelSink::label(const std::filesystem::path& file, double value, 
         refuseNan(file, voxel, value);
     }
     const double whole = std::round(value);
-    if (whole < 0 || whole > maxLabel) {
-        refuse(file,
-               fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
-                           "an image: give the segmentation that was made of it",
-                           voxel, value));
-    }
+    refuseIf(whole < 0 || whole > maxLabel, file,
+             "{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
+             "an image: give the segmentation that was made of it",
+             voxel, value);
     if (std::abs(value - whole) > std::max(allowed(rules, value), rules.round ? roundable : 0.0)) {
         refuseFraction(file, voxel, value, rules.scaled);
     }
@@ -115,9 +115,8 @@ void LabelSink::addWhole(double whole)
         }
         const auto known = codes_.emplace(value, static_cast<std::uint16_t>(values_.size()));
         if (known.second) {
-            if (values_.size() > 65535) {
-                refuse(file_, "has more than 65536 different values, so it is an image: give the segmentation");
-            }
+            refuseIf(values_.size() > 65535, file_,
+                     "has more than 65536 different values, so it is an image: give the segmentation");
             values_.push_back(value);
         }
         labels_.push_back(known.first->second);
@@ -146,24 +145,25 @@ void LabelSink::refuseOdd(bool surelyLabels) const
         refuseFraction(file_, fraction_->voxel, fraction_->value, rules_.scaled);
     }
     if (fraction_) {
-        refuse(file_, fmt::format("{} is {:.9g}, and {} voxels like it are up to {:.2g} off a whole number: --round takes "
-                                  "the whole number",
-                                  fraction_->voxel, fraction_->value, fractions_, farthest_));
+        refuse(file_,
+               "{} is {:.9g}, and {} voxels like it are up to {:.2g} off a whole number: --round takes "
+               "the whole number",
+               fraction_->voxel, fraction_->value, fractions_, farthest_);
     }
     if (different() > maxDifferent && !surelyLabels) {
         refuse(file_,
-               fmt::format("{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
-                           "an image: give the segmentation that was made of it",
-                           outside_->voxel, outside_->value));
+               "{} is {:.7g}: a label map holds whole numbers from 0 to 65535, so this is not a label map but "
+               "an image: give the segmentation that was made of it",
+               outside_->voxel, outside_->value);
     }
     if (std::abs(outside_->value) > maxExact) {
-        refuse(file_, fmt::format("{} is {:.17g}: whole numbers over 2^53 cannot be told apart, save it with smaller ones",
-                                  outside_->voxel, outside_->value));
+        refuse(file_, "{} is {:.17g}: whole numbers over 2^53 cannot be told apart, save it with smaller ones",
+               outside_->voxel, outside_->value);
     }
     refuse(file_,
-           fmt::format("{} is {:.17g}: a label is a whole number from 0 to 65535; if this is a label map, --renumber "
-                       "gives such labels free values; if it is an image, give the segmentation that was made of it",
-                       outside_->voxel, outside_->value));
+           "{} is {:.17g}: a label is a whole number from 0 to 65535; if this is a label map, --renumber "
+           "gives such labels free values; if it is an image, give the segmentation that was made of it",
+           outside_->voxel, outside_->value);
 }
 
 // The labels of codes: values from 0 to 65535 stay, others take the lowest that are free, in rising order.
@@ -185,9 +185,8 @@ std::vector<std::uint16_t> LabelSink::decoded(ImportedLabels& out) const
             continue;
         }
         free = std::find(free, used.end(), false);
-        if (free == used.end()) {
-            refuse(file_, "--renumber: every label value from 1 to 65535 is in use: save it with fewer labels");
-        }
+        refuseIf(free == used.end(), file_,
+                 "--renumber: every label value from 1 to 65535 is in use: save it with fewer labels");
         *free = true;
         labelOf[code] = static_cast<std::uint16_t>(free - used.begin());
         out.renumbered.push_back({value, labelOf[code]});
@@ -210,9 +209,10 @@ void LabelSink::finish(bool surelyLabels, ImportedLabels& out)
         refuseOdd(surelyLabels);
     }
     if (different() > maxDifferent && !surelyLabels) {
-        refuse(file_, fmt::format("has {} different values, so it is not a label map (at most {}) but an image: give the "
-                                  "segmentation that was made of it",
-                                  different(), maxDifferent));
+        refuse(file_,
+               "has {} different values, so it is not a label map (at most {}) but an image: give the "
+               "segmentation that was made of it",
+               different(), maxDifferent);
     }
     if (fractions_ > 0) {
         out.warnings.push_back(

@@ -1,7 +1,6 @@
 #include <volume/import/header_text.h>
 #include <volume/import/source.h>
 
-#include <cmath>
 #include <fstream>
 
 namespace palpate::volume {
@@ -24,10 +23,8 @@ Fields readFields(const std::filesystem::path& file, std::uint64_t& end)
         }
         fields[trimmed(line.substr(0, equals))] = trimmed(line.substr(equals + 1));
     }
-    if (fields.count("ElementDataFile") == 0 || fields.count("DimSize") == 0 || fields.count("ElementType") == 0) {
-        refuse(file,
-               "is not a MetaImage, DimSize, ElementType or ElementDataFile is missing from its header: save it again");
-    }
+    refuseIf(fields.count("ElementDataFile") == 0 || fields.count("DimSize") == 0 || fields.count("ElementType") == 0, file,
+             "is not a MetaImage, DimSize, ElementType or ElementDataFile is missing from its header: save it again");
     return fields;
 }
 
@@ -57,10 +54,8 @@ Component metaComponent(const std::filesystem::path& file, const std::string& ty
         {"MET_ULONG_LONG", Component::u64}, {"MET_LONG_LONG", Component::i64}, {"MET_FLOAT", Component::f32},
         {"MET_DOUBLE", Component::f64}};
     const auto found = types.find(type);
-    if (found == types.end()) {
-        refuse(file, fmt::format("ElementType = {}: is not read, save it with one number of 8 to 64 bits per voxel",
-                                 type.substr(0, 60)));
-    }
+    refuseIf(found == types.end(), file, "ElementType = {}: is not read, save it with one number of 8 to 64 bits per voxel",
+             type.substr(0, 60));
     return found->second;
 }
 
@@ -70,8 +65,8 @@ std::vector<std::int64_t> sizesOf(const std::filesystem::path& file, const Field
     std::vector<std::int64_t> sizes = integers(file, "DimSize", fields.at("DimSize"));
     const std::string said = firstOf(fields, {"NDims"});
     if (!said.empty() && integer(file, "NDims", said) != static_cast<std::int64_t>(sizes.size())) {
-        refuse(file, fmt::format("NDims = {} but DimSize = {}: its header contradicts itself, save it again", said,
-                                 fields.at("DimSize")));
+        refuse(file, "NDims = {} but DimSize = {}: its header contradicts itself, save it again", said,
+               fields.at("DimSize"));
     }
     dimensions = std::max<std::size_t>(3, sizes.size());
     while (sizes.size() > 3 && sizes.back() == 1) {
@@ -88,9 +83,8 @@ std::vector<double> someNumbers(const std::filesystem::path& file, const Fields&
         return fallback;
     }
     std::vector<double> found = numbers(file, what, text);
-    if (found.size() != fallback.size()) {
-        refuse(file, fmt::format("{} = {}: must be {} numbers, save it again", what, text.substr(0, 100), fallback.size()));
-    }
+    refuseIf(found.size() != fallback.size(), file, "{} = {}: must be {} numbers, save it again", what, text.substr(0, 100),
+             fallback.size());
     return found;
 }
 
@@ -99,9 +93,8 @@ void place(const Fields& fields, std::size_t dimensions, Source& source)
 {
     const std::filesystem::path& file = source.header;
     const std::string units = lowerCase(firstOf(fields, {"DistanceUnits"}));
-    if (!units.empty() && units != "mm" && units != "?") {
-        refuse(file, fmt::format("DistanceUnits = {}: only mm is understood, save it with mm", units.substr(0, 60)));
-    }
+    refuseIf(!units.empty() && units != "mm" && units != "?", file,
+             "DistanceUnits = {}: only mm is understood, save it with mm", units.substr(0, 60));
     std::vector<double> straight(dimensions * dimensions, 0.0);
     for (std::size_t k = 0; k < dimensions; ++k) {
         straight[k * dimensions + k] = 1.0;
@@ -130,17 +123,14 @@ void place(const Fields& fields, std::size_t dimensions, Source& source)
 void locateData(const Fields& fields, std::uint64_t headerEnd, Source& source)
 {
     const std::string& name = fields.at("ElementDataFile");
-    if (name == "LIST" || name.rfind("LIST ", 0) == 0 || name.find('%') != std::string::npos) {
-        refuse(source.header, "its slices lie in one file each: save it as one file");
-    }
+    refuseIf(name == "LIST" || name.rfind("LIST ", 0) == 0 || name.find('%') != std::string::npos, source.header,
+             "its slices lie in one file each: save it as one file");
     const bool local = lowerCase(name) == "local";
     source.data = local ? source.header : besides(source.header, name, source.warnings);
     source.offset = local ? headerEnd : 0;
     const std::string given = firstOf(fields, {"HeaderSize"});
     const std::int64_t headerSize = given.empty() ? 0 : integer(source.header, "HeaderSize", given);
-    if (headerSize < -1) {
-        refuse(source.header, fmt::format("HeaderSize = {}: must be -1 or more, save it again", headerSize));
-    }
+    refuseIf(headerSize < -1, source.header, "HeaderSize = {}: must be -1 or more, save it again", headerSize);
     source.fromEnd = headerSize == -1;
     source.offset += headerSize > 0 ? static_cast<std::uint64_t>(headerSize) : 0;
 }
@@ -180,9 +170,8 @@ Source readMeta(const std::filesystem::path& file)
     source.component = metaComponent(file, fields.at("ElementType"));
     source.bigEndian = isTrue(fields, "BinaryDataByteOrderMSB") || isTrue(fields, "ElementByteOrderMSB");
     const std::string channels = firstOf(fields, {"ElementNumberOfChannels"});
-    if (!channels.empty() && channels != "1") {
-        refuse(file, fmt::format("has {} values per voxel: save it with one", channels.substr(0, 30)));
-    }
+    refuseIf(!channels.empty() && channels != "1", file, "has {} values per voxel: save it with one",
+             channels.substr(0, 30));
     place(fields, dimensions, source);
     if (fields.count("BinaryData") != 0 && !isTrue(fields, "BinaryData")) {
         locateData(fields, headerEnd, source);

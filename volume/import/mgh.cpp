@@ -30,9 +30,8 @@ Source readMgh(const std::filesystem::path& file)
     source.header = source.data = file;
     source.encoding = looksLike(file, 0);
     const std::vector<std::byte> bytes = unpackedBytes(file, 0, source.encoding, 0, headerBytes);
-    if (bytes.size() < headerBytes || bigEndian<std::int32_t>(bytes, 0) != 1) {
-        refuse(file, "is not a FreeSurfer volume, its header does not begin with version 1: save it again");
-    }
+    refuseIf(bytes.size() < headerBytes || bigEndian<std::int32_t>(bytes, 0) != 1, file,
+             "is not a FreeSurfer volume, its header does not begin with version 1: save it again");
     const auto integer = [&](std::size_t at) { return bigEndian<std::int32_t>(bytes, at); };
     const auto number = [&](std::size_t at) { return static_cast<double>(bigEndian<float>(bytes, at)); };
     std::vector<std::int64_t> sizes = {integer(4), integer(8), integer(12)};
@@ -44,7 +43,7 @@ Source readMgh(const std::filesystem::path& file)
         {0, Component::u8}, {1, Component::i32}, {3, Component::f32}, {4, Component::i16}, {10, Component::u16}};
     const auto type = types.find(integer(20));
     if (type == types.end()) {
-        refuse(file, fmt::format("its type of voxel, {}, is not read: save it with whole numbers", integer(20)));
+        refuse(file, "its type of voxel, {}, is not read: save it with whole numbers", integer(20));
     }
     source.component = type->second;
     source.bigEndian = true;

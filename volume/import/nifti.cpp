@@ -24,24 +24,20 @@ NiftiHeader readNiftiHeader(const std::filesystem::path& file)
 {
     const Encoding encoding = looksLike(file, 0);
     std::vector<std::byte> bytes = unpackedBytes(file, 0, encoding, 0, NiftiHeader::secondBytes);
-    if (bytes.size() < NiftiHeader::firstBytes) {
-        refuse(file, fmt::format("ends after {} bytes, but a NIfTI header has {}: get the file again", bytes.size(),
-                                 NiftiHeader::firstBytes));
-    }
+    refuseIf(bytes.size() < NiftiHeader::firstBytes, file,
+             "ends after {} bytes, but a NIfTI header has {}: get the file again", bytes.size(), NiftiHeader::firstBytes);
     for (const bool swapped : {false, true}) {
         if (isLength(bytes, NiftiHeader::firstBytes, swapped)) {
             const std::string magic(reinterpret_cast<const char*>(bytes.data()) + 344, 3);
             const bool analyze = magic != "n+1" && magic != "ni1";
-            if (analyze && lowerCase(file.string()).find(".hdr") == std::string::npos) {
-                refuse(file, "is not a NIfTI file, its magic is missing: save it again");
-            }
+            refuseIf(analyze && lowerCase(file.string()).find(".hdr") == std::string::npos, file,
+                     "is not a NIfTI file, its magic is missing: save it again");
             return NiftiHeader(std::move(bytes), false, swapped, analyze);
         }
         if (bytes.size() == NiftiHeader::secondBytes && isLength(bytes, NiftiHeader::secondBytes, swapped)) {
             NiftiHeader header(std::move(bytes), true, swapped);
-            if (header.magic() != "n+2" && header.magic() != "ni2") {
-                refuse(file, "is not a NIfTI-2 file, its magic is missing: save it again");
-            }
+            refuseIf(header.magic() != "n+2" && header.magic() != "ni2", file,
+                     "is not a NIfTI-2 file, its magic is missing: save it again");
             return header;
         }
     }
@@ -54,18 +50,15 @@ Component componentOf(const std::filesystem::path& file, const NiftiHeader& head
         {2, Component::u8},  {256, Component::i8},   {512, Component::u16},  {4, Component::i16},  {768, Component::u32},
         {8, Component::i32}, {1280, Component::u64}, {1024, Component::i64}, {16, Component::f32}, {64, Component::f64}};
     const int code = header.datatype();
-    if (code == 128 || code == 2304 || code == 32 || code == 1792 || code == 2048) {
-        refuse(file, "has colours or complex numbers as voxels: save it with one number per voxel");
-    }
+    refuseIf(code == 128 || code == 2304 || code == 32 || code == 1792 || code == 2048, file,
+             "has colours or complex numbers as voxels: save it with one number per voxel");
     const auto found = types.find(code);
-    if (found == types.end()) {
-        refuse(file, fmt::format("datatype {} is not read: save it with whole or floating-point numbers", code));
-    }
+    refuseIf(found == types.end(), file, "datatype {} is not read: save it with whole or floating-point numbers", code);
     if (header.bitpix() < 0 || static_cast<std::uint64_t>(header.bitpix()) != 8 * bytesOf(found->second)) {
         refuse(file,
-               fmt::format("datatype {} has {} bits per voxel, but bitpix says {}: its header contradicts itself, save "
-                           "it again",
-                           code, 8 * bytesOf(found->second), header.bitpix()));
+               "datatype {} has {} bits per voxel, but bitpix says {}: its header contradicts itself, save "
+               "it again",
+               code, 8 * bytesOf(found->second), header.bitpix());
     }
     return found->second;
 }
@@ -73,9 +66,8 @@ Component componentOf(const std::filesystem::path& file, const NiftiHeader& head
 Index3 sizeOf(const std::filesystem::path& file, const NiftiHeader& header, Source& source)
 {
     const std::int64_t dimensions = header.dim(0);
-    if (dimensions < 1 || dimensions > 7) {
-        refuse(file, fmt::format("dim[0] = {}, but it must be 1 to 7: its header is wrong, save it again", dimensions));
-    }
+    refuseIf(dimensions < 1 || dimensions > 7, file,
+             "dim[0] = {}, but it must be 1 to 7: its header is wrong, save it again", dimensions);
     std::vector<std::int64_t> sizes;
     for (std::int64_t i = 1; i <= dimensions; ++i) {
         sizes.push_back(header.dim(static_cast<std::size_t>(i)));
@@ -91,10 +83,9 @@ void locateData(const NiftiHeader& header, Source& source)
     const bool single = !header.analyze() && header.magic()[1] == '+';
     source.data = source.header;
     const double start = header.voxOffset();
-    if (!(start >= 0 && start < 1e9) || (single && start < static_cast<double>(header.length())) ||
-        start != std::floor(start)) {
-        refuse(source.header, fmt::format("vox_offset = {}: the voxels cannot begin there, save it again", start));
-    }
+    refuseIf(!(start >= 0 && start < 1e9) || (single && start < static_cast<double>(header.length())) ||
+                 start != std::floor(start),
+             source.header, "vox_offset = {}: the voxels cannot begin there, save it again", start);
     source.skip = static_cast<std::uint64_t>(start);
     if (!single) {
         std::string stem = source.header.string();
@@ -104,9 +95,8 @@ void locateData(const NiftiHeader& header, Source& source)
         if (!std::filesystem::is_regular_file(source.data, error)) {
             source.data = stem + ".img.gz";
         }
-        if (!std::filesystem::is_regular_file(source.data, error)) {
-            refuse(source.header, fmt::format("its voxels, {}.img, are not there: put that file beside it", stem));
-        }
+        refuseIf(!std::filesystem::is_regular_file(source.data, error), source.header,
+                 "its voxels, {}.img, are not there: put that file beside it", stem);
     }
     // The first voxels of a file of its own may look like the beginning of a packed stream.
     const std::uint64_t whole = source.skip + source.elements() * bytesOf(source.component);
@@ -150,12 +140,10 @@ void readScale(const NiftiHeader& header, Source& source)
 {
     if (header.analyze()) {
         // SPM puts a factor where Analyze has nothing.
-        if (header.slope() != 0 && header.slope() != 1) {
-            refuse(source.header,
-                   fmt::format("is Analyze 7.5 with a factor of {:g} at the place where SPM puts one, which the "
-                               "format does not know: save it as NIfTI",
-                               header.slope()));
-        }
+        refuseIf(header.slope() != 0 && header.slope() != 1, source.header,
+                 "is Analyze 7.5 with a factor of {:g} at the place where SPM puts one, which the "
+                 "format does not know: save it as NIfTI",
+                 header.slope());
         return;
     }
     const double slope = header.slope();
@@ -177,7 +165,7 @@ Source readNifti(const std::filesystem::path& file)
     Source source;
     source.header = std::regex_replace(file.string(), std::regex("\\.img(\\.gz)?$", std::regex::icase), ".hdr$1");
     if (std::error_code error; !std::filesystem::is_regular_file(source.header, error)) {
-        refuse(file, fmt::format("its header {} is not there: put that file beside it", source.header.string()));
+        refuse(file, "its header {} is not there: put that file beside it", source.header.string());
     }
     const NiftiHeader header = readNiftiHeader(source.header);
     source.size = sizeOf(file, header, source);

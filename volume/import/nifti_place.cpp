@@ -57,7 +57,7 @@ double unitOf(const std::filesystem::path& file, const NiftiHeader& header)
         case 3:
             return 1e-6;
         default:
-            refuse(file, fmt::format("xyzt_units = {}: the unit of length is unknown, save it again", header.units()));
+            refuse(file, "xyzt_units = {}: the unit of length is unknown, save it again", header.units());
     }
 }
 
@@ -115,9 +115,8 @@ void placeNifti(const NiftiHeader& header, Source& source)
         // The format allows no negative edge, and readers differ in what they make of one: a mirrored axis, or none.
         for (const std::size_t k : {1, 2, 3}) {
             if (header.pixdim(k) < 0) {
-                refuse(source.header,
-                       fmt::format("pixdim[{}] = {:g}: it is not known which way this axis runs, save it again", k,
-                                   header.pixdim(k)));
+                refuse(source.header, "pixdim[{}] = {:g}: it is not known which way this axis runs, save it again", k,
+                       header.pixdim(k));
             }
         }
         source.affine = q;

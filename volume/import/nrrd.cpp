@@ -1,7 +1,7 @@
 #include <volume/import/header_text.h>
 #include <volume/import/nrrd.h>
 
-#include <cmath>
+#include <algorithm>
 #include <fstream>
 
 namespace palpate::volume {
@@ -16,9 +16,7 @@ NrrdHeader readNrrdHeader(const std::filesystem::path& file)
     header.file = file;
     std::string line;
     std::getline(in, line);
-    if (line.rfind("NRRD000", 0) != 0) {
-        refuse(file, "is not a NRRD file, it does not begin with NRRD000: save it again");
-    }
+    refuseIf(line.rfind("NRRD000", 0) != 0, file, "is not a NRRD file, it does not begin with NRRD000: save it again");
     header.end = line.size() + 1;
     bool open = true;
     while (open && std::getline(in, line) && header.end < longest) {
@@ -34,9 +32,8 @@ NrrdHeader readNrrdHeader(const std::filesystem::path& file)
             header.pairs[text.substr(0, pair)] = text.substr(pair + 2);
         } else if (colon != std::string::npos) {
             const std::string name = lowerCase(text.substr(0, colon));
-            if (!header.fields.emplace(name, trimmed(text.substr(colon + 2))).second) {
-                refuse(file, fmt::format("its header gives '{}' twice: save it again", name));
-            }
+            refuseIf(!header.fields.emplace(name, trimmed(text.substr(colon + 2))).second, file,
+                     "its header gives '{}' twice: save it again", name);
         }
         // Data files can be listed behind this field; none of that is read.
         open = open && !(header.field("data file", header.field("datafile")).rfind("LIST", 0) == 0);
@@ -46,51 +43,22 @@ NrrdHeader readNrrdHeader(const std::filesystem::path& file)
 
 Component nrrdComponent(const std::filesystem::path& file, const std::string& type)
 {
-    static const std::map<std::string, Component> types = {{"signed char", Component::i8},
-                                                           {"int8", Component::i8},
-                                                           {"int8_t", Component::i8},
-                                                           {"uchar", Component::u8},
-                                                           {"unsigned char", Component::u8},
-                                                           {"uint8", Component::u8},
-                                                           {"uint8_t", Component::u8},
-                                                           {"short", Component::i16},
-                                                           {"short int", Component::i16},
-                                                           {"signed short", Component::i16},
-                                                           {"signed short int", Component::i16},
-                                                           {"int16", Component::i16},
-                                                           {"int16_t", Component::i16},
-                                                           {"ushort", Component::u16},
-                                                           {"unsigned short", Component::u16},
-                                                           {"unsigned short int", Component::u16},
-                                                           {"uint16", Component::u16},
-                                                           {"uint16_t", Component::u16},
-                                                           {"int", Component::i32},
-                                                           {"signed int", Component::i32},
-                                                           {"int32", Component::i32},
-                                                           {"int32_t", Component::i32},
-                                                           {"uint", Component::u32},
-                                                           {"unsigned int", Component::u32},
-                                                           {"uint32", Component::u32},
-                                                           {"uint32_t", Component::u32},
-                                                           {"longlong", Component::i64},
-                                                           {"long long", Component::i64},
-                                                           {"long long int", Component::i64},
-                                                           {"signed long long", Component::i64},
-                                                           {"signed long long int", Component::i64},
-                                                           {"int64", Component::i64},
-                                                           {"int64_t", Component::i64},
-                                                           {"ulonglong", Component::u64},
-                                                           {"unsigned long long", Component::u64},
-                                                           {"unsigned long long int", Component::u64},
-                                                           {"uint64", Component::u64},
-                                                           {"uint64_t", Component::u64},
-                                                           {"float", Component::f32},
-                                                           {"double", Component::f64}};
-    const auto found = types.find(lowerCase(type));
-    if (found == types.end()) {
-        refuse(file, fmt::format("type: '{}' is not read: save it with whole or floating-point numbers", type));
-    }
-    return found->second;
+    static const std::vector<std::pair<Component, std::vector<std::string>>> types{
+        {Component::i8, {"signed char", "int8", "int8_t"}},
+        {Component::u8, {"uchar", "unsigned char", "uint8", "uint8_t"}},
+        {Component::i16, {"short", "short int", "signed short", "signed short int", "int16", "int16_t"}},
+        {Component::u16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
+        {Component::i32, {"int", "signed int", "int32", "int32_t"}},
+        {Component::u32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+        {Component::i64,
+         {"longlong", "long long", "long long int", "signed long long", "signed long long int", "int64", "int64_t"}},
+        {Component::u64, {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
+        {Component::f32, {"float"}},
+        {Component::f64, {"double"}}};
+    const std::string name = lowerCase(type);
+    const auto found = std::ranges::find_if(types, [&](const auto& t) { return std::ranges::count(t.second, name) > 0; });
+    refuseIf(found == types.end(), file, "type: '{}' is not read: save it with whole or floating-point numbers", type);
+    return found->first;
 }
 
 Encoding encodingNamed(const std::filesystem::path& file, const std::string& name)
@@ -100,9 +68,7 @@ Encoding encodingNamed(const std::filesystem::path& file, const std::string& nam
         {"bzip2", Encoding::bzip2}, {"bz2", Encoding::bzip2},    {"ascii", Encoding::text},
         {"text", Encoding::text},   {"txt", Encoding::text},     {"hex", Encoding::hex}};
     const auto found = encodings.find(lowerCase(name));
-    if (found == encodings.end()) {
-        refuse(file, fmt::format("encoding: '{}' is not read: save it with raw or gzip encoding", name));
-    }
+    refuseIf(found == encodings.end(), file, "encoding: '{}' is not read: save it with raw or gzip encoding", name);
     return found->second;
 }
 
@@ -121,9 +87,8 @@ std::uint64_t skipLines(const std::filesystem::path& file, std::uint64_t offset,
 void locateData(const NrrdHeader& header, Source& source)
 {
     const std::string name = header.field("data file", header.field("datafile"));
-    if (name.rfind("LIST", 0) == 0 || name.find('%') != std::string::npos) {
-        refuse(source.header, "its slices lie in one file each: save it as one file");
-    }
+    refuseIf(name.rfind("LIST", 0) == 0 || name.find('%') != std::string::npos, source.header,
+             "its slices lie in one file each: save it as one file");
     source.data = name.empty() ? source.header : besides(source.header, name, source.warnings);
     source.offset = name.empty() ? header.end : 0;
     source.encoding = encodingNamed(source.header, header.field("encoding"));
@@ -131,10 +96,8 @@ void locateData(const NrrdHeader& header, Source& source)
         integer(source.header, "line skip", header.field("line skip", header.field("lineskip", "0")));
     const std::int64_t bytes =
         integer(source.header, "byte skip", header.field("byte skip", header.field("byteskip", "0")));
-    if (bytes < -1 || lines < 0) {
-        refuse(source.header,
-               fmt::format("byte skip: {}, line skip: {}: only -1 or more is allowed, save it again", bytes, lines));
-    }
+    refuseIf(bytes < -1 || lines < 0, source.header,
+             "byte skip: {}, line skip: {}: only -1 or more is allowed, save it again", bytes, lines);
     source.offset = skipLines(source.data, source.offset, lines);
     source.fromEnd = bytes == -1;
     // In packed data the bytes are those of what is unpacked.
@@ -150,11 +113,9 @@ void judgePacking(Source& source)
     if (source.encoding == there || (!packed(source.encoding) && !packed(there))) {
         return;
     }
-    if (packed(source.encoding)) {
-        refuse(source.header,
-               fmt::format("encoding: {}, but the data are not compressed in that way: its header is wrong, save it again",
-                           source.encoding == Encoding::deflate ? "gzip" : "bzip2"));
-    }
+    refuseIf(packed(source.encoding), source.header,
+             "encoding: {}, but the data are not compressed in that way: its header is wrong, save it again",
+             source.encoding == Encoding::deflate ? "gzip" : "bzip2");
     const std::uint64_t wanted = source.elements() * bytesOf(source.component);
     if (source.encoding == Encoding::raw && there == Encoding::deflate && source.data.extension() == ".gz") {
         source.encoding = there;

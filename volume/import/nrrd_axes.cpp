@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <volume/import/header_text.h>
 #include <volume/import/nrrd.h>
 
@@ -45,10 +46,8 @@ Vec3 vector3(const std::filesystem::path& file, const std::string& what, const s
     std::replace_if(
         inside.begin(), inside.end(), [](char c) { return c == '(' || c == ')' || c == ','; }, ' ');
     const std::vector<double> v = numbers(file, what, inside);
-    if (v.size() != 3) {
-        refuse(file, fmt::format("{}: {} has {} numbers, but space has 3: its header is wrong, save it again", what,
-                                 entry.substr(0, 60), v.size()));
-    }
+    refuseIf(v.size() != 3, file, "{}: {} has {} numbers, but space has 3: its header is wrong, save it again", what,
+             entry.substr(0, 60), v.size());
     return {v[0], v[1], v[2]};
 }
 
@@ -56,10 +55,8 @@ Vec3 vector3(const std::filesystem::path& file, const std::string& what, const s
 std::vector<std::string> perAxis(const NrrdHeader& header, const std::string& name, std::size_t axes)
 {
     const std::vector<std::string> found = entries(header.field(name));
-    if (!found.empty() && found.size() != axes) {
-        refuse(header.file, fmt::format("{}: has {} entries for {} axes: its header contradicts itself, save it again",
-                                        name, found.size(), axes));
-    }
+    refuseIf(!found.empty() && found.size() != axes, header.file,
+             "{}: has {} entries for {} axes: its header contradicts itself, save it again", name, found.size(), axes);
     return found;
 }
 
@@ -67,8 +64,8 @@ std::vector<Axis> axesOf(const NrrdHeader& header)
 {
     const std::vector<std::int64_t> sizes = integers(header.file, "sizes", header.field("sizes"));
     if (integer(header.file, "dimension", header.field("dimension")) != static_cast<std::int64_t>(sizes.size())) {
-        refuse(header.file, fmt::format("dimension: {} but sizes: {}: its header contradicts itself, save it again",
-                                        header.field("dimension"), header.field("sizes")));
+        refuse(header.file, "dimension: {} but sizes: {}: its header contradicts itself, save it again",
+               header.field("dimension"), header.field("sizes"));
     }
     const auto kinds = perAxis(header, "kinds", sizes.size());
     const auto directions = perAxis(header, "space directions", sizes.size());
@@ -123,9 +120,8 @@ double unitOf(const NrrdHeader& header)
     for (std::string unit; in >> unit;) {
         const auto found = known.find(unit);
         if (found == known.end() || (all > 0 && all != found->second)) {
-            refuse(header.file,
-                   fmt::format("space units: {}: only one of mm, um, cm and m for all axes is understood, save it in mm",
-                               header.field("space units").substr(0, 60)));
+            refuse(header.file, "space units: {}: only one of mm, um, cm and m for all axes is understood, save it in mm",
+                   header.field("space units").substr(0, 60));
         }
         all = found->second;
     }
@@ -161,9 +157,9 @@ void findLayers(const NrrdHeader& header, const std::vector<Axis>& axes, const s
         }
         if (axes[i].size < 1 || axes[i].size > 32767 || source.layers > 1 || source.volumes > 1) {
             refuse(header.file,
-                   fmt::format("sizes: {} (kinds: {}): one axis beside those of space is read, of at most 32767 volumes: "
-                               "save one volume of it",
-                               header.field("sizes"), header.field("kinds", "not given").substr(0, 80)));
+                   "sizes: {} (kinds: {}): one axis beside those of space is read, of at most 32767 volumes: "
+                   "save one volume of it",
+                   header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
         }
         source.dimensions =
             fmt::format("sizes: {}; kinds: {}", header.field("sizes"), header.field("kinds", "not given").substr(0, 80));
@@ -179,10 +175,7 @@ void placeNrrd(const NrrdHeader& header, Source& source)
 {
     const std::vector<Axis> axes = axesOf(header);
     const std::vector<std::size_t> space = spaceAxes(axes);
-    std::vector<std::int64_t> sizes;
-    for (const std::size_t i : space) {
-        sizes.push_back(axes[i].size);
-    }
+    const auto sizes = base::mapped<std::int64_t>(space, [&](const std::size_t i) { return axes[i].size; });
     source.size = checkedSize(header.file, sizes);
     findLayers(header, axes, space, source);
 
@@ -225,9 +218,8 @@ std::vector<SegmentName> slicerSegments(const NrrdHeader& header)
         const auto whole = [&](const char* what, std::int64_t fallback) {
             const auto text = header.pair(key + what);
             const std::int64_t value = text ? integer(header.file, key + what, *text) : fallback;
-            if (value < 0 || value > 65535) {
-                refuse(header.file, fmt::format("{}{} = {}: it must be 0 to 65535, save it again", key, what, value));
-            }
+            refuseIf(value < 0 || value > 65535, header.file, "{}{} = {}: it must be 0 to 65535, save it again", key, what,
+                     value);
             return value;
         };
         SegmentName segment;

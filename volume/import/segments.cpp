@@ -1,3 +1,4 @@
+#include <base/mapped.h>
 #include <volume/import/label_sink.h>
 #include <volume/import/segments.h>
 
@@ -16,11 +17,7 @@ constexpr std::size_t maxSegmentsNamed = 12;  // in a list of names
 
 std::vector<std::string> namesOf(const std::vector<Segment>& segments)
 {
-    std::vector<std::string> names;
-    for (const Segment& s : segments) {
-        names.push_back(s.label.name);
-    }
-    return names;
+    return base::mapped<std::string>(segments, [&](const Segment& s) { return s.label.name; });
 }
 
 // Indices of segments, the winner of all first.
@@ -47,8 +44,8 @@ std::vector<std::size_t> winnersFirst(const std::filesystem::path& file, const s
         const auto found =
             std::find_if(order.begin(), order.end(), [&](std::size_t i) { return segments[i].label.name == name; });
         if (found == order.end()) {
-            refuse(file, fmt::format("--overlap names '{}', which is no segment of it: it has {}", name,
-                                     fmt::join(namesOf(segments), ", ")));
+            refuse(file, "--overlap names '{}', which is no segment of it: it has {}", name,
+                   fmt::join(namesOf(segments), ", "));
         }
         std::rotate(order.begin(), found, found + 1);
     }
@@ -68,9 +65,7 @@ void makeUnique(const std::filesystem::path& file, std::vector<Segment>& segment
         if (taken.insert(s.label.value).second) {
             continue;
         }
-        if (++highest > 65535) {
-            refuse(file, "its segments need label values over 65535: save it with fewer");
-        }
+        refuseIf(++highest > 65535, file, "its segments need label values over 65535: save it with fewer");
         changed.push_back(fmt::format("segment '{}' has label value {}, which is taken: it gets {}", s.label.name,
                                       s.label.value, highest));
         s.label.value = static_cast<std::uint16_t>(highest);
@@ -113,9 +108,7 @@ void flatten(const std::filesystem::path& file, std::vector<Segment> segments, c
         }
         return s.voxels == 0;
     });
-    if (segments.empty()) {
-        refuse(file, "no voxel is set in any of its segments: give a segmentation that holds something");
-    }
+    refuseIf(segments.empty(), file, "no voxel is set in any of its segments: give a segmentation that holds something");
     if (!empty.empty()) {
         const std::size_t all = empty.size();
         empty.resize(std::min(all, maxSegmentsNamed));
@@ -149,11 +142,9 @@ std::vector<Segment> layeredSegments(const Source& source, const ImportOptions& 
         segments.push_back({std::move(label), {}, 0});
     };
     for (const SegmentName& s : source.segments) {
-        if (s.layer >= source.layers) {
-            refuse(source.header,
-                   fmt::format("segment '{}' is said to be in layer {}, but there are {} layers: save it again",
-                               s.label.name, s.layer, source.layers));
-        }
+        refuseIf(s.layer >= source.layers, source.header,
+                 "segment '{}' is said to be in layer {}, but there are {} layers: save it again", s.label.name, s.layer,
+                 source.layers);
         append(s.label, s.layer, s.label.value);
     }
     constexpr std::size_t most = 4096;  // segments
@@ -171,12 +162,10 @@ std::vector<Segment> layeredSegments(const Source& source, const ImportOptions& 
             if (index.count({layer, value}) == 0) {
                 append({value, fmt::format("layer {} value {}", layer, value), ""}, layer, value);
             }
-            if (segments.size() > most) {
-                refuse(source.header,
-                       fmt::format("has more than {} segments, so it is an image: give the segmentation that "
-                                   "was made of it",
-                                   most));
-            }
+            refuseIf(segments.size() > most, source.header,
+                     "has more than {} segments, so it is an image: give the segmentation that "
+                     "was made of it",
+                     most);
             segments[index.at({layer, value})].add(static_cast<std::uint32_t>(voxel));
         }
     });

@@ -17,6 +17,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 // Inside volume/import/ only: what the readers of the formats with a header and one stream of voxels agree on.
@@ -87,9 +88,21 @@ void checkBytes(Source& source);
 void decode(const Source& source, const std::function<void(double)>& progress,
             const std::function<void(std::span<const double>)>& sink);
 
-[[noreturn]] inline void refuse(const std::filesystem::path& file, const std::string& why)
+/// Throws std::runtime_error with the file's name and why it is not read, a format with its values.
+template <typename... Values>
+[[noreturn]] void refuse(const std::filesystem::path& file, fmt::format_string<Values...> why, Values&&... values)
 {
-    throw std::runtime_error(printable(fmt::format("{}: {}", file.string(), why)));
+    throw std::runtime_error(
+        printable(fmt::format("{}: {}", file.native(), fmt::format(why, std::forward<Values>(values)...))));
+}
+
+/// The same if `wrong`. The values are evaluated in any case: name only such as can be.
+template <typename... Values>
+void refuseIf(bool wrong, const std::filesystem::path& file, fmt::format_string<Values...> why, Values&&... values)
+{
+    if (wrong) {
+        refuse(file, why, std::forward<Values>(values)...);
+    }
 }
 
 /// The three sizes of a header, each in 1..32767 and not too many voxels, so that nothing absurd is allocated.

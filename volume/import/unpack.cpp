@@ -1,5 +1,7 @@
 #include <volume/import/unpack.h>
 
+#include <base/error.h>
+
 #include <bzlib.h>
 #include <fmt/format.h>
 #include <zlib.h>
@@ -10,7 +12,6 @@
 #include <cstring>
 #include <fstream>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -25,9 +26,7 @@ constexpr std::size_t chunk = std::size_t{1} << 18;
 std::ifstream openAt(const std::filesystem::path& file, std::uint64_t offset)
 {
     std::ifstream in(file, std::ios::binary);
-    if (!in) {
-        throw std::runtime_error(fmt::format("{}: cannot be opened: check the name and the permissions", file.string()));
-    }
+    base::failIf(!in, "{}: cannot be opened: check the name and the permissions", file.native());
     in.seekg(static_cast<std::streamoff>(offset));
     return in;
 }
@@ -40,68 +39,41 @@ std::size_t fill(std::ifstream& in, std::vector<std::byte>& buffer)
 
 [[noreturn]] void damaged(const std::filesystem::path& file, const std::string& why)
 {
-    throw std::runtime_error(
-        fmt::format("{}: its compressed data are damaged ({}): get the file again", file.string(), why));
-}
-
-[[noreturn]] void cutShort(const std::filesystem::path& file)
-{
-    throw std::runtime_error(
-        fmt::format("{}: its compressed data end too early: the file is cut short, get it again", file.string()));
+    throw base::error("{}: its compressed data are damaged ({}): get the file again", file.string(), why);
 }
 
 // zlib's inflater; 47 makes it accept gzip and zlib streams.
 class Inflater {
 public:
-    Inflater()
-    {
-        if (inflateInit2(&stream_, 47) != Z_OK) {
-            throw std::runtime_error("zlib cannot start: out of memory");
-        }
-    }
+    Inflater() { base::failIf(inflateInit2(&stream_, 47) != Z_OK, "zlib cannot start: out of memory"); }
     ~Inflater() { inflateEnd(&stream_); }
     Inflater(const Inflater&) = delete;
     Inflater& operator=(const Inflater&) = delete;
 
-    z_stream& stream() { return stream_; }
+    void take(std::span<std::byte> packed)
+    {
+        stream_.next_in = reinterpret_cast<Bytef*>(packed.data());
+        stream_.avail_in = static_cast<uInt>(packed.size());
+    }
+    std::size_t left() const { return stream_.avail_in; }
+    /// Goes on with a further member of a gzip file; false where none begins.
+    bool restart() { return *stream_.next_in == 0x1f && inflateReset(&stream_) == Z_OK; }
+    /// Returns what remains free of `plain`.
+    std::size_t decode(const std::filesystem::path& file, std::span<std::byte> plain, bool& ended)
+    {
+        stream_.next_out = reinterpret_cast<Bytef*>(plain.data());
+        stream_.avail_out = static_cast<uInt>(plain.size());
+        const int status = inflate(&stream_, Z_NO_FLUSH);
+        if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) {
+            damaged(file, stream_.msg != nullptr ? stream_.msg : "zlib error");
+        }
+        ended = status == Z_STREAM_END;
+        return stream_.avail_out;
+    }
 
 private:
     z_stream stream_{};
 };
-
-void inflateAll(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
-{
-    Inflater inflater;
-    z_stream& z = inflater.stream();
-    std::vector<std::byte> packed(chunk);
-    std::vector<std::byte> plain(4 * chunk);
-    bool ended = false;
-    while (const std::size_t count = fill(in, packed)) {
-        z.next_in = reinterpret_cast<Bytef*>(packed.data());
-        z.avail_in = static_cast<uInt>(count);
-        z.avail_out = 1;
-        // A full buffer may mean that there is more to come of what is read already.
-        while (z.avail_in > 0 || (z.avail_out == 0 && !ended)) {
-            // A gzip file may hold several members, one after another; anything else behind the end is padding.
-            if (ended && (*z.next_in != 0x1f || inflateReset(&z) != Z_OK)) {
-                return;
-            }
-            z.next_out = reinterpret_cast<Bytef*>(plain.data());
-            z.avail_out = static_cast<uInt>(plain.size());
-            const int status = inflate(&z, Z_NO_FLUSH);
-            if (status != Z_OK && status != Z_STREAM_END && status != Z_BUF_ERROR) {
-                damaged(file, z.msg != nullptr ? z.msg : "zlib error");
-            }
-            ended = status == Z_STREAM_END;
-            if (!sink({plain.data(), plain.size() - z.avail_out})) {
-                return;
-            }
-        }
-    }
-    if (!ended) {
-        cutShort(file);
-    }
-}
 
 class Bunzipper {
 public:
@@ -110,7 +82,12 @@ public:
     Bunzipper(const Bunzipper&) = delete;
     Bunzipper& operator=(const Bunzipper&) = delete;
 
-    bz_stream& stream() { return stream_; }
+    void take(std::span<std::byte> packed)
+    {
+        stream_.next_in = reinterpret_cast<char*>(packed.data());
+        stream_.avail_in = static_cast<unsigned>(packed.size());
+    }
+    std::size_t left() const { return stream_.avail_in; }
     /// Goes on with a further stream; false where none begins.
     bool restart()
     {
@@ -125,47 +102,45 @@ public:
         stream_.avail_in = rest.avail_in;
         return true;
     }
+    std::size_t decode(const std::filesystem::path& file, std::span<std::byte> plain, bool& ended)
+    {
+        stream_.next_out = reinterpret_cast<char*>(plain.data());
+        stream_.avail_out = static_cast<unsigned>(plain.size());
+        const int status = BZ2_bzDecompress(&stream_);
+        if (status != BZ_OK && status != BZ_STREAM_END) {
+            damaged(file, fmt::format("bzip2 error {}", status));
+        }
+        ended = status == BZ_STREAM_END;
+        return stream_.avail_out;
+    }
 
 private:
-    void start()
-    {
-        if (BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK) {
-            throw std::runtime_error("bzip2 cannot start: out of memory");
-        }
-    }
+    void start() { base::failIf(BZ2_bzDecompressInit(&stream_, 0, 0) != BZ_OK, "bzip2 cannot start: out of memory"); }
     bz_stream stream_{};
 };
 
-void bunzipAll(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
+template <class Decoder>
+void decodeAll(const std::filesystem::path& file, std::ifstream& in, const Sink& sink)
 {
-    Bunzipper bunzipper;
-    std::vector<std::byte> packed(chunk);
-    std::vector<std::byte> plain(4 * chunk);
+    Decoder decoder;
+    std::vector<std::byte> packed(chunk), plain(4 * chunk);
     bool ended = false;
     while (const std::size_t count = fill(in, packed)) {
-        bunzipper.stream().next_in = reinterpret_cast<char*>(packed.data());
-        bunzipper.stream().avail_in = static_cast<unsigned>(count);
-        bunzipper.stream().avail_out = 1;
-        while (bunzipper.stream().avail_in > 0 || (bunzipper.stream().avail_out == 0 && !ended)) {
-            if (ended && !bunzipper.restart()) {
-                return;  // padding behind the end
+        decoder.take({packed.data(), count});
+        std::size_t room = 1;
+        // A full buffer may mean that there is more to come of what is read already.
+        while (decoder.left() > 0 || (room == 0 && !ended)) {
+            // A file may hold several streams, one after another; anything else behind the end is padding.
+            if (ended && !decoder.restart()) {
+                return;
             }
-            bz_stream& b = bunzipper.stream();
-            b.next_out = reinterpret_cast<char*>(plain.data());
-            b.avail_out = static_cast<unsigned>(plain.size());
-            const int status = BZ2_bzDecompress(&b);
-            if (status != BZ_OK && status != BZ_STREAM_END) {
-                damaged(file, fmt::format("bzip2 error {}", status));
-            }
-            ended = status == BZ_STREAM_END;
-            if (!sink({plain.data(), plain.size() - b.avail_out})) {
+            room = decoder.decode(file, plain, ended);
+            if (!sink({plain.data(), plain.size() - room})) {
                 return;
             }
         }
     }
-    if (!ended) {
-        cutShort(file);
-    }
+    base::failIf(!ended, "{}: its compressed data end too early: the file is cut short, get it again", file.native());
 }
 
 // One number of a text; NaN is one, a word is not.
@@ -178,9 +153,8 @@ double number(const std::filesystem::path& file, const std::string& token)
         return std::numeric_limits<double>::infinity();
     }
     if (error != std::errc() || end != token.data() + token.size()) {
-        throw std::runtime_error(
-            fmt::format("{}: its voxels are text, but '{}' is no number: save it again with gzip encoding", file.string(),
-                        token.substr(0, 20)));
+        throw base::error("{}: its voxels are text, but '{}' is no number: save it again with gzip encoding", file.string(),
+                          token.substr(0, 20));
     }
     return value;
 }
@@ -238,12 +212,10 @@ void readHex(const std::filesystem::path& file, std::ifstream& in, const Sink& s
                 continue;
             }
             const int digit = hexDigit(c);
-            if (digit < 0) {
-                throw std::runtime_error(fmt::format(
-                    "{}: its voxels are hexadecimal digits, but there is a character with code {} among them: save "
-                    "it again with gzip encoding",
-                    file.string(), static_cast<int>(static_cast<unsigned char>(c))));
-            }
+            base::failIf(digit < 0,
+                         "{}: its voxels are hexadecimal digits, but there is a character with code {} among them: save "
+                         "it again with gzip encoding",
+                         file.native(), static_cast<int>(static_cast<unsigned char>(c)));
             if (high < 0) {
                 high = digit;
             } else {
@@ -281,9 +253,9 @@ void unpack(const std::filesystem::path& file, std::uint64_t offset, Encoding en
     std::ifstream in = openAt(file, offset);
     switch (encoding) {
         case Encoding::deflate:
-            return inflateAll(file, in, sink);
+            return decodeAll<Inflater>(file, in, sink);
         case Encoding::bzip2:
-            return bunzipAll(file, in, sink);
+            return decodeAll<Bunzipper>(file, in, sink);
         case Encoding::text:
             return readText(file, in, sink);
         case Encoding::hex:

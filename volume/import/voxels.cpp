@@ -67,18 +67,13 @@ void append(Component component, std::span<const std::byte> bytes, bool turned, 
 Index3 checkedSize(const std::filesystem::path& file, const std::vector<std::int64_t>& sizes)
 {
     const std::string text = fmt::format("{}", fmt::join(sizes, " x "));
-    if (sizes.size() > 3) {
-        refuse(file, fmt::format("has {} dimensions ({}): save one volume of it", sizes.size(), text));
-    }
-    if (sizes.size() < 3) {
-        refuse(file, fmt::format("has {} dimensions ({}): a volume has 3, give one", sizes.size(), text));
-    }
+    refuseIf(sizes.size() > 3, file, "has {} dimensions ({}): save one volume of it", sizes.size(), text);
+    refuseIf(sizes.size() < 3, file, "has {} dimensions ({}): a volume has 3, give one", sizes.size(), text);
     if (std::any_of(sizes.begin(), sizes.end(), [](std::int64_t n) { return n < 1 || n > 32767; })) {
-        refuse(file, fmt::format("its size is {}: each side must be 1 to 32767 voxels, save it again", text));
+        refuse(file, "its size is {}: each side must be 1 to 32767 voxels, save it again", text);
     }
-    if (static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]) > maxVoxels) {
-        refuse(file, fmt::format("its size is {}: more than {} voxels are not read, crop or resample it", text, maxVoxels));
-    }
+    refuseIf(static_cast<std::uint64_t>(sizes[0] * sizes[1] * sizes[2]) > maxVoxels, file,
+             "its size is {}: more than {} voxels are not read, crop or resample it", text, maxVoxels);
     return {static_cast<int>(sizes[0]), static_cast<int>(sizes[1]), static_cast<int>(sizes[2])};
 }
 
@@ -105,18 +100,15 @@ void checkBytes(Source& source)
             ? fmt::format("its header promises {} voxels, but there are {} numbers", size, there / width)
             : fmt::format("its header promises {} voxels of {} bytes, {} in all, but there are {}{}", size, width, expected,
                           there > most ? "more than " : "", std::min(there, most));
-    if (there < expected) {
-        refuse(source.header, sizes + ": it is cut short or its header is wrong, get or save it again");
-    }
+    refuseIf(there < expected, source.header, "{}: it is cut short or its header is wrong, get or save it again", sizes);
     if (there - expected <= source.trailer) {
         return;
     }
     // A little padding at the end is harmless; what could be a wrong size, or a header of its own, is not.
     const Index3 n = source.size;
     const auto sheet = static_cast<std::uint64_t>(std::min({n.x * n.y, n.y * n.z, n.x * n.z}));
-    if (there - expected >= std::min(maxPadding, sheet * width)) {
-        refuse(source.header, sizes + ": its header is wrong or the data begin elsewhere, save it again");
-    }
+    refuseIf(there - expected >= std::min(maxPadding, sheet * width), source.header,
+             "{}: its header is wrong or the data begin elsewhere, save it again", sizes);
     if (there > expected) {
         source.warnings.push_back(fmt::format("{} bytes behind the voxels are ignored", there - expected));
     }
@@ -168,29 +160,24 @@ void decode(const Source& source, const std::function<void(double)>& progress,
         }
         return left > 0;
     });
-    if (left > 0) {
-        refuse(source.header, "its data changed while they were read: try again");
-    }
+    refuseIf(left > 0, source.header, "its data changed while they were read: try again");
 }
 
 void checkAffine(const std::filesystem::path& file, const Affine& affine, bool sheared, std::vector<std::string>& warnings)
 {
     const Vec3 spacing = affine.spacing();
     const bool finite = std::isfinite(affine.voxelVolume()) && std::isfinite(glm::dot(affine.origin, Vec3(1.0)));
-    if (!finite || !(spacing.x > 0 && spacing.y > 0 && spacing.z > 0)) {
-        refuse(file, fmt::format("its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again",
-                                 1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
-    }
-    if (std::max({spacing.x, spacing.y, spacing.z}) > maxSpacing ||
-        std::min({spacing.x, spacing.y, spacing.z}) < minSpacing) {
-        refuse(file, fmt::format("its voxels are {} x {} x {} mm: that is no patient, check the units in its header",
-                                 1e3 * spacing.x, 1e3 * spacing.y, 1e3 * spacing.z));
-    }
+    refuseIf(!finite || !(spacing.x > 0 && spacing.y > 0 && spacing.z > 0), file,
+             "its voxels are {} x {} x {} mm: the spacing in its header is wrong, save it again", 1e3 * spacing.x,
+             1e3 * spacing.y, 1e3 * spacing.z);
+    refuseIf(std::max({spacing.x, spacing.y, spacing.z}) > maxSpacing ||
+                 std::min({spacing.x, spacing.y, spacing.z}) < minSpacing,
+             file, "its voxels are {} x {} x {} mm: that is no patient, check the units in its header", 1e3 * spacing.x,
+             1e3 * spacing.y, 1e3 * spacing.z);
     const double shear = shearOf(affine);
     // Three axes can be at wrong angles in pairs too small to see, and still lie in one plane.
-    if (affine.voxelVolume() < 1e-3 * spacing.x * spacing.y * spacing.z) {
-        refuse(file, "its voxel axes lie in one plane: the directions in its header are wrong, save it again");
-    }
+    refuseIf(affine.voxelVolume() < 1e-3 * spacing.x * spacing.y * spacing.z, file,
+             "its voxel axes lie in one plane: the directions in its header are wrong, save it again");
     if (std::sin(shear) <= maxShear) {
         return;
     }
@@ -198,9 +185,7 @@ void checkAffine(const std::filesystem::path& file, const Affine& affine, bool s
         "its voxel axes are sheared by {:.1f} degrees (a tilted gantry, or an affine "
         "registration)",
         shear / degree);
-    if (!sheared) {
-        refuse(file, said + ": give --voxel MM, which resamples it to a straight grid");
-    }
+    refuseIf(!sheared, file, "{}: give --voxel MM, which resamples it to a straight grid", said);
     warnings.push_back(said);
 }
 
@@ -212,9 +197,7 @@ void makeFinite(const std::filesystem::path& file, std::vector<float>& values, s
         bad += std::isfinite(v) ? 0 : 1;
         lowest = std::isfinite(v) ? std::min(lowest, v) : lowest;
     }
-    if (bad == values.size()) {
-        refuse(file, "no voxel is a number: save the image again");
-    }
+    refuseIf(bad == values.size(), file, "no voxel is a number: save the image again");
     if (bad > 0) {
         std::replace_if(
             values.begin(), values.end(), [](float v) { return !std::isfinite(v); }, lowest);

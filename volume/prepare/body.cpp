@@ -1,5 +1,6 @@
 #include <volume/prepare/body.h>
 
+#include <base/error.h>
 #include <volume/clean.h>
 #include <volume/import.h>
 #include <volume/prepare/bone.h>
@@ -14,7 +15,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::prepare {
@@ -102,14 +102,10 @@ public:
 
     std::uint16_t add(const std::string& name, const std::string& tissue)
     {
-        if (!table_.find(tissue)) {
-            throw std::runtime_error(fmt::format("the tissue table '{}' has no '{}', which {} is to be: add one to it",
-                                                 table_.name, tissue, name));
-        }
+        base::failIf(!table_.find(tissue), "the tissue table '{}' has no '{}', which {} is to be: add one to it",
+                     table_.name, tissue, name);
         const auto at = std::find(used_.begin() + 1, used_.end(), false);
-        if (at == used_.end()) {
-            throw std::runtime_error("every label value from 1 to 65535 is in use: save the labels with fewer");
-        }
+        base::failIf(at == used_.end(), "every label value from 1 to 65535 is in use: save the labels with fewer");
         *at = true;
         const auto value = static_cast<std::uint16_t>(at - used_.begin());
         names_.push_back({value, name, tissue});
@@ -128,12 +124,10 @@ private:
 void checkAxes(const LabelImage& image, const char* option)
 {
     constexpr double most = 0.002;  // as formats.md has it [rad]
-    if (volume::shearOf(image.affine) > most) {
-        throw std::runtime_error(
-            fmt::format("{}: the voxels' axes are not at right angles: resample the labels first "
-                        "(import them with --voxel, export them, and import that)",
-                        option));
-    }
+    base::failIf(volume::shearOf(image.affine) > most,
+                 "{}: the voxels' axes are not at right angles: resample the labels first "
+                 "(import them with --voxel, export them, and import that)",
+                 option);
 }
 
 /// What is where in the CT. One step after the other, each on voxels that none before it has taken.
@@ -189,10 +183,8 @@ private:
         const Mask dense = where([&](std::size_t i) { return hu_[i] > airBelow || labels_.labelled(i); });
         Mask core = eroded(grid_, dense, tableSheet);
         const MaskPieces pieces = piecesOf(grid_, core, {});
-        if (pieces.pieces.empty()) {
-            throw std::runtime_error(
-                "--body-from-image: nothing in the image is as dense as a body: is it a CT in Hounsfield units?");
-        }
+        base::failIf(pieces.pieces.empty(),
+                     "--body-from-image: nothing in the image is as dense as a body: is it a CT in Hounsfield units?");
         std::vector<std::uint64_t> labelled(pieces.pieces.size(), 0);
         std::size_t largest = 0;
         for (std::size_t p = 0; p < pieces.pieces.size(); ++p) {
@@ -413,12 +405,10 @@ LabelImage extended(const LabelImage& image, Index3 before, Index3 after, const 
 {
     constexpr double maxVoxels = 4e9;
     const Vec3 size = Vec3(image.size + before + after);
-    if (!(size.x * size.y * size.z < maxVoxels)) {
-        throw std::runtime_error(
-            fmt::format("{}: makes over 4 thousand million voxels: resample the labels to larger "
-                        "ones first, or crop the image",
-                        option));
-    }
+    base::failIf(!(size.x * size.y * size.z < maxVoxels),
+                 "{}: makes over 4 thousand million voxels: resample the labels to larger "
+                 "ones first, or crop the image",
+                 option);
     const LabelImage more = volume::padded(image, glm::max(before, after));
     const Index3 low = glm::max(before, after) - before;
     return volume::cropped(more, low, low + image.size + before + after - 1);
@@ -477,9 +467,7 @@ std::vector<PreparationStep> bodyFromHull(LabelImage& image, std::vector<LabelNa
     for (std::size_t i = 0; i < organs.size(); ++i) {
         organs[i] = labels.labelled(i) ? 1 : 0;
     }
-    if (std::find(organs.begin(), organs.end(), 1) == organs.end()) {
-        throw std::runtime_error(fmt::format("{}: no voxel has a label of tissue", option));
-    }
+    base::failIf(std::find(organs.begin(), organs.end(), 1) == organs.end(), "{}: no voxel has a label of tissue", option);
     Mask hull = dilated(grid, organs, thickness);
     fillHolesBySlices(grid, hull, std::numeric_limits<double>::infinity());
     const Vec3 spacing = image.affine.spacing();

@@ -3,7 +3,6 @@
 #include <volume/label_image.h>
 
 #include <tbb/parallel_for.h>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 

@@ -1,6 +1,8 @@
 #include <volume/prepare/mapping.h>
 #include <volume/prepare/offers.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <datasets/label_map.h>
 
@@ -11,7 +13,6 @@
 #include <cctype>
 #include <optional>
 #include <set>
-#include <stdexcept>
 
 namespace palpate::prepare {
 
@@ -36,11 +37,7 @@ struct Setting {
 
 std::vector<std::string> tissuesOf(const volume::TissueTable& table)
 {
-    std::vector<std::string> names;
-    for (const volume::TissueRow& row : table.rows) {
-        names.push_back(row.name);
-    }
-    return names;
+    return base::mapped<std::string>(table.rows, &volume::TissueRow::name);
 }
 
 // The labels that are there, for a message.
@@ -63,13 +60,12 @@ std::vector<Setting> readSettings(const MappingOptions& options, const volume::T
     std::vector<Setting> settings;
     for (const std::string& text : options.set) {
         const std::size_t at = text.rfind('=');
-        if (at == std::string::npos || at == 0 || at + 1 == text.size()) {
-            throw std::runtime_error(fmt::format("--set {}: must be NAME=TISSUE or VALUE=TISSUE", text));
-        }
+        base::failIf(at == std::string::npos || at == 0 || at + 1 == text.size(),
+                     "--set {}: must be NAME=TISSUE or VALUE=TISSUE", text);
         settings.push_back({text, text.substr(0, at), text.substr(at + 1)});
         if (!table.find(settings.back().tissue)) {
-            throw std::runtime_error(fmt::format("--set {}: '{}' is not in the tissue table '{}'; it has: {}", text,
-                                                 settings.back().tissue, table.name, fmt::join(tissuesOf(table), ", ")));
+            throw base::error("--set {}: '{}' is not in the tissue table '{}'; it has: {}", text, settings.back().tissue,
+                              table.name, fmt::join(tissuesOf(table), ", "));
         }
     }
     return settings;
@@ -99,8 +95,8 @@ public:
         };
         for (const Setting& s : settings_) {
             if (!there(s)) {
-                throw std::runtime_error(fmt::format("--set {}: no voxel has a label of that name or value; there are {}",
-                                                     s.text, listOf(labels, counts)));
+                throw base::error("--set {}: no voxel has a label of that name or value; there are {}", s.text,
+                                  listOf(labels, counts));
             }
         }
         checkSettings(counts);
@@ -162,8 +158,8 @@ private:
                     continue;
                 }
                 if (first != nullptr && first->tissue != s.tissue) {
-                    throw std::runtime_error(fmt::format("--set {} and --set {}: both name label {}: leave one out",
-                                                         first->text, s.text, originalOf(value)));
+                    throw base::error("--set {} and --set {}: both name label {}: leave one out", first->text, s.text,
+                                      originalOf(value));
                 }
                 first = &s;
             }
@@ -210,9 +206,9 @@ private:
             list.resize(maxContradictions);
             list.push_back(fmt::format("and {} more", all - maxContradictions));
         }
-        throw std::runtime_error(fmt::format(
+        throw base::error(
             "{}: --map {} contradicts the names in it: {}: leave out --map, or give that of the program that made it",
-            file.string(), map, fmt::join(list, "; ")));
+            file.string(), map, fmt::join(list, "; "));
     }
 
     void searchByName(const std::string& name, FoundLabel& found) const
@@ -254,11 +250,11 @@ private:
             break;
         }
     }
-    throw std::runtime_error(fmt::format(
+    throw base::error(
         "{}: no tissue is known for {} of its labels: {}: give --map NAME (one that --list-maps lists, or a TOML "
         "file), --names FILE (a colour table or dataset.json), --set NAME=TISSUE, or --default-tissue NAME; "
         "--write-map FILE begins a label map{}",
-        file.string(), unknown.size(), fmt::join(list, ", "), offers(labels, counts)));
+        file.string(), unknown.size(), fmt::join(list, ", "), offers(labels, counts));
 }
 
 // One note for all that happened to several labels, or with --verbose each its own.
@@ -311,8 +307,8 @@ std::vector<LabelName> mapLabels(const MappingOptions& options, const std::files
                                  const volume::TissueTable& table, std::vector<std::string>& notes)
 {
     if (!options.defaultTissue.empty() && !table.find(options.defaultTissue)) {
-        throw std::runtime_error(fmt::format("--default-tissue {}: is not in the tissue table '{}'; it has: {}",
-                                             options.defaultTissue, table.name, fmt::join(tissuesOf(table), ", ")));
+        throw base::error("--default-tissue {}: is not in the tissue table '{}'; it has: {}", options.defaultTissue,
+                          table.name, fmt::join(tissuesOf(table), ", "));
     }
     const Mapper mapper(options, file, labels, counts, table, notes);
     std::vector<LabelName> named;

@@ -1,5 +1,6 @@
 #include <volume/prepare/name_table.h>
 
+#include <base/error.h>
 #include <base/inputs.h>
 
 #include <fmt/format.h>
@@ -9,11 +10,8 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
-#include <map>
 #include <regex>
-#include <set>
 #include <sstream>
-#include <stdexcept>
 
 namespace palpate::prepare {
 
@@ -25,25 +23,18 @@ constexpr std::uintmax_t largestFile = 16U << 20U;
 constexpr std::size_t maxRowsListed = 8;   // labels in a message
 constexpr std::size_t longestLine = 1000;  // std::regex needs a frame of the stack for each character
 
-[[noreturn]] void refuse(const std::filesystem::path& file, const std::string& why)
-{
-    throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
-}
-
 std::string textOf(const std::filesystem::path& file)
 {
     if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        refuse(file, why);
+        throw base::error("{}: {}", file.native(), why);
     }
     std::error_code error;
     if (const auto size = std::filesystem::file_size(file, error); error || size > largestFile) {
-        refuse(file, "over 16 MB, too large for a table of names: is it a volume?");
+        throw base::error("{}: over 16 MB, too large for a table of names: is it a volume?", file.native());
     }
     std::ifstream in(file, std::ios::binary);
     std::string text((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-    if (in.bad() || !in.is_open()) {
-        refuse(file, "cannot be read: check its permissions");
-    }
+    base::failIf(in.bad() || !in.is_open(), "{}: cannot be read: check its permissions", file.native());
     return text;
 }
 
@@ -68,12 +59,11 @@ void readLines(const std::string& text, NameTable& table)
         std::smatch m;
         const bool isShort = line.size() <= longestLine;
         const bool snapped = isShort && std::regex_match(line, m, snap);
-        if (!snapped && !(isShort && std::regex_match(line, m, colours))) {
-            throw std::runtime_error(fmt::format(
-                "{}:{}: neither VALUE NAME R G B A of 3D Slicer and FreeSurfer nor VALUE R G B A VISIBLE MESH \"NAME\" of "
-                "ITK-SNAP nor a dataset.json: name the table that belongs to the labels",
-                table.file.string(), number));
-        }
+        base::failIf(
+            !snapped && !(isShort && std::regex_match(line, m, colours)),
+            "{}:{}: neither VALUE NAME R G B A of 3D Slicer and FreeSurfer nor VALUE R G B A VISIBLE MESH \"NAME\" of "
+            "ITK-SNAP nor a dataset.json: name the table that belongs to the labels",
+            table.file.native(), number);
         const std::size_t red = snapped ? 2 : 3;
         table.kind = snapped ? "ITK-SNAP label description" : "colour table";
         table.entries.push_back(
@@ -91,9 +81,8 @@ bool isWhole(const std::string& text)
 void readDataset(const json& root, NameTable& table)
 {
     table.kind = "dataset.json";
-    if (!root.is_object() || !root.contains("labels") || !root.at("labels").is_object()) {
-        refuse(table.file, "is JSON without \"labels\": name the dataset.json of the data set");
-    }
+    base::failIf(!root.is_object() || !root.contains("labels") || !root.at("labels").is_object(),
+                 "{}: is JSON without \"labels\": name the dataset.json of the data set", table.file.native());
     for (const auto& [key, value] : root.at("labels").items()) {
         const bool single = value.is_array() && value.size() == 1 && value[0].is_number_integer();
         if (value.is_string() && isWhole(key)) {
@@ -103,7 +92,8 @@ void readDataset(const json& root, NameTable& table)
         } else if (value.is_array()) {
             table.regions.push_back(key);
         } else {
-            refuse(table.file, fmt::format("labels: \"{}\" is neither {{\"1\": \"liver\"}} nor {{\"liver\": 1}}", key));
+            throw base::error("{}: labels: \"{}\" is neither {{\"1\": \"liver\"}} nor {{\"liver\": 1}}",
+                              table.file.native(), key);
         }
     }
 }
@@ -113,7 +103,7 @@ json jsonOf(const std::filesystem::path& file, const std::string& text)
     try {
         return json::parse(text);
     } catch (const json::exception& e) {
-        refuse(file, fmt::format("is not JSON ({}): get it again", e.what()));
+        throw base::error("{}: is not JSON ({}): get it again", file.native(), e.what());
     }
 }
 
@@ -165,7 +155,8 @@ const NameTable::Entry* entryOf(const NameTable& table, std::int64_t value)
             continue;
         }
         if (found != nullptr && !sameName(found->name, e.name)) {
-            refuse(table.file, fmt::format("calls label {} both '{}' and '{}': remove one", value, found->name, e.name));
+            throw base::error("{}: calls label {} both '{}' and '{}': remove one", table.file.native(), value, found->name,
+                              e.name);
         }
         found = &e;
     }
@@ -200,13 +191,13 @@ void apply(const NameTable& table, const std::filesystem::path& file, const Labe
         ++given;
     }
     if (!contradictions.empty()) {
-        refuse(file,
-               fmt::format("the names in {} contradict those in the file: {}: leave the table out, or name the right one",
-                           table.file.string(), joined(contradictions)));
+        throw base::error(
+            "{}: the names in {} contradict those in the file: {}: leave the table out, or name the right one",
+            file.native(), table.file.string(), joined(contradictions));
     }
     if (given == 0) {
-        refuse(table.file, fmt::format("names none of the labels of {} ({}): is it the table of another file?",
-                                       file.filename().string(), joined(missing)));
+        throw base::error("{}: names none of the labels of {} ({}): is it the table of another file?", table.file.native(),
+                          file.filename().string(), joined(missing));
     }
     if (!missing.empty()) {
         labels.warnings.push_back(fmt::format("{} has no name for {} of the labels: {}", table.file.filename().string(),
@@ -230,9 +221,8 @@ NameTable readNameTable(const std::filesystem::path& file)
     } else {
         readLines(text, table);
     }
-    if (table.entries.empty()) {
-        refuse(file, "holds no names of labels: name the table that belongs to the labels");
-    }
+    base::failIf(table.entries.empty(), "{}: holds no names of labels: name the table that belongs to the labels",
+                 file.native());
     return table;
 }
 

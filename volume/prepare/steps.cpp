@@ -1,5 +1,6 @@
 #include <volume/prepare/steps.h>
 
+#include <base/error.h>
 #include <base/split.h>
 #include <volume/clean.h>
 #include <volume/resample.h>
@@ -12,9 +13,7 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace palpate::prepare {
 
@@ -83,10 +82,8 @@ private:
             made = made || n.tissue == wanted;
             all.push_back(n.name);
         }
-        if (!named && !made) {
-            throw std::runtime_error(fmt::format("{} {}: there is no structure or tissue of this name; there are {}",
-                                                 option, wanted, fmt::join(all, ", ")));
-        }
+        base::failIf(!named && !made, "{} {}: there is no structure or tissue of this name; there are {}", option, wanted,
+                     fmt::join(all, ", "));
         return named ? byName : byTissue;
     }
 
@@ -154,10 +151,8 @@ private:
             at = rest + 1;
         }
         const Vec3 low = 1e-3 * Vec3(mm[0], mm[2], mm[4]), high = 1e-3 * Vec3(mm[1], mm[3], mm[5]);
-        if (glm::any(glm::greaterThanEqual(low, high))) {
-            throw std::runtime_error(fmt::format(
-                "--crop {}: must be x0,x1,y0,y1,z0,z1 in mm, each first one less than its second", options_.crop));
-        }
+        base::failIf(glm::any(glm::greaterThanEqual(low, high)),
+                     "--crop {}: must be x0,x1,y0,y1,z0,z1 in mm, each first one less than its second", options_.crop);
         Vec3 first(std::numeric_limits<double>::max()), last(std::numeric_limits<double>::lowest());
         for (int corner = 0; corner < 8; ++corner) {
             const Vec3 n =
@@ -199,7 +194,7 @@ private:
         }
         const Index3 low = glm::max(box->first, Index3(0)), high = glm::min(box->second, image_.size - 1);
         if (glm::any(glm::lessThan(high, low))) {
-            throw std::runtime_error(fmt::format("--crop {}: no voxel lies there; {}", options_.crop, extentText()));
+            throw base::error("--crop {}: no voxel lies there; {}", options_.crop, extentText());
         }
         const std::size_t before = image_.values.size();
         image_ = volume::cropped(image_, low, high);
@@ -212,12 +207,10 @@ private:
     {
         const volume::VoxelGrid grid = volume::isotropicGrid({image_.size, image_.affine}, options_.voxel);
         const double count = static_cast<double>(grid.size.x) * grid.size.y * grid.size.z;
-        if (!(count < maxVoxels)) {
-            throw std::runtime_error(
-                fmt::format("--voxel {:g}mm: makes {} x {} x {} voxels, over 4 thousand million: choose "
-                            "larger ones, or --crop",
-                            1e3 * options_.voxel, grid.size.x, grid.size.y, grid.size.z));
-        }
+        base::failIf(!(count < maxVoxels),
+                     "--voxel {:g}mm: makes {} x {} x {} voxels, over 4 thousand million: choose "
+                     "larger ones, or --crop",
+                     1e3 * options_.voxel, grid.size.x, grid.size.y, grid.size.z);
         volume::ResampledLabels out = volume::resampled(
             image_, grid, [&](double fraction) { tell_(fmt::format("resampling: {:.0f} %", 100 * fraction)); });
         image_ = std::move(out.image);
@@ -261,9 +254,7 @@ private:
     {
         tell_("closing holes in the skin");
         const volume::SkinLabels labels = skin();
-        if (labels.skin == 0) {
-            throw std::runtime_error("--close-skin-holes: nothing in the volume is skin: make one with --add-skin");
-        }
+        base::failIf(labels.skin == 0, "--close-skin-holes: nothing in the volume is skin: make one with --add-skin");
         const volume::ClosedHoles holes = volume::closeSkinHoles(image_, labels, *options_.closeSkinHoles);
         report("close-skin-holes", "", 0,
                fmt::format("{} holes in the skin closed, {:.2g} mm deep; {} left that are over {:g} mm across{}",
@@ -307,9 +298,8 @@ private:
             used[n.value] = true;
         }
         const auto at = std::find(used.begin() + 1, used.end(), false);
-        if (at == used.end()) {
-            throw std::runtime_error("--add-skin: every label value from 1 to 65535 is in use: save the labels with fewer");
-        }
+        base::failIf(at == used.end(),
+                     "--add-skin: every label value from 1 to 65535 is in use: save the labels with fewer");
         return static_cast<std::uint16_t>(at - used.begin());
     }
 
@@ -320,18 +310,16 @@ private:
                 return row.name;
             }
         }
-        throw std::runtime_error(
-            fmt::format("--add-skin: the tissue table '{}' has no tissue of role skin: add one to it", table_.name));
+        throw base::error("--add-skin: the tissue table '{}' has no tissue of role skin: add one to it", table_.name);
     }
 
     void pad()
     {
         const Index3 by(glm::ceil(options_.pad / image_.affine.spacing() - 1e-6));
         const Vec3 size = Vec3(image_.size + 2 * by);
-        if (!(size.x * size.y * size.z < maxVoxels)) {
-            throw std::runtime_error(fmt::format(
-                "--pad {:g}mm: makes over 4 thousand million voxels: choose less, or larger voxels", 1e3 * options_.pad));
-        }
+        base::failIf(!(size.x * size.y * size.z < maxVoxels),
+                     "--pad {:g}mm: makes over 4 thousand million voxels: choose less, or larger voxels",
+                     1e3 * options_.pad);
         const std::size_t before = image_.values.size();
         image_ = volume::padded(image_, by);
         report("pad", "", image_.values.size() - before,

@@ -1,6 +1,7 @@
 #include <volume/prepare/volume_import.h>
 
 #include <base/build.h>
+#include <base/error.h>
 #include <base/quantities.h>
 #include <datasets/label_map.h>
 #include <volume/fnv.h>
@@ -35,17 +36,13 @@ volume::ImportedImage readImage(const ImportRequest& o, std::vector<std::string>
     for (const std::string& warning : image.warnings) {
         notes.push_back(fmt::format("{}: {}", o.image.filename().string(), warning));
     }
-    if (!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit) {
-        throw std::runtime_error(
-            fmt::format("{}: says itself that it is in {}: leave --image-unit out", o.image.string(), image.what));
-    }
+    base::failIf(!o.imageUnit.empty() && !image.what.empty() && image.what != o.imageUnit,
+                 "{}: says itself that it is in {}: leave --image-unit out", o.image.native(), image.what);
     image.what = o.imageUnit.empty() ? image.what : o.imageUnit;
-    if (o.bodyFromImage && image.what != "HU") {
-        throw std::runtime_error(
-            fmt::format("{}: --body-from-image needs CT in Hounsfield units: add --image-unit HU if it "
-                        "is that, or invent a body with --body-from-hull MM",
-                        o.image.string()));
-    }
+    base::failIf(o.bodyFromImage && image.what != "HU",
+                 "{}: --body-from-image needs CT in Hounsfield units: add --image-unit HU if it "
+                 "is that, or invent a body with --body-from-hull MM",
+                 o.image.native());
     return image;
 }
 
@@ -69,10 +66,10 @@ volume::CompanionImage companionOf(const ImportRequest& o, const volume::Importe
         companion.values[i] = std::isnan(companion.values[i]) ? missing : companion.values[i];
     }
     if (2 * bare > labelled) {
-        throw std::runtime_error(
-            fmt::format("{}: it covers less than half of the labelled voxels of {}: give the image that the "
-                        "segmentation was made of, in the same patient frame",
-                        o.image.string(), o.input.filename().string()));
+        throw base::error(
+            "{}: it covers less than half of the labelled voxels of {}: give the image that the "
+            "segmentation was made of, in the same patient frame",
+            o.image.string(), o.input.filename().string());
     }
     if (bare > 0) {
         notes.push_back(fmt::format("{} labelled voxels lie outside the image and have {} there{}", bare, missing,
@@ -179,23 +176,14 @@ void checkRequest(const ImportRequest& o)
     checkLength(padBounds, o.steps.pad);
     checkLength(cropBounds, o.steps.cropMargin);
     checkLength(holesBounds, o.steps.closeSkinHoles.value_or(0.0));
-    if (!o.stiffness.empty() && o.image.empty()) {
-        throw std::runtime_error("--stiffness-from: needs the image: add --image FILE");
-    }
-    if (o.bodyFromImage && o.image.empty()) {
-        throw std::runtime_error("--body-from-image: needs the image: add --image FILE");
-    }
-    if (!o.imageUnit.empty() && o.image.empty()) {
-        throw std::runtime_error("--image-unit: needs the image: add --image FILE");
-    }
-    if (o.imageVolume > 0 && o.image.empty()) {
-        throw std::runtime_error("--image-volume: needs the image: add --image FILE");
-    }
+    base::failIf(!o.stiffness.empty() && o.image.empty(), "--stiffness-from: needs the image: add --image FILE");
+    base::failIf(o.bodyFromImage && o.image.empty(), "--body-from-image: needs the image: add --image FILE");
+    base::failIf(!o.imageUnit.empty() && o.image.empty(), "--image-unit: needs the image: add --image FILE");
+    base::failIf(o.imageVolume > 0 && o.image.empty(), "--image-volume: needs the image: add --image FILE");
     std::error_code none;
-    if (!o.reading.series.empty() && fs::exists(o.input, none) && !fs::is_directory(o.input, none) &&
-        !fs::is_directory(o.image, none)) {
-        throw std::runtime_error("--series: neither the labels nor the image are a folder of DICOM: leave --series out");
-    }
+    base::failIf(!o.reading.series.empty() && fs::exists(o.input, none) && !fs::is_directory(o.input, none) &&
+                     !fs::is_directory(o.image, none),
+                 "--series: neither the labels nor the image are a folder of DICOM: leave --series out");
 }
 
 NamedLabels readLabels(const ImportRequest& request, const ImportProgress& tell)
