@@ -1,5 +1,5 @@
+#include <base/error.h>
 #include <datasets/approach.h>
-#include <datasets/scene.h>
 #include <datasets/voxel_obstacles.h>
 
 #include <fmt/format.h>
@@ -13,8 +13,6 @@
 #include <iterator>
 #include <map>
 #include <numbers>
-#include <optional>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -54,8 +52,7 @@ Labels namedLabels(const Scene& scene, const Tissue& tissue)
         for (const Structure& s : tissue.structures()) {
             names += (names.empty() ? "" : ", ") + s.name;
         }
-        throw std::runtime_error(
-            fmt::format("{}: no structure '{}' in the volume; there are {}", scene.name, scene.target, names));
+        throw base::error("{}: no structure '{}' in the volume; there are {}", scene.name, scene.target, names);
     }
     return labels;
 }
@@ -336,10 +333,10 @@ std::vector<Line> goodLines(const Scene& scene, const Tissue& tissue, std::optio
         const double widest = std::max_element(lines.begin(), lines.end(), wider)->way.clearance;
         reasons += fmt::format("; the widest keeps {:.1f} mm", 1e3 * std::max(0.0, widest));
     }
-    throw std::runtime_error(
-        fmt::format("{}: no straight way to '{}' from the skin that keeps {:g} mm from vital structures and bone ({} ways "
-                    "reach it{}): set entry_mm and aim_mm in [target]",
-                    scene.name, scene.target, wanted.back() * 1e3, lines.size(), reasons));
+    throw base::error(
+        "{}: no straight way to '{}' from the skin that keeps {:g} mm from vital structures and bone ({} ways "
+        "reach it{}): set entry_mm and aim_mm in [target]",
+        scene.name, scene.target, wanted.back() * 1e3, lines.size(), reasons);
 }
 
 // Two lines between which there is something to choose.

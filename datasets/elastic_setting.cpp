@@ -1,9 +1,10 @@
 #include <datasets/scene.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -27,11 +28,7 @@ constexpr std::array<Setting, 3> settings{{
 
 std::vector<std::string> elasticSettings()
 {
-    std::vector<std::string> names;
-    for (const Setting& setting : settings) {
-        names.emplace_back(setting.name);
-    }
-    return names;
+    return base::mapped<std::string>(settings, &Setting::name);
 }
 
 ElasticSettings elasticSetting(const std::string& name, const ElasticSettings& base)
@@ -45,8 +42,7 @@ ElasticSettings elasticSetting(const std::string& name, const ElasticSettings& b
             return out;
         }
     }
-    throw std::runtime_error(
-        fmt::format("setting '{}': there is none; there are {}", name, fmt::join(elasticSettings(), ", ")));
+    throw base::error("setting '{}': there is none; there are {}", name, fmt::join(elasticSettings(), ", "));
 }
 
 }  // namespace palpate::datasets

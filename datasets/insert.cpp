@@ -1,5 +1,7 @@
 #include <datasets/insert.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/split.h>
 #include <datasets/phantom_parts.h>
 
@@ -8,11 +10,9 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <fstream>
-#include <stdexcept>
 #include <string>
 
 namespace palpate::datasets {
@@ -27,11 +27,9 @@ constexpr int surfaceSamples = 200;  // of a lesion that looks for room
 
 std::vector<volume::LabelName> namesOf(const Tissue& tissue)
 {
-    std::vector<volume::LabelName> names;
-    for (const volume::Structure& s : tissue.structures()) {
-        names.push_back({s.value, s.name, tissue.table().rows[s.tissue].name, s.colour, s.terminology});
-    }
-    return names;
+    return base::mapped<volume::LabelName>(tissue.structures(), [&](const volume::Structure& s) {
+        return volume::LabelName{s.value, s.name, tissue.table().rows[s.tissue].name, s.colour, s.terminology};
+    });
 }
 
 // The volume with other labels or another table; its image stays.
@@ -123,10 +121,8 @@ std::uint16_t freeLabel(const std::vector<bool>& used, const std::string& insert
     const std::ptrdiff_t afterHighest = std::find(used.rbegin(), used.rend(), true).base() - used.begin();
     const auto next =
         used.begin() + afterHighest < used.end() ? used.begin() + afterHighest : std::ranges::find(used, false);
-    if (next == used.end()) {
-        throw std::runtime_error(
-            fmt::format("insert '{}': every label value from 1 to 65535 is in use: save the labels with fewer", insert));
-    }
+    base::failIf(next == used.end(), "insert '{}': every label value from 1 to 65535 is in use: save the labels with fewer",
+                 insert);
     return static_cast<std::uint16_t>(next - used.begin());
 }
 
@@ -139,10 +135,9 @@ Vec3 parsePoint(const std::string& line, const std::string& where)
         const auto number = base::withoutPlus({at, end});
         const auto [rest, error] = std::from_chars(number.data(), end, p[axis]);
         const bool separated = axis == 2 ? rest == end : rest != end && *rest == ',';
-        if (error != std::errc() || !separated || !(std::abs(p[axis]) <= farthestCoordinate)) {
-            throw std::runtime_error(fmt::format("{}: '{}': must be three numbers x,y,z [mm], each -{:g} to {:g}", where,
-                                                 line, farthestCoordinate, farthestCoordinate));
-        }
+        base::failIf(error != std::errc() || !separated || !(std::abs(p[axis]) <= farthestCoordinate),
+                     "{}: '{}': must be three numbers x,y,z [mm], each -{:g} to {:g}", where, line, farthestCoordinate,
+                     farthestCoordinate);
         at = rest + 1;
     }
     return p * 1e-3;
@@ -163,20 +158,15 @@ Tissue withInserts(const Tissue& tissue, std::span<const Insert> inserts)
     }
     auto provenance = tissue.provenance();
     for (const Insert& insert : inserts) {
-        if (!tissue.table().find(insert.tissue)) {
-            throw std::runtime_error(
-                fmt::format("insert '{}': tissue '{}' is not in the volume's tissue table", insert.name, insert.tissue));
-        }
+        base::failIf(!tissue.table().find(insert.tissue), "insert '{}': tissue '{}' is not in the volume's tissue table",
+                     insert.name, insert.tissue);
         const bool known = std::any_of(names.begin(), names.end(), [&](const auto& n) { return n.name == insert.name; });
-        if (known) {
-            throw std::runtime_error(
-                fmt::format("insert '{}': the volume has a structure of this name: choose another name", insert.name));
-        }
+        base::failIf(known, "insert '{}': the volume has a structure of this name: choose another name", insert.name);
         const std::uint16_t label = freeLabel(used, insert.name);
         if (draw(image, Shape(insert), inside, label) == 0) {
             const Vec3 c = insert.centre * 1e3;
-            throw std::runtime_error(fmt::format("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume",
-                                                 insert.name, c.x, c.y, c.z));
+            throw base::error("insert '{}' at [{:g}, {:g}, {:g}] mm: there is no tissue of the volume", insert.name, c.x,
+                              c.y, c.z);
         }
         names.push_back({label, insert.name, insert.tissue});
         used[label] = true;
@@ -194,9 +184,7 @@ Tissue withTable(const Tissue& tissue, volume::TissueTable table)
 std::vector<Vec3> loadLocations(const std::filesystem::path& file)
 {
     std::ifstream in(file);
-    if (!in) {
-        throw std::runtime_error(file.string() + ": locations cannot be read: give the .loc file of the phantom");
-    }
+    base::failIf(!in, "{}: locations cannot be read: give the .loc file of the phantom", file.native());
     std::vector<Vec3> places;
     std::string line;
     for (int number = 1; std::getline(in, line); ++number) {
@@ -204,9 +192,7 @@ std::vector<Vec3> loadLocations(const std::filesystem::path& file)
             places.push_back(parsePoint(line, fmt::format("{}:{}", file.string(), number)));
         }
     }
-    if (places.empty()) {
-        throw std::runtime_error(file.string() + ": holds no locations, one x,y,z [mm] per line");
-    }
+    base::failIf(places.empty(), "{}: holds no locations, one x,y,z [mm] per line", file.native());
     return places;
 }
 
@@ -221,10 +207,10 @@ Insert placeLesion(const Tissue& tissue, const std::filesystem::path& locations,
             return lesion;
         }
     }
-    throw std::runtime_error(fmt::format(
+    throw base::error(
         "{}: at none of its {} places does a lesion of {:g} mm lie wholly in the volume's tissue: is it of this "
         "volume? else choose a smaller one",
-        locations.string(), places.size(), lesion.diameter * 1e3));
+        locations.string(), places.size(), lesion.diameter * 1e3);
 }
 
 Insert placeLesionIn(const Tissue& tissue, const std::string& structure, Insert lesion)
@@ -243,8 +229,8 @@ Insert placeLesionIn(const Tissue& tissue, const std::string& structure, Insert 
     }
     if (places.empty()) {
         const float deepest = *std::min_element(field.values.begin(), field.values.end());
-        throw std::runtime_error(fmt::format("'{}' has no room for a lesion {:g} mm across: {:.0f} mm fit in at most",
-                                             structure, 2e3 * radius, std::max(0.0, -2e3 * static_cast<double>(deepest))));
+        throw base::error("'{}' has no room for a lesion {:g} mm across: {:.0f} mm fit in at most", structure, 2e3 * radius,
+                          std::max(0.0, -2e3 * static_cast<double>(deepest)));
     }
     Random random(lesion.seed);
     lesion.centre = grid.position(grid.node(places[random.bits() % places.size()]));

@@ -1,5 +1,7 @@
 #include <datasets/label_map.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/embedded.h>
 #include <datasets/toml_fields.h>
 
@@ -13,7 +15,6 @@
 #include <cmath>
 #include <regex>
 #include <set>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -55,10 +56,8 @@ LabelMap readLabelMap(std::string_view text, const std::string& file)
     const toml::table root = parseToml(text, file);
     Section top(root, file, "");
     LabelMap map = readMap(top, std::filesystem::path(file).stem().string());
-    if (map.labels.empty() && map.segments.empty()) {
-        throw std::runtime_error(file +
-                                 ": no labels in it: labels = [ { value = 1, name = \"liver\", tissue = \"liver\" } ]");
-    }
+    base::failIf(map.labels.empty() && map.segments.empty(),
+                 "{}: no labels in it: labels = [ {{ value = 1, name = \"liver\", tissue = \"liver\" }} ]", file);
     return map;
 }
 
@@ -89,10 +88,8 @@ std::string textOf(const std::string& nameOrFile, const std::vector<std::string>
         return std::string(embeddedFile("tables/" + nameOrFile + ".toml"));
     }
     std::error_code error;
-    if (!std::filesystem::exists(nameOrFile, error)) {
-        throw std::runtime_error(
-            fmt::format("{}: neither a file nor a built-in {} ({})", nameOrFile, what, fmt::join(names, ", ")));
-    }
+    base::failIf(!std::filesystem::exists(nameOrFile, error), "{}: neither a file nor a built-in {} ({})", nameOrFile, what,
+                 fmt::join(names, ", "));
     origin = nameOrFile;
     return readText(nameOrFile);
 }
@@ -154,11 +151,7 @@ const std::vector<LabelMap>& labelMaps()
 
 std::vector<std::string> labelMapNames()
 {
-    std::vector<std::string> names;
-    for (const LabelMap& map : labelMaps()) {
-        names.push_back(map.name);
-    }
-    return names;
+    return base::mapped<std::string>(labelMaps(), &LabelMap::name);
 }
 
 LabelMap labelMap(const std::string& nameOrFile)
@@ -172,10 +165,10 @@ LabelMap labelMap(const std::string& nameOrFile)
     if (const std::string why = base::whyNoFile(nameOrFile); !why.empty()) {
         const std::vector<std::string> names = labelMapNames();
         const std::string near = base::nearest(nameOrFile, names);
-        throw std::runtime_error(fmt::format(
+        throw base::error(
             "{}: neither a file ({}) nor one of the {} built-in label maps{}; 'palpate import --list-maps' lists "
             "them",
-            nameOrFile, why, names.size(), near.empty() ? "" : fmt::format(", is it {}?", near)));
+            nameOrFile, why, names.size(), near.empty() ? "" : fmt::format(", is it {}?", near));
     }
     return readLabelMap(readText(nameOrFile), nameOrFile);
 }
@@ -298,9 +291,7 @@ volume::StiffnessMap stiffnessMap(const std::string& nameOrFile, const std::stri
         for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
             map.tissues.push_back(list->get(i)->value<std::string>().value_or(""));
         }
-        if (map.tissues.empty()) {
-            top.refuse("tissues", "must be a list of tissues: [\"fat\", \"gland\"]");
-        }
+        top.refuseIf(map.tissues.empty(), "tissues", "must be a list of tissues: [\"fat\", \"gland\"]");
     }
     for (const std::string& tissue : map.tissues) {
         if (!table.find(tissue)) {

@@ -1,13 +1,13 @@
 #include <datasets/phantom.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/phantom_parts.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -34,8 +34,7 @@ const Maker& makerOf(const std::string& name)
             return maker;
         }
     }
-    throw std::runtime_error(
-        fmt::format("phantom '{}': there is none; there are {}", name, fmt::join(phantomNames(), ", ")));
+    throw base::error("phantom '{}': there is none; there are {}", name, fmt::join(phantomNames(), ", "));
 }
 
 double checked(const std::string& phantom, const PhantomParameter& p, double value)
@@ -43,12 +42,11 @@ double checked(const std::string& phantom, const PhantomParameter& p, double val
     // The negation also catches what is not a number.
     if (!(value >= p.low && value <= p.high)) {
         const std::string unit = p.unit.empty() ? "" : " " + p.unit;
-        throw std::runtime_error(fmt::format("phantom '{}': {} = {}{}: must be {:g} to {:g}{}", phantom, p.name, value,
-                                             unit, p.low, p.high, unit));
+        throw base::error("phantom '{}': {} = {}{}: must be {:g} to {:g}{}", phantom, p.name, value, unit, p.low, p.high,
+                          unit);
     }
-    if (p.whole && value != std::floor(value)) {
-        throw std::runtime_error(fmt::format("phantom '{}': {} = {}: must be a whole number", phantom, p.name, value));
-    }
+    base::failIf(p.whole && value != std::floor(value), "phantom '{}': {} = {}: must be a whole number", phantom, p.name,
+                 value);
     return value;
 }
 
@@ -68,12 +66,8 @@ PhantomValues checkedValues(const PhantomSpec& spec, const std::vector<PhantomPa
         }
     }
     const auto refuse = [&](const std::string& name) {
-        std::vector<std::string> known;
-        for (const PhantomParameter& p : parameters) {
-            known.push_back(p.name);
-        }
-        throw std::runtime_error(
-            fmt::format("phantom '{}': no such parameter '{}'; it takes {}", spec.name, name, fmt::join(known, ", ")));
+        const auto known = base::mapped<std::string>(parameters, &PhantomParameter::name);
+        throw base::error("phantom '{}': no such parameter '{}'; it takes {}", spec.name, name, fmt::join(known, ", "));
     };
     for (const auto& [name, value] : spec.numbers) {
         if (!values.numbers.contains(name)) {
@@ -107,11 +101,7 @@ volume::Provenance provenance(const PhantomSpec& spec, const PhantomValues& valu
 
 std::vector<std::string> phantomNames()
 {
-    std::vector<std::string> names;
-    for (const Maker& maker : makers) {
-        names.emplace_back(maker.name);
-    }
-    return names;
+    return base::mapped<std::string>(makers, &Maker::name);
 }
 
 std::vector<PhantomParameter> phantomParameters(const std::string& name)
@@ -127,10 +117,8 @@ volume::Tissue makePhantom(const PhantomSpec& spec, const volume::TissueTable& t
     const Maker& maker = makerOf(spec.name);
     const PhantomValues values = checkedValues(spec, phantomParameters(spec.name));
     for (const auto& [name, word] : values.words) {
-        if (!table.find(word)) {
-            throw std::runtime_error(fmt::format("phantom '{}': {} = \"{}\": the tissue table '{}' has no such tissue",
-                                                 spec.name, name, word, table.name));
-        }
+        base::failIf(!table.find(word), "phantom '{}': {} = \"{}\": the tissue table '{}' has no such tissue", spec.name,
+                     name, word, table.name);
     }
     const PhantomLabels labels = maker.make(values);
     return volume::Tissue::fromLabels(labels.image, table, labels.names, provenance(spec, values));

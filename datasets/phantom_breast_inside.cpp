@@ -1,12 +1,12 @@
 #include <datasets/phantom_breast.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -220,10 +220,10 @@ std::vector<Lump> placeTumours(const BreastShape& shape, const PhantomValues& va
             return tumours;
         }
     }
-    throw std::runtime_error(fmt::format(
+    throw base::error(
         "phantom 'breast': {:d} of tumour_diameter_mm = {:g} mm, tumour_depth_mm = {:g} mm find no room in a breast of "
         "radius_mm = {:g} mm: make them smaller, less deep or fewer, or the breast larger",
-        wanted, diameter, depth, shape.radius));
+        wanted, diameter, depth, shape.radius);
 }
 
 namespace {
@@ -255,11 +255,9 @@ std::vector<Tube> growVessel(const BreastShape& shape, Vec3 foot, Random& random
             longest = std::move(tubes);
         }
     }
-    if (longest.size() < 5) {
-        throw std::runtime_error(fmt::format(
-            "phantom 'breast': no room for the {} beside the tumours: make them smaller or fewer, or set vessels = 0",
-            name));
-    }
+    base::failIf(longest.size() < 5,
+                 "phantom 'breast': no room for the {} beside the tumours: make them smaller or fewer, or set vessels = 0",
+                 name);
     return longest;
 }
 

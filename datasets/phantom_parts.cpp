@@ -1,6 +1,7 @@
 #include <datasets/phantom_parts.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
@@ -8,7 +9,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -40,16 +40,12 @@ volume::LabelImage phantomImage(const PhantomValues& values, Vec3 low, Vec3 high
         }
     }
     const double count = static_cast<double>(image.size.x) * image.size.y * image.size.z;
-    if (count > maxVoxels) {
-        throw std::runtime_error(fmt::format("a phantom of {} x {} x {} voxels is too large: choose a larger voxel",
-                                             image.size.x, image.size.y, image.size.z));
-    }
-    if (count * perVoxel > values.memory) {
-        throw std::runtime_error(
-            fmt::format("a phantom of {} x {} x {} voxels takes some {:.1f} GB of memory, and {:.1f} GB are free: choose a "
-                        "larger voxel, or go on with --anyway",
-                        image.size.x, image.size.y, image.size.z, count * perVoxel / giga, values.memory / giga));
-    }
+    base::failIf(count > maxVoxels, "a phantom of {} x {} x {} voxels is too large: choose a larger voxel", image.size.x,
+                 image.size.y, image.size.z);
+    base::failIf(count * perVoxel > values.memory,
+                 "a phantom of {} x {} x {} voxels takes some {:.1f} GB of memory, and {:.1f} GB are free: choose a "
+                 "larger voxel, or go on with --anyway",
+                 image.size.x, image.size.y, image.size.z, count * perVoxel / giga, values.memory / giga);
     image.affine.linear = Mat3(edge * 1e-3);
     image.affine.origin = (low + Vec3(edge / 2)) * 1e-3;
     image.values.assign(image.offset(Index3(0, 0, image.size.z)), 0);

@@ -1,11 +1,11 @@
 #include <datasets/phantom_parts.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <glm/geometric.hpp>
 
 #include <array>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::datasets {
 
@@ -22,10 +22,10 @@ struct Layer {
 void requireRoom(bool room, const char* phantom, const PhantomValues& values)
 {
     if (!room) {
-        throw std::runtime_error(
-            fmt::format("phantom '{}': a tumour of tumour_diameter_mm = {:g} mm finds no room there: make it smaller, or "
-                        "the body larger",
-                        phantom, values.number("tumour_diameter_mm")));
+        throw base::error(
+            "phantom '{}': a tumour of tumour_diameter_mm = {:g} mm finds no room there: make it smaller, or "
+            "the body larger",
+            phantom, values.number("tumour_diameter_mm"));
     }
 }
 

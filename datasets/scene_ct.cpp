@@ -24,9 +24,7 @@ void readCt(Section& top, CtSpec& ct)
 {
     if (std::optional<Section> section = top.section("ct")) {
         ct.slices = static_cast<int>(section->integer("slices", "", 1, maxSlices).value_or(usualSlices));
-        if (ct.slices % 2 == 0) {
-            section->refuse("slices", "must be odd: the middle one goes through the tip");
-        }
+        section->refuseIf(ct.slices % 2 == 0, "slices", "must be odd: the middle one goes through the tip");
         readFields<CtSpec>(*section, ctFields, ct, Need::some);
         section->finish();
     }

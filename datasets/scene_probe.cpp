@@ -57,9 +57,7 @@ void readPlace(Section& section, ProbeSpec& probe)
     probe.lateral = readDirection(section, "lateral");
     const Vec3 across = probe.lateral - glm::dot(probe.lateral, probe.direction) * probe.direction;
     constexpr double least = 0.2;
-    if (glm::length(across) < least) {
-        section.refuse("lateral", "must not be along direction");
-    }
+    section.refuseIf(glm::length(across) < least, "lateral", "must not be along direction");
     probe.lateral = glm::normalize(across);
 }
 
@@ -81,17 +79,14 @@ void readProbe(Section& top, ProbeSpec& probe)
         section->finish();
     }
     for (Section& section : top.sections("probe_step")) {
-        if (probe.kind == ProbeKind::none) {
-            section.refuse("at_s", "a step of a probe needs a [probe]");
-        }
+        section.refuseIf(probe.kind == ProbeKind::none, "at_s", "a step of a probe needs a [probe]");
         ProbeStep step;
         if (!section.has("at_s")) {
             section.missing("at_s", "when the probe is there [s]");
         }
         readFields<ProbeStep>(section, probeStepFields, step, Need::some);
-        if (!probe.script.empty() && step.time <= probe.script.back().time) {
-            section.refuse("at_s", "must be later than the step before", "s");
-        }
+        section.refuseIf(!probe.script.empty() && step.time <= probe.script.back().time, "at_s",
+                         "must be later than the step before", "s");
         section.finish();
         probe.script.push_back(step);
         if (probe.script.size() > maxProbeSteps) {

@@ -137,9 +137,8 @@ void readVolume(Section& top, const std::filesystem::path& origin, VolumeSource&
     if (!volume) {
         top.missing("[volume]", "a scene needs file = \"..\" or phantom = \"..\" in it");
     }
-    if (volume->has("file") == volume->has("phantom")) {
-        top.refuse("volume", "needs one of file = \"..\" and phantom = \"..\"");
-    }
+    top.refuseIf(volume->has("file") == volume->has("phantom"), "volume",
+                 "needs one of file = \"..\" and phantom = \"..\"");
     if (const auto file = volume->word("file")) {
         source.file = resolved(*file, origin);
     } else {
@@ -163,9 +162,8 @@ void readDffb(Section& top, DffbParameters& dffb)
         }
     }
     const double mass = dffb.surgery.mass + dffb.structure.mass + dffb.tissue.mass + dffb.task.mass;
-    if (dffb.mode == DffbMode::thesis && mass <= 0) {
-        section->refuse("mode", "gives no force without a mass: set mass_kg in [dffb.surgery] or another term");
-    }
+    section->refuseIf(dffb.mode == DffbMode::thesis && mass <= 0, "mode",
+                      "gives no force without a mass: set mass_kg in [dffb.surgery] or another term");
     section->finish();
 }
 
@@ -194,9 +192,8 @@ void readLaw(Section& elastic, volume::Law& law)
     }
     const auto finite = std::span(volume::lawNames).subspan(1);
     if (const auto index = elastic.choice("law", finite)) {
-        if (volume::isSmall(law)) {
-            elastic.refuse("law", "small strain has one law: leave this out, or set strain = \"finite\"");
-        }
+        elastic.refuseIf(volume::isSmall(law), "law",
+                         "small strain has one law: leave this out, or set strain = \"finite\"");
         law = *volume::lawNamed(finite[*index]);
     }
 }
@@ -210,9 +207,7 @@ bool readElastic(Section& model, ElasticSettings& elastic)
         readFields<ElasticSettings>(*section, elasticFields, elastic, Need::some);
         readLaw(*section, elastic.law);
         section->finish();
-        if (elastic.window % 2 == 0) {
-            section->refuse("window", "must be odd");
-        }
+        section->refuseIf(elastic.window % 2 == 0, "window", "must be odd");
     }
     return named;
 }
@@ -271,9 +266,7 @@ void readInserts(Section& top, std::vector<Insert>& inserts)
             section.missing("centre_mm", "where it is: [x, y, z] in mm");
         }
         insert.to = section.point("to_mm", farthestCoordinate);
-        if (insert.spiculated && insert.to) {
-            section.refuse("spiculated", "a rod has no spikes: leave out to_mm");
-        }
+        section.refuseIf(insert.spiculated && insert.to, "spiculated", "a rod has no spikes: leave out to_mm");
         if (const auto seed = section.integer("seed", "", 0, std::numeric_limits<std::int64_t>::max())) {
             insert.seed = static_cast<std::uint64_t>(*seed);
         }
@@ -390,9 +383,8 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     readInserts(top, scene.source.inserts);
     readChoice(top, "task", taskNames, scene.task);
     const auto tissues = top.word("tissues");
-    if (tissues && !scene.source.file.empty()) {
-        top.refuse("tissues", "a volume file holds its tissues; give the table to `palpate import --tissues`");
-    }
+    top.refuseIf(tissues && !scene.source.file.empty(), "tissues",
+                 "a volume file holds its tissues; give the table to `palpate import --tissues`");
     scene.tissueChanges = readTissueChanges(top);
     readTool(top, scene.tool);
     readModel(top, scene.model);
@@ -408,9 +400,8 @@ Scene parseScene(const std::string& text, const std::filesystem::path& origin)
     readProbe(top, scene.probe);
     readCt(top, scene.ct);
     readGravity(top, scene.gravity);
-    if (scene.ct.given() && scene.probe.kind != ProbeKind::none) {
-        top.refuse("ct", "a scene is guided by ultrasound ([probe]) or by CT ([ct]), not by both");
-    }
+    top.refuseIf(scene.ct.given() && scene.probe.kind != ProbeKind::none, "ct",
+                 "a scene is guided by ultrasound ([probe]) or by CT ([ct]), not by both");
     top.finish();
     if (scene.target.empty() && !scene.aim) {
         top.missing("[target]", "structure = \"..\", what to sample, or aim_mm = [x, y, z]");

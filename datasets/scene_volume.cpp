@@ -1,3 +1,5 @@
+#include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/insert.h>
 #include <datasets/scene.h>
 #include <datasets/scene_text.h>
@@ -9,7 +11,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::datasets {
@@ -75,11 +76,7 @@ std::vector<VitalStructure> chooseVital(const Tissue& tissue, const std::string&
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.volume > b.volume; });
     candidates.resize(std::min(candidates.size(), maxVital));
-    std::vector<VitalStructure> vital;
-    for (const Candidate& c : candidates) {
-        vital.push_back({.name = c.name});
-    }
-    return vital;
+    return base::mapped<VitalStructure>(candidates, [&](const Candidate& c) { return VitalStructure{.name = c.name}; });
 }
 
 }  // namespace
@@ -118,8 +115,8 @@ Scene sceneForVolume(const std::filesystem::path& file, const Tissue& tissue, co
 {
     const std::string aim = target.empty() ? lesionOf(tissue) : target;
     if (aim.empty()) {
-        throw std::runtime_error(fmt::format("{}: no tumour or lesion to aim at: choose with --target NAME, one of {}",
-                                             file.string(), fmt::join(solidNames(tissue), ", ")));
+        throw base::error("{}: no tumour or lesion to aim at: choose with --target NAME, one of {}", file.string(),
+                          fmt::join(solidNames(tissue), ", "));
     }
     Scene scene;
     scene.name = file.stem().string();
@@ -138,9 +135,8 @@ Tissue volumeAlone(const Scene& scene)
         auto table = scene.tissues.empty() ? defaultTissues() : loadTissues(scene.tissues);
         return makePhantom(scene.source.phantom, withChanges(std::move(table), scene.tissueChanges));
     }
-    if (scene.source.file.extension() != ".vdb") {
-        throw std::runtime_error(scene.source.file.string() + ": not a .vdb volume: convert it with `palpate import`");
-    }
+    base::failIf(scene.source.file.extension() != ".vdb", "{}: not a .vdb volume: convert it with `palpate import`",
+                 scene.source.file.native());
     Tissue tissue = Tissue::load(scene.source.file);
     return scene.tissueChanges.empty() ? std::move(tissue)
                                        : withTable(tissue, withChanges(tissue.table(), scene.tissueChanges));

@@ -1,5 +1,7 @@
 #include <datasets/tables.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/embedded.h>
 #include <datasets/scene_text.h>
 #include <datasets/toml_fields.h>
@@ -7,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <span>
 #include <stdexcept>
 
 namespace palpate::datasets {
@@ -81,9 +82,7 @@ Role readRole(Section& section)
         section.missing("role", "plain, skin, tumour, vital, bone or air");
     }
     const std::optional<Role> role = volume::roleNamed(*text);
-    if (!role) {
-        section.refuse("role", "must be plain, skin, tumour, vital, bone or air");
-    }
+    section.refuseIf(!role, "role", "must be plain, skin, tumour, vital, bone or air");
     return *role;
 }
 
@@ -92,9 +91,8 @@ glm::vec3 readColour(Section& section)
 {
     const std::string text = section.word("colour").value_or("");
     constexpr std::string_view digits = "0123456789abcdefABCDEF";
-    if (text.size() != 7 || text[0] != '#' || text.find_first_not_of(digits, 1) != std::string::npos) {
-        section.refuse("colour", "must be \"#rrggbb\"");
-    }
+    section.refuseIf(text.size() != 7 || text[0] != '#' || text.find_first_not_of(digits, 1) != std::string::npos, "colour",
+                     "must be \"#rrggbb\"");
     glm::vec3 colour(0.0F);
     for (int c = 0; c < 3; ++c) {
         const std::string pair = text.substr(1 + 2 * static_cast<std::size_t>(c), 2);
@@ -165,21 +163,16 @@ TissueTable readTissues(std::string_view text, const std::string& file)
     table.name = top.word("name").value_or(std::filesystem::path(file).stem().string());
     for (Section& section : top.sections("tissue")) {
         TissueRow row = readTissue(section);
-        if (table.find(row.name)) {
-            section.refuse("name", "is there twice");
-        }
-        if (table.rows.empty() != (row.name == "air") || (row.name == "air") != (row.role == Role::air)) {
-            section.refuse("role", "the first tissue, and no other, must be \"air\" of role air");
-        }
+        section.refuseIf(table.find(row.name).has_value(), "name", "is there twice");
+        section.refuseIf(table.rows.empty() != (row.name == "air") || (row.name == "air") != (row.role == Role::air),
+                         "role", "the first tissue, and no other, must be \"air\" of role air");
         table.rows.push_back(std::move(row));
         if (table.rows.size() > maxTissues) {
             section.refuse("name", fmt::format("over {} tissues", maxTissues));
         }
     }
     top.finish();
-    if (table.rows.empty()) {
-        throw std::runtime_error(file + ": no [[tissue]] in it: see `palpate phantom --help` for the built-in table");
-    }
+    base::failIf(table.rows.empty(), "{}: no [[tissue]] in it: see `palpate phantom --help` for the built-in table", file);
     return table;
 }
 
@@ -282,13 +275,9 @@ TissueTable withChanges(TissueTable table, std::span<const TissueChange> changes
     for (const TissueChange& change : changes) {
         const auto index = table.find(change.tissue);
         if (!index || *index == 0) {
-            std::vector<std::string> names;
-            for (const TissueRow& row : std::span(table.rows).subspan(1)) {
-                names.push_back(row.name);
-            }
-            throw std::runtime_error(fmt::format("{}{}[tissue.{}]: is not in the volume's tissue table; it has: {}",
-                                                 change.place, change.place.empty() ? "" : ": ", change.tissue,
-                                                 fmt::join(names, ", ")));
+            const auto names = base::mapped<std::string>(std::span(table.rows).subspan(1), &TissueRow::name);
+            throw base::error("{}{}[tissue.{}]: is not in the volume's tissue table; it has: {}", change.place,
+                              change.place.empty() ? "" : ": ", change.tissue, fmt::join(names, ", "));
         }
         TissueRow& row = table.rows[*index];
         forNumbers([&](const Field<TissueRow>& f, double TissueRow::*member) {

@@ -1,6 +1,8 @@
 #include <datasets/toml_section.h>
 
+#include <base/error.h>
 #include <base/inputs.h>
+#include <base/nearest.h>
 #include <volume/direction.h>
 
 #include <fmt/format.h>
@@ -10,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <numeric>
 #include <sstream>
 #include <stdexcept>
 
@@ -63,23 +64,6 @@ std::string valueText(const toml::node& node)
     return node.is_table() ? "{..}" : "a date or time";
 }
 
-// Levenshtein's distance: insertions, deletions and replacements from `a` to `b`.
-std::size_t editDistance(std::string_view a, std::string_view b)
-{
-    std::vector<std::size_t> row(b.size() + 1);
-    std::iota(row.begin(), row.end(), std::size_t{0});
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = row[0];
-        row[0] = i;
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U);
-            diagonal = row[j];
-            row[j] = std::min({replaced, row[j] + 1, row[j - 1] + 1});
-        }
-    }
-    return row.back();
-}
-
 }  // namespace
 
 std::string tomlString(std::string_view text)
@@ -104,14 +88,14 @@ toml::table parseToml(std::string_view text, const std::string& file)
     try {
         return toml::parse(text, file);
     } catch (const toml::parse_error& e) {
-        throw std::runtime_error(fmt::format("{}:{}: not TOML: {}", file, e.source().begin.line, e.description()));
+        throw base::error("{}:{}: not TOML: {}", file, e.source().begin.line, e.description());
     }
 }
 
 std::string readText(const std::filesystem::path& file)
 {
     if (const std::string why = base::whyNoFile(file); !why.empty()) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
+        throw base::error("{}: {}", file.string(), why);
     }
     std::error_code error;
     if (const auto size = std::filesystem::file_size(file, error); error || size > largestFile) {
@@ -120,9 +104,7 @@ std::string readText(const std::filesystem::path& file)
     std::ifstream in(file, std::ios::binary);
     std::ostringstream text;
     text << in.rdbuf();
-    if (!in) {
-        throw std::runtime_error(file.string() + ": cannot be read: check its permissions");
-    }
+    base::failIf(!in, "{}: cannot be read: check its permissions", file.native());
     return text.str();
 }
 
@@ -160,14 +142,13 @@ void Section::refuse(std::string_view key, std::string_view what, std::string_vi
         missing(key, what);
     }
     const bool scalar = node->is_number() && !unit.empty();
-    throw std::runtime_error(fmt::format("{} = {}{}{}: {}", where(*node, key), valueText(*node), scalar ? " " : "",
-                                         scalar ? unit : std::string_view(), what));
+    throw base::error("{} = {}{}{}: {}", where(*node, key), valueText(*node), scalar ? " " : "",
+                      scalar ? unit : std::string_view(), what);
 }
 
 void Section::missing(std::string_view key, std::string_view what) const
 {
-    throw std::runtime_error(
-        fmt::format("{} is missing{}{}{}", where(*table_, key), what.empty() ? "" : " (", what, what.empty() ? "" : ")"));
+    throw base::error("{} is missing{}{}{}", where(*table_, key), what.empty() ? "" : " (", what, what.empty() ? "" : ")");
 }
 
 double Section::numberOf(const toml::node& node, std::string_view key, std::string_view unit) const
@@ -176,9 +157,7 @@ double Section::numberOf(const toml::node& node, std::string_view key, std::stri
     if (!value) {
         refuse(key, fmt::format("expected a number{}{}, found {}", unit.empty() ? "" : " in ", unit, kind(node)));
     }
-    if (!std::isfinite(*value)) {
-        refuse(key, "must be a finite number", unit);
-    }
+    refuseIf(!std::isfinite(*value), key, "must be a finite number", unit);
     return *value;
 }
 
@@ -233,9 +212,7 @@ std::optional<std::string> Section::word(std::string_view key)
     if (!node->is_string()) {
         refuse(key, fmt::format("expected text in quotes, found {}", kind(*node)));
     }
-    if (node->as_string()->get().empty()) {
-        refuse(key, "must not be empty");
-    }
+    refuseIf(node->as_string()->get().empty(), key, "must not be empty");
     return node->as_string()->get();
 }
 
@@ -280,9 +257,7 @@ std::optional<Vec3> Section::direction(std::string_view key, double limit)
         return std::nullopt;
     }
     const Vec3 way = volume::rescaled(*given);
-    if (!(glm::length(way) > 0)) {
-        refuse(key, "a direction must not be [0, 0, 0]");
-    }
+    refuseIf(!(glm::length(way) > 0), key, "a direction must not be [0, 0, 0]");
     return glm::normalize(way);
 }
 
@@ -338,11 +313,11 @@ void Section::finish() const
             continue;
         }
         const auto nearer = [&](const std::string& a, const std::string& b) {
-            return editDistance(key.str(), a) < editDistance(key.str(), b);
+            return base::editDistance(key.str(), a) < base::editDistance(key.str(), b);
         };
         const auto nearest = std::min_element(known_.begin(), known_.end(), nearer);
         const std::string hint = nearest == known_.end() ? "" : fmt::format("; did you mean {}?", *nearest);
-        throw std::runtime_error(fmt::format("{}: unknown key{}", where(node, key.str()), hint));
+        throw base::error("{}: unknown key{}", where(node, key.str()), hint);
     }
 }
 

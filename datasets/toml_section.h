@@ -56,6 +56,12 @@ public:
     void setTitle(std::string title) { title_ = std::move(title); }
     /// Refuses the value of `key`.
     [[noreturn]] void refuse(std::string_view key, std::string_view what, std::string_view unit = {}) const;
+    void refuseIf(bool wrong, std::string_view key, std::string_view what, std::string_view unit = {}) const
+    {
+        if (wrong) {
+            refuse(key, what, unit);
+        }
+    }
     /// Says that `key` is missing.
     [[noreturn]] void missing(std::string_view key, std::string_view what) const;
     /// Refuses keys that nobody asked for, with the nearest of those that were.

@@ -8,7 +8,6 @@
 #include <glm/matrix.hpp>
 
 #include <algorithm>
-#include <cmath>
 
 namespace palpate::datasets {
 
