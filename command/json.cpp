@@ -1,12 +1,12 @@
 #include <command/json.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 
 #include <nlohmann/json.hpp>
 
 #include <fstream>
 #include <iostream>
-#include <stdexcept>
 #include <system_error>
 
 namespace palpate::command {
@@ -15,11 +15,12 @@ namespace palpate::command {
 // not UTF-8 (a file's may be anything) is no reason to fail.
 void writeJson(const std::filesystem::path& file, const nlohmann::json& figures)
 {
+    if (file.empty()) {
+        return;
+    }
     const std::string text = figures.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + '\n';
     if (file == "-") {
-        if (!(std::cout << text << std::flush)) {
-            throw std::runtime_error("standard output: the figures cannot be written");
-        }
+        base::failIf(!(std::cout << text << std::flush), "standard output: the figures cannot be written");
         return;
     }
     // Whole or not at all; what is there and no file of the disk's (a pipe, /dev/stdout) is written as it is.
@@ -31,9 +32,7 @@ void writeJson(const std::filesystem::path& file, const nlohmann::json& figures)
     std::ofstream out(file);
     out << text;
     out.close();
-    if (!out) {
-        throw std::runtime_error(file.string() + ": cannot be written: check the folder and the space on the disk");
-    }
+    base::failIf(!out, "{}: cannot be written: check the folder and the space on the disk", file.native());
 }
 
 }  // namespace palpate::command

@@ -6,7 +6,7 @@
 
 namespace palpate::command {
 
-/// Writes figures where `--json FILE` asked for them ("-" = standard output). Throws std::runtime_error.
+/// Writes figures to the file of `--json` ("-" = standard output, "" = not asked for). Throws std::runtime_error.
 void writeJson(const std::filesystem::path& file, const nlohmann::json& figures);
 
 }  // namespace palpate::command

@@ -1,10 +1,10 @@
 #include <command/options.h>
 
+#include <base/error.h>
+
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <stdexcept>
-#include <string>
 #include <utility>
 
 namespace palpate::command {
@@ -76,9 +76,7 @@ void addFalconOptions(CLI::App& command, session::FalconOptions& options)
 void checkFalconOptions(const CLI::App& command, bool falcon)
 {
     for (const char* name : {"--falcon-firmware", "--falcon-grip-g", "--on-unplug"}) {
-        if (!falcon && command.count(name) > 0) {
-            throw std::runtime_error(fmt::format("{}: needs --device falcon", name));
-        }
+        base::failIf(!falcon && command.count(name) > 0, "{}: needs --device falcon", name);
     }
 }
 

@@ -1,5 +1,6 @@
 #include <planner/costs.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -13,7 +14,6 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::planner {
 
@@ -108,9 +108,7 @@ void benchCosts(const CostsArguments& o)
             printLaw(law, costs, of);
         }
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, out);
-    }
+    command::writeJson(o.json, out);
 }
 
 }  // namespace
@@ -125,9 +123,8 @@ PlanCosts loadCosts(const std::filesystem::path& file)
             const nlohmann::json::json_pointer at(fmt::format("/{}/{}", law, key));
             const auto found = json.is_object() && json.contains(at) ? json.at(at) : nlohmann::json();
             if (!found.is_number() || !(found.get<double>() >= 0.0)) {
-                throw std::runtime_error(
-                    fmt::format("{}: no number at {}: 'palpate bench costs --json {}' makes such a file", file.string(),
-                                at.to_string(), file.string()));
+                throw base::error("{}: no number at {}: 'palpate bench costs --json {}' makes such a file", file.string(),
+                                  at.to_string(), file.string());
             }
             to->*value = found.get<double>();
         }

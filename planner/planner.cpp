@@ -1,15 +1,14 @@
 #include <planner/planner.h>
 
+#include <base/error.h>
 #include <studies/kernel/kernel_rivals.h>
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::planner {
 
@@ -304,10 +303,9 @@ Plan planModel(const haptics::SessionModel& model, const PlanRequest& request,
                const std::function<void(const std::string&)>& progress)
 {
     // What the spring takes, every model does.
-    if (1e6 * request.budget < request.costs.usPerTick) {
-        throw std::runtime_error(fmt::format("--budget: {:g} us: every model takes over {:g} us per tick: give more",
-                                             1e6 * request.budget, request.costs.usPerTick));
-    }
+    base::failIf(1e6 * request.budget < request.costs.usPerTick,
+                 "--budget: {:g} us: every model takes over {:g} us per tick: give more", 1e6 * request.budget,
+                 request.costs.usPerTick);
     return Planner(model, request, progress).run();
 }
 

@@ -1,13 +1,12 @@
 #include <planner/tick_costs.h>
 
+#include <base/error.h>
 #include <studies/kernel/kernel_rivals.h>
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <stdexcept>
 
 namespace palpate::planner {
 
@@ -69,9 +68,7 @@ LawCosts fitCosts(std::span<const TickSample> samples)
 {
     constexpr int sweeps = 20000;
     constexpr std::size_t n = std::tuple_size_v<Terms>;
-    if (samples.size() < n) {
-        throw std::runtime_error(fmt::format("costs of a tick: {} samples, at least {} are needed", samples.size(), n));
-    }
+    base::failIf(samples.size() < n, "costs of a tick: {} samples, at least {} are needed", samples.size(), n);
     // Normal equations of the relative errors, by projected coordinate descent: convex, so that it ends at the minimum.
     std::array<Terms, n> a{};
     Terms b{};

@@ -1,6 +1,7 @@
 #include <report/groups.h>
 
 #include <base/counted.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/utf8.h>
 #include <report/html.h>
@@ -195,11 +196,7 @@ int decimalsOf(const haptics::Measure& measure) noexcept
 
 std::vector<double> rowOf(const haptics::Score& score)
 {
-    std::vector<double> row;
-    for (const haptics::Measure& m : haptics::measures()) {
-        row.push_back(m.value(score));
-    }
-    return row;
+    return base::mapped<double>(haptics::measures(), [&](const haptics::Measure& m) { return m.value(score); });
 }
 
 double quantile(std::vector<double> values, double fraction)

@@ -22,27 +22,12 @@ using haptics::EventKind;
 
 std::string escape(std::string_view text)
 {
+    static const std::map<char, const char*> marks{
+        {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
     std::string out;
     for (const char c : text) {
-        switch (c) {
-            case '&':
-                out += "&amp;";
-                break;
-            case '<':
-                out += "&lt;";
-                break;
-            case '>':
-                out += "&gt;";
-                break;
-            case '"':
-                out += "&quot;";
-                break;
-            case '\'':
-                out += "&#39;";
-                break;
-            default:
-                out += c;
-        }
+        const auto mark = marks.find(c);
+        out += mark == marks.end() ? std::string(1, c) : mark->second;
     }
     return out;
 }
@@ -149,11 +134,7 @@ std::string embedded(const nlohmann::json& data)
     std::string out;
     out.reserve(text.size());
     for (const char c : text) {
-        if (c == '<') {
-            out += "\\u003c";
-        } else {
-            out += c;
-        }
+        out += c == '<' ? std::string("\\u003c") : std::string(1, c);
     }
     return out;
 }

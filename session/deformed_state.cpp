@@ -1,10 +1,10 @@
 #include <session/deformed_state.h>
 
+#include <base/error.h>
 #include <haptics/broadcast.h>
 #include <haptics/replay.h>
 #include <session/open.h>
 
-#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace palpate::session {
 
@@ -50,13 +49,9 @@ std::uint64_t tickAt(const haptics::Record& record, const std::string& file, dou
 {
     const double rate = record.info().rate;
     const std::uint64_t ticks = record.ticks();
-    if (ticks == 0) {
-        throw std::runtime_error(file + ": no tick was recorded: there is no state to export");
-    }
+    base::failIf(ticks == 0, "{}: no tick was recorded: there is no state to export", file);
     const double last = static_cast<double>(ticks - 1) / rate;
-    if (!(at >= 0 && at <= last + 1e-9)) {
-        throw std::runtime_error(fmt::format("{}: --at {:g}s: the record runs from 0 s to {:g} s", file, at, last));
-    }
+    base::failIf(!(at >= 0 && at <= last + 1e-9), "{}: --at {:g}s: the record runs from 0 s to {:g} s", file, at, last);
     return static_cast<std::uint64_t>(std::floor(at * rate + 1e-6));
 }
 
@@ -69,18 +64,16 @@ void recompute(const haptics::Record& record, haptics::Simulation& simulation, c
         if (next > tick) {
             return;
         }
-        if (then.tick != next) {
-            throw std::runtime_error(
-                fmt::format("{}: tick {} is missing in the record: what comes after it cannot be "
-                            "computed",
-                            file, next));
-        }
+        base::failIf(then.tick != next,
+                     "{}: tick {} is missing in the record: what comes after it cannot be "
+                     "computed",
+                     file, next);
         const haptics::TickRecord& now = simulation.tick(then.device);
         if (!comparison.add(then, now)) {
-            throw std::runtime_error(
-                fmt::format("{}: differs from tick {} on: the record was made by another build ({}) or machine, or was "
-                            "changed: {}",
-                            file, next, record.info().build, comparison.inWords()));
+            throw base::error(
+                "{}: differs from tick {} on: the record was made by another build ({}) or machine, or was "
+                "changed: {}",
+                file, next, record.info().build, comparison.inWords());
         }
         if (each) {
             each(now);

@@ -1,5 +1,6 @@
 #include <session/devices.h>
 
+#include <base/error.h>
 #include <haptics/falcon/device.h>
 #include <haptics/hand.h>
 #include <haptics/mouse.h>
@@ -14,7 +15,6 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <stdexcept>
 
 namespace palpate::session {
 
@@ -84,9 +84,7 @@ private:
 
 std::unique_ptr<Device> openFalcon(const SessionModel& model, const DeviceRequest& request, const Broadcast* broadcast)
 {
-    if (!request.falcon) {
-        throw std::runtime_error("device 'falcon': there is nothing that opens it (DeviceRequest::falcon)");
-    }
+    base::failIf(!request.falcon, "device 'falcon': there is nothing that opens it (DeviceRequest::falcon)");
     auto device = falcon::falconBefore(model, request.falcon, startDistance);
     const bool guided = model.scene.probe.kind != datasets::ProbeKind::none || model.scene.ct.given();
     if (broadcast == nullptr || !guided) {
@@ -114,22 +112,15 @@ void checkTool(const DeviceRequest& request, const datasets::Scene& scene)
         haptics::skillCalled(request.trainee);  // that there is such a one
     }
     const bool needle = scene.tool.kind == datasets::ToolKind::needle;
-    if (needle && scene.task == datasets::SessionTask::find) {
-        throw std::runtime_error(scene.name +
-                                 ": task \"find\" with a needle: give [tool] kind = \"capsule\" or \"sphere\"");
-    }
-    if (!needle && scene.task == datasets::SessionTask::advance) {
-        throw std::runtime_error(scene.name + ": task \"advance\" without a needle: give [tool] kind = \"needle\"");
-    }
-    if (!needle && scene.task == datasets::SessionTask::touch && !request.trainee.empty()) {
-        throw std::runtime_error(fmt::format("{}: --trainee {} holds a needle and the tool is none: leave --trainee away",
-                                             scene.name, request.trainee));
-    }
-    if (!needle && scene.task == datasets::SessionTask::biopsy && !request.trainee.empty()) {
-        throw std::runtime_error(
-            fmt::format("{}: --trainee {} takes a biopsy and the tool is no needle: choose another scene, or add --palpate",
-                        scene.name, request.trainee));
-    }
+    base::failIf(needle && scene.task == datasets::SessionTask::find,
+                 "{}: task \"find\" with a needle: give [tool] kind = \"capsule\" or \"sphere\"", scene.name);
+    base::failIf(!needle && scene.task == datasets::SessionTask::advance,
+                 "{}: task \"advance\" without a needle: give [tool] kind = \"needle\"", scene.name);
+    base::failIf(!needle && scene.task == datasets::SessionTask::touch && !request.trainee.empty(),
+                 "{}: --trainee {} holds a needle and the tool is none: leave --trainee away", scene.name, request.trainee);
+    base::failIf(!needle && scene.task == datasets::SessionTask::biopsy && !request.trainee.empty(),
+                 "{}: --trainee {} takes a biopsy and the tool is no needle: choose another scene, or add --palpate",
+                 scene.name, request.trainee);
 }
 
 }  // namespace

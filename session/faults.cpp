@@ -1,9 +1,8 @@
 #include <session/faults.h>
 
+#include <base/error.h>
 #include <base/quantities.h>
 #include <haptics/simulation.h>
-
-#include <fmt/format.h>
 
 #include <sys/resource.h>
 
@@ -13,7 +12,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 #include <system_error>
 #include <utility>
 
@@ -44,10 +42,10 @@ constexpr std::array forms{Form{"gap", {FaultKind::gap, 0.0, 50e-3}},
 
 [[noreturn]] void refuse(const std::string& text)
 {
-    throw std::runtime_error(
-        fmt::format("--inject: {}: must be WHAT[=AMOUNT][/LENGTH]@TIME with a unit to every number, as gap=50ms@2s, "
-                    "late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s",
-                    text));
+    throw base::error(
+        "--inject: {}: must be WHAT[=AMOUNT][/LENGTH]@TIME with a unit to every number, as gap=50ms@2s, "
+        "late=5ms/500ms@2s, nan@2s, jump=100mm/20ms@2s, unplug=200ms@2s, stall-viewer=1s@2s, disk-full@2s",
+        text);
 }
 
 // What stands behind the last `mark` in `text`, which it takes off.
@@ -68,10 +66,8 @@ double within(const std::optional<double>& value, double most, const std::string
     if (!value) {
         refuse(text);
     }
-    if (!(*value > 0.0 && *value <= most)) {
-        throw std::runtime_error(
-            fmt::format("--inject: {}: its {} must be over 0 and up to {:g} {}", text, what, most, unit));
-    }
+    base::failIf(!(*value > 0.0 && *value <= most), "--inject: {}: its {} must be over 0 and up to {:g} {}", text, what,
+                 most, unit);
     return *value;
 }
 

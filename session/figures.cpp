@@ -1,13 +1,9 @@
 #include <session/figures.h>
 
-#include <haptics/simulation.h>
-
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <sys/resource.h>
-
-#include <string>
 
 namespace palpate::session {
 

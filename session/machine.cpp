@@ -4,9 +4,7 @@
 #include <base/outputs.h>
 #include <base/processor_time.h>
 #include <base/user_files.h>
-#include <datasets/scene.h>
 #include <haptics/simulation.h>
-#include <haptics/timing.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -1,6 +1,7 @@
 #include <session/open.h>
 
 #include <base/build.h>
+#include <base/error.h>
 #include <base/inputs.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
@@ -33,10 +34,8 @@ double gainOfTrial(const std::string& trial)
 {
     int k = 0, n = 0, read = 0;
     const bool two = std::sscanf(trial.c_str(), "%5d/%5d%n", &k, &n, &read) == 2;
-    if (!two || static_cast<std::size_t>(read) != trial.size() || n < 2 || k < 1 || k > n) {
-        throw std::runtime_error(
-            fmt::format("--trial {}: must be K/N, trial K of N, with N 2 or more and K from 1 to N", trial));
-    }
+    base::failIf(!two || static_cast<std::size_t>(read) != trial.size() || n < 2 || k < 1 || k > n,
+                 "--trial {}: must be K/N, trial K of N, with N 2 or more and K from 1 to N", trial);
     return static_cast<double>(n - k) / (n - 1);
 }
 
@@ -80,9 +79,8 @@ void change(Scene& scene, const SceneChanges& changes)
         scene.model.setting = *changes.setting;
         scene.model.elastic = datasets::elasticSetting(*changes.setting, scene.model.elastic);
     }
-    if (changes.trial && changes.dffb != "fade") {
-        throw std::runtime_error("--trial: says how far a study's guidance has faded: add --dffb fade");
-    }
+    base::failIf(changes.trial && changes.dffb != "fade",
+                 "--trial: says how far a study's guidance has faded: add --dffb fade");
     if (changes.dffb) {
         changeDffb(scene.dffb, *changes.dffb, changes.trial);
     }
@@ -126,14 +124,12 @@ Scene changed(Scene scene, SceneChanges changes, const std::string& origin)
         return scene;
     }
     const bool idleSeed = changes.seed && !changes.seedElsewhere;
-    if (!scene.source.file.empty() && (idleSeed || changes.voxelsPerSide)) {
-        throw std::runtime_error(
-            fmt::format("{}: the volume is no phantom: {} changes nothing", origin, idleSeed ? "--seed" : "--voxels"));
-    }
+    base::failIf(!scene.source.file.empty() && (idleSeed || changes.voxelsPerSide),
+                 "{}: the volume is no phantom: {} changes nothing", origin, idleSeed ? "--seed" : "--voxels");
     change(scene, changes);
     if (changes.setting && scene.model.level != datasets::ModelLevel::elastic) {
-        throw std::runtime_error(fmt::format("{}: the tissue model is {}: --setting changes nothing; add --model elastic",
-                                             origin, levelOf(scene)));
+        throw base::error("{}: the tissue model is {}: --setting changes nothing; add --model elastic", origin,
+                          levelOf(scene));
     }
     Scene again = datasets::parseScene(datasets::sceneText(scene), origin);
     again.tissueChanges = scene.tissueChanges;  // the same, with their lines in the file
@@ -175,16 +171,13 @@ volume::Tissue withLesion(volume::Tissue tissue, SceneChanges& changes)
 void refuseNoScene(const std::filesystem::path& file)
 {
     const std::filesystem::path end = file.extension() == ".gz" ? file.stem().extension() : file.extension();
-    if (end == ".db") {
-        throw std::runtime_error(file.string() +
-                                 ": is no scene: a record is shown by 'palpate-view --replay' and "
-                                 "scored by 'palpate score'; give a scene (.toml) or a volume (.vdb)");
-    }
+    base::failIf(end == ".db",
+                 "{}: is no scene: a record is shown by 'palpate-view --replay' and scored by 'palpate score'; give a "
+                 "scene (.toml) or a volume (.vdb)",
+                 file.native());
     constexpr std::array<const char*, 9> labels{".nii", ".hdr", ".img", ".nrrd", ".nhdr", ".mha", ".mhd", ".mgz", ".dcm"};
-    if (std::ranges::find(labels, end) != labels.end()) {
-        throw std::runtime_error(file.string() +
-                                 ": is no scene: 'palpate import' makes a volume (.vdb) of a label map first");
-    }
+    base::failIf(std::ranges::find(labels, end) != labels.end(),
+                 "{}: is no scene: 'palpate import' makes a volume (.vdb) of a label map first", file.native());
 }
 
 }  // namespace
@@ -200,9 +193,7 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
         const bool aims = !changes.tool || changes.target || !datasets::lesionOf(*tissue).empty();
         if (!aims) {
             changes.target = datasets::largestStructure(*tissue);
-            if (changes.target->empty()) {
-                throw std::runtime_error(what + ": the volume holds no tissue, only air: import one with tissue");
-            }
+            base::failIf(changes.target->empty(), "{}: the volume holds no tissue, only air: import one with tissue", what);
         }
         auto scene = changed(volumeScene(path, *tissue, changes), changes, what);
         auto model = haptics::buildModel(std::move(scene), std::move(tissue), !changes.tool);
@@ -210,21 +201,19 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
         return model;
     }
     if (changes.lesion) {
-        throw std::runtime_error(
-            fmt::format("{}: --lesion-from {}: needs the phantom's volume (.vdb) for SCENE; `palpate import` makes it",
-                        what, changes.lesion->from.string()));
+        throw base::error("{}: --lesion-from {}: needs the phantom's volume (.vdb) for SCENE; `palpate import` makes it",
+                          what, changes.lesion->from.string());
     }
     auto builtIn = datasets::builtInScene(what);
     std::error_code none;
-    if (!builtIn && std::filesystem::is_directory(path, none)) {
-        throw std::runtime_error(what + ": is a folder: give a scene (.toml) or a volume (.vdb)");
-    }
+    base::failIf(!builtIn && std::filesystem::is_directory(path, none),
+                 "{}: is a folder: give a scene (.toml) or a volume (.vdb)", what);
     if (!builtIn && std::filesystem::is_symlink(path, none) && !std::filesystem::exists(path, none)) {
         throw std::runtime_error(what + ": " + base::whyNoFile(path));
     }
     if (!builtIn && !std::filesystem::exists(path, none)) {
-        throw std::runtime_error(fmt::format("{}: no such scene or volume; built-in scenes are: {}", what,
-                                             fmt::join(datasets::builtInScenes(), ", ")));
+        throw base::error("{}: no such scene or volume; built-in scenes are: {}", what,
+                          fmt::join(datasets::builtInScenes(), ", "));
     }
     if (!builtIn) {
         refuseNoScene(path);
@@ -240,13 +229,12 @@ haptics::SessionModel reopenSession(const std::string& file, const haptics::Sess
     auto scene = datasets::parseScene(info.sceneText, info.sceneOrigin);
     auto tissue = std::make_shared<const volume::Tissue>(datasets::sceneVolume(scene));
     auto model = haptics::buildModel(std::move(scene), std::move(tissue));
-    if (haptics::modelHash(model) != info.volumeHash) {
-        throw std::runtime_error(file +
-                                 ": the volume or the tissue table of this session has changed since it was "
-                                 "recorded; replay it with those it was recorded with");
-    }
+    base::failIf(haptics::modelHash(model) != info.volumeHash,
+                 "{}: the volume or the tissue table of this session has changed since it was recorded; replay it with "
+                 "those it was recorded with",
+                 file);
     if (const std::string contradiction = haptics::contradictionIn(info, model); !contradiction.empty()) {
-        throw std::runtime_error(fmt::format("{}: was changed: {}", file, contradiction));
+        throw base::error("{}: was changed: {}", file, contradiction);
     }
     return model;
 }

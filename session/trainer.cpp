@@ -10,14 +10,10 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cmath>
-#include <limits>
 #include <optional>
-#include <stdexcept>
 #include <thread>
 
 namespace palpate::session {

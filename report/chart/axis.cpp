@@ -1,5 +1,7 @@
 #include <report/chart/axis.h>
 
+#include <base/error.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,7 +9,6 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 #include <string_view>
 
 namespace palpate::report {
@@ -105,8 +106,8 @@ DrawableChart drawableChart(Chart chart, const std::filesystem::path& file)
         std::ranges::copy_if(s.y, std::back_inserter(y), [](double v) { return !std::isnan(v); });
     }
     if (x.empty()) {
-        throw std::runtime_error(fmt::format("{}: the chart has no value to draw{}", file.string(),
-                                             out > 0 ? ": " + leftOut(out, chart.logX || chart.logY) : ""));
+        throw base::error("{}: the chart has no value to draw{}", file.string(),
+                          out > 0 ? ": " + leftOut(out, chart.logX || chart.logY) : "");
     }
     out += std::erase_if(chart.bounds, [&](const ChartLine& b) { return !drawable(b.y, chart.logY); });
     for (const ChartLine& b : chart.bounds) {

@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <base/outputs.h>
 #include <report/chart/axis.h>
 #include <report/chart/chart.h>
@@ -6,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::report {
 
@@ -55,9 +55,7 @@ json chartData(const DrawableChart& drawn)
 void writeChartHtml(std::span<const Chart> charts, const std::string& title, const std::filesystem::path& file,
                     const std::string& below)
 {
-    if (charts.empty() && below.empty()) {
-        throw std::runtime_error(file.string() + ": there is no chart to draw");
-    }
+    base::failIf(charts.empty() && below.empty(), "{}: there is no chart to draw", file.native());
     json data = {{"charts", json::object()}};
     std::string body = "<header><div><p class=\"eyebrow\">Palpate</p><h1>" + escape(title) + "</h1></div></header>";
     for (std::size_t i = 0; i < charts.size(); ++i) {

@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/process.h>
 #include <base/utf8.h>
@@ -15,7 +16,6 @@
 #include <cstdio>
 #include <cstring>
 #include <memory>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -238,10 +238,7 @@ using TemporaryFile = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 TemporaryFile temporaryFile(const std::filesystem::path& file)
 {
     TemporaryFile out(std::tmpfile(), &std::fclose);
-    if (!out) {
-        throw std::runtime_error(
-            fmt::format("{}: no temporary file can be made ({}): make room in /tmp", file.string(), std::strerror(errno)));
-    }
+    base::failIf(!out, "{}: no temporary file can be made ({}): make room in /tmp", file.native(), std::strerror(errno));
     return out;
 }
 
@@ -262,11 +259,8 @@ int runGnuplot(const std::array<std::FILE*, 3>& streams, const std::filesystem::
     // The settings of whoever runs this must not change the picture.
     const auto [pid, error] =
         base::start({{"gnuplot", "--default-settings"}, {fileno(streams[0]), fileno(streams[1]), fileno(streams[2])}});
-    if (error != 0) {
-        throw std::runtime_error(
-            fmt::format("{}: gnuplot, which draws it, cannot be started ({}): apt-get install gnuplot-nox", file.string(),
-                        std::strerror(error)));
-    }
+    base::failIf(error != 0, "{}: gnuplot, which draws it, cannot be started ({}): apt-get install gnuplot-nox",
+                 file.native(), std::strerror(error));
     return base::exitStatus(pid);
 }
 
@@ -283,19 +277,18 @@ std::string drawn(const std::string& commands, const std::filesystem::path& file
 {
     const TemporaryFile in = temporaryFile(file), out = temporaryFile(file), errors = temporaryFile(file);
     const bool written = std::fwrite(commands.data(), 1, commands.size(), in.get()) == commands.size();
-    if (!written || std::fflush(in.get()) != 0) {
-        throw std::runtime_error(file.string() + ": the chart's data do not fit into /tmp: make room there");
-    }
+    base::failIf(!written || std::fflush(in.get()) != 0, "{}: the chart's data do not fit into /tmp: make room there",
+                 file.native());
     std::rewind(in.get());
     const int status = runGnuplot({in.get(), out.get(), errors.get()}, file);
     std::string png = contents(out.get());
     // gnuplot ends well also when the disk was full: a whole picture ends with this chunk.
     if (status != 0 || !png.starts_with("\x89PNG") || !png.ends_with("IEND\xAE\x42\x60\x82")) {
         const std::string why = complaint(contents(errors.get()));
-        throw std::runtime_error(
-            fmt::format("{}: gnuplot could not draw it (exit status {}{}{}): check room in /tmp, and that Debian's "
-                        "gnuplot-nox is installed",
-                        file.string(), status, why.empty() ? "" : ": ", why));
+        throw base::error(
+            "{}: gnuplot could not draw it (exit status {}{}{}): check room in /tmp, and that Debian's "
+            "gnuplot-nox is installed",
+            file.string(), status, why.empty() ? "" : ": ", why);
     }
     return png;
 }
