@@ -1,5 +1,6 @@
 #include <sweep/plan.h>
 
+#include <base/error.h>
 #include <base/split.h>
 #include <datasets/scene_text.h>
 #include <datasets/toml_fields.h>
@@ -67,7 +68,7 @@ toml::table& elementOf(toml::array& list, std::string_view part, const std::stri
             return table;
         }
     }
-    throw std::runtime_error(fmt::format("key '{}': there is no {}; there are: {}", key, part, fmt::join(names, ", ")));
+    throw base::error("key '{}': there is no {}; there are: {}", key, part, fmt::join(names, ", "));
 }
 
 // 3: no axis.
@@ -81,9 +82,8 @@ void setCoordinate(toml::array& point, std::string_view part, const std::string&
     const std::size_t axis = axisOf(part);
     const auto* const number = std::get_if<double>(&value);
     const auto* const whole = std::get_if<std::int64_t>(&value);
-    if (axis == 3 || point.size() != 3 || (number == nullptr && whole == nullptr)) {
-        throw std::runtime_error(fmt::format("key '{}': a point has x, y and z, numbers in mm", key));
-    }
+    base::failIf(axis == 3 || point.size() != 3 || (number == nullptr && whole == nullptr),
+                 "key '{}': a point has x, y and z, numbers in mm", key);
     point.replace(point.cbegin() + static_cast<std::ptrdiff_t>(axis),
                   number != nullptr ? *number : static_cast<double>(*whole));
 }
@@ -109,7 +109,7 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value, Ne
     for (std::size_t i = 0; i + 1 < parts.size(); ++i) {
         toml::node* next = table->get(parts[i]);
         if (next == nullptr && (parts[i] == "insert" || parts[i] == "vital" || parts[i] == "script")) {
-            throw std::runtime_error(fmt::format("key '{}': the scene has no [[{}]]", key, parts[i]));
+            throw base::error("key '{}': the scene has no [[{}]]", key, parts[i]);
         }
         if (next == nullptr && i + 2 == parts.size() && axisOf(parts.back()) < 3) {
             next = table->insert(parts[i], toml::array(0.0, 0.0, 0.0)).first->second.as_array();
@@ -129,7 +129,7 @@ void setKey(toml::table& root, const std::string& key, const KeyValue& value, Ne
             }
             return;
         } else {
-            throw std::runtime_error(fmt::format("key '{}': {} has no keys in it", key, parts[i]));
+            throw base::error("key '{}': {} has no keys in it", key, parts[i]);
         }
     }
     insertValue(*table, parts.back(), value);
@@ -153,9 +153,7 @@ void apply(toml::table& root, const std::vector<Setting>& settings, const std::m
         }
     }
     for (const auto& [point, axes] : points) {
-        if (axes.size() != 3) {
-            throw std::runtime_error(fmt::format("key '{}': the scene leaves this point open: set its x, y and z", point));
-        }
+        base::failIf(axes.size() != 3, "key '{}': the scene leaves this point open: set its x, y and z", point);
     }
 }
 

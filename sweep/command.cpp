@@ -1,6 +1,8 @@
 #include <sweep/command.h>
 
 #include <base/build.h>
+#include <base/counted.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
 #include <command/json.h>
@@ -72,11 +74,6 @@ std::string duration(double seconds)
            : s < 120  ? fmt::format("{} s", s)
            : s < 7200 ? fmt::format("{} min", s / 60)
                       : fmt::format("{:.1f} h", seconds / 3600);
-}
-
-std::string plural(std::size_t count, const char* what)
-{
-    return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
 }
 
 // "[######......] 412 of 1000 cases, 8.1 a second, 72 s left".
@@ -155,20 +152,18 @@ void dryRun(const SweepArguments& o)
     const auto [seconds, bytes, measured] = costOf(plan);
     const double all = seconds * static_cast<double>(plan.cases()) / o.jobs;
     const double disk = bytes * static_cast<double>(plan.cases());
-    if (!o.json.empty()) {
-        command::writeJson(o.json,
-                           {{"cases", plan.cases()}, {"case_s", seconds}, {"estimated_s", all}, {"disk_mb", disk / 1e6}});
-    }
+    command::writeJson(o.json,
+                       {{"cases", plan.cases()}, {"case_s", seconds}, {"estimated_s", all}, {"disk_mb", disk / 1e6}});
     if (o.json == "-") {
         return;
     }
-    fmt::print("{}: {} = {} x {}; axes: ", plan.name, plural(plan.cases(), "case"), plural(plan.points.size(), "point"),
-               plural(plan.repeats, "repeat"));
+    fmt::print("{}: {} = {} x {}; axes: ", plan.name, base::counted(plan.cases(), "case"),
+               base::counted(plan.points.size(), "point"), base::counted(plan.repeats, "repeat"));
     for (const Axis& a : plan.axes) {
         fmt::print("{}{}", &a == &plan.axes[0] ? "" : ", ", a.name);
     }
     fmt::print("\nabout {:.3g} s a case, measured on {}: {} on {}; {:.3g} MB on the disk\n", seconds,
-               plural(measured, "case"), duration(all),
+               base::counted(measured, "case"), duration(all),
                o.jobs == 1 ? std::string("one process") : fmt::format("{} processes", o.jobs), disk / 1e6);
 }
 
@@ -213,8 +208,8 @@ PoolResult runCases(const SweepArguments& o, SweepFolder& folder, const std::vec
     const std::size_t before = all - cases.size();
     if (o.onSlurm) {
         const auto told = [&](std::size_t done, std::size_t running, std::size_t waiting) {
-            progress.show(
-                fmt::format("{}; {} running, {} waiting", bar(before, done, all, begin), plural(running, "task"), waiting));
+            progress.show(fmt::format("{}; {} running, {} waiting", bar(before, done, all, begin),
+                                      base::counted(running, "task"), waiting));
             return interrupts == 0;
         };
         runOnSlurm(folder, cases, merged(o, folder.plan()), std::string(base::build()), told);
@@ -224,7 +219,7 @@ PoolResult runCases(const SweepArguments& o, SweepFolder& folder, const std::vec
     }
     const auto told = [&](std::size_t done, std::size_t running) {
         folder.lock().check();
-        progress.show(interrupts > 0 ? fmt::format("finishing {}; Ctrl-C again aborts them", plural(running, "case"))
+        progress.show(interrupts > 0 ? fmt::format("finishing {}; Ctrl-C again aborts them", base::counted(running, "case"))
                                      : bar(before, done, all, begin));
         return interrupts == 0;
     };
@@ -242,19 +237,17 @@ std::vector<std::size_t> conclude(const SweepArguments& o, const SweepFolder& fo
     const auto processes = static_cast<double>(std::min(begun, static_cast<std::size_t>(o.jobs)));
     const double fraction = run.seconds > 0 && processes > 0 ? run.cpuSeconds / (run.seconds * processes) : 0.0;
     const fs::path file = folder.path() / "table.csv";
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"cases", wanted.size()},
-                                    {"done", table.rows.size()},
-                                    {"failed", failed},
-                                    {"seconds", run.seconds},
-                                    {"cpu_fraction", fraction},
-                                    {"table", file.string()}});
-    }
+    command::writeJson(o.json, {{"cases", wanted.size()},
+                                {"done", table.rows.size()},
+                                {"failed", failed},
+                                {"seconds", run.seconds},
+                                {"cpu_fraction", fraction},
+                                {"table", file.string()}});
     if (o.json != "-") {
         fmt::print("{} of {}, {} failed; {} now in {:.3g} s{}\ntable: {}, {}\n", table.rows.size(),
-                   plural(wanted.size(), "case"), failed, run.done, run.seconds,
+                   base::counted(wanted.size(), "case"), failed, run.done, run.seconds,
                    run.cpuSeconds > 0 ? fmt::format(", {:.0f} % of {}", 100 * fraction,
-                                                    plural(static_cast<std::size_t>(processes), "core"))
+                                                    base::counted(static_cast<std::size_t>(processes), "core"))
                                       : "",
                    file.string(), (folder.path() / "table.db").string());
     }
@@ -278,10 +271,8 @@ void run(const SweepArguments& o)
         remainingCases(folder, wanted, [](const std::string& what) { fmt::print(stderr, "palpate: {}\n", what); });
     const PoolResult result = cases.empty() ? PoolResult() : runCases(o, folder, cases, wanted.cases.size());
     const auto missing = conclude(o, folder, result, cases.size(), wanted.cases);
-    if (!missing.empty()) {
-        throw std::runtime_error(fmt::format("interrupted: {} of {} cases are done; the same command resumes",
-                                             wanted.cases.size() - missing.size(), wanted.cases.size()));
-    }
+    base::failIf(!missing.empty(), "interrupted: {} of {} cases are done; the same command resumes",
+                 wanted.cases.size() - missing.size(), wanted.cases.size());
     if (isPart(o) && o.json != "-") {
         fmt::print("when all parts are done: palpate sweep -o {} --merge\n", base::shellWord(o.folder));
     }
@@ -298,8 +289,8 @@ void merge(const SweepArguments& o)
     result.done = came;
     const auto missing = conclude(o, folder, result, 0, allCases(folder.plan()));
     if (!missing.empty()) {
-        throw std::runtime_error(fmt::format("{}: {} of {} cases are missing: run them with --cases {}, and merge again",
-                                             o.folder, missing.size(), folder.plan().cases(), listOfCases(missing)));
+        throw base::error("{}: {} of {} cases are missing: run them with --cases {}, and merge again", o.folder,
+                          missing.size(), folder.plan().cases(), listOfCases(missing));
     }
 }
 
@@ -312,9 +303,7 @@ void report(const SweepArguments& o)
     }
     const fs::path file = folder.path() / "report.html";
     base::writeWhole(file, sweepPage(folder.plan(), rows));
-    if (!o.json.empty()) {
-        command::writeJson(o.json, sensitivity(folder.plan(), rows));
-    }
+    command::writeJson(o.json, sensitivity(folder.plan(), rows));
     if (o.json != "-") {
         fmt::print("report: {}\n", file.string());
     }
@@ -334,9 +323,7 @@ void sweepCommand(const SweepArguments& o)
     } else if (o.folder.empty() && !o.dry) {
         throw std::runtime_error("sweep: no folder: add -o DIR");
     } else if (o.dry) {
-        if (o.plan.empty() && o.folder.empty()) {
-            throw std::runtime_error("sweep --dry-run: no plan: give a plan, or -o DIR");
-        }
+        base::failIf(o.plan.empty() && o.folder.empty(), "sweep --dry-run: no plan: give a plan, or -o DIR");
         dryRun(o);
     } else if (o.merge) {
         merge(o);

@@ -3,7 +3,6 @@
 #include <boost/random/sobol.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace palpate::sweep {

@@ -1,8 +1,8 @@
 #include <sweep/folder.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <datasets/scene_text.h>
-#include <sweep/lock.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -33,9 +33,7 @@ std::string textOf(const fs::path& file)
 {
     std::ifstream in(file, std::ios::binary);
     std::string text((std::istreambuf_iterator<char>(in)), {});
-    if (!in && text.empty()) {
-        throw std::runtime_error(file.string() + ": cannot be read: check its name and permissions");
-    }
+    base::failIf(!in && text.empty(), "{}: cannot be read: check its name and permissions", file.native());
     return text;
 }
 
@@ -91,8 +89,7 @@ T valueOf(const json& entry, const char* key, bool (json::*is)() const noexcept,
 {
     const auto at = entry.find(key);
     if (at == entry.end() || !((*at).*is)()) {
-        throw std::runtime_error(
-            fmt::format("key {} is {}{}", key, at == entry.end() ? "missing, and should be " : "no ", what));
+        throw base::error("key {} is {}{}", key, at == entry.end() ? "missing, and should be " : "no ", what);
     }
     return at->get<T>();
 }
@@ -101,14 +98,10 @@ T valueOf(const json& entry, const char* key, bool (json::*is)() const noexcept,
 SweepRow parseRow(const std::string& text, std::size_t index, const SweepPlan& plan)
 {
     const json entry = json::parse(text, nullptr, false);
-    if (!entry.is_object()) {
-        throw std::runtime_error("is no JSON object");
-    }
+    base::failIf(!entry.is_object(), "is no JSON object");
     SweepRow row;
     row.index = valueOf<std::size_t>(entry, "case", &json::is_number_unsigned, "whole number");
-    if (row.index != index) {
-        throw std::runtime_error(fmt::format("key case is {}", row.index));
-    }
+    base::failIf(row.index != index, "key case is {}", row.index);
     row.error = valueOf<std::string>(entry, "error", &json::is_string, "text");
     row.build = valueOf<std::string>(entry, "build", &json::is_string, "text");
     row.machine = valueOf<std::string>(entry, "machine", &json::is_string, "text");
@@ -117,14 +110,11 @@ SweepRow parseRow(const std::string& text, std::size_t index, const SweepPlan& p
     const json outputs = valueOf<json>(entry, "outputs", &json::is_object, "object");
     for (const auto& output : plan.outputs) {
         const json value = outputs.value(output.name, json());
-        if (!value.is_number() && !value.is_null()) {
-            throw std::runtime_error(fmt::format("key outputs.{} is no number", output.name));
-        }
+        base::failIf(!value.is_number() && !value.is_null(), "key outputs.{} is no number", output.name);
         row.outputs.push_back(value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN());
     }
-    if (valueOf<std::string>(entry, "checksum", &json::is_string, "text") != checksumOf(entry)) {
-        throw std::runtime_error("key checksum does not match");
-    }
+    base::failIf(valueOf<std::string>(entry, "checksum", &json::is_string, "text") != checksumOf(entry),
+                 "key checksum does not match");
     return row;
 }
 
@@ -136,12 +126,9 @@ std::pair<std::string, fs::path> planText(const std::string& given)
     if (!ready.empty()) {
         return {std::string(ready), given + ".toml"};
     }
-    if (fs::is_directory(given)) {
-        throw std::runtime_error(given + ": is a folder: give a plan (.toml), and the folder with -o");
-    }
+    base::failIf(fs::is_directory(given), "{}: is a folder: give a plan (.toml), and the folder with -o", given);
     if (!fs::exists(given)) {
-        throw std::runtime_error(
-            fmt::format("{}: no such plan; ready plans are: {}", given, fmt::join(builtInPlans(), ", ")));
+        throw base::error("{}: no such plan; ready plans are: {}", given, fmt::join(builtInPlans(), ", "));
     }
     return {textOf(given), fs::absolute(given)};
 }
@@ -151,7 +138,7 @@ void SweepFolder::begin()
     std::error_code failed;
     fs::create_directories(folder_ / "cases", failed);
     if (failed) {
-        throw std::runtime_error(fmt::format("{}: cannot be made ({})", folder_.string(), failed.message()));
+        throw base::error("{}: cannot be made ({})", folder_.string(), failed.message());
     }
     base::writeWhole(folder_ / "scene.toml", datasets::sceneText(plan_.base));
     const json about{{"name", plan_.name}, {"inputs", inputsOf(plan_.base)}};
@@ -169,12 +156,9 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         text = planText(given);
     }
     if (!fs::exists(file)) {
-        if (given.empty()) {
-            throw std::runtime_error(folder_.string() + ": holds no sweep: give a plan");
-        }
-        if (fs::exists(folder_) && (!fs::is_directory(folder_) || !fs::is_empty(folder_))) {
-            throw std::runtime_error(folder_.string() + ": is not empty and holds no sweep: choose another folder");
-        }
+        base::failIf(given.empty(), "{}: holds no sweep: give a plan", folder_.native());
+        base::failIf(fs::exists(folder_) && (!fs::is_directory(folder_) || !fs::is_empty(folder_)),
+                     "{}: is not empty and holds no sweep: choose another folder", folder_.native());
         plan_ = parsePlan(text.first, text.second, namedScene);
         base::checkOutputFolder(folder_);
         base::makeFolders(folder_);
@@ -187,21 +171,18 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         return;
     }
     plan_ = parsePlan(textOf(file), file, sceneOfFolder);
-    if (!given.empty() && text.first != plan_.text) {
-        throw std::runtime_error(fmt::format(
-            "{}: holds another plan than {}: choose another folder, or leave out the plan to resume that of the folder",
-            folder_.string(), given));
-    }
+    base::failIf(
+        !given.empty() && text.first != plan_.text,
+        "{}: holds another plan than {}: choose another folder, or leave out the plan to resume that of the folder",
+        folder_.native(), given);
     const json about = json::parse(textOf(folder_ / "sweep.json"), nullptr, false);
-    if (!about.is_object()) {
-        throw std::runtime_error(folder_.string() + "/sweep.json: is damaged: begin in another folder");
-    }
+    base::failIf(!about.is_object(), "{}/sweep.json: is damaged: begin in another folder", folder_.native());
     plan_.name = about.value("name", plan_.name);
     if (const json now = inputsOf(plan_.base); about.value("inputs", json()) != now) {
-        throw std::runtime_error(
-            fmt::format("{}: a file that its scene reads has changed since the sweep began ({}): bring "
-                        "it back, or begin in another folder",
-                        folder_.string(), now.dump()));
+        throw base::error(
+            "{}: a file that its scene reads has changed since the sweep began ({}): bring "
+            "it back, or begin in another folder",
+            folder_.string(), now.dump());
     }
 }
 

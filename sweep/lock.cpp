@@ -1,5 +1,7 @@
 #include <sweep/lock.h>
 
+#include <base/error.h>
+
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -10,7 +12,6 @@
 #include <ctime>
 #include <fstream>
 #include <random>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::sweep {
@@ -40,9 +41,8 @@ base::FileLock lockOf(const fs::path& folder)
     }
     const json other = read(folder);
     const auto word = [&](const char* key) { return other.is_object() ? other.value(key, "?") : "?"; };
-    throw std::runtime_error(fmt::format("{}: another run works on it (process {} on {}, since {}): wait for it or stop it",
-                                         folder.string(), other.is_object() ? other.value("process", 0L) : 0L,
-                                         word("machine"), word("since")));
+    throw base::error("{}: another run works on it (process {} on {}, since {}): wait for it or stop it", folder.string(),
+                      other.is_object() ? other.value("process", 0L) : 0L, word("machine"), word("since"));
 }
 
 }  // namespace
@@ -71,9 +71,7 @@ std::string FolderLock::holder(const fs::path& folder)
 
 void FolderLock::check() const
 {
-    if (holder(folder_) != id_) {
-        throw std::runtime_error(folder_.string() + ": another run has taken it over: this one ends");
-    }
+    base::failIf(holder(folder_) != id_, "{}: another run has taken it over: this one ends", folder_.native());
 }
 
 }  // namespace palpate::sweep

@@ -1,8 +1,8 @@
 #include <sweep/plan.h>
 
+#include <base/error.h>
 #include <datasets/embedded.h>
 #include <datasets/scene_text.h>
-#include <datasets/tables.h>
 #include <datasets/toml_section.h>
 #include <haptics/trainee.h>
 #include <sweep/formula.h>
@@ -55,14 +55,10 @@ std::vector<std::string> wordsOf(Section& section, std::string_view key)
     const toml::array* const list = node->as_array();
     for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
         const auto word = list->get(i)->value_exact<std::string>();
-        if (!word || word->empty()) {
-            section.refuse(key, "expected a list of texts in quotes");
-        }
+        section.refuseIf(!word || word->empty(), key, "expected a list of texts in quotes");
         out.push_back(*word);
     }
-    if (list == nullptr) {
-        section.refuse(key, "expected a list of texts in quotes");
-    }
+    section.refuseIf(list == nullptr, key, "expected a list of texts in quotes");
     return out;
 }
 
@@ -72,15 +68,12 @@ void readRange(Section& section, std::string_view key, Axis& axis)
     const auto number = [&](std::size_t i) {
         return list != nullptr && list->size() == 2 ? list->get(i)->value<double>() : std::nullopt;
     };
-    if (!number(0) || !number(1) || !(*number(0) < *number(1)) || std::abs(*number(0)) > furthest ||
-        std::abs(*number(1)) > furthest) {
-        section.refuse(key, "expected [low, high], two numbers, the lower one first");
-    }
+    section.refuseIf(!number(0) || !number(1) || !(*number(0) < *number(1)) || std::abs(*number(0)) > furthest ||
+                         std::abs(*number(1)) > furthest,
+                     key, "expected [low, high], two numbers, the lower one first");
     axis.low = *number(0);
     axis.high = *number(1);
-    if (axis.log && axis.low <= 0) {
-        section.refuse(key, "a logarithmic range must be above 0");
-    }
+    section.refuseIf(axis.log && axis.low <= 0, key, "a logarithmic range must be above 0");
 }
 
 Axis readAxis(Section& section, DesignKind design)
@@ -91,9 +84,7 @@ Axis readAxis(Section& section, DesignKind design)
     if (axis.name.empty()) {
         section.missing("key", "what varies, such as \"tissue.fat.youngs_kpa\"; or name, for formulas alone");
     }
-    if (!isVariable(axis.name)) {
-        section.refuse("name", "must be letters, digits and _, and begin with a letter");
-    }
+    section.refuseIf(!isVariable(axis.name), "name", "must be letters, digits and _, and begin with a letter");
     const int ways = (section.has("values") ? 1 : 0) + (section.has("range") ? 1 : 0) + (section.has("log_range") ? 1 : 0);
     if (ways != 1) {
         section.missing("values", "one of values = [..], range = [low, high], log_range = [low, high]");
@@ -104,9 +95,7 @@ Axis readAxis(Section& section, DesignKind design)
         for (std::size_t i = 0; list != nullptr && i < list->size(); ++i) {
             axis.values.push_back(valueOf(section, "values", *list->get(i)));
         }
-        if (axis.values.empty()) {
-            section.refuse("values", "expected a list of values");
-        }
+        section.refuseIf(axis.values.empty(), "values", "expected a list of values");
     } else {
         axis.log = section.has("log_range");
         readRange(section, axis.log ? "log_range" : "range", axis);
@@ -139,9 +128,7 @@ std::vector<Setting> readSettings(Section& top, std::string_view key)
 {
     std::vector<Setting> out;
     if (const toml::node* node = top.node(key)) {
-        if (!node->is_table()) {
-            top.refuse(key, "expected a table of keys and values");
-        }
+        top.refuseIf(!node->is_table(), key, "expected a table of keys and values");
         flatten(top, key, *node->as_table(), "", out);
     }
     return out;
@@ -192,9 +179,7 @@ void readMarks(Section& top, SweepPlan& plan)
         mark.label = section.word("label").value_or(fmt::format("{:g}", mark.at));
         section.finish();
         const bool known = std::ranges::any_of(plan.outputs, [&](const auto& o) { return o.name == mark.output; });
-        if (!known) {
-            section.refuse("output", "is none of the plan's outputs");
-        }
+        section.refuseIf(!known, "output", "is none of the plan's outputs");
         plan.marks.push_back(std::move(mark));
     }
 }
@@ -320,7 +305,7 @@ bool holds(const std::string& constraint, const SweepPlan& plan, const SweepCase
 {
     const double value = evaluate(constraint, c.variables);
     if (!std::isfinite(value)) {
-        throw std::runtime_error(fmt::format("formula '{}' gives no finite number at {}", constraint, namedPoint(plan, c)));
+        throw base::error("formula '{}' gives no finite number at {}", constraint, namedPoint(plan, c));
     }
     return value != 0;
 }
@@ -330,9 +315,8 @@ void applyConstraints(SweepPlan& plan, Section& top)
     if (plan.constraints.empty()) {
         return;
     }
-    if (plan.design == DesignKind::saltelli || plan.design == DesignKind::morris) {
-        top.refuse("constraints", "a design for sensitivity is whole or none: leave them out, or choose sobol");
-    }
+    top.refuseIf(plan.design == DesignKind::saltelli || plan.design == DesignKind::morris, "constraints",
+                 "a design for sensitivity is whole or none: leave them out, or choose sobol");
     UnitPoints kept;
     const UnitPoints all = std::move(plan.points);
     for (const auto& point : all) {
@@ -349,9 +333,7 @@ void applyConstraints(SweepPlan& plan, Section& top)
         }
     }
     plan.points = std::move(kept);
-    if (plan.points.empty()) {
-        top.refuse("constraints", "no point is left");
-    }
+    top.refuseIf(plan.points.empty(), "constraints", "no point is left");
 }
 
 }  // namespace
@@ -418,8 +400,8 @@ datasets::Scene namedScene(const std::string& what, const std::filesystem::path&
         return datasets::sceneForVolume(file, volume::Tissue::load(file));
     }
     if (!std::filesystem::exists(path)) {
-        throw std::runtime_error(fmt::format("{}: scene = \"{}\": no such file; built-in scenes are: {}", origin.string(),
-                                             what, fmt::join(datasets::builtInScenes(), ", ")));
+        throw base::error("{}: scene = \"{}\": no such file; built-in scenes are: {}", origin.string(), what,
+                          fmt::join(datasets::builtInScenes(), ", "));
     }
     return datasets::loadScene(path);
 }

@@ -1,5 +1,6 @@
 #include <sweep/plan_checks.h>
 
+#include <base/error.h>
 #include <datasets/tables.h>
 #include <sweep/formula.h>
 
@@ -10,7 +11,6 @@
 #include <map>
 #include <set>
 #include <stdexcept>
-#include <utility>
 #include <vector>
 
 namespace palpate::sweep {
@@ -129,7 +129,7 @@ void probeCases(const SweepPlan& plan, const std::string& file)
         try {
             checkTissues(sweepCase(plan, index).scene, tables);
         } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("{}: case {}: {}", file, index, withoutPlace(e.what())));
+            throw base::error("{}: case {}: {}", file, index, withoutPlace(e.what()));
         }
     }
 }
@@ -149,7 +149,7 @@ void probeOutputs(const SweepPlan& plan, const std::string& file)
         try {
             numbers[output.name] = output.formula.empty() ? 1 : evaluate(output.formula, numbers);
         } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("{}: outputs: {}", file, e.what()));
+            throw base::error("{}: outputs: {}", file, e.what());
         }
     }
 }

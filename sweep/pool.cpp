@@ -1,6 +1,6 @@
 #include <sweep/pool.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
 
 #include <signal.h>
 #include <sys/mman.h>
@@ -19,7 +19,6 @@
 #include <new>
 #include <set>
 #include <stdexcept>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -47,9 +46,7 @@ public:
     SharedPages()
     {
         void* const pages = mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-        if (pages == MAP_FAILED) {
-            throw std::runtime_error(fmt::format("no memory for a pool of processes ({})", std::strerror(errno)));
-        }
+        base::failIf(pages == MAP_FAILED, "no memory for a pool of processes ({})", std::strerror(errno));
         shared_ = new (pages) Shared;
     }
     ~SharedPages() { munmap(shared_, sizeof(Shared)); }
@@ -157,10 +154,7 @@ private:
         if (pid == 0) {
             live(shared_, slot, first, count_, parent, work_);
         }
-        if (pid < 0) {
-            throw std::runtime_error(
-                fmt::format("a process cannot be started ({}): use fewer --jobs", std::strerror(errno)));
-        }
+        base::failIf(pid < 0, "a process cannot be started ({}): use fewer --jobs", std::strerror(errno));
         pids_[slot] = pid;
     }
 

@@ -1,19 +1,17 @@
 #include <sweep/procedures.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/processor_time.h>
 #include <haptics/measures.h>
 #include <session/devices.h>
 #include <session/session.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <stdexcept>
 
 namespace palpate::sweep {
 
@@ -178,9 +176,8 @@ ProcedureResult press(const Run& run, const Procedure& p)
 {
     const auto& model = run.model;
     const auto& tool = model.scene.tool;
-    if (tool.kind == datasets::ToolKind::needle) {
-        throw std::runtime_error("procedure press: a needle pierces: set tool.kind to sphere or capsule");
-    }
+    base::failIf(tool.kind == datasets::ToolKind::needle,
+                 "procedure press: a needle pierces: set tool.kind to sphere or capsule");
     const Vec3 inward = -model.surface.normal(model.approach.entry);
     const Vec3 left = std::abs(inward.x) < 0.9 ? Vec3(1, 0, 0) : Vec3(0, 0, 1);
     Vec3 place = model.approach.entry + p.aside * glm::normalize(left - glm::dot(left, inward) * inward);
@@ -198,9 +195,7 @@ ProcedureResult press(const Run& run, const Procedure& p)
 ProcedureResult needle(const Run& run, const Procedure& p)
 {
     const auto& model = run.model;
-    if (model.scene.tool.kind != datasets::ToolKind::needle) {
-        throw std::runtime_error("procedure needle: set tool.kind to needle");
-    }
+    base::failIf(model.scene.tool.kind != datasets::ToolKind::needle, "procedure needle: set tool.kind to needle");
     const Vec3 way = glm::normalize(model.approach.aim - model.approach.entry);
     Drive drive(model.approach.entry - outside * way, way, outside + p.depth, p, true);
     const double tickTime = carryOut(run, drive);
@@ -244,10 +239,9 @@ std::vector<OutputInfo> outputsOf(ProcedureKind kind)
                 {"pull_n", "largest force on the way out"},
                 {"work_mj", "work of the hand, in and out"}};
     }
-    std::vector<OutputInfo> out;
-    for (const haptics::Measure& m : haptics::measures()) {
-        out.push_back({m.key, "measure of the score, docs/score.md"});
-    }
+    auto out = base::mapped<OutputInfo>(haptics::measures(), [&](const haptics::Measure& m) {
+        return OutputInfo{m.key, "measure of the score, docs/score.md"};
+    });
     out.insert(out.end(), {{"peak_basic_n", "largest force of the tissue"},
                            {"peak_additional_n", "largest additional force (DFFB)"},
                            {"energy_made_mj", "largest net energy given to the hand"},

@@ -1,6 +1,7 @@
 #include <sweep/run.h>
 
 #include <base/build.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/split.h>
 #include <datasets/scene_text.h>
@@ -15,7 +16,6 @@
 #include <numeric>
 #include <optional>
 #include <set>
-#include <stdexcept>
 
 namespace palpate::sweep {
 
@@ -37,9 +37,7 @@ std::pair<std::size_t, std::size_t> partOf(const std::string& shard)
     const auto slash = shard.find('/');
     const auto k = numberOf(std::string_view(shard).substr(0, slash));
     const auto n = slash == std::string::npos ? std::nullopt : numberOf(std::string_view(shard).substr(slash + 1));
-    if (!k || !n || *k < 1 || *k > *n) {
-        throw std::runtime_error(fmt::format("--shard {}: must be K/N, part K of N, with K from 1 to N", shard));
-    }
+    base::failIf(!k || !n || *k < 1 || *k > *n, "--shard {}: must be K/N, part K of N, with K from 1 to N", shard);
     return {*k, *n};
 }
 
@@ -50,8 +48,8 @@ void checkSamePlan(const SweepFolder& to, const SweepFolder& from)
 {
     if (from.plan().text != to.plan().text ||
         datasets::sceneText(from.plan().base) != datasets::sceneText(to.plan().base)) {
-        throw std::runtime_error(fmt::format("{}: is of another plan or scene than {}: it cannot be merged",
-                                             from.path().string(), to.path().string()));
+        throw base::error("{}: is of another plan or scene than {}: it cannot be merged", from.path().string(),
+                          to.path().string());
     }
 }
 
@@ -107,10 +105,10 @@ void checkOneBuild(const SweepFolder& to, const std::vector<std::optional<SweepR
         builds.insert(merged.row.build);
     }
     if (builds.size() > 1 && !come.empty()) {
-        throw std::runtime_error(
-            fmt::format("{}: the shards are of different builds, {}: compute them with one build, or add --any-build (the "
-                        "table names the build of each case)",
-                        to.path().string(), fmt::join(builds, " and ")));
+        throw base::error(
+            "{}: the shards are of different builds, {}: compute them with one build, or add --any-build (the "
+            "table names the build of each case)",
+            to.path().string(), fmt::join(builds, " and "));
     }
 }
 
@@ -135,10 +133,10 @@ std::vector<std::size_t> remainingCases(const SweepFolder& folder, const CasesWa
         }
     }
     if (!others.empty() && !cases.empty() && !wanted.anyBuild) {
-        throw std::runtime_error(
-            fmt::format("{}: holds cases of build {}, and this is build {}: use that build, or add --any-build (the table "
-                        "names the build of each case)",
-                        folder.path().string(), fmt::join(others, ", "), std::string(base::build())));
+        throw base::error(
+            "{}: holds cases of build {}, and this is build {}: use that build, or add --any-build (the table "
+            "names the build of each case)",
+            folder.path().string(), fmt::join(others, ", "), std::string(base::build()));
     }
     return cases;
 }
@@ -177,12 +175,8 @@ std::vector<std::size_t> casesOfList(const std::string& list, std::size_t cases)
         const auto dash = text.find('-');
         const auto first = numberOf(text.substr(0, dash));
         const auto last = dash == std::string_view::npos ? first : numberOf(text.substr(dash + 1));
-        if (!first || !last || *first > *last) {
-            throw std::runtime_error(fmt::format("--cases {}: must be numbers and ranges, as in 0-9,12", list));
-        }
-        if (*last >= cases) {
-            throw std::runtime_error(fmt::format("--cases {}: the plan has the cases 0 to {}", list, cases - 1));
-        }
+        base::failIf(!first || !last || *first > *last, "--cases {}: must be numbers and ranges, as in 0-9,12", list);
+        base::failIf(*last >= cases, "--cases {}: the plan has the cases 0 to {}", list, cases - 1);
         for (std::size_t i = *first; i <= *last; ++i) {
             out.insert(i);
         }
@@ -230,9 +224,7 @@ std::size_t mergeShards(const fs::path& folder, const std::vector<fs::path>& fro
         }
     }
     std::sort(parts.begin(), parts.end());
-    if (parts.empty()) {
-        throw std::runtime_error(folder.string() + ": has no shards to merge: give their folders after --merge");
-    }
+    base::failIf(parts.empty(), "{}: has no shards to merge: give their folders after --merge", folder.native());
     if (!fs::exists(folder / "plan.toml")) {
         const SweepFolder first(parts.front(), "", false);
         base::makeFolders(folder / "cases");

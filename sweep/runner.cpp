@@ -1,5 +1,6 @@
 #include <sweep/case.h>
 
+#include <base/error.h>
 #include <datasets/scene_text.h>
 #include <haptics/recorder.h>
 #include <haptics/replay.h>
@@ -11,10 +12,8 @@
 
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
-#include <stdexcept>
 
 namespace palpate::sweep {
 
@@ -83,10 +82,8 @@ CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Pro
     }
     const auto begin = std::chrono::steady_clock::now();
     const auto watch = [&](const haptics::TickRecord&, const haptics::ServoTiming&) {
-        if (std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > plan_.caseLimit) {
-            throw std::runtime_error(
-                fmt::format("took over {:g} s and was aborted (case_limit_s in the plan)", plan_.caseLimit));
-        }
+        base::failIf(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() > plan_.caseLimit,
+                     "took over {:g} s and was aborted (case_limit_s in the plan)", plan_.caseLimit);
     };
     auto result = carryOut(modelled->model, info, procedure, seed, recorder ? &*recorder : nullptr, watch);
     if (recorder) {

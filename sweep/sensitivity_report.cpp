@@ -1,5 +1,6 @@
 #include <sweep/report.h>
 
+#include <base/mapped.h>
 #include <sweep/sensitivity.h>
 
 #include <nlohmann/json.hpp>
@@ -45,20 +46,16 @@ struct Ranking {
 
 std::vector<std::vector<double>> bySobol(const SweepPlan& plan, const std::vector<double>& means)
 {
-    std::vector<std::vector<double>> out;
-    for (const SobolIndex& i : sobolIndices(means, plan.axes.size())) {
-        out.push_back({i.total, i.totalError, i.first, i.firstError});
-    }
-    return out;
+    return base::mapped<std::vector<double>>(sobolIndices(means, plan.axes.size()), [&](const SobolIndex& i) {
+        return std::vector<double>{i.total, i.totalError, i.first, i.firstError};
+    });
 }
 
 std::vector<std::vector<double>> byMorris(const SweepPlan& plan, const std::vector<double>& means)
 {
-    std::vector<std::vector<double>> out;
-    for (const MorrisEffect& e : morrisEffects(plan.points, means)) {
-        out.push_back({e.absolute, e.mean, e.spread});
-    }
-    return out;
+    return base::mapped<std::vector<double>>(morrisEffects(plan.points, means), [&](const MorrisEffect& e) {
+        return std::vector<double>{e.absolute, e.mean, e.spread};
+    });
 }
 
 std::vector<std::vector<double>> byShare(const SweepPlan& plan, const std::vector<double>& means)
@@ -66,10 +63,8 @@ std::vector<std::vector<double>> byShare(const SweepPlan& plan, const std::vecto
     std::vector<std::vector<double>> out;
     const bool whole = std::ranges::all_of(means, [](double v) { return std::isfinite(v); });
     for (std::size_t a = 0; whole && a < plan.axes.size(); ++a) {
-        std::vector<std::size_t> level;
-        for (const auto& point : plan.points) {
-            level.push_back(static_cast<std::size_t>(point[a]));
-        }
+        const auto level =
+            base::mapped<std::size_t>(plan.points, [&](const auto& point) { return static_cast<std::size_t>(point[a]); });
         out.push_back({mainEffect(means, level)});
     }
     return out;

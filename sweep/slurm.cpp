@@ -1,6 +1,7 @@
 #include <sweep/slurm.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
 #include <sweep/local.h>
@@ -255,9 +256,8 @@ void workOnChunk(const fs::path& file, int jobs, const std::string& build)
     const json submission = json::parse(in, nullptr, false);
     const char* const task = std::getenv("SLURM_ARRAY_TASK_ID");
     const std::size_t number = task != nullptr ? static_cast<std::size_t>(std::strtoul(task, nullptr, 10)) : 0;
-    if (!submission.is_object() || !submission.contains("chunks") || number >= submission["chunks"].size()) {
-        throw std::runtime_error(file.string() + ": holds no chunk for this task");
-    }
+    base::failIf(!submission.is_object() || !submission.contains("chunks") || number >= submission["chunks"].size(),
+                 "{}: holds no chunk for this task", file.native());
     SweepFolder folder(submission.at("folder").get<std::string>(), "", false);
     const auto lock = submission.at("lock").get<std::string>();
     std::vector<std::size_t> cases;

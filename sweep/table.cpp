@@ -1,5 +1,7 @@
 #include <sweep/table.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <datasets/scene_text.h>
 
 #include <fmt/format.h>
@@ -155,10 +157,7 @@ private:
 
 void fill(Database& db, const SweepTable& table, const SweepPlan& plan)
 {
-    std::vector<std::string> names;
-    for (const auto& c : table.columns) {
-        names.push_back(identifier(c.name));
-    }
+    const auto names = base::mapped<std::string>(table.columns, [&](const auto& c) { return identifier(c.name); });
     db.run(
         fmt::format("CREATE TABLE results ({}); CREATE TABLE columns (name TEXT, kind TEXT, meaning TEXT); CREATE TABLE "
                     "sweep (key TEXT, value TEXT)",
@@ -229,8 +228,8 @@ void writeDatabase(const std::filesystem::path& file, const SweepTable& table, c
         std::filesystem::rename(half, file);
     } catch (const std::exception& e) {
         std::filesystem::remove(half, ignored);
-        throw std::runtime_error(
-            fmt::format("{}: cannot be written ({}): check the folder and the space on the disk", file.string(), e.what()));
+        throw base::error("{}: cannot be written ({}): check the folder and the space on the disk", file.string(),
+                          e.what());
     }
 }
 
