@@ -1,10 +1,10 @@
 #include <studies/accuracy/accuracy.h>
 
+#include <base/error.h>
 #include <haptics/contact_law.h>
 #include <studies/kernel/kernel_rivals.h>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -100,10 +100,7 @@ double secondsSince(std::chrono::steady_clock::time_point start)
 TrialModel limited(TrialModel model, double maxSeconds)
 {
     model.tick = [tick = std::move(model.tick), maxSeconds, used = 0.0, count = 0](const TrialLoad& load) mutable {
-        if (used > maxSeconds) {
-            throw std::runtime_error(
-                fmt::format("takes {:.0f} ms per tick: stopped after {:.0f} s", 1e3 * used / count, used));
-        }
+        base::failIf(used > maxSeconds, "takes {:.0f} ms per tick: stopped after {:.0f} s", 1e3 * used / count, used);
         const auto start = std::chrono::steady_clock::now();
         const ElasticResult result = tick(load);
         used += secondsSince(start);
@@ -119,9 +116,7 @@ void checkFinite(std::span<const TrialResult> results)
     for (const TrialResult& result : results) {
         for (const TrialErrors& e : result.looks) {
             for (const double figure : {e.rms, e.near, e.max, e.force, e.volume}) {
-                if (!std::isfinite(figure)) {
-                    throw std::runtime_error("its displacements or forces are no finite numbers");
-                }
+                base::failIf(!std::isfinite(figure), "its displacements or forces are no finite numbers");
             }
         }
     }

@@ -1,6 +1,8 @@
 #include <studies/accuracy/command.h>
 
 #include <base/build.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
@@ -112,10 +114,8 @@ std::vector<Baseline> chosen(std::vector<Baseline> all, const AccuracyArguments&
         names.insert(rival.name);
     }
     for (const std::string& name : o.methods) {
-        if (!names.contains(name)) {
-            throw std::runtime_error(
-                fmt::format("--methods {}: there is no such method; there are {}", name, fmt::join(names, ", ")));
-        }
+        base::failIf(!names.contains(name), "--methods {}: there is no such method; there are {}", name,
+                     fmt::join(names, ", "));
     }
     std::erase_if(all, [&](const Baseline& b) {
         const bool wanted = o.methods.empty() || std::ranges::find(o.methods, b.method) != o.methods.end();
@@ -129,17 +129,12 @@ std::vector<Baseline> chosen(std::vector<Baseline> all, const AccuracyArguments&
 
 std::vector<Rival> rivalsOf(const AccuracyArguments& o)
 {
-    std::vector<double> spacings;
-    for (const double mm : o.rivalSpacings) {
-        spacings.push_back(1e-3 * mm);
-    }
+    const auto spacings = base::mapped<double>(o.rivalSpacings, [&](const double mm) { return 1e-3 * mm; });
     std::vector<Rival> rivals;
     for (const std::string& text : o.rivals) {
         Rival rival = rivalOf(text, spacings);
-        if (std::ranges::find(rivals, rival.name, &Rival::name) != rivals.end()) {
-            throw std::runtime_error(
-                fmt::format("--rival {}: there is another one called {}: write NAME=COMMAND", text, rival.name));
-        }
+        base::failIf(std::ranges::find(rivals, rival.name, &Rival::name) != rivals.end(),
+                     "--rival {}: there is another one called {}: write NAME=COMMAND", text, rival.name);
         rivals.push_back(std::move(rival));
     }
     return rivals;
@@ -178,15 +173,12 @@ std::vector<Case> casesOf(const Solved& s, const std::vector<Rival>& rivals, con
     std::vector<Baseline> methods = accuracyMethods(s.subject);
     addConforming(s.subject, o, methods);
     for (const Rival& rival : rivals) {
-        if (std::ranges::find(methods, rival.name, &Baseline::method) != methods.end()) {
-            throw std::runtime_error(
-                fmt::format("--rival: {} is a method of this command: write another NAME=COMMAND", rival.name));
-        }
+        base::failIf(std::ranges::find(methods, rival.name, &Baseline::method) != methods.end(),
+                     "--rival: {} is a method of this command: write another NAME=COMMAND", rival.name);
     }
-    std::vector<Case> cases;
-    for (Baseline& method : chosen(std::move(methods), o)) {
-        cases.push_back({std::move(method), nullptr, 0});
-    }
+    auto cases = base::mapped<Case>(chosen(std::move(methods), o), [&](Baseline& method) {
+        return Case{std::move(method), nullptr, 0};
+    });
     for (const Rival& rival : rivals) {
         const bool first = o.quick && !asked(rival, o);
         for (const double spacing : std::span(rival.spacings).first(first ? 1 : rival.spacings.size())) {
@@ -272,15 +264,12 @@ std::vector<Solved> solveAll(const AccuracyArguments& o, const std::vector<std::
     std::vector<Solved> all;
     for (const std::string& what : subjects) {
         if (std::ranges::find(all, shortName(what), &Solved::scene) != all.end()) {
-            throw std::runtime_error(
-                fmt::format("{}: there is another scene called {} in this run: rename one", what, shortName(what)));
+            throw base::error("{}: there is another scene called {} in this run: rename one", what, shortName(what));
         }
         all.push_back(solved(what, o, progress));
     }
     std::erase_if(all, [](const Solved& s) { return s.references.empty(); });
-    if (all.empty()) {
-        throw std::runtime_error("no scene has a reference: see the lines above");
-    }
+    base::failIf(all.empty(), "no scene has a reference: see the lines above");
     return all;
 }
 
@@ -331,21 +320,15 @@ void checkRivals(const json& figures, const AccuracyArguments& o)
                                         e["failure"].get<std::string>()));
         }
     }
-    if (!failures.empty()) {
-        throw std::runtime_error(fmt::format("{}", fmt::join(failures, "; ")));
-    }
+    base::failIf(!failures.empty(), "{}", fmt::join(failures, "; "));
 }
 
 void checkLaws(const AccuracyArguments& o)
 {
-    if (o.laws.empty()) {
-        throw std::runtime_error(fmt::format("--law: name one of {}, or more", fmt::join(volume::lawNames, ", ")));
-    }
+    base::failIf(o.laws.empty(), "--law: name one of {}, or more", fmt::join(volume::lawNames, ", "));
     for (const std::string& law : o.laws) {
-        if (!volume::lawNamed(law)) {
-            throw std::runtime_error(
-                fmt::format("--law {}: there is no such law; there are {}", law, fmt::join(volume::lawNames, ", ")));
-        }
+        base::failIf(!volume::lawNamed(law), "--law {}: there is no such law; there are {}", law,
+                     fmt::join(volume::lawNames, ", "));
     }
 }
 
@@ -382,9 +365,7 @@ void accuracyCommand(AccuracyArguments o)
                        figures["chart"].size(), figures["cases_resumed"].get<std::size_t>(), o.folder, pictures.size());
         }
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
     checkRivals(figures, o);
 }
 

@@ -1,5 +1,6 @@
 #include <studies/accuracy/conforming.h>
 
+#include <base/error.h>
 #include <base/process.h>
 #include <base/temporary_folder.h>
 #include <studies/accuracy/command_log.h>
@@ -14,7 +15,6 @@
 #include <iomanip>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -33,7 +33,7 @@ void runMesher(const fs::path& mesher, const fs::path& volume, const fs::path& m
                                    fmt::format("{:g}", 1e3 * size), "--largest", fmt::format("{:g}", 1e3 * growth * size)},
                                   {-1, said.number(), said.number()}});
     if (status != 0) {
-        throw std::runtime_error(fmt::format("palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log)));
+        throw base::error("palpate-mesh --size {:g}: {}", 1e3 * size, lastLine(log));
     }
 }
 
@@ -52,9 +52,7 @@ public:
                 readTets();
             }
         }
-        if (body_.tets.empty()) {
-            throw std::runtime_error(file.string() + ": no tetrahedra; is palpate-mesh of another version?");
-        }
+        base::failIf(body_.tets.empty(), "{}: no tetrahedra; is palpate-mesh of another version?", file.native());
     }
     TetBody body() && { return std::move(body_); }
 
@@ -182,10 +180,8 @@ TetBody conformingTets(const fs::path& mesher, const volume::Tissue& tissue, dou
     tissue.save(volume);
     runMesher(mesher, volume, mesh, size);
     TetBody body = MeshFile(mesh, tissue.table(), poissonCap).body();
-    if (body.points.size() > maxPoints) {
-        throw std::runtime_error(fmt::format("{} points at {:g} mm: {} are the most; take a larger size",
-                                             body.points.size(), 1e3 * size, maxPoints));
-    }
+    base::failIf(body.points.size() > maxPoints, "{} points at {:g} mm: {} are the most; take a larger size",
+                 body.points.size(), 1e3 * size, maxPoints);
     hold(body);
     body.outer.assign(body.points.size(), 0);
     for (const auto& face : outsideOf(body)) {

@@ -1,7 +1,7 @@
 #include <studies/accuracy/deep.h>
 
 #include <base/build.h>
-#include <base/outputs.h>
+#include <base/error.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <session/open.h>
@@ -17,7 +17,6 @@
 #include <cmath>
 #include <map>
 #include <set>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::studies {
@@ -181,10 +180,8 @@ std::vector<DeepCase> chosen(const DeepCommand& c)
         scenes.insert(one.scene);
     }
     for (const std::string& scene : c.scenes) {
-        if (!scenes.contains(scene)) {
-            throw std::runtime_error(fmt::format("--scenes {}: has no stored forces; scenes with stored forces are {}",
-                                                 scene, fmt::join(scenes, ", ")));
-        }
+        base::failIf(!scenes.contains(scene), "--scenes {}: has no stored forces; scenes with stored forces are {}", scene,
+                     fmt::join(scenes, ", "));
     }
     const std::vector<std::string> wanted = c.scenes.empty() && c.quick ? std::vector<std::string>{"block"} : c.scenes;
     std::erase_if(cases, [&](const DeepCase& one) {
@@ -234,14 +231,12 @@ void deepCommand(const DeepCommand& c)
             fmt::print("\n{}: depth.html, depth.csv, depth.json, {} pictures\n", c.folder.string(), pictures.size());
         }
     }
-    if (!c.json.empty()) {
-        command::writeJson(c.json, figures);
-    }
+    command::writeJson(c.json, figures);
     for (const json& s : figures.at("summary")) {
         if (s.at("pull_n").get<double>() > 0.0) {
-            throw std::runtime_error(fmt::format("{}, {}, {}: the tissue pulls the tool inwards by {:.2g} N",
-                                                 s.at("scene").get<std::string>(), s.at("tool").get<std::string>(),
-                                                 s.at("setting").get<std::string>(), s.at("pull_n").get<double>()));
+            throw base::error("{}, {}, {}: the tissue pulls the tool inwards by {:.2g} N", s.at("scene").get<std::string>(),
+                              s.at("tool").get<std::string>(), s.at("setting").get<std::string>(),
+                              s.at("pull_n").get<double>());
         }
     }
 }

@@ -1,18 +1,17 @@
 #include <studies/accuracy/deep_press.h>
 
+#include <base/error.h>
 #include <base/processor_time.h>
 #include <chainmail/elastic.h>
 #include <haptics/simulation.h>
 #include <studies/kernel/kernel_rivals.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -57,10 +56,8 @@ std::vector<Felt> feel(Elastic& elastic, const TrialPath& path, double speed, De
         elastic.relax(load.load());
         const double took = base::processorTime() - start;
         const Vec3 force = elastic.toolForce(0);
-        if (!std::isfinite(glm::length(force))) {
-            throw std::runtime_error(
-                fmt::format("the force {:.2f} mm below the surface is no number", 1e3 * (pressed - path.gap)));
-        }
+        base::failIf(!std::isfinite(glm::length(force)), "the force {:.2f} mm below the surface is no number",
+                     1e3 * (pressed - path.gap));
         if (!elastic.atRest()) {
             seconds.push_back(took);
         }

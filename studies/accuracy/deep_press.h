@@ -6,7 +6,6 @@
 #include <studies/kernel/kernel_trial.h>
 
 #include <cstddef>
-#include <functional>
 #include <span>
 #include <vector>
 

@@ -1,5 +1,6 @@
 #include <studies/accuracy/deep_references.h>
 
+#include <base/error.h>
 #include <base/split.h>
 
 #include <fmt/format.h>
@@ -9,7 +10,6 @@
 #include <array>
 #include <fstream>
 #include <optional>
-#include <stdexcept>
 #include <string_view>
 
 namespace palpate::studies {
@@ -27,10 +27,8 @@ class Row {
 public:
     Row(std::string_view line, std::string where) : cells_(base::csvCells(line)), where_(std::move(where))
     {
-        if (cells_.size() != columns.size()) {
-            throw std::runtime_error(fmt::format("{}: {} values: must be {}: {}", where_, cells_.size(), columns.size(),
-                                                 fmt::join(columns, ",")));
-        }
+        base::failIf(cells_.size() != columns.size(), "{}: {} values: must be {}: {}", where_, cells_.size(),
+                     columns.size(), fmt::join(columns, ","));
     }
 
     bool isHead() const { return std::ranges::equal(cells_, columns); }
@@ -42,8 +40,8 @@ public:
     {
         const auto* const found = std::ranges::find(words, cells_[column]);
         if (found == words.end()) {
-            throw std::runtime_error(fmt::format("{}: {} = '{}': must be {}", where_, columns[column], cells_[column],
-                                                 fmt::join(words, " or ")));
+            throw base::error("{}: {} = '{}': must be {}", where_, columns[column], cells_[column],
+                              fmt::join(words, " or "));
         }
         return static_cast<std::size_t>(found - words.begin());
     }
@@ -53,8 +51,8 @@ public:
         const std::string_view cell = cells_[column];
         const std::optional<double> value = base::numberIn(cell);
         if (!value || !(*value >= least && *value <= most)) {
-            throw std::runtime_error(fmt::format("{}: {} = '{}': must be a number from {:g} to {:g}", where_,
-                                                 columns[column], cell, least, most));
+            throw base::error("{}: {} = '{}': must be a number from {:g} to {:g}", where_, columns[column], cell, least,
+                              most);
         }
         return *value;
     }
@@ -117,10 +115,8 @@ std::vector<DeepCase> readDeepCases(std::istream& in, const std::string& origin)
         }
         const Row row(line, fmt::format("{}:{}", origin, number));
         if (head) {
-            if (!row.isHead()) {
-                throw std::runtime_error(
-                    fmt::format("{}:{}: no line of column names: begin with {}", origin, number, fmt::join(columns, ",")));
-            }
+            base::failIf(!row.isHead(), "{}:{}: no line of column names: begin with {}", origin, number,
+                         fmt::join(columns, ","));
             head = false;
             continue;
         }
@@ -132,18 +128,14 @@ std::vector<DeepCase> readDeepCases(std::istream& in, const std::string& origin)
         }
         found->references.push_back(referenceOf(row));
     }
-    if (cases.empty()) {
-        throw std::runtime_error(fmt::format("{}: holds no forces", origin));
-    }
+    base::failIf(cases.empty(), "{}: holds no forces", origin);
     return cases;
 }
 
 std::vector<DeepCase> loadDeepCases(const std::filesystem::path& file)
 {
     std::ifstream in(file);
-    if (!in) {
-        throw std::runtime_error(file.string() + ": cannot be read: is it there, and may it be read?");
-    }
+    base::failIf(!in, "{}: cannot be read: is it there, and may it be read?", file.native());
     return readDeepCases(in, file.string());
 }
 

@@ -2,7 +2,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>

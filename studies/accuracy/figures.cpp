@@ -1,5 +1,6 @@
 #include <studies/accuracy/figures.h>
 
+#include <base/mapped.h>
 #include <studies/kernel/figures.h>
 
 #include <fmt/format.h>
@@ -238,10 +239,7 @@ std::string accuracyCsv(const json& figures)
 {
     std::string out = fmt::format("{}\n", fmt::join(columns, ","));
     for (const json& entry : figures.at("chart")) {
-        std::vector<std::string> cells;
-        for (const char* key : columns) {
-            cells.push_back(csvCell(entry, key));
-        }
+        const auto cells = base::mapped<std::string>(columns, [&](const char* key) { return csvCell(entry, key); });
         out += fmt::format("{}\n", fmt::join(cells, ","));
     }
     return out;

@@ -2,8 +2,6 @@
 
 #include <studies/accuracy/references.h>
 
-#include <fmt/format.h>
-
 namespace palpate::studies {
 
 namespace {

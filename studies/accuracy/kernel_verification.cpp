@@ -1,5 +1,6 @@
 #include <studies/accuracy/kernel_verification.h>
 
+#include <base/mapped.h>
 #include <chainmail/elastic.h>
 #include <studies/accuracy/contact_formulas.h>
 #include <studies/accuracy/deep_press.h>
@@ -81,10 +82,9 @@ double sphereForce(const ElasticBody& body, double radius, double depth, Vec3 be
 // Force of ties without side stiffness at these points of the top, all pulled `depth` inward [N].
 double tiesForce(const ElasticBody& body, std::span<const Vec3> points, double stiffness, double depth)
 {
-    std::vector<Tie> ties;
-    for (const Vec3& p : points) {
-        ties.push_back({p, depth * inward, inward, stiffness, 0.0});
-    }
+    const auto ties = base::mapped<Tie>(points, [&](const Vec3& p) {
+        return Tie{p, depth * inward, inward, stiffness, 0.0};
+    });
     const ElasticLoad load{{}, ties, {Vec3(0.0), inward, 0.0}};
     Elastic elastic(body, {.window = window, .maxSites = ties.size()}, load.focus);
     elastic.relax(load, maxCycles, tight);

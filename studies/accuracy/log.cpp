@@ -1,8 +1,9 @@
 #include <studies/accuracy/log.h>
 
+#include <base/error.h>
+
 #include <algorithm>
 #include <fstream>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::studies {
@@ -15,9 +16,7 @@ AccuracyLog::AccuracyLog(std::filesystem::path file, std::string build) : file_(
         return;
     }
     std::ifstream in(file_);
-    if (!in) {
-        throw std::runtime_error(file_.string() + ": cannot be read: check its permissions");
-    }
+    base::failIf(!in, "{}: cannot be read: check its permissions", file_.native());
     for (std::string line; std::getline(in, line);) {
         json parsed = json::parse(line, nullptr, false);
         const bool whole = parsed.is_object() && parsed.value("build", json()).is_string() &&
@@ -54,9 +53,7 @@ void AccuracyLog::add(const std::string& reference, const json& entry)
         ended = before.get() == '\n';
     }
     out << (ended ? "" : "\n") << lines_.back().dump(-1, ' ', false, json::error_handler_t::replace) << std::endl;
-    if (!out) {
-        throw std::runtime_error(file_.string() + ": cannot be written: check the folder and the space on the disk");
-    }
+    base::failIf(!out, "{}: cannot be written: check the folder and the space on the disk", file_.native());
 }
 
 }  // namespace palpate::studies

@@ -1,11 +1,11 @@
 #include <studies/accuracy/reference_file.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <volume/fnv.h>
 
 #include <fmt/format.h>
 #include <zlib.h>
-#include <glm/common.hpp>
 #include <glm/gtc/type_ptr.hpp>
 #include <nlohmann/json.hpp>
 
@@ -16,8 +16,6 @@
 #include <cstring>
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
-#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -56,9 +54,7 @@ std::vector<Word> unpacked(const json& binary, std::size_t count)
 {
     using Unsigned = std::make_unsigned_t<Word>;
     const auto& bytes = binary.get_binary();
-    if (bytes.size() != count * sizeof(Word)) {
-        throw std::runtime_error("lists of different lengths");
-    }
+    base::failIf(bytes.size() != count * sizeof(Word), "lists of different lengths");
     std::vector<Word> words(count);
     Unsigned before = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -189,9 +185,9 @@ std::string deflated(const Bytes& bytes)
 {
     uLongf size = compressBound(bytes.size());
     std::string out(size, '\0');
-    if (compress2(reinterpret_cast<Bytef*>(out.data()), &size, bytes.data(), bytes.size(), Z_BEST_COMPRESSION) != Z_OK) {
-        throw std::runtime_error("reference: it cannot be packed: there is not enough memory");
-    }
+    base::failIf(
+        compress2(reinterpret_cast<Bytef*>(out.data()), &size, bytes.data(), bytes.size(), Z_BEST_COMPRESSION) != Z_OK,
+        "reference: it cannot be packed: there is not enough memory");
     out.resize(size);
     return out;
 }
@@ -199,9 +195,7 @@ std::string deflated(const Bytes& bytes)
 Bytes inflated(const std::string& bytes)
 {
     z_stream stream{};
-    if (inflateInit(&stream) != Z_OK) {
-        throw std::runtime_error("not enough memory");
-    }
+    base::failIf(inflateInit(&stream) != Z_OK, "not enough memory");
     stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
     stream.avail_in = static_cast<uInt>(bytes.size());
     Bytes out;
@@ -214,9 +208,7 @@ Bytes inflated(const std::string& bytes)
         out.insert(out.end(), part.begin(), part.end() - static_cast<std::ptrdiff_t>(stream.avail_out));
     }
     inflateEnd(&stream);
-    if (status != Z_STREAM_END) {
-        throw std::runtime_error("cut short, or not a reference");
-    }
+    base::failIf(status != Z_STREAM_END, "cut short, or not a reference");
     return out;
 }
 
@@ -224,13 +216,11 @@ std::pair<Reference, ReferenceInfo> parsed(const std::string& bytes)
 {
     const json in = json::from_cbor(inflated(bytes));
     if (const int is = in.at("palpate_reference").get<int>(); is != format) {
-        throw std::runtime_error(fmt::format("it has format {}, this program reads {}", is, format));
+        throw base::error("it has format {}, this program reads {}", is, format);
     }
     Reference r;
     const auto count = in.at("count").get<std::size_t>();
-    if (count > maxBytes / sizeof(Vec3f)) {
-        throw std::runtime_error("lists of different lengths");
-    }
+    base::failIf(count > maxBytes / sizeof(Vec3f), "lists of different lengths");
     r.position = positionOf(in.at("position"), count);
     for (const json& state : in.at("states")) {
         r.states.push_back(stateOf(state, count));
@@ -327,16 +317,14 @@ void saveReference(const std::filesystem::path& file, const Reference& reference
 std::pair<Reference, ReferenceInfo> loadReference(const std::filesystem::path& file)
 {
     std::ifstream in(file, std::ios::binary);
-    if (!in || std::filesystem::is_directory(file)) {
-        throw std::runtime_error(file.string() + ": cannot be read: check its name and its permissions");
-    }
+    base::failIf(!in || std::filesystem::is_directory(file), "{}: cannot be read: check its name and its permissions",
+                 file.native());
     const std::string bytes{std::istreambuf_iterator<char>(in), {}};
     try {
         return parsed(bytes);
     } catch (const std::exception& e) {
-        throw std::runtime_error(
-            fmt::format("{}: is no reference that can be used ({}): make it anew with palpate-reference --save",
-                        file.string(), e.what()));
+        throw base::error("{}: is no reference that can be used ({}): make it anew with palpate-reference --save",
+                          file.string(), e.what());
     }
 }
 

@@ -1,6 +1,7 @@
 #include <studies/accuracy/references.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/process.h>
 #include <base/user_files.h>
 
@@ -109,8 +110,8 @@ void solve(const std::string& what, const AccuracySubject& subject, const std::s
     std::error_code failed;
     fs::create_directories(folder, failed);
     if (failed) {
-        throw std::runtime_error(fmt::format("{}: cannot be made ({}): name another folder with --references",
-                                             folder.string(), failed.message()));
+        throw base::error("{}: cannot be made ({}): name another folder with --references", folder.string(),
+                          failed.message());
     }
     std::vector<std::string> arguments{
         what,     "--law",      law, "--tool", subject.path.tool.name, "--speed", fmt::format("{:g}", 1e3 * subject.speed),
@@ -119,11 +120,8 @@ void solve(const std::string& what, const AccuracySubject& subject, const std::s
         arguments.insert(arguments.end(), {"--path-of", subject.pathOf.string()});
     }
     const int status = runReferenceProgram(arguments);
-    if (status != 0) {
-        throw std::runtime_error(
-            fmt::format("{}: palpate-reference did not solve its {} reference (exit status {}): its message is above", what,
-                        law, status));
-    }
+    base::failIf(status != 0, "{}: palpate-reference did not solve its {} reference (exit status {}): its message is above",
+                 what, law, status);
 }
 
 }  // namespace
@@ -161,21 +159,19 @@ SolvedReference solvedReference(const std::string& what, AccuracySubject& subjec
     }
     const std::string& scene = subject.model->scene.name;
     if (referenceProgram().empty()) {
-        throw std::runtime_error(
-            fmt::format("{}: there is no {} reference for it (key {}), and palpate-reference, which solves one, was not "
-                        "built: build with -DPALPATE_REFERENCE=ON, or take scenes that have one: {}",
-                        what, law, key, scenesWith(law, folders)));
+        throw base::error(
+            "{}: there is no {} reference for it (key {}), and palpate-reference, which solves one, was not "
+            "built: build with -DPALPATE_REFERENCE=ON, or take scenes that have one: {}",
+            what, law, key, scenesWith(law, folders));
     }
     tell(fmt::format("{}: {} reference by finite elements", what, law));
     const fs::path file = folders.own / fmt::format("{}-{}-{}.ref", scene, law, key);
     solve(what, subject, law, file);
     SolvedReference made = taken(file);
-    if (made.second.key != key) {
-        throw std::runtime_error(
-            fmt::format("{}: palpate-reference solved another problem (key {} instead of {}): both "
-                        "programs must be of one build",
-                        what, made.second.key, key));
-    }
+    base::failIf(made.second.key != key,
+                 "{}: palpate-reference solved another problem (key {} instead of {}): both "
+                 "programs must be of one build",
+                 what, made.second.key, key);
     return made;
 }
 

@@ -1,6 +1,8 @@
 #include <studies/accuracy/rival.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/split.h>
 #include <studies/accuracy/command_log.h>
 #include <studies/accuracy/rival_files.h>
@@ -16,11 +18,9 @@
 #include <cctype>
 #include <chrono>
 #include <cstdlib>
-#include <fstream>
 #include <numeric>
 #include <sstream>
 #include <stdexcept>
-#include <utility>
 
 namespace palpate::studies {
 
@@ -119,9 +119,7 @@ void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)
 {
     const fs::path log = folder / "log.txt";
     const File none("/dev/null", O_RDONLY), said(log, O_WRONLY | O_CREAT | O_TRUNC);
-    if (said.number() < 0) {
-        throw std::runtime_error(log.string() + ": cannot be written");
-    }
+    base::failIf(said.number() < 0, "{}: cannot be written", log.native());
     const std::string line = rival.command + " \"$1\"";
     base::ChildProcess child(base::Program{{"/bin/sh", "-c", line, "sh", fs::absolute(folder).string()},
                                            {none.number(), said.number(), said.number()},
@@ -132,13 +130,13 @@ void runCommand(const Rival& rival, const fs::path& folder, double maxSeconds)
     constexpr int signalled = 128;  // more is the shell's way to say that a signal has ended the command
     if (child.killed() || status > signalled) {
         const std::string which = child.killed() ? "a signal" : fmt::format("signal {}", status - signalled);
-        throw std::runtime_error(fmt::format("was ended by {}{}", which, lastWords(log)));
+        throw base::error("was ended by {}{}", which, lastWords(log));
     }
     if (child.pid() > 0) {
-        throw std::runtime_error(fmt::format("has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log)));
+        throw base::error("has not ended in {:g} s (--rival-limit){}", maxSeconds, lastWords(log));
     }
     if (status != 0) {
-        throw std::runtime_error(fmt::format("exit status {}{}", status, lastWords(log)));
+        throw base::error("exit status {}{}", status, lastWords(log));
     }
 }
 
@@ -146,20 +144,16 @@ TrialResult compared(const RivalAnswer& answer, const TetBody& mesh, const Accur
                      const Reference& reference)
 {
     const PositionCells cells = positionCells(reference.position);
-    std::vector<TetPlace> places;
-    for (const Vec3f& p : reference.position) {
-        places.push_back(placeOf(mesh, Vec3(p)));
-    }
+    const auto places = base::mapped<TetPlace>(reference.position, [&](const Vec3f& p) { return placeOf(mesh, Vec3(p)); });
     TrialResult result;
     std::size_t look = 0;
     for (const TrialTick& t : schedule(subject.path, subject.speed)) {
         if (!t.look) {
             continue;
         }
-        std::vector<Vec3> u;
-        for (const TetPlace& place : places) {
-            u.push_back(valueAt(place, [&](std::uint32_t p) { return answer.u[look][p]; }));
-        }
+        const auto u = base::mapped<Vec3>(places, [&](const TetPlace& place) {
+            return valueAt(place, [&](std::uint32_t p) { return answer.u[look][p]; });
+        });
         result.looks.push_back(errorsOf(u, answer.force[look], reference, cells, stateAt(reference, t.pose)));
         result.looks.back().phase = t.phase;
         ++look;
@@ -198,16 +192,12 @@ Rival rivalOf(const std::string& text, const std::vector<double>& spacings)
     const std::size_t at = text.find('=');
     const bool named = at != std::string::npos && isName(text.substr(0, at));
     Rival rival{"", std::string(base::trimmed(named ? std::string_view(text).substr(at + 1) : text)), "", spacings};
-    if (rival.command.empty()) {
-        throw std::runtime_error(fmt::format("--rival {}: there is no command in it: COMMAND or NAME=COMMAND", text));
-    }
+    base::failIf(rival.command.empty(), "--rival {}: there is no command in it: COMMAND or NAME=COMMAND", text);
     rival.name = named ? text.substr(0, at) : nameFor(rival.command);
-    if (!isName(rival.name)) {
-        throw std::runtime_error(
-            fmt::format("--rival {}: '{}' cannot be its name: write NAME=COMMAND, a name of letters, "
-                        "digits, '_', '-' and '.'",
-                        text, rival.name));
-    }
+    base::failIf(!isName(rival.name),
+                 "--rival {}: '{}' cannot be its name: write NAME=COMMAND, a name of letters, "
+                 "digits, '_', '-' and '.'",
+                 text, rival.name);
     return rival;
 }
 

@@ -1,5 +1,6 @@
 #include <studies/accuracy/rival_files.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/split.h>
 
@@ -84,9 +85,7 @@ void addPath(json& push, const AccuracySubject& subject)
 template <typename Take>
 std::size_t readTable(const std::filesystem::path& file, std::string_view head, std::size_t most, Take&& take)
 {
-    const auto fail = [&](const std::string& what) {
-        throw std::runtime_error(fmt::format("{}: {}", file.filename().string(), what));
-    };
+    const auto fail = [&](const std::string& what) { throw base::error("{}: {}", file.filename().string(), what); };
     std::ifstream in(file);
     if (!in || std::filesystem::is_directory(file)) {
         fail("was not written");
@@ -124,8 +123,7 @@ std::size_t readTable(const std::filesystem::path& file, std::string_view head, 
 void checkRows(const std::filesystem::path& file, std::size_t rows, std::size_t wanted, const std::string& ofWhat)
 {
     if (rows != wanted) {
-        throw std::runtime_error(
-            fmt::format("{}: {} rows: must be {}, {}", file.filename().string(), rows, wanted, ofWhat));
+        throw base::error("{}: {} rows: must be {}, {}", file.filename().string(), rows, wanted, ofWhat);
     }
 }
 
@@ -187,7 +185,7 @@ RivalAnswer readRivalAnswer(const std::filesystem::path& folder, std::size_t loo
     const auto times = folder / "times.csv";
     readTable(times, "processor_s", maxTimes, [&](std::span<const double> v) {
         if (v[0] <= 0.0) {
-            throw std::runtime_error(fmt::format("{}: {:g} s: must be over 0", times.filename().string(), v[0]));
+            throw base::error("{}: {:g} s: must be over 0", times.filename().string(), v[0]);
         }
         out.seconds.push_back(v[0]);
     });

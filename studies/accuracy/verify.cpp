@@ -1,5 +1,6 @@
 #include <studies/accuracy/verify.h>
 
+#include <base/error.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <studies/accuracy/kernel_verification.h>
@@ -43,9 +44,8 @@ json referenceRows(command::Progress& progress)
     in.close();
     std::error_code ignored;
     std::filesystem::remove(file, ignored);
-    if (!written.is_object() || !written.contains("verification")) {
-        throw std::runtime_error(fmt::format("palpate-reference --verify gave no figures (exit status {})", status));
-    }
+    base::failIf(!written.is_object() || !written.contains("verification"),
+                 "palpate-reference --verify gave no figures (exit status {})", status);
     json rows = written["verification"];
     for (json& row : rows) {
         row["solver"] = "reference";
@@ -98,9 +98,7 @@ void verifyCommand(bool quick, const std::filesystem::path& file)
             fmt::print("{}\n", missing);
         }
     }
-    if (!file.empty()) {
-        command::writeJson(file, {{"verification", rows}, {"chart", json::array()}});
-    }
+    command::writeJson(file, {{"verification", rows}, {"chart", json::array()}});
     std::size_t over = 0;
     for (const json& row : rows) {
         over += row["holds"].get<bool>() ? 0 : 1;
@@ -108,9 +106,7 @@ void verifyCommand(bool quick, const std::filesystem::path& file)
     if (both && !missing.empty()) {
         throw std::runtime_error(missing);
     }
-    if (over > 0) {
-        throw std::runtime_error(fmt::format("{} of {} rows are over their bounds: see the table", over, rows.size()));
-    }
+    base::failIf(over > 0, "{} of {} rows are over their bounds: see the table", over, rows.size());
 }
 
 }  // namespace palpate::studies

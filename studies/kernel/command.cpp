@@ -1,5 +1,7 @@
 #include <studies/kernel/command.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -14,7 +16,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -34,11 +35,7 @@ struct KernelArguments {
 
 std::vector<std::string> toolNames()
 {
-    std::vector<std::string> names;
-    for (const auto& tool : trialTools()) {
-        names.push_back(tool.name);
-    }
-    return names;
+    return base::mapped<std::string>(trialTools(), [&](const auto& tool) { return tool.name; });
 }
 
 void printHead()
@@ -127,18 +124,14 @@ void checkNames(const KernelArguments& o)
 {
     const auto known = toolNames();
     for (const std::string& tool : o.tools) {
-        if (std::ranges::find(known, tool) == known.end()) {
-            throw std::runtime_error(
-                fmt::format("--tools {}: there is no such tool; there are {}", tool, fmt::join(known, ", ")));
-        }
+        base::failIf(std::ranges::find(known, tool) == known.end(), "--tools {}: there is no such tool; there are {}", tool,
+                     fmt::join(known, ", "));
     }
     for (const std::string& setting : o.settings) {
         datasets::elasticSetting(setting);
     }
     for (const double speed : o.speeds) {
-        if (!(speed >= 1.0 && speed <= 1000.0)) {
-            throw std::runtime_error(fmt::format("--speeds {:g}: must be 1 to 1000 mm/s", speed));
-        }
+        base::failIf(!(speed >= 1.0 && speed <= 1000.0), "--speeds {:g}: must be 1 to 1000 mm/s", speed);
     }
 }
 
@@ -228,9 +221,7 @@ void benchKernelCommand(KernelArguments o)
     if (tell) {
         printSummary(figures);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
     if (!o.folder.empty()) {
         writeKernelFolder(o.folder, figures, cases);
     }

@@ -1,5 +1,6 @@
 #include <studies/kernel/figures.h>
 
+#include <base/mapped.h>
 #include <command/json.h>
 #include <datasets/scene.h>
 #include <report/chart/chart.h>
@@ -9,7 +10,6 @@
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -227,10 +227,8 @@ report::Chart errorChart(const std::vector<KernelCase>& cases, const char* what,
 
 std::vector<int> operatorWindows(const std::vector<std::string>& settings)
 {
-    std::vector<int> windows;
-    for (const std::string& setting : settings) {
-        windows.push_back(datasets::elasticSetting(setting).window);
-    }
+    auto windows =
+        base::mapped<int>(settings, [&](const std::string& setting) { return datasets::elasticSetting(setting).window; });
     windows.push_back(datasets::elasticSetting("default").window);
     if (!settings.empty()) {
         windows.push_back(31);  // fills its rows, and leaves the first-level cache

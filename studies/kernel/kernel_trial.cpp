@@ -1,5 +1,6 @@
 #include <studies/kernel/kernel_trial.h>
 
+#include <base/mapped.h>
 #include <base/processor_time.h>
 #include <studies/kernel/trial_errors.h>
 
@@ -14,8 +15,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <functional>
-#include <limits>
 #include <memory>
 #include <numeric>
 #include <optional>
@@ -289,10 +288,8 @@ TrialModel nothingModel()
 std::vector<TrialResult> runTrials(const TrialModel& model, const TrialPath& path, double speed,
                                    std::span<const Reference* const> references)
 {
-    std::vector<PositionCells> cells;
-    for (const Reference* reference : references) {
-        cells.push_back(positionCells(reference->position));
-    }
+    const auto cells = base::mapped<PositionCells>(
+        references, [&](const Reference* reference) { return positionCells(reference->position); });
     std::vector<std::vector<TrialErrors>> looks(references.size());
     TrialRun run(model, path);
     for (const TrialTick& t : schedule(path, speed)) {

@@ -1,13 +1,11 @@
 #include <studies/kernel/machine_rates.h>
 
+#include <base/error.h>
 #include <studies/kernel/machine_rates_sets.h>
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <stdexcept>
 #include <string_view>
 #include <vector>
 
@@ -41,9 +39,7 @@ MachineRates machineRates(const char* name)
     static constexpr std::array<const RateLoops*, 3> sets{&ratesV2, &ratesAvx2, &ratesAvx512};
     const auto* const found =
         std::ranges::find_if(sets, [&](const RateLoops* s) { return std::string_view(s->name) == name; });
-    if (found == sets.end()) {
-        throw std::runtime_error(fmt::format("instruction set '{}': its rates cannot be measured", name));
-    }
+    base::failIf(found == sets.end(), "instruction set '{}': its rates cannot be measured", name);
     const RateLoops& loops = **found;
     const std::vector<float> from(copied, 1.0F);
     std::vector<float> to(copied, 0.0F);

@@ -1,6 +1,7 @@
 #include <studies/kernel/trial_errors.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -174,11 +175,9 @@ const ReferenceState& stateAt(const Reference& reference, TrialPose pose)
 std::vector<TrialErrors> errorsBetween(const Reference& model, const Reference& reference, const TrialPath& path,
                                        double speed)
 {
-    if (model.position != reference.position) {
-        throw std::runtime_error(
-            fmt::format("references with {} and {} positions that are not the same cannot be compared: make both anew",
-                        model.position.size(), reference.position.size()));
-    }
+    base::failIf(model.position != reference.position,
+                 "references with {} and {} positions that are not the same cannot be compared: make both anew",
+                 model.position.size(), reference.position.size());
     const PositionCells cells = positionCells(reference.position);
     std::vector<TrialErrors> out;
     for (const TrialTick& t : schedule(path, speed)) {

@@ -1,11 +1,11 @@
 #include <studies/kernel/trial_path.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -65,11 +65,9 @@ TrialPlace trialPlace(const volume::Tissue& tissue, const volume::DistanceField&
     place.sideways = glm::normalize(left - glm::dot(left, place.inward) * place.inward);
     place.thickness = softLength(tissue, entry, place.inward);
     place.shaft = softLength(tissue, entry, place.approach);
-    if (place.thickness <= 0.0 || place.shaft <= 0.0) {
-        throw std::runtime_error(
-            fmt::format("entry at {:.1f}, {:.1f}, {:.1f} mm: there is no soft tissue to press under it", 1e3 * entry.x,
-                        1e3 * entry.y, 1e3 * entry.z));
-    }
+    base::failIf(place.thickness <= 0.0 || place.shaft <= 0.0,
+                 "entry at {:.1f}, {:.1f}, {:.1f} mm: there is no soft tissue to press under it", 1e3 * entry.x,
+                 1e3 * entry.y, 1e3 * entry.z);
     return place;
 }
 

@@ -263,9 +263,7 @@ void benchNeedle(const NeedleArguments& o)
     if (!o.folder.empty()) {
         writeFolder(o.folder, f, figures);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
 }
 
 }  // namespace

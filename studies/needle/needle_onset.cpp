@@ -1,5 +1,4 @@
 #include <haptics/simulation.h>
-#include <occupancy/query.h>
 #include <studies/needle/needle_curves.h>
 
 #include <algorithm>

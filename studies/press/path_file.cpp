@@ -1,5 +1,6 @@
 #include <studies/press/path_file.h>
 
+#include <base/error.h>
 #include <base/inputs.h>
 #include <base/split.h>
 #include <haptics/tick.h>
@@ -14,8 +15,6 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <optional>
-#include <span>
 #include <stdexcept>
 #include <string_view>
 
@@ -53,10 +52,7 @@ public:
     NumberFile(std::istream& in, std::string origin, const std::vector<std::string>& known)
         : in_(in), origin_(std::move(origin)), known_(known), place_(known.size())
     {
-        if (!next()) {
-            throw std::runtime_error(
-                fmt::format("{}: holds no line of column names: begin with {}", origin_, fmt::join(known_, ",")));
-        }
+        base::failIf(!next(), "{}: holds no line of column names: begin with {}", origin_, fmt::join(known_, ","));
         for (const std::string_view name : base::csvCells(line_)) {
             addColumn(name);
         }
@@ -70,8 +66,7 @@ public:
     void require(const std::string& name) const
     {
         if (!has(static_cast<std::size_t>(std::ranges::find(known_, name) - known_.begin()))) {
-            throw std::runtime_error(
-                fmt::format("{}: column {} is missing: the columns are {}", where(), name, fmt::join(known_, ", ")));
+            throw base::error("{}: column {} is missing: the columns are {}", where(), name, fmt::join(known_, ", "));
         }
     }
 
@@ -82,8 +77,7 @@ public:
         }
         cells_ = base::csvCells(line_);
         if (cells_.size() != count_) {
-            throw std::runtime_error(
-                fmt::format("{}: {} values: must be {}, one per column", where(), cells_.size(), count_));
+            throw base::error("{}: {} values: must be {}, one per column", where(), cells_.size(), count_);
         }
         return true;
     }
@@ -93,12 +87,10 @@ public:
         const std::string_view cell = cells_[*place_[column]];
         const std::optional<double> value = base::numberIn(cell);
         if (!value || !std::isfinite(*value)) {
-            throw std::runtime_error(
-                fmt::format("{}: {} = '{}': must be a number", where(), known_[column], cellInWords(cell)));
+            throw base::error("{}: {} = '{}': must be a number", where(), known_[column], cellInWords(cell));
         }
         if (std::abs(*value) > most) {
-            throw std::runtime_error(
-                fmt::format("{}: {} = {:g}: must be {:g} to {:g}{}", where(), known_[column], *value, -most, most, unit));
+            throw base::error("{}: {} = {:g}: must be {:g} to {:g}{}", where(), known_[column], *value, -most, most, unit);
         }
         return *value;
     }
@@ -123,9 +115,7 @@ private:
                 return true;
             }
         }
-        if (in_.bad()) {
-            throw std::runtime_error(origin_ + ": cannot be read to its end");
-        }
+        base::failIf(in_.bad(), "{}: cannot be read to its end", origin_);
         return false;
     }
 
@@ -136,12 +126,12 @@ private:
         }
         const auto at = std::ranges::find(known_, name);
         if (at == known_.end()) {
-            throw std::runtime_error(fmt::format("{}: column '{}' is not known: the columns are {}", where(),
-                                                 cellInWords(name), fmt::join(known_, ", ")));
+            throw base::error("{}: column '{}' is not known: the columns are {}", where(), cellInWords(name),
+                              fmt::join(known_, ", "));
         }
         auto& place = place_[static_cast<std::size_t>(at - known_.begin())];
         if (place) {
-            throw std::runtime_error(fmt::format("{}: column {} is there twice", where(), name));
+            throw base::error("{}: column {} is there twice", where(), name);
         }
         place = count_++;
     }
@@ -164,7 +154,7 @@ std::ifstream opened(const std::filesystem::path& file, const char* what)
         in.open(file);
     }
     if (!in.is_open()) {
-        throw std::runtime_error(fmt::format("{}: {}; give {}", file.string(), why.empty() ? "cannot be read" : why, what));
+        throw base::error("{}: {}; give {}", file.string(), why.empty() ? "cannot be read" : why, what);
     }
     return in;
 }
@@ -184,8 +174,8 @@ Vec3 axisOf(const NumberFile& file)
 void checkFollows(const NumberFile& file, const ToolPose& before, const ToolPose& pose)
 {
     if (!(pose.seconds > before.seconds)) {
-        throw std::runtime_error(fmt::format("{}: seconds = {:g}: must be after {:g}, the row before", file.where(),
-                                             pose.seconds, before.seconds));
+        throw base::error("{}: seconds = {:g}: must be after {:g}, the row before", file.where(), pose.seconds,
+                          before.seconds);
     }
     if (glm::dot(before.axis, pose.axis) < halfTurn) {
         throw std::runtime_error(
@@ -220,9 +210,8 @@ PosePath readPosePath(std::istream& in, const std::string& origin, std::optional
     NumberFile file(in, origin, pathColumns);
     const bool timed = file.has(seconds);
     const bool turned = file.has(axis) || file.has(axis + 1) || file.has(axis + 2);
-    if (!turned && !standardAxis) {
-        throw std::runtime_error(origin + ": the scene has no planned line: add the columns axis_x,axis_y,axis_z");
-    }
+    base::failIf(!turned && !standardAxis, "{}: the scene has no planned line: add the columns axis_x,axis_y,axis_z",
+                 origin);
     for (std::size_t c = axis; turned && c < pathColumns.size(); ++c) {
         file.require(pathColumns[c]);
     }
@@ -236,13 +225,11 @@ PosePath readPosePath(std::istream& in, const std::string& origin, std::optional
         }
         path.poses.push_back(pose);
         if (const double span = pose.seconds - path.poses.front().seconds; span > maxTicks * tickSeconds) {
-            throw std::runtime_error(fmt::format("{}: {:g} s after the first row: a path may take {:g} s at most",
-                                                 file.where(), span, maxTicks * tickSeconds));
+            throw base::error("{}: {:g} s after the first row: a path may take {:g} s at most", file.where(), span,
+                              maxTicks * tickSeconds);
         }
     }
-    if (path.poses.empty()) {
-        throw std::runtime_error(origin + ": holds no pose: write at least one row under the column names");
-    }
+    base::failIf(path.poses.empty(), "{}: holds no pose: write at least one row under the column names", origin);
     return path;
 }
 
@@ -260,9 +247,7 @@ std::vector<FilePoint> loadPoints(const std::filesystem::path& file)
     while (table.nextRow()) {
         points.push_back({table.position(), table.where()});
     }
-    if (points.empty()) {
-        throw std::runtime_error(file.string() + ": holds no point: write at least one row under the column names");
-    }
+    base::failIf(points.empty(), "{}: holds no point: write at least one row under the column names", file.native());
     return points;
 }
 

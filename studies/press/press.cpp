@@ -1,17 +1,15 @@
 #include <studies/press/press.h>
 
+#include <base/error.h>
 #include <base/processor_time.h>
 #include <haptics/simulation.h>
 #include <studies/press/pose_load.h>
 
-#include <fmt/format.h>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -29,11 +27,9 @@ std::vector<Vec3> anchorsOf(const haptics::SessionModel& model, std::span<const 
     std::vector<Vec3> anchors;
     for (const FilePoint& point : asked) {
         const double outside = model.surface.distance(point.at);
-        if (outside > 0.5 * level.nodes.spacing) {
-            throw std::runtime_error(fmt::format(
-                "{}: the point lies {:.2f} mm outside of the tissue: it must lie inside, as the tissue is at rest",
-                point.where, 1e3 * outside));
-        }
+        base::failIf(outside > 0.5 * level.nodes.spacing,
+                     "{}: the point lies {:.2f} mm outside of the tissue: it must lie inside, as the tissue is at rest",
+                     point.where, 1e3 * outside);
         anchors.push_back(nearestTissue(level, point.at));
     }
     return anchors;
@@ -50,10 +46,8 @@ chainmail::ElasticOptions optionsFor(const haptics::SessionModel& model, const d
 chainmail::Focus startOf(const PosePath& path, const haptics::SessionModel& model, const PressOptions& options)
 {
     PoseLoad load(model, options.tool, path.poses.front());
-    if (!load.holds()) {
-        throw std::runtime_error(path.origin +
-                                 ": the needle's tip is not in tissue at the first pose: begin the path inside the tissue");
-    }
+    base::failIf(!load.holds(), "{}: the needle's tip is not in tissue at the first pose: begin the path inside the tissue",
+                 path.origin);
     const bool presses = options.tool.kind != datasets::ToolKind::needle;
     for (std::size_t tick = 0; presses && tick < path.ticks(); ++tick) {
         load.set(path.at(tick));
@@ -111,11 +105,9 @@ private:
         s.residual = shareLeft(elastic_, result);
         s.depth = result.depth;
         s.behind = result.behind;
-        if (!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy)) {
-            throw std::runtime_error(
-                fmt::format("{}: {:.3f} s: the force is not a number: move the tool less deep or more slowly", path_.origin,
-                            pose.seconds));
-        }
+        base::failIf(!std::isfinite(glm::length(s.force)) || !std::isfinite(s.energy),
+                     "{}: {:.3f} s: the force is not a number: move the tool less deep or more slowly", path_.origin,
+                     pose.seconds);
         summary_.notConverged += converge && s.residual > pressTolerance ? 1 : 0;
         summary_.windowMoves += result.moved && !elastic_.atRest() ? 1 : 0;
         return s;

@@ -3,11 +3,9 @@
 
 #include <chainmail/propagate.h>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <cmath>
 
 namespace palpate::studies {
 

@@ -1,5 +1,6 @@
 #include <studies/stability/command.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/options.h>
@@ -13,7 +14,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -37,11 +37,10 @@ struct StabilityArguments {
 json runCells(const StabilityArguments& o, StabilityModels& models, command::Progress& progress)
 {
     const auto cells = matrixCells(models, o.choice);
-    if (cells.empty()) {
-        throw std::runtime_error(
-            "no cell is left: the needle pierces tissue in these scenes, and none of these methods supports that: choose "
-            "others");
-    }
+    base::failIf(
+        cells.empty(),
+        "no cell is left: the needle pierces tissue in these scenes, and none of these methods supports that: choose "
+        "others");
     progress.show("models of the scenes");
     models.prepare(cells);
     std::vector<CellResult> results(cells.size());
@@ -75,8 +74,8 @@ void checkCells(const json& cells, const StabilityModels& models)
         const std::size_t count = failed.size();
         const std::string more = count > maxNamed ? fmt::format(" and {} more", count - maxNamed) : "";
         failed.resize(std::min(count, maxNamed));
-        throw std::runtime_error(fmt::format("{} cell{} of the default method failed: {}{}", count, count == 1 ? "" : "s",
-                                             fmt::join(failed, ", "), more));
+        throw base::error("{} cell{} of the default method failed: {}{}", count, count == 1 ? "" : "s",
+                          fmt::join(failed, ", "), more);
     }
 }
 
@@ -85,8 +84,8 @@ void checkFuzz(const json& fuzzed)
 {
     for (const char* const key : {"crashes", "over_cap", "over_slew", "non_finite", "pulled"}) {
         if (fuzzed.at(key) != 0) {
-            throw std::runtime_error(fmt::format("hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
-                                                 fuzzed.at(key).dump()));
+            throw base::error("hostile sessions: {} = {}: see failed_seeds in the figures (--json)", key,
+                              fuzzed.at(key).dump());
         }
     }
 }
@@ -97,9 +96,7 @@ void recordOne(const StabilityArguments& o, StabilityModels& models)
     models.prepare({cell});
     const CellResult r = o.record.empty() ? runCell(cell, models) : recordCell(cell, models, o.record);
     const json cells = json::array({cellEntry(r)});
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"cells", cells}});
-    }
+    command::writeJson(o.json, {{"cells", cells}});
     if (o.json != "-") {
         fmt::print("{}: {} {:.4g} {}, bound {:g}: {}\n", o.cell, name(r.bounded.figure), r.figure, unit(r.bounded.figure),
                    r.bounded.bound, r.pass() ? "pass" : "FAIL");
@@ -115,9 +112,7 @@ void stabilityCommand(const StabilityArguments& o)
     }
     base::checkOutputs(outputs, {});
     base::checkOutputFolder(o.folder);
-    if (o.cell.empty() && !o.record.empty()) {
-        throw std::runtime_error("--record: needs a cell: add --case SCENE/METHOD/DEVICE/GRIP/RATE");
-    }
+    base::failIf(o.cell.empty() && !o.record.empty(), "--record: needs a cell: add --case SCENE/METHOD/DEVICE/GRIP/RATE");
     StabilityModels models;
     if (!o.cell.empty()) {
         recordOne(o, models);
@@ -147,9 +142,7 @@ void stabilityCommand(const StabilityArguments& o)
     if (!o.folder.empty()) {
         writeStabilityFolder(o.folder, figures);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
     checkCells(figures.at("cells"), models);
     checkFuzz(figures.at("fuzz"));
 }

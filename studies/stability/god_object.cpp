@@ -3,7 +3,6 @@
 
 #include <glm/geometric.hpp>
 
-#include <cmath>
 #include <limits>
 
 namespace palpate::studies {

@@ -1,8 +1,6 @@
 #include <haptics/bounded.h>
 #include <studies/stability/method.h>
 
-#include <glm/geometric.hpp>
-
 #include <array>
 
 namespace palpate::studies {

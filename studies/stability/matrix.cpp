@@ -1,5 +1,6 @@
 #include <studies/stability/matrix.h>
 
+#include <base/error.h>
 #include <base/split.h>
 
 #include <fmt/format.h>
@@ -14,7 +15,6 @@
 #include <exception>
 #include <mutex>
 #include <set>
-#include <stdexcept>
 #include <thread>
 
 namespace palpate::studies {
@@ -28,10 +28,8 @@ std::vector<std::string> chosen(const std::vector<std::string>& all, const std::
                                 const char* what)
 {
     for (const auto& name : asked) {
-        if (std::ranges::find(all, name) == all.end()) {
-            throw std::runtime_error(
-                fmt::format("--{} {}: there is no such name; there are {}", what, name, fmt::join(all, ", ")));
-        }
+        base::failIf(std::ranges::find(all, name) == all.end(), "--{} {}: there is no such name; there are {}", what, name,
+                     fmt::join(all, ", "));
     }
     if (asked.empty()) {
         return all;
@@ -49,7 +47,7 @@ const T& named(const std::vector<T>& all, const std::string& name, const char* w
     if (found == all.end()) {
         std::vector<std::string> names;
         std::ranges::transform(all, std::back_inserter(names), &T::name);
-        throw std::runtime_error(fmt::format("{}: there is no such {}; there are {}", name, what, fmt::join(names, ", ")));
+        throw base::error("{}: there is no such {}; there are {}", name, what, fmt::join(names, ", "));
     }
     return *found;
 }
@@ -194,16 +192,14 @@ Cell cellOf(const StabilityModels& models, const std::string& id)
     int rate = 0;
     const char* end = grip ? parts[4].data() + parts[4].size() : nullptr;
     const bool whole = grip && std::from_chars(parts[4].data(), end, rate).ptr == end;
-    if (!whole || rate < 100 || rate > 20000) {
-        throw std::runtime_error(
-            fmt::format("--case {}: is no cell: give SCENE/METHOD/DEVICE/grip or released/RATE, such as "
-                        "plate-1mm/elastic/premium/grip/1000",
-                        id));
-    }
+    base::failIf(!whole || rate < 100 || rate > 20000,
+                 "--case {}: is no cell: give SCENE/METHOD/DEVICE/grip or released/RATE, such as "
+                 "plate-1mm/elastic/premium/grip/1000",
+                 id);
     if (models.scene(parts[0]).pierced && !models.method(parts[1]).pierces) {
-        throw std::runtime_error(fmt::format(
+        throw base::error(
             "--case {}: the needle pierces tissue in this scene, and {} does not support that: choose another method", id,
-            parts[1]));
+            parts[1]);
     }
     haptics::deviceParameters(parts[2]);
     return {parts[0], parts[1], parts[2], parts[3] == "grip", rate};

@@ -1,13 +1,11 @@
 #include <studies/stability/record.h>
 
+#include <base/error.h>
 #include <datasets/scene_text.h>
 #include <haptics/recorder.h>
 #include <session/open.h>
 
-#include <fmt/format.h>
-
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -32,9 +30,7 @@ haptics::SessionModel modelIn(const StabilityScene& scene, const std::string& de
 
 std::filesystem::path volumeBeside(const std::filesystem::path& record)
 {
-    if (record.extension() != ".db") {
-        throw std::runtime_error(record.string() + ": is no name of a record: it must end in .db");
-    }
+    base::failIf(record.extension() != ".db", "{}: is no name of a record: it must end in .db", record.native());
     auto volume = std::filesystem::absolute(record).lexically_normal();
     return volume.replace_extension(".vdb");
 }
@@ -45,9 +41,8 @@ CellResult recordCell(const Cell& cell, const StabilityModels& models, const std
     const auto& method = models.method(cell.method);
     const auto volume = volumeBeside(file);
     for (const auto& there : {file, volume}) {
-        if (std::filesystem::exists(there)) {
-            throw std::runtime_error(there.string() + ": exists already; choose another name or remove it");
-        }
+        base::failIf(std::filesystem::exists(there), "{}: exists already; choose another name or remove it",
+                     there.native());
     }
     scene.tissue->save(volume);
     const auto model = modelIn(scene, cell.device, method.level, volume);
@@ -74,7 +69,7 @@ CellResult recordCell(const Cell& cell, const StabilityModels& models, const std
                                    });
     recorder.finish({});
     if (!recorder.error().empty()) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), recorder.error()));
+        throw base::error("{}: {}", file.string(), recorder.error());
     }
     const Bounded bounded = cell.held ? scene.held : scene.released;
     return {cell, bounded, figureOf(bounded.figure, trace, scene)};

@@ -1,11 +1,8 @@
 #include <studies/stability/theory.h>
 
-#include <haptics/arm.h>
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 

@@ -1,6 +1,7 @@
 #include <studies/thesis/command.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantiles.h>
 #include <base/temporary_folder.h>
@@ -20,7 +21,6 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::studies {
@@ -147,11 +147,9 @@ void benchTasks(const ThesisArguments& o)
     auto objects = o.objects;
     std::ranges::sort(objects);
     objects.erase(std::ranges::unique(objects).begin(), objects.end());
-    if (objects.size() < 3) {
-        throw std::runtime_error("--objects: give three different numbers or more, for a line fit");
-    }
+    base::failIf(objects.size() < 3, "--objects: give three different numbers or more, for a line fit");
     if (const int least = voxelsFor(objects.back()); o.voxels != 0 && o.voxels < least) {
-        throw std::runtime_error(fmt::format("--voxels {}: {} objects need {} or more", o.voxels, objects.back(), least));
+        throw base::error("--voxels {}: {} objects need {} or more", o.voxels, objects.back(), least);
     }
     command::Progress progress;
     TasksResult result;
@@ -174,9 +172,7 @@ void benchTasks(const ThesisArguments& o)
     if (!o.folder.empty()) {
         writeTasksFolder(o.folder, figures);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
 }
 
 }  // namespace

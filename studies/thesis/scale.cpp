@@ -17,10 +17,8 @@
 #include <chrono>
 #include <limits>
 #include <memory>
-#include <new>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -299,10 +297,8 @@ void benchScale(const ScaleArguments& o)
         }
         largest[fmt::format("under_{:.0f}_us", 1e6 * bound)] = entry;
     }
-    if (!o.json.empty()) {
-        command::writeJson(
-            o.json, {{"largest", largest}, {"memory_gb", o.memoryGb}, {"cores", std::thread::hardware_concurrency()}});
-    }
+    command::writeJson(o.json,
+                       {{"largest", largest}, {"memory_gb", o.memoryGb}, {"cores", std::thread::hardware_concurrency()}});
 }
 
 }  // namespace

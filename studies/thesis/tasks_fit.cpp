@@ -1,11 +1,12 @@
 #include <studies/thesis/tasks_fit.h>
 
+#include <base/error.h>
+
 #include <boost/math/distributions/students_t.hpp>
 
 #include <cassert>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -17,9 +18,7 @@ bool LineFit::flat() const noexcept
 LineFit fitLine(std::span<const double> x, std::span<const double> y)
 {
     assert(x.size() == y.size());
-    if (x.size() < 3) {
-        throw std::runtime_error("a line with errors needs three points or more");
-    }
+    base::failIf(x.size() < 3, "a line with errors needs three points or more");
     const auto n = static_cast<double>(x.size());
     const double meanX = std::accumulate(x.begin(), x.end(), 0.0) / n;
     const double meanY = std::accumulate(y.begin(), y.end(), 0.0) / n;
@@ -29,9 +28,7 @@ LineFit fitLine(std::span<const double> x, std::span<const double> y)
         xy += (x[i] - meanX) * (y[i] - meanY);
         yy += (y[i] - meanY) * (y[i] - meanY);
     }
-    if (!(xx > 0.0)) {
-        throw std::runtime_error("a line needs points at different places");
-    }
+    base::failIf(!(xx > 0.0), "a line needs points at different places");
     LineFit fit;
     fit.points = x.size();
     fit.slope = xy / xx;

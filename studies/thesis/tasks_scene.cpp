@@ -1,5 +1,6 @@
 #include <studies/thesis/tasks_scene.h>
 
+#include <base/error.h>
 #include <datasets/phantom_random.h>
 #include <datasets/tables.h>
 
@@ -8,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::studies {
@@ -60,10 +60,9 @@ int sideOf(const InclusionSpec& spec)
 {
     const int least = minPitch * cellsFor(spec.inclusions);
     const int side = spec.voxelsPerSide > 0 ? spec.voxelsPerSide : voxelsFor(spec.inclusions);
-    if (spec.inclusions == 0 || side < least) {
-        throw std::runtime_error(fmt::format("{} inclusions in a block of {} voxels a side: needs 1 or more, and {} voxels",
-                                             spec.inclusions, side, least));
-    }
+    base::failIf(spec.inclusions == 0 || side < least,
+                 "{} inclusions in a block of {} voxels a side: needs 1 or more, and {} voxels", spec.inclusions, side,
+                 least);
     return side;
 }
 

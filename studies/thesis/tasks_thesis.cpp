@@ -1,8 +1,8 @@
 #include <studies/thesis/tasks_thesis.h>
 
+#include <base/error.h>
+
 #include <algorithm>
-#include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace palpate::studies {
@@ -115,9 +115,7 @@ TaskModel taskModel(std::span<const EventLine> lines)
 {
     const auto of = [&](std::string_view event) {
         const auto found = std::ranges::find(lines, event, &EventLine::event);
-        if (found == lines.end()) {
-            throw std::runtime_error("the task-timing model needs event " + std::string(event));
-        }
+        base::failIf(found == lines.end(), "the task-timing model needs event {}", event);
         return found->line;
     };
     TaskModel m;

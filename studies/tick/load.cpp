@@ -101,13 +101,11 @@ void benchLoad(const LoadArguments& o)
     for (const auto& warning : warnings) {
         fmt::print(stderr, "palpate: {}\n", warning);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"scene", o.scene},
-                                    {"cores", std::thread::hardware_concurrency()},
-                                    {"load", !o.idle},
-                                    {"warnings", warnings},
-                                    {"cases", cases}});
-    }
+    command::writeJson(o.json, {{"scene", o.scene},
+                                {"cores", std::thread::hardware_concurrency()},
+                                {"load", !o.idle},
+                                {"warnings", warnings},
+                                {"cases", cases}});
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 #include <studies/tick/view.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <haptics/broadcast.h>
-#include <session/figures.h>
 #include <session/open.h>
 #include <studies/tick/bench_tick.h>
 
@@ -24,7 +24,6 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -165,9 +164,7 @@ nlohmann::json readFigures(const fs::path& file)
     std::ifstream in(file);
     auto figures = nlohmann::json::parse(in, nullptr, false);
     fs::remove(file);
-    if (figures.is_discarded()) {
-        throw std::runtime_error("palpate-view wrote no figures: install it beside palpate, and install xvfb");
-    }
+    base::failIf(figures.is_discarded(), "palpate-view wrote no figures: install it beside palpate, and install xvfb");
     return figures;
 }
 
@@ -200,9 +197,8 @@ nlohmann::json measure(const ViewArguments& o, const haptics::SessionModel& mode
         words.emplace_back("--ultrasound");
     }
     base::ChildProcess viewer((base::programFolder() / "palpate-view").string(), words, "build it with PALPATE_VIEWER=ON");
-    if (publishWave(publisher, model, wave, viewer) != 0) {
-        throw std::runtime_error("palpate-view did not finish its pictures: see its message above");
-    }
+    base::failIf(publishWave(publisher, model, wave, viewer) != 0,
+                 "palpate-view did not finish its pictures: see its message above");
     auto figures = readFigures(file);
     nlohmann::json result{{"display", {display.size.x, display.size.y, display.size.z}},
                           {"side", side},

@@ -1,6 +1,7 @@
 #include <studies/transfer/command.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantiles.h>
 #include <base/temporary_folder.h>
@@ -23,7 +24,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -50,9 +50,8 @@ nlohmann::json spread(const std::vector<double>& values, double unit)
 
 nlohmann::json transferFigures(const Transfer& t, const Transfer& late)
 {
-    if (t.seconds.empty() || late.seconds.empty()) {
-        throw std::runtime_error("no position reached the other process: too little real-time priority, or a busy machine");
-    }
+    base::failIf(t.seconds.empty() || late.seconds.empty(),
+                 "no position reached the other process: too little real-time priority, or a busy machine");
     auto figures = spread(t.seconds, 1e6);
     figures["first"] = 1e6 * t.seconds.front();
     figures["received"] = t.seconds.size();
@@ -92,9 +91,7 @@ void benchIpc(const IpcOptions& o)
             printTransfer(name, figures[key]);
         }
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
 }
 
 struct SyncOptions {
@@ -134,9 +131,7 @@ nlohmann::json syncFigures(const std::array<std::vector<Picture>, 2>& viewers)
             inTime += have.back() < frameSeconds ? 1 : 0;
         }
     }
-    if (skew.empty()) {
-        throw std::runtime_error("the two viewers showed no tick in common: let it run longer (--seconds)");
-    }
+    base::failIf(skew.empty(), "the two viewers showed no tick in common: let it run longer (--seconds)");
     const auto rate = [&](const std::vector<Picture>& v) {
         return static_cast<double>(v.size() - 1) / (v.back().done - v.front().done);
     };
@@ -188,9 +183,7 @@ void benchSync(const SyncOptions& o)
         timing = trainer.run().timing;
         constexpr double patience = 20.0;  // [s]
         for (std::size_t i = 0; i < viewers.size(); ++i) {
-            if (viewers[i]->wait(patience) != 0) {
-                throw std::runtime_error("a viewer failed: its message is above");
-            }
+            base::failIf(viewers[i]->wait(patience) != 0, "a viewer failed: its message is above");
             pictures[i] = readTimeline(fileOf(i));
         }
     }
@@ -201,9 +194,7 @@ void benchSync(const SyncOptions& o)
     if (o.json != "-") {
         printSync(figures);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
 }
 
 }  // namespace

@@ -1,7 +1,8 @@
 #include <studies/transfer/timeline.h>
 
+#include <base/error.h>
+
 #include <fstream>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -17,9 +18,7 @@ std::vector<TimelinePicture> readTimeline(const fs::path& file)
     for (TimelinePicture p; in >> p.tick >> comma >> p.published >> comma >> p.read >> comma >> p.done;) {
         pictures.push_back(p);
     }
-    if (pictures.size() < 2) {
-        throw std::runtime_error("a viewer showed no pictures: its message is above");
-    }
+    base::failIf(pictures.size() < 2, "a viewer showed no pictures: its message is above");
     return pictures;
 }
 

@@ -1,5 +1,6 @@
 #include <studies/transfer/transfer.h>
 
+#include <base/error.h>
 #include <base/temporary_folder.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
@@ -12,7 +13,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -21,7 +21,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
-#include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -158,9 +157,9 @@ public:
     {
         while (!seen_->ready) {
             siginfo_t ended{};
-            if (::waitid(P_PID, static_cast<id_t>(id_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid == id_) {
-                throw std::runtime_error("the viewer's process has ended by itself");
-            }
+            base::failIf(
+                ::waitid(P_PID, static_cast<id_t>(id_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 && ended.si_pid == id_,
+                "the viewer's process has ended by itself");
             std::this_thread::sleep_for(std::chrono::milliseconds(1));
         }
     }

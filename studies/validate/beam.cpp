@@ -1,5 +1,6 @@
 #include <studies/validate/beam.h>
 
+#include <base/error.h>
 #include <studies/validate/cell_body.h>
 #include <studies/validate/measurements.h>
 
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -83,23 +83,17 @@ std::vector<MeasuredDrop> dropsIn(const std::filesystem::path& file)
         const double load = table.number(row, "tip_load_N");
         byLoad[load].tipLoad = load;
         const auto marker = static_cast<std::size_t>(table.number(row, "marker"));
-        if (marker >= markers.size()) {
-            throw std::runtime_error(fmt::format("{}: marker {} of three", file.string(), marker));
-        }
+        base::failIf(marker >= markers.size(), "{}: marker {} of three", file.native(), marker);
         byLoad[load].runs[marker].push_back(table.number(row, "settled_down_mm"));
     }
     std::vector<MeasuredDrop> out;
     for (const auto& [load, drop] : byLoad) {
         for (const auto& runs : drop.runs) {
-            if (runs.empty()) {
-                throw std::runtime_error(fmt::format("{}: a marker is missing at {} N", file.string(), load));
-            }
+            base::failIf(runs.empty(), "{}: a marker is missing at {} N", file.native(), load);
         }
         out.push_back(drop);
     }
-    if (out.size() < 2 || out[0].tipLoad != 0.0) {
-        throw std::runtime_error(file.string() + ": needs a run without load and one with");
-    }
+    base::failIf(out.size() < 2 || out[0].tipLoad != 0.0, "{}: needs a run without load and one with", file.native());
     return out;
 }
 
@@ -165,8 +159,8 @@ std::array<Vec3, 3> beamMarkers(const Beam& beam)
             body.scale(static_cast<double>(step) / (step - 1));
         }
         if (!body.solve(tolerance, evaluations)) {
-            throw std::runtime_error(fmt::format("beam: no equilibrium at {} of {} of its load, residual {:.1e}", step,
-                                                 loadSteps, body.unbalanced()));
+            throw base::error("beam: no equilibrium at {} of {} of its load, residual {:.1e}", step, loadSteps,
+                              body.unbalanced());
         }
     }
     std::array<Vec3, 3> out;

@@ -4,7 +4,6 @@
 #include <chainmail/window.h>
 #include <volume/geometry.h>
 
-#include <functional>
 #include <vector>
 
 namespace palpate::studies {

@@ -1,5 +1,6 @@
 #include <studies/validate/command.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <command/progress.h>
@@ -23,7 +24,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -61,10 +61,7 @@ Experiment FolderRun::ultrasoundChecks()
         options.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(options.tissues);
     const auto soundOf = [&](std::string_view name) {
         const auto row = table.find(name);
-        if (!row) {
-            throw std::runtime_error(
-                fmt::format("{}: has no tissue '{}', which the checks need", options.tissues.string(), name));
-        }
+        base::failIf(!row, "{}: has no tissue '{}', which the checks need", options.tissues.native(), name);
         return haptics::soundOf(table.rows[*row]);
     };
     checks = ultrasound::runChecks(soundOf, [&](double fraction) { progress.show("ultrasound", fraction); });
@@ -154,9 +151,7 @@ void checkVerdicts(const std::vector<Experiment>& experiments)
         what += fmt::format("{}not run (name the experiments that you want): {}", what.empty() ? "" : "; ",
                             fmt::join(missing, ", "));
     }
-    if (!what.empty()) {
-        throw std::runtime_error("validate: " + what);
-    }
+    base::failIf(!what.empty(), "validate: {}", what);
 }
 
 // Files that an experiment may read.
@@ -178,13 +173,10 @@ void validateCommand(const ValidateArguments& o)
 {
     base::checkOutputs({o.json, o.csv}, inputsOf(o));
     base::checkOutputFolder(o.folder);
-    if (!o.tissues.empty() && !o.names.empty() && std::ranges::find(o.names, "ultrasound") == o.names.end()) {
-        throw std::runtime_error(
-            "--tissues: only the experiment ultrasound reads a tissue table: name it too, or leave this out");
-    }
-    if (!o.data.empty() && !std::filesystem::is_directory(o.data)) {
-        throw std::runtime_error(o.data.string() + ": is no folder: name the one with the measurements");
-    }
+    base::failIf(!o.tissues.empty() && !o.names.empty() && std::ranges::find(o.names, "ultrasound") == o.names.end(),
+                 "--tissues: only the experiment ultrasound reads a tissue table: name it too, or leave this out");
+    base::failIf(!o.data.empty() && !std::filesystem::is_directory(o.data),
+                 "{}: is no folder: name the one with the measurements", o.data.native());
     command::Progress progress(command::Progress::Clock::ticking);
     FolderRun run{o, measurementFolders(o.data), progress, {}, {}};
     for (const char* name : allNames) {
@@ -212,9 +204,7 @@ void validateCommand(const ValidateArguments& o)
     if (!o.folder.empty()) {
         writeValidateFolder(o.folder, run.experiments);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figuresOf(run));
-    }
+    command::writeJson(o.json, figuresOf(run));
     if (o.csv == "-") {
         fmt::print("{}", experimentsCsv(run.experiments));
     } else if (!o.csv.empty()) {

@@ -1,14 +1,13 @@
+#include <base/child_process.h>
+#include <base/error.h>
 #include <studies/validate/experiment.h>
 #include <studies/validate/measurements.h>
-
-#include <base/child_process.h>
 
 #include <fmt/format.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
 
 namespace palpate::studies {
 
@@ -52,24 +51,20 @@ Measurements::Measurements(const fs::path& file) : file_(file)
                 columns_[cells[i]] = i;
             }
         } else if (cells.size() != columns_.size()) {
-            throw std::runtime_error(fmt::format("{}, line {}: {} cells where the head names {} columns", file.string(),
-                                                 number, cells.size(), columns_.size()));
+            throw base::error("{}, line {}: {} cells where the head names {} columns", file.string(), number, cells.size(),
+                              columns_.size());
         } else {
             cells_.push_back(std::move(cells));
             lines_.push_back(number);
         }
     }
-    if (cells_.empty()) {
-        throw std::runtime_error(file.string() + ": has no rows");
-    }
+    base::failIf(cells_.empty(), "{}: has no rows", file.native());
 }
 
 const std::string& Measurements::text(std::size_t row, std::string_view column) const
 {
     const auto found = columns_.find(column);
-    if (found == columns_.end()) {
-        throw std::runtime_error(fmt::format("{}: has no column '{}'", file_.string(), column));
-    }
+    base::failIf(found == columns_.end(), "{}: has no column '{}'", file_.native(), column);
     return cells_[row][found->second];
 }
 
@@ -79,8 +74,7 @@ double Measurements::number(std::size_t row, std::string_view column) const
     char* end = nullptr;
     const double value = std::strtod(cell.c_str(), &end);
     if (cell.empty() || *end != '\0' || !std::isfinite(value)) {
-        throw std::runtime_error(
-            fmt::format("{}, line {}: {} is '{}', which is no number", file_.string(), lines_[row], column, cell));
+        throw base::error("{}, line {}: {} is '{}', which is no number", file_.string(), lines_[row], column, cell);
     }
     return value;
 }

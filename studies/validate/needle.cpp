@@ -1,5 +1,7 @@
 #include <studies/validate/needle.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <studies/validate/measurements.h>
 
 #include <fmt/format.h>
@@ -7,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -39,10 +40,8 @@ std::map<int, Curve> curvesIn(const std::filesystem::path& file)
         const bool in = table.text(row, "phase") == "ins";
         const double force = table.number(row, "F_mean_N");
         const double x = millimetre * table.number(row, "x_mm");
-        if (x < 0.0 || x > longestTravel) {
-            throw std::runtime_error(fmt::format("{}: curve {}: x_mm = {:g}: must be 0 to {:g}", file.string(), curve,
-                                                 1e3 * x, 1e3 * longestTravel));
-        }
+        base::failIf(x < 0.0 || x > longestTravel, "{}: curve {}: x_mm = {:g}: must be 0 to {:g}", file.native(), curve,
+                     1e3 * x, 1e3 * longestTravel);
         const auto bin = static_cast<std::size_t>(x / strokeStep);
         auto& [sum, count] = bins[{curve, in}][bin];
         sum += in ? force : -force;
@@ -113,10 +112,7 @@ struct Fit {
 Fit fitted(const std::vector<Curve>& curves)
 {
     Fit fit;
-    std::vector<double> onsets;
-    for (const Curve& c : curves) {
-        onsets.push_back(static_cast<double>(onsetOf(tipForce(c))));
-    }
+    auto onsets = base::mapped<double>(curves, [&](const Curve& c) { return static_cast<double>(onsetOf(tipForce(c))); });
     std::ranges::sort(onsets);
     fit.surface = static_cast<std::size_t>(onsets[onsets.size() / 2]);
     double n = 0, x = 0, y = 0, xx = 0, xy = 0;
@@ -166,11 +162,9 @@ Corridor corridorOf(const std::vector<std::vector<double>>& curves, const std::f
                 here.push_back(curve[bin]);
             }
         }
-        if (here.empty()) {
-            throw std::runtime_error(fmt::format("{}: no curve with an odd number has a force at {:g} to {:g} mm of travel",
-                                                 file.string(), 1e3 * strokeStep * static_cast<double>(bin),
-                                                 1e3 * strokeStep * static_cast<double>(bin + 1)));
-        }
+        base::failIf(here.empty(), "{}: no curve with an odd number has a force at {:g} to {:g} mm of travel",
+                     file.native(), 1e3 * strokeStep * static_cast<double>(bin),
+                     1e3 * strokeStep * static_cast<double>(bin + 1));
         std::ranges::sort(here);
         const auto at = [&](double fraction) {
             const double place = fraction * static_cast<double>(here.size() - 1);
@@ -291,10 +285,8 @@ std::map<double, std::vector<double>> holdRatios(const std::filesystem::path& fi
         if (seconds == 0.0) {
             starts[curve] = force;
         }
-        if (!starts.contains(curve) || starts[curve] <= 0.0) {
-            throw std::runtime_error(
-                fmt::format("{}: curve {} must begin with a force above 0 at t_hold_s = 0", file.string(), curve));
-        }
+        base::failIf(!starts.contains(curve) || starts[curve] <= 0.0,
+                     "{}: curve {} must begin with a force above 0 at t_hold_s = 0", file.native(), curve);
         if ((curve % 2 == 0) == even) {
             ratios[seconds].push_back(force / starts[curve]);
         }
@@ -329,17 +321,14 @@ Experiment holdExperiment(const NeedleStroke& ours, const volume::Relaxation& fi
     for (std::size_t i = 0; i < heldAt.size(); ++i) {
         const auto found = measured.find(heldAt[i]);
         if (found == measured.end()) {
-            throw std::runtime_error(fmt::format("{}: has no force {} s after the stop", file.string(), heldAt[i]));
+            throw base::error("{}: has no force {} s after the stop", file.string(), heldAt[i]);
         }
         const double wanted = meanFrom(found->second, 0);
         const double off = ours.held[i] / ours.held.front() - wanted;
         if (heldAt[i] == 1.0 || heldAt[i] == 10.0) {
             e.error = largerError(e.error, 1e2 * std::abs(off));
         }
-        std::vector<double> apart;
-        for (const double r : found->second) {
-            apart.push_back(1e2 * (r - wanted));
-        }
+        const auto apart = base::mapped<double>(found->second, [&](const double r) { return 1e2 * (r - wanted); });
         spread = largerError(spread, summaryOf(apart).rms);
         e.worst = largerError(e.worst, 1e2 * std::abs(off));
         mean.x.push_back(heldAt[i]);
@@ -416,9 +405,8 @@ std::vector<Experiment> needleInLiver(const std::filesystem::path& curves, const
     for (auto& [number, curve] : curvesIn(curves)) {
         (number % 2 == 0 ? fitCurves : heldBack).push_back(std::move(curve));
     }
-    if (fitCurves.size() < 3 || heldBack.size() < 3) {
-        throw std::runtime_error(curves.string() + ": needs three curves with even numbers and three with odd ones");
-    }
+    base::failIf(fitCurves.size() < 3 || heldBack.size() < 3,
+                 "{}: needs three curves with even numbers and three with odd ones", curves.native());
     const Fit fit = fitted(fitCurves);
     std::vector<std::vector<double>> measuredTip, measuredIn;
     for (const Curve& c : heldBack) {

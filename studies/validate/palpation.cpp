@@ -1,5 +1,6 @@
 #include <studies/validate/palpation.h>
 
+#include <base/error.h>
 #include <haptics/session_model.h>
 #include <studies/press/press.h>
 #include <studies/validate/measurements.h>
@@ -10,7 +11,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -68,7 +68,7 @@ double factOf(const Measurements& facts, const std::string& id, const std::files
             return facts.number(row, "value");
         }
     }
-    throw std::runtime_error(fmt::format("{}: has no fact '{}'", file.string(), id));
+    throw base::error("{}: has no fact '{}'", file.string(), id);
 }
 
 }  // namespace

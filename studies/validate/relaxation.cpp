@@ -4,7 +4,6 @@
 #include <studies/press/press.h>
 
 #include <fmt/format.h>
-#include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>

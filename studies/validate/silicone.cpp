@@ -1,5 +1,6 @@
 #include <studies/validate/silicone.h>
 
+#include <base/error.h>
 #include <studies/validate/cell_body.h>
 #include <studies/validate/measurements.h>
 #include <studies/validate/yeoh.h>
@@ -9,9 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
 #include <numbers>
-#include <stdexcept>
 
 namespace palpate::studies {
 
@@ -49,8 +48,7 @@ std::vector<Material> materialsIn(const std::filesystem::path& file)
     }
     for (const Material& m : all) {
         if (m.strain != all.front().strain) {
-            throw std::runtime_error(
-                fmt::format("{}: {} is measured at other strains than {}", file.string(), m.name, all.front().name));
+            throw base::error("{}: {} is measured at other strains than {}", file.string(), m.name, all.front().name);
         }
     }
     return all;
@@ -316,8 +314,8 @@ std::vector<double> compressionLoads(const Cylinder& shape, double stiffening, b
             }
             quarter.press(0.5 * now * shape.height, bonded);
             if (!quarter.body.solve(tolerance, evaluations)) {
-                throw std::runtime_error(fmt::format("cylinder at {:.1f} % strain: no equilibrium, residual {:.1e}",
-                                                     1e2 * now, quarter.body.unbalanced()));
+                throw base::error("cylinder at {:.1f} % strain: no equilibrium, residual {:.1e}", 1e2 * now,
+                                  quarter.body.unbalanced());
             }
         }
         before = strain;

@@ -1,5 +1,6 @@
 #include <studies/kernel/baselines/factored.h>
 
+#include <base/error.h>
 #include <studies/kernel/baselines/tet_factor.h>
 
 #include <Eigen/Dense>
@@ -8,7 +9,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::studies {
@@ -33,16 +33,14 @@ double distanceToSegment(Vec3 p, Vec3 a, Vec3 b)
 
 FactoredTets::FactoredTets(TetBody mesh, const TrialPath& path) : mesh_(std::move(mesh))
 {
-    if (path.tool.kind != TrialKind::sphere) {
-        throw std::runtime_error("prefactored tetrahedra: " + path.tool.name + " is no sphere; press with a sphere");
-    }
+    base::failIf(path.tool.kind != TrialKind::sphere, "prefactored tetrahedra: {} is no sphere; press with a sphere",
+                 path.tool.name);
     for (const std::uint8_t held : mesh_.held) {
         unknown_.push_back(held != 0 ? TetFactor::held : static_cast<std::uint32_t>(unknowns_++));
     }
     findContacts(path);
-    if (contacts_.empty()) {
-        throw std::runtime_error("prefactored tetrahedra: the tool meets no point of the surface; take a smaller spacing");
-    }
+    base::failIf(contacts_.empty(),
+                 "prefactored tetrahedra: the tool meets no point of the surface; take a smaller spacing");
     solveColumns();
     u_.assign(3 * unknowns_, 0.0F);
 }

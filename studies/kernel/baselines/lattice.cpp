@@ -1,5 +1,6 @@
 #include <studies/kernel/baselines/lattice.h>
 
+#include <base/error.h>
 #include <studies/kernel/baselines/fifo_mail.h>
 #include <studies/kernel/kernel_rivals.h>
 #include <studies/kernel/node_values.h>
@@ -8,7 +9,6 @@
 
 #include <array>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -26,10 +26,9 @@ constexpr std::array<std::pair<double, double>, 3> tightened{{{4e-3, 0.25}, {2e-
 volume::NodeGrid gridOf(const BaselineScene& scene, double spacing)
 {
     const auto grid = volume::affordableGrid(scene.tissue.box(), spacing, maxTrialNodes);
-    if (grid.spacing > 1.001 * spacing) {
-        throw std::runtime_error(fmt::format("lattice baseline: {:g} mm would need over {} nodes; use {:.2g} mm or more",
-                                             1e3 * spacing, maxTrialNodes, 1e3 * grid.spacing));
-    }
+    base::failIf(grid.spacing > 1.001 * spacing,
+                 "lattice baseline: {:g} mm would need over {} nodes; use {:.2g} mm or more", 1e3 * spacing, maxTrialNodes,
+                 1e3 * grid.spacing);
     return grid;
 }
 

@@ -1,8 +1,9 @@
 #include <studies/kernel/baselines/tet_factor.h>
 
+#include <base/error.h>
+
 #include <Eigen/SparseCholesky>
 
-#include <stdexcept>
 #include <vector>
 
 namespace palpate::studies {
@@ -45,9 +46,8 @@ TetFactor::TetFactor(const TetBody& mesh, std::span<const std::uint32_t> unknown
     Eigen::SparseMatrix<double> matrix(size, size);
     matrix.setFromTriplets(entries.begin(), entries.end());
     impl_->factors.compute(matrix);
-    if (impl_->factors.info() != Eigen::Success) {
-        throw std::runtime_error("prefactored tetrahedra: the stiffness is not positive definite; is the body held?");
-    }
+    base::failIf(impl_->factors.info() != Eigen::Success,
+                 "prefactored tetrahedra: the stiffness is not positive definite; is the body held?");
 }
 
 TetFactor::~TetFactor() = default;

@@ -1,6 +1,7 @@
 #include <studies/kernel/baselines/tets.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::studies {
@@ -288,18 +288,14 @@ TetBody latticeTets(const volume::Tissue& tissue, const volume::DistanceField& s
 {
     const auto cells = volume::coveringGrid(tissue.box(), spacing, 2.0 * spacing);
     if (cells.count() / 2 > maxPoints) {
-        throw std::runtime_error(fmt::format("{} cells of {:g} mm: too many for {} points; take a larger spacing",
-                                             cells.count(), 1e3 * spacing, maxPoints));
+        throw base::error("{} cells of {:g} mm: too many for {} points; take a larger spacing", cells.count(),
+                          1e3 * spacing, maxPoints);
     }
     TetBody mesh = Cutter(tissue, cells, poissonCap).cut(surface);
-    if (mesh.tets.empty()) {
-        throw std::runtime_error(
-            fmt::format("no cell of {:g} mm is half full of tissue and held; take a smaller spacing", 1e3 * spacing));
-    }
-    if (mesh.points.size() > maxPoints) {
-        throw std::runtime_error(fmt::format("{} points at {:g} mm: {} are the most; take a larger spacing",
-                                             mesh.points.size(), 1e3 * spacing, maxPoints));
-    }
+    base::failIf(mesh.tets.empty(), "no cell of {:g} mm is half full of tissue and held; take a smaller spacing",
+                 1e3 * spacing);
+    base::failIf(mesh.points.size() > maxPoints, "{} points at {:g} mm: {} are the most; take a larger spacing",
+                 mesh.points.size(), 1e3 * spacing, maxPoints);
     return mesh;
 }
 

@@ -4,7 +4,6 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
