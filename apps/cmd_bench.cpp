@@ -97,9 +97,7 @@ void benchTick(const BenchArguments& o)
     if (tell) {
         fmt::print("the largest median is {:.2f} x that of the first volume\n", growth);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"cases", cases}, {"growth", growth}, {"scene", o.scene}});
-    }
+    command::writeJson(o.json, {{"cases", cases}, {"growth", growth}, {"scene", o.scene}});
 }
 
 struct QueryOptions {
@@ -156,9 +154,7 @@ void benchQuery(const QueryOptions& o)
     if (tell) {
         fmt::print("no median of a touch is over {:.2f} x that in the first body\n", growth);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"cases", cases}, {"growth", growth}});
-    }
+    command::writeJson(o.json, {{"cases", cases}, {"growth", growth}});
 }
 
 void addBenchQuery(CLI::App& bench)

@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <apps/viewers.h>
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
@@ -82,9 +83,7 @@ void list(const CaseArguments& o)
 void show(const CaseArguments& o)
 {
     const Case c = training::findCase(o.id);
-    if (!o.json.empty()) {
-        command::writeJson(o.json, caseFigures(c));
-    }
+    command::writeJson(o.json, caseFigures(c));
     if (o.json == "-") {
         return;
     }
@@ -112,9 +111,7 @@ void check(const CaseArguments& o)
     for (const std::string& fault : faults) {
         fmt::print("{}\n", fault);
     }
-    if (!faults.empty()) {
-        throw std::runtime_error(fmt::format("{}: {} {}", o.id, faults.size(), faults.size() == 1 ? "fault" : "faults"));
-    }
+    base::failIf(!faults.empty(), "{}: {} {}", o.id, faults.size(), faults.size() == 1 ? "fault" : "faults");
     fmt::print("{}: good\n", c.id);
 }
 
@@ -170,9 +167,7 @@ void draw(const CaseArguments& o)
             drawn.push_back(entry.path());
         }
     }
-    if (drawn.empty()) {
-        throw std::runtime_error(c.id + ": the viewer drew no picture, or took too long");
-    }
+    base::failIf(drawn.empty(), "{}: the viewer drew no picture, or took too long", c.id);
     fs::copy_file(drawn.front(), to, fs::copy_options::overwrite_existing);
     progress.clear();
     fmt::print("{}\n", to.string());

@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <base/error.h>
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
 #include <command/json.h>
@@ -61,9 +62,7 @@ void listCurricula(const CurriculumArguments& o)
                            {"exercises", c.exercises.size()},
                            {"file", c.file.string()}});
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"curricula", figures}});
-    }
+    command::writeJson(o.json, {{"curricula", figures}});
     if (o.json != "-") {
         for (const Curriculum& c : all) {
             fmt::print("{:<22} {} exercises: {}\n{:<22} {}\n", c.id, c.exercises.size(), c.title, "", c.about);
@@ -96,9 +95,7 @@ void checkCurriculum(const CurriculumArguments& o)
                    sessionsInWords(averageRunLength(plan, CusumChart::learning, p)));
     }
     const std::vector<std::string> faults = training::faultsOf(c);
-    if (!faults.empty()) {
-        throw std::runtime_error(fmt::format("{}", fmt::join(faults, "; ")));
-    }
+    base::failIf(!faults.empty(), "{}", fmt::join(faults, "; "));
     fmt::print("good\n");
 }
 
@@ -153,9 +150,7 @@ void next(const CurriculumArguments& o)
             fmt::print("{}: {} {}\n  {}\n", c.id, e->exercise->title, reason, how);
         }
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"name", person.name}, {"next", figures}});
-    }
+    command::writeJson(o.json, {{"name", person.name}, {"next", figures}});
 }
 
 double quantile(std::vector<int> values, double fraction)
@@ -195,9 +190,7 @@ void simulate(const CurriculumArguments& o)
             fmt::print("{:<10} {:>8}  {}\n", law.name, taken.size(), words);
         }
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"curriculum", c.id}, {"skills", figures}});
-    }
+    command::writeJson(o.json, {{"curriculum", c.id}, {"skills", figures}});
 }
 
 // Gates, alarm rates against theory, and the file of profiles under kill -9.
@@ -240,18 +233,16 @@ void verify(const CurriculumArguments& o)
     if (o.json != "-") {
         fmt::print("{}", text);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"people", o.people},
-                                    {"sessions", courses.sessions},
-                                    {"finished", courses.finished},
-                                    {"gate_faults", courses.gateFaults},
-                                    {"signals", signals},
-                                    {"kills", kills.kills},
-                                    {"stored", kills.sessions},
-                                    {"kill_faults", kills.faults}});
-    }
+    command::writeJson(o.json, {{"people", o.people},
+                                {"sessions", courses.sessions},
+                                {"finished", courses.finished},
+                                {"gate_faults", courses.gateFaults},
+                                {"signals", signals},
+                                {"kills", kills.kills},
+                                {"stored", kills.sessions},
+                                {"kill_faults", kills.faults}});
     if (!faults.empty()) {
-        throw std::runtime_error(fmt::format("{}: {} faults, the first: {}", c.id, faults.size(), faults.front()));
+        throw base::error("{}: {} faults, the first: {}", c.id, faults.size(), faults.front());
     }
 }
 

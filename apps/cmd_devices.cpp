@@ -2,6 +2,7 @@
 #include <apps/falcon_buttons.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <command/json.h>
 
 #include <session/falcon.h>
@@ -23,7 +24,6 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
-#include <stdexcept>
 #include <vector>
 
 namespace palpate::apps {
@@ -75,10 +75,8 @@ void installRule(const fs::path& folder)
     const fs::path file = folder / falcon::udevRuleFile;
     std::ofstream stream(file);
     stream << falcon::udevRule() << std::flush;
-    if (!stream) {
-        throw std::runtime_error(fmt::format("{}: cannot be written ({}): run 'sudo palpate devices --install-udev'",
-                                             file.string(), std::strerror(errno)));
-    }
+    base::failIf(!stream, "{}: cannot be written ({}): run 'sudo palpate devices --install-udev'", file.native(),
+                 std::strerror(errno));
     ::chmod(file.c_str(), 0644);
     // Without udev (a container) the rule waits for it.
     const bool told = std::system(
@@ -125,9 +123,8 @@ Exchanges exchange(const DevicesArguments& o)
         if (link.exchange({})) {
             done.roundTrip.push_back(wire->now() - before);
         } else if (link.lost()) {
-            throw std::runtime_error(fmt::format("the Falcon {} after {} exchanges: check its cable and power supply",
-                                                 wire->gone() ? "was unplugged" : "stopped answering",
-                                                 done.roundTrip.size()));
+            throw base::error("the Falcon {} after {} exchanges: check its cable and power supply",
+                              wire->gone() ? "was unplugged" : "stopped answering", done.roundTrip.size());
         }
     }
     done.seconds = wire->now() - start;
@@ -256,9 +253,7 @@ void devices(const DevicesArguments& o)
     if (o.forceTest) {
         figures["force_test"] = pushOnce(o);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
 }
 
 }  // namespace

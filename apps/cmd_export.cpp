@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <apps/export_ct.h>
 #include <apps/export_ultrasound.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <command/json.h>
@@ -16,10 +17,8 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 
 namespace palpate::apps {
@@ -59,38 +58,26 @@ void checkOptions(ExportArguments& o)
     if (o.what.empty()) {
         o.what = isVtu(o.output) ? "displacement" : isPng(o.output) ? "ultrasound" : "labels";
     }
-    if (o.volume.empty() == o.record.empty()) {
-        throw std::runtime_error("palpate export: give a volume (V.vdb), or a record (--record FILE --at TIME)");
-    }
-    if ((o.what == "ultrasound" || o.what == "ct") != isPng(o.output)) {
-        throw std::runtime_error(
-            fmt::format("{}: ultrasound and ct are written as .png, all else is not: change the file's name or --what",
-                        o.output.string()));
-    }
-    if (!o.like.empty() && (o.what != "ultrasound" || !o.at.empty())) {
-        throw std::runtime_error(
-            "--like: needs --record FILE and -o FILE.png, and takes the time from the picture: leave out --at");
-    }
+    base::failIf(o.volume.empty() == o.record.empty(),
+                 "palpate export: give a volume (V.vdb), or a record (--record FILE --at TIME)");
+    base::failIf((o.what == "ultrasound" || o.what == "ct") != isPng(o.output),
+                 "{}: ultrasound and ct are written as .png, all else is not: change the file's name or --what",
+                 o.output.native());
+    base::failIf(!o.like.empty() && (o.what != "ultrasound" || !o.at.empty()),
+                 "--like: needs --record FILE and -o FILE.png, and takes the time from the picture: leave out --at");
     if (o.like.empty() && o.record.empty() != o.at.empty()) {
         throw std::runtime_error(o.at.empty() ? "--record: needs a time of the session: add --at 3.2s"
                                               : "--at: needs a record: add --record FILE");
     }
-    if (o.record.empty() && ofRecordOnly(o.what)) {
-        throw std::runtime_error(
-            fmt::format("{}: {} needs a session: give --record FILE --at TIME", o.output.string(), o.what));
-    }
-    if (!o.record.empty() && !ofRecordOnly(o.what) && o.what != "labels") {
-        throw std::runtime_error(fmt::format("--what {}: does not change in a session: export it from the volume", o.what));
-    }
-    if (isVtu(o.output) && o.what != "displacement") {
-        throw std::runtime_error(
-            fmt::format("{}: a .vtu holds the displacement of a record's nodes, not {}: name it .nii.gz "
-                        "or .nrrd",
-                        o.output.string(), o.what));
-    }
-    if (!o.map.empty() && o.what != "labels") {
-        throw std::runtime_error("--write-map: needs --what labels");
-    }
+    base::failIf(o.record.empty() && ofRecordOnly(o.what), "{}: {} needs a session: give --record FILE --at TIME",
+                 o.output.native(), o.what);
+    base::failIf(!o.record.empty() && !ofRecordOnly(o.what) && o.what != "labels",
+                 "--what {}: does not change in a session: export it from the volume", o.what);
+    base::failIf(isVtu(o.output) && o.what != "displacement",
+                 "{}: a .vtu holds the displacement of a record's nodes, not {}: name it .nii.gz "
+                 "or .nrrd",
+                 o.output.native(), o.what);
+    base::failIf(!o.map.empty() && o.what != "labels", "--write-map: needs --what labels");
     if (!isVtu(o.output) && !isPng(o.output)) {
         volume::checkExportName(o.output);
     }
@@ -101,9 +88,7 @@ double timeFrom(const std::string& text)
 {
     const auto plain = base::timeOf(text + "s");
     const auto time = plain ? plain : base::timeOf(text);
-    if (!time) {
-        throw std::runtime_error(fmt::format("--at {}: must be a time, 3.2s or 3200ms", text));
-    }
+    base::failIf(!time, "--at {}: must be a time, 3.2s or 3200ms", text);
     return *time;
 }
 
@@ -214,9 +199,7 @@ void runExport(ExportArguments o)
     if (o.json != "-") {
         fmt::print("{} -> {} ({}{})\n", o.record.empty() ? o.volume.string() : o.record, o.output.string(), o.what, more);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
+    command::writeJson(o.json, figures);
 }
 
 }  // namespace

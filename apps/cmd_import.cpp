@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <command/json.h>
@@ -56,12 +57,10 @@ nlohmann::json importFigures(const prepare::ImportedVolume& made)
 
 void checkOptions(const ImportArguments& o)
 {
-    if (o.output.empty() == o.mapping.writeMap.empty()) {
-        throw std::runtime_error("palpate import: give -o V.vdb, or --write-map FILE to begin a label map instead");
-    }
-    if (!o.output.empty() && o.output.extension() != ".vdb") {
-        throw std::runtime_error(o.output.string() + ": a volume is a .vdb file: name it so");
-    }
+    base::failIf(o.output.empty() == o.mapping.writeMap.empty(),
+                 "palpate import: give -o V.vdb, or --write-map FILE to begin a label map instead");
+    base::failIf(!o.output.empty() && o.output.extension() != ".vdb", "{}: a volume is a .vdb file: name it so",
+                 o.output.native());
     prepare::checkRequest(o);
     base::checkOutputs({o.output, o.mapping.writeMap, o.json},
                        {o.input, o.image, o.stiffness, o.tissues, o.mapping.map, o.mapping.names});
@@ -92,9 +91,7 @@ void runImport(ImportArguments o)
         fmt::print("{} -> {}\n\n", o.input.string(), o.output.string());
         report::printVolume(made.tissue);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, importFigures(made));
-    }
+    command::writeJson(o.json, importFigures(made));
 }
 
 void addReading(CLI::App& command, ImportArguments& o)

@@ -24,9 +24,7 @@ void runInfo(const InfoArguments& options)
         fmt::print("{}\n\n", options.file.string());
         report::printVolume(tissue);
     }
-    if (!options.json.empty()) {
-        command::writeJson(options.json, report::volumeFigures(tissue));
-    }
+    command::writeJson(options.json, report::volumeFigures(tissue));
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <base/error.h>
 #include <base/memory.h>
 #include <base/outputs.h>
 #include <command/json.h>
@@ -13,7 +14,6 @@
 
 #include <chrono>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -45,9 +45,7 @@ void listParameters(const std::string& phantom)
 void applySetting(datasets::PhantomSpec& spec, const std::string& setting)
 {
     const std::size_t equals = setting.find('=');
-    if (equals == std::string::npos || equals == 0) {
-        throw std::runtime_error(fmt::format("--set {}: must be key=value", setting));
-    }
+    base::failIf(equals == std::string::npos || equals == 0, "--set {}: must be key=value", setting);
     const std::string key = setting.substr(0, equals), value = setting.substr(equals + 1);
     for (const datasets::PhantomParameter& p : datasets::phantomParameters(spec.name)) {
         if (p.name == key && !p.word.empty()) {
@@ -61,9 +59,7 @@ void applySetting(datasets::PhantomSpec& spec, const std::string& setting)
     } catch (const std::exception&) {
         read = 0;
     }
-    if (read == 0 || read != value.size()) {
-        throw std::runtime_error(fmt::format("--set {}: '{}' is not a number", setting, value));
-    }
+    base::failIf(read == 0 || read != value.size(), "--set {}: '{}' is not a number", setting, value);
 }
 
 nlohmann::json figures(const volume::Tissue& tissue, double seconds)
@@ -108,9 +104,8 @@ void runPhantom(PhantomArguments& options)
         return;
     }
     if (options.spec.name.empty() || options.output.empty()) {
-        throw std::runtime_error(
-            fmt::format("phantom: give a phantom ({}) and a file, -o V.vdb; --list shows the parameters",
-                        fmt::join(datasets::phantomNames(), ", ")));
+        throw base::error("phantom: give a phantom ({}) and a file, -o V.vdb; --list shows the parameters",
+                          fmt::join(datasets::phantomNames(), ", "));
     }
     base::checkNames({options.output});
     base::checkOutputs({options.output, options.json}, {options.tissues});
@@ -130,9 +125,7 @@ void runPhantom(PhantomArguments& options)
     if (options.json != "-") {
         printSummary(options, tissue, seconds);
     }
-    if (!options.json.empty()) {
-        command::writeJson(options.json, figures(tissue, seconds));
-    }
+    command::writeJson(options.json, figures(tissue, seconds));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <command/json.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <command/progress.h>
@@ -13,9 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -139,9 +138,7 @@ void planScene(const PlanArguments& o)
     const auto model = session::openSession(o.scene, changes);
     const Plan plan = planner::planModel(model, request, [&](const std::string& what) { progress.show(what); });
     progress.clear();
-    if (!o.json.empty()) {
-        command::writeJson(o.json, planner::planFigures(o.scene, plan, request, o.costs));
-    }
+    command::writeJson(o.json, planner::planFigures(o.scene, plan, request, o.costs));
     const bool tell = o.json != "-";
     if (tell) {
         printReference(plan, request.costs, o.costs);
@@ -150,12 +147,12 @@ void planScene(const PlanArguments& o)
     }
     if (!plan.choice) {
         const PlanCandidate& c = plan.candidates[plan.nearest];
-        throw std::runtime_error(fmt::format(
-            "{}: no model holds {:g} %{} in {:g} us; the nearest is {}: {:.2f} %{} in {:.0f} us", o.scene,
-            100.0 * request.error,
-            request.forceError ? fmt::format(" and {:g} % of the force", 100.0 * *request.forceError) : "",
-            1e6 * request.budget, c.name(), c.error,
-            request.forceError && c.force ? fmt::format(" and {:.2f} % of the force", *c.force) : "", c.microseconds));
+        throw base::error("{}: no model holds {:g} %{} in {:g} us; the nearest is {}: {:.2f} %{} in {:.0f} us", o.scene,
+                          100.0 * request.error,
+                          request.forceError ? fmt::format(" and {:g} % of the force", 100.0 * *request.forceError) : "",
+                          1e6 * request.budget, c.name(), c.error,
+                          request.forceError && c.force ? fmt::format(" and {:.2f} % of the force", *c.force) : "",
+                          c.microseconds);
     }
     if (tell) {
         const PlanCandidate& c = plan.candidates[*plan.choice];

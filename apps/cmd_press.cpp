@@ -2,6 +2,7 @@
 #include <command/json.h>
 #include <command/options.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <command/progress.h>
 #include <session/open.h>
@@ -12,12 +13,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <array>
 #include <cstdio>
 #include <iterator>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -61,9 +60,7 @@ struct Run {
 
 double inRange(const std::string& option, double value, double least, double most)
 {
-    if (!(value >= least && value <= most)) {
-        throw std::runtime_error(fmt::format("{} {:g}: must be {:g} to {:g} mm", option, value, least, most));
-    }
+    base::failIf(!(value >= least && value <= most), "{} {:g}: must be {:g} to {:g} mm", option, value, least, most);
     return 1e-3 * value;
 }
 
@@ -80,16 +77,14 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
         tool.kind = static_cast<ToolKind>(std::ranges::find(toolKinds, *o.tool) - toolKinds.begin());
     }
     const bool needle = tool.kind == ToolKind::needle, other = tool.kind != scene.kind;
-    if (tool.kind == ToolKind::sphere && o.length) {
-        throw std::runtime_error("--length-mm: the tool is a sphere, which has no length: leave it out");
-    }
+    base::failIf(tool.kind == ToolKind::sphere && o.length,
+                 "--length-mm: the tool is a sphere, which has no length: leave it out");
     if (!needle && scene.kind == ToolKind::needle && !o.radius) {
-        throw std::runtime_error(
-            fmt::format("--tool {}: the tool of {} is a needle: add --radius-mm for this one", *o.tool, o.scene));
+        throw base::error("--tool {}: the tool of {} is a needle: add --radius-mm for this one", *o.tool, o.scene);
     }
     if (other && tool.kind == ToolKind::capsule && !o.length) {
-        throw std::runtime_error(fmt::format("--tool capsule: the tool of {} is a {}: add --length-mm for this one",
-                                             o.scene, kindName(scene.kind)));
+        throw base::error("--tool capsule: the tool of {} is a {}: add --length-mm for this one", o.scene,
+                          kindName(scene.kind));
     }
     tool.length = needle && other ? ToolSpec{}.length : tool.length;
     tool.radius = needle && other ? ToolSpec{}.radius : tool.radius;
@@ -256,9 +251,8 @@ void warnOfStartInside(const Run& run)
 void runPress(const PressArguments& o)
 {
     base::checkOutputs({o.json, o.csv}, {o.scene, o.path, o.at});
-    if (o.json == "-" && o.csv == "-") {
-        throw std::runtime_error("--json -, --csv -: standard output takes one of them: give the other a file");
-    }
+    base::failIf(o.json == "-" && o.csv == "-",
+                 "--json -, --csv -: standard output takes one of them: give the other a file");
     command::Progress progress;
     progress.show(o.scene + ": volume");
     session::SceneChanges changes = o.changes;

@@ -1,5 +1,6 @@
 #include <apps/command.h>
 #include <base/counted.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/user_files.h>
 #include <command/json.h>
@@ -12,7 +13,6 @@
 #include <nlohmann/json.hpp>
 
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -93,9 +93,9 @@ void erase(const ProfileArguments& o)
     ProfileStore store = open(o);
     const Person person = store.find(o.name);
     if (!o.yes) {
-        throw std::runtime_error(
-            fmt::format("{}: erasing cannot be undone: {} and all records; add --yes (palpate profile export keeps a copy)",
-                        person.name, base::counted(static_cast<std::size_t>(person.sessions), "session")));
+        throw base::error(
+            "{}: erasing cannot be undone: {} and all records; add --yes (palpate profile export keeps a copy)",
+            person.name, base::counted(static_cast<std::size_t>(person.sessions), "session"));
     }
     const training::Erased erased = store.erase(person);
     // The window has the people of the standard file.
@@ -114,8 +114,7 @@ void erase(const ProfileArguments& o)
     tell(erased.unclear, "this file cannot be read and was not erased; look whether it is of " + person.name);
     tell(erased.stuck, "this file is still there: remove it");
     if (!erased.stuck.empty()) {
-        throw std::runtime_error(
-            fmt::format("{}: not all files of {} could be removed", erased.stuck.front().string(), person.name));
+        throw base::error("{}: not all files of {} could be removed", erased.stuck.front().string(), person.name);
     }
 }
 

@@ -1,6 +1,8 @@
 #include <apps/command.h>
 #include <apps/progress_figures.h>
 #include <base/counted.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <report/measure_table.h>
@@ -94,9 +96,8 @@ void addToGroup(const ProgressArguments& o, const std::string& text, const train
                 std::vector<report::ScoredGroup>& groups)
 {
     const std::size_t equals = text.find('=');
-    if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
-        throw std::runtime_error("--group " + text + ": give a name and profiles, as in --group residents=anna,bert");
-    }
+    base::failIf(equals == 0 || equals == std::string::npos || equals + 1 == text.size(),
+                 "--group {}: give a name and profiles, as in --group residents=anna,bert", text);
     const std::string called = text.substr(0, equals);
     auto group = std::ranges::find(groups, called, &report::ScoredGroup::name);
     group = group != groups.end() ? group : groups.insert(groups.end(), {called, {}});
@@ -118,9 +119,7 @@ std::vector<report::ScoredGroup> groupsOf(const ProgressArguments& o, const trai
         addToGroup(o, text, store, groups);
     }
     for (const report::ScoredGroup& g : groups) {
-        if (g.sessions.empty()) {
-            throw std::runtime_error("--group " + g.name + ": these people have no such sessions");
-        }
+        base::failIf(g.sessions.empty(), "--group {}: these people have no such sessions", g.name);
     }
     return groups;
 }
@@ -168,23 +167,17 @@ void run(const ProgressArguments& o)
     base::checkNames({o.html, o.csv, o.xapi});
     base::checkOutputs({o.html, o.csv, o.xapi, o.json}, {store.file()});
     Curricula curricula;
-    std::vector<std::string> asked;
-    for (const std::string& id : o.curricula) {
-        asked.push_back(curricula.add(id));
-    }
-    std::vector<PersonProgress> people;
-    for (const std::string& name : o.names) {
-        people.push_back(progressOf(store, store.find(name), asked, curricula));
-    }
+    const auto asked = base::mapped<std::string>(o.curricula, [&](const std::string& id) { return curricula.add(id); });
+    auto people = base::mapped<PersonProgress>(
+        o.names, [&](const std::string& name) { return progressOf(store, store.find(name), asked, curricula); });
     if (o.all) {
         for (const training::Person& person : store.people()) {
             people.push_back(progressOf(store, person, asked, curricula));
         }
     }
     const std::vector<report::ScoredGroup> groups = groupsOf(o, store);
-    if (people.empty() && groups.empty()) {
-        throw std::runtime_error("progress: give a profile's name, --all, or --group NAME=PROFILE,PROFILE");
-    }
+    base::failIf(people.empty() && groups.empty(),
+                 "progress: give a profile's name, --all, or --group NAME=PROFILE,PROFILE");
     if (!o.html.empty()) {
         training::writeProgressPage(o.html, people, groups);
     }
@@ -194,9 +187,7 @@ void run(const ProgressArguments& o)
     if (!o.xapi.empty()) {
         training::writeXapi(o.xapi, people);
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, progressFigures(people, groups));
-    }
+    command::writeJson(o.json, progressFigures(people, groups));
     if (o.json != "-") {
         for (const PersonProgress& p : people) {
             printPerson(p);

@@ -3,6 +3,7 @@
 #include <base/outputs.h>
 #include <command/json.h>
 
+#include <base/error.h>
 #include <haptics/record_check.h>
 #include <haptics/replay.h>
 #include <session/figures.h>
@@ -13,7 +14,6 @@
 #include <nlohmann/json.hpp>
 
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -85,12 +85,8 @@ void replayRecord(const ReplayArguments& o)
     if (result.firstDifference) {
         figures["first_difference_tick"] = *result.firstDifference;
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, figures);
-    }
-    if (!faults.empty()) {
-        throw std::runtime_error(fmt::format("{}: {}", o.file, faults));
-    }
+    command::writeJson(o.json, figures);
+    base::failIf(!faults.empty(), "{}: {}", o.file, faults);
     if (o.json == "-") {
         return;
     }

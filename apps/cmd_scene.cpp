@@ -1,4 +1,6 @@
 #include <apps/command.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/quantities.h>
 #include <base/shell_word.h>
@@ -64,8 +66,8 @@ void checkStructure(const volume::Tissue& tissue, const std::string& option, con
             names.push_back(s.name);
         }
     }
-    throw std::runtime_error(fmt::format("{} {}: the volume has no structure or tissue of this name; it has {}", option,
-                                         name, fmt::join(names, ", ")));
+    throw base::error("{} {}: the volume has no structure or tissue of this name; it has {}", option, name,
+                      fmt::join(names, ", "));
 }
 
 // The scene without a way in.
@@ -79,10 +81,8 @@ Scene sceneOf(const SceneArguments& o, const volume::Tissue& tissue, const std::
             checkStructure(tissue, "--vital", name);
             scene.vital.push_back({.name = name});
         }
-        if (scene.vital.size() > datasets::maxVital) {
-            throw std::runtime_error(
-                fmt::format("--vital: {} names: give {} at most", scene.vital.size(), datasets::maxVital));
-        }
+        base::failIf(scene.vital.size() > datasets::maxVital, "--vital: {} names: give {} at most", scene.vital.size(),
+                     datasets::maxVital);
     }
     if (lesion) {
         scene.source.inserts.push_back(*lesion);
@@ -176,10 +176,9 @@ void writeScene(Scene scene, const SceneArguments& o, const FoundWays& found, co
 
 std::string crossingText(const Proposal& way)
 {
-    std::vector<std::string> parts;
-    for (const datasets::Crossing& c : way.verdict.crossings) {
-        parts.push_back(fmt::format("{} {:.0f}", c.structure, std::max(1.0, 1e3 * c.length)));
-    }
+    const auto parts = base::mapped<std::string>(way.verdict.crossings, [&](const datasets::Crossing& c) {
+        return fmt::format("{} {:.0f}", c.structure, std::max(1.0, 1e3 * c.length));
+    });
     return fmt::format("{}", fmt::join(parts, ", "));
 }
 
@@ -219,20 +218,14 @@ nlohmann::json wayFigures(const Scene& scene, const FoundWays& found, const Scen
                         {"corridor", p.verdict.corridor},
                         {"warnings", p.verdict.warnings}});
     }
-    std::vector<std::string> vital;
-    for (const datasets::VitalStructure& v : scene.vital) {
-        vital.push_back(v.name);
-    }
+    const auto vital = base::mapped<std::string>(scene.vital, &datasets::VitalStructure::name);
     return {{"scene", o.output.string()}, {"target", scene.target}, {"vital", vital},
             {"needle", found.needle},     {"chosen", o.choose},     {"ways", ways}};
 }
 
 void printWays(const Scene& scene, const FoundWays& found, const SceneArguments& o)
 {
-    std::vector<std::string> vital;
-    for (const datasets::VitalStructure& v : scene.vital) {
-        vital.push_back(v.name);
-    }
+    const auto vital = base::mapped<std::string>(scene.vital, &datasets::VitalStructure::name);
     fmt::print("target   {}\nvital    {}\nneedle   {}\n\n", scene.target,
                vital.empty() ? "none" : fmt::format("{}", fmt::join(vital, ", ")), found.needle);
     fmt::print("way  entry [mm, LPS]         aim [mm, LPS]           length [mm]  clearance [mm]  slant [deg]\n");
@@ -273,17 +266,13 @@ void runScene(const SceneArguments& o)
     Scene scene = sceneOf(o, tissue, lesion);
     progress.show("looking for ways in");
     const FoundWays found = findWays(scene, o, tissue, margin);
-    if (o.choose > static_cast<int>(found.ways.size())) {
-        throw std::runtime_error(
-            fmt::format("--choose {}: there are {} ways: choose one of these", o.choose, found.ways.size()));
-    }
+    base::failIf(o.choose > static_cast<int>(found.ways.size()), "--choose {}: there are {} ways: choose one of these",
+                 o.choose, found.ways.size());
     const Proposal& chosen = found.ways[static_cast<std::size_t>(o.choose - 1)];
     const std::vector<std::string> warnings = warningsOf(tissue, chosen);
     progress.clear();
     for (const std::string& warning : warnings) {
-        if (o.strict) {
-            throw std::runtime_error(fmt::format("{}: {}: no scene is written with --strict", o.volume.string(), warning));
-        }
+        base::failIf(o.strict, "{}: {}: no scene is written with --strict", o.volume.native(), warning);
         fmt::print(stderr, "warning: {}\n", warning);
     }
     writeScene(scene, o, found, chosen, warnings);
@@ -292,9 +281,7 @@ void runScene(const SceneArguments& o)
         fmt::print("\n{}: way {} written; run it with: palpate train {}\n", o.output.string(), o.choose,
                    base::shellWord(o.output.string()));
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, wayFigures(scene, found, o));
-    }
+    command::writeJson(o.json, wayFigures(scene, found, o));
 }
 
 }  // namespace

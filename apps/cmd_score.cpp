@@ -7,6 +7,8 @@
 #include <report/report.h>
 #include <session/figures.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <haptics/record_check.h>
 #include <haptics/score.h>
 
@@ -74,14 +76,11 @@ std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessio
 Group parseGroup(const std::string& text, std::vector<Session>& sessions)
 {
     const std::size_t equals = text.find('=');
-    if (equals == 0 || equals == std::string::npos || equals + 1 == text.size()) {
-        throw std::runtime_error("--group " + text + ": give a name and files, as in --group experts=a.db,b.db");
-    }
+    base::failIf(equals == 0 || equals == std::string::npos || equals + 1 == text.size(),
+                 "--group {}: give a name and files, as in --group experts=a.db,b.db", text);
     Group group{text.substr(0, equals), {}};
     for (const std::string& file : CLI::detail::split(text.substr(equals + 1), ',')) {
-        if (file.empty()) {
-            throw std::runtime_error("--group " + text + ": a file between two commas is missing");
-        }
+        base::failIf(file.empty(), "--group {}: a file between two commas is missing", text);
         group.sessions.push_back(open(file, sessions));
     }
     return group;
@@ -202,18 +201,13 @@ void scoreRecord(const ScoreArguments& options)
     for (const std::string& text : options.groups) {
         groups.push_back(parseGroup(text, sessions));
     }
-    if (sessions.empty()) {
-        throw std::runtime_error("score: give at least one record, or --group NAME=FILE,FILE");
-    }
+    base::failIf(sessions.empty(), "score: give at least one record, or --group NAME=FILE,FILE");
     std::vector<std::filesystem::path> read;
     std::ranges::transform(sessions, std::back_inserter(read), &Session::file);
     base::checkNames({options.report});
     base::checkOutputs({options.json, options.report}, read);
     warn(sessions);
-    std::vector<report::ScoredGroup> all;
-    for (const Group& g : groups) {
-        all.push_back(scored(g, sessions));
-    }
+    const auto all = base::mapped<report::ScoredGroup>(groups, [&](const Group& g) { return scored(g, sessions); });
     if (!options.report.empty()) {
         if (!groups.empty()) {
             report::writeGroupReport(options.report, all);
@@ -224,9 +218,7 @@ void scoreRecord(const ScoreArguments& options)
                                      ": a report is of one record or of groups: give one file, or --group NAME=FILE,FILE");
         }
     }
-    if (!options.json.empty()) {
-        command::writeJson(options.json, figures(sessions, groups));
-    }
+    command::writeJson(options.json, figures(sessions, groups));
     if (options.json != "-") {
         printSessions(sessions);
         if (!groups.empty()) {

@@ -24,7 +24,6 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
-#include <vector>
 
 namespace palpate::apps {
 
@@ -145,9 +144,7 @@ void listSessions(const SessionsArguments& o)
     const pid_t parent = ::getppid();  // without it nobody looks any more
     do {
         const json all = lookAtAll();
-        if (!o.json.empty()) {
-            command::writeJson(o.json, {{"sessions", all}});
-        }
+        command::writeJson(o.json, {{"sessions", all}});
         if (o.json != "-") {
             printSessions(all);
             std::fflush(stdout);

@@ -4,6 +4,7 @@
 #include <apps/train_figures.h>
 #include <apps/train_profile.h>
 #include <apps/viewers.h>
+#include <base/error.h>
 #include <base/memory.h>
 #include <base/outputs.h>
 #include <base/temporary_folder.h>
@@ -31,7 +32,6 @@
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
@@ -116,9 +116,7 @@ void checkFaults(const TrainArguments& o)
 {
     const auto need = [&](std::initializer_list<session::FaultKind> kinds, bool there, const char* hint) {
         for (const session::FaultKind kind : kinds) {
-            if (session::has(o.faults, kind) && !there) {
-                throw std::runtime_error(fmt::format("--inject: {}", hint));
-            }
+            base::failIf(session::has(o.faults, kind) && !there, "--inject: {}", hint);
         }
     };
     need({session::FaultKind::gap, session::FaultKind::late}, !o.unpaced,
@@ -131,18 +129,13 @@ void checkFaults(const TrainArguments& o)
 void checkDevice(const TrainArguments& o)
 {
     const session::DeviceKind& device = session::deviceKind(o.device);
-    if (!o.trainee.empty() && o.device != "hand") {
-        throw std::runtime_error("--trainee " + o.trainee +
-                                 ": needs --device hand; mouse, falcon and record bring their own hand");
-    }
-    if (device.somebodyHolds && o.unpaced) {
-        throw std::runtime_error("--device " + o.device + ": a person holds it, at real-time pace: leave out --unpaced");
-    }
-    if (device.needsViewer && !wantsWindow(o) && o.session.empty()) {
-        throw std::runtime_error(fmt::format(
-            "--device {}: needs a window to move it in: add --view, or --session NAME and open palpate-view on it",
-            o.device));
-    }
+    base::failIf(!o.trainee.empty() && o.device != "hand",
+                 "--trainee {}: needs --device hand; mouse, falcon and record bring their own hand", o.trainee);
+    base::failIf(device.somebodyHolds && o.unpaced,
+                 "--device {}: a person holds it, at real-time pace: leave out --unpaced", o.device);
+    base::failIf(device.needsViewer && !wantsWindow(o) && o.session.empty(),
+                 "--device {}: needs a window to move it in: add --view, or --session NAME and open palpate-view on it",
+                 o.device);
 }
 
 // The tasks are built-in scenes; that of the scene itself goes with any.
@@ -152,9 +145,7 @@ const std::vector<std::string> tasks{"core-biopsy", "us-core-biopsy", "ct-core-b
 void applyTask(TrainArguments& o)
 {
     const bool ownScene = !o.task.empty() && o.task != "core-biopsy" && o.task != "find-lump";
-    if (ownScene && o.sceneGiven) {
-        throw std::runtime_error(fmt::format("--task {}: has a scene of its own: leave out {}", o.task, o.scene));
-    }
+    base::failIf(ownScene && o.sceneGiven, "--task {}: has a scene of its own: leave out {}", o.task, o.scene);
     if (ownScene || (o.task == "find-lump" && !o.sceneGiven)) {
         o.scene = o.task;
     }
@@ -184,9 +175,8 @@ void checkOutputs(const TrainArguments& o)
         throw std::runtime_error(record.string() + ": exists already; choose another name or remove it" +
                                  (o.record.empty() ? " (the record beside the report)" : ""));
     }
-    if (!o.report.empty() && record == fs::path(o.report)) {
-        throw std::runtime_error(o.report + ": is the name of the record too: call the report .html");
-    }
+    base::failIf(!o.report.empty() && record == fs::path(o.report),
+                 "{}: is the name of the record too: call the report .html", o.report);
 }
 
 // Writes all that was asked for, whatever of it fails, and adds what failed to the problem of `result`. Returns what there
@@ -265,9 +255,7 @@ std::function<std::string(const datasets::Scene&)> fitToMachine(std::string& fit
 void applyTraining(TrainArguments& o, Training& training)
 {
     if (const std::string scene = training.scene(); !scene.empty()) {
-        if (o.sceneGiven || !o.task.empty()) {
-            throw std::runtime_error("--case: a case has a scene of its own: leave out SCENE and --task");
-        }
+        base::failIf(o.sceneGiven || !o.task.empty(), "--case: a case has a scene of its own: leave out SCENE and --task");
         o.scene = scene;
         o.sceneGiven = true;
     }
@@ -325,9 +313,8 @@ void applyTryout(TrainArguments& o)
     if (!o.tryout) {
         return;
     }
-    if (!session::deviceKind(o.device).somebodyHolds) {
-        throw std::runtime_error("--tryout: a person must hold the tool: add --device mouse or --device falcon");
-    }
+    base::failIf(!session::deviceKind(o.device).somebodyHolds,
+                 "--tryout: a person must hold the tool: add --device mouse or --device falcon");
     o.scene = o.sceneGiven ? o.scene : "layered";
     o.seconds = o.seconds > 0 ? o.seconds : tryoutSeconds;
     o.view = o.closeAtEnd = true;

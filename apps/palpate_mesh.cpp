@@ -1,6 +1,7 @@
 // palpate-mesh: a volume as conforming tetrahedra. A program of its own: what it links is under the GPL and the AGPL, see
 // reference/NOTICE.
 #include <apps/parsed_program.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <command/interrupted.h>
 #include <command/json.h>
@@ -22,7 +23,6 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace palpate::apps {
 
@@ -45,18 +45,16 @@ volume::Tissue openVolume(const std::string& what)
     const fs::path file(what);
     if (file.extension() == ".toml") {
         const datasets::Scene scene = datasets::loadScene(file);
-        if (scene.gravity.given) {
-            throw std::runtime_error(what +
-                                     ": [gravity]: only the volume without gravity is meshed: leave this section out");
-        }
+        base::failIf(scene.gravity.given,
+                     "{}: [gravity]: only the volume without gravity is meshed: leave this section out", what);
         return datasets::sceneVolume(scene);
     }
     if (const auto scene = datasets::builtInScene(what); scene && !fs::exists(file)) {
         return datasets::sceneVolume(*scene);
     }
     if (file.extension().empty() && !fs::exists(file)) {
-        throw std::runtime_error(fmt::format("{}: is neither a volume (.vdb) nor a built-in phantom: these are {}", what,
-                                             fmt::join(datasets::builtInScenes(), ", ")));
+        throw base::error("{}: is neither a volume (.vdb) nor a built-in phantom: these are {}", what,
+                          fmt::join(datasets::builtInScenes(), ", "));
     }
     return session::loadVolume(file);
 }
@@ -114,8 +112,8 @@ void printQuality(const MeshArguments& o, const reference::MeshQuality& q, const
 void run(const MeshArguments& o)
 {
     if (o.volume.empty()) {
-        throw std::runtime_error(fmt::format("no volume: name one (.vdb), or a built-in phantom: {}",
-                                             fmt::join(datasets::builtInScenes(), ", ")));
+        throw base::error("no volume: name one (.vdb), or a built-in phantom: {}",
+                          fmt::join(datasets::builtInScenes(), ", "));
     }
     if (o.output.empty()) {
         throw std::runtime_error("nothing to write: name a file with -o, which ends in " + reference::meshFileEndings());

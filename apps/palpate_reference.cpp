@@ -1,7 +1,8 @@
 // palpate-reference: the finite-element reference of one scene. A program of its own: what it links is under the GPL, see
 // reference/NOTICE.
-#include <apps/command.h>
 #include <apps/parsed_program.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <command/json.h>
 #include <reference/ccx.h>
@@ -23,7 +24,6 @@
 #include <array>
 #include <cstdio>
 #include <ctime>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -76,8 +76,7 @@ studies::TrialTool toolNamed(const std::string& name)
             names.push_back(tool.name);
         }
     }
-    throw std::runtime_error(
-        fmt::format("--tool {}: the reference is pressed by a sphere: {}", name, fmt::join(names, ", ")));
+    throw base::error("--tool {}: the reference is pressed by a sphere: {}", name, fmt::join(names, ", "));
 }
 
 studies::TrialTool toolOf(const ReferenceArguments& o)
@@ -98,22 +97,17 @@ studies::TrialTool toolOf(const ReferenceArguments& o)
 studies::ReferencePress pressIn(const std::string& file, const studies::TrialTool& tool)
 {
     const auto info = studies::loadReference(file).second;
-    if (!info.press) {
-        throw std::runtime_error(fmt::format("--path-of {}: the file has no path: it is older than November 2026", file));
-    }
-    if (info.tool != tool.name) {
-        throw std::runtime_error(fmt::format("--path-of {}: its tool is {}, not {}", file, info.tool, tool.name));
-    }
+    base::failIf(!info.press, "--path-of {}: the file has no path: it is older than November 2026", file);
+    base::failIf(info.tool != tool.name, "--path-of {}: its tool is {}, not {}", file, info.tool, tool.name);
     return *info.press;
 }
 
 // Straight in, and back out by the same looks.
 std::vector<studies::TrialPose> posesOf(const ReferenceArguments& o, const studies::TrialPath& path)
 {
-    std::vector<studies::TrialPose> poses;
-    for (const double depth : o.looks) {
-        poses.push_back({path.gap + 1e-3 * depth, 0.0});
-    }
+    auto poses = base::mapped<studies::TrialPose>(o.looks, [&](const double depth) {
+        return studies::TrialPose{path.gap + 1e-3 * depth, 0.0};
+    });
     for (std::size_t look = o.looks.size(); o.retreat && look-- > 1;) {
         poses.push_back(poses[look - 1]);
     }
@@ -137,9 +131,8 @@ void checkInPlanes(const ReferenceArguments& o, const studies::TrialPath& path)
     for (int axis = 0; axis < 3; ++axis) {
         const double off = std::max(std::abs(path.start[axis]), std::abs(path.at({path.press, path.drag})[axis]));
         if (planes[static_cast<std::size_t>(axis)] && off > rounding) {
-            throw std::runtime_error(
-                fmt::format("--mirrored {}: the tool is {:.3f} mm from the plane {} = 0: solve all of it", o.mirrored,
-                            1e3 * off, "xyz"[axis]));
+            throw base::error("--mirrored {}: the tool is {:.3f} mm from the plane {} = 0: solve all of it", o.mirrored,
+                              1e3 * off, "xyz"[axis]);
         }
     }
 }
@@ -276,12 +269,8 @@ void verify(const ReferenceArguments& o)
                         {"bound_pct", row.bound},
                         {"source", row.source}});
     }
-    if (!o.json.empty()) {
-        command::writeJson(o.json, {{"verification", rows}});
-    }
-    if (over > 0) {
-        throw std::runtime_error(fmt::format("{} of {} figures are off by more than their bounds", over, rows.size()));
-    }
+    command::writeJson(o.json, {{"verification", rows}});
+    base::failIf(over > 0, "{} of {} figures are off by more than their bounds", over, rows.size());
 }
 
 void run(const ReferenceArguments& o)
@@ -290,20 +279,15 @@ void run(const ReferenceArguments& o)
         verify(o);
         return;
     }
-    if (o.scene.empty()) {
-        throw std::runtime_error("no scene: give one, or --verify");
-    }
+    base::failIf(o.scene.empty(), "no scene: give one, or --verify");
     base::checkOutputs({o.vtu, o.json, o.save, o.ccx}, {o.scene, o.pathOf});
-    if (o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty()) {
-        throw std::runtime_error("nothing to write: name a file with --output, --json, --save or --export-ccx");
-    }
-    if (!o.save.empty() && o.mesher != "cgal") {
-        throw std::runtime_error("--save: `palpate accuracy` needs references on CGAL's mesh: leave out --mesher");
-    }
-    if (!o.save.empty() && (!o.looks.empty() || !o.mirrored.empty())) {
-        throw std::runtime_error(
-            "--save: `palpate accuracy` needs all looks of the trial, in the whole body: leave out --looks and --mirrored");
-    }
+    base::failIf(o.vtu.empty() && o.json.empty() && o.save.empty() && o.ccx.empty(),
+                 "nothing to write: name a file with --output, --json, --save or --export-ccx");
+    base::failIf(!o.save.empty() && o.mesher != "cgal",
+                 "--save: `palpate accuracy` needs references on CGAL's mesh: leave out --mesher");
+    base::failIf(
+        !o.save.empty() && (!o.looks.empty() || !o.mirrored.empty()),
+        "--save: `palpate accuracy` needs all looks of the trial, in the whole body: leave out --looks and --mirrored");
     const auto tool = toolOf(o);
     session::SceneChanges changes;
     changes.model = "spring";  // the kernel's own body is not needed

@@ -1,5 +1,6 @@
 #include <apps/parsed_program.h>
 #include <base/child_process.h>
+#include <base/error.h>
 #include <command/json.h>
 #include <trainer/window.h>
 
@@ -8,7 +9,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 
 namespace {
@@ -75,10 +75,9 @@ void run(Words& w)
     int& width = w.options.width;
     int& height = w.options.height;
     const int read = std::sscanf(w.size.c_str(), "%dx%d%n", &width, &height, &end);
-    if (read != 2 || static_cast<std::size_t>(end) != w.size.size() || width < 320 || height < 240 || width > 8192 ||
-        height > 8192) {
-        throw std::runtime_error("--size " + w.size + ": must be WIDTHxHEIGHT, 320x240 to 8192x8192 pixels");
-    }
+    palpate::base::failIf(read != 2 || static_cast<std::size_t>(end) != w.size.size() || width < 320 || height < 240 ||
+                              width > 8192 || height > 8192,
+                          "--size {}: must be WIDTHxHEIGHT, 320x240 to 8192x8192 pixels", w.size);
     w.options.programs = palpate::base::programFolder();
     palpate::trainer::SessionFolder sink(w.sessions);
     const WindowFigures figures =

@@ -1,5 +1,6 @@
 #include <apps/replay_player.h>
 
+#include <base/error.h>
 #include <base/words.h>
 #include <channel/channel.h>
 #include <haptics/broadcast.h>
@@ -19,7 +20,6 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
-#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -70,9 +70,7 @@ private:
 std::uint64_t ticksOf(const Record& record, const std::string& file)
 {
     const std::uint64_t ticks = record.ticks();
-    if (ticks == 0) {
-        throw std::runtime_error(file + ": no tick was recorded: there is nothing to play");
-    }
+    base::failIf(ticks == 0, "{}: no tick was recorded: there is nothing to play", file);
     return ticks;
 }
 
@@ -157,7 +155,7 @@ struct ReplayPlayer::Impl {
                     return;
                 }
                 if (then.tick != film.ticks()) {
-                    throw std::runtime_error(fmt::format("{}: tick {} is missing in the record", file, film.ticks()));
+                    throw base::error("{}: tick {} is missing in the record", file, film.ticks());
                 }
                 const TickRecord& now = simulation.tick(then.device);
                 const bool first = comparison.differences().empty();
@@ -256,9 +254,8 @@ render::Ghost ReplayPlayer::ghostOf(const std::string& file) const
     // Sessions at two settings of the tissue model are in one body; only their models tell.
     const bool alike = other.info().volumeHash == impl_->record.info().volumeHash;
     if (!alike && bodyHash(session::reopenSession(file, other.info())) != bodyHash(impl_->model)) {
-        throw std::runtime_error(
-            fmt::format("--ghost {}: is a session in another body than {}: take a record of a session in the same body",
-                        file, impl_->file));
+        throw base::error("--ghost {}: is a session in another body than {}: take a record of a session in the same body",
+                          file, impl_->file);
     }
     constexpr std::uint64_t every = 10;  // ticks
     render::Ghost ghost;

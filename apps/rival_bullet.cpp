@@ -1,6 +1,8 @@
 // palpate-rival-bullet: Bullet's deformable bodies on a push of `palpate accuracy`. Settings are those of Bullet's example
 // VolumetricDeformable, where docs/accuracy.md does not say otherwise.
 #include <apps/rival_push.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/processor_time.h>
 
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
@@ -11,7 +13,6 @@
 #include <BulletSoftBody/btSoftBody.h>
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
 #include <btBulletDynamicsCommon.h>
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
@@ -19,7 +20,6 @@
 #include <limits>
 #include <memory>
 #include <set>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -109,10 +109,7 @@ void addMasses(btSoftBody& body, const RivalPush& push)
 
 std::unique_ptr<btSoftBody> bodyOf(const RivalPush& push, btSoftBodyWorldInfo& info)
 {
-    std::vector<btVector3> points;
-    for (const Vec3& p : push.points) {
-        points.push_back(unitsOf(p));
-    }
+    const auto points = base::mapped<btVector3>(push.points, [&](const Vec3& p) { return unitsOf(p); });
     auto body = std::make_unique<btSoftBody>(&info, static_cast<int>(points.size()), points.data(), nullptr);
     addLinks(*body, push);
     for (const auto& t : push.tets) {
@@ -286,11 +283,7 @@ RivalPush connected(const RivalPush& push, std::vector<std::uint32_t>& place)
 // Of all points of the push: those left out stay.
 std::vector<Vec3> spread(const std::vector<Vec3>& u, const std::vector<std::uint32_t>& place)
 {
-    std::vector<Vec3> out;
-    for (const std::uint32_t p : place) {
-        out.push_back(p == none ? Vec3(0.0) : u[p]);
-    }
-    return out;
+    return base::mapped<Vec3>(place, [&](const std::uint32_t p) { return p == none ? Vec3(0.0) : u[p]; });
 }
 
 RivalResults solve(const RivalPush& whole)
@@ -303,9 +296,7 @@ RivalResults solve(const RivalPush& whole)
         const double start = base::processorTime();
         const Vec3 force = bullet.tick(push.centre[t == 0 ? 0 : t - 1], push.centre[t]);
         const double took = base::processorTime() - start;
-        if (!std::isfinite(glm::length(force))) {
-            throw std::runtime_error(fmt::format("tick {}: the force is not finite: the body has come apart", t));
-        }
+        base::failIf(!std::isfinite(glm::length(force)), "tick {}: the force is not finite: the body has come apart", t);
         if (force != Vec3(0.0)) {
             results.seconds.push_back(took);
         }

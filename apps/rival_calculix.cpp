@@ -1,16 +1,15 @@
 // palpate-rival-calculix: CalculiX with neo-Hookean quadratic tetrahedra on a push of `palpate accuracy`. Of
 // palpate-reference's code, and under its licence: see reference/NOTICE.
 #include <apps/rival_push.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <reference/ccx.h>
-
-#include <fmt/format.h>
 
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -52,10 +51,8 @@ void addFaces(const RivalPush& push, reference::TetMesh& mesh)
 reference::TetMesh meshOf(const RivalPush& push)
 {
     constexpr std::size_t maxMaterials = std::numeric_limits<std::uint8_t>::max();
-    if (push.materials.size() > maxMaterials) {
-        throw std::runtime_error(fmt::format("{} materials: the maximum is {}; take another --rival-mesh-mm",
-                                             push.materials.size(), maxMaterials));
-    }
+    base::failIf(push.materials.size() > maxMaterials, "{} materials: the maximum is {}; take another --rival-mesh-mm",
+                 push.materials.size(), maxMaterials);
     reference::TetMesh mesh;
     mesh.points = push.points;
     mesh.tets = push.tets;
@@ -68,13 +65,10 @@ reference::TetMesh meshOf(const RivalPush& push)
 
 RivalResults solve(const RivalPush& push, const std::filesystem::path& folder)
 {
-    if (!reference::hasCcx()) {
-        throw std::runtime_error("ccx is not in PATH: install Debian's calculix-ccx");
-    }
-    std::vector<reference::Material> materials;
-    for (const RivalMaterial& m : push.materials) {
-        materials.push_back({m.youngsModulus, m.poisson, 0.0});
-    }
+    base::failIf(!reference::hasCcx(), "ccx is not in PATH: install Debian's calculix-ccx");
+    const auto materials = base::mapped<reference::Material>(push.materials, [&](const RivalMaterial& m) {
+        return reference::Material{m.youngsModulus, m.poisson, 0.0};
+    });
     reference::CcxPress press{push.held, push.radius, push.centre.at(0), {}};
     for (const std::size_t look : push.looks) {
         press.centres.push_back(push.centre.at(look));

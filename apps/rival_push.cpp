@@ -1,5 +1,7 @@
 #include <apps/rival_push.h>
 #include <base/build.h>
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 
 #include <fmt/format.h>
@@ -10,7 +12,6 @@
 #include <cstdio>
 #include <exception>
 #include <fstream>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -20,11 +21,8 @@ namespace {
 
 std::vector<Vec3> vectorsIn(const json& list)
 {
-    std::vector<Vec3> out;
-    for (const json& v : list) {
-        out.emplace_back(v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>());
-    }
-    return out;
+    return base::mapped<Vec3>(
+        list, [&](const json& v) { return Vec3(v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()); });
 }
 
 std::string rowsOf(std::span<const Vec3> vectors)
@@ -48,9 +46,7 @@ RivalPush readRivalPush(const std::filesystem::path& folder)
 {
     const std::filesystem::path file = folder / "push.json";
     std::ifstream in(file);
-    if (!in) {
-        throw std::runtime_error(file.string() + ": cannot be read: palpate accuracy --rival writes it");
-    }
+    base::failIf(!in, "{}: cannot be read: palpate accuracy --rival writes it", file.native());
     try {
         const json push = json::parse(in);
         RivalPush out;
@@ -69,8 +65,7 @@ RivalPush readRivalPush(const std::filesystem::path& folder)
         push.at("look_ticks").get_to(out.looks);
         return out;
     } catch (const json::exception& e) {
-        throw std::runtime_error(
-            fmt::format("{}: cannot be read as a push of palpate accuracy --rival: {}", file.string(), e.what()));
+        throw base::error("{}: cannot be read as a push of palpate accuracy --rival: {}", file.string(), e.what());
     }
 }
 

@@ -1,6 +1,7 @@
 #include <apps/train_profile.h>
 
 #include <base/counted.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <training/progress.h>
 
@@ -29,9 +30,7 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         auto [curriculum, exercise] = training::findExercise(options_.exercise);
         curriculum_ = std::move(curriculum);
         exercise_ = curriculum_->exercise(exercise);
-        if (!options_.caseId.empty()) {
-            throw std::runtime_error("--case: --exercise has a case of its own: leave out one of them");
-        }
+        base::failIf(!options_.caseId.empty(), "--case: --exercise has a case of its own: leave out one of them");
         case_ = training::findCase(exercise_->caseId);
     } else if (!options_.caseId.empty()) {
         case_ = training::findCase(options_.caseId);
@@ -41,9 +40,8 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         const auto here = std::ranges::find(progress.exercises, exercise_, &training::ExerciseProgress::exercise);
         if (!here->available) {
             const auto* const next = progress.next();
-            throw std::runtime_error(fmt::format("--exercise {}: is still locked for {}{}", options_.exercise,
-                                                 person_->name,
-                                                 next ? "; next is " + curriculum_->id + "/" + next->exercise->id : ""));
+            throw base::error("--exercise {}: is still locked for {}{}", options_.exercise, person_->name,
+                              next ? "; next is " + curriculum_->id + "/" + next->exercise->id : "");
         }
         trial_ = static_cast<int>(here->sessions.size()) + 1;
     }

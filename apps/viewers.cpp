@@ -1,12 +1,12 @@
 #include <apps/viewers.h>
 
+#include <base/error.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::apps {
@@ -117,18 +117,15 @@ std::vector<std::string> tissuesToFind(const haptics::SessionModel& model)
 void checkViewer()
 {
     const auto viewer = base::programFolder() / "palpate-view";
-    if (!std::filesystem::exists(viewer)) {
-        throw std::runtime_error(viewer.string() + ": cannot be started: it is missing; " + howToDraw);
-    }
+    base::failIf(!std::filesystem::exists(viewer), "{}: cannot be started: it is missing; {}", viewer.native(), howToDraw);
 }
 
 void drawRecord(const std::filesystem::path& record, const std::string& pictures, double timeout)
 {
     base::ChildProcess viewer(base::programFolder() / "palpate-view",
                               {"--replay", record.string(), "--offscreen", pictures}, howToDraw);
-    if (viewer.wait(timeout) != 0) {
-        throw std::runtime_error(pictures + ": the pictures are not complete: the viewer failed or took too long");
-    }
+    base::failIf(viewer.wait(timeout) != 0, "{}: the pictures are not complete: the viewer failed or took too long",
+                 pictures);
 }
 
 }  // namespace palpate::apps
