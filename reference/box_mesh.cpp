@@ -1,13 +1,13 @@
 #include <reference/box_mesh.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
+
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
-#include <stdexcept>
 
 namespace palpate::reference {
 
@@ -98,11 +98,9 @@ void turnPositive(TetMesh& mesh)
 
 std::vector<double> gradedCells(double low, double fineTo, double high, double fine, double growth)
 {
-    if (!(low <= fineTo && fineTo <= high && low < high && fine > 0.0 && growth >= 1.0)) {
-        throw std::runtime_error(fmt::format(
-            "cells of {:g} mm from {:g} to {:g} mm, fine up to {:g} mm, growing {:g} times: not a way to divide it",
-            1e3 * fine, 1e3 * low, 1e3 * high, 1e3 * fineTo, growth));
-    }
+    base::failIf(!(low <= fineTo && fineTo <= high && low < high && fine > 0.0 && growth >= 1.0),
+                 "cells of {:g} mm from {:g} to {:g} mm, fine up to {:g} mm, growing {:g} times: not a way to divide it",
+                 1e3 * fine, 1e3 * low, 1e3 * high, 1e3 * fineTo, growth);
     std::vector<double> ends{low};
     const int even = static_cast<int>(std::ceil((fineTo - low) / fine - 1e-9));
     for (int i = 1; i <= even; ++i) {

@@ -1,6 +1,9 @@
 #include <reference/ccx.h>
 
+#include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/shell_word.h>
 #include <base/units.h>
 
 #include <fmt/format.h>
@@ -15,8 +18,6 @@
 #include <map>
 #include <set>
 #include <sstream>
-#include <stdexcept>
-#include <string>
 
 namespace palpate::reference {
 
@@ -154,15 +155,6 @@ void writeMaterials(std::ostream& out, const TetMesh& mesh, std::span<const Mate
     }
 }
 
-std::string quoted(const std::string& text)
-{
-    std::string out = "'";
-    for (const char c : text) {
-        out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    }
-    return out + "'";
-}
-
 using Block = std::vector<std::vector<double>>;
 
 // Blocks of numbers that follow the headings of a kind in a .dat file.
@@ -199,19 +191,16 @@ Block lastBlock(const std::filesystem::path& file, const std::string& heading)
 
 std::vector<Vec3> displacementsIn(const Block& block)
 {
-    std::vector<Vec3> u;
-    for (const auto& row : block) {
-        u.push_back(Vec3(row.at(1), row.at(2), row.at(3)) / units::mm);
-    }
-    return u;
+    return base::mapped<Vec3>(block, [&](const auto& row) { return Vec3(row.at(1), row.at(2), row.at(3)) / units::mm; });
 }
 
 // Runs ccx on an exported file, in its folder. Returns the file with its results.
 std::filesystem::path resultsOf(const std::filesystem::path& file, int& status)
 {
     const std::filesystem::path job = std::filesystem::absolute(file).replace_extension();
-    const std::string command = fmt::format("cd {} && OMP_NUM_THREADS=1 ccx {} > ccx.log 2>&1",
-                                            quoted(job.parent_path().string()), quoted(job.filename().string()));
+    const std::string command =
+        fmt::format("cd {} && OMP_NUM_THREADS=1 ccx {} > ccx.log 2>&1", base::shellWord(job.parent_path().native()),
+                    base::shellWord(job.filename().native()));
     std::filesystem::path results = job;
     results += ".dat";
     std::filesystem::remove(results);
@@ -366,8 +355,8 @@ void checkCcx(const TetMesh& mesh, std::span<const Material> materials, Law law,
 {
     for (const auto row : mesh.tissue) {
         if (!volume::isSmall(law) && materials[row].stiffening != 0.0) {
-            throw std::runtime_error(fmt::format("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0",
-                                                 file.string(), materials[row].stiffening));
+            throw base::error("{}: CalculiX has no tissue that stiffens by {:g}: set it to 0", file.string(),
+                              materials[row].stiffening);
         }
     }
 }
@@ -418,9 +407,7 @@ CcxSolution runCcx(const std::filesystem::path& file)
     int status = 0;
     const std::filesystem::path results = resultsOf(file, status);
     CcxSolution solution{displacementsIn(lastBlock(results, "displacements"))};
-    if (status != 0 || solution.u.empty()) {
-        throw std::runtime_error(fmt::format("{}: ccx gave no solution (exit status {})", file.string(), status));
-    }
+    base::failIf(status != 0 || solution.u.empty(), "{}: ccx gave no solution (exit status {})", file.native(), status);
     for (int axis = 0; axis < 3; ++axis) {
         const auto total = lastBlock(results, fmt::format("for set {}", drivenSets[static_cast<std::size_t>(axis)]));
         solution.force[axis] = total.empty() ? 0.0 : -newtonPerMilli * total.back().at(static_cast<std::size_t>(axis));
@@ -454,9 +441,7 @@ void exportCcxPress(const TetMesh& mesh, std::span<const Material> materials, co
     }
     writeSteps(out, press);
     out.close();
-    if (!out) {
-        throw std::runtime_error(fmt::format("{}: cannot be written", file.string()));
-    }
+    base::failIf(!out, "{}: cannot be written", file.native());
 }
 
 std::vector<CcxSolution> runCcxPress(const std::filesystem::path& file, std::size_t steps)
@@ -465,9 +450,8 @@ std::vector<CcxSolution> runCcxPress(const std::filesystem::path& file, std::siz
     const std::filesystem::path results = resultsOf(file, status);
     const std::vector<Block> u = blocksOf(results, "displacements"), force = blocksOf(results, "for set TOOL");
     if (status != 0 || u.size() != stepsPerCentre * steps || force.size() != u.size()) {
-        throw std::runtime_error(fmt::format("{}: ccx solved {} of {} steps (exit status {}): ccx.log says why",
-                                             file.string(), std::min(u.size(), force.size()) / stepsPerCentre, steps,
-                                             status));
+        throw base::error("{}: ccx solved {} of {} steps (exit status {}): ccx.log says why", file.string(),
+                          std::min(u.size(), force.size()) / stepsPerCentre, steps, status);
     }
     std::vector<CcxSolution> solutions;
     for (std::size_t i = stepsPerCentre - 1; i < u.size(); i += stepsPerCentre) {

@@ -1,6 +1,6 @@
 #include <reference/factor.h>
 
-#include <fmt/format.h>
+#include <base/error.h>
 
 #include <dlfcn.h>
 #include <dmumps_c.h>
@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <stdexcept>
 
 extern "C" {
 
@@ -116,10 +115,9 @@ Factor::Factor(const SymmetricMatrix& matrix) : impl_(std::make_unique<Impl>())
     const int status = m.infog[0];
     if (status < 0) {
         impl_->run(end);
-        throw std::runtime_error(fmt::format("a system of {} unknowns cannot be factorized (MUMPS says {}): {}", m.n,
-                                             status,
-                                             status == -10 ? "it is singular, hold the body somewhere"
-                                                           : "there may not be memory enough, make the elements larger"));
+        throw base::error("a system of {} unknowns cannot be factorized (MUMPS says {}): {}", m.n, status,
+                          status == -10 ? "it is singular, hold the body somewhere"
+                                        : "there may not be memory enough, make the elements larger");
     }
     m.irn = m.jcn = m.blkptr = nullptr;
     m.a = nullptr;

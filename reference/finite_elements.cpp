@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <base/units.h>
 #include <reference/finite_elements.h>
 #include <reference/tissue_terms.h>
@@ -11,8 +12,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
 
 namespace palpate::reference {
 
@@ -148,9 +147,8 @@ void FiniteElements::Impl::findFaces(const TetMesh& from)
         }
         freeFaces.push_back(!face.held && !mirrored ? 1 : 0);
     }
-    if (faces.size() != from.faces.size()) {
-        throw std::runtime_error("mesh: a face is not one of its tetrahedron's: give each face's tetrahedron");
-    }
+    base::failIf(faces.size() != from.faces.size(),
+                 "mesh: a face is not one of its tetrahedron's: give each face's tetrahedron");
 }
 
 void FiniteElements::Impl::addMaterials(const TetMesh& from, std::span<const Material> materials)

@@ -17,7 +17,6 @@
 #include <cmath>
 #include <functional>
 #include <unordered_map>
-#include <vector>
 
 namespace palpate::reference {
 

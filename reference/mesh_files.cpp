@@ -1,7 +1,7 @@
 #include <reference/mesh_files.h>
 
+#include <base/error.h>
 #include <base/units.h>
-#include <reference/mesh_parts.h>
 #include <reference/surfaces.h>
 
 #include <fmt/format.h>
@@ -21,8 +21,6 @@
 #include <iterator>
 #include <map>
 #include <set>
-#include <stdexcept>
-#include <vector>
 
 namespace palpate::reference {
 
@@ -213,7 +211,7 @@ Maker makerOf(const std::filesystem::path& file)
         {".vtu", vtuText}, {".vtk", vtkText}, {".msh", mshText}, {".inp", inpText}};
     const auto found = makers.find(file.extension().string());
     if (found == makers.end()) {
-        throw std::runtime_error(fmt::format("{}: a mesh is written as {}: name it so", file.string(), meshFileEndings()));
+        throw base::error("{}: a mesh is written as {}: name it so", file.string(), meshFileEndings());
     }
     return found->second;
 }

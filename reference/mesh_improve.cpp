@@ -1,6 +1,5 @@
 #include <reference/mesh_improve.h>
 
-#include <reference/mesh_parts.h>
 #include <reference/mesh_quality.h>
 #include <reference/mesh_swap.h>
 #include <reference/surfaces.h>
@@ -8,7 +7,6 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>

@@ -1,10 +1,11 @@
 #include <reference/mesh_parts.h>
 
+#include <base/mapped.h>
+
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -94,11 +95,7 @@ std::vector<double> volumesOf(const TetMesh& mesh, std::span<const std::uint8_t>
     for (std::size_t t = 0; t < mesh.tets.size(); ++t) {
         volume[mesh.tissue[t]] += sixVolumes(mesh, t) / 6.0;
     }
-    std::vector<double> out;
-    for (const std::uint8_t row : rows) {
-        out.push_back(volume[row]);
-    }
-    return out;
+    return base::mapped<double>(rows, [&](const std::uint8_t row) { return volume[row]; });
 }
 
 double smallestDihedral(const TetMesh& mesh) noexcept

@@ -1,5 +1,6 @@
 #include <reference/mesher.h>
 
+#include <base/error.h>
 #include <reference/label_pieces.h>
 #include <reference/mesh_domain.h>
 #include <reference/mesh_parts.h>
@@ -11,7 +12,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <stdexcept>
 
 namespace palpate::reference {
 
@@ -158,9 +158,8 @@ BodyMesh meshBody(const volume::Tissue& tissue, const MeshOptions& options, cons
     body.mixtures = std::move(mixtures.materials);
     body.volume = std::move(mixtures.volume);
     addFaces(tissue, labels, body.mesh);
-    if (std::ranges::none_of(body.mesh.faces, &TetMesh::Face::held)) {
-        throw std::runtime_error("volume: no tissue that holds the body touches it: mark bone or chest wall as fixed");
-    }
+    base::failIf(std::ranges::none_of(body.mesh.faces, &TetMesh::Face::held),
+                 "volume: no tissue that holds the body touches it: mark bone or chest wall as fixed");
     return body;
 }
 

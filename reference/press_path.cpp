@@ -1,14 +1,13 @@
 #include <reference/press_path.h>
 
+#include <base/mapped.h>
 #include <studies/kernel/trial_errors.h>
 
 #include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 namespace palpate::reference {
 
@@ -93,10 +92,9 @@ ReferenceState ofAll(ReferenceState part, const SolveOptions& options)
 
 std::vector<Material> materialsOf(const PressProblem& problem, const BodyMesh& body)
 {
-    std::vector<Material> materials;
-    for (const auto& row : problem.tissue.table().rows) {
-        materials.push_back({row.youngsModulus, row.poissonRatio, row.stiffening});
-    }
+    auto materials = base::mapped<Material>(problem.tissue.table().rows, [&](const auto& row) {
+        return Material{row.youngsModulus, row.poissonRatio, row.stiffening};
+    });
     materials.insert(materials.end(), body.mixtures.begin(), body.mixtures.end());
     for (Material& m : materials) {
         m.poisson = std::min(m.poisson, problem.poissonCap);

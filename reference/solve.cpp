@@ -1,5 +1,6 @@
 #include <reference/solve.h>
 
+#include <base/error.h>
 #include <base/units.h>
 #include <reference/equilibrium.h>
 
@@ -13,7 +14,6 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <stdexcept>
 
 namespace palpate::reference {
 
@@ -33,28 +33,22 @@ constexpr double shortest = 1e-4;     // fraction of a load that a step must tak
 
 void checkMesh(const TetMesh& mesh, std::span<const Material> materials, const SolveOptions& options)
 {
-    if (mesh.tets.empty()) {
-        throw std::runtime_error("mesh: there are no tetrahedra");
-    }
+    base::failIf(mesh.tets.empty(), "mesh: there are no tetrahedra");
     if (const auto worst = std::max_element(mesh.tissue.begin(), mesh.tissue.end()); *worst >= materials.size()) {
-        throw std::runtime_error(fmt::format("mesh: tissue row {} of a table of {}", *worst, materials.size()));
+        throw base::error("mesh: tissue row {} of a table of {}", *worst, materials.size());
     }
     for (std::size_t i = 0; i < materials.size(); ++i) {
         const Material& m = materials[i];
         const bool used = std::find(mesh.tissue.begin(), mesh.tissue.end(), i) != mesh.tissue.end();
-        if (used && (!(m.youngsModulus > 0.0) || !(m.poisson > -1.0 && m.poisson < 0.5) ||
-                     !(m.stiffening >= volume::minStiffening))) {
-            throw std::runtime_error(
-                fmt::format("tissue row {}: Young's modulus {:g} kPa, Poisson's ratio {:g}, stiffening {:g}: "
-                            "must be over 0, between -1 and 0.5, and not under {:g}",
-                            i, 1e-3 * m.youngsModulus, m.poisson, m.stiffening, volume::minStiffening));
-        }
+        base::failIf(used && (!(m.youngsModulus > 0.0) || !(m.poisson > -1.0 && m.poisson < 0.5) ||
+                              !(m.stiffening >= volume::minStiffening)),
+                     "tissue row {}: Young's modulus {:g} kPa, Poisson's ratio {:g}, stiffening {:g}: "
+                     "must be over 0, between -1 and 0.5, and not under {:g}",
+                     i, 1e-3 * m.youngsModulus, m.poisson, m.stiffening, volume::minStiffening);
     }
     const auto& still = options.mirrored;
     const bool held = std::any_of(mesh.faces.begin(), mesh.faces.end(), [](const auto& f) { return f.held; });
-    if (!held && !(still[0] && still[1] && still[2])) {
-        throw std::runtime_error("mesh: no face is held: the body would fly away");
-    }
+    base::failIf(!held && !(still[0] && still[1] && still[2]), "mesh: no face is held: the body would fly away");
 }
 
 // Throws when tetrahedra that share no point, not even by others, are left over.
@@ -77,10 +71,8 @@ void checkOneBody(const TetMesh& mesh)
     for (const auto& tet : mesh.tets) {
         apart += root(tet[0]) != root(mesh.tets.front()[0]) ? 1 : 0;
     }
-    if (apart > 0) {
-        throw std::runtime_error(fmt::format(
-            "mesh: {} of {} tetrahedra are not connected with the first one: keep one body", apart, mesh.tets.size()));
-    }
+    base::failIf(apart > 0, "mesh: {} of {} tetrahedra are not connected with the first one: keep one body", apart,
+                 mesh.tets.size());
 }
 
 }  // namespace
@@ -338,9 +330,7 @@ void Solver::press(const RigidTool& tool)
 {
     Impl& s = *impl_;
     const Obstacle to{units::mm * tool.centre, units::mm * tool.radius, units::mm * tool.shaft};
-    if (!s.body.driven.empty()) {
-        throw std::runtime_error("tool: displacements are prescribed already: take a new solver");
-    }
+    base::failIf(!s.body.driven.empty(), "tool: displacements are prescribed already: take a new solver");
     if (!s.tool || s.tool->radius != to.radius || s.tool->shaft != to.shaft) {
         s.tool = s.retreat(to);
         s.lastChange.clear();
@@ -363,11 +353,9 @@ void Solver::press(const RigidTool& tool)
     if (way > 0.0) {
         s.stride = std::clamp(length * way, minStride * to.radius, stepOfRadius * to.radius);
     }
-    if (done < 1.0) {
-        throw std::runtime_error(fmt::format(
-            "tool: does not converge at {:.3f} mm of {:.3f} mm: press less deep, or make the elements smaller there",
-            done * way, way));
-    }
+    base::failIf(done < 1.0,
+                 "tool: does not converge at {:.3f} mm of {:.3f} mm: press less deep, or make the elements smaller there",
+                 done * way, way);
 }
 
 void Solver::prescribe(const Patch& patch)
@@ -379,9 +367,7 @@ void Solver::prescribe(const Patch& patch)
     s.body.state.assign(s.body.fem.size(), 0.0);
     s.body.steps = 0;
     const std::vector<double> goal = s.prescribed(patch);
-    if (s.body.driven.empty()) {
-        throw std::runtime_error("patch: no free face lies in it: make it larger, or the elements smaller");
-    }
+    base::failIf(s.body.driven.empty(), "patch: no free face lies in it: make it larger, or the elements smaller");
     double length = 1.0;
     const auto step = [&](double fraction) {
         const std::vector<double> state = s.body.state;
@@ -402,10 +388,10 @@ void Solver::prescribe(const Patch& patch)
         for (const double g : goal) {
             largest = std::max(largest, std::abs(g));
         }
-        throw std::runtime_error(
-            fmt::format("patch: does not converge at {:.3f} mm of {:.3f} mm: prescribe less, or make "
-                        "the elements smaller there",
-                        done * largest, largest));
+        throw base::error(
+            "patch: does not converge at {:.3f} mm of {:.3f} mm: prescribe less, or make "
+            "the elements smaller there",
+            done * largest, largest);
     }
 }
 

@@ -1,12 +1,10 @@
 #include <reference/symmetry.h>
 
+#include <base/error.h>
 #include <volume/clean.h>
-
-#include <fmt/format.h>
 
 #include <cmath>
 #include <cstdint>
-#include <stdexcept>
 #include <vector>
 
 namespace palpate::reference {
@@ -23,8 +21,8 @@ int twicePlane(const volume::LabelImage& image, int axis)
     const double spacing = image.affine.spacing()[axis];
     const bool aligned = std::abs(std::abs(image.affine.linear[axis][axis]) - spacing) < between * spacing;
     if (!aligned || std::abs(twice - std::round(twice)) > between || std::lround(twice) % 2 == 0) {
-        throw std::runtime_error(fmt::format("volume: the plane {} = 0 does not run between voxels: solve all of it",
-                                             "xyz"[static_cast<std::size_t>(axis)]));
+        throw base::error("volume: the plane {} = 0 does not run between voxels: solve all of it",
+                          "xyz"[static_cast<std::size_t>(axis)]);
     }
     return static_cast<int>(std::lround(twice));
 }
@@ -37,8 +35,8 @@ void checkSymmetry(const volume::LabelImage& image, const std::vector<std::uint8
         other[axis] = twice - n[axis];
         const bool in = other[axis] >= 0 && other[axis] < image.size[axis];
         if (rows[image.values[image.offset(n)]] != (in ? rows[image.values[image.offset(other)]] : 0)) {
-            throw std::runtime_error(fmt::format("volume: tissues differ across the plane {} = 0: solve all of it",
-                                                 "xyz"[static_cast<std::size_t>(axis)]));
+            throw base::error("volume: tissues differ across the plane {} = 0: solve all of it",
+                              "xyz"[static_cast<std::size_t>(axis)]);
         }
     });
 }

@@ -1,7 +1,8 @@
 #include <reference/tetgen_job.h>
 
+#include <base/error.h>
+
 #include <fstream>
-#include <stdexcept>
 #include <type_traits>
 
 namespace palpate::reference {
@@ -28,9 +29,7 @@ public:
     void finish()
     {
         out_.close();
-        if (!out_) {
-            throw std::runtime_error(file_.string() + ": cannot be written: is the disk full?");
-        }
+        base::failIf(!out_, "{}: cannot be written: is the disk full?", file_.native());
     }
 
 private:
@@ -75,12 +74,7 @@ public:
     }
 
 private:
-    void check() const
-    {
-        if (!in_) {
-            throw std::runtime_error(file_.string() + ": is no whole job of TetGen's");
-        }
-    }
+    void check() const { base::failIf(!in_, "{}: is no whole job of TetGen's", file_.native()); }
 
     std::filesystem::path file_;
     std::ifstream in_;

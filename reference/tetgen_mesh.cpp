@@ -1,6 +1,7 @@
 #include <reference/tetgen_mesh.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/temporary_folder.h>
 #include <base/units.h>
 #include <reference/mesh_parts.h>
@@ -71,8 +72,8 @@ TetGenResult filled(const Surfaces& surfaces, const TetGenOptions& options)
     try {
         return run(jobOf(surfaces, options), options);
     } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("TetGen cannot mesh these surfaces: {}{}; another --size may do, or --surface",
-                                             e.what(), whatCrosses(surfaces, options)));
+        throw base::error("TetGen cannot mesh these surfaces: {}{}; another --size may do, or --surface", e.what(),
+                          whatCrosses(surfaces, options));
     }
 }
 
@@ -117,10 +118,10 @@ void checkVolumes(const TetMesh& mesh, const Surfaces& surfaces)
     const std::vector<double> made = volumesOf(mesh, rows);
     for (std::size_t row = 0; row < wanted.size(); ++row) {
         if (std::abs(made[row] - wanted[row]) > sameVolume * all) {
-            throw std::runtime_error(
-                fmt::format("TetGen's mesh has {:g} ml of tissue {} where its surfaces enclose {:g} ml: "
-                            "take another --size",
-                            1e6 * made[row], row, 1e6 * wanted[row]));
+            throw base::error(
+                "TetGen's mesh has {:g} ml of tissue {} where its surfaces enclose {:g} ml: "
+                "take another --size",
+                1e6 * made[row], row, 1e6 * wanted[row]);
         }
     }
 }

@@ -7,7 +7,6 @@
 #include <reference/surface_nets.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include <limits>
 
