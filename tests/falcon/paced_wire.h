@@ -1,8 +1,8 @@
 #pragma once
 
 #include <haptics/falcon/bytes.h>
-#include <haptics/falcon/emulator.h>
 #include <haptics/falcon/transport.h>
+#include <tests/falcon/emulator.h>
 
 #include <atomic>
 #include <chrono>

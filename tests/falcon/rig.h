@@ -1,8 +1,8 @@
 #pragma once
 
-#include <haptics/falcon/emulated_wire.h>
-#include <haptics/falcon/emulator.h>
 #include <haptics/falcon/link.h>
+#include <tests/falcon/emulated_wire.h>
+#include <tests/falcon/emulator.h>
 
 #include <algorithm>
 #include <atomic>

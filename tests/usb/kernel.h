@@ -1,6 +1,6 @@
 #pragma once
 
-#include <haptics/falcon/emulator.h>
+#include <tests/falcon/emulator.h>
 
 #include <linux/usbdevice_fs.h>
 #include <umockdev.h>

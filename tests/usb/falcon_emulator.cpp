@@ -1,9 +1,10 @@
 // An emulated Novint Falcon that a virtual machine sees on its USB: QEMU's usb-redir connects to it. See docs/devices.md.
-#include <haptics/falcon/emulator.h>
+#include <tests/falcon/emulator.h>
+
+#include <base/error.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <glm/geometric.hpp>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -391,9 +392,7 @@ int connectTo(const std::string& path)
 void run(const std::string& path, const std::string& firmware)
 {
     std::ifstream stream(firmware, std::ios::binary);
-    if (!stream) {
-        throw std::runtime_error(firmware + ": cannot be read: give the firmware that the emulated Falcon runs");
-    }
+    base::failIf(!stream, "{}: cannot be read: give the firmware that the emulated Falcon runs", firmware);
     Emulator device({std::istreambuf_iterator<char>(stream), {}});
     const int socket = connectTo(path);
     Server server(device, socket);

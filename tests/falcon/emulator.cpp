@@ -1,4 +1,4 @@
-#include <haptics/falcon/emulator.h>
+#include <tests/falcon/emulator.h>
 
 #include <haptics/bounded.h>
 
@@ -12,7 +12,7 @@ namespace palpate::falcon {
 
 namespace {
 
-constexpr double step = 0.25e-3;        // of the arm [s]
+constexpr double armStep = 0.25e-3;     // of the arm [s]
 constexpr double thinking = 40e-6;      // of the processor, between a packet and its answer [s]
 constexpr double emulatedBoot = 50e-3;  // [s]
 constexpr double bits = 10.0;           // of a byte on the serial line
@@ -39,7 +39,7 @@ Emulator::Emulator(std::vector<std::uint8_t> firmware, std::uint64_t seed)
     : firmware_(std::move(firmware)),
       random_(seed),
       parameters_(mechanics()),
-      arm_(parameters_, firm, Vec3(0.0, 0.0, 0.13), step),
+      arm_(parameters_, firm, Vec3(0.0, 0.0, 0.13), armStep),
       goal_(0.0, 0.0, 0.13)
 {
     // At rest in the hand, under its own weight.
@@ -158,10 +158,10 @@ void Emulator::advance(double seconds)
     const double end = time_ + seconds;
     while (time_ < end) {
         const double next = arriving_.empty() ? end : std::min(end, std::max(time_, arriving_.front().ready));
-        time_ = std::min(next, lived_ + step);
-        if (time_ >= lived_ + step) {
-            live(step);
-            lived_ += step;
+        time_ = std::min(next, lived_ + armStep);
+        if (time_ >= lived_ + armStep) {
+            live(armStep);
+            lived_ += armStep;
         }
         while (!arriving_.empty() && arriving_.front().ready <= time_) {
             const std::uint8_t byte = arriving_.front().value;

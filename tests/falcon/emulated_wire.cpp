@@ -1,4 +1,4 @@
-#include <haptics/falcon/emulated_wire.h>
+#include <tests/falcon/emulated_wire.h>
 
 #include <algorithm>
 
