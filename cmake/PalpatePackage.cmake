@@ -3,6 +3,7 @@ include(CMakePackageConfigHelpers)
 
 set(palpate_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/palpate)
 install(EXPORT palpateTargets NAMESPACE palpate:: DESTINATION ${palpate_package_dir})
+get_property(palpate_components GLOBAL PROPERTY PALPATE_INSTALLED)
 configure_package_config_file(cmake/palpateConfig.cmake.in palpateConfig.cmake INSTALL_DESTINATION ${palpate_package_dir})
 write_basic_package_version_file(palpateConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES
@@ -11,7 +12,7 @@ install(FILES
   DESTINATION ${palpate_package_dir})
 
 # The same for pkg-config.
-get_property(palpate_pc_libs GLOBAL PROPERTY PALPATE_INSTALLED)
+set(palpate_pc_libs ${palpate_components})
 list(REMOVE_ITEM palpate_pc_libs render)
 list(TRANSFORM palpate_pc_libs PREPEND -lpalpate_)
 set(palpate_pc_private openvdb boost_iostreams bz2 ${palpate_dicom_parts})
@@ -29,7 +30,7 @@ configure_file(packaging/palpate.pc.in palpate.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/palpate.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 
 # All that `cmake --install` takes, without the tests.
-get_property(palpate_installed GLOBAL PROPERTY PALPATE_INSTALLED)
+set(palpate_installed ${palpate_components})
 list(TRANSFORM palpate_installed PREPEND palpate_)
 add_custom_target(palpate_installed)
 foreach(target IN LISTS palpate_installed ITEMS palpate palpate-view palpate-trainer palpate-reference palpate-mesh
