@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 namespace palpate::base {
 
@@ -13,7 +14,14 @@ public:
     /// @param what  that is put there, in the message of the std::runtime_error where none can be made
     explicit TemporaryFolder(const std::string& what)
     {
-        std::string name = (std::filesystem::temp_directory_path() / "palpate-XXXXXX").string();
+        std::error_code none;
+        const std::filesystem::path parent = std::filesystem::temp_directory_path(none);
+        if (none) {
+            const char* const set = std::getenv("TMPDIR");
+            throw std::runtime_error("TMPDIR=" + std::string(set != nullptr ? set : "") + ": there is no such folder for " +
+                                     what);
+        }
+        std::string name = (parent / "palpate-XXXXXX").string();
         if (::mkdtemp(name.data()) == nullptr) {
             throw std::runtime_error(name + ": no folder can be made there for " + what);
         }

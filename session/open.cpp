@@ -249,6 +249,12 @@ std::string hostName()
 
 }  // namespace
 
+void startHere(haptics::SessionInfo& info)
+{
+    info.host = hostName();
+    info.started = fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
+}
+
 haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
                                      const std::string& device)
 {
@@ -256,8 +262,7 @@ haptics::SessionInfo describeSession(const haptics::SessionModel& model, const s
     info.sceneOrigin = origin;
     info.device = device;
     info.build = std::string(base::build());
-    info.host = hostName();
-    info.started = fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
+    startHere(info);
     info.seed = model.scene.source.phantom.seed;
     return info;
 }

@@ -58,6 +58,9 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
 /// when the record says something else of its scene than the scene does.
 haptics::SessionModel reopenSession(const std::string& file, const haptics::SessionInfo& info);
 
+/// Says of `info` that its session starts now, on this machine.
+void startHere(haptics::SessionInfo& info);
+
 /// What a record says about this session, which starts now on this machine.
 haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,
                                      const std::string& device);

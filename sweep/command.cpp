@@ -5,6 +5,7 @@
 #include <base/error.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
+#include <base/temporary_folder.h>
 #include <command/json.h>
 #include <command/progress.h>
 #include <sweep/local.h>
@@ -19,13 +20,14 @@
 #include <nlohmann/json.hpp>
 
 #include <signal.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <initializer_list>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -116,8 +118,11 @@ struct CaseCost {
 CaseCost costOf(const SweepPlan& plan)
 {
     CaseRunner runner(plan, std::string(base::build()));
-    const fs::path record =
-        plan.records ? fs::temp_directory_path() / fmt::format("palpate-sweep-{}.db", getpid()) : fs::path();
+    std::optional<base::TemporaryFolder> place;
+    if (plan.records) {
+        place.emplace("the records of these cases");
+    }
+    const fs::path record = place ? *place / "case.db" : fs::path();
     CaseCost cost;
     std::vector<std::string> errors;
     for (const std::size_t i : std::set<std::size_t>{0, plan.cases() / 2, plan.cases() - 1}) {
@@ -352,6 +357,23 @@ void addParts(CLI::App& c, SweepArguments& o)
     merge->expected(0, CLI::detail::expected_max_vector_size)->type_name("[DIR..]")->excludes(shard)->excludes(cases);
 }
 
+// What would be ignored.
+void refuseIgnored(CLI::App& c)
+{
+    const auto exclude = [&c](const char* option, std::initializer_list<const char*> others) {
+        for (const char* const other : others) {
+            c.get_option(option)->excludes(c.get_option(other));
+        }
+    };
+    exclude("--slurm", {"--shard", "--cases", "--merge"});
+    exclude("--dry-run", {"--shard", "--cases", "--merge", "--slurm", "--retry", "--any-build"});
+    exclude("--merge", {"--jobs", "--retry"});
+    exclude("--report", {"PLAN", "--output", "--dry-run", "--jobs", "--shard", "--cases", "--merge", "--slurm", "--retry",
+                         "--any-build"});
+    exclude("--list", {"PLAN", "--output", "--dry-run", "--jobs", "--shard", "--cases", "--merge", "--slurm", "--retry",
+                       "--any-build", "--report", "--json"});
+}
+
 }  // namespace
 
 void addSweep(CLI::App& app)
@@ -382,15 +404,13 @@ void addSweep(CLI::App& app)
     c->add_option("--sbatch", o->slurm.options, "Further option for sbatch, e.g. --sbatch=--qos=long; may be repeated")
         ->needs(slurm)
         ->allow_extra_args(false);
-    for (const char* const part : {"--shard", "--cases", "--merge"}) {
-        c->get_option(part)->excludes(slurm);
-    }
     c->add_flag("--retry", o->retry, "Run failed cases again");
     c->add_flag("--any-build", o->anyBuild, "Resume or merge a sweep of other builds");
     c->add_option("--report", o->report, "Write report.html into this folder of a sweep");
     c->add_flag("--list", o->list, "List ready plans, and outputs of each procedure");
     c->add_option("--work", o->work, "Work of a task of a job array")->group("");
     c->add_option("--json", o->json, "Write figures to this file (- = standard output)");
+    refuseIgnored(*c);
     c->final_callback([o] { sweepCommand(*o); });
 }
 

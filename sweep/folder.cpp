@@ -37,9 +37,8 @@ std::string textOf(const fs::path& file)
     return text;
 }
 
-std::string hashOf(const fs::path& file)
+std::string hashOf(const std::string& bytes)
 {
-    const std::string bytes = textOf(file);
     std::uint64_t hash = 0xcbf29ce484222325U;
     for (const char c : bytes) {
         hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
@@ -52,10 +51,16 @@ json inputsOf(const datasets::Scene& scene)
     json inputs = json::object();
     for (const std::string& file : {scene.source.file.string(), scene.tissues}) {
         if (!file.empty()) {
-            inputs[file] = hashOf(file);
+            inputs[file] = hashOf(textOf(file));
         }
     }
     return inputs;
+}
+
+// What the cases follow from, as it is in the folder.
+json ownOf(const std::string& plan, const std::string& scene)
+{
+    return {{"plan.toml", hashOf(plan)}, {"scene.toml", hashOf(scene)}};
 }
 
 // The folder's own base scene, whatever the plan calls it.
@@ -140,8 +145,9 @@ void SweepFolder::begin()
     if (failed) {
         throw base::error("{}: cannot be made ({})", folder_.string(), failed.message());
     }
-    base::writeWhole(folder_ / "scene.toml", datasets::sceneText(plan_.base));
-    const json about{{"name", plan_.name}, {"inputs", inputsOf(plan_.base)}};
+    const std::string scene = datasets::sceneText(plan_.base);
+    base::writeWhole(folder_ / "scene.toml", scene);
+    const json about{{"name", plan_.name}, {"inputs", inputsOf(plan_.base)}, {"own", ownOf(plan_.text, scene)}};
     base::writeWhole(folder_ / "sweep.json", about.dump(1));
     base::writeWhole(folder_ / "plan.toml", plan_.text);  // the last: it makes the folder a sweep
 }
@@ -177,6 +183,16 @@ SweepFolder::SweepFolder(fs::path folder, const std::string& given, bool hold)
         folder_.native(), given);
     const json about = json::parse(textOf(folder_ / "sweep.json"), nullptr, false);
     base::failIf(!about.is_object(), "{}/sweep.json: is damaged: begin in another folder", folder_.native());
+    const json own = ownOf(plan_.text, textOf(folder_ / "scene.toml"));
+    for (const auto& [name, hash] : own.items()) {
+        // A folder of an older build has no hash.
+        if (about.contains("own") && about["own"].value(name, std::string()) != hash) {
+            throw base::error(
+                "{}: was changed since the sweep began, and the cases that are done are of the old one: bring it "
+                "back, or begin in another folder",
+                (folder_ / name).string());
+        }
+    }
     plan_.name = about.value("name", plan_.name);
     if (const json now = inputsOf(plan_.base); about.value("inputs", json()) != now) {
         throw base::error(

@@ -27,7 +27,7 @@ struct SweepRow {
 ///
 ///     plan.toml           the plan as given
 ///     scene.toml          its base scene, with absolute paths
-///     sweep.json          its name, and the files that it reads with a hash of their bytes
+///     sweep.json          its name, and hashes of plan, scene and the files that the scene reads
 ///     lock                who works on it
 ///     cases/000/17.json   a finished case, by thousands
 ///     records/17.db       of plans with records

@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <datasets/tables.h>
 #include <sweep/formula.h>
+#include <volume/tissue.h>
 
 #include <fmt/format.h>
 
@@ -67,18 +68,24 @@ std::set<std::size_t> casesOfValues(const SweepPlan& plan)
     return cases;
 }
 
-// Of a phantom's scene: of a volume's own table nothing is known before it is read.
-void checkTissues(const datasets::Scene& scene, std::map<std::string, volume::TissueTable>& tables)
+// The table that a scene changes: of its volume, of a file, or the standard one.
+volume::TissueTable tableOf(const datasets::Scene& scene)
 {
     if (!scene.source.file.empty()) {
+        return volume::Tissue::load(scene.source.file).table();
+    }
+    return scene.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(scene.tissues);
+}
+
+void checkTissues(const datasets::Scene& scene, std::map<std::string, volume::TissueTable>& tables)
+{
+    if (scene.tissueChanges.empty() && scene.tissues.empty()) {
         return;
     }
-    auto at = tables.find(scene.tissues);
+    const std::string file = scene.source.file.empty() ? scene.tissues : scene.source.file.string();
+    auto at = tables.find(file);
     if (at == tables.end()) {
-        at = tables
-                 .emplace(scene.tissues,
-                          scene.tissues.empty() ? datasets::defaultTissues() : datasets::loadTissues(scene.tissues))
-                 .first;
+        at = tables.emplace(file, tableOf(scene)).first;
     }
     datasets::withChanges(at->second, scene.tissueChanges);
 }
@@ -127,7 +134,11 @@ void probeCases(const SweepPlan& plan, const std::string& file)
     std::map<std::string, volume::TissueTable> tables;
     for (const std::size_t index : cases) {
         try {
-            checkTissues(sweepCase(plan, index).scene, tables);
+            const SweepCase c = sweepCase(plan, index);
+            checkTissues(c.scene, tables);
+            if (!plan.reference.empty()) {
+                checkTissues(c.reference, tables);
+            }
         } catch (const std::runtime_error& e) {
             throw base::error("{}: case {}: {}", file, index, withoutPlace(e.what()));
         }

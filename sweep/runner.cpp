@@ -4,6 +4,7 @@
 #include <datasets/scene_text.h>
 #include <haptics/recorder.h>
 #include <haptics/replay.h>
+#include <session/open.h>
 #include <sweep/formula.h>
 #include <sweep/procedures.h>
 
@@ -78,7 +79,12 @@ CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Pro
     info.seed = procedure.seed.value_or(seed);
     std::optional<haptics::Recorder> recorder;
     if (!record.empty()) {
-        recorder.emplace(record, info);
+        session::startHere(info);
+        try {
+            recorder.emplace(record, info);
+        } catch (const std::runtime_error& e) {
+            throw RecordFailed(e.what());
+        }
     }
     const auto begin = std::chrono::steady_clock::now();
     const auto watch = [&](const haptics::TickRecord&, const haptics::ServoTiming&) {
@@ -89,7 +95,7 @@ CaseRunner::Measured CaseRunner::measure(const datasets::Scene& scene, const Pro
     if (recorder) {
         recorder->finish({});
         if (!recorder->error().empty()) {
-            throw RecordFailed(fmt::format("{}: {}", record.string(), recorder->error()));
+            throw RecordFailed(recorder->error());
         }
     }
     return {std::move(result.values), result.tickTime};

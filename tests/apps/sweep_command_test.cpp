@@ -176,8 +176,7 @@ TEST_F(Sweep, AFullDiskIsOneLine)
     const std::string program = std::filesystem::path(PALPATE_BIN_DIR) / "palpate";
     // No file over 4 kB: the cases have room, the table has none.
     const Outcome full =
-        Program("/bin/bash", {"-c", "trap '' XFSZ; ulimit -f 4; exec " + program + " sweep " + file + " -o " + folder("s")})
-            .wait();
+        Program("/bin/bash", {"-c", "ulimit -f 4; exec " + program + " sweep " + file + " -o " + folder("s")}).wait();
     EXPECT_EQ(full.status, 1);
     EXPECT_EQ(std::ranges::count(full.err, '\n'), 1) << full.err;
     EXPECT_NE(full.err.find("cannot be written"), std::string::npos) << full.err;
@@ -224,7 +223,24 @@ TEST_F(Sweep, RecordsReplay)
     figures({"sweep", plan("p.toml", text), "-o", folder("s"), "--jobs", "2"});
     for (const char* const record : {"0.db", "1.db"}) {
         EXPECT_TRUE(figures({"replay", folder("s") + "/records/" + record})["identical"].get<bool>());
+        const Outcome started =
+            Program("/usr/bin/sqlite3", {folder("s") + "/records/" + record,
+                                         "SELECT julianday('now') - julianday(value) FROM session WHERE key = 'started'"})
+                .wait();
+        EXPECT_LT(std::stod(started.out), 0.1);  // [days]
     }
+    const std::string program = std::filesystem::path(PALPATE_BIN_DIR) / "palpate";
+    const Outcome nowhere =
+        Program("/usr/bin/env", {"TMPDIR=/none", program, "sweep", folder("s") + "/plan.toml", "--dry-run"}).wait();
+    EXPECT_EQ(nowhere.err, "palpate: TMPDIR=/none: there is no such folder for the records of these cases\n");
+    // A record that cannot be begun is no fault of its case.
+    const std::filesystem::path home = folder("s"), record = home / "records/0.db";
+    std::filesystem::remove(home / "cases/000/0.json");
+    std::filesystem::remove(record);
+    std::filesystem::create_directories(record / "in the way");
+    expectRefusal({"sweep", "-o", folder("s")}, "0.db: exists already");
+    std::filesystem::remove_all(record);
+    EXPECT_EQ(figures({"sweep", "-o", folder("s")})["failed"], 0);
 }
 
 TEST_F(Sweep, RefusesWhatCannotBe)
@@ -237,6 +253,16 @@ TEST_F(Sweep, RefusesWhatCannotBe)
                   "is not empty and holds no sweep");
     figures({"sweep", file, "-o", folder("s"), "--jobs", "2"});
     expectRefusal({"sweep", other, "-o", folder("s")}, "holds another plan");
+    // The plan of the folder itself, by hand: its table would have new parameters beside old results.
+    for (const char* const own : {"plan.toml", "scene.toml"}) {
+        const std::string text = readText(folder("s") + "/" + own);
+        writeText(folder("s") + "/" + own, text + "# edited\n");
+        expectRefusal({"sweep", "-o", folder("s")}, std::string(own) + ": was changed since the sweep began");
+        writeText(folder("s") + "/" + own, text);
+    }
+    figures({"sweep", "-o", folder("s")});
+    expectRefusal({"sweep", "--report", folder("s"), "-o", folder("s")}, "--report excludes");
+    expectRefusal({"sweep", file, "--dry-run", "--shard", "1/2"}, "--dry-run excludes");
     expectRefusal({"sweep", file, "-o", folder("s"), "--time", "10"}, "--slurm");
     expectRefusal({"sweep", "--report", folder("none")}, "holds no sweep");
     expectRefusal({"sweep", file, "-o", "/proc/x"}, "choose another place");

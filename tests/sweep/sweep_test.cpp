@@ -1,6 +1,7 @@
 #include <sweep/case.h>
 #include <sweep/plan.h>
 
+#include <datasets/scene.h>
 #include <datasets/scene_text.h>
 #include <sweep/folder.h>
 
@@ -190,6 +191,26 @@ TEST(SweepPlan, TriesEachValueOfAListOnce)
                       "]\n[[axis]]\nkey = \"tissue.fatt.youngs_kpa\"\nvalues = [3]\n")
                   .find("it has: skin, fat"),
               std::string::npos);
+}
+
+// A volume has a table of its own; the reference cases change it too.
+TEST(SweepPlan, TriesTissuesOfVolumesAndReferences)
+{
+    const tests::Folder home;
+    datasets::Scene small = *datasets::builtInScene("block");
+    small.source.phantom.voxel = 4e-3;
+    const volume::Tissue tissue = datasets::sceneVolume(small);
+    tissue.save(home / "b.vdb");
+    const std::string scene = "scene = \"" + (home / "b.vdb").string() + "\"\n";
+    const std::string axis = "[[axis]]\nkey = \"tissue.fatt.youngs_kpa\"\nvalues = [3]\n";
+    EXPECT_NE(refusal(scene + axis).find("case 0: [tissue.fatt]: is not in the volume's tissue table"), std::string::npos)
+        << refusal(scene + axis);
+    const std::string fat = "[[axis]]\nkey = \"tissue.fat.youngs_kpa\"\nvalues = [3]\n";
+    EXPECT_EQ(refusal(scene + fat), "");
+    for (const std::string& body : {scene, std::string("scene = \"block\"\n")}) {
+        const std::string error = refusal(body + fat + "[reference]\ntissue.fatt.youngs_kpa = 3\n");
+        EXPECT_NE(error.find("case 0: [tissue.fatt]: is not in the volume's tissue table"), std::string::npos) << error;
+    }
 }
 
 TEST(SweepPlan, ReadyPlansAreWhole)
