@@ -123,8 +123,9 @@ int main(int argc, char** argv)
     sweep::addSweep(app);
 #endif
 
-    command::refuseEmptyValues(app);
+    command::refuseNoValues(app);
     command::endOnSignals();
+    command::failOnLargeFiles();
     try {
         app.parse(commandOf(argc, argv));
         checkStandardOutput();

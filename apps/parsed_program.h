@@ -28,7 +28,8 @@ int runParsed(int argc, char** argv, const std::string& name, const std::string&
     app.failure_message(
         [&](const CLI::App*, const CLI::Error& e) { return name + ": " + e.what() + " (see " + name + " --help)\n"; });
     add(app);
-    command::refuseEmptyValues(app);
+    command::refuseNoValues(app);
+    command::failOnLargeFiles();
     try {
         app.parse(command::argumentsOf(argc, argv));
         run();

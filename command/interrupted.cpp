@@ -39,4 +39,9 @@ void endOnSignals()
     }
 }
 
+void failOnLargeFiles()
+{
+    std::signal(SIGXFSZ, SIG_IGN);
+}
+
 }  // namespace palpate::command

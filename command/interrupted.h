@@ -10,6 +10,10 @@ namespace palpate::command {
 /// handlers of their own meanwhile. A signal that is ignored stays ignored (nohup).
 void endOnSignals();
 
+/// From now on a file that grows over the user's limit (ulimit -f) is an error of its writer, as a full disk is; the system
+/// would end the program without a word.
+void failOnLargeFiles();
+
 /// What was asked for has been ended in order by a signal, before its time: the program's exit status is 128 + signal.
 class Interrupted : public std::runtime_error {
 public:

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <cmath>
+#include <string>
 #include <utility>
 
 namespace palpate::command {
@@ -29,7 +31,7 @@ std::string seedFault(const std::string& text)
     return digits ? "" : fmt::format("{}: must be a whole number, 0 or more", text);
 }
 
-void refuseEmptyValues(CLI::App& app)
+void refuseNoValues(CLI::App& app)
 {
     // Without a description, which --help would print behind each option.
     const CLI::Validator filled(
@@ -37,13 +39,23 @@ void refuseEmptyValues(CLI::App& app)
             return value.empty() ? std::string("the value is empty: give one, or leave out the option") : std::string();
         },
         "");
+    const CLI::Validator number(
+        [](const std::string& value) {
+            double read = 0.0;
+            const bool none = CLI::detail::lexical_cast(value, read) && std::isnan(read);
+            return none ? fmt::format("{}: must be a number", value) : std::string();
+        },
+        "");
     for (CLI::Option* const option : app.get_options([](const CLI::Option* o) { return !o->get_lnames().empty(); })) {
         if (option->get_expected_min() > 0) {
             option->transform(filled);  // before its other checks
         }
+        if (option->get_type_name().find("FLOAT in [") != std::string::npos) {
+            option->check(number);
+        }
     }
     for (CLI::App* const command : app.get_subcommands([](const CLI::App*) { return true; })) {
-        refuseEmptyValues(*command);
+        refuseNoValues(*command);
     }
 }
 

@@ -19,8 +19,9 @@ void addSetting(CLI::App& command, session::SceneChanges& changes);
 std::string seedFault(const std::string& text);
 
 /// Call after all options have been added, for a program's app: none of them takes an empty value ("--csv ''", a variable
-/// of a shell that is not set), but for those that may have none (expected(0, 1)).
-void refuseEmptyValues(CLI::App& app);
+/// of a shell that is not set), but for those that may have none (expected(0, 1)); none with a CLI::Range
+/// takes "nan", which is in all of them.
+void refuseNoValues(CLI::App& app);
 
 /// The words of a command line, last first as CLI11 takes them. An empty value behind `=` ("--csv=") is a word of its own:
 /// CLI11 would take the next word.

@@ -166,7 +166,8 @@ void addStability(CLI::App& app)
                       ->check(CLI::Range(100, 20000))
                       ->capture_default_str();
     c->add_flag("--quick", o->choice.quick, "Some scenes, one device, 1 kHz: under a minute");
-    auto* fuzzed = c->add_option("--fuzz", o->fuzz, "Also run this many hostile sessions of Palpate's own levels");
+    auto* fuzzed = c->add_option("--fuzz", o->fuzz, "Also run this many hostile sessions of Palpate's own levels")
+                       ->check(CLI::Range(1, 100'000'000));
     c->add_flag("--fuzz-only", o->fuzzOnly, "Run only the hostile sessions")->needs(fuzzed);
     c->add_option("--seed", o->seed, "Seed of the hostile sessions")
         ->capture_default_str()

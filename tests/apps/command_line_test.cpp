@@ -125,6 +125,8 @@ TEST(CommandLine, AnOptionWithAnEmptyValueIsRefused)
     for (const std::string option : {"--csv", "--json", "--at"}) {
         expectRefusal({"press", "block", "--path", folder / "p.csv", option, ""}, option + ": the value is empty");
     }
+    // Of any bound a comparison with it is false.
+    expectRefusal({"accuracy", "--limit", "nan"}, "--limit: nan: must be a number");
     expectRefusal({"press", "block", "--csv=", "--path", folder / "p.csv"}, "--csv: the value is empty");
     expectRefusal({"train", "block", "--headless="},
                   "The following argument was not expected: \"\"; an option that takes no value has no =");

@@ -80,6 +80,7 @@ TEST(StabilityCommand, RefusesWhatThereIsNot)
     expectRefusal({"stability", "--scenes", "moon"}, "there are plate-1mm");
     expectRefusal({"stability", "--methods", "magic"}, "there are elastic");
     expectRefusal({"stability", "--case", "plate-1mm/elastic"}, "is no cell");
+    expectRefusal({"stability", "--fuzz", "-1"}, "--fuzz: ");
     expectRefusal({"stability", "--record", "x.db"}, "--case");
     const std::string cell = "plate-1mm/elastic/touch/grip/";
     expectRefusal({"stability", "--case", cell + "1000x"}, "is no cell");
