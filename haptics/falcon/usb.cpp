@@ -293,7 +293,10 @@ void UsbTransport::restart() noexcept
     libusb_clear_halt(handle_, endpointIn);
     closing_ = stalled_ = false;
     for (Slot& slot : in_) {
-        submit(slot);
+        // One that has not come back yet goes on when it does.
+        if (!slot.inFlight) {
+            submit(slot);
+        }
     }
 }
 

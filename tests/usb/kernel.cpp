@@ -90,7 +90,7 @@ void Kernel::finish(Urb urb, int status, const std::vector<std::uint8_t>& data, 
 void Kernel::live()
 {
     device_.advance(std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count() - device_.now());
-    while (!reading_.empty()) {
+    while (reading_.size() > (keepsOne ? 1U : 0U)) {
         std::vector<std::uint8_t> packet;
         const int status = gone ? -ENODEV : stalled ? -EPIPE : 0;
         if (status == 0) {
@@ -99,8 +99,8 @@ void Kernel::live()
                 return;
             }
         }
-        finish(reading_.front(), status, packet, packet.size());
-        reading_.pop_front();
+        finish(reading_.back(), status, packet, packet.size());
+        reading_.pop_back();
     }
 }
 
@@ -159,8 +159,10 @@ void Kernel::discard(UMockdevIoctlClient* client, UMockdevIoctlData* argument)
         umockdev_ioctl_client_complete(client, -1, EINVAL);
         return;
     }
-    finish(*found, -ENOENT, {}, 0);
-    reading_.erase(found);
+    if (!keepsOne || found != reading_.begin()) {
+        finish(*found, -ENOENT, {}, 0);
+        reading_.erase(found);
+    }
     umockdev_ioctl_client_complete(client, 0, 0);
 }
 
@@ -199,7 +201,10 @@ void Kernel::answer(UMockdevIoctlClient* client)
         claimed = owner_ != nullptr;
         umockdev_ioctl_client_complete(client, refused ? -1 : 0, refused ? EBUSY : 0);
     } else {
-        owner_ = is(USBDEVFS_RELEASEINTERFACE) && owner_ == client ? nullptr : owner_;
+        if (is(USBDEVFS_RELEASEINTERFACE) && owner_ == client) {
+            owner_ = nullptr;
+            reading_.clear();  // ended when the file is closed, which comes next
+        }
         claimed = owner_ != nullptr;
         stalled = stalled && !is(USBDEVFS_CLEAR_HALT);
         umockdev_ioctl_client_complete(client, 0, 0);

@@ -26,6 +26,7 @@ public:
     Kernel& operator=(const Kernel&) = delete;
 
     std::atomic<bool> gone{false}, claimed{false}, refuseClaim{false}, stalled{false};
+    std::atomic<bool> keepsOne{false};  // of what is read, whatever happens
 
 private:
     // The head of usbdevfs_urb, which ends in an array without a length.

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include <malloc.h>
+
 #include <atomic>
 #include <memory>
 #include <string>
@@ -82,6 +84,29 @@ TEST(FalconUsb, StallsOfTheEndpointAreCleared)
     }
     EXPECT_GE(link.counts().exchanges, 80U);
     EXPECT_FALSE(bench.wire->gone());
+}
+
+// A kernel that does not give a transfer back, whether it is cancelled or not: it is neither sent off a second time nor
+// freed.
+TEST(FalconUsb, ATransferThatDoesNotComeBackIsLeftAlone)
+{
+    Bench bench;
+    bench.device.makeReady();
+    Link link(*bench.wire, {std::nullopt, 0.0, false}, [](const std::string&) {});
+    link.connect(never);
+    mallopt(M_PERTURB, 0x55);  // what is freed cannot be used on
+    bench.kernel.keepsOne = true;
+    bench.kernel.stalled = true;
+    for (int n = 0; n < 20; ++n) {
+        link.exchange({});
+    }
+    EXPECT_GE(link.counts().exchanges, 10U);
+    link.close();
+    EXPECT_FALSE(bench.kernel.claimed);
+    mallopt(M_PERTURB, 0);
+    bench.kernel.keepsOne = false;
+    link.connect(never);
+    EXPECT_TRUE(link.exchange({}));
 }
 
 TEST(FalconUsb, UnpluggingIsNoticed)
