@@ -126,7 +126,17 @@ SceneBox fromKeywords(const py::object& source, const py::kwargs& tables)
         return tables.empty() ? box : changed(box, tables);
     }
     const auto text = py::module_::import("palpate._toml").attr("dumps")(tables).cast<std::string>();
-    return parsed(text, (std::filesystem::current_path() / "keywords").string());
+    // Files in it are relative to this folder; an error says neither a file nor a line, which there are none of.
+    const std::string place = (std::filesystem::current_path() / "keywords").string();
+    try {
+        return {datasets::parseScene(text, place), place, nullptr, false};
+    } catch (const std::runtime_error& e) {
+        std::string what = e.what();
+        if (what.starts_with(place + ":")) {
+            what.erase(0, what.find(": ", place.size()) + 2);
+        }
+        throwSceneError(what);
+    }
 }
 
 SceneBox forVolume(const py::object& what, const std::string& target)

@@ -2,7 +2,7 @@
 
 import re
 
-_PLACE = re.compile(r"^(?P<file>[^:]+):(?P<line>\d+): (?P<rest>.*)$", re.S)
+_PLACE = re.compile(r"^(?P<file>.+?):(?P<line>\d+): (?P<rest>.*)$", re.S)
 _KEY = re.compile(r"^(?:\[+(?P<section>[^\]]+)\]+ )?(?:(?P<who>'[^']*':) )?(?P<key>[A-Za-z_][\w.]*)(?: =|:)")
 _QUOTED = re.compile(r"key '(?P<key>[^']+)'")
 

@@ -21,7 +21,14 @@ try:
 
     _Env, _Box = _gymnasium.Env, _gymnasium.spaces.Box
 except ImportError:
-    _Env = object
+    class _Env:
+        """Of gymnasium.Env the random numbers of its episodes, which are the same."""
+
+        np_random = None
+
+        def reset(self, *, seed=None, options=None):
+            if seed is not None or self.np_random is None:
+                self.np_random = np.random.default_rng(seed)
 
     class _Box:
         """A box of numbers from low to high, as gymnasium.spaces.Box."""
@@ -151,7 +158,6 @@ class Biopsy(_Env):
         self.max_speed, self.entry_error = float(max_speed), float(entry_error)
         self.action_space = _Box(-1.0, 1.0, (4,), np.float32)
         self.observation_space = _Box(-np.inf, np.inf, (16,), np.float32)
-        self._seed = None
         self.session = None
 
     def reset(self, *, seed=None, options=None):
@@ -160,9 +166,8 @@ class Biopsy(_Env):
         Returns:
             (observation, info)
         """
-        if seed is not None or self._seed is None:
-            self._seed = np.random.default_rng(seed)
-        random = self._seed
+        super().reset(seed=seed)
+        random = self.np_random
         entry, aim = self.model.entry, self.model.aim
         line = (aim - entry) / np.linalg.norm(aim - entry)
         side, other = _across(line)
@@ -180,9 +185,10 @@ class Biopsy(_Env):
         """One step of 20 ms. Returns (observation, reward, terminated, truncated, info)."""
         if self.session is None or self._done:
             raise Error("step: the episode is over: call reset()")
-        action = np.clip(np.nan_to_num(np.asarray(action, float)), -1, 1)
-        if action.shape != (4,):
+        action = np.asarray(action, float)
+        if action.shape != (4,) or np.isnan(action).any():
             raise ValueError("action: give 4 numbers: velocity along, to two sides, trigger")
+        action = np.clip(action, -1, 1)
         n = self.ticks_per_step
         way = action[:3] @ self._frame * (self.max_speed * _palpate.TICK_SECONDS)
         poses = np.empty((n, 6))
@@ -328,7 +334,7 @@ class Vector:
             observations (count x 16), rewards, terminated, truncated (count each), infos (list of dict)
         """
         actions = np.asarray(actions)
-        if actions.shape != self._action_shape or actions.dtype.kind not in "biuf":
+        if actions.shape != self._action_shape or actions.dtype.kind not in "biuf" or np.isnan(actions).any():
             shape = " x ".join(map(str, self._action_shape))
             raise ValueError(f"actions: give {shape} numbers, a row for each environment")
         results = self._ask([("step", actions[part]) for part in self._parts])

@@ -1,8 +1,12 @@
 import functools
+import importlib.util
 import os
 import signal
+import sys
 import time
+import types
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -115,6 +119,41 @@ class Biopsy(unittest.TestCase):
         with self.assertRaisesRegex(palpate.Error, "no needle"):
             envs.Biopsy("block")
 
+    def test_an_action_that_is_no_number_is_refused(self):
+        env = make()
+        env.reset(seed=1)
+        with self.assertRaisesRegex(ValueError, "give 4 numbers"):
+            env.step([np.nan, 0, 0, 0])
+        env.step(np.zeros(4))
+
+    # What gymnasium.utils.env_checker.check_env asks of the random numbers, with an Env that keeps them as gymnasium's does.
+    def test_gymnasium_has_the_random_numbers(self):
+        class Env:
+            _np_random = None
+
+            @property
+            def np_random(self):
+                self._np_random = self._np_random or np.random.default_rng()
+                return self._np_random
+
+            def reset(self, *, seed=None, options=None):
+                self._np_random = self._np_random if seed is None else np.random.default_rng(seed)
+
+        gymnasium = types.SimpleNamespace(Env=Env, spaces=types.SimpleNamespace(Box=envs._Box))
+        with unittest.mock.patch.dict(sys.modules, gymnasium=gymnasium):
+            spec = importlib.util.spec_from_file_location("palpate.envs_with_gymnasium", envs.__file__)
+            spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
+        env = module.Biopsy(layered())
+        self.assertIsInstance(env, Env)
+        env.reset()
+        first, _ = env.reset(seed=123)
+        state = env._np_random.bit_generator.state
+        np.testing.assert_array_equal(env.reset(seed=123)[0], first)
+        self.assertEqual(env._np_random.bit_generator.state, state)
+        env.reset(seed=456)
+        self.assertNotEqual(env._np_random.bit_generator.state, state)
+        np.testing.assert_array_equal(make().reset(seed=123)[0], first)
+
     def test_it_can_be_looked_at(self):
         env = envs.Biopsy(layered(), render_mode="ultrasound")
         env.reset(seed=1)
@@ -197,7 +236,8 @@ class BrokenVectors(unittest.TestCase):
     def test_wrong_actions_are_refused_before_any_process_sees_them(self):
         with envs.Vector(2, make, processes=2, seed=1) as vector:
             vector.reset()
-            for wrong in (np.zeros((2, 3)), np.zeros((3, 4)), np.zeros(4), 0.0, np.full((2, 4), "x"), [[None] * 4] * 2):
+            for wrong in (np.zeros((2, 3)), np.zeros((3, 4)), np.zeros(4), 0.0, np.full((2, 4), "x"), [[None] * 4] * 2,
+                          np.full((2, 4), np.nan)):
                 with self.subTest(wrong), self.assertRaisesRegex(ValueError, "give 2 x 4 numbers"):
                     vector.step(wrong)
             self.assertEqual(vector.step(np.zeros((2, 4)))[0].shape, (2, 16))

@@ -32,7 +32,7 @@ class Scenes(InFolder):
         self.assertEqual(after, before)
 
     def test_an_error_says_file_line_and_key(self):
-        file = self.folder / "bad.toml"
+        file = self.folder / "a:bad.toml"
         file.write_text('name = "x"\n[volume]\nphantom = "block"\n\n[dffb]\nrange_mm = -4\n')
         with self.assertRaises(palpate.SceneError) as caught:
             palpate.Scene(file)
@@ -47,6 +47,10 @@ class Scenes(InFolder):
         with self.assertRaises(palpate.SceneError) as caught:
             palpate.Scene("block", tool={"radius_mm": -1})
         self.assertEqual(caught.exception.key, "tool.radius_mm")
+        with self.assertRaises(palpate.SceneError) as caught:
+            palpate.Scene(volume={"phantom": "block"}, tool={"kind": "sphere", "radius_mm": -1})
+        self.assertEqual((caught.exception.file, caught.exception.line, caught.exception.key), (None, None, "tool.radius_mm"))
+        self.assertNotIn("keywords", str(caught.exception))
         with self.assertRaisesRegex(palpate.SceneError, "out of range") as caught:
             palpate.Scene("block").changed({"volume.seed": 2**63})
         self.assertEqual(caught.exception.key, "volume.seed")
