@@ -261,8 +261,8 @@ TEST_F(Sweep, RefusesWhatCannotBe)
         writeText(folder("s") + "/" + own, text);
     }
     figures({"sweep", "-o", folder("s")});
-    expectRefusal({"sweep", "--report", folder("s"), "-o", folder("s")}, "--report excludes");
-    expectRefusal({"sweep", file, "--dry-run", "--shard", "1/2"}, "--dry-run excludes");
+    expectRefusal({"sweep", "--report", folder("s"), "-o", folder("s")}, "excludes --report");
+    expectRefusal({"sweep", file, "--dry-run", "--shard", "1/2"}, "excludes");
     expectRefusal({"sweep", file, "-o", folder("s"), "--time", "10"}, "--slurm");
     expectRefusal({"sweep", "--report", folder("none")}, "holds no sweep");
     expectRefusal({"sweep", file, "-o", "/proc/x"}, "choose another place");
