@@ -28,12 +28,10 @@ std::string caseText(const NewCase& wanted, const datasets::Scene& scene, double
     return fmt::format(
         "title = {}\nscene = \"scene.toml\"\ndifficulty = {}\ntrains = [\"core biopsy\"]\n"
         "measures = [\"total\", \"best_target_pct\", \"targeting_error_mm\", \"vital_contacts\", \"passes\", "
-        "\"beyond_target_mm\"]\nbriefing = [\n  {},\n  \"Touch the skin at the planned entry and push until it gives "
-        "way.\",\n"
+        "\"beyond_target_mm\"]\nbriefing = [\n  {},\n  \"Touch the skin and push until it gives way.\",\n"
         "  {},\n  \"Fire, and draw the needle back.\",\n]\nlicence = {}\nsource = {}\n",
         tomlString(wanted.title.empty() ? wanted.volume.stem().string() : wanted.title), wanted.difficulty,
-        tomlString(
-            fmt::format("Take a core of the {}, {:.0f} mm below the skin along the planned line.", target, 1e3 * depth)),
+        tomlString(fmt::format("Take a core of the {}, {:.0f} mm below the skin.", target, 1e3 * depth)),
         tomlString(
             fmt::format("Advance until the tip is at the near rim of the {}: the gun throws the needle {:.0f} mm on.",
                         target, 1e3 * scene.tool.throwLength)),
