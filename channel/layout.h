@@ -19,14 +19,14 @@
 namespace palpate::channel {
 
 inline constexpr std::uint64_t magic = 0x31455441504c4150;  // "PALPATE1"
-inline constexpr std::uint32_t version = 7;
+inline constexpr std::uint32_t version = 8;
 inline constexpr std::uint64_t frameTicks = 33;  // from one publication of displaced nodes to the next: 30 a second
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxStructures = 16;
 inline constexpr std::size_t maxWindows = 4;
 inline constexpr std::size_t maxDisplaced = 1U << 16;
 inline constexpr std::size_t maxHoles = 8;
-inline constexpr std::size_t maxMarks = 8;
+inline constexpr std::size_t maxMarks = 32;
 inline constexpr std::size_t nameLength = 32;
 /// Of a display voxel: the row of its tissue, and whether it lies on the border of a vital structure's warning distance.
 inline constexpr std::uint8_t rowBits = maxTissues - 1, shellBit = 0x80;
@@ -171,8 +171,8 @@ struct State {
     std::uint32_t pictures = 0;     // that the hand asked for so far: stored ultrasound pictures, or CT scans
     std::uint32_t pictureHeld = 0;  // 1: its button is down
     std::array<Hole, maxHoles> hole{};
-    std::uint32_t marks = 0;     // places marked so far; `mark` has the last maxMarks, number n at n modulo maxMarks
-    std::uint32_t markHeld = 0;  // 1: its button is down
+    std::uint32_t marks = 0;     // places that are marked: the first ones of `mark`; there are no more than maxMarks
+    std::uint32_t markHeld = 0;  // 1: its button is down, 2: that which takes a mark back, 3: both
     std::array<Mark, maxMarks> mark{};
     std::uint64_t missed = 0;     // ticks
     double tickP99 = 0;           // [s]
@@ -185,10 +185,12 @@ struct Input {
     Triple axis{0, 1, 0};  // unit vector, from the shaft to the tip
     // How far the other hand has moved the scene's ultrasound probe: press, slide, sweep [m], rock, tilt, turn [rad].
     std::array<double, 6> probe{};
-    std::uint32_t held = 0;      // 1: the dead-man switch
-    std::uint32_t ended = 0;     // 1: the session is to end, 2: and to begin anew
-    std::uint32_t fires = 0;     // how often the gun was fired: counted, so that a short press is never between two looks
-    std::uint32_t marks = 0;     // how often the place of the tool was marked
+    std::uint32_t held = 0;     // 1: the dead-man switch
+    std::uint32_t ended = 0;    // 1: the session is to end, 2: and to begin anew
+    std::uint32_t fires = 0;    // how often the gun was fired: counted, so that a short press is never between two looks
+    std::uint32_t marks = 0;    // how often the place of the tool was marked
+    std::uint32_t unmarks = 0;  // how often the last mark was taken back
+    std::uint32_t padding = 0;
     std::uint32_t pictures = 0;  // how often the ultrasound picture was stored
     std::uint32_t paused = 0;    // 1: the session is to stand still
     std::uint64_t beat = 0;      // how often this was written: it stands still when the viewer is dead or stuck

@@ -19,6 +19,25 @@ std::array<float, 3> floats(Vec3 v) noexcept
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
+// Those that the score counts.
+void showMarks(const TickRecord& r, channel::State& state) noexcept
+{
+    static_assert(maxMarks == channel::maxMarks);
+    constexpr std::uint32_t set = 1, back = 2;
+    const std::uint32_t held =
+        ((r.device.buttons & buttonMark) != 0 ? set : 0) | ((r.device.buttons & buttonUnmark) != 0 ? back : 0);
+    const std::uint32_t pressed = held & ~state.markHeld;
+    if ((pressed & set) != 0 && state.marks < channel::maxMarks) {
+        // On the surface, where there is one: the tool itself is pressed into it.
+        const Vec3 place = r.phase == Phase::contact ? r.proxy : r.device.position + r.deflection;
+        state.mark[state.marks++] = {floats(place), floats(r.device.axis)};
+    }
+    if ((pressed & back) != 0 && state.marks > 0) {
+        --state.marks;
+    }
+    state.markHeld = held;
+}
+
 }  // namespace
 
 channel::Publisher publisherOf(const std::string& session, const SessionModel& model, std::uint32_t viewersHand,
@@ -67,14 +86,7 @@ void showTick(const TickRecord& r, const ServoTiming& timing, channel::State& st
     const std::uint32_t held = (r.device.buttons & buttonPicture) != 0 ? 1 : 0;
     state.pictures += held != 0 && state.pictureHeld == 0 ? 1 : 0;
     state.pictureHeld = held;
-    const std::uint32_t marking = (r.device.buttons & buttonMark) != 0 ? 1 : 0;
-    if (marking != 0 && state.markHeld == 0) {
-        // On the surface, where there is one: the tool itself is pressed into it.
-        const Vec3 place = r.phase == Phase::contact ? r.proxy : r.device.position + r.deflection;
-        state.mark[state.marks % channel::maxMarks] = {floats(place), floats(r.device.axis)};
-        ++state.marks;
-    }
-    state.markHeld = marking;
+    showMarks(r, state);
     if (r.fired) {
         state.hole[state.cores % channel::maxHoles] = {floats(r.core.restStart), floats(r.core.restEnd)};
         ++state.cores;

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace palpate::haptics {
 
@@ -91,10 +92,7 @@ void LossWatch::add(const TickRecord& record) noexcept
             touched_ = event.structure;
         }
     }
-    if (now.marks > before_.marks) {
-        marks_ += record.device.position;
-        at_[mark] = seconds;
-    }
+    note(mark, now.marks > before_.marks, seconds);
     before_ = now;
 }
 
@@ -192,7 +190,9 @@ std::vector<Loss> LossWatch::ofPalpation(const Score& s, const SessionInfo& info
                             ? said(tr("The marks' middle lies {:.1Lf} mm beside that of the {}"), 1e3 * s.markError, target)
                             : said(tr("What was marked cannot be compared with the {}"), target);
     if (target_) {
-        const Vec3 away = marks_ / static_cast<double>(s.marks) - target_->middle;
+        const std::span<const Vec3> marks = scorer_.marks();
+        const Vec3 sum = std::accumulate(marks.begin(), marks.end(), Vec3(0.0));
+        const Vec3 away = sum / static_cast<double>(s.marks) - target_->middle;
         const std::string direction = directionInWords(away - glm::dot(away, target_->axis) * target_->axis);
         where += direction.empty() ? "" : ", " + direction;
     }

@@ -27,6 +27,8 @@ public:
     explicit LossWatch(const SessionInfo& info);
     void add(const TickRecord& record) noexcept;
     Score score() const noexcept { return scorer_.score(); }
+    /// Of the scorer.
+    std::span<const Vec3> marks() const noexcept { return scorer_.marks(); }
 
     /// All losses, the largest first. With the total their points add up to 100. Allocates.
     /// @param info  that of the constructor: names of structures
@@ -68,7 +70,6 @@ private:
     std::array<double, moments> at_{};  // [s]; below 0: never
     CoreSample core_;                   // the best
     std::uint8_t touched_ = 0xFF;       // the vital structure that was touched first
-    Vec3 marks_{0.0};                   // sum of the marks' places [m]
     std::optional<TargetShape> target_;
 };
 

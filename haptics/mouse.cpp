@@ -46,6 +46,7 @@ void MouseDevice::listen() noexcept
         // What a viewer before this session has counted is none of ours.
         fire_.done = now->fires;
         mark_.done = now->marks;
+        unmark_.done = now->unmarks;
         picture_.done = now->pictures;
     }
     input_ = *now;
@@ -89,6 +90,7 @@ DeviceSample MouseDevice::read() noexcept
     sample.buttons = input_.held != 0 ? buttonDeadMan : 0U;
     sample.buttons |= fire_.down(input_.fires, period_) ? buttonFire : 0U;
     sample.buttons |= mark_.down(input_.marks, period_) ? buttonMark : 0U;
+    sample.buttons |= unmark_.down(input_.unmarks, period_) ? buttonUnmark : 0U;
     sample.buttons |= picture_.down(input_.pictures, period_) ? buttonPicture : 0U;
     return sample;
 }

@@ -56,7 +56,7 @@ private:
     Vec3 goal_{0.0};      // [m]
     Vec3 axis_{0.0};
     ProbeFollower probe_;
-    Trigger fire_, mark_, picture_;
+    Trigger fire_, mark_, unmark_, picture_;
     bool ended_ = false;
 };
 

@@ -406,6 +406,11 @@ void Scorer::addMark(const TickRecord& record) noexcept
         marks_[score_.marks++] = record.device.position;
     }
     markDown_ = down;
+    const bool takenBack = (record.device.buttons & buttonUnmark) != 0;
+    if (takenBack && !unmarkDown_ && score_.marks > 0) {
+        --score_.marks;
+    }
+    unmarkDown_ = takenBack;
 }
 
 void Scorer::addPicture(const TickRecord& record) noexcept

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -154,6 +155,8 @@ public:
     Score score() const noexcept;
     /// What add() counts as it stands: what score() computes from it (times, lengths, means, marks, total) is missing.
     const Score& counted() const noexcept { return score_; }
+    /// Where the tool was at the marks that count [m].
+    std::span<const Vec3> marks() const noexcept { return {marks_.data(), score_.marks}; }
 
 private:
     void addContact(const TickRecord& record) noexcept;
@@ -187,8 +190,8 @@ private:
     std::uint64_t probeTicks_ = 0, insideTicks_ = 0, tipTicks_ = 0;
     double inBeamSum_ = 0, shareSum_ = 0, minInBeam_ = std::numeric_limits<double>::infinity(), reached_ = 0;
     bool pictureDown_ = false;
-    std::array<Vec3, 32> marks_{};  // [m]
-    bool markDown_ = false;
+    std::array<Vec3, maxMarks> marks_{};  // [m]
+    bool markDown_ = false, unmarkDown_ = false;
     std::optional<TargetShape> target_;
 };
 

@@ -18,10 +18,12 @@ inline constexpr double settledAfter = 0.6;
 inline constexpr std::size_t maxStructures = 16;  // target first, then the lookup table of vital structures
 inline constexpr std::size_t maxTissues = 64;
 inline constexpr std::size_t maxEventsPerTick = 16;
+inline constexpr std::size_t maxMarks = 32;  // of a session; further ones do not count
 
 inline constexpr std::uint32_t buttonDeadMan = 1U << 0;  // held: forces are on
 inline constexpr std::uint32_t buttonFire = 1U << 1;     // the biopsy gun
 inline constexpr std::uint32_t buttonMark = 1U << 2;     // "here": the trainee marks the place of the tool
+inline constexpr std::uint32_t buttonUnmark = 1U << 3;   // takes the last mark back
 inline constexpr std::uint32_t buttonPicture = 1U << 8;  // stores the ultrasound picture, or takes a CT scan
 inline constexpr std::uint32_t modelTooSlow = 1U << 30;  // the loop cannot keep up: use a cheaper model from now on
 inline constexpr std::uint32_t poseInvalid = 1U

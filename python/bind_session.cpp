@@ -136,7 +136,7 @@ std::vector<DeviceSample> samplesOf(const Given& given, Vec3 axis)
     }
     const py::ssize_t rows = poses.shape(0);
     const Doubles buttons = columnOf(given.buttons, rows, "buttons", buttonBits,
-                                     "give sums of DEADMAN, FIRE and MARK, whole numbers below 2**32");
+                                     "give sums of DEADMAN, FIRE, MARK and UNMARK, whole numbers below 2**32");
     const Doubles fresh = columnOf(given.fresh, rows, "fresh", 1, "give True or False");
     std::vector<DeviceSample> samples;
     samples.reserve(static_cast<std::size_t>(rows));
@@ -371,6 +371,7 @@ void bindConstants(py::module_& module)
     module.attr("DEADMAN") = haptics::buttonDeadMan;
     module.attr("FIRE") = haptics::buttonFire;
     module.attr("MARK") = haptics::buttonMark;
+    module.attr("UNMARK") = haptics::buttonUnmark;
     module.attr("EVENTS") = py::tuple(py::cast(haptics::eventNames));
     module.attr("PHASES") = py::tuple(py::cast(haptics::phaseNames));
     module.attr("WARNINGS") = py::tuple(py::cast(haptics::warningNames));

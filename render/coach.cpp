@@ -115,7 +115,9 @@ Coaching approach(const channel::Scenery& scenery, const channel::State& state, 
         c.wrong = view.planned ? wayFault(scenery, state, view.aim) : "";
     } else {
         c.step = 4;
-        c.now = view.handIsHere ? tr("Fire the gun (Space, or the other mouse button)") : tr("Fire the gun");
+        c.now = !view.handIsHere ? tr("Fire the gun")
+                : view.scanned   ? tr("Fire the gun (Space)")
+                                 : tr("Fire the gun (Space, or the other mouse button)");
         const std::string danger = throwFault(scenery, state);
         c.wrong = !danger.empty() ? danger : view.planned ? wayFault(scenery, state, view.aim) : "";
     }
@@ -190,15 +192,15 @@ Coaching touch(const channel::Scenery& scenery, const channel::State& state, con
 
 Coaching palpation(const channel::State& state, const CoachView& view)
 {
-    if (view.marks >= 2)
+    if (state.marks >= 2)
         return {3, 3,
                 view.handIsHere ? tr("End the session (E, or click here), or mark another edge (M)")
                                 : tr("Done: both edges are marked"),
                 "", view.handIsHere};
     if (state.phase == channel::Phase::free)
         return {1, 3, tr("Touch the skin with the fingertip"), "", false};
-    std::string now = view.marks == 0 ? tr("Press here and there: where is it harder? Mark one edge of it")
-                                      : tr("Mark the opposite edge of the lump");
+    std::string now = state.marks == 0 ? tr("Press here and there: where is it harder? Mark one edge of it")
+                                       : tr("Mark the opposite edge of the lump");
     return {2, 3, now + (view.handIsHere ? " (M)" : ""), "", false};
 }
 

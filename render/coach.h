@@ -20,11 +20,11 @@ struct Coaching {
 /// What somebody who holds the tool has to be told.
 struct CoachView {
     glm::dvec3 aim{0.0};        // of the planned line, where the deformed tissue has it now [m]
-    std::uint32_t marks = 0;    // places that were marked
     bool planned = true;        // the planned line is shown
     bool targetHidden = false;  // it is to be found
     bool handIsHere = false;    // the window is the hand: steps name the keys
     bool outOfSight = false;    // the tip is outside the picture
+    bool scanned = false;       // the ultrasound picture is shown, where the other mouse button moves the probe
 };
 
 /// The step that the session is at: of a touch or an advance where the scene asks for that, else of a biopsy (needle) or

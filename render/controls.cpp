@@ -113,8 +113,7 @@ void Controls::keep()
     if (const auto moved = spaceMouse_.moved(); moved != ultrasound::ProbeMove{})
         moveProbe(moved);
     hand_.keep(follower_);
-    const auto input = follower_.session() != nullptr ? follower_.session()->input() : std::nullopt;
-    picture_.setSteps(steps_, input ? input->marks : 0, hand_.commands());
+    picture_.setSteps(steps_, hand_.commands());
     if (tryout_ && follower_.known() && follower_.session() != nullptr)
         picture_.setCoaching(tryout_->see(follower_.session()->scenery(), follower_.state(), hand_.held()));
     picture_.setCaption(caption());
@@ -138,10 +137,11 @@ void Controls::button(int button, bool down)
     used_ = true;
     if (button == GLFW_MOUSE_BUTTON_MIDDLE)
         return camera(down ? vtkCommand::MiddleButtonPressEvent : vtkCommand::MiddleButtonReleaseEvent);
-    if (!down) {
+    if (!down && (measuring_ || probing_)) {
         if (measuring_)
             picture_.ultrasound().endCaliper();
         measuring_ = probing_ = false;
+        return;  // it was not for the tool, which keys may hold
     }
     if (down && onUltrasound()) {
         measuring_ = button == GLFW_MOUSE_BUTTON_LEFT && measures();
@@ -170,7 +170,7 @@ void Controls::moved(glm::dvec2 to, bool fine)
 {
     used_ = true;
     const glm::dvec2 from = std::exchange(cursor_, to);
-    if (hand_.held()) {
+    if (hand_.held() && !measuring_ && !probing_) {
         const glm::dvec3 at = hand_.target();
         const glm::dvec3 way = picture_.under(point(to), at) - picture_.under(point(from), at);
         hand_.move((fine ? fineShare : 1.0) * way);
@@ -188,17 +188,22 @@ void Controls::moved(glm::dvec2 to, bool fine)
 // Of a scene that holds the probe the session has its pose; else this viewer puts it on the skin.
 void Controls::moveProbe(const ultrasound::ProbeMove& by)
 {
-    const bool held = follower_.session() != nullptr && follower_.session()->scenery().probe != channel::ProbeKind::none;
-    if (!held)
+    if (!sceneHoldsProbe())
         picture_.ultrasound().moveProbe(by);
     else if (hand_.commands())
         hand_.moveProbe(by);
 }
 
+bool Controls::sceneHoldsProbe() const
+{
+    return follower_.session() != nullptr && follower_.session()->scenery().probe != channel::ProbeKind::none;
+}
+
 void Controls::storePicture()
 {
     picture_.ultrasound().store(images_);
-    hand_.storePicture();
+    if (!picture_.hasCt())  // where the same button takes a scan, with its dose
+        hand_.storePicture();
 }
 
 // By the keyboard: what the button of the index finger does while it is held.

@@ -10,6 +10,7 @@
 
 #include <vtkGenericRenderWindowInteractor.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -57,6 +58,8 @@ public:
         int value = 0;  // of several that do the same to different things
         bool alt = false;
     };
+    // What else a key needs: a needle as the tool, a probe that this window may move, one that no scene holds.
+    enum class Needs : std::uint8_t { nothing, needle, probe, freeProbe };
     struct Key {
         unsigned windows;  // kinds, added up
         const char* shown;
@@ -66,6 +69,7 @@ public:
         bool ofImage = false;       // only where the body has a CT or MR
         bool ofUltrasound = false;  // only while the ultrasound picture is shown
         bool ofCt = false;          // only while the CT scan is shown
+        Needs needs = Needs::nothing;
     };
     /// The one list of them.
     static const std::vector<Key> keys;
@@ -85,6 +89,8 @@ private:
     void storePicture();
     void step(glm::dvec3 direction, double steps, bool fine);
     bool applies(const Key& key) const;
+    bool has(Needs what) const;
+    bool sceneHoldsProbe() const;
     std::vector<KeyHelp> help() const;
     Screen screen() const;
     void jumpBy(double seconds);

@@ -30,6 +30,8 @@ std::vector<Event> eventsBetween(const channel::State& before, const channel::St
         add(EventKind::fired);
     if (now.marks > before.marks)
         events.push_back({now.time, EventKind::marked, now.marks, 0});
+    if (now.marks < before.marks)
+        events.push_back({now.time, EventKind::unmarked, before.marks, 0});
     if (now.status != before.status && now.status != Status::running)
         add(now.status == Status::faulted ? EventKind::fault : EventKind::finished);
     return events;
@@ -59,6 +61,8 @@ std::string words(const Event& event, const channel::Scenery& scenery)
             return said(tr("core: {:.0f} % target"), 100 * event.target);
         case EventKind::marked:
             return said(tr("mark {}"), event.structure);
+        case EventKind::unmarked:
+            return said(tr("mark {} taken back"), event.structure);
         case EventKind::fault:
             return tr("FAULT: forces off");
         case EventKind::finished:

@@ -8,7 +8,19 @@
 
 namespace palpate::render {
 
-enum class EventKind : std::uint8_t { contact, inserted, out, near, veryNear, touching, fired, marked, fault, finished };
+enum class EventKind : std::uint8_t {
+    contact,
+    inserted,
+    out,
+    near,
+    veryNear,
+    touching,
+    fired,
+    marked,
+    unmarked,
+    fault,
+    finished
+};
 
 /// State::missed of a record that does not say it.
 inline constexpr std::uint64_t notCounted = ~std::uint64_t{0};
@@ -17,7 +29,7 @@ inline constexpr std::uint64_t notCounted = ~std::uint64_t{0};
 struct Event {
     double time = 0;  // of the session [s]
     EventKind kind = EventKind::contact;
-    std::uint32_t structure = 0;  // that a warning is about; marked: number of the mark
+    std::uint32_t structure = 0;  // that a warning is about; marked, unmarked: number of the mark
     double target = 0;            // fired: fraction of target tissue
 };
 

@@ -70,8 +70,16 @@ const std::vector<Controls::Key> Controls::keys{
      marked("  Space"),
      marked("fire the biopsy gun; so does the other mouse button"),
      {{GLFW_KEY_SPACE, 0, once}},
-     [](Controls& c, const Press&) { c.hand_.fire(); }},
-    {hand, "M", marked("mark the place of the tool"), {{0, 'm', once}}, [](Controls& c, const Press&) { c.hand_.mark(); }},
+     [](Controls& c, const Press&) { c.hand_.fire(); },
+     false,
+     false,
+     false,
+     Controls::Needs::needle},
+    {hand,
+     "M",
+     marked("mark the place of the tool; with Shift take the last mark back"),
+     {{0, 'm', once}},
+     [](Controls& c, const Press& p) { p.shift ? c.hand_.unmark() : c.hand_.mark(); }},
     {held,
      marked("S Pause"),
      marked("pause: the force fades, time stands still; go on"),
@@ -217,7 +225,9 @@ const std::vector<Controls::Key> Controls::keys{
      {},
      nullptr,
      false,
-     true},
+     true,
+     false,
+     Controls::Needs::probe},
     {every,
      marked("wheel"),
      marked("on the picture: depth while no tool is held; with Shift press the probe in"),
@@ -233,7 +243,9 @@ const std::vector<Controls::Key> Controls::keys{
          p.shift ? c.moveProbe({.rock = p.sign * turnStep}) : c.moveProbe({.slide = p.sign * probeStep});
      },
      false,
-     true},
+     true,
+     false,
+     Controls::Needs::probe},
     {every,
      marked("Alt up down"),
      marked("sweep it by 1 mm; with Shift turn it by 2 degrees"),
@@ -242,7 +254,9 @@ const std::vector<Controls::Key> Controls::keys{
          p.shift ? c.moveProbe({.turn = p.sign * turnStep}) : c.moveProbe({.sweep = p.sign * probeStep});
      },
      false,
-     true},
+     true,
+     false,
+     Controls::Needs::probe},
     {every,
      marked("Alt Page down, up"),
      marked("press it in by 0.5 mm, take it back; with Shift tilt it by 2 degrees"),
@@ -251,7 +265,9 @@ const std::vector<Controls::Key> Controls::keys{
          p.shift ? c.moveProbe({.tilt = p.sign * turnStep}) : c.moveProbe({.press = p.sign * keyPressStep});
      },
      false,
-     true},
+     true,
+     false,
+     Controls::Needs::probe},
     {every,
      "D",
      marked("more depth; with Shift less"),
@@ -349,7 +365,9 @@ const std::vector<Controls::Key> Controls::keys{
      {{0, 't', once}},
      [](Controls& c, const Press&) { c.picture_.ultrasound().changeProbe(); },
      false,
-     true},
+     true,
+     false,
+     Controls::Needs::freeProbe},
     {every,
      "P",
      marked("store the picture"),
@@ -363,7 +381,22 @@ bool Controls::applies(const Key& key) const
 {
     const unsigned here = playback_ != nullptr ? record : hand_.is() ? hand : hand_.commands() ? device : session;
     return (key.windows & here) != 0 && (!key.ofImage || picture_.hasImage()) &&
-           (!key.ofUltrasound || picture_.ultrasoundShown()) && (!key.ofCt || picture_.ctShown());
+           (!key.ofUltrasound || picture_.ultrasoundShown()) && (!key.ofCt || picture_.ctShown()) && has(key.needs);
+}
+
+bool Controls::has(Needs what) const
+{
+    switch (what) {
+        case Needs::needle:
+            return follower_.session() == nullptr || follower_.session()->scenery().tool == channel::ToolKind::needle;
+        case Needs::probe:
+            return !sceneHoldsProbe() || hand_.commands();
+        case Needs::freeProbe:
+            return !sceneHoldsProbe();
+        case Needs::nothing:
+            break;
+    }
+    return true;
 }
 
 void Controls::key(int key, const std::string& name, bool again, int mods)
@@ -423,7 +456,8 @@ std::string keysInWords()
     text += "\nWhile the ultrasound picture is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofUltrasound)
-            text += fmt::format("  {:<18}{}\n", k.shown, k.what);
+            text += fmt::format("  {:<18}{}{}\n", k.shown, k.what,
+                                k.needs == Controls::Needs::freeProbe ? " (where the scene has no probe)" : "");
     text += "\nWhile the CT scan of a scene with CT is shown:\n";
     for (const Controls::Key& k : Controls::keys)
         if (k.ofCt)

@@ -40,6 +40,8 @@ public:
     void moveProbe(const ultrasound::ProbeMove& by) noexcept;
     void storePicture() noexcept { input_.pictures += paused() ? 0 : 1; }
     void mark() noexcept { input_.marks += paused() ? 0 : 1; }
+    /// Takes the last mark back.
+    void unmark() noexcept { input_.unmarks += paused() ? 0 : 1; }
     void end() noexcept { input_.ended = 1; }
     /// Lets the tool go and makes the session stand still, or go on.
     void togglePause() noexcept;

@@ -48,6 +48,8 @@ std::string fileWords(const Event& event, const channel::Name& structure)
                 return "fired";
             case EventKind::marked:
                 return "mark";
+            case EventKind::unmarked:
+                return "mark taken back";
             case EventKind::fault:
                 return "fault";
             case EventKind::finished:

@@ -107,8 +107,14 @@ void drawDistance(Pen& pen, const channel::Scenery& scenery, const channel::Stat
 {
     const double distance = state.distance[s];
     const std::string name = spokenHere(text(scenery.structure[s])), when = contactWords(state, s);
+    // Within half a voxel of the surface the label at the tip may still be the other one.
+    const bool atRim = distance > -0.5 * scenery.labels.spacing;
     if (s == 0)
-        pen.pair(name + tr(" (target)") + when, distance <= 0 ? tr("INSIDE") : millimetresText(distance), good);
+        pen.pair(name + tr(" (target)") + when,
+                 distance > 0 ? millimetresText(distance)
+                 : atRim      ? tr("at its rim")
+                              : tr("INSIDE"),
+                 good);
     else if (distance <= 0)
         pen.pair(name + tr("  TOUCHED"), millimetresText(distance), red);
     else if (distance < scenery.warnDistance[s])

@@ -416,17 +416,16 @@ Header Picture::header() const
     CoachView view = coached_;
     view.aim = s.aim();
     view.planned = !concealed_.any();
-    view.marks = std::max(view.marks, s.state.marks);  // of a device and a record as well
     view.outOfSight = !shows(vec(s.state.tip));
     view.targetHidden = !concealed_.tissues.empty();
+    view.scanned = ultrasoundShown_;
     header.coaching = coach(s.scenery, s.state, view);
     return header;
 }
 
-void Picture::setSteps(bool told, std::uint32_t marks, bool handIsHere)
+void Picture::setSteps(bool told, bool handIsHere)
 {
     stepsTold_ = told;
-    coached_.marks = marks;
     coached_.handIsHere = handIsHere;
 }
 

@@ -61,8 +61,8 @@ public:
     void setNotice(const std::string& words, const std::string& smaller);
     /// What a session came to, instead of the notice, until the next open().
     void setResult(ResultCard result) { result_ = std::move(result); }
-    /// Of the hand, for the steps in words: places marked, and whether it is this window. `told`: steps are shown.
-    void setSteps(bool told, std::uint32_t marks, bool handIsHere);
+    /// For the steps in words: whether the hand is this window. `told`: steps are shown.
+    void setSteps(bool told, bool handIsHere);
     /// Steps that are told instead of those of the session; nothing: those.
     void setCoaching(std::optional<Coaching> words) { told_ = std::move(words); }
     /// Whether a click there ends the session: on the words of the last step.
@@ -96,6 +96,8 @@ public:
     const UltrasoundPicture& ultrasound() const noexcept { return ultrasound_; }
     /// Whether the scene has CT, whose last scan is shown where the ultrasound picture is not.
     bool ctShown() const noexcept { return ct_.opened() && !ultrasoundShown_; }
+    /// Whether the scene is guided by CT.
+    bool hasCt() const noexcept { return ct_.opened(); }
     void nextCtWindow() noexcept { ct_.nextWindow(); }
     /// Camera and opacities as they were when the session was opened.
     void resetView();

@@ -68,8 +68,9 @@ ScreenPlan::ScreenPlan(int windowWidth, int windowHeight, Layout layout, double 
     } else if (scanned) {
         // Large, and the body in the place of the slice; without a place for that the picture has the whole.
         ultrasound = view;
-        // In a narrow view caption and step take two lines each.
-        const int upper = static_cast<int>((view.width < 30 * font ? 9.2 : 6.6) * font), lower = static_cast<int>(3 * font);
+        // Title, caption, step and what is wrong stand above it: nothing hides where the needle comes in. In a narrow view,
+        // or one of longer words (German), caption and step take two lines each.
+        const int upper = static_cast<int>((view.width < 46 * font ? 9.2 : 8.2) * font), lower = static_cast<int>(3 * font);
         ultrasound.y += lower;
         ultrasound.height = std::max(ultrasound.height - upper - lower, 1);
         view = slices[0].empty() ? Area{panel.x, panel.y + panel.height - 1, panel.width, 1} : slices[0];

@@ -199,6 +199,10 @@ void UltrasoundPicture::drawConsole(Canvas& canvas, const ultrasound::BeamImage&
               amber, true);
     if (!message_.empty())
         words(message_, good);
+    for (std::size_t i = calipers_.size(); i-- > 0;) {
+        const double length = mm * static_cast<double>(glm::distance(calipers_[i][0], calipers_[i][1]));
+        words(base::said("{}  {:.1Lf} mm", i + 1, length), caliperColour, true);
+    }
 }
 
 // Where the needle goes from here; before it is inside, the planned line. Only as far as it lies near the picture's plane.
@@ -238,10 +242,6 @@ void UltrasoundPicture::drawCalipers(Canvas& canvas, const ultrasound::BeamImage
             canvas.line({p[0], p[1] - 5}, {p[0], p[1] + 5}, 1.5, caliperColour);
         }
         canvas.line(a, b, 1, caliperColour);
-        const double length = mm * static_cast<double>(glm::distance(calipers_[i][0], calipers_[i][1]));
-        const double y = area_.y + area_.height - (2.0 + static_cast<double>(i)) * lineHeight * font;
-        canvas.text({area_.x + 0.5 * font, y}, base::said("{}  {:.1Lf} mm", i + 1, length), font, caliperColour,
-                    Align::left, true);
         canvas.text({b[0] + 6, b[1] + 4}, fmt::format("{}", i + 1), 0.9 * font, caliperColour);
     }
 }

@@ -164,11 +164,6 @@ struct Collector {
             data.entries.push_back(point.tip);
         }
         outside = r.phase == haptics::Phase::free;
-        const bool down = (r.device.buttons & haptics::buttonMark) != 0;
-        if (down && !markDown) {
-            data.marks.push_back(point.tip);
-        }
-        markDown = down;
     }
 
     // Bins as columns.
@@ -186,7 +181,7 @@ struct Collector {
 
     double rate;
     std::size_t structures;
-    bool markDown = false, outside = true;
+    bool outside = true;
     double furthest = 0;                       // inside, on this way in [mm]
     std::vector<std::vector<double>> nearest;  // by bin, then structure [mm]
     haptics::LossWatch watch;
@@ -270,6 +265,9 @@ ReportData collect(const haptics::Record& record)
     Collector c(record.info(), record.ticks());
     record.each([&](const haptics::TickRecord& tick) { c.add(tick); });
     c.data.score = c.watch.score();
+    for (const Vec3& mark : c.watch.marks()) {
+        c.data.marks.push_back(mark * 1e3);
+    }
     const base::English page;  // all of it is
     c.data.losses = c.watch.losses(record.info());
     c.data.forces = c.forces.finish();

@@ -18,6 +18,7 @@ from ._palpate import (
     MARK,
     PHASES,
     TICK_SECONDS,
+    UNMARK,
     WARNINGS,
     Model,
     Scene,
@@ -38,6 +39,6 @@ build = _palpate.build  #: version and commit of the C++ side
 
 __all__ = [
     "DEADMAN", "EVENTS", "Error", "FIRE", "MARK", "Model", "PHASES", "Record", "Scene", "SceneError", "Session", "SweepResult",
-    "TICK_SECONDS", "Tick", "Volume", "WARNINGS", "accuracy", "build", "merge", "phantoms", "plan", "press_path", "scenes",
-    "score", "sweep", "sweep_outputs",
+    "TICK_SECONDS", "Tick", "UNMARK", "Volume", "WARNINGS", "accuracy", "build", "merge", "phantoms", "plan", "press_path",
+    "scenes", "score", "sweep", "sweep_outputs",
 ]

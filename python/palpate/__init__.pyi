@@ -6,6 +6,7 @@ from ._palpate import (
     MARK as MARK,
     PHASES as PHASES,
     TICK_SECONDS as TICK_SECONDS,
+    UNMARK as UNMARK,
     WARNINGS as WARNINGS,
     Model as Model,
     Scene as Scene,

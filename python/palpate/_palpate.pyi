@@ -10,6 +10,7 @@ _Path = str | os.PathLike[str]
 DEADMAN: int
 FIRE: int
 MARK: int
+UNMARK: int
 EVENTS: tuple[str, ...]
 PHASES: tuple[str, ...]
 WARNINGS: tuple[str, ...]
@@ -287,7 +288,7 @@ class Session:
             pose: (x, y, z) of the tool's tip, or a sphere's centre [m]; or with the tool's axis behind it (6). Without an
                 axis the last one stays; the first is that of the planned line. With 12 numbers the last six are how far the hand has
                 moved the scene's ultrasound probe: press, slide, sweep [m], rock, tilt, turn [rad].
-            buttons: DEADMAN (held: forces are sent), FIRE, MARK, added up.
+            buttons: DEADMAN (held: forces are sent), FIRE, MARK, UNMARK (takes the last mark back), added up.
             fresh: False says that the device had no new pose.
 
         Raises:

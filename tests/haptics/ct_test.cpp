@@ -56,6 +56,59 @@ TEST(Marks, AreSeenWhereTheToolWasWhenItsButtonWentDown)
     EXPECT_FLOAT_EQ(state.mark[1].axis[1], 1.0F);
 }
 
+// Taken back from the last one on, once for each press; where there is none, nothing happens.
+TEST(Marks, AreTakenBackFromTheLastOneOn)
+{
+    channel::State state;
+    TickRecord r;
+    for (const std::uint32_t buttons : {buttonMark, 0U, buttonMark, 0U, buttonUnmark, buttonUnmark, 0U, buttonMark}) {
+        r.device.buttons = buttons;
+        r.device.position = {1e-3 * static_cast<double>(r.tick), 0, 0};
+        showTick(r, {}, state);
+        ++r.tick;
+    }
+    ASSERT_EQ(state.marks, 2U);
+    EXPECT_FLOAT_EQ(state.mark[0].place[0], 0.0F);
+    EXPECT_FLOAT_EQ(state.mark[1].place[0], 7e-3F);
+    for (int i = 0; i < 3; ++i) {
+        r.device.buttons = i % 2 == 0 ? buttonUnmark : 0U;
+        showTick(r, {}, state);
+    }
+    r.device.buttons = 0;
+    showTick(r, {}, state);
+    r.device.buttons = buttonUnmark;
+    showTick(r, {}, state);
+    EXPECT_EQ(state.marks, 0U);
+}
+
+// Of three marks the second is taken back: what is left are two 12 mm apart, their middle 5 mm beside the target's.
+TEST(Marks, ThatWereTakenBackDoNotCount)
+{
+    SessionInfo info = synthetic::info();
+    info.extra.emplace_back(targetShapeKey, toText({{0.01, 0.02, 0}, {0, 1, 0}, 0.010}));
+    Scorer scorer(info);
+    const auto press = [&scorer](std::uint32_t button, double x) {
+        TickRecord r;
+        r.device.position = {x, -0.01, 0};
+        for (const std::uint32_t buttons : {button, button, 0U}) {
+            r.device.buttons = buttons;
+            scorer.add(r);
+            ++r.tick;
+        }
+    };
+    press(buttonUnmark, 0);  // there is none yet
+    press(buttonMark, 0.009);
+    press(buttonMark, 0.070);
+    press(buttonUnmark, 0);
+    press(buttonMark, 0.021);
+    const Score s = scorer.score();
+    EXPECT_EQ(s.marks, 2U);
+    EXPECT_NEAR(s.markError, 5e-3, 1e-9);
+    EXPECT_NEAR(s.markSizeError, 2e-3, 1e-9);
+    ASSERT_EQ(scorer.marks().size(), 2U);
+    EXPECT_EQ(scorer.marks()[1].x, 0.021);
+}
+
 TEST(Ct, ADoseThatIsNoneCountsNothing)
 {
     for (const char* text : {"", "much", "nan", "-3", "inf"}) {

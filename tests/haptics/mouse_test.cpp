@@ -124,16 +124,19 @@ TEST(Mouse, EveryPressFiresOnceAndEndsOnce)
     for (int press = 0; press < 3; ++press) {
         ++viewer.now.fires;
         ++viewer.now.marks;
-        int fired = 0, marked = 0;
+        ++viewer.now.unmarks;
+        int fired = 0, marked = 0, takenBack = 0;
         std::uint32_t before = 0;
         for (int i = 0; i < 200; ++i) {
             const auto s = device.read();
             fired += (s.buttons & ~before & buttonFire) != 0 ? 1 : 0;
             marked += (s.buttons & ~before & buttonMark) != 0 ? 1 : 0;
+            takenBack += (s.buttons & ~before & buttonUnmark) != 0 ? 1 : 0;
             before = s.buttons;
         }
         EXPECT_EQ(fired, 1);
         EXPECT_EQ(marked, 1);
+        EXPECT_EQ(takenBack, 1);
         EXPECT_EQ(before, 0U);
     }
     EXPECT_FALSE(device.finished());

@@ -74,6 +74,9 @@ TEST(Coach, LeadsThroughABiopsyStepByStep)
     EXPECT_EQ(coach(scenery, s, view).wrong, "");
     s.distance[0] = s.ahead[0] = 1e-3;
     EXPECT_EQ(coach(scenery, s, view).now, "Fire the gun (Space, or the other mouse button)");
+    CoachView onPicture = view;
+    onPicture.scanned = true;  // where the other button moves the probe
+    EXPECT_EQ(coach(scenery, s, onPicture).now, "Fire the gun (Space)");
     s.cores = 1;
     s.coreTarget = 0.6;
     EXPECT_NE(coach(scenery, s, view).now.find("60 % tumour: draw the needle out"), std::string::npos);
@@ -137,7 +140,7 @@ TEST(Coach, APalpationAsksForTwoMarksAndSaysNothingOfTheLump)
     hidden.planned = false;
     channel::State s = stateAt(30e-3, 0, 0, channel::Phase::contact);
     for (std::uint32_t marks : {0U, 1U, 2U}) {
-        hidden.marks = marks;
+        s.marks = marks;
         const Coaching c = coach(scenery, s, hidden);
         EXPECT_EQ(c.step, marks < 2 ? 2 : 3);
         EXPECT_EQ(c.wrong, "");

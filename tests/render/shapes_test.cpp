@@ -145,6 +145,9 @@ TEST(Events, AMarkIsOneOfThem)
     const auto events = eventsBetween(before, now);
     ASSERT_EQ(events.size(), 1U);
     EXPECT_EQ(words(events[0], bodyScenery()), "mark 2");
+    const auto back = eventsBetween(now, before);
+    ASSERT_EQ(back.size(), 1U);
+    EXPECT_EQ(words(back[0], bodyScenery()), "mark 2 taken back");
 }
 
 // On the body, not at the middle of the fingertip's round end, which is a radius above it.

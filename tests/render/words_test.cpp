@@ -96,7 +96,7 @@ TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
 {
     Picture& picture = studio->picture();
     picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
-    picture.setSteps(true, 0, true);
+    picture.setSteps(true, true);
     picture.showUltrasound(true);
     constexpr std::array<std::pair<int, int>, 4> sizes{{{320, 320}, {480, 360}, {640, 480}, {1280, 960}}};
     for (const auto& [wide, high] : sizes)
@@ -112,7 +112,7 @@ TEST_F(WordsTest, OfAnUltrasoundPictureLieOnNothingElse)
         }
     picture.showUltrasound(false);
     picture.setCaption("");
-    picture.setSteps(false, 0, false);
+    picture.setSteps(false, false);
     studio->resize(width, height);
 }
 
@@ -121,7 +121,7 @@ TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
 {
     Picture& picture = studio->picture();
     picture.setCaption("hold the left button, or press Enter, to take the tool   (? lists the keys)");
-    picture.setSteps(true, 0, true);
+    picture.setSteps(true, true);
     constexpr std::array<std::pair<int, int>, 5> sizes{{{320, 320}, {420, 700}, {700, 320}, {500, 400}, {1280, 960}}};
     for (const auto& [wide, high] : sizes)
         for (const auto& [layout, layoutName] : layouts)
@@ -136,7 +136,7 @@ TEST_F(WordsTest, LieInTheWindowAndNotOnEachOther)
                 expectApart(all, wide, high, name);
             }
     picture.setCaption("");
-    picture.setSteps(false, 0, false);
+    picture.setSteps(false, false);
     picture.setDisplayScale(1);
     studio->resize(width, height);
 }
