@@ -236,6 +236,9 @@ Person ProfileStore::add(const std::string& name, Hand hand)
     if (name.front() == ' ' || name.back() == ' ') {
         throw std::runtime_error("profile '" + name + "': must not begin or end with a blank");
     }
+    if (name.front() == '-') {
+        throw std::runtime_error("profile '" + name + "': must not begin with '-', which commands take for an option");
+    }
     for (const Person& one : people()) {
         if (one.name == name) {
             throw std::runtime_error(name + ": there is a profile of this name already");

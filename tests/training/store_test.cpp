@@ -99,6 +99,7 @@ TEST(ProfileStore, RefusesNamesThatAreNone)
         EXPECT_NE(errorOf([&] { store.add(name, Hand::right); }).find("begin or end with a blank"), std::string::npos)
             << name;
     }
+    EXPECT_NE(errorOf([&] { store.add("-x", Hand::right); }).find("begin with '-'"), std::string::npos);
     EXPECT_NE(errorOf([&] { store.find("ana"); }).find("did you mean anna?"), std::string::npos);
 }
 
