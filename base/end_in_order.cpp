@@ -9,7 +9,9 @@ std::atomic<int> signalled{0};
 
 void onSignal(int signal)
 {
-    signalled = signal;
+    if (signal != SIGUSR1) {
+        signalled = signal;
+    }
     endAsked = true;
 }
 

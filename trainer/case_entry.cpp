@@ -33,19 +33,9 @@ CaseEntry entryOf(const json& one)
     c.core = !c.palpation && std::ranges::none_of(measures, [](const std::string& measure) {
         return measure == "rest_s" || measure == "tip_to_target_mm";
     });
-    c.steps.push_back(c.palpation ? tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
-                                       "hold the fingertip. The wheel "
-                                       "forward, or Page down, presses.")
-                                  : tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
-                                       "hold the needle. The wheel "
-                                       "forward, or Page down, pushes it in by 1 mm."));
-    if (c.core) {
-        c.steps.back() += " " + std::string(tr("Space fires."));
-    }
     for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
         c.steps.push_back(tr(step));
     }
-    c.steps.push_back(c.palpation ? tr("M marks, S pauses, E ends the session.") : tr("S pauses, E ends the session."));
     return c;
 }
 

@@ -15,7 +15,7 @@ struct CaseEntry {
     std::string picture;             // PNG file
     int difficulty = 1;              // 1 (first steps) to 5
     std::string trains;              // what it is good for, in a line
-    std::vector<std::string> steps;  // of the briefing
+    std::vector<std::string> steps;  // of its own briefing: stepsOf() has the others
     bool palpation = false;          // with a fingertip
     bool core = true;                // else, and where it is no palpation, no core is asked for
     std::optional<double> best;      // points of the best session so far; nothing: not done yet
@@ -24,8 +24,7 @@ struct CaseEntry {
 /// "first steps", "easy", "medium", "hard", "very hard".
 const char* difficultyInWords(int difficulty) noexcept;
 
-/// What `palpate case list --json` gives, easiest first; the briefings begin and end with what the mouse does. Cases that
-/// are not whole are left out.
+/// What `palpate case list --json` gives, easiest first. Cases that are not whole are left out.
 std::vector<CaseEntry> casesOf(const nlohmann::json& list);
 
 /// Somebody who trains.

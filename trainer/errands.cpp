@@ -29,6 +29,11 @@ namespace {
 
 constexpr double answerTime = 30;  // of a short command, on a machine that has much to do [s]
 
+const char* opening()
+{
+    return tr("It opens in a window of its own. That may take some seconds.");
+}
+
 }  // namespace
 
 struct Errands::Impl {
@@ -50,7 +55,15 @@ struct Errands::Impl {
         const SessionFiles files = sink.filesFor(chosenCase(state));
         const auto arguments = trainArguments(state, files);
         session.emplace(programs / "palpate", arguments, scratch / "session.log");
+        ending = false;
         sessionStarted(state, files, asTyped("palpate", arguments));
+    }
+    // Once: what comes after its end, the profile and the figures, is not to be broken off.
+    void endSession()
+    {
+        if (session && !std::exchange(ending, true)) {
+            session->conclude();
+        }
     }
     void startDebrief(State& state)
     {
@@ -165,11 +178,12 @@ struct Errands::Impl {
         std::ranges::stable_sort(i.everybody.sessions, std::greater(), &KeptSession::started);
         chooseKept(state, std::min(i.chosen, std::max<std::size_t>(i.everybody.sessions.size(), 1) - 1));
     }
-    void watch(const State& state, const std::vector<std::string>& words)
+    void watch(State& state, const std::vector<std::string>& words)
     {
         std::vector<std::string> all = words;
         all.insert(all.end(), {"--layout", "instructor", "--palette", state.settings.palette});
         eyes.emplace_back(programs / "palpate-view", all, scratch / ("watch-" + std::to_string(++watched) + ".log"));
+        state.notice = opening();
     }
     void keepNote(State& state)
     {
@@ -224,7 +238,7 @@ struct Errands::Impl {
     void addPerson(State& state)
     {
         const std::string name = state.newPerson;
-        Running command(programs / "palpate", {"profile", "new", name}, scratch / "person.log");
+        Running command(programs / "palpate", {"profile", "new", "--", name}, scratch / "person.log");
         command.finish(answerTime);
         state.notice = command.message();
         listPeople(state);
@@ -352,8 +366,8 @@ struct Errands::Impl {
         }
         eyes.remove_if([&](Running& one) {
             const bool ended = one.ended();
-            if (ended && one.failed()) {
-                state.notice = one.message();
+            if (ended && (one.failed() || state.notice == opening())) {
+                state.notice = one.failed() ? one.message() : "";
             }
             changed = changed || ended;
             return ended;
@@ -371,6 +385,7 @@ struct Errands::Impl {
     ResultSink& sink;
     std::vector<std::string> curricula;  // that there are
     std::optional<Running> session, devices, replay, push, tryout, expert, film, live;
+    bool ending = false;  // the session was told to end
     fs::file_time_type liveRead;
     std::list<Running> eyes;  // viewers of the instructor
     int watched = 0;          // how many there were
@@ -424,10 +439,7 @@ void Errands::run(Errand errand, State& state)
             case Errand::startSession:
                 return impl_->startSession(state);
             case Errand::endSession:
-                if (impl_->session) {
-                    impl_->session->end();
-                }
-                return;
+                return impl_->endSession();
             case Errand::testForce:
                 return impl_->testForce(state);
             case Errand::tryHand:

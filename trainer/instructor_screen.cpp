@@ -310,6 +310,7 @@ Errand drawInstructor(State& state)
     }
     const bool turned = page != static_cast<int>(state.instructor.page);
     state.instructor.page = static_cast<InstructorPage>(page);
+    turned ? state.notice.clear() : void();
     beginPart("page", 0, -3.4F * ImGui::GetFontSize());
     Errand errand = Errand::none;
     switch (state.instructor.page) {

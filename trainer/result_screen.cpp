@@ -124,7 +124,11 @@ Errand drawResult(State& state)
     drawMeasures(result);
     ImGui::Columns(1);
     two ? endPart() : void();
-    words(said(tr("Record: {}"), state.files.record.string()), quiet);
+    if (state.replaying) {
+        words(tr("The debrief runs in a window of its own. It may take some seconds to open."), skyBlue);
+    } else {
+        words(said(tr("Record: {}"), state.files.record.string()), quiet);
+    }
     chosen = two ? drawChoices(state) : chosen;
     two ? void() : endPart();
     return moment != Errand::none ? moment : chosen;

@@ -103,7 +103,8 @@ void addMeasures(const nlohmann::json& asked, const nlohmann::json& score, const
     for (const auto& [key, label, unit, decimals] : shown) {
         const auto value = score.find(key);
         const bool ofCores = std::string_view(key).starts_with("best_target") || std::string_view(key) == "passes";
-        if (noCore && ofCores) {
+        const bool ofMarks = std::string_view(key).starts_with("mark_");  // anybody may mark; elsewhere it means nothing
+        if ((noCore && ofCores) || (ofMarks && judged != "marks")) {
             continue;
         }
         if (value != score.end() && value->is_number()) {

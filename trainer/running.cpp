@@ -58,6 +58,13 @@ void Running::end() const noexcept
     }
 }
 
+void Running::conclude() const noexcept
+{
+    if (pid_ > 0) {
+        ::kill(pid_, SIGUSR1);
+    }
+}
+
 bool Running::ended() noexcept
 {
     if (pid_ > 0 && ::waitpid(pid_, &status_, WNOHANG) == pid_) {

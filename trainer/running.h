@@ -20,7 +20,10 @@ public:
 
     /// Waits so long at most for its end [s]. Returns whether it has ended.
     bool finish(double seconds) noexcept;
+    /// Breaks it off, politely.
     void end() const noexcept;
+    /// Tells it that its work is done (base/end_in_order.h).
+    void conclude() const noexcept;
     bool ended() noexcept;
     /// @pre  it has ended
     bool failed() const noexcept;

@@ -215,11 +215,11 @@ Errand drawDevices(State& state)
     return errand;
 }
 
-void drawSteps(const CaseEntry& c)
+void drawSteps(const std::vector<std::string>& steps)
 {
     ImGui::BeginGroup();
-    for (std::size_t i = 0; i < c.steps.size(); ++i) {
-        words(said("{}.  {}", i + 1, c.steps[i]));
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+        words(said("{}.  {}", i + 1, steps[i]));
     }
     ImGui::EndGroup();
 }
@@ -239,7 +239,7 @@ void drawBriefing(State& state, const TextureOf& textureOf)
         ImGui::EndGroup();
         ImGui::SameLine(0.45F * wide);
     }
-    drawSteps(c);
+    drawSteps(stepsOf(state));
     if (radio(tr("Practise: steps and faults in words, planned line"), !state.test)) {
         state.test = false;
     }
@@ -249,6 +249,11 @@ void drawBriefing(State& state, const TextureOf& textureOf)
     }
     if (state.test && !c.palpation) {
         words(tr("In a test nothing shows the planned entry and line: choose the way yourself."));
+    }
+    if (!state.person.empty() && state.exercise.empty()) {
+        words(
+            said(tr("Free practice: kept for {}, but it counts for no exercise. Those are under Progress."), state.person),
+            skyBlue);
     }
     words(said(tr("As a command: {}"), asTyped("palpate", trainArguments(state, {"SESSION.db", "SESSION.json"}))), quiet);
     if (!beside && texture.id != 0) {

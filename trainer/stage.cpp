@@ -266,6 +266,11 @@ bool Stage::closed() const
     return glfwWindowShouldClose(impl_->window.get()) != GLFW_FALSE;
 }
 
+void Stage::stay()
+{
+    glfwSetWindowShouldClose(impl_->window.get(), GLFW_FALSE);
+}
+
 bool Stage::focused() const
 {
     return glfwGetWindowAttrib(impl_->window.get(), GLFW_FOCUSED) != GLFW_FALSE;

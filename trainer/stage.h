@@ -28,6 +28,8 @@ public:
     /// What draws.
     std::string renderer() const;
     bool closed() const;
+    /// Takes back that the window was closed.
+    void stay();
     /// Whether keys go to this window.
     bool focused() const;
     /// Has keys go to this window.

@@ -35,6 +35,7 @@ void turnTo(State& state, Screen screen)
 {
     state.screen = screen;
     state.notice.clear();
+    state.leaving = false;
 }
 
 }  // namespace
@@ -43,6 +44,36 @@ const CaseEntry& chosenCase(const State& state)
 {
     assert(!state.cases.empty());
     return state.cases[std::min(state.chosen, state.cases.size() - 1)];
+}
+
+std::vector<std::string> stepsOf(const State& state)
+{
+    const CaseEntry& c = chosenCase(state);
+    std::vector<std::string> steps;
+    if (state.useFalcon) {
+        steps.emplace_back(c.palpation ? tr("Hold the centre button of the grip: you hold the fingertip. Push to press.")
+                                       : tr("Hold the centre button of the grip: you hold the needle. Push it in."));
+        steps.front() += c.core ? " " + std::string(tr("The forward button fires.")) : "";
+    } else {
+        steps.emplace_back(c.palpation
+                               ? tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
+                                    "hold the fingertip. The wheel "
+                                    "forward, or Page down, presses.")
+                               : tr("Hold the mouse button of your index finger in the picture, or press Enter: you "
+                                    "hold the needle. The wheel "
+                                    "forward, or Page down, pushes it in by 1 mm."));
+        steps.front() += c.core ? " " + std::string(tr("Space fires.")) : "";
+    }
+    steps.insert(steps.end(), c.steps.begin(), c.steps.end());
+    if (state.useFalcon) {
+        steps.emplace_back(c.palpation
+                               ? tr("The right button marks. The left one, held for a second, ends the session. S pauses.")
+                               : tr("The left button, held for a second, ends the session. S pauses."));
+    } else {
+        steps.emplace_back(c.palpation ? tr("M marks, Shift M takes the last mark back, S pauses, E ends the session.")
+                                       : tr("S pauses, E ends the session."));
+    }
+    return steps;
 }
 
 const char* nameOf(Screen screen) noexcept
@@ -112,7 +143,7 @@ Errand goBack(State& state)
 {
     switch (state.screen) {
         case Screen::cases:
-            return Errand::quit;
+            return leave(state);
         case Screen::devices:
         case Screen::result:
         case Screen::progress:
@@ -126,6 +157,19 @@ Errand goBack(State& state)
             break;
     }
     return state.running ? Errand::endSession : Errand::none;
+}
+
+Errand leave(State& state)
+{
+    const bool notes = !state.instructor.drafts.empty();
+    if (state.leaving || (!notes && !state.running)) {
+        return Errand::quit;
+    }
+    state.leaving = true;
+    state.notice = state.running ? tr("A session still runs: end it first, or close again to break it off.")
+                                 : tr("There are notes that are not kept yet (Instructor, Sessions that were kept). Close "
+                                      "again to lose them.");
+    return Errand::none;
 }
 
 Errand again(State& state)
@@ -244,12 +288,14 @@ void sessionStarted(State& state, SessionFiles files, std::string command)
     state.result = {};
     state.notice.clear();
     state.running = true;
+    state.leaving = false;
     state.screen = Screen::session;
 }
 
 void sessionEnded(State& state, Result result)
 {
-    state.running = false;
+    state.running = state.leaving = false;
+    state.notice.clear();
     state.result = std::move(result);
     state.screen = Screen::result;
     const bool counts = state.result.problem.empty() && (state.person.empty() || !state.result.notKept);

@@ -111,6 +111,7 @@ struct State {
     bool ghosting = false;        // an expert's session is being made
     std::string notice;           // something that went wrong outside a session, or what has become of an errand
     bool popup = false;           // something lies over the screen
+    bool leaving = false;         // it was said what would be lost
     Settings settings;
 };
 
@@ -142,6 +143,8 @@ enum class Errand {
 Errand advance(State& state);
 /// Back to the screen before; quits from the first.
 Errand goBack(State& state);
+/// The window is to close. Quits, but for the first time that something would be lost with it: the notice says what.
+Errand leave(State& state);
 /// Result screen: the same case again.
 Errand again(State& state);
 /// Result screen: replay of the session, from the beginning or from the moment of a loss of points.
@@ -172,6 +175,8 @@ void sessionStarted(State& state, SessionFiles files, std::string command);
 void sessionEnded(State& state, Result result);
 
 const CaseEntry& chosenCase(const State& state);
+/// Of the chosen case, for what will be held.
+std::vector<std::string> stepsOf(const State& state);
 /// What the main button of the screen says.
 const char* mainButton(const State& state) noexcept;
 

@@ -99,7 +99,11 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
     Presses presses(stage, errands);
     std::vector<double> seconds;
     int due = 0;  // pictures until all has settled
-    while (!stage.closed() && (options.frames == 0 || seconds.size() < options.frames)) {
+    while (options.frames == 0 || seconds.size() < options.frames) {
+        if (stage.closed() && leave(state) == Errand::quit) {
+            break;
+        }
+        stage.stay();
         if (options.frames == 0 && due == 0) {
             presses.await(state);
             due = 2;

@@ -164,6 +164,23 @@ TEST_F(TrainingCommands, AnInterruptedSessionSaysThatItIsNotKept)
     EXPECT_EQ(palpate({"profile", "add-record", "anna", record}).status, 0);
 }
 
+// SIGUSR1 is how the trainer's window ends a session: as E in the session's own window, which counts.
+TEST_F(TrainingCommands, ASessionThatIsToldThatItIsDoneIsKept)
+{
+    ASSERT_EQ(palpate({"profile", "new", "anna"}).status, 0);
+    const std::string record = folder_ / "done.db";
+    Program running("palpate",
+                    {"train", "layered", "--profile", "anna", "--headless", "--setting", "fast", "--record", record});
+    for (int i = 0; i < 300 && !fs::exists(record); ++i) {
+        ::usleep(100000);
+    }
+    ::usleep(2000000);  // to the skin
+    running.send(SIGUSR1);
+    const Outcome done = running.wait();
+    EXPECT_EQ(done.status, 0) << done.err;
+    EXPECT_NE(done.out.find("kept for anna as session 1"), std::string::npos) << done.out << done.err;
+}
+
 // Nobody can score or replay again what the profile would then claim.
 TEST_F(TrainingCommands, ASessionWhoseDiskWasFullIsNotKept)
 {

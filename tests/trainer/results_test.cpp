@@ -162,7 +162,8 @@ TEST(Devices, AreToldWithWhatToDo)
 TEST(Results, NameWhatThePointsAreForWhereNoCoreWasAskedFor)
 {
     const Folder folder;
-    write(folder / "a.json", R"({"score": {"total": 100, "judged": "rest", "passes": 0, "best_target_pct": 0,
+    write(folder / "a.json",
+          R"({"score": {"total": 100, "judged": "rest", "passes": 0, "best_target_pct": 0, "mark_error_mm": 0.3,
         "rest_s": 3.4, "points": {"core": 50, "vital": 25, "technique": 25}, "losses": []}})");
     const Result r = readResult(folder / "a.json");
     ASSERT_EQ(r.parts.size(), 3U);

@@ -104,6 +104,28 @@ TEST(State, WhatIsSaidOnAScreenIsNotSaidOnTheNext)
     EXPECT_EQ(state.notice, "");
 }
 
+// What was typed and not kept, or a session that runs, goes only if the window is closed twice.
+TEST(State, WhatWouldBeLostIsSaidBeforeTheWindowCloses)
+{
+    State state = firstState();
+    EXPECT_EQ(leave(state), Errand::quit);
+    state.instructor.drafts[{"Ada", 3}] = {"calm hands", 4};
+    EXPECT_EQ(goBack(state), Errand::none);
+    EXPECT_NE(state.notice.find("notes"), std::string::npos);
+    EXPECT_EQ(goBack(state), Errand::quit);
+    showInstructor(state);
+    goBack(state);
+    EXPECT_EQ(goBack(state), Errand::none) << "after another screen it is said again";
+    state.instructor.drafts.clear();
+    sessionStarted(state, {}, "");
+    EXPECT_EQ(leave(state), Errand::none);
+    EXPECT_NE(state.notice.find("session"), std::string::npos);
+    EXPECT_EQ(leave(state), Errand::quit);
+    sessionEnded(state, scored(50));
+    EXPECT_EQ(state.notice, "");
+    EXPECT_EQ(leave(state), Errand::quit);
+}
+
 // Whatever is pressed in whatever order: a session runs on its own screen and on no other, and one case is chosen.
 TEST(State, RandomButtonsNeverLeaveASessionWithoutItsScreen)
 {
@@ -244,10 +266,23 @@ TEST(Cases, AreReadAsTheCommandListsThem)
     EXPECT_TRUE(cases[1].core && !cases[2].core) << "where no core is asked for it is no core biopsy";
     EXPECT_EQ(cases[0].id, "lump");
     EXPECT_TRUE(cases[0].palpation && !cases[1].palpation);
-    EXPECT_EQ(cases[0].steps.size(), 4U);
+    EXPECT_EQ(cases[0].steps.size(), 2U);
     EXPECT_EQ(cases[1].trains, "a, b");
-    EXPECT_EQ(cases[1].steps[1], "Reach it.");
-    EXPECT_NE(cases[1].steps[0].find("needle"), std::string::npos);
+    EXPECT_EQ(cases[1].steps[0], "Reach it.");
+    // Before and behind them stands what the hand does: with the mouse, or with the buttons of a grip.
+    State state;
+    state.cases = cases;
+    state.chosen = 1;
+    ASSERT_EQ(stepsOf(state).size(), 3U);
+    EXPECT_NE(stepsOf(state)[0].find("the needle. The wheel"), std::string::npos);
+    EXPECT_EQ(stepsOf(state)[1], "Reach it.");
+    state.useFalcon = true;
+    EXPECT_EQ(stepsOf(state)[0],
+              "Hold the centre button of the grip: you hold the needle. Push it in. The forward button fires.");
+    EXPECT_EQ(stepsOf(state)[2], "The left button, held for a second, ends the session. S pauses.");
+    state.chosen = 0;
+    EXPECT_EQ(stepsOf(state).size(), 4U);
+    EXPECT_EQ(stepsOf(state)[0], "Hold the centre button of the grip: you hold the fingertip. Push to press.");
     for (const char* other : {"null", "[]", "{}", R"({"cases": 3})", R"({"cases": [1, "a", null]})"}) {
         EXPECT_TRUE(casesOf(nlohmann::json::parse(other)).empty()) << other;
     }
