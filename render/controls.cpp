@@ -155,8 +155,10 @@ void Controls::button(int button, bool down)
         return hand_.fire();
     if (button == GLFW_MOUSE_BUTTON_LEFT && down && hand_.commands() && picture_.endsAt(point(cursor_)))
         return hand_.end();
-    if (button == GLFW_MOUSE_BUTTON_LEFT && hand_.is())
+    if (button == GLFW_MOUSE_BUTTON_LEFT && hand_.is()) {
+        byKey_ = false;
         return down ? hand_.press(follower_.state()) : hand_.release();
+    }
     if (button == GLFW_MOUSE_BUTTON_LEFT && playback_ != nullptr) {
         scrubbing_ = down;
         return scrub();
@@ -170,7 +172,7 @@ void Controls::moved(glm::dvec2 to, bool fine)
 {
     used_ = true;
     const glm::dvec2 from = std::exchange(cursor_, to);
-    if (hand_.held() && !measuring_ && !probing_) {
+    if (hand_.held() && !byKey_ && !measuring_ && !probing_) {
         const glm::dvec3 at = hand_.target();
         const glm::dvec3 way = picture_.under(point(to), at) - picture_.under(point(from), at);
         hand_.move((fine ? fineShare : 1.0) * way);
@@ -213,6 +215,7 @@ void Controls::toggleHold()
         hand_.release();
     else if (hand_.is())
         hand_.press(follower_.state());
+    byKey_ = hand_.held();
 }
 
 void Controls::step(glm::dvec3 direction, double steps, bool fine)

@@ -120,6 +120,7 @@ private:
         closing_;  // when the key that closes was pressed, and ended a session if pressed again
     bool used_ = false, helping_ = false, scrubbing_ = false;
     bool measuring_ = false, probing_ = false;  // on the ultrasound picture
+    bool byKey_ = false;                        // a key has taken the tool: the mouse leaves it alone
 };
 
 }  // namespace palpate::render

@@ -230,7 +230,11 @@ TEST(Desktop, APauseIsNotInTheRecordAndANewBeginningLeavesNothingOfTheOldOne)
     desktop.xdotool({"key", "BackSpace"});
     wait(0.5);
     EXPECT_EQ(eyes->ending(), channel::Ending::none) << "only a session that is paused begins anew";
-    desktop.xdotool({"key", "Return"});
+    ASSERT_TRUE(pressUntil("Return", [&] { return eyes->input() && eyes->input()->held != 0; }));
+    const auto held = vec(eyes->input()->target);
+    desktop.xdotool({"mousemove", "200", "300", "mousemove", "500", "400"});
+    wait(1);
+    EXPECT_LT(glm::distance(vec(eyes->input()->target), held), 1e-3) << "the mouse moves nothing that a key holds";
     ASSERT_TRUE(pressUntil("s", paused));
     const auto at = eyes->state()->tick;
     wait(1.0);

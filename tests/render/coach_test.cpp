@@ -41,7 +41,7 @@ channel::State stateAt(double x, double y, double z, channel::Phase phase)
     return s;
 }
 
-const CoachView view{{0, 20e-3, 0}, 0, true, false, true};
+const CoachView view{.aim = {0, 20e-3, 0}, .handIsHere = true};
 
 // A needle that was turned out of the picture by the wheel looks like one that is gone.
 TEST(Coach, NamesTheKeysThatBringAToolBackIntoThePicture)
