@@ -65,8 +65,35 @@ Errand drawLosses(State& state)
     return errand;
 }
 
-// What can be done with the session, by a click or a letter.
-Errand drawChoices(State& state)
+// What can be done with the session.
+struct Choices {
+    std::string again, debrief, expert, film;
+};
+
+Choices choicesOf(const State& state)
+{
+    return {tr("Same case again (A)"), tr("See it again: debrief (D)"),
+            state.ghosting ? tr("An expert does it ...") : tr("Beside an expert (X)"),
+            state.filming ? tr("The film is being made ...") : tr("Film (F)")};
+}
+
+// Of drawChoices(), beyond its first row.
+float heightOfFurtherRows(const Choices& choices)
+{
+    const ImGuiStyle& style = ImGui::GetStyle();
+    const float room = ImGui::GetContentRegionAvail().x;
+    float used = 0, high = 0;
+    for (const std::string& label : {choices.again, choices.debrief, choices.expert, choices.film}) {
+        const float wide = ImGui::CalcTextSize(label.c_str()).x + 2 * style.FramePadding.x;
+        const bool below = used > 0 && used + wide + 2 * style.ItemSpacing.x > room;  // as besideIfRoom()
+        high += below ? ImGui::GetFrameHeightWithSpacing() : 0;
+        used = used > 0 && !below ? used + style.ItemSpacing.x + wide : wide;
+    }
+    return high;
+}
+
+// By a click or a letter.
+Errand drawChoices(State& state, const Choices& choices)
 {
     const bool free = !state.replaying && !state.ghosting;
     Errand errand = Errand::none;
@@ -79,16 +106,16 @@ Errand drawChoices(State& state)
         ImGui::EndDisabled();
         return pressed && now;
     };
-    if (choice(tr("Same case again (A)"), 'A', true)) {
+    if (choice(choices.again, 'A', true)) {
         return again(state);
     }
-    if (choice(tr("See it again: debrief (D)"), 'D', free)) {
+    if (choice(choices.debrief, 'D', free)) {
         errand = debrief(state);
     }
-    if (choice(state.ghosting ? tr("An expert does it ...") : tr("Beside an expert (X)"), 'X', free)) {
+    if (choice(choices.expert, 'X', free)) {
         errand = Errand::seeExpert;
     }
-    if (choice(state.filming ? tr("The film is being made ...") : tr("Film (F)"), 'F', !state.filming)) {
+    if (choice(choices.film, 'F', !state.filming)) {
         errand = Errand::makeFilm;
     }
     return errand;
@@ -107,7 +134,8 @@ Errand drawResult(State& state)
     }
     // Where texts are large, all of it rolls, and what can be done comes before the figures.
     const bool two = roomForTwo();
-    beginPart("result", 0, -(two ? 6.6F : 3.4F) * em);
+    const Choices choices = choicesOf(state);
+    beginPart("result", 0, two ? -6.6F * em - heightOfFurtherRows(choices) : -3.4F * em);
     heading(said(tr("{:.0f} of 100 points"), result.total), two ? 1.9F : 1.45F);
     words(chosenCase(state).title, quiet);
     if (result.notKept && !state.person.empty()) {
@@ -119,7 +147,7 @@ Errand drawResult(State& state)
     drawParts(result);
     ImGui::Spacing();
     const Errand moment = drawLosses(state);
-    Errand chosen = two ? Errand::none : drawChoices(state);
+    Errand chosen = two ? Errand::none : drawChoices(state, choices);
     ImGui::NextColumn();
     drawMeasures(result);
     ImGui::Columns(1);
@@ -129,7 +157,7 @@ Errand drawResult(State& state)
     } else {
         words(said(tr("Record: {}"), state.files.record.string()), quiet);
     }
-    chosen = two ? drawChoices(state) : chosen;
+    chosen = two ? drawChoices(state, choices) : chosen;
     two ? void() : endPart();
     return moment != Errand::none ? moment : chosen;
 }
