@@ -244,6 +244,7 @@ ElasticBody elasticBody(const volume::NodeGrid& cells, const std::vector<volume:
     addSurface(cells, surface, pointsPerEdge(cells.spacing, toolRadius), all, body);
     body.levels = cellLevels(all, static_cast<std::size_t>(levels), support, surface);
     body.rows = rowsOf(body.cells, body.levels.front().nodes.size, &SurfaceCell::cell);
+    body.held = std::move(all.held);
     return body;
 }
 

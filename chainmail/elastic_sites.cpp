@@ -43,7 +43,7 @@ std::span<const ElasticTool> Elastic::heldTools(std::span<const ElasticTool> too
     held_.resize(tools.size());
     tools_.clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
-        tools_.push_back(held_[i].place(tools[i], stack_.body().levels.front(), volume::isSmall(options_.law), holdsBack));
+        tools_.push_back(held_[i].place(tools[i], stack_.body(), volume::isSmall(options_.law), holdsBack));
     }
     return tools_;
 }

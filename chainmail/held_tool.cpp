@@ -20,56 +20,81 @@ constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius
 constexpr double ease = 0.02;        // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
 constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
 constexpr int maxSteps = 256;        // along a way through the tissue
+constexpr double mostHeld = 0.5;     // fraction of the tissue around a place that is held, from which on the place is
 
-bool isHeld(const CellLevel& level, Vec3 at) noexcept
-{
-    const Index3 node(glm::round((at - level.nodes.origin) / level.nodes.spacing));
-    return level.nodes.contains(node) && level.fixed[level.nodes.offset(node)] != 0;
-}
+constexpr int pieces = 4;  // of a capsule, between places at which it may meet what is held
 
-Vec3 foremost(const occupancy::RoundCone& shape, Vec3 inward) noexcept
+// Fraction of the tissue around a place that is held, between the middles of cells. 0 outside of the grid.
+double heldAt(const ElasticBody& body, Vec3 at) noexcept
 {
-    const Vec3 a = shape.a + shape.radiusA * inward;
-    const Vec3 b = shape.b + shape.radiusB * inward;
-    return glm::dot(a, inward) > glm::dot(b, inward) ? a : b;
-}
-
-// How far the foremost point of the real tool is inside of what is held in space, on its way from where the body's is [m].
-double insideHeld(const CellLevel& level, Vec3 from, Vec3 inward, double way) noexcept
-{
-    const double step = std::max(0.25 * level.nodes.spacing, way / maxSteps);
-    for (double t = 0.0; t < way; t += step) {
-        if (isHeld(level, from + t * inward)) {
-            return way - t;
-        }
+    const auto& grid = body.levels.front().nodes;
+    const Vec3 cells = (at - grid.origin) / grid.spacing - 0.5;
+    const Index3 low(glm::floor(cells));
+    if (!grid.contains(low) || !grid.contains(low + 1)) {
+        return 0.0;
     }
-    return 0.0;
+    const auto fraction = trilinear(cells - Vec3(low));
+    double sum = 0.0;
+    for (int i = 0; i < 8; ++i) {
+        sum += static_cast<double>(fraction[static_cast<std::size_t>(i)] * body.held[grid.offset(low + octant(i))]);
+    }
+    return sum;
+}
+
+// How far a place gets on its way until most of the tissue is held [m].
+double freeWay(const ElasticBody& body, Vec3 from, Vec3 inward, double way) noexcept
+{
+    const double step = std::max(0.25 * body.levels.front().nodes.spacing, way / maxSteps);
+    double before = 0.0;
+    for (double t = 0.0; t < way + step; t += step) {
+        const double here = heldAt(body, from + t * inward);
+        if (here >= mostHeld) {
+            return here > before ? std::max(t - step * (here - mostHeld) / (here - before), 0.0) : t;
+        }
+        before = here;
+    }
+    return way;
+}
+
+// The same of a tool from where it would lie on the surface at rest: of its front, along its length.
+double freeWay(const ElasticBody& body, const ElasticTool& tool, Vec3 inward, double way) noexcept
+{
+    const occupancy::RoundCone& s = tool.shape;
+    const int places = s.a == s.b ? 0 : pieces;
+    double least = way;
+    for (int i = 0; i <= places; ++i) {
+        const double t = places > 0 ? static_cast<double>(i) / places : 0.0;
+        const Vec3 front = glm::mix(s.a, s.b, t) + glm::mix(s.radiusA, s.radiusB, t) * inward;
+        least = std::min(least, freeWay(body, front - tool.pushed, inward, least));
+    }
+    return least;
 }
 
 }  // namespace
 
-ElasticTool HeldTool::place(const ElasticTool& tool, const CellLevel& finest, bool isSmall, bool holdsBack) noexcept
+ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bool isSmall, bool holdsBack) noexcept
 {
     const double radius = tool.shape.widest();
     const double wanted = glm::length(tool.pushed);
-    const double most = isSmall ? std::min(wanted, smallStrain * radius) : wanted;
-    const double sink = std::min(sinkRadii * radius + sinkSpacings * finest.nodes.spacing, maxSink * radius);
-    const double bears = std::min(sink + onBone * load / tool.stiffest, std::max(sink, mostOnBone * radius));
-    const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
-    given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
-    behind = wanted - given;
-    deeper = 1.0 + behind / std::max(given, leastGiven * radius);
     friction = tool.friction;
     inward = wanted > 0.0 ? tool.pushed / wanted : Vec3(0.0);
-    stopped = 0.0;
+    const double free = holdsBack ? freeWay(body, tool, inward, wanted) : wanted;
+    const double most = isSmall ? std::min(free, smallStrain * radius) : free;
+    const double spacing = body.levels.front().nodes.spacing;
+    const double sink = std::min(sinkRadii * radius + sinkSpacings * spacing, maxSink * radius);
+    const double bears = std::min(sink + onBone * load / tool.stiffest, std::max(sink, mostOnBone * radius));
+    const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
+    // A tool that is led sideways into what is held, over an edge, was stopped by no force on its way there: its depth
+    // counts as far as it goes further in itself.
+    const double stiffest = std::min(tool.stiffest, ElasticTool().stiffest);
+    stopped = stiffest * std::clamp(stopped / stiffest + wanted - given - behind, 0.0, wanted - free);
+    given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
+    behind = wanted - given;
+    deeper = 1.0 + (free - given) / std::max(given, leastGiven * radius);
     ElasticTool felt = tool;
     felt.shape.a -= behind * inward;
     felt.shape.b -= behind * inward;
     felt.pushed = given * inward;
-    if (behind > 0.0) {
-        stopped = std::min(tool.stiffest, ElasticTool().stiffest) *
-                  insideHeld(finest, foremost(felt.shape, inward), inward, behind);
-    }
     return felt;
 }
 

@@ -14,8 +14,10 @@ namespace palpate::chainmail {
 ///     - small strain is pressed by more than a radius
 ///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
 ///
+///     - it would get into what is held in space: cells over bone that a tool would press flat bear next to nothing
+///
 /// From there its force goes on by Hertz's law, with the depth to the power of 3/2. What is held in space stops the real
-/// tool: it does not get into bone.
+/// tool besides, as stiffly as a contact may be.
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
@@ -38,7 +40,7 @@ struct HeldTool {
     }
     /// The tool for this call, as deep as the last one lets it go.
     /// @param holdsBack  false: as it is
-    ElasticTool place(const ElasticTool& tool, const CellLevel& finest, bool isSmall, bool holdsBack) noexcept;
+    ElasticTool place(const ElasticTool& tool, const ElasticBody& body, bool isSmall, bool holdsBack) noexcept;
     /// The force on the real tool, by that on the one which the body feels [N]. Without friction it has no part into the
     /// body: tissue that was left on the wrong side of a tool, by a jump or a corner, does not pull it.
     Vec3 force(Vec3 felt) const noexcept { return outward(ownForce(felt) + blend.offset()); }

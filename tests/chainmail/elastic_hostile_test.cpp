@@ -192,7 +192,7 @@ TEST(ElasticHostile, AForceAtNoDepthIsNotRaisedBeyondBounds)
         HeldTool held;
         held.given = given;
         held.stretch = 6.5;  // no further
-        held.place(tool, body.levels.front(), false, true);
+        held.place(tool, body, false, true);
         EXPECT_EQ(held.given, given);
         const double from = std::max(given, 0.1 * radius);
         EXPECT_NEAR(glm::length(held.force({0, -1, 0})), std::pow(1.0 + (whole - given) / from, 1.5), 1e-9) << given;
