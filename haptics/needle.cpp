@@ -245,6 +245,13 @@ struct Needle {
                 state.sliding = held > 0.0 ? 1 : -1;
             }
         }
+        // Tissue that a rupture drives back loads the shaft no more than it is stretched by that way: where it would, it
+        // sticks.
+        const double stretched = state.shaftForce + hold.stiffness * advance;
+        if (ruptures && hold.sliding > stretched) {
+            state.shaftForce = stretched;
+            state.sliding = 0;
+        }
         if (state.sliding != 0) {
             state.shaftForce = state.sliding * hold.sliding + hold.damping * state.speed;
             state.shaftLost = {};
