@@ -119,8 +119,8 @@ struct ElasticBody {
     std::vector<SurfaceCell> cells;   // that the surface runs through, by z, then y, then x
     std::vector<std::uint32_t> rows;  // first of `cells` in row (y, z) of the finest level, at y + z * its nodes along y
     std::vector<SurfacePoint> points;
-    std::vector<float> held;          // of each cell of the finest level, what share of its tissue is held in space
-    bool relaxes = false;             // its moduli are those right after a step
+    std::vector<float> held;  // of each cell of the finest level, what share of its tissue is held in space
+    bool relaxes = false;     // its moduli are those right after a step
 };
 
 /// @param cells        centres of the finest level's cells; two layers of cells at its border must be empty: a surface that

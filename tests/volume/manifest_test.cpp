@@ -363,7 +363,7 @@ TEST(Manifest, FoldersOfMasksBecomeOneLabelMap)
     EXPECT_EQ(std::count(organs.image.values.begin(), organs.image.values.end(), organs.names[0].value), 39350);
     ASSERT_EQ(organs.warnings.size(), 1U);
     EXPECT_NE(organs.warnings[0].find("without a voxel are left out: heart"), std::string::npos);
-    EXPECT_NE(reasonOf([&] { importLabels(data); }).find("holds the values"), std::string::npos);
+    EXPECT_NE(reasonOf([&] { importLabels(data); }).find("give the segmentation"), std::string::npos);
 }
 
 // Half of a file is never taken for all of it.

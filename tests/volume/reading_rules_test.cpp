@@ -13,6 +13,7 @@
 #include <sys/stat.h>
 #include <glm/geometric.hpp>
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <numeric>
@@ -278,6 +279,25 @@ TEST_F(ReadingRules, NearlyWholeLabelsAreRoundedOnlyForWhoSaysSo)
     const fs::path soft = write("s.nii", NiftiFields(16, 32).oriented().bytes + bytesOf(values));
     EXPECT_NE(reason(soft).find("an image or a probability"), std::string::npos) << reason(soft);
     EXPECT_NE(reason(soft, options).find("voxel (1, 2, 0) is 0.4"), std::string::npos) << reason(soft, options);
+}
+
+// A value that is no label is no inside either: a probability of 0.05, or the -1 that is written for nothing.
+TEST_F(ReadingRules, AMaskOfAFolderHoldsALabel)
+{
+    fs::create_directories(folder / "masks");
+    const auto masked = [&](float inside) {
+        std::vector<float> values(24, 0.0F);
+        values[4] = values[9] = inside;
+        write("masks/liver.nii", NiftiFields(16, 32).oriented().bytes + bytesOf(values));
+        return folder / "masks";
+    };
+    for (const float inside : {1.0F, 255.0F, 0.99999994F}) {
+        const ImportedLabels labels = importLabels(masked(inside));
+        EXPECT_EQ(std::accumulate(labels.image.values.begin(), labels.image.values.end(), 0), 2) << inside;
+    }
+    EXPECT_NE(reason(masked(0.05F)).find("voxel 4 is 0.05"), std::string::npos) << reason(folder / "masks");
+    EXPECT_NE(reason(masked(-1.0F)).find("voxel 4 is -1"), std::string::npos) << reason(folder / "masks");
+    EXPECT_NE(reason(masked(NAN)).find("voxel 4 is not a number"), std::string::npos) << reason(folder / "masks");
 }
 
 // Two bytes without a byte order: little endian, and said.

@@ -1,6 +1,7 @@
 #include <volume/import/barrier.h>
 #include <volume/import/dicom.h>
 #include <volume/import/header_text.h>
+#include <volume/import/label_sink.h>
 #include <volume/import/segments.h>
 
 #include <glm/common.hpp>
@@ -34,21 +35,29 @@ std::string structureName(const std::filesystem::path& file)
     return printable(name.substr(0, name.rfind('.')));
 }
 
-// Any value but 0 is inside; more than one such value is no mask.
-Segment readMask(const Source& source, std::uint16_t value, const std::function<void(double)>& progress)
+// One label but 0 is inside; more than one is no mask, and neither are the fractions of a probability.
+Segment readMask(const Source& source, std::uint16_t value, const ImportOptions& options,
+                 const std::function<void(double)>& progress)
 {
     Segment segment;
     segment.label = {value, structureName(source.header), ""};
-    double inside = 0;
+    LabelRules rules(source.scaled, options);
+    rules.round = true;  // which one it is does not matter
+    double seen = 0;     // the last value
+    std::uint16_t label = 0, inside = 0;
     std::uint32_t voxel = 0;
     decode(source, progress, [&](std::span<const double> values) {
         for (const double v : values) {
-            if (v != 0) {
-                inside = inside == 0 ? v : inside;
-                refuseIf(v != inside, source.header,
+            if (v != seen) {
+                label = LabelSink::label(source.header, v, rules, fmt::format("voxel {}", voxel));
+                seen = v;
+            }
+            if (label != 0) {
+                inside = inside == 0 ? label : inside;
+                refuseIf(label != inside, source.header,
                          "holds the values {} and {} beside 0, but in a folder of masks each file is "
                          "one structure: name this file alone if it is a label map",
-                         inside, v);
+                         inside, label);
                 segment.add(voxel);
             }
             ++voxel;
@@ -99,7 +108,7 @@ ImportedLabels masks(const std::filesystem::path& folder, const Files& files, co
                 options.progress((static_cast<double>(i) + fraction) / static_cast<double>(files.size()));
             }
         };
-        segments.push_back(readMask(source, static_cast<std::uint16_t>(i + 1), progress));
+        segments.push_back(readMask(source, static_cast<std::uint16_t>(i + 1), options, progress));
     }
     out.image.size = first.size;
     out.image.affine = first.affine;
