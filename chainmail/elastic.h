@@ -102,8 +102,11 @@ public:
     /// Over a move of the windows, toolForce() is blended, see MoveBlend.
     Vec3 toolForce(std::size_t i) const noexcept;
     Vec3 tieForce(std::size_t i) const noexcept { return sumOfContacts(i, true); }
-    /// By how much tool `i` of the last load is held back, see HeldTool [m].
-    double behind(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].behind; }
+    /// By how much tool `i` of the last load is held back on its way to what is held in space, see HeldTool [m].
+    double behind(std::size_t i) const noexcept
+    {
+        return atRest_ || i >= held_.size() ? 0.0 : held_[i].behind - held_[i].inHeld;
+    }
     /// How deep the surface is in tool `i` of the last load, as deep as that is held back [m].
     double depth(std::size_t i) const noexcept { return atRest_ || i >= held_.size() ? 0.0 : held_[i].depth; }
     /// Displacement of the material that is at `rest` [m].

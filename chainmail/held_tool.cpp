@@ -90,6 +90,7 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     stopped = stiffest * std::clamp(stopped / stiffest + wanted - given - behind, 0.0, wanted - free);
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
+    inHeld = wanted - free;
     deeper = 1.0 + (free - given) / std::max(given, leastGiven * radius);
     ElasticTool felt = tool;
     felt.shape.a -= behind * inward;

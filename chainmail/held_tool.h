@@ -13,7 +13,6 @@ namespace palpate::chainmail {
 ///     - the surface sinks into it by more than a bound, and than a contact that is as stiff as may be
 ///     - small strain is pressed by more than a radius
 ///     - it would go deeper in one call than lets the body follow: so it does not jump through a thin part
-///
 ///     - it would get into what is held in space: cells over bone that a tool would press flat bear next to nothing
 ///
 /// From there its force goes on by Hertz's law, with the depth to the power of 3/2. What is held in space stops the real
@@ -21,6 +20,7 @@ namespace palpate::chainmail {
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
+    double inHeld = 0;    // and of that, how deep it is in what is held in space [m]
     double deeper = 1;    // the real one's depth over that, from a least one on [-]
     double depth = 0;     // to which the surface sank into it in the last call [m]
     double sunk = 0;      // the same as it would be in the finest cells, for the bound [m]

@@ -38,7 +38,7 @@ struct Reaction {
     double residual = 0;        // of the level's own: largest violated link [m]
     std::optional<Vec3> force;  // of the tissue on the tool; none where the level does not know it [N]
     double depth = 0;           // of the deepest point of tissue inside the tool, where the force is known [m]
-    double behind = 0;          // by how much the level holds the tool back, see HeldTool [m]
+    double behind = 0;          // by how much the tool is held back, see Elastic::behind() [m]
     Vec3 othersForce{0.0};      // of the tissue on Grip::others together [N]
 };
 
