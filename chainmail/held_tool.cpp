@@ -20,9 +20,9 @@ constexpr double mostOnBone = 0.35;  // but not over this fraction of the radius
 constexpr double ease = 0.02;        // by which a tool goes deeper per call, in its radii, by what is left of maxStretch
 constexpr double leastGiven = 0.1;   // from which depth Hertz's law goes on at least, in the tool's radii
 constexpr int maxSteps = 256;        // along a way through the tissue
+constexpr double stop = 4e3;         // of what is held, stiffness [N/m]
 constexpr double mostHeld = 0.5;     // fraction of the tissue around a place that is held, from which on the place is
-
-constexpr int pieces = 4;  // of a capsule, between places at which it may meet what is held
+constexpr int pieces = 4;            // of a capsule, between places at which it may meet what is held
 
 // Fraction of the tissue around a place that is held, between the middles of cells. 0 outside of the grid.
 double heldAt(const ElasticBody& body, Vec3 at) noexcept
@@ -86,8 +86,8 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
     // A tool that is led sideways into what is held, over an edge, was stopped by no force on its way there: its depth
     // counts as far as it goes further in itself.
-    const double stiffest = std::min(tool.stiffest, ElasticTool().stiffest);
-    stopped = stiffest * std::clamp(stopped / stiffest + wanted - given - behind, 0.0, wanted - free);
+    const double stiff = std::min(tool.stiffest, stop);
+    stopped = stiff * std::clamp(stopped / stiff + wanted - given - behind, 0.0, wanted - free);
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
     inHeld = wanted - free;

@@ -16,7 +16,7 @@ namespace palpate::chainmail {
 ///     - it would get into what is held in space: cells over bone that a tool would press flat bear next to nothing
 ///
 /// From there its force goes on by Hertz's law, with the depth to the power of 3/2. What is held in space stops the real
-/// tool besides, as stiffly as a contact may be.
+/// tool besides, by a spring from where that begins.
 struct HeldTool {
     double given = 0;     // how deep it is [m]
     double behind = 0;    // how much deeper the real one is [m]
