@@ -86,8 +86,7 @@ ElasticTool HeldTool::place(const ElasticTool& tool, const ElasticBody& body, bo
     const double further = std::min(bears - sunk, ease * radius * (maxStretch - stretch));
     // A tool that is led sideways into what is held, over an edge, was stopped by no force on its way there: its depth
     // counts as far as it goes further in itself.
-    const double stiff = std::min(tool.stiffest, stop);
-    stopped = stiff * std::clamp(stopped / stiff + wanted - given - behind, 0.0, wanted - free);
+    stopped = stop * std::clamp(stopped / stop + wanted - given - behind, 0.0, wanted - free);
     given = holdsBack ? std::clamp(given + further, 0.0, most) : wanted;
     behind = wanted - given;
     inHeld = wanted - free;

@@ -22,12 +22,27 @@ using haptics::EventKind;
 
 std::string escape(std::string_view text)
 {
-    static const std::map<char, const char*> marks{
-        {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
     std::string out;
     for (const char c : text) {
-        const auto mark = marks.find(c);
-        out += mark == marks.end() ? std::string(1, c) : mark->second;
+        switch (c) {
+            case '&':
+                out += "&amp;";
+                break;
+            case '<':
+                out += "&lt;";
+                break;
+            case '>':
+                out += "&gt;";
+                break;
+            case '"':
+                out += "&quot;";
+                break;
+            case '\'':
+                out += "&#39;";
+                break;
+            default:
+                out += c;
+        }
     }
     return out;
 }
@@ -134,7 +149,11 @@ std::string embedded(const nlohmann::json& data)
     std::string out;
     out.reserve(text.size());
     for (const char c : text) {
-        out += c == '<' ? std::string("\\u003c") : std::string(1, c);
+        if (c == '<') {
+            out += "\\u003c";
+        } else {
+            out += c;
+        }
     }
     return out;
 }
