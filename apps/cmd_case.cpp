@@ -19,7 +19,6 @@
 #include <nlohmann/json.hpp>
 
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -61,9 +60,7 @@ void list(const CaseArguments& o)
     for (const std::string& fault : faults) {
         fmt::print(stderr, "palpate: warning: {}\n", fault);
     }
-    if (all.empty()) {
-        throw std::runtime_error(training::nothingThere("cases"));
-    }
+    base::failIf(all.empty(), "{}", training::nothingThere("cases"));
     if (!o.json.empty()) {
         auto cases = nlohmann::json::array();
         for (const Case& c : all) {

@@ -19,7 +19,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -51,9 +50,7 @@ void listCurricula(const CurriculumArguments& o)
     for (const std::string& fault : faults) {
         fmt::print(stderr, "palpate: warning: {}\n", fault);
     }
-    if (all.empty()) {
-        throw std::runtime_error(training::nothingThere("curricula"));
-    }
+    base::failIf(all.empty(), "{}", training::nothingThere("curricula"));
     auto figures = nlohmann::json::array();
     for (const Curriculum& c : all) {
         figures.push_back({{"id", c.id},
@@ -116,9 +113,7 @@ void next(const CurriculumArguments& o)
         curricula.push_back(training::findCurriculum(o.id.empty() ? last->curriculum : o.id));
     } else {
         curricula = training::allCurricula();
-        if (curricula.empty()) {
-            throw std::runtime_error(training::nothingThere("curricula"));
-        }
+        base::failIf(curricula.empty(), "{}", training::nothingThere("curricula"));
     }
     auto figures = nlohmann::json::array();
     for (const Curriculum& c : curricula) {

@@ -19,7 +19,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -65,10 +64,9 @@ void checkOptions(ExportArguments& o)
                  o.output.native());
     base::failIf(!o.like.empty() && (o.what != "ultrasound" || !o.at.empty()),
                  "--like: needs --record FILE and -o FILE.png, and takes the time from the picture: leave out --at");
-    if (o.like.empty() && o.record.empty() != o.at.empty()) {
-        throw std::runtime_error(o.at.empty() ? "--record: needs a time of the session: add --at 3.2s"
-                                              : "--at: needs a record: add --record FILE");
-    }
+    base::failIf(
+        o.like.empty() && o.record.empty() != o.at.empty(), "{}",
+        o.at.empty() ? "--record: needs a time of the session: add --at 3.2s" : "--at: needs a record: add --record FILE");
     base::failIf(o.record.empty() && ofRecordOnly(o.what), "{}: {} needs a session: give --record FILE --at TIME",
                  o.output.native(), o.what);
     base::failIf(!o.record.empty() && !ofRecordOnly(o.what) && o.what != "labels",
@@ -145,7 +143,7 @@ void exportVolume(const ExportArguments& o, const volume::ExportOptions& how)
     } else if (const auto image = tissue.companion()) {
         volume::exportImage(o.output, grid, image->values, how);
     } else {
-        throw std::runtime_error(o.volume.string() + ": holds no image: give one to 'palpate import --image'");
+        throw base::error("{}: holds no image: give one to 'palpate import --image'", o.volume.native());
     }
 }
 

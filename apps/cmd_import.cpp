@@ -16,7 +16,6 @@
 #include <memory>
 #include <new>
 #include <optional>
-#include <stdexcept>
 
 namespace palpate::apps {
 
@@ -264,8 +263,8 @@ void addImport(CLI::App& app)
         try {
             runImport(*o);
         } catch (const std::bad_alloc&) {
-            throw std::runtime_error(o->input.string() +
-                                     ": needs more memory than this machine has: crop it, or resample it to larger voxels");
+            throw base::error("{}: needs more memory than this machine has: crop it, or resample it to larger voxels",
+                              o->input.native());
         }
     });
 }

@@ -82,10 +82,8 @@ ToolSpec toolOf(const PressArguments& o, const ToolSpec& scene)
     if (!needle && scene.kind == ToolKind::needle && !o.radius) {
         throw base::error("--tool {}: the tool of {} is a needle: add --radius-mm for this one", *o.tool, o.scene);
     }
-    if (other && tool.kind == ToolKind::capsule && !o.length) {
-        throw base::error("--tool capsule: the tool of {} is a {}: add --length-mm for this one", o.scene,
-                          kindName(scene.kind));
-    }
+    base::failIf(other && tool.kind == ToolKind::capsule && !o.length,
+                 "--tool capsule: the tool of {} is a {}: add --length-mm for this one", o.scene, kindName(scene.kind));
     tool.length = needle && other ? ToolSpec{}.length : tool.length;
     tool.radius = needle && other ? ToolSpec{}.radius : tool.radius;
     tool.radius = o.radius ? inRange("--radius-mm", *o.radius, minRadius, maxRadius) : tool.radius;

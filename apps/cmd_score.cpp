@@ -20,7 +20,6 @@
 #include <cstdio>
 #include <iterator>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -214,8 +213,8 @@ void scoreRecord(const ScoreArguments& options)
         } else if (sessions.size() == 1) {
             report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures, sessions[0].file);
         } else {
-            throw std::runtime_error(options.report.string() +
-                                     ": a report is of one record or of groups: give one file, or --group NAME=FILE,FILE");
+            throw base::error("{}: a report is of one record or of groups: give one file, or --group NAME=FILE,FILE",
+                              options.report.native());
         }
     }
     command::writeJson(options.json, figures(sessions, groups));

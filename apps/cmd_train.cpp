@@ -172,8 +172,8 @@ void checkOutputs(const TrainArguments& o)
     const auto record = recordFile(o);
     base::checkOutputs({o.json, record}, {});
     if (!record.empty() && fs::exists(record)) {
-        throw std::runtime_error(record.string() + ": exists already; choose another name or remove it" +
-                                 (o.record.empty() ? " (the record beside the report)" : ""));
+        throw base::error("{}: exists already; choose another name or remove it{}", record.native(),
+                          (o.record.empty() ? " (the record beside the report)" : ""));
     }
     base::failIf(!o.report.empty() && record == fs::path(o.report),
                  "{}: is the name of the record too: call the report .html", o.report);
@@ -237,7 +237,7 @@ haptics::SessionModel openModel(TrainArguments& o)
     }
     haptics::SessionModel model = session::openSession(o.scene, o.changes);
     if (const std::string why = o.anyway ? "" : session::whyTooSlow(session::rehearse(model), !o.unpaced); !why.empty()) {
-        throw std::runtime_error(o.scene + ": " + why);
+        throw base::error("{}: {}", o.scene, why);
     }
     return model;
 }
@@ -402,9 +402,7 @@ void train(TrainArguments o)
             result.signal, fmt::format("interrupted ({}): the session was ended in order{}{}", strsignal(result.signal),
                                        result.problem.empty() ? "" : "; ", result.problem));
     }
-    if (!result.problem.empty()) {
-        throw std::runtime_error(result.problem);
-    }
+    base::failIf(!result.problem.empty(), "{}", result.problem);
 }
 
 // Empty, or what is wrong with a value of --seconds.

@@ -1,5 +1,6 @@
 #include <apps/export_ct.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <channel/deformation.h>
 #include <ct/scanner.h>
@@ -10,14 +11,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <stdexcept>
 
 namespace palpate::apps {
 
 std::string exportCt(const CtExport& o, const std::function<void(double)>& progress)
 {
     if (const haptics::Record record(o.record); !(haptics::scanDoseOf(record.info()) > 0)) {
-        throw std::runtime_error(o.record + ": its scene has no CT: take a record of a scene with a section [ct]");
+        throw base::error("{}: its scene has no CT: take a record of a scene with a section [ct]", o.record);
     }
     const session::ShownState shown = session::shownState(o.record, o.at, std::nullopt, progress);
     const haptics::Showing& s = shown.showing;

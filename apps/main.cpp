@@ -1,6 +1,7 @@
 #include <apps/command.h>
 #include <apps/version.h>
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/inputs.h>
 #include <base/nearest.h>
 #include <command/interrupted.h>
@@ -22,7 +23,6 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -59,8 +59,8 @@ void checkStandardOutput()
 {
     errno = 0;
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-        throw std::runtime_error(std::string("standard output: cannot be written") +
-                                 (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : ""));
+        throw palpate::base::error("standard output: cannot be written{}",
+                                   (errno != 0 ? std::string(" (") + std::strerror(errno) + ")" : ""));
     }
 }
 

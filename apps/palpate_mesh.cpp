@@ -20,7 +20,6 @@
 #include <algorithm>
 #include <ctime>
 #include <filesystem>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -52,10 +51,9 @@ volume::Tissue openVolume(const std::string& what)
     if (const auto scene = datasets::builtInScene(what); scene && !fs::exists(file)) {
         return datasets::sceneVolume(*scene);
     }
-    if (file.extension().empty() && !fs::exists(file)) {
-        throw base::error("{}: is neither a volume (.vdb) nor a built-in phantom: these are {}", what,
-                          fmt::join(datasets::builtInScenes(), ", "));
-    }
+    base::failIf(file.extension().empty() && !fs::exists(file),
+                 "{}: is neither a volume (.vdb) nor a built-in phantom: these are {}", what,
+                 fmt::join(datasets::builtInScenes(), ", "));
     return session::loadVolume(file);
 }
 
@@ -111,13 +109,9 @@ void printQuality(const MeshArguments& o, const reference::MeshQuality& q, const
 
 void run(const MeshArguments& o)
 {
-    if (o.volume.empty()) {
-        throw base::error("no volume: name one (.vdb), or a built-in phantom: {}",
-                          fmt::join(datasets::builtInScenes(), ", "));
-    }
-    if (o.output.empty()) {
-        throw std::runtime_error("nothing to write: name a file with -o, which ends in " + reference::meshFileEndings());
-    }
+    base::failIf(o.volume.empty(), "no volume: name one (.vdb), or a built-in phantom: {}",
+                 fmt::join(datasets::builtInScenes(), ", "));
+    base::failIf(o.output.empty(), "nothing to write: name a file with -o, which ends in {}", reference::meshFileEndings());
     reference::checkMeshFile(o.output);
     base::checkOutputs({o.output, o.json}, {o.volume});
     const volume::Tissue tissue = openVolume(o.volume);

@@ -130,10 +130,9 @@ void checkInPlanes(const ReferenceArguments& o, const studies::TrialPath& path)
     const auto planes = planesOf(o);
     for (int axis = 0; axis < 3; ++axis) {
         const double off = std::max(std::abs(path.start[axis]), std::abs(path.at({path.press, path.drag})[axis]));
-        if (planes[static_cast<std::size_t>(axis)] && off > rounding) {
-            throw base::error("--mirrored {}: the tool is {:.3f} mm from the plane {} = 0: solve all of it", o.mirrored,
-                              1e3 * off, "xyz"[axis]);
-        }
+        base::failIf(planes[static_cast<std::size_t>(axis)] && off > rounding,
+                     "--mirrored {}: the tool is {:.3f} mm from the plane {} = 0: solve all of it", o.mirrored, 1e3 * off,
+                     "xyz"[axis]);
     }
 }
 

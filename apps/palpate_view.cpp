@@ -1,5 +1,6 @@
 #include <apps/parsed_program.h>
 #include <apps/replay_player.h>
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/words.h>
 #include <command/interrupted.h>
@@ -25,8 +26,8 @@ void readSize(const std::string& text, palpate::render::ViewerOptions& options)
 {
     int end = 0;
     const int read = std::sscanf(text.c_str(), "%dx%d%n", &options.width, &options.height, &end);
-    if (read != 2 || static_cast<std::size_t>(end) != text.size())
-        throw std::runtime_error("--size " + text + ": must be WIDTHxHEIGHT in pixels, for example 1280x960");
+    palpate::base::failIf(read != 2 || static_cast<std::size_t>(end) != text.size(),
+                          "--size {}: must be WIDTHxHEIGHT in pixels, for example 1280x960", text);
 }
 
 void writeFigures(const std::string& file, const palpate::render::ViewerFigures& figures)
@@ -60,8 +61,7 @@ void writeTimeline(const std::string& file, const std::vector<palpate::render::S
     for (const auto& p : pictures)
         out << p.tick << ',' << p.published << ',' << p.read << ',' << p.done << '\n';
     out.close();
-    if (!out)
-        throw std::runtime_error(file + ": cannot be written");
+    palpate::base::failIf(!out, "{}: cannot be written", file);
 }
 
 // What the command line says in words.
@@ -156,7 +156,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         if (!words.ghost.empty())
             options.ghost = player->ghostOf(words.ghost);
     } else if (words.at >= 0 || !words.ghost.empty()) {
-        throw std::runtime_error("--at, --ghost: need a record: add --replay RECORD");
+        throw palpate::base::error("--at, --ghost: need a record: add --replay RECORD");
     }
     const auto figures = palpate::render::runViewer(options);
     if (!words.json.empty())
@@ -176,8 +176,7 @@ void run(Words& words, palpate::render::ViewerOptions& options)
         std::fprintf(stderr, "palpate-view: interrupted: %s before the session does\n", what.c_str());
     if (player && !player->problem().empty())
         throw std::runtime_error(player->problem());
-    if (missing)
-        throw std::runtime_error(nothing);
+    palpate::base::failIf(missing, "{}", nothing);
 }
 
 }  // namespace

@@ -154,9 +154,7 @@ struct ReplayPlayer::Impl {
                 if (stop || then.tick >= length) {
                     return;
                 }
-                if (then.tick != film.ticks()) {
-                    throw base::error("{}: tick {} is missing in the record", file, film.ticks());
-                }
+                base::failIf(then.tick != film.ticks(), "{}: tick {} is missing in the record", file, film.ticks());
                 const TickRecord& now = simulation.tick(then.device);
                 const bool first = comparison.differences().empty();
                 if (!comparison.add(then, now) && first) {
@@ -253,10 +251,9 @@ render::Ghost ReplayPlayer::ghostOf(const std::string& file) const
     const Record other(file);
     // Sessions at two settings of the tissue model are in one body; only their models tell.
     const bool alike = other.info().volumeHash == impl_->record.info().volumeHash;
-    if (!alike && bodyHash(session::reopenSession(file, other.info())) != bodyHash(impl_->model)) {
-        throw base::error("--ghost {}: is a session in another body than {}: take a record of a session in the same body",
-                          file, impl_->file);
-    }
+    base::failIf(!alike && bodyHash(session::reopenSession(file, other.info())) != bodyHash(impl_->model),
+                 "--ghost {}: is a session in another body than {}: take a record of a session in the same body", file,
+                 impl_->file);
     constexpr std::uint64_t every = 10;  // ticks
     render::Ghost ghost;
     other.each([&](const TickRecord& r) {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <haptics/recorder.h>
-#include <haptics/session_model.h>
 #include <render/viewer.h>
 
 #include <memory>

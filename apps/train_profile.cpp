@@ -24,7 +24,7 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         store_.emplace(options_.profiles.empty() ? training::ProfileStore::standardFile() : options_.profiles);
         person_ = store_->find(options_.profile);
     } else if (!options_.profiles.empty()) {
-        throw std::runtime_error("--profiles: needs a profile: add --profile NAME");
+        throw base::error("--profiles: needs a profile: add --profile NAME");
     }
     if (!options_.exercise.empty()) {
         auto [curriculum, exercise] = training::findExercise(options_.exercise);
@@ -59,10 +59,9 @@ std::string Training::scene() const
 
 void Training::change(session::SceneChanges& changes) const
 {
-    if (changes.dffb && (options_.test || exercise_ != nullptr)) {
-        throw std::runtime_error(options_.test ? "--dffb: a test is without guidance: leave it out"
-                                               : "--dffb: the exercise says how much guidance there is: leave it out");
-    }
+    base::failIf(changes.dffb && (options_.test || exercise_ != nullptr), "{}",
+                 options_.test ? "--dffb: a test is without guidance: leave it out"
+                               : "--dffb: the exercise says how much guidance there is: leave it out");
     if (changes.dffb) {
         return;  // the user says it
     }

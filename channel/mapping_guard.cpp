@@ -1,5 +1,6 @@
 #include <channel/mapping_guard.h>
 
+#include <base/error.h>
 #include <signal.h>
 #include <sys/mman.h>
 
@@ -7,7 +8,6 @@
 #include <atomic>
 #include <cstdint>
 #include <mutex>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::channel {
@@ -82,7 +82,7 @@ MappingGuard::MappingGuard(void* base, std::size_t bytes)
         slots[i].base.store(reinterpret_cast<std::uintptr_t>(base), std::memory_order_release);
         return;
     }
-    throw std::runtime_error("too many sessions are looked at in one process");
+    throw base::error("too many sessions are looked at in one process");
 }
 
 MappingGuard::MappingGuard(MappingGuard&& other) noexcept : slot_(std::exchange(other.slot_, -1)) {}

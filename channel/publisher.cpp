@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <channel/bounds.h>
 #include <channel/channel.h>
 #include <channel/mapping_guard.h>
@@ -16,7 +17,6 @@
 #include <ctime>
 #include <filesystem>
 #include <new>
-#include <stdexcept>
 #include <system_error>
 
 namespace palpate::channel {
@@ -36,7 +36,7 @@ struct File {
 
 [[noreturn]] void fail(const std::string& session, const std::string& what, int error)
 {
-    throw std::runtime_error("session " + session + ": " + what + ": " + std::strerror(error));
+    throw base::error("session {}: {}: {}", session, what, std::strerror(error));
 }
 
 bool sameFile(int descriptor, const std::string& name)
@@ -90,8 +90,7 @@ void removeLeftBehind(const std::string& session, const std::string& name)
     if (old.descriptor < 0)
         fail(session, "there is one already that belongs to somebody else (choose another --session)", errno);
     if (const std::uint64_t pid = ownerOf(old.descriptor).pid)
-        throw std::runtime_error("session " + session + " is running already (pid " + std::to_string(pid) +
-                                 "): end it or choose another --session");
+        throw base::error("session {} is running already (pid {}): end it or choose another --session", session, pid);
     removeLocked(old, name);
 }
 
@@ -132,21 +131,17 @@ constexpr std::size_t aligned(std::size_t bytes)
 void checkScenery(const std::string& session, const Scenery& scenery, std::size_t labels, std::size_t image,
                   std::size_t fine)
 {
-    if (fine != voxelsOf(scenery.fine))
-        throw std::runtime_error("session " + session + ": " + std::to_string(fine) + " fine labels for a grid of " +
-                                 std::to_string(voxelsOf(scenery.fine)));
-    if (labels == 0 || labels != voxelsOf(scenery.labels))
-        throw std::runtime_error("session " + session + ": " + std::to_string(labels) + " labels for a grid of " +
-                                 std::to_string(voxelsOf(scenery.labels)));
-    if (scenery.windows > maxWindows || image != (scenery.windows > 0 ? labels : 0))
-        throw std::runtime_error("session " + session + ": an image of " + std::to_string(image) + " voxels with " +
-                                 std::to_string(scenery.windows) + " windows, for " + std::to_string(labels) + " labels");
-    if (scenery.tissues > maxTissues || scenery.structures > maxStructures)
-        throw std::runtime_error("session " + session + ": at most " + std::to_string(maxTissues) + " tissues and " +
-                                 std::to_string(maxStructures) + " structures can be shown");
-    if (!sound(scenery))
-        throw std::runtime_error("session " + session +
-                                 ": its scenery has a grid, a colour, a name or a length that no viewer shows");
+    base::failIf(fine != voxelsOf(scenery.fine), "session {}: {} fine labels for a grid of {}", session, fine,
+                 voxelsOf(scenery.fine));
+    base::failIf(labels == 0 || labels != voxelsOf(scenery.labels), "session {}: {} labels for a grid of {}", session,
+                 labels, voxelsOf(scenery.labels));
+    base::failIf(scenery.windows > maxWindows || image != (scenery.windows > 0 ? labels : 0),
+                 "session {}: an image of {} voxels with {} windows, for {} labels", session, image, scenery.windows,
+                 labels);
+    base::failIf(scenery.tissues > maxTissues || scenery.structures > maxStructures,
+                 "session {}: at most {} tissues and {} structures can be shown", session, maxTissues, maxStructures);
+    base::failIf(!sound(scenery), "session {}: its scenery has a grid, a colour, a name or a length that no viewer shows",
+                 session);
 }
 
 std::uint64_t now() noexcept
@@ -259,8 +254,7 @@ void Publisher::Impl::show()
 {
     const std::string folder(segmentFolder);
     if (::link((folder + temporary).c_str(), (folder + name).c_str()) != 0) {
-        if (errno == EEXIST)
-            throw std::runtime_error("session " + session + " has just been started by another process");
+        base::failIf(errno == EEXIST, "session {} has just been started by another process", session);
         fail(session, "cannot show shared memory", errno);
     }
     ::shm_unlink(temporary.c_str());

@@ -1,5 +1,6 @@
 #include <channel/segment.h>
 
+#include <base/error.h>
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
@@ -7,7 +8,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <stdexcept>
 
 namespace palpate::channel {
 
@@ -17,9 +17,8 @@ std::string segmentName(const std::string& session)
     const auto allowed = [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
     };
-    if (session.empty() || session.size() > longest || !std::all_of(session.begin(), session.end(), allowed))
-        throw std::runtime_error("session \"" + session.substr(0, longest) +
-                                 "\": a name is 1 to 64 letters, digits, '-' and '_'");
+    base::failIf(session.empty() || session.size() > longest || !std::all_of(session.begin(), session.end(), allowed),
+                 "session \"{}\": a name is 1 to 64 letters, digits, '-' and '_'", session.substr(0, longest));
     return "/palpate-" + session;
 }
 

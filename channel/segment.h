@@ -8,7 +8,6 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 
 /// The bytes of the segment, for its ends, publisher.cpp, subscriber.cpp and hand.cpp, and for their tests. Not part of the

@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <channel/bounds.h>
 #include <channel/channel.h>
 #include <channel/mapping_guard.h>
@@ -13,7 +14,6 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 #include <string_view>
 
 namespace palpate::channel {
@@ -58,7 +58,7 @@ bool coherent(const Places& header, const Scenery& scenery) noexcept
 // Throws when the segment is not one that this program can read.
 void check(const std::string& session, const Places& header, std::uint64_t bytes)
 {
-    const auto refuse = [&](const std::string& what) { throw std::runtime_error("session " + session + ": " + what); };
+    const auto refuse = [&](const std::string& what) { throw base::error("session {}: {}", session, what); };
     if (header.version != version)
         refuse("the simulation speaks version " + std::to_string(header.version) + ", this viewer version " +
                std::to_string(version) + "; install both from the same build");
@@ -117,9 +117,8 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
     const int file = openSegment(impl.name, O_RDONLY);
     if (file < 0 && errno == ENOENT)
         return std::nullopt;
-    if (file < 0)
-        throw std::runtime_error("session " + session + ": cannot be read: " + std::strerror(errno) +
-                                 " (only the user who started it may)");
+    base::failIf(file < 0, "session {}: cannot be read: {} (only the user who started it may)", session,
+                 std::strerror(errno));
     struct stat status {};
     const bool known = ::fstat(file, &status) == 0;
     impl.bytes = static_cast<std::size_t>(status.st_size);
@@ -128,20 +127,19 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
         known && impl.bytes >= sizeof(Header) ? ::mmap(nullptr, impl.bytes, PROT_READ, MAP_SHARED, file, 0) : MAP_FAILED;
     ::close(file);
     if (mapped == MAP_FAILED)
-        throw std::runtime_error("session " + session + ": its shared memory was not made by palpate; remove " +
-                                 (segmentFolder + impl.name));
+        throw base::error("session {}: its shared memory was not made by palpate; remove {}", session,
+                          (segmentFolder + impl.name));
     impl.base = mapped;
     impl.guard = MappingGuard(mapped, impl.bytes);
     impl.header = &impl.at<Header>(0);
     if (impl.header->magic.load(std::memory_order_acquire) != magic)
-        throw std::runtime_error("session " + session + ": its shared memory was not made by palpate; remove " +
-                                 (segmentFolder + impl.name));
+        throw base::error("session {}: its shared memory was not made by palpate; remove {}", session,
+                          (segmentFolder + impl.name));
     impl.places = placesIn(*impl.header);
     check(session, impl.places, impl.bytes);
     std::memcpy(&impl.scenery, &impl.at<std::byte>(impl.places.scenery), sizeof(Scenery));
     if (!coherent(impl.places, impl.scenery))
-        throw std::runtime_error("session " + session +
-                                 ": its shared memory is damaged; end the simulation and start it again");
+        throw base::error("session {}: its shared memory is damaged; end the simulation and start it again", session);
     if (!lives(impl.places))
         return std::nullopt;
     impl.nodes = voxelsOf(impl.scenery.lattice);

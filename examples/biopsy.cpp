@@ -6,7 +6,6 @@
 
 #include <cstdio>
 #include <exception>
-#include <string>
 
 using namespace palpate;
 

@@ -2,7 +2,6 @@
 #include <palpate/datasets/scene.h>
 #include <palpate/haptics/simulation.h>
 
-#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <memory>

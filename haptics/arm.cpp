@@ -1,5 +1,6 @@
 #include <haptics/arm.h>
 
+#include <base/error.h>
 #include <haptics/bounded.h>
 
 #include <fmt/format.h>
@@ -10,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 namespace palpate::haptics {
 
@@ -51,10 +51,8 @@ const DeviceParameters& deviceParameters(std::string_view name)
         return ideal;
     }
     const auto* found = std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return d.name == name; });
-    if (found == devices.end()) {
-        throw std::runtime_error(
-            fmt::format("no device '{}' is known: take one of {}, {}", name, fmt::join(deviceNames(), ", "), ideal.name));
-    }
+    base::failIf(found == devices.end(), "no device '{}' is known: take one of {}, {}", name,
+                 fmt::join(deviceNames(), ", "), ideal.name);
     return *found;
 }
 
@@ -70,11 +68,9 @@ std::vector<std::string> deviceNames()
 Arm::Arm(const DeviceParameters& device, const Grip& grip, Vec3 start, double period)
     : device_(device), grip_(grip), period_(period), goal_(start), position_(start)
 {
-    if (!(device.delay / period < static_cast<double>(longestLine - 2))) {
-        throw std::runtime_error("device '" + std::string(device.name) + "': a delay of " + std::to_string(device.delay) +
-                                 " s is over " + std::to_string(longestLine - 2) +
-                                 " samples: shorten it or sample more slowly");
-    }
+    base::failIf(!(device.delay / period < static_cast<double>(longestLine - 2)),
+                 "device '{}': a delay of {:f} s is over {} samples: shorten it or sample more slowly", device.name,
+                 device.delay, longestLine - 2);
 }
 
 void Arm::release(Vec3 position, Vec3 velocity) noexcept

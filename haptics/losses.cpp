@@ -3,8 +3,6 @@
 #include <base/direction.h>
 #include <base/said.h>
 
-#include <fmt/format.h>
-
 #include <glm/geometric.hpp>
 
 #include <algorithm>

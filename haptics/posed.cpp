@@ -1,5 +1,6 @@
 #include <haptics/posed.h>
 
+#include <base/error.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,8 +15,7 @@ namespace {
 void checkPlan(const datasets::Scene& scene)
 {
     const auto refuse = [&](std::string_view what, std::string_view instead) {
-        throw std::runtime_error(
-            fmt::format("{}: [gravity]: {} do not move with the tissue: {}", scene.name, what, instead));
+        throw base::error("{}: [gravity]: {} do not move with the tissue: {}", scene.name, what, instead);
     };
     if (std::ranges::any_of(scene.script, [](const datasets::TraineeStep& step) {
             return step.kind != datasets::TraineeStep::Kind::fire && step.kind != datasets::TraineeStep::Kind::wait;
@@ -36,10 +36,10 @@ std::optional<Vec3> moved(const datasets::Scene& scene, const chainmail::Posture
     const std::optional<Vec3> to = map.moved(*place);
     if (!to) {
         const Vec3 mm = *place * 1e3;
-        throw std::runtime_error(
-            fmt::format("{}: [target] {} = [{:g}, {:g}, {:g}] mm: [gravity] moves it with the tissue, and "
-                        "there is none",
-                        scene.name, key, mm.x, mm.y, mm.z));
+        throw base::error(
+            "{}: [target] {} = [{:g}, {:g}, {:g}] mm: [gravity] moves it with the tissue, and "
+            "there is none",
+            scene.name, key, mm.x, mm.y, mm.z);
     }
     return to;
 }
@@ -59,7 +59,7 @@ Posed posed(const datasets::Scene& scene, std::shared_ptr<const volume::Tissue> 
         try {
             return chainmail::postureOf(*tissue, {g.strength * g.shapeDown, g.strength * g.down}, settings);
         } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("{}: [gravity]: {}", scene.name, e.what()));
+            throw base::error("{}: [gravity]: {}", scene.name, e.what());
         }
     }();
     Posed out{nullptr, moved(scene, posture.map, "entry_mm", scene.entry), moved(scene, posture.map, "aim_mm", scene.aim),

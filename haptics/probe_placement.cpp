@@ -1,17 +1,16 @@
 #include <haptics/probe_placement.h>
 
+#include <base/error.h>
 #include <base/units.h>
 #include <datasets/crossing.h>
 #include <haptics/probe.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <stdexcept>
 
 namespace palpate::haptics {
 
@@ -130,13 +129,11 @@ ProbePlan planProbe(const datasets::Scene& scene, const volume::Tissue& tissue, 
             }
         }
     }
-    if (!best) {
-        throw std::runtime_error(
-            fmt::format("{}: [probe] over_target: no needle reaches the target beside the probe at {:.0f} to {:.0f} "
-                        "degrees to its face: "
-                        "give face_mm, direction and lateral",
-                        scene.name, flattest / degree, steepest / degree));
-    }
+    base::failIf(!best,
+                 "{}: [probe] over_target: no needle reaches the target beside the probe at {:.0f} to {:.0f} "
+                 "degrees to its face: "
+                 "give face_mm, direction and lateral",
+                 scene.name, flattest / degree, steepest / degree);
     plan.lateral = best->lateral;
     plan.approach.entry = best->entry;
     return plan;

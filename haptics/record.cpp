@@ -1,9 +1,8 @@
+#include <base/error.h>
 #include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
 #include <haptics/record_rows.h>
 #include <haptics/recorder.h>
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
@@ -45,10 +44,10 @@ std::string pathOf(const std::filesystem::path& file)
 {
     std::error_code failed;
     if (!std::filesystem::exists(file, failed)) {
-        throw std::runtime_error(file.string() + ": no such file; give the record of a session");
+        throw base::error("{}: no such file; give the record of a session", file.native());
     }
     if (!std::filesystem::is_regular_file(file, failed)) {
-        throw std::runtime_error(file.string() + ": is not a file; give the record of a session");
+        throw base::error("{}: is not a file; give the record of a session", file.native());
     }
     return file.string();
 }
@@ -88,13 +87,14 @@ struct Record::Impl {
         } catch (const std::exception& e) {
             const int status = database ? sqlite3_errcode(database->get()) : SQLITE_CANTOPEN;
             if (status == SQLITE_NOTADB) {
-                throw std::runtime_error(file + ": is not a session record; palpate train --record writes one");
+                throw base::error("{}: is not a session record; palpate train --record writes one", file);
             }
             if (status == SQLITE_CANTOPEN) {
-                throw std::runtime_error(file + ": cannot be opened (" + e.what() +
-                                         "); copy it, with its -wal file, to a folder that you can read and write");
+                throw base::error(
+                    "{}: cannot be opened ({}); copy it, with its -wal file, to a folder that you can read and write", file,
+                    e.what());
             }
-            throw std::runtime_error(file + ": is damaged (" + e.what() + "); copy it again or take another record");
+            throw base::error("{}: is damaged ({}); copy it again or take another record", file, e.what());
         }
     }
 
@@ -104,9 +104,7 @@ struct Record::Impl {
         std::error_code none;
         const auto log = std::filesystem::file_size(file + "-wal", none);
         const auto page = static_cast<std::uintmax_t>(single(*database, "PRAGMA page_size"));
-        if ((none || log == 0) && std::filesystem::file_size(file) % page != 0) {
-            throw std::runtime_error("its end is missing");
-        }
+        base::failIf((none || log == 0) && std::filesystem::file_size(file) % page != 0, "its end is missing");
     }
 
     void checkFormat()
@@ -117,25 +115,23 @@ struct Record::Impl {
             version = static_cast<int>(single(*database, "PRAGMA user_version"));
         });
         if (id == 0 && single(*database, "SELECT count(*) FROM sqlite_master") == 0) {
-            throw std::runtime_error(file + ": holds no session: its writer was stopped before it began; remove it");
+            throw base::error("{}: holds no session: its writer was stopped before it began; remove it", file);
         }
         if (id != format::applicationId) {
-            throw std::runtime_error(file +
-                                     ": is an SQLite file, but not a session record; palpate train --record writes one");
+            throw base::error("{}: is an SQLite file, but not a session record; palpate train --record writes one", file);
         }
         if (version < format::oldestVersion || version > format::version) {
-            throw std::runtime_error(file + ": is a record of format " + std::to_string(version) + ", this program reads " +
-                                     std::to_string(format::oldestVersion) + " to " + std::to_string(format::version) +
-                                     "; use the program that wrote it");
+            throw base::error("{}: is a record of format {}, this program reads {} to {}; use the program that wrote it",
+                              file, version, format::oldestVersion, format::version);
         }
         if (version < format::sealedVersion && !statementOf("seal").empty()) {
-            throw std::runtime_error(file + ": is damaged (a record of format " + std::to_string(version) +
-                                     " has no seal, and here one is); copy it again or take another");
+            throw base::error(
+                "{}: is damaged (a record of format {} has no seal, and here one is); copy it again or take another", file,
+                version);
         }
         for (const auto& [table, sql] : format::schema({})) {
             if ((table != "seal" || version >= format::sealedVersion) && statementOf(table).empty()) {
-                throw std::runtime_error(file + ": is damaged (table " + table +
-                                         " is missing); copy it again or take another");
+                throw base::error("{}: is damaged (table {} is missing); copy it again or take another", file, table);
             }
         }
     }
@@ -153,9 +149,8 @@ struct Record::Impl {
     {
         for (const auto& [table, sql] : format::schema(info)) {
             const bool compared = version >= format::sealedVersion;
-            if (compared ? statementOf(table) != sql : statementOf(table).starts_with("CREATE VIRTUAL")) {
-                throw std::runtime_error("table " + table + " is not as a recorder makes it");
-            }
+            base::failIf(compared ? statementOf(table) != sql : statementOf(table).starts_with("CREATE VIRTUAL"),
+                         "table {} is not as a recorder makes it", table);
         }
     }
 
@@ -166,9 +161,7 @@ struct Record::Impl {
         Statement session(*database, "SELECT key, value FROM session ORDER BY rowid");
         while (session.step()) {
             const std::string key(session.text(0));
-            if (!keys.insert(key).second) {
-                throw std::runtime_error("table session has key " + key + " twice");
-            }
+            base::failIf(!keys.insert(key).second, "table session has key {} twice", key);
             if (key == "rate_hz") {
                 info.rate = format::realOf(session, 1, "rate_hz");
             } else if (key == "seed") {
@@ -180,9 +173,7 @@ struct Record::Impl {
             }
         }
         for (const char* key : {"scene", "scene_text", "volume_hash", "build", "rate_hz"}) {
-            if (!keys.contains(key)) {
-                throw std::runtime_error(std::string("table session has no key ") + key);
-            }
+            base::failIf(!keys.contains(key), "table session has no key {}", key);
         }
         Statement structures(*database, "SELECT structure, name, warn_distance_m FROM structures ORDER BY structure");
         while (structures.step()) {
@@ -201,19 +192,15 @@ struct Record::Impl {
     // Rows of the tables that others refer to are numbered from 0 without holes; no more are read than there may be.
     static void inOrder(const Statement& row, const char* table, std::size_t expected)
     {
-        if (expected >= maxTissues || row.integer(0) != static_cast<std::int64_t>(expected)) {
-            throw std::runtime_error(
-                fmt::format("table {} has row {} where {} should be", table, row.integer(0), expected));
-        }
+        base::failIf(expected >= maxTissues || row.integer(0) != static_cast<std::int64_t>(expected),
+                     "table {} has row {} where {} should be", table, row.integer(0), expected);
     }
 
     static std::uint64_t seedOf(const std::string& text)
     {
         std::uint64_t seed = 0;
         const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-        if (error != std::errc() || end != text.data() + text.size()) {
-            throw std::runtime_error("seed '" + text + "' is no whole number");
-        }
+        base::failIf(error != std::errc() || end != text.data() + text.size(), "seed '{}' is no whole number", text);
         return seed;
     }
 
@@ -269,9 +256,7 @@ struct Record::Impl {
                 events->take(record.tick, [&](const Statement& row) { format::readEvent(row, record); });
                 cores->take(record.tick, [&](const Statement& row) { format::readCore(row, record, core); });
                 fractions->take(record.tick, [&](const Statement& row) { format::readFraction(row, record); });
-                if (record.fired && !core) {
-                    throw std::runtime_error(fmt::format("tick {}: its core is missing, and it fired", record.tick));
-                }
+                base::failIf(record.fired && !core, "tick {}: its core is missing, and it fired", record.tick);
                 format::checkTick(record, info);
             });
             if (!more) {
@@ -286,7 +271,7 @@ struct Record::Impl {
         try {
             format::eachColumn(record, format::columnsOf(info, version), format::Reader{row});
         } catch (const std::runtime_error& e) {
-            throw std::runtime_error(fmt::format("tick {}: {}", row.integer(0), e.what()));
+            throw base::error("tick {}: {}", row.integer(0), e.what());
         }
     }
 

@@ -1,5 +1,6 @@
 #include <haptics/record_bounds.h>
 
+#include <base/error.h>
 #include <haptics/record_format.h>
 
 #include <fmt/format.h>
@@ -7,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::haptics::format {
 
@@ -23,19 +23,15 @@ void checkName(const char* what, const std::string& text)
 {
     const bool control =
         std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-    if (text.size() > longestName || control) {
-        throw std::runtime_error(control ? fmt::format("{} has control characters", what)
-                                         : fmt::format("{} has {} bytes: {} at most", what, text.size(), longestName));
-    }
+    base::failIf(text.size() > longestName || control, "{}",
+                 control ? fmt::format("{} has control characters", what)
+                         : fmt::format("{} has {} bytes: {} at most", what, text.size(), longestName));
 }
 
 struct Bounds {
     const TickRecord& tick;
 
-    [[noreturn]] void refuse(const std::string& what) const
-    {
-        throw std::runtime_error(fmt::format("tick {}: {}", tick.tick, what));
-    }
+    [[noreturn]] void refuse(const std::string& what) const { throw base::error("tick {}: {}", tick.tick, what); }
 
     void within(const char* what, double value, double low, double high) const
     {
@@ -79,16 +75,12 @@ void checkCore(const Bounds& check, const CoreSample& core, std::size_t tissues)
 
 void checkInfo(const SessionInfo& info)
 {
-    if (!(info.rate >= slowestRate && info.rate <= fastestRate)) {
-        throw std::runtime_error(
-            fmt::format("a rate of {:g} Hz is outside {:g} to {:g} Hz", info.rate, slowestRate, fastestRate));
-    }
-    if (info.structures.size() > maxStructures || info.tissues.size() > maxTissues) {
-        throw std::runtime_error(
-            fmt::format("{} structures and {} tissues: at most {} structures and {} tissues fit into a "
-                        "record",
-                        info.structures.size(), info.tissues.size(), maxStructures, maxTissues));
-    }
+    base::failIf(!(info.rate >= slowestRate && info.rate <= fastestRate), "a rate of {:g} Hz is outside {:g} to {:g} Hz",
+                 info.rate, slowestRate, fastestRate);
+    base::failIf(info.structures.size() > maxStructures || info.tissues.size() > maxTissues,
+                 "{} structures and {} tissues: at most {} structures and {} tissues fit into a "
+                 "record",
+                 info.structures.size(), info.tissues.size(), maxStructures, maxTissues);
     checkName("the operator", info.operatorName);
     checkName("the host", info.host);
     checkName("the date", info.started);
@@ -100,10 +92,8 @@ void checkInfo(const SessionInfo& info)
         checkName("the name of a tissue", name);
     }
     for (const double distance : info.warnDistances) {
-        if (!(distance >= 0 && distance <= furthest)) {
-            throw std::runtime_error(
-                fmt::format("a warning distance of {:g} m is outside 0 to {:g} m", distance, furthest));
-        }
+        base::failIf(!(distance >= 0 && distance <= furthest), "a warning distance of {:g} m is outside 0 to {:g} m",
+                     distance, furthest);
     }
 }
 

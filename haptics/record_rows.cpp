@@ -1,13 +1,13 @@
 #include <haptics/record_rows.h>
 
+#include <base/error.h>
+
 namespace palpate::haptics::format {
 
 void readEvent(const Statement& row, TickRecord& record)
 {
-    if (integerOf(row, 5, "position of an event", 0, maxEventsPerTick - 1) != record.eventCount) {
-        throw std::runtime_error(
-            fmt::format("tick {}: event {} is missing or there twice", record.tick, record.eventCount));
-    }
+    base::failIf(integerOf(row, 5, "position of an event", 0, maxEventsPerTick - 1) != record.eventCount,
+                 "tick {}: event {} is missing or there twice", record.tick, record.eventCount);
     Event& event = record.events[record.eventCount++];
     event.kind = fromName<EventKind>(row.text(1), eventNames);
     event.structure = optionalIndex(row, 2, "structure of an event");
@@ -17,9 +17,7 @@ void readEvent(const Statement& row, TickRecord& record)
 
 void readCore(const Statement& row, TickRecord& record, bool& found)
 {
-    if (!record.fired) {
-        throw std::runtime_error(fmt::format("tick {}: a core of a tick that did not fire", record.tick));
-    }
+    base::failIf(!record.fired, "tick {}: a core of a tick that did not fire", record.tick);
     CoreSample& core = record.core;
     const auto real = [&row](int column) { return realOf(row, column, "a value of a core"); };
     core.volume = real(1);
@@ -34,9 +32,7 @@ void readCore(const Statement& row, TickRecord& record, bool& found)
 
 void readFraction(const Statement& row, TickRecord& record)
 {
-    if (!record.fired) {
-        throw std::runtime_error(fmt::format("tick {}: fractions of a core of a tick that did not fire", record.tick));
-    }
+    base::failIf(!record.fired, "tick {}: fractions of a core of a tick that did not fire", record.tick);
     const auto tissue = integerOf(row, 1, "tissue of a core", 0, static_cast<std::int64_t>(maxTissues) - 1);
     record.core.fraction[static_cast<std::size_t>(tissue)] = realOf(row, 2, "fraction of a core");
 }

@@ -2,10 +2,9 @@
 
 // Rows of a record's file as fields of ours, none of them believed; used by the reader (record.cpp), no public header.
 
+#include <base/error.h>
 #include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
-
-#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -29,7 +28,7 @@ Enum fromName(std::string_view word, const std::array<std::string_view, n>& name
         std::string shown(word.substr(0, 40));
         std::ranges::replace_if(
             shown, [](char c) { return c < 0x20 || c == 0x7F; }, '?');
-        throw std::runtime_error("unknown word '" + shown + "'");
+        throw base::error("unknown word '{}'", shown);
     }
     return static_cast<Enum>(found - names.begin());
 }
@@ -37,20 +36,16 @@ Enum fromName(std::string_view word, const std::array<std::string_view, n>& name
 // A value of the row as the file must have it; throws with the column's name.
 inline std::int64_t integerOf(const Statement& row, int column, const char* name, std::int64_t low, std::int64_t high)
 {
-    if (row.type(column) != SQLITE_INTEGER) {
-        throw std::runtime_error(std::string(name) + " is no whole number");
-    }
+    base::failIf(row.type(column) != SQLITE_INTEGER, "{} is no whole number", name);
     const std::int64_t value = row.integer(column);
-    if (value < low || value > high) {
-        throw std::runtime_error(fmt::format("{} is {}, outside {} to {}", name, value, low, high));
-    }
+    base::failIf(value < low || value > high, "{} is {}, outside {} to {}", name, value, low, high);
     return value;
 }
 
 inline double realOf(const Statement& row, int column, const char* name)
 {
     if (const int type = row.type(column); type == SQLITE_TEXT || type == SQLITE_BLOB) {
-        throw std::runtime_error(std::string(name) + " is no number");
+        throw base::error("{} is no number", name);
     }
     return row.real(column);
 }
@@ -124,8 +119,7 @@ private:
     void next() { tick_ = rows_.step() ? std::optional(tickOf(rows_)) : std::nullopt; }
     [[noreturn]] void orphan() const
     {
-        throw std::runtime_error(
-            fmt::format("table {} has a row of tick {}, which table ticks does not have", table_, *tick_));
+        throw base::error("table {} has a row of tick {}, which table ticks does not have", table_, *tick_);
     }
 
     std::string table_;

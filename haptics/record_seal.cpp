@@ -1,5 +1,6 @@
 #include <haptics/record_seal.h>
 
+#include <base/error.h>
 #include <haptics/record_format.h>
 
 #include <fmt/format.h>
@@ -9,7 +10,6 @@
 #include <bit>
 #include <map>
 #include <new>
-#include <stdexcept>
 
 namespace palpate::haptics::format {
 
@@ -78,9 +78,7 @@ RowDigest::RowDigest() : context_(EVP_MD_CTX_new())
 
 void RowDigest::addBytes(const void* bytes, std::size_t count)
 {
-    if (EVP_DigestUpdate(context_.get(), bytes, count) != 1) {
-        throw std::runtime_error("SHA-256 cannot be computed");
-    }
+    base::failIf(EVP_DigestUpdate(context_.get(), bytes, count) != 1, "SHA-256 cannot be computed");
 }
 
 void RowDigest::addBits(char type, std::uint64_t bits)
@@ -119,10 +117,9 @@ std::string RowDigest::text() const
     const std::unique_ptr<evp_md_ctx_st, Free> copy(EVP_MD_CTX_new());
     std::array<unsigned char, EVP_MAX_MD_SIZE> bytes{};
     unsigned count = 0;
-    if (!copy || EVP_MD_CTX_copy_ex(copy.get(), context_.get()) != 1 ||
-        EVP_DigestFinal_ex(copy.get(), bytes.data(), &count) != 1) {
-        throw std::runtime_error("SHA-256 cannot be computed");
-    }
+    base::failIf(!copy || EVP_MD_CTX_copy_ex(copy.get(), context_.get()) != 1 ||
+                     EVP_DigestFinal_ex(copy.get(), bytes.data(), &count) != 1,
+                 "SHA-256 cannot be computed");
     std::string out;
     for (unsigned i = 0; i < count; ++i) {
         out += fmt::format("{:02x}", bytes[i]);

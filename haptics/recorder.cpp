@@ -1,10 +1,10 @@
+#include <base/error.h>
 #include <haptics/record_bounds.h>
 #include <haptics/record_format.h>
 #include <haptics/recorder.h>
 
 #include <boost/lockfree/spsc_queue.hpp>
 
-#include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
 #include <sys/stat.h>
@@ -95,7 +95,7 @@ void writeInfo(Database& database, const SessionInfo& info)
 
 [[noreturn]] void refuse(const std::string& file, const std::string& why)
 {
-    throw std::runtime_error(file + ": cannot be made: " + why);
+    throw base::error("{}: cannot be made: {}", file, why);
 }
 
 // Gives `part` the name `file`, never in another file's place.
@@ -106,7 +106,7 @@ void giveName(const std::string& part, const std::string& file)
         failed = std::rename(part.c_str(), file.c_str()) == 0 ? 0 : errno;
     }
     if (failed == EEXIST || failed == EINVAL) {
-        throw std::runtime_error(file + ": exists already; choose another name or remove it");
+        throw base::error("{}: exists already; choose another name or remove it", file);
     }
     if (failed != 0) {
         refuse(file, std::strerror(failed));
@@ -117,7 +117,7 @@ void giveName(const std::string& part, const std::string& file)
 void makeFile(const std::string& file, const SessionInfo& info)
 {
     if (std::filesystem::exists(file)) {
-        throw std::runtime_error(file + ": exists already; choose another name or remove it");
+        throw base::error("{}: exists already; choose another name or remove it", file);
     }
     const std::string part = file + "." + std::to_string(::getpid()) + ".part";
     removeFile(part);

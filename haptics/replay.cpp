@@ -1,5 +1,6 @@
 #include <haptics/replay.h>
 
+#include <base/error.h>
 #include <haptics/score.h>
 #include <haptics/simulation.h>
 #include <volume/fnv.h>
@@ -11,7 +12,6 @@
 
 #include <algorithm>
 #include <array>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -49,12 +49,10 @@ ReplayResult replay(const Record& record, const SessionModel& model)
     ForceHash hash;
     TickComparison comparison(record);
     record.each([&](const TickRecord& then) {
-        if (then.tick != result.ticks) {
-            throw std::runtime_error(
-                fmt::format("tick {} is missing in the record: forces depend on every tick, so it "
-                            "cannot be replayed",
-                            result.ticks));
-        }
+        base::failIf(then.tick != result.ticks,
+                     "tick {} is missing in the record: forces depend on every tick, so it "
+                     "cannot be replayed",
+                     result.ticks);
         const TickRecord& now = simulation.tick(then.device);
         hash.add(now);
         ++result.ticks;
@@ -63,9 +61,7 @@ ReplayResult replay(const Record& record, const SessionModel& model)
             result.firstDifference = result.firstDifference.value_or(then.tick);
         }
     });
-    if (result.ticks == 0) {
-        throw std::runtime_error("the record holds no ticks: there is nothing to replay");
-    }
+    base::failIf(result.ticks == 0, "the record holds no ticks: there is nothing to replay");
     result.forceHash = hash.value();
     result.differences = comparison.differences();
     result.inWords = comparison.inWords();

@@ -1,11 +1,11 @@
 #include <haptics/session_model.h>
 
+#include <base/error.h>
 #include <chainmail/deformation.h>
 #include <chainmail/loose_pieces.h>
 #include <haptics/posed.h>
 #include <haptics/probe_placement.h>
 
-#include <fmt/format.h>
 #include <glm/common.hpp>
 
 #include <algorithm>
@@ -115,8 +115,7 @@ GuardedStructure guarded(const volume::Tissue& tissue, const volume::NodeGrid& g
     s.name = name;
     s.labels = tissue.labelsNamed(name);
     if (s.labels.empty()) {
-        throw std::runtime_error(
-            fmt::format("{}: {} '{}' is not in the volume; it has: {}", scene, what, name, structureNames(tissue)));
+        throw base::error("{}: {} '{}' is not in the volume; it has: {}", scene, what, name, structureNames(tissue));
     }
     s.distance = tissue.distanceTo(s.labels, grid);
     return s;
@@ -127,22 +126,19 @@ std::string structureAt(const volume::Tissue& tissue, Vec3 aim, const std::strin
 {
     const std::uint16_t label = volume::Tissue::Reader(tissue).label(aim);
     const auto at = std::ranges::find(tissue.structures(), label, &volume::Structure::value);
-    if (at == tissue.structures().end() || tissue.table().rows[at->tissue].role == volume::Role::air) {
-        throw std::runtime_error(fmt::format("{}: [target] aim_mm = [{:g}, {:g}, {:g}] lies outside the body", scene,
-                                             1e3 * aim.x, 1e3 * aim.y, 1e3 * aim.z));
-    }
+    base::failIf(at == tissue.structures().end() || tissue.table().rows[at->tissue].role == volume::Role::air,
+                 "{}: [target] aim_mm = [{:g}, {:g}, {:g}] lies outside the body", scene, 1e3 * aim.x, 1e3 * aim.y,
+                 1e3 * aim.z);
     return at->name;
 }
 
 void checkToolFits(const datasets::Scene& scene, const chainmail::Lattice& lattice)
 {
     constexpr std::size_t maxSeeds = 1U << 16;  // nodes that a tool may hold: beyond, a tick has no time for them
-    if (chainmail::maxPressSeeds(lattice, scene.tool.radius) > maxSeeds) {
-        throw std::runtime_error(
-            fmt::format("{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise [model{}] spacing_mm",
-                        scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing,
-                        scene.model.level == datasets::ModelLevel::elastic ? ".elastic" : ""));
-    }
+    base::failIf(chainmail::maxPressSeeds(lattice, scene.tool.radius) > maxSeeds,
+                 "{}: a tool of {:g} mm radius is too large for a lattice of {:g} mm: raise [model{}] spacing_mm",
+                 scene.name, 1e3 * scene.tool.radius, 1e3 * lattice.grid.spacing,
+                 scene.model.level == datasets::ModelLevel::elastic ? ".elastic" : "");
 }
 
 // The planned line. A probe that is to lie over the target gets its place. The scene keeps the places of its text.
@@ -176,18 +172,13 @@ datasets::Approach approachIfAny(datasets::Scene& scene, const Posed& posture, c
 
 SessionModel buildModel(datasets::Scene scene, std::shared_ptr<const volume::Tissue> tissue, bool isSession)
 {
-    if (!tissue) {
-        throw std::runtime_error(scene.name + ": a model needs the scene's volume, and there is none");
-    }
-    if (tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures) {
-        throw std::runtime_error(fmt::format("{}: at most {} tissues and {} vital structures are supported", scene.name,
-                                             maxTissues, maxStructures - 1));
-    }
-    if (scene.model.walls && !anyWalls(*tissue)) {
-        throw std::runtime_error(scene.name +
-                                 ": [model] walls = true, but no tissue of the volume has inner walls: give one "
-                                 "of them wall_spacing_mm and wall_n in [tissue.NAME]");
-    }
+    base::failIf(!tissue, "{}: a model needs the scene's volume, and there is none", scene.name);
+    base::failIf(tissue->table().rows.size() > maxTissues || scene.vital.size() + 1 > maxStructures,
+                 "{}: at most {} tissues and {} vital structures are supported", scene.name, maxTissues, maxStructures - 1);
+    base::failIf(scene.model.walls && !anyWalls(*tissue),
+                 "{}: [model] walls = true, but no tissue of the volume has inner walls: give one of them wall_spacing_mm "
+                 "and wall_n in [tissue.NAME]",
+                 scene.name);
     const Posed posture = posed(scene, std::move(tissue));
     tissue = posture.tissue;
     if (scene.target.empty() && posture.aim) {

@@ -14,8 +14,6 @@
 #include <array>
 #include <memory>
 #include <optional>
-#include <span>
-#include <vector>
 
 namespace palpate::haptics {
 

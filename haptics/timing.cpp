@@ -3,7 +3,6 @@
 #include <boost/histogram.hpp>
 
 #include <algorithm>
-#include <cstddef>
 #include <vector>
 
 namespace palpate::haptics {

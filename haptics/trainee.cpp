@@ -1,12 +1,12 @@
 #include <haptics/trainee.h>
 
+#include <base/error.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
-#include <cmath>
-#include <stdexcept>
 
 namespace palpate::haptics {
 
@@ -45,9 +45,7 @@ constexpr int maxLooks = 4;     // at one picture without the tip; then it goes 
 const Skill& skillCalled(std::string_view name)
 {
     const auto* const found = std::find_if(skills.begin(), skills.end(), [&](const Skill& s) { return s.name == name; });
-    if (found == skills.end()) {
-        throw std::runtime_error(fmt::format("trainee '{}': there are {}", name, fmt::join(skillNames(), ", ")));
-    }
+    base::failIf(found == skills.end(), "trainee '{}': there are {}", name, fmt::join(skillNames(), ", "));
     return *found;
 }
 

@@ -7,11 +7,7 @@
 #include <haptics/session_model.h>
 #include <haptics/trainee_skill.h>
 
-#include <array>
 #include <cstdint>
-#include <string>
-#include <string_view>
-#include <vector>
 
 namespace palpate::haptics {
 

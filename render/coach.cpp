@@ -5,7 +5,6 @@
 #include <render/deformation.h>
 #include <render/events.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>

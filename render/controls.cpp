@@ -6,7 +6,6 @@
 
 #include <vtkCommand.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>

@@ -3,16 +3,15 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <base/error.h>
 #include <fcntl.h>
 #include <poll.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/random.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
-#include <cerrno>
 #include <csignal>
 #include <cstdlib>
 #include <stdexcept>
@@ -85,8 +84,7 @@ bool displayWorks()
 std::string PrivateDisplay::start(const std::string& cookieFile, int& status)
 {
     std::array<int, 2> answer{};
-    if (::pipe(answer.data()) != 0)
-        throw std::runtime_error("cannot start a display: out of file descriptors");
+    base::failIf(::pipe(answer.data()) != 0, "cannot start a display: out of file descriptors");
     const pid_t parent = ::getpid();
     server_ = ::fork();
     if (server_ == 0) {
@@ -105,8 +103,7 @@ std::string PrivateDisplay::start(const std::string& cookieFile, int& status)
 
 PrivateDisplay::PrivateDisplay() : cookie_(secretCookie())
 {
-    if (cookie_ < 0)
-        throw std::runtime_error("cannot start a display: out of file descriptors");
+    base::failIf(cookie_ < 0, "cannot start a display: out of file descriptors");
     const std::string cookieFile = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(cookie_);
     // Two servers that start at the same moment may take the same number, and one of them ends: it looks again.
     constexpr int attempts = 4;

@@ -2,8 +2,6 @@
 
 #include <base/said.h>
 
-#include <fmt/format.h>
-
 #include <algorithm>
 
 namespace palpate::render {

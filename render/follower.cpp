@@ -1,16 +1,14 @@
 #include <render/follower.h>
 
+#include <base/error.h>
 #include <base/said.h>
 #include <render/result_file.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <ctime>
 
 #include <algorithm>
-#include <cmath>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::render {
@@ -66,7 +64,7 @@ std::string onlySession(const std::vector<std::string>& running)
     std::string all;
     for (const std::string& name : running)
         all += (all.empty() ? "" : ", ") + name;
-    throw std::runtime_error("several sessions are running (" + all + "): choose one with --session NAME");
+    throw base::error("several sessions are running ({}): choose one with --session NAME", all);
 }
 
 }  // namespace
@@ -189,14 +187,10 @@ void Follower::lookForResult(Picture& picture)
 
 void Follower::giveUp() const
 {
-    if (ending_ == channel::Ending::torn)
-        throw std::runtime_error(fmt::format("session {}: its shared memory was cut off by another program", name_));
-    if (ending_ == channel::Ending::killed)
-        throw std::runtime_error(fmt::format("session {} stopped without ending (process {} is gone)", name_, pid_));
-    if (ending_ == channel::Ending::none)
-        throw std::runtime_error(fmt::format("no session {}within {:g} s: start one with palpate train{}",
-                                             wanted_.empty() ? "" : wanted_ + " ", wait_,
-                                             wanted_.empty() ? "" : " --session " + wanted_));
+    base::failIf(ending_ == channel::Ending::torn, "session {}: its shared memory was cut off by another program", name_);
+    base::failIf(ending_ == channel::Ending::killed, "session {} stopped without ending (process {} is gone)", name_, pid_);
+    base::failIf(ending_ == channel::Ending::none, "no session {}within {:g} s: start one with palpate train{}",
+                 wanted_.empty() ? "" : wanted_ + " ", wait_, wanted_.empty() ? "" : " --session " + wanted_);
 }
 
 void Follower::poll(Picture& picture)

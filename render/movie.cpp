@@ -1,5 +1,6 @@
 #include <render/movie.h>
 
+#include <base/error.h>
 #include <base/process.h>
 
 #include <vtkImageData.h>
@@ -14,7 +15,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -26,7 +26,7 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
 {
     std::array<int, 2> ends{};
     if (::pipe2(ends.data(), O_CLOEXEC) != 0)
-        throw std::runtime_error(file_.string() + ": " + std::strerror(errno));
+        throw base::error("{}: {}", file_.native(), std::strerror(errno));
     // An ffmpeg that has ended is an error of write(), and no signal.
     std::signal(SIGPIPE, SIG_IGN);
     const int* size = window.GetSize();
@@ -48,8 +48,9 @@ MovieFile::MovieFile(std::filesystem::path file, vtkRenderWindow& window)
     pipe_ = ends[1];
     if (error != 0) {
         closeAndWait();
-        throw std::runtime_error(file_.string() + ": needs the program ffmpeg (" + std::strerror(error) +
-                                 "): install the package ffmpeg, or write pictures with --offscreen DIR");
+        throw base::error(
+            "{}: needs the program ffmpeg ({}): install the package ffmpeg, or write pictures with --offscreen DIR",
+            file_.native(), std::strerror(error));
     }
 }
 
@@ -85,8 +86,8 @@ void MovieFile::add(int frames)
     for (int i = 0; i < frames; ++i)
         for (std::size_t done = 0; done < size;) {
             const ssize_t written = ::write(pipe_, bytes + done, size - done);
-            if (written < 0 && errno != EINTR)
-                throw std::runtime_error(file_.string() + ": ffmpeg has ended (is the disk full? its message is above)");
+            base::failIf(written < 0 && errno != EINTR, "{}: ffmpeg has ended (is the disk full? its message is above)",
+                         file_.native());
             done += written > 0 ? static_cast<std::size_t>(written) : 0;
         }
 }
@@ -99,8 +100,7 @@ bool MovieFile::finish()
     std::error_code error;
     if (status == 0)
         std::filesystem::rename(partial_, file_, error);
-    if (status != 0 || error)
-        throw std::runtime_error(file_.string() + ": cannot be written (ffmpeg's message is above)");
+    base::failIf(status != 0 || error, "{}: cannot be written (ffmpeg's message is above)", file_.native());
     return true;
 }
 

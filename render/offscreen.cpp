@@ -1,3 +1,4 @@
+#include <base/error.h>
 #include <base/outputs.h>
 #include <base/png.h>
 #include <render/events.h>
@@ -17,7 +18,6 @@
 #include <cctype>
 #include <cmath>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -96,7 +96,7 @@ private:
             std::filesystem::rename(partial, file, error);
         if (writer->GetErrorCode() != 0 || error) {
             std::filesystem::remove(partial, error);
-            throw std::runtime_error(file.string() + ": cannot be written (is the disk full?)");
+            throw base::error("{}: cannot be written (is the disk full?)", file.native());
         }
     }
 

@@ -6,13 +6,11 @@
 #include <render/tool_picture.h>
 #include <render/volume_picture.h>
 
-#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <span>
 #include <vector>
 
 namespace palpate::render {

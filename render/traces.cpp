@@ -1,7 +1,5 @@
 #include <render/traces.h>
 
-#include <base/said.h>
-
 #include <render/overlay.h>
 
 #include <fmt/format.h>

@@ -17,7 +17,6 @@
 #include <cmath>
 #include <cstring>
 #include <exception>
-#include <utility>
 
 namespace palpate::render {
 namespace {

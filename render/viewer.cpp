@@ -1,5 +1,6 @@
 #include <render/viewer.h>
 
+#include <base/error.h>
 #include <render/display.h>
 #include <render/hosts.h>
 
@@ -12,7 +13,6 @@
 #include <cstdlib>
 #include <iterator>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -45,11 +45,10 @@ void standBack()
 void check(const ViewerOptions& options)
 {
     constexpr int most = 8192;
-    if (options.width < leastSide || options.height < leastSide || options.width > most || options.height > most)
-        throw std::runtime_error("size " + std::to_string(options.width) + "x" + std::to_string(options.height) +
-                                 ": each side must be 320 to 8192 pixels");
-    if (!(options.every >= 0) || !(options.wait >= 0))
-        throw std::runtime_error("the times for pictures and for waiting must be 0 s or more");
+    base::failIf(options.width < leastSide || options.height < leastSide || options.width > most || options.height > most,
+                 "size {}x{}: each side must be 320 to 8192 pixels", options.width, options.height);
+    base::failIf(!(options.every >= 0) || !(options.wait >= 0),
+                 "the times for pictures and for waiting must be 0 s or more");
 }
 
 }  // namespace
@@ -81,8 +80,7 @@ ViewerFigures runViewer(const ViewerOptions& options)
     standBack();
     const bool window = options.offscreen.empty() && options.movie.empty();
     const bool works = !options.hidden && displayWorks();
-    if (window && !options.hidden && !works)
-        throw std::runtime_error("no display: set DISPLAY, or use --offscreen DIR");
+    base::failIf(window && !options.hidden && !works, "no display: set DISPLAY, or use --offscreen DIR");
     std::optional<PrivateDisplay> display;
     if (!works)
         display.emplace();

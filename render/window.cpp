@@ -4,6 +4,7 @@
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 
+#include <base/error.h>
 #include <render/controls.h>
 #include <render/follower.h>
 #include <render/hosts.h>
@@ -22,7 +23,6 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -41,8 +41,7 @@ using Window = std::unique_ptr<GLFWwindow, WindowCloser>;
 
 Window openWindow(const ViewerOptions& options)
 {
-    if (glfwInit() == GLFW_FALSE)
-        throw std::runtime_error("no display: set DISPLAY, or use --offscreen DIR");
+    base::failIf(glfwInit() == GLFW_FALSE, "no display: set DISPLAY, or use --offscreen DIR");
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -56,8 +55,7 @@ Window openWindow(const ViewerOptions& options)
         height = std::min(height, options.height);
     }
     Window window(glfwCreateWindow(width, height, "Palpate", nullptr, nullptr));
-    if (!window)
-        throw std::runtime_error("the display has no OpenGL 3.2, which the viewer needs");
+    base::failIf(!window, "the display has no OpenGL 3.2, which the viewer needs");
     glfwSetWindowSizeLimits(window.get(), leastSide, leastSide, GLFW_DONT_CARE, GLFW_DONT_CARE);
     glfwMakeContextCurrent(window.get());
     glfwSwapInterval(0);
@@ -90,8 +88,7 @@ void connect(vtkGenericOpenGLRenderWindow& target, GLFWwindow* window)
     target.SetMapped(true);
     target.SetReadyForRendering(true);
     target.SetShowWindow(true);
-    if (!target.InitializeFromCurrentContext())
-        throw std::runtime_error("the display has no OpenGL 3.2, which the viewer needs");
+    base::failIf(!target.InitializeFromCurrentContext(), "the display has no OpenGL 3.2, which the viewer needs");
     target.SetSwapBuffers(0);
 }
 

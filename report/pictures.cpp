@@ -1,5 +1,6 @@
 #include <report/pictures.h>
 
+#include <base/error.h>
 #include <base/png.h>
 #include <base/split.h>
 #include <report/html.h>
@@ -12,7 +13,6 @@
 #include <fstream>
 #include <iterator>
 #include <optional>
-#include <stdexcept>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -88,9 +88,7 @@ std::vector<std::filesystem::path> pngFilesIn(const std::filesystem::path& folde
             all.push_back(entry.path());
         }
     }
-    if (failed) {
-        throw std::runtime_error(folder.string() + ": pictures cannot be read: " + failed.message());
-    }
+    base::failIf(static_cast<bool>(failed), "{}: pictures cannot be read: {}", folder.native(), failed.message());
     std::ranges::sort(all);
     return all;
 }

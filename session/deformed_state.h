@@ -6,7 +6,6 @@
 #include <haptics/simulation.h>
 #include <volume/resample.h>
 
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>

@@ -20,7 +20,6 @@
 #include <cstdio>
 #include <ctime>
 #include <memory>
-#include <stdexcept>
 #include <system_error>
 
 namespace palpate::session {
@@ -149,7 +148,7 @@ Scene volumeScene(const std::filesystem::path& file, const volume::Tissue& tissu
 volume::Tissue loadVolume(const std::filesystem::path& file)
 {
     if (std::error_code none; std::filesystem::is_directory(file, none)) {
-        throw std::runtime_error(file.string() + ": is a folder: give a volume (.vdb)");
+        throw base::error("{}: is a folder: give a volume (.vdb)", file.native());
     }
     return volume::Tissue::load(file);
 }
@@ -209,7 +208,7 @@ haptics::SessionModel openSession(const std::string& what, SceneChanges changes)
     base::failIf(!builtIn && std::filesystem::is_directory(path, none),
                  "{}: is a folder: give a scene (.toml) or a volume (.vdb)", what);
     if (!builtIn && std::filesystem::is_symlink(path, none) && !std::filesystem::exists(path, none)) {
-        throw std::runtime_error(what + ": " + base::whyNoFile(path));
+        throw base::error("{}: {}", what, base::whyNoFile(path));
     }
     if (!builtIn && !std::filesystem::exists(path, none)) {
         throw base::error("{}: no such scene or volume; built-in scenes are: {}", what,

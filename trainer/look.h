@@ -1,7 +1,5 @@
 #pragma once
 
-#include <string>
-
 namespace palpate::trainer {
 
 /// Colours, spacing and font of the window. Call once for each text scale, between pictures.

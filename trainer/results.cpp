@@ -1,5 +1,6 @@
 #include <trainer/results.h>
 
+#include <base/error.h>
 #include <base/said.h>
 #include <base/user_files.h>
 #include <trainer/state.h>
@@ -14,7 +15,6 @@
 #include <fstream>
 #include <map>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <tuple>
@@ -226,9 +226,7 @@ SessionFiles SessionFolder::filesFor(const CaseEntry& of)
 {
     std::error_code failed;
     fs::create_directories(folder_, failed);
-    if (failed) {
-        throw std::runtime_error(folder_.string() + ": cannot be made (" + failed.message() + ")");
-    }
+    base::failIf(static_cast<bool>(failed), "{}: cannot be made ({})", folder_.native(), failed.message());
     const std::string stem = fmt::format("{}-{:%Y%m%d-%H%M%S}", of.id, fmt::localtime(std::time(nullptr)));
     for (int i = 0;; ++i) {
         const fs::path base = folder_ / (i == 0 ? stem : fmt::format("{}-{}", stem, i));

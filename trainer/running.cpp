@@ -1,5 +1,6 @@
 #include <trainer/running.h>
 
+#include <base/error.h>
 #include <base/process.h>
 
 #include <fcntl.h>
@@ -10,7 +11,6 @@
 #include <chrono>
 #include <cstring>
 #include <fstream>
-#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -26,9 +26,7 @@ Running::Running(const std::filesystem::path& program, const std::vector<std::st
     if (out >= 0) {
         ::close(out);
     }
-    if (error != 0) {
-        throw std::runtime_error(program.string() + ": cannot be started (" + std::strerror(error) + ")");
-    }
+    base::failIf(error != 0, "{}: cannot be started ({})", program.native(), std::strerror(error));
     pid_ = pid;
 }
 

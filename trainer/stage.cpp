@@ -1,5 +1,6 @@
 #include <trainer/stage.h>
 
+#include <base/error.h>
 #include <base/words.h>
 #include <trainer/case_pictures.h>
 #include <trainer/look.h>
@@ -15,7 +16,6 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -38,17 +38,13 @@ using Window = std::unique_ptr<GLFWwindow, WindowCloser>;
 
 Window openWindow(int width, int height)
 {
-    if (glfwInit() == GLFW_FALSE) {
-        throw std::runtime_error(tr("no display: set DISPLAY, or type palpate --help for the commands"));
-    }
+    base::failIf(glfwInit() == GLFW_FALSE, "{}", tr("no display: set DISPLAY, or type palpate --help for the commands"));
     glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
     glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 2);
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_OPENGL_FORWARD_COMPAT, GLFW_TRUE);
     Window window(glfwCreateWindow(width, height, tr("Palpate trainer"), nullptr, nullptr));
-    if (!window) {
-        throw std::runtime_error(tr("the display has no OpenGL 3.2, which the window needs"));
-    }
+    base::failIf(!window, "{}", tr("the display has no OpenGL 3.2, which the window needs"));
     glfwMakeContextCurrent(window.get());
     glfwSwapInterval(0);
     return window;

@@ -1,5 +1,6 @@
 #include <training/case.h>
 
+#include <base/error.h>
 #include <base/nearest.h>
 #include <datasets/scene.h>
 #include <datasets/toml_section.h>
@@ -175,15 +176,15 @@ Case findCase(const std::string& id)
         }
     }
     if (std::error_code none; fs::is_directory(id, none)) {
-        throw std::runtime_error(id + ": no case: there is no " + std::string(caseFile) + " in it");
+        throw base::error("{}: no case: there is no {} in it", id, caseFile);
     }
     std::vector<std::string> ids;
     for (const Case& one : allCases()) {
         ids.push_back(one.id);
     }
     const std::string meant = base::nearest(id, ids);
-    throw std::runtime_error(fmt::format("{}: there is no such case{} (palpate case list)", id,
-                                         meant.empty() ? "" : "; did you mean " + meant + "?"));
+    throw base::error("{}: there is no such case{} (palpate case list)", id,
+                      meant.empty() ? "" : "; did you mean " + meant + "?");
 }
 
 namespace {

@@ -1,5 +1,6 @@
 #include <training/case.h>
 
+#include <base/error.h>
 #include <base/outputs.h>
 #include <datasets/approach.h>
 #include <datasets/scene_text.h>
@@ -12,7 +13,6 @@
 
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
 #include <string>
 
 namespace palpate::training {
@@ -43,11 +43,10 @@ std::string caseText(const NewCase& wanted, const datasets::Scene& scene, double
 Case makeCase(const NewCase& wanted)
 {
     if (fs::exists(wanted.folder)) {
-        throw std::runtime_error(wanted.folder.string() + ": exists already; choose another name or remove it");
+        throw base::error("{}: exists already; choose another name or remove it", wanted.folder.native());
     }
-    if (wanted.volume.extension() != ".vdb") {
-        throw std::runtime_error(wanted.volume.string() + ": a case is made of a volume (.vdb): palpate import makes one");
-    }
+    base::failIf(wanted.volume.extension() != ".vdb", "{}: a case is made of a volume (.vdb): palpate import makes one",
+                 wanted.volume.native());
     const volume::Tissue tissue = session::loadVolume(wanted.volume);
     const fs::path normal = fs::absolute(wanted.folder).lexically_normal();
     const fs::path folder = normal.has_filename() ? normal : normal.parent_path();  // of "name/"

@@ -1,5 +1,6 @@
 #include <training/course_check.h>
 
+#include <base/error.h>
 #include <haptics/record_format.h>
 
 #include <fmt/format.h>
@@ -13,7 +14,6 @@
 #include <cmath>
 #include <map>
 #include <random>
-#include <stdexcept>
 #include <utility>
 
 namespace palpate::training {
@@ -100,9 +100,7 @@ void storeSessions(const std::filesystem::path& file, const std::vector<Simulate
         const auto& sessions = courses[k].sessions;
         for (auto n = static_cast<std::size_t>(person.sessions); n < sessions.size(); ++n) {
             store.store(person, sessions[n]);
-            if (::write(out, "s", 1) != 1) {
-                throw std::runtime_error("nobody listens");
-            }
+            base::failIf(::write(out, "s", 1) != 1, "nobody listens");
         }
     }
 }
@@ -159,13 +157,9 @@ std::size_t storeAndKill(const std::filesystem::path& file, const std::vector<Si
     constexpr int maxHeard = 7;
     constexpr useconds_t longest = 12000;  // about two sessions [us]
     int ends[2];
-    if (::pipe(ends) != 0) {
-        throw std::runtime_error("no pipe can be made to a process that stores");
-    }
+    base::failIf(::pipe(ends) != 0, "no pipe can be made to a process that stores");
     const pid_t child = ::fork();
-    if (child < 0) {
-        throw std::runtime_error("no process can be started that stores");
-    }
+    base::failIf(child < 0, "no process can be started that stores");
     if (child == 0) {
         ::close(ends[0]);
         storeTheRest(file, courses, ends[1]);
@@ -210,9 +204,8 @@ CourseCheck checkCourses(const Curriculum& curriculum, int people, std::uint64_t
 {
     for (const Exercise& e : curriculum.exercises) {
         if (e.gate.of > longestWindow) {
-            throw std::runtime_error(
-                fmt::format("exercise {}: its gate looks at the last {} sessions; verify follows {} at most", e.id,
-                            e.gate.of, longestWindow));
+            throw base::error("exercise {}: its gate looks at the last {} sessions; verify follows {} at most", e.id,
+                              e.gate.of, longestWindow);
         }
     }
     CourseCheck check;

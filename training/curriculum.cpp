@@ -1,5 +1,6 @@
 #include <training/curriculum.h>
 
+#include <base/error.h>
 #include <base/nearest.h>
 #include <datasets/toml_section.h>
 #include <training/case.h>
@@ -208,8 +209,8 @@ Curriculum findCurriculum(const std::string& id)
         ids.push_back(one.id);
     }
     const std::string meant = base::nearest(id, ids);
-    throw std::runtime_error(fmt::format("{}: there is no such curriculum{} (palpate curriculum list)", id,
-                                         meant.empty() ? "" : "; did you mean " + meant + "?"));
+    throw base::error("{}: there is no such curriculum{} (palpate curriculum list)", id,
+                      meant.empty() ? "" : "; did you mean " + meant + "?");
 }
 
 std::pair<Curriculum, std::string> findExercise(const std::string& named)
@@ -218,12 +219,10 @@ std::pair<Curriculum, std::string> findExercise(const std::string& named)
     const std::size_t slash = fs::path(named).extension() == ".toml" ? std::string::npos : named.rfind('/');
     Curriculum curriculum = findCurriculum(named.substr(0, slash));
     std::string exercise = slash == std::string::npos ? "" : named.substr(slash + 1);
-    if (curriculum.exercise(exercise) == nullptr) {
-        throw std::runtime_error(
-            fmt::format("--exercise {}: {} has no such exercise: give CURRICULUM/EXERCISE (palpate "
-                        "curriculum check {})",
-                        named, curriculum.id, named.substr(0, slash)));
-    }
+    base::failIf(curriculum.exercise(exercise) == nullptr,
+                 "--exercise {}: {} has no such exercise: give CURRICULUM/EXERCISE (palpate "
+                 "curriculum check {})",
+                 named, curriculum.id, named.substr(0, slash));
     return {std::move(curriculum), std::move(exercise)};
 }
 

@@ -1,6 +1,7 @@
 #include <training/folders.h>
 
 #include <base/child_process.h>
+#include <base/error.h>
 #include <base/user_files.h>
 
 #include <cstdlib>
@@ -23,9 +24,7 @@ fs::path installedData()
 fs::path userData()
 {
     fs::path folder = base::userFolder(base::UserFolder::data);
-    if (folder.empty()) {
-        throw std::runtime_error("profiles: neither XDG_DATA_HOME nor HOME says where they are: give --profiles FILE");
-    }
+    base::failIf(folder.empty(), "profiles: neither XDG_DATA_HOME nor HOME says where they are: give --profiles FILE");
     return folder;
 }
 

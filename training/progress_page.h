@@ -4,7 +4,6 @@
 #include <training/progress.h>
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
 namespace palpate::training {

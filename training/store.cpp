@@ -1,5 +1,6 @@
 #include <training/store.h>
 
+#include <base/error.h>
 #include <base/nearest.h>
 #include <base/outputs.h>
 #include <base/utf8.h>
@@ -81,10 +82,8 @@ void makePrivate(const fs::path& file)
         ::chmod(file.parent_path().c_str(), 0700);
     }
     const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
-    if (descriptor < 0) {
-        throw std::runtime_error(
-            fmt::format("{}: cannot be opened: {}", file.string(), errno == ELOOP ? "is a link" : std::strerror(errno)));
-    }
+    base::failIf(descriptor < 0, "{}: cannot be opened: {}", file.string(),
+                 errno == ELOOP ? "is a link" : std::strerror(errno));
     if (isStore(descriptor)) {
         ::fchmod(descriptor, 0600);
     }
@@ -127,12 +126,9 @@ void migrate(Database& database)
     const auto application = pragma(database, "application_id");
     Statement tables(database, "SELECT count(*) FROM sqlite_master");
     tables.step();
-    if (tables.integer(0) > 0 && application != applicationId) {
-        throw std::runtime_error("is no file of profiles: choose another name");
-    }
+    base::failIf(tables.integer(0) > 0 && application != applicationId, "is no file of profiles: choose another name");
     if (version > newest) {
-        throw std::runtime_error(
-            fmt::format("was written by a newer Palpate (version {}; this one knows {}): update", version, newest));
+        throw base::error("was written by a newer Palpate (version {}; this one knows {}): update", version, newest);
     }
     for (auto v = version; v < newest; ++v) {
         database.execute(migrations[static_cast<std::size_t>(v)]);
@@ -166,9 +162,8 @@ void checkLine(const std::string& what, const std::string& text, std::size_t mos
 {
     const bool control =
         std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7F; });
-    if (text.empty() || text.size() > most || control || !base::isUtf8(text)) {
-        throw std::runtime_error(fmt::format("{}: must be 1 to {} bytes of text (UTF-8) in one line", what, most));
-    }
+    base::failIf(text.empty() || text.size() > most || control || !base::isUtf8(text),
+                 "{}: must be 1 to {} bytes of text (UTF-8) in one line", what, most);
 }
 
 }  // namespace
@@ -182,7 +177,7 @@ auto guarded(const fs::path& file, const Work& work)
     try {
         return work();
     } catch (const std::runtime_error& e) {
-        throw std::runtime_error(fmt::format("{}: {}", file.string(), e.what()));
+        throw base::error("{}: {}", file.string(), e.what());
     }
 }
 
@@ -233,16 +228,10 @@ fs::path ProfileStore::windowFolder() const
 Person ProfileStore::add(const std::string& name, Hand hand)
 {
     checkLine("profile '" + name + "'", name, 100);
-    if (name.front() == ' ' || name.back() == ' ') {
-        throw std::runtime_error("profile '" + name + "': must not begin or end with a blank");
-    }
-    if (name.front() == '-') {
-        throw std::runtime_error("profile '" + name + "': must not begin with '-', which commands take for an option");
-    }
+    base::failIf(name.front() == ' ' || name.back() == ' ', "profile '{}': must not begin or end with a blank", name);
+    base::failIf(name.front() == '-', "profile '{}': must not begin with '-', which commands take for an option", name);
     for (const Person& one : people()) {
-        if (one.name == name) {
-            throw std::runtime_error(name + ": there is a profile of this name already");
-        }
+        base::failIf(one.name == name, "{}: there is a profile of this name already", name);
     }
     return guarded(impl_->file, [&] {
         Statement insert(*impl_->database, "INSERT INTO person (name, hand, created) VALUES (?, ?, ?)");
@@ -282,9 +271,8 @@ Person ProfileStore::find(const std::string& name) const
         names.push_back(one.name);
     }
     const std::string meant = base::nearest(name, names);
-    throw std::runtime_error(
-        fmt::format("{}: there is no such profile{}", name,
-                    meant.empty() ? "; palpate profile new makes one" : "; did you mean " + meant + "?"));
+    throw base::error("{}: there is no such profile{}", name,
+                      meant.empty() ? "; palpate profile new makes one" : "; did you mean " + meant + "?");
 }
 
 void ProfileStore::setHand(const Person& person, Hand hand)
@@ -306,8 +294,7 @@ std::int64_t ProfileStore::store(const Person& person, const StoredSession& s)
             known.bind(1, person.id);
             known.bind(2, std::string_view(s.recordSha256));
             if (known.step()) {
-                throw std::runtime_error(
-                    fmt::format("{} has this session already, number {}", person.name, known.integer(0)));
+                throw base::error("{} has this session already, number {}", person.name, known.integer(0));
             }
         }
         Statement insert(
@@ -377,19 +364,15 @@ std::set<fs::path> ProfileStore::recordsOf(const Person& person) const
 void ProfileStore::annotate(const Person& person, std::int64_t session, const std::string& note, int rating)
 {
     guarded(impl_->file, [&] {
-        if (rating < 0 || rating > 5) {
-            throw std::runtime_error(fmt::format("rating {}: must be 1 to 5, or 0 for none", rating));
-        }
+        base::failIf(rating < 0 || rating > 5, "rating {}: must be 1 to 5, or 0 for none", rating);
         Statement update(*impl_->database, "UPDATE session SET note = ?, rating = ? WHERE id = ? AND person = ?");
         update.bind(1, std::string_view(note));
         update.bind(2, static_cast<std::int64_t>(rating));
         update.bind(3, session);
         update.bind(4, person.id);
         update.run();
-        if (sqlite3_changes(impl_->database->get()) == 0) {
-            throw std::runtime_error(
-                fmt::format("{} has no session {}: palpate progress '{}' lists them", person.name, session, person.name));
-        }
+        base::failIf(sqlite3_changes(impl_->database->get()) == 0, "{} has no session {}: palpate progress '{}' lists them",
+                     person.name, session, person.name);
     });
 }
 
@@ -451,16 +434,14 @@ Erased ProfileStore::erase(const Person& person)
 void ProfileStore::backup(const fs::path& to) const
 {
     if (fs::exists(to)) {
-        throw std::runtime_error(to.string() + ": exists already; choose another name or remove it");
+        throw base::error("{}: exists already; choose another name or remove it", to.native());
     }
     const fs::path part = to.string() + fmt::format(".{}.part", ::getpid());
     try {
         makePrivate(part);
         Database copy(part.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
         sqlite3_backup* const job = sqlite3_backup_init(copy.get(), "main", impl_->database->get(), "main");
-        if (job == nullptr) {
-            throw std::runtime_error(sqlite3_errmsg(copy.get()));
-        }
+        base::failIf(job == nullptr, "{}", sqlite3_errmsg(copy.get()));
         const int done = sqlite3_backup_step(job, -1);
         if (sqlite3_backup_finish(job); done != SQLITE_DONE) {
             throw std::runtime_error(sqlite3_errstr(done));
@@ -472,7 +453,7 @@ void ProfileStore::backup(const fs::path& to) const
         for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
             fs::remove(part.string() + suffix, none);
         }
-        throw std::runtime_error(fmt::format("{}: no backup was made: {}", to.string(), e.what()));
+        throw base::error("{}: no backup was made: {}", to.string(), e.what());
     }
 }
 

@@ -1,10 +1,10 @@
 #include <training/store.h>
 
+#include <base/error.h>
 #include <base/split.h>
 #include <haptics/measures.h>
 
 #include <cmath>
-#include <stdexcept>
 
 namespace palpate::training {
 
@@ -23,11 +23,10 @@ StoredSession sessionOf(const std::filesystem::path& file)
 {
     const haptics::Record record(file);
     const haptics::Seal seal = record.seal();
-    if (seal.state == haptics::Seal::State::open) {
-        throw std::runtime_error(file.string() + ": was not closed: its session was cut off or still runs");
-    }
+    base::failIf(seal.state == haptics::Seal::State::open, "{}: was not closed: its session was cut off or still runs",
+                 file.native());
     if (seal.state == haptics::Seal::State::broken) {
-        throw std::runtime_error(file.string() + ": was changed after it was closed: " + seal.changed.front());
+        throw base::error("{}: was changed after it was closed: {}", file.native(), seal.changed.front());
     }
     const haptics::SessionInfo& info = record.info();
     StoredSession s;

@@ -1,7 +1,6 @@
 #include <ultrasound/check_bodies.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace palpate::ultrasound {

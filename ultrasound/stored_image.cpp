@@ -1,5 +1,6 @@
 #include <ultrasound/stored_image.h>
 
+#include <base/error.h>
 #include <base/png.h>
 
 #include <nlohmann/json.hpp>
@@ -7,7 +8,6 @@
 #include <array>
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
 
 namespace palpate::ultrasound {
 
@@ -74,8 +74,7 @@ StoredHow understood(const json& j)
     how.width = j.at("width").get<int>();
     how.height = j.at("height").get<int>();
     constexpr int most = 8192;
-    if (how.width < 1 || how.height < 1 || how.width > most || how.height > most)
-        throw std::runtime_error("its size is none");
+    base::failIf(how.width < 1 || how.height < 1 || how.width > most || how.height > most, "its size is none");
     return how;
 }
 
@@ -93,15 +92,13 @@ StoredHow readStored(const std::filesystem::path& file)
 {
     std::ifstream in(file, std::ios::binary);
     const std::string png((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
-    if (!in)
-        throw std::runtime_error(file.string() + ": cannot be read");
+    base::failIf(!in, "{}: cannot be read", file.native());
     const std::string text = base::textInPng(png, keyword);
-    if (text.empty())
-        throw std::runtime_error(file.string() + ": is no ultrasound image that palpate has stored");
+    base::failIf(text.empty(), "{}: is no ultrasound image that palpate has stored", file.native());
     try {
         return understood(json::parse(text));
     } catch (const std::exception& e) {
-        throw std::runtime_error(file.string() + ": what it says of how it was made is damaged: " + e.what());
+        throw base::error("{}: what it says of how it was made is damaged: {}", file.native(), e.what());
     }
 }
 

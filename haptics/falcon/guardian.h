@@ -1,9 +1,5 @@
 #pragma once
 
-#include <atomic>
-#include <cstdint>
-#include <memory>
-
 namespace palpate::falcon {
 
 /// Sees to it that no Falcon is left under torque by a program that ends or stands still.

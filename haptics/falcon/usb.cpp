@@ -1,5 +1,6 @@
 #include <haptics/falcon/usb.h>
 
+#include <base/error.h>
 #include <haptics/falcon/bytes.h>
 #include <haptics/falcon/guardian.h>
 
@@ -13,7 +14,6 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <stdexcept>
 #include <thread>
 
 namespace palpate::falcon {
@@ -29,9 +29,7 @@ constexpr int interface = 0;
 
 void check(int result, const char* what)
 {
-    if (result < 0) {
-        throw std::runtime_error(fmt::format("USB: {}: {}", what, libusb_strerror(static_cast<libusb_error>(result))));
-    }
+    base::failIf(result < 0, "USB: {}: {}", what, libusb_strerror(static_cast<libusb_error>(result)));
 }
 
 // libusb with its lists.

@@ -105,10 +105,8 @@ DrawableChart drawableChart(Chart chart, const std::filesystem::path& file)
         std::ranges::copy_if(s.x, std::back_inserter(x), [](double v) { return !std::isnan(v); });
         std::ranges::copy_if(s.y, std::back_inserter(y), [](double v) { return !std::isnan(v); });
     }
-    if (x.empty()) {
-        throw base::error("{}: the chart has no value to draw{}", file.string(),
-                          out > 0 ? ": " + leftOut(out, chart.logX || chart.logY) : "");
-    }
+    base::failIf(x.empty(), "{}: the chart has no value to draw{}", file.string(),
+                 out > 0 ? ": " + leftOut(out, chart.logX || chart.logY) : "");
     out += std::erase_if(chart.bounds, [&](const ChartLine& b) { return !drawable(b.y, chart.logY); });
     for (const ChartLine& b : chart.bounds) {
         y.push_back(b.y);

@@ -2,7 +2,6 @@
 
 #include <report/chart/chart.h>
 
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
