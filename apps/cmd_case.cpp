@@ -1,7 +1,9 @@
 #include <apps/command.h>
+#include <apps/listed.h>
 #include <apps/viewers.h>
 #include <base/child_process.h>
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
@@ -55,19 +57,8 @@ nlohmann::json caseFigures(const Case& c)
 
 void list(const CaseArguments& o)
 {
-    std::vector<std::string> faults;
-    const auto all = training::allCases(&faults);
-    for (const std::string& fault : faults) {
-        fmt::print(stderr, "palpate: warning: {}\n", fault);
-    }
-    base::failIf(all.empty(), "{}", training::nothingThere("cases"));
-    if (!o.json.empty()) {
-        auto cases = nlohmann::json::array();
-        for (const Case& c : all) {
-            cases.push_back(caseFigures(c));
-        }
-        command::writeJson(o.json, {{"cases", cases}});
-    }
+    const auto all = listed("cases", training::allCases);
+    command::writeJson(o.json, {{"cases", base::mapped<nlohmann::json>(all, caseFigures)}});
     if (o.json != "-") {
         fmt::print("{:<22} {:<10}  {}\n", "case", "difficulty", "title: what it trains");
         for (const Case& c : all) {

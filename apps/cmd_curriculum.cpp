@@ -1,7 +1,10 @@
 #include <apps/command.h>
+#include <apps/listed.h>
 #include <base/error.h>
+#include <base/quantiles.h>
 #include <base/shell_word.h>
 #include <base/temporary_folder.h>
+#include <base/utc.h>
 #include <command/json.h>
 #include <command/options.h>
 #include <command/progress.h>
@@ -45,12 +48,7 @@ std::string levelInWords(const training::Level& level)
 
 void listCurricula(const CurriculumArguments& o)
 {
-    std::vector<std::string> faults;
-    const auto all = training::allCurricula(&faults);
-    for (const std::string& fault : faults) {
-        fmt::print(stderr, "palpate: warning: {}\n", fault);
-    }
-    base::failIf(all.empty(), "{}", training::nothingThere("curricula"));
+    const auto all = listed("curricula", training::allCurricula);
     auto figures = nlohmann::json::array();
     for (const Curriculum& c : all) {
         figures.push_back({{"id", c.id},
@@ -96,14 +94,9 @@ void checkCurriculum(const CurriculumArguments& o)
     fmt::print("good\n");
 }
 
-fs::path fileOf(const CurriculumArguments& o)
-{
-    return o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles;
-}
-
 void next(const CurriculumArguments& o)
 {
-    const training::ProfileStore store(fileOf(o));
+    const training::ProfileStore store(o.profiles);
     const training::Person person = store.find(o.profile);
     const auto sessions = store.sessions(person);
     // The one that was named, else that of the last session, else all.
@@ -112,12 +105,11 @@ void next(const CurriculumArguments& o)
     if (!o.id.empty() || last != sessions.rend()) {
         curricula.push_back(training::findCurriculum(o.id.empty() ? last->curriculum : o.id));
     } else {
-        curricula = training::allCurricula();
-        base::failIf(curricula.empty(), "{}", training::nothingThere("curricula"));
+        curricula = listed("curricula", training::allCurricula);
     }
     auto figures = nlohmann::json::array();
     for (const Curriculum& c : curricula) {
-        const auto progress = training::progressOf(c, sessions, training::utcNow());
+        const auto progress = training::progressOf(c, sessions, base::utc());
         const auto* const e = progress.next();
         if (e == nullptr) {
             figures.push_back({{"curriculum", c.id}, {"finished", true}});
@@ -148,12 +140,6 @@ void next(const CurriculumArguments& o)
     command::writeJson(o.json, {{"name", person.name}, {"next", figures}});
 }
 
-double quantile(std::vector<int> values, double fraction)
-{
-    std::ranges::sort(values);
-    return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
-}
-
 void simulate(const CurriculumArguments& o)
 {
     const Curriculum c = training::findCurriculum(o.id);
@@ -163,22 +149,20 @@ void simulate(const CurriculumArguments& o)
                    c.id, o.most, "skill", "finished", "sessions that took: median (quartiles; most)");
     }
     for (const training::LearningLaw& law : training::learningLaws()) {
-        std::vector<int> taken;
+        std::vector<double> taken;
         for (int k = 0; k < o.people; ++k) {
             const auto course = training::simulate(c, law, o.seed + static_cast<std::uint64_t>(k), o.most);
             if (course.finished) {
-                taken.push_back(static_cast<int>(course.sessions.size()));
+                taken.push_back(static_cast<double>(course.sessions.size()));
             }
         }
         nlohmann::json one = {{"skill", law.name}, {"people", o.people}, {"finished", taken.size()}};
         std::string words = "none";
         if (!taken.empty()) {
-            one["sessions"] = {{"median", quantile(taken, 0.5)},
-                               {"lower_quartile", quantile(taken, 0.25)},
-                               {"upper_quartile", quantile(taken, 0.75)},
-                               {"max", quantile(taken, 1)}};
-            words = fmt::format("{:.0f} ({:.0f} to {:.0f}; {:.0f})", quantile(taken, 0.5), quantile(taken, 0.25),
-                                quantile(taken, 0.75), quantile(taken, 1));
+            const auto at = [&](double fraction) { return base::lowerQuantile(taken, fraction); };
+            one["sessions"] = {
+                {"median", at(0.5)}, {"lower_quartile", at(0.25)}, {"upper_quartile", at(0.75)}, {"max", at(1)}};
+            words = fmt::format("{:.0f} ({:.0f} to {:.0f}; {:.0f})", at(0.5), at(0.25), at(0.75), at(1));
         }
         figures.push_back(one);
         if (o.json != "-") {

@@ -3,6 +3,7 @@
 
 #include <base/child_process.h>
 #include <base/error.h>
+#include <base/quantiles.h>
 #include <command/json.h>
 
 #include <session/falcon.h>
@@ -154,12 +155,6 @@ nlohmann::json pushOnce(const DevicesArguments& o)
             {"words", falcon::inWords(test)}};
 }
 
-double atShare(const std::vector<double>& sorted, double fraction)
-{
-    const auto i = static_cast<std::size_t>(fraction * static_cast<double>(sorted.size()));
-    return sorted[std::min(i, sorted.size() - 1)];
-}
-
 nlohmann::json exchangeFigures(const Exchanges& e)
 {
     return {{"answered", e.counts.exchanges},
@@ -169,8 +164,8 @@ nlohmann::json exchangeFigures(const Exchanges& e)
             {"firmware_loaded", e.loaded},
             {"rate_hz", static_cast<double>(e.counts.exchanges) / e.seconds},
             {"round_trip_us",
-             {{"p50", 1e6 * atShare(e.roundTrip, 0.5)},
-              {"p99", 1e6 * atShare(e.roundTrip, 0.99)},
+             {{"p50", 1e6 * base::lowerQuantile(e.roundTrip, 0.5)},
+              {"p99", 1e6 * base::lowerQuantile(e.roundTrip, 0.99)},
               {"max", 1e6 * e.roundTrip.back()}}}};
 }
 
@@ -178,7 +173,7 @@ void printExchanges(const Exchanges& e)
 {
     const double rate = static_cast<double>(e.counts.exchanges) / e.seconds;
     fmt::print("{} packets there and back: {:.0f} per second, {:.0f} us (p50), {:.0f} us (p99)\n", e.counts.exchanges, rate,
-               1e6 * atShare(e.roundTrip, 0.5), 1e6 * atShare(e.roundTrip, 0.99));
+               1e6 * base::lowerQuantile(e.roundTrip, 0.5), 1e6 * base::lowerQuantile(e.roundTrip, 0.99));
     fmt::print("  {} were not answered, {} not plausible, {} bytes belonged to none\n", e.counts.unanswered,
                e.counts.implausible, e.counts.lostBytes);
     if (rate < slow || 100 * (e.counts.unanswered + e.counts.implausible) > e.counts.exchanges) {

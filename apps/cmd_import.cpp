@@ -95,63 +95,52 @@ void runImport(ImportArguments o)
 
 void addReading(CLI::App& command, ImportArguments& o)
 {
+    command.option_defaults()->group("Reading");
     command
         .add_option("--overlap", o.reading.overlap,
                     "Segment of a voxel in several segments: smallest (default), first, last, or names; later names win")
         ->type_name("RULE|NAMES")
-        ->delimiter(',')
-        ->group("Reading");
+        ->delimiter(',');
     command.add_option("--series", o.reading.series, "SeriesInstanceUID to read from a folder with several series")
-        ->type_name("UID")
-        ->group("Reading");
+        ->type_name("UID");
     command
         .add_option("--threshold", o.reading.fractionalThreshold,
                     "Lowest probability of tissue in a fractional DICOM SEG (default: 0.5)")
-        ->check(CLI::Range(0.0, 1.0))
-        ->group("Reading");
+        ->check(CLI::Range(0.0, 1.0));
     command.add_option("--volume", o.reading.volume, "Number of the volume in a 4D file, from 1")
         ->check(CLI::Range(1, 1 << 30))
-        ->type_name("N")
-        ->group("Reading");
-    command.add_flag("--renumber", o.reading.renumber, "Replace values below 0 or above 65535 by free label values")
-        ->group("Reading");
-    command.add_flag("--round", o.reading.round, "Round values that are within 0.001 of a whole number")->group("Reading");
+        ->type_name("N");
+    command.add_flag("--renumber", o.reading.renumber, "Replace values below 0 or above 65535 by free label values");
+    command.add_flag("--round", o.reading.round, "Round values that are within 0.001 of a whole number");
     command
         .add_option("--axes", o.reading.axes,
                     "Directions of the voxel axes, if the file does not define them: LPS, RAS, LAS, ...")
-        ->type_name("XYZ")
-        ->group("Reading");
-    command.add_flag("--dicom-labels", o.reading.dicomLabels, "Read the values of a DICOM series (CT, MR, ...) as labels")
-        ->group("Reading");
+        ->type_name("XYZ");
+    command.add_flag("--dicom-labels", o.reading.dicomLabels, "Read the values of a DICOM series (CT, MR, ...) as labels");
     command.add_option("--image-volume", o.imageVolume, "Number of the volume in a 4D image, from 1")
         ->check(CLI::Range(1, 1 << 30))
-        ->type_name("N")
-        ->group("Reading");
+        ->type_name("N");
     command.add_option("--image", o.image, "CT or MR of the same patient, on any grid, kept with the labels")
-        ->type_name("FILE")
-        ->group("Reading");
+        ->type_name("FILE");
     command.add_option("--image-unit", o.imageUnit, "HU: the image is CT in Hounsfield units; not needed for DICOM")
-        ->check(CLI::IsMember({"HU"}))
-        ->group("Reading");
+        ->check(CLI::IsMember({"HU"}));
     command
         .add_option("--stiffness-from", o.stiffness,
                     "Scale Young's modulus by the image: the built-in map hu, or a TOML file (docs/scenes.md)")
-        ->type_name("hu|FILE")
-        ->group("Reading");
+        ->type_name("hu|FILE");
 }
 
 void addMapping(CLI::App& command, ImportArguments& o)
 {
+    command.option_defaults()->group("Tissue");
     command
         .add_option("--map,--labels", o.mapping.map,
                     "Label map that assigns tissues to labels: a built-in name, or a TOML file")
-        ->type_name("NAME|FILE")
-        ->group("Tissue");
+        ->type_name("NAME|FILE");
     command
         .add_option("--names", o.mapping.names,
                     "Names of the labels: a colour table (3D Slicer, FreeSurfer, ITK-SNAP) or a dataset.json")
-        ->type_name("FILE")
-        ->group("Tissue");
+        ->type_name("FILE");
     command
         .add_flag_callback(
             "--list-maps",
@@ -162,19 +151,14 @@ void addMapping(CLI::App& command, ImportArguments& o)
                 throw CLI::Success();
             },
             "List the built-in label maps with their sources, and exit")
-        ->trigger_on_parse()
-        ->group("Tissue");
-    command.add_flag("--verbose", o.mapping.verbose, "Print a warning for each label and each overlap, not one for all")
-        ->group("Tissue");
+        ->trigger_on_parse();
+    command.add_flag("--verbose", o.mapping.verbose, "Print a warning for each label and each overlap, not one for all");
     command.add_option("--set", o.mapping.set, "Tissue of one label, by its name or value; may be repeated")
-        ->type_name("LABEL=TISSUE")
-        ->group("Tissue");
+        ->type_name("LABEL=TISSUE");
     command.add_option("--default-tissue", o.mapping.defaultTissue, "Tissue of labels that are not assigned otherwise")
-        ->type_name("NAME")
-        ->group("Tissue");
+        ->type_name("NAME");
     command.add_option("--write-map", o.mapping.writeMap, "Write a label map to edit, filled in as far as known, and exit")
-        ->type_name("FILE")
-        ->group("Tissue");
+        ->type_name("FILE");
     CLI::Option* const fromImage =
         command
             .add_option_function<std::vector<std::string>>(
@@ -182,35 +166,28 @@ void addMapping(CLI::App& command, ImportArguments& o)
                 "Segment skin, fat, muscle, bone, lung and vessels around the labels in the CT image")
             ->expected(0, 1)
             ->check(CLI::IsMember({"ct"}))
-            ->type_name("[ct]")
-            ->group("Tissue");
+            ->type_name("[ct]");
     command
         .add_option("--body-from-hull", o.bodyFromHull,
                     "Add this thickness of invented soft tissue and skin around the labels [mm]")
         ->type_name("MM")
-        ->excludes(fromImage)
-        ->group("Tissue");
-    command.add_option("--tissues", o.tissues, "Tissue table instead of the built-in one")
-        ->type_name("FILE")
-        ->group("Tissue");
+        ->excludes(fromImage);
+    command.add_option("--tissues", o.tissues, "Tissue table instead of the built-in one")->type_name("FILE");
 }
 
 void addSteps(CLI::App& command, ImportArguments& o)
 {
-    const char* group = "Changes, done in this order; lengths in mm, or with a unit";
+    command.option_defaults()->group("Changes, done in this order; lengths in mm, or with a unit");
     CLI::Option* const crop =
         command
             .add_option("--crop", o.steps.crop,
                         "Keep a box around all tissue, around a structure, or x0,x1,y0,y1,z0,z1 in LPS")
-            ->type_name("tissue|NAME|BOX")
-            ->group(group);
+            ->type_name("tissue|NAME|BOX");
     command.add_option("--crop-margin", o.cropMargin, "Margin around the structure or tissue (default: 10)")
         ->type_name("MM")
-        ->needs(crop)
-        ->group(group);
+        ->needs(crop);
     command.add_option("--voxel", o.voxel, "Resample to cubes of this edge length; straightens sheared grids")
-        ->type_name("MM")
-        ->group(group);
+        ->type_name("MM");
     command
         .add_option_function<std::vector<std::string>>(
             "--largest-component",
@@ -225,8 +202,7 @@ void addSteps(CLI::App& command, ImportArguments& o)
             "Keep only the largest piece of every label, or of this one")
         ->expected(0, 1)
         ->type_name("[NAME]")
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-        ->group(group);
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command
         .add_option_function<std::vector<std::string>>(
             "--close-skin-holes",
@@ -236,12 +212,10 @@ void addSteps(CLI::App& command, ImportArguments& o)
             },
             "Close holes in the skin up to this size (default: 10)")
         ->expected(0, 1)
-        ->type_name("[MM]")
-        ->group(group);
+        ->type_name("[MM]");
     command.add_option("--add-skin", o.addSkin, "Turn the outermost layer of tissue, of this thickness, into skin")
-        ->type_name("MM")
-        ->group(group);
-    command.add_option("--pad", o.pad, "Add air of this width on all sides")->type_name("MM")->group(group);
+        ->type_name("MM");
+    command.add_option("--pad", o.pad, "Add air of this width on all sides")->type_name("MM");
 }
 
 }  // namespace

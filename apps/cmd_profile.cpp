@@ -32,39 +32,28 @@ struct ProfileArguments {
     bool test = false, yes = false;
 };
 
-ProfileStore open(const ProfileArguments& o)
-{
-    return ProfileStore(o.profiles.empty() ? ProfileStore::standardFile() : o.profiles);
-}
-
-const char* handInWords(Hand hand)
-{
-    return hand == Hand::left ? "left" : "right";
-}
-
 void make(const ProfileArguments& o)
 {
-    ProfileStore store = open(o);
+    ProfileStore store(o.profiles);
     const Person person = store.add(o.name, o.hand == "left" ? Hand::left : Hand::right);
-    fmt::print("{}: made, {} hand, in {}\n", person.name, handInWords(person.hand), store.file().string());
+    fmt::print("{}: made, {} hand, in {}\n", person.name, nameOf(person.hand), store.file().string());
 }
 
 void changeHand(const ProfileArguments& o)
 {
-    ProfileStore store = open(o);
+    ProfileStore store(o.profiles);
     store.setHand(store.find(o.name), o.hand == "left" ? Hand::left : Hand::right);
     fmt::print("{}: {} hand\n", o.name, o.hand);
 }
 
 void list(const ProfileArguments& o)
 {
-    const ProfileStore store = open(o);
+    const ProfileStore store(o.profiles);
     const auto people = store.people();
     if (!o.json.empty()) {
         auto out = nlohmann::json::array();
         for (const Person& p : people) {
-            out.push_back(
-                {{"name", p.name}, {"hand", handInWords(p.hand)}, {"created", p.created}, {"sessions", p.sessions}});
+            out.push_back({{"name", p.name}, {"hand", nameOf(p.hand)}, {"created", p.created}, {"sessions", p.sessions}});
         }
         command::writeJson(o.json, {{"file", store.file().string()}, {"profiles", out}});
     }
@@ -75,14 +64,14 @@ void list(const ProfileArguments& o)
         fmt::print("no profiles yet: palpate profile new NAME\n");
     }
     for (const Person& p : people) {
-        fmt::print("{:<24} {:<6} {:>14}, since {}\n", p.name, handInWords(p.hand),
+        fmt::print("{:<24} {:<6} {:>14}, since {}\n", p.name, nameOf(p.hand),
                    base::counted(static_cast<std::size_t>(p.sessions), "session"), p.created.substr(0, 10));
     }
 }
 
 void exportOne(const ProfileArguments& o)
 {
-    const ProfileStore store = open(o);
+    const ProfileStore store(o.profiles);
     const fs::path to = o.output.empty() ? fs::path("-") : o.output;
     base::checkOutputs({to}, {store.file()});
     command::writeJson(to, store.exported(store.find(o.name)));
@@ -90,7 +79,7 @@ void exportOne(const ProfileArguments& o)
 
 void erase(const ProfileArguments& o)
 {
-    ProfileStore store = open(o);
+    ProfileStore store(o.profiles);
     const Person person = store.find(o.name);
     if (!o.yes) {
         throw base::error(
@@ -120,14 +109,14 @@ void erase(const ProfileArguments& o)
 
 void backup(const ProfileArguments& o)
 {
-    const ProfileStore store = open(o);
+    const ProfileStore store(o.profiles);
     store.backup(o.output);
     fmt::print("{}: {} profiles\n", o.output.string(), store.people().size());
 }
 
 void addRecords(const ProfileArguments& o)
 {
-    ProfileStore store = open(o);
+    ProfileStore store(o.profiles);
     const Person person = store.find(o.name);
     // All are read before one is stored.
     std::vector<training::StoredSession> sessions;
@@ -154,7 +143,7 @@ void addRecords(const ProfileArguments& o)
 
 void note(const ProfileArguments& o)
 {
-    ProfileStore store = open(o);
+    ProfileStore store(o.profiles);
     store.annotate(store.find(o.name), o.session, o.note, o.rating);
     fmt::print("{}: session {} noted\n", o.name, o.session);
 }

@@ -4,6 +4,7 @@
 #include <base/error.h>
 #include <base/mapped.h>
 #include <base/outputs.h>
+#include <base/utc.h>
 #include <command/json.h>
 #include <report/measure_table.h>
 #include <training/progress_page.h>
@@ -13,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -77,7 +79,7 @@ PersonProgress progressOf(const training::ProfileStore& store, const training::P
     }
     for (const std::string& id : named) {
         if (const auto* const c = curricula.called(id)) {
-            out.curricula.push_back(training::progressOf(*c, out.sessions, training::utcNow()));
+            out.curricula.push_back(training::progressOf(*c, out.sessions, base::utc()));
         }
     }
     return out;
@@ -154,16 +156,16 @@ void printSessionsOf(const PersonProgress& p)
     for (const training::StoredSession& s : p.sessions) {
         std::string started = s.started.substr(0, 16);
         std::ranges::replace(started, 'T', ' ');
-        const auto total = s.values.find("total");
+        const double total = training::valueIn(s.values, "total");
         fmt::print("  {:>7}  {:<20}  {:<22}  {:>5}  {}{}\n", s.id, started, s.caseId.empty() ? s.scene : s.caseId,
-                   total == s.values.end() ? "-" : fmt::format("{:.0f}", total->second),
+                   std::isnan(total) ? "-" : fmt::format("{:.0f}", total),
                    s.exercise.empty() ? "free practice" : s.curriculum + "/" + s.exercise, s.test ? " (test)" : "");
     }
 }
 
 void run(const ProgressArguments& o)
 {
-    const training::ProfileStore store(o.profiles.empty() ? training::ProfileStore::standardFile() : o.profiles);
+    const training::ProfileStore store(o.profiles);
     base::checkNames({o.html, o.csv, o.xapi});
     base::checkOutputs({o.html, o.csv, o.xapi, o.json}, {store.file()});
     Curricula curricula;

@@ -1,4 +1,5 @@
 #include <apps/command.h>
+#include <apps/progress_figures.h>
 #include <base/build.h>
 #include <base/outputs.h>
 #include <command/json.h>
@@ -42,17 +43,12 @@ struct ScoreArguments {
 
 struct Session {
     std::filesystem::path file;
-    std::string scene, model, device;
-    std::string operatorName, host, started, sha256;
+    haptics::SessionInfo info;
+    std::string sha256;
     bool complete = true;
     Score score;
     std::vector<haptics::Loss> losses;
     std::vector<std::string> warnings;
-};
-
-struct Group {
-    std::string name;
-    std::vector<std::size_t> sessions;  // rows of all sessions
 };
 
 std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessions)
@@ -66,89 +62,57 @@ std::size_t open(const std::filesystem::path& file, std::vector<Session>& sessio
     haptics::LossWatch watch(info);
     record.each([&](const haptics::TickRecord& tick) { watch.add(tick); });
     haptics::RecordCheck check = haptics::checkRecord(record, base::build());
-    sessions.push_back({file, info.scene, info.model, info.device, info.operatorName, info.host, info.started,
-                        check.seal.sha256, record.complete(), watch.score(), watch.losses(info),
-                        std::move(check.warnings)});
+    sessions.push_back(
+        {file, info, check.seal.sha256, record.complete(), watch.score(), watch.losses(info), std::move(check.warnings)});
     return sessions.size() - 1;
 }
 
-Group parseGroup(const std::string& text, std::vector<Session>& sessions)
+report::ScoredGroup parseGroup(const std::string& text, std::vector<Session>& sessions)
 {
     const std::size_t equals = text.find('=');
     base::failIf(equals == 0 || equals == std::string::npos || equals + 1 == text.size(),
                  "--group {}: give a name and files, as in --group experts=a.db,b.db", text);
-    Group group{text.substr(0, equals), {}};
+    report::ScoredGroup group{text.substr(0, equals), {}};
     for (const std::string& file : CLI::detail::split(text.substr(equals + 1), ',')) {
         base::failIf(file.empty(), "--group {}: a file between two commas is missing", text);
-        group.sessions.push_back(open(file, sessions));
+        group.sessions.push_back(report::rowOf(sessions[open(file, sessions)].score));
     }
     return group;
 }
 
-report::ScoredGroup scored(const Group& group, const std::vector<Session>& sessions)
+json effectSize(const report::ScoredGroup& a, const report::ScoredGroup& b)
 {
-    report::ScoredGroup out{group.name, {}};
-    for (const std::size_t i : group.sessions) {
-        out.sessions.push_back(report::rowOf(sessions[i].score));
-    }
+    json out = effectFigures(a, b);
+    out.update({{"kind", "cliffs_delta"}, {"of", a.name}, {"over", b.name}});
     return out;
 }
 
-std::vector<double> valuesOf(const Group& group, const std::vector<Session>& sessions, const haptics::Measure& measure)
-{
-    return report::valuesOf(scored(group, sessions), measure);
-}
-
-json effectSize(const Group& a, const Group& b, const std::vector<Session>& sessions)
-{
-    json out = {{"kind", "cliffs_delta"}, {"of", a.name}, {"over", b.name}};
-    for (const haptics::Measure& m : haptics::measures()) {
-        const auto delta = report::effectSize(scored(a, sessions), scored(b, sessions), m);
-        out[m.key] = delta ? json(*delta) : json();
-    }
-    return out;
-}
-
-json figures(const std::vector<Session>& sessions, const std::vector<Group>& groups)
+json figures(const std::vector<Session>& sessions, const std::vector<report::ScoredGroup>& groups)
 {
     json out = {{"sessions", json::array()}};
     for (const Session& s : sessions) {
         json one = session::scoreFigures(s.score, s.losses);
         one.update({{"file", s.file.string()},
-                    {"scene", s.scene},
-                    {"model", s.model},
-                    {"device", s.device},
-                    {"operator", s.operatorName},
-                    {"host", s.host},
-                    {"started", s.started},
+                    {"scene", s.info.scene},
+                    {"model", s.info.model},
+                    {"device", s.info.device},
+                    {"operator", s.info.operatorName},
+                    {"host", s.info.host},
+                    {"started", s.info.started},
                     {"complete", s.complete},
                     {"record_sha256", s.sha256},
                     {"doubts", s.warnings}});
         out["sessions"].push_back(std::move(one));
     }
-    out["groups"] = json::array();
-    for (const Group& g : groups) {
-        json medians, lower, upper;
-        for (const haptics::Measure& m : haptics::measures()) {
-            const auto values = valuesOf(g, sessions, m);
-            medians[m.key] = report::quantile(values, 0.5);
-            lower[m.key] = report::quantile(values, 0.25);
-            upper[m.key] = report::quantile(values, 0.75);
-        }
-        out["groups"].push_back({{"name", g.name},
-                                 {"n", g.sessions.size()},
-                                 {"median", medians},
-                                 {"lower_quartile", lower},
-                                 {"upper_quartile", upper}});
-    }
+    out["groups"] = base::mapped<json>(groups, groupFigures);
     if (groups.size() >= 2) {
-        out["effect_size"] = effectSize(groups[0], groups[1], sessions);
+        out["effect_size"] = effectSize(groups[0], groups[1]);
     }
     if (groups.size() > 2) {
         out["effect_sizes"] = json::array();
         for (std::size_t a = 0; a < groups.size(); ++a) {
             for (std::size_t b = a + 1; b < groups.size(); ++b) {
-                out["effect_sizes"].push_back(effectSize(groups[a], groups[b], sessions));
+                out["effect_sizes"].push_back(effectSize(groups[a], groups[b]));
             }
         }
     }
@@ -193,23 +157,20 @@ void warn(const std::vector<Session>& sessions)
 void scoreRecord(const ScoreArguments& options)
 {
     std::vector<Session> sessions;
-    std::vector<Group> groups;
     for (const std::filesystem::path& file : options.files) {
         open(file, sessions);
     }
-    for (const std::string& text : options.groups) {
-        groups.push_back(parseGroup(text, sessions));
-    }
+    const auto groups = base::mapped<report::ScoredGroup>(
+        options.groups, [&](const std::string& text) { return parseGroup(text, sessions); });
     base::failIf(sessions.empty(), "score: give at least one record, or --group NAME=FILE,FILE");
     std::vector<std::filesystem::path> read;
     std::ranges::transform(sessions, std::back_inserter(read), &Session::file);
     base::checkNames({options.report});
     base::checkOutputs({options.json, options.report}, read);
     warn(sessions);
-    const auto all = base::mapped<report::ScoredGroup>(groups, [&](const Group& g) { return scored(g, sessions); });
     if (!options.report.empty()) {
         if (!groups.empty()) {
-            report::writeGroupReport(options.report, all);
+            report::writeGroupReport(options.report, groups);
         } else if (sessions.size() == 1) {
             report::writeReport(options.report, haptics::Record(sessions[0].file), options.pictures, sessions[0].file);
         } else {
@@ -221,7 +182,7 @@ void scoreRecord(const ScoreArguments& options)
     if (options.json != "-") {
         printSessions(sessions);
         if (!groups.empty()) {
-            fmt::print("\n{}\n", report::groupTable(all));
+            fmt::print("\n{}\n", report::groupTable(groups));
         }
     }
 }

@@ -3,6 +3,7 @@
 #include <base/child_process.h>
 #include <base/error.h>
 #include <base/inputs.h>
+#include <base/mapped.h>
 #include <base/nearest.h>
 #include <command/interrupted.h>
 #include <command/options.h>
@@ -83,13 +84,8 @@ int main(int argc, char** argv)
             while (!within->get_subcommands().empty()) {
                 within = within->get_subcommands().front();
             }
-            std::vector<std::string> commands;
-            for (const CLI::App* command : within->get_subcommands({})) {
-                commands.push_back(command->get_name());
-            }
-            const std::string meant = palpate::base::nearest(unknown[0], commands);
-            what = unknown[0] + ": there is no such command or option" +
-                   (meant.empty() ? "" : "; did you mean " + meant + "?");
+            const auto commands = palpate::base::mapped<std::string>(within->get_subcommands({}), &CLI::App::get_name);
+            what = unknown[0] + ": there is no such command or option" + palpate::base::meant(unknown[0], commands);
         }
         if (what.ends_with("not expected: ")) {
             what += "\"\"; an option that takes no value has no = behind it";
@@ -126,21 +122,8 @@ int main(int argc, char** argv)
     command::refuseNoValues(app);
     command::endOnSignals();
     command::failOnLargeFiles();
-    try {
+    return exitStatus(app, [&] {
         app.parse(commandOf(argc, argv));
         checkStandardOutput();
-        return 0;
-    } catch (const CLI::ParseError& e) {
-        const int status = app.exit(e);
-        return status == 0 ? 0 : 2;
-    } catch (const command::Interrupted& e) {
-        std::fprintf(stderr, "palpate: %s\n", e.what());
-        return e.exitStatus();
-    } catch (const std::filesystem::filesystem_error& e) {
-        std::fprintf(stderr, "palpate: %s\n", palpate::base::inWords(e).c_str());
-        return 1;
-    } catch (const std::exception& e) {
-        std::fprintf(stderr, "palpate: %s\n", e.what());
-        return 1;
-    }
+    });
 }

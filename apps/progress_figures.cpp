@@ -26,25 +26,12 @@ double medianOf(std::vector<double> values)
     return values.empty() ? NAN : report::quantile(std::move(values), 0.5);
 }
 
-// The total, and what the levels ask for.
-std::vector<std::string> keysOf(const training::Exercise& exercise)
-{
-    std::vector<std::string> keys{"total"};
-    for (const training::Level& level : exercise.gate.levels) {
-        if (std::ranges::find(keys, level.measure) == keys.end()) {
-            keys.push_back(level.measure);
-        }
-    }
-    return keys;
-}
-
 // A value for each session; null where there is none.
 json curveOf(const ExerciseProgress& e, std::string_view key)
 {
     json curve = json::array();
     for (const StoredSession& s : e.sessions) {
-        const auto at = s.values.find(key);
-        curve.push_back(at == s.values.end() ? json() : json(at->second));
+        curve.push_back(training::valueIn(s.values, key));
     }
     return curve;
 }
@@ -56,11 +43,11 @@ void addRows(const PersonProgress& p, const CurriculumProgress& c, const Exercis
         return;
     }
     const auto& last = e.chart.back();
-    for (const std::string& key : keysOf(*e.exercise)) {
+    for (const std::string& key : training::measuresOf(*e.exercise)) {
         std::vector<double> values;
         for (const StoredSession& s : e.sessions) {
-            if (const auto at = s.values.find(key); at != s.values.end()) {
-                values.push_back(at->second);
+            if (const double value = training::valueIn(s.values, key); !std::isnan(value)) {
+                values.push_back(value);
             }
         }
         values.erase(values.begin(), values.end() - static_cast<std::ptrdiff_t>(std::min(values.size(), recent)));
@@ -97,7 +84,7 @@ json levelsOf(const training::Gate& gate)
 json standing(const PersonProgress& p, const CurriculumProgress& c, const ExerciseProgress& e, bool next)
 {
     json curves = json::object(), alarm = json::array(), learning = json::array();
-    for (const std::string& key : keysOf(*e.exercise)) {
+    for (const std::string& key : training::measuresOf(*e.exercise)) {
         curves[key] = curveOf(e, key);
     }
     for (const training::CusumPoint& point : e.chart) {
@@ -166,7 +153,9 @@ json sessionOf(const PersonProgress& p, const StoredSession& s)
             {"measures", s.values}};
 }
 
-json groupOf(const report::ScoredGroup& g)
+}  // namespace
+
+json groupFigures(const report::ScoredGroup& g)
 {
     json median, lower, upper, values;
     for (const haptics::Measure& m : haptics::measures()) {
@@ -180,12 +169,20 @@ json groupOf(const report::ScoredGroup& g)
             {"lower_quartile", lower}, {"upper_quartile", upper}, {"values", values}};
 }
 
-}  // namespace
+json effectFigures(const report::ScoredGroup& a, const report::ScoredGroup& b)
+{
+    json out;
+    for (const haptics::Measure& m : haptics::measures()) {
+        const auto delta = report::effectSize(a, b, m);
+        out[m.key] = delta ? json(*delta) : json();
+    }
+    return out;
+}
 
 json progressFigures(const std::vector<PersonProgress>& people, const std::vector<report::ScoredGroup>& groups)
 {
     json rows = json::array(), exercises = json::array(), next = json::array(), sessions = json::array(),
-         compared = json::array(), measures = json::array();
+         measures = json::array();
     for (const PersonProgress& p : people) {
         for (const CurriculumProgress& c : p.curricula) {
             const auto* const n = c.next();
@@ -199,19 +196,17 @@ json progressFigures(const std::vector<PersonProgress>& people, const std::vecto
             sessions.push_back(sessionOf(p, s));
         }
     }
-    for (const report::ScoredGroup& g : groups) {
-        compared.push_back(groupOf(g));
-    }
     for (const haptics::Measure& m : haptics::measures()) {
         measures.push_back({{"key", m.key}, {"label", m.label}, {"unit", m.unit}, {"decimals", m.decimals}});
     }
-    json out = {{"people", rows},       {"exercises", exercises}, {"next", next},
-                {"sessions", sessions}, {"groups", compared},     {"measures", measures}};
+    json out = {{"people", rows},
+                {"exercises", exercises},
+                {"next", next},
+                {"sessions", sessions},
+                {"groups", base::mapped<json>(groups, groupFigures)},
+                {"measures", measures}};
     if (groups.size() >= 2) {
-        for (const haptics::Measure& m : haptics::measures()) {
-            const auto delta = report::effectSize(groups[0], groups[1], m);
-            out["effect_size"][m.key] = delta ? json(*delta) : json();
-        }
+        out["effect_size"] = effectFigures(groups[0], groups[1]);
     }
     return out;
 }

@@ -14,4 +14,9 @@ namespace palpate::apps {
 nlohmann::json progressFigures(const std::vector<training::PersonProgress>& people,
                                const std::vector<report::ScoredGroup>& groups);
 
+/// Medians, quartiles and values of a group, by measure.
+nlohmann::json groupFigures(const report::ScoredGroup& group);
+/// Cliff's delta of one group over another, by measure.
+nlohmann::json effectFigures(const report::ScoredGroup& a, const report::ScoredGroup& b);
+
 }  // namespace palpate::apps

@@ -1,5 +1,6 @@
 #include <apps/train_attempts.h>
 
+#include <base/utc.h>
 #include <training/progress.h>
 
 #include <fmt/format.h>
@@ -24,7 +25,7 @@ session::TrainResult runToItsEnd(const haptics::SessionModel& model, haptics::Se
             }
         }
         fmt::print(stderr, "palpate: the session starts again\n");
-        info.started = training::utcNow();
+        info.started = base::utc();
     }
 }
 

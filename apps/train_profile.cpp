@@ -3,6 +3,7 @@
 #include <base/counted.h>
 #include <base/error.h>
 #include <base/outputs.h>
+#include <base/utc.h>
 #include <training/progress.h>
 
 #include <fmt/chrono.h>
@@ -21,7 +22,7 @@ namespace fs = std::filesystem;
 Training::Training(TrainingOptions options) : options_(std::move(options))
 {
     if (!options_.profile.empty()) {
-        store_.emplace(options_.profiles.empty() ? training::ProfileStore::standardFile() : options_.profiles);
+        store_.emplace(options_.profiles);
         person_ = store_->find(options_.profile);
     } else if (!options_.profiles.empty()) {
         throw base::error("--profiles: needs a profile: add --profile NAME");
@@ -36,7 +37,7 @@ Training::Training(TrainingOptions options) : options_(std::move(options))
         case_ = training::findCase(options_.caseId);
     }
     if (exercise_ != nullptr && person_) {
-        const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), training::utcNow());
+        const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), base::utc());
         const auto here = std::ranges::find(progress.exercises, exercise_, &training::ExerciseProgress::exercise);
         if (!here->available) {
             const auto* const next = progress.next();
@@ -175,7 +176,7 @@ Conclusion Training::keep(const haptics::SessionInfo& info, const session::Sessi
     lines.push_back(fmt::format("kept for {} as session {} ({} so far)", person_->name, id,
                                 base::counted(store_->sessions(*person_).size(), "session")));
     if (curriculum_) {
-        const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), training::utcNow());
+        const auto progress = training::progressOf(*curriculum_, store_->sessions(*person_), base::utc());
         const auto* const next = progress.next();
         lines.push_back(next == nullptr ? "all exercises are reached"
                                         : fmt::format("{} {}", next->exercise->title, training::reasonFor(*next)));

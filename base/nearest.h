@@ -42,4 +42,11 @@ inline std::string nearest(std::string_view word, const std::vector<std::string>
     return best;
 }
 
+/// "; did you mean X?", for the word that nearest() finds; `otherwise` where there is none.
+inline std::string meant(std::string_view word, const std::vector<std::string>& words, const std::string& otherwise = "")
+{
+    const std::string one = nearest(word, words);
+    return one.empty() ? otherwise : "; did you mean " + one + "?";
+}
+
 }  // namespace palpate::base

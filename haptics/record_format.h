@@ -150,6 +150,13 @@ private:
 class Statement {
 public:
     Statement(const Database& database, const std::string& sql);
+    /// With these values bound from the first position on.
+    template <class... Values>
+    Statement(const Database& database, const std::string& sql, const Values&... values) : Statement(database, sql)
+    {
+        int position = 0;
+        (bind(++position, values), ...);
+    }
     ~Statement();
     Statement(const Statement&) = delete;
     Statement& operator=(const Statement&) = delete;

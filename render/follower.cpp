@@ -1,6 +1,7 @@
 #include <render/follower.h>
 
 #include <base/error.h>
+#include <base/quantiles.h>
 #include <base/said.h>
 #include <render/result_file.h>
 
@@ -14,21 +15,13 @@
 namespace palpate::render {
 namespace {
 
+using base::lowerQuantile;
 using base::said;
 using base::tr;
 
 double seconds(Clock::duration d)
 {
     return std::chrono::duration<double>(d).count();
-}
-
-double quantile(std::vector<double> values, double fraction)
-{
-    if (values.empty())
-        return 0;
-    const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), values.begin() + at, values.end());
-    return values[static_cast<std::size_t>(at)];
 }
 
 // The clock that State::published is in [s].
@@ -259,13 +252,13 @@ ViewerFigures Follower::figures() const
 {
     ViewerFigures figures;
     figures.frames = frames_;
-    figures.frameP50 = quantile(frameSeconds_, 0.5);
-    figures.frameP90 = quantile(frameSeconds_, 0.9);
+    figures.frameP50 = lowerQuantile(frameSeconds_, 0.5);
+    figures.frameP90 = lowerQuantile(frameSeconds_, 0.9);
     std::vector<double> delays;
     for (const Shown& picture : shown_)
         delays.push_back(picture.done - picture.published);
-    figures.delayP50 = quantile(delays, 0.5);
-    figures.delayP99 = quantile(std::move(delays), 0.99);
+    figures.delayP50 = lowerQuantile(delays, 0.5);
+    figures.delayP99 = lowerQuantile(std::move(delays), 0.99);
     figures.shown = shown_;
     const double span = first_ ? seconds(last_ - *first_) : 0;
     figures.rate = span > 0 ? static_cast<double>(frames_ - 1) / span : 0;
@@ -278,8 +271,8 @@ void addScans(const UltrasoundPicture& ultrasound, ViewerFigures& figures)
     if (!scans || scans->seconds.empty())
         return;
     figures.scans = scans->seconds.size();
-    figures.scanP50 = quantile(scans->seconds, 0.5);
-    figures.scanP90 = quantile(scans->seconds, 0.9);
+    figures.scanP50 = lowerQuantile(scans->seconds, 0.5);
+    figures.scanP90 = lowerQuantile(scans->seconds, 0.9);
     figures.firstScan = scans->first;
     for (std::size_t i = 0; i < ultrasound::stageCount; ++i)
         figures.scanStages.emplace_back(ultrasound::stageNames[i], scans->stages[i] / static_cast<double>(figures.scans));

@@ -3,12 +3,12 @@
 #include <base/build.h>
 #include <base/error.h>
 #include <base/inputs.h>
+#include <base/utc.h>
 #include <datasets/insert.h>
 #include <datasets/scene_text.h>
 #include <haptics/replay.h>
 #include <haptics/score.h>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -18,7 +18,6 @@
 #include <array>
 #include <cassert>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <system_error>
 
@@ -251,7 +250,7 @@ std::string hostName()
 void startHere(haptics::SessionInfo& info)
 {
     info.host = hostName();
-    info.started = fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
+    info.started = base::utc();
 }
 
 haptics::SessionInfo describeSession(const haptics::SessionModel& model, const std::string& origin,

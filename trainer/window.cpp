@@ -1,5 +1,6 @@
 #include <trainer/window.h>
 
+#include <base/quantiles.h>
 #include <base/user_files.h>
 #include <base/words.h>
 #include <trainer/errands.h>
@@ -19,15 +20,10 @@ namespace {
 constexpr double idle = 0.2;           // between looks at what runs, when nobody does anything [s]
 constexpr double betweenLooks = 0.03;  // for buttons of a device, where there is one [s]
 
-double quantile(const std::vector<double>& sorted, double fraction)
+ScreenFigures figuresOf(std::string screen, const std::vector<double>& seconds)
 {
-    return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1))];
-}
-
-ScreenFigures figuresOf(std::string screen, std::vector<double> seconds)
-{
-    std::ranges::sort(seconds);
-    return {std::move(screen), seconds.size(), quantile(seconds, 0.5), quantile(seconds, 0.9), quantile(seconds, 1)};
+    const auto at = [&](double fraction) { return base::lowerQuantile(seconds, fraction); };
+    return {std::move(screen), seconds.size(), at(0.5), at(0.9), at(1)};
 }
 
 // Cases, people and settings as they are.
@@ -129,7 +125,7 @@ WindowFigures runWindow(const WindowOptions& options, ResultSink& sink)
             stage.renew();
         }
     }
-    return {stage.renderer(), figuresOf({}, std::move(seconds)), {}};
+    return {stage.renderer(), figuresOf({}, seconds), {}};
 }
 
 WindowFigures measureScreens(const WindowOptions& options, ResultSink& sink)
@@ -149,9 +145,9 @@ WindowFigures measureScreens(const WindowOptions& options, ResultSink& sink)
             seconds.push_back(stage.draw(state).seconds);
         }
         all.insert(all.end(), seconds.begin(), seconds.end());
-        figures.screens.push_back(figuresOf(name, std::move(seconds)));
+        figures.screens.push_back(figuresOf(name, seconds));
     }
-    figures.all = figuresOf({}, std::move(all));
+    figures.all = figuresOf({}, all);
     return figures;
 }
 

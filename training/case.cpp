@@ -1,6 +1,7 @@
 #include <training/case.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/nearest.h>
 #include <datasets/scene.h>
 #include <datasets/toml_section.h>
@@ -55,8 +56,7 @@ void readScene(Section& top, Case& made)
     }
     const auto builtIn = datasets::builtInScenes();
     if (std::ranges::find(builtIn, *scene) == builtIn.end()) {
-        const std::string meant = base::nearest(*scene, builtIn);
-        top.refuse("scene", "there is no such built-in scene" + (meant.empty() ? "" : "; did you mean " + meant + "?"));
+        top.refuse("scene", "there is no such built-in scene" + base::meant(*scene, builtIn));
     }
     made.scene = *scene;
 }
@@ -65,15 +65,20 @@ void readScene(Section& top, Case& made)
 
 void checkMeasure(const Section& section, std::string_view key, const std::string& measure)
 {
-    std::vector<std::string> keys;
-    for (const haptics::Measure& m : haptics::measures()) {
-        keys.emplace_back(m.key);
-    }
+    const auto keys = base::mapped<std::string>(haptics::measures(), &haptics::Measure::key);
     if (std::ranges::find(keys, measure) == keys.end()) {
-        const std::string meant = base::nearest(measure, keys);
         section.refuse(key, fmt::format("there is no measure {}{}", measure,
-                                        meant.empty() ? " (docs/score.md lists them)" : "; did you mean " + meant + "?"));
+                                        base::meant(measure, keys, " (docs/score.md lists them)")));
     }
+}
+
+std::string called(Section& section, std::string_view key, std::string_view what)
+{
+    const auto word = section.word(key);
+    if (!word) {
+        section.missing(key, what);
+    }
+    return *word;
 }
 
 std::vector<std::string> wordsOf(Section& section, std::string_view key)
@@ -107,11 +112,7 @@ Case loadCase(const fs::path& given)
     const fs::path file = made.folder / caseFile;
     const toml::table table = datasets::parseToml(datasets::readText(file), file.string());
     Section top(table, file.string(), "");
-    const auto title = top.word("title");
-    if (!title) {
-        top.missing("title", "a few words");
-    }
-    made.title = *title;
+    made.title = called(top, "title", "a few words");
     readScene(top, made);
     if (const auto picture = top.word("picture")) {
         made.picture = fileIn(top, made, "picture", *picture);
@@ -130,11 +131,7 @@ Case loadCase(const fs::path& given)
     for (const std::string& measure : made.measures) {
         checkMeasure(top, "measures", measure);
     }
-    const auto licence = top.word("licence");
-    if (!licence) {
-        top.missing("licence", "who may use the case and its volume, e.g. \"CC0-1.0\"");
-    }
-    made.licence = *licence;
+    made.licence = called(top, "licence", "who may use the case and its volume, e.g. \"CC0-1.0\"");
     made.source = top.word("source").value_or("");
     top.finish();
     return made;
@@ -148,16 +145,7 @@ bool isCaseFolder(const fs::path& what)
 
 std::vector<Case> allCases(std::vector<std::string>* faults)
 {
-    std::vector<Case> all;
-    for (const fs::path& folder : entriesOf("cases", [](const fs::path& p) { return isCaseFolder(p); })) {
-        try {
-            all.push_back(loadCase(folder));
-        } catch (const std::runtime_error& e) {
-            if (faults != nullptr) {
-                faults->emplace_back(e.what());
-            }
-        }
-    }
+    auto all = loadedOf<Case>("cases", isCaseFolder, loadCase, faults);
     std::ranges::sort(all, [](const Case& a, const Case& b) {
         return a.difficulty != b.difficulty ? a.difficulty < b.difficulty : a.title < b.title;
     });
@@ -178,13 +166,8 @@ Case findCase(const std::string& id)
     if (std::error_code none; fs::is_directory(id, none)) {
         throw base::error("{}: no case: there is no {} in it", id, caseFile);
     }
-    std::vector<std::string> ids;
-    for (const Case& one : allCases()) {
-        ids.push_back(one.id);
-    }
-    const std::string meant = base::nearest(id, ids);
     throw base::error("{}: there is no such case{} (palpate case list)", id,
-                      meant.empty() ? "" : "; did you mean " + meant + "?");
+                      base::meant(id, base::mapped<std::string>(allCases(), &Case::id)));
 }
 
 namespace {

@@ -1,6 +1,7 @@
 #include <training/curriculum.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/nearest.h>
 #include <datasets/toml_section.h>
 #include <training/case.h>
@@ -28,11 +29,7 @@ constexpr std::array<std::string_view, 2> modeNames{"any", "test"};
 Level readLevel(Section& section)
 {
     Level level;
-    const auto measure = section.word("measure");
-    if (!measure) {
-        section.missing("measure", "a measure of docs/score.md");
-    }
-    level.measure = *measure;
+    level.measure = called(section, "measure", "a measure of docs/score.md");
     checkMeasure(section, "measure", level.measure);
     const bool ofHundred = level.measure == "total" || level.measure.ends_with("_pct");
     const auto [low, high] = ofHundred ? std::pair(0.0, 100.0) : std::pair(-1e9, 1e9);
@@ -61,15 +58,6 @@ Gate readGate(Section& section)
         section.missing("level", "at least one [[exercise.level]]: what opens the gate");
     }
     return gate;
-}
-
-std::string called(Section& section, std::string_view key, std::string_view what)
-{
-    const auto word = section.word(key);
-    if (!word) {
-        section.missing(key, what);
-    }
-    return *word;
 }
 
 Exercise readExercise(Section& section, const Curriculum& before)
@@ -104,13 +92,9 @@ Exercise readExercise(Section& section, const Curriculum& before)
     for (const std::string& other : e.after) {
         // Only those before it: so none wait for one another.
         if (before.exercise(other) == nullptr) {
-            std::vector<std::string> ids;
-            for (const Exercise& one : before.exercises) {
-                ids.push_back(one.id);
-            }
-            const std::string meant = base::nearest(other, ids);
-            section.refuse("after", fmt::format("there is no exercise {} before this one{}", other,
-                                                meant.empty() ? "" : "; did you mean " + meant + "?"));
+            const auto ids = base::mapped<std::string>(before.exercises, &Exercise::id);
+            section.refuse("after",
+                           fmt::format("there is no exercise {} before this one{}", other, base::meant(other, ids)));
         }
     }
     section.finish();
@@ -179,16 +163,8 @@ std::vector<std::string> faultsOf(const Curriculum& curriculum)
 
 std::vector<Curriculum> allCurricula(std::vector<std::string>* faults)
 {
-    std::vector<Curriculum> all;
-    for (const fs::path& file : entriesOf("curricula", [](const fs::path& p) { return p.extension() == ".toml"; })) {
-        try {
-            all.push_back(loadCurriculum(file));
-        } catch (const std::runtime_error& e) {
-            if (faults != nullptr) {
-                faults->emplace_back(e.what());
-            }
-        }
-    }
+    auto all = loadedOf<Curriculum>(
+        "curricula", [](const fs::path& p) { return p.extension() == ".toml"; }, loadCurriculum, faults);
     std::ranges::sort(all, {}, &Curriculum::title);
     return all;
 }
@@ -204,13 +180,8 @@ Curriculum findCurriculum(const std::string& id)
             return loadCurriculum(file);
         }
     }
-    std::vector<std::string> ids;
-    for (const Curriculum& one : allCurricula()) {
-        ids.push_back(one.id);
-    }
-    const std::string meant = base::nearest(id, ids);
     throw base::error("{}: there is no such curriculum{} (palpate curriculum list)", id,
-                      meant.empty() ? "" : "; did you mean " + meant + "?");
+                      base::meant(id, base::mapped<std::string>(allCurricula(), &Curriculum::id)));
 }
 
 std::pair<Curriculum, std::string> findExercise(const std::string& named)
@@ -224,6 +195,17 @@ std::pair<Curriculum, std::string> findExercise(const std::string& named)
                  "curriculum check {})",
                  named, curriculum.id, named.substr(0, slash));
     return {std::move(curriculum), std::move(exercise)};
+}
+
+std::vector<std::string> measuresOf(const Exercise& exercise)
+{
+    std::vector<std::string> keys{"total"};
+    for (const Level& level : exercise.gate.levels) {
+        if (std::ranges::find(keys, level.measure) == keys.end()) {
+            keys.push_back(level.measure);
+        }
+    }
+    return keys;
 }
 
 double guidanceOf(const Exercise& exercise, int number, bool test) noexcept

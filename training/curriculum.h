@@ -56,6 +56,8 @@ Curriculum findCurriculum(const std::string& id);
 /// Throws std::runtime_error where it has none.
 std::pair<Curriculum, std::string> findExercise(const std::string& named);
 
+/// "total", and the measures that the levels of its gate ask for.
+std::vector<std::string> measuresOf(const Exercise& exercise);
 /// The fraction of guidance in trial `number` (from 1 up) of an exercise: 1 all, 0 none.
 double guidanceOf(const Exercise& exercise, int number, bool test) noexcept;
 

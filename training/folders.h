@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,24 @@ std::vector<std::filesystem::path> dataFolders(const char* kind);
 /// What lies in these folders and is wanted, one of each name: the user's hides one of the same name that came along.
 std::vector<std::filesystem::path> entriesOf(const char* kind,
                                              const std::function<bool(const std::filesystem::path&)>& wanted);
+
+/// What `load` makes of each of them. Those that it refuses are left out, and `faults`, where it is not null, has why.
+template <class Made, class Load>
+std::vector<Made> loadedOf(const char* kind, const std::function<bool(const std::filesystem::path&)>& wanted,
+                           const Load& load, std::vector<std::string>* faults)
+{
+    std::vector<Made> all;
+    for (const std::filesystem::path& entry : entriesOf(kind, wanted)) {
+        try {
+            all.push_back(load(entry));
+        } catch (const std::runtime_error& e) {
+            if (faults != nullptr) {
+                faults->emplace_back(e.what());
+            }
+        }
+    }
+    return all;
+}
 
 /// What to say where a list of them is empty: where was looked, and which package has them.
 std::string nothingThere(const char* kind);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace palpate::training {
 
@@ -10,12 +11,15 @@ bool Level::met(double value) const noexcept
     return !std::isnan(value) && (!atLeast || value >= *atLeast) && (!atMost || value <= *atMost);
 }
 
+double valueIn(const Values& values, std::string_view key) noexcept
+{
+    const auto at = values.find(key);
+    return at == values.end() ? std::numeric_limits<double>::quiet_NaN() : at->second;
+}
+
 bool meets(const Gate& gate, const Values& values) noexcept
 {
-    return std::ranges::all_of(gate.levels, [&](const Level& level) {
-        const auto at = values.find(level.measure);
-        return at != values.end() && level.met(at->second);
-    });
+    return std::ranges::all_of(gate.levels, [&](const Level& level) { return level.met(valueIn(values, level.measure)); });
 }
 
 GateState stateOf(const Gate& gate, std::span<const Trial> trials)

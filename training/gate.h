@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace palpate::training {
@@ -26,6 +27,8 @@ struct Gate {
 
 /// Measures of one session, by key. A key that is missing is a value that is not there.
 using Values = std::map<std::string, double, std::less<>>;
+/// Not a number where it is missing.
+double valueIn(const Values& values, std::string_view key) noexcept;
 
 /// A session as a gate sees it.
 struct Trial {

@@ -1,6 +1,5 @@
 #include <training/progress.h>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,11 +16,6 @@ std::optional<double> daysOf(const std::string& utc)
         return std::nullopt;
     }
     return static_cast<double>(::timegm(&parts)) / 86400.0;
-}
-
-std::string utcNow()
-{
-    return fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 namespace {

@@ -42,7 +42,5 @@ std::string reasonFor(const ExerciseProgress& next);
 
 /// "2026-11-22T09:14:05Z" in days; nothing for anything else.
 std::optional<double> daysOf(const std::string& utc);
-/// Now, UTC.
-std::string utcNow();
 
 }  // namespace palpate::training

@@ -77,12 +77,11 @@ json resultOf(const StoredSession& s, std::optional<bool> met)
     if (met) {
         result["success"] = *met;
     }
-    if (const auto total = s.values.find("total"); total != s.values.end()) {
-        result["score"] = {
-            {"scaled", std::clamp(total->second / 100, 0.0, 1.0)}, {"raw", total->second}, {"min", 0}, {"max", 100}};
+    if (const double total = valueIn(s.values, "total"); !std::isnan(total)) {
+        result["score"] = {{"scaled", std::clamp(total / 100, 0.0, 1.0)}, {"raw", total}, {"min", 0}, {"max", 100}};
     }
-    if (const auto seconds = s.values.find("seconds"); seconds != s.values.end() && std::isfinite(seconds->second)) {
-        result["duration"] = fmt::format("PT{:.2f}S", seconds->second);
+    if (const double seconds = valueIn(s.values, "seconds"); std::isfinite(seconds)) {
+        result["duration"] = fmt::format("PT{:.2f}S", seconds);
     }
     return result;
 }
@@ -129,8 +128,8 @@ void writeProgressCsv(const std::filesystem::path& file, const std::vector<Perso
                                s.guidance, met ? (*met ? "yes" : "no") : "", s.rating > 0 ? std::to_string(s.rating) : "",
                                cell(s.device), cell(s.build), cell(s.record));
             for (const haptics::Measure& m : haptics::measures()) {
-                const auto at = s.values.find(m.key);
-                out += at == s.values.end() || !std::isfinite(at->second) ? "," : fmt::format(",{:.9g}", at->second);
+                const double value = valueIn(s.values, m.key);
+                out += std::isfinite(value) ? fmt::format(",{:.9g}", value) : ",";
             }
         }
     }

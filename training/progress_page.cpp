@@ -1,6 +1,7 @@
 #include <training/progress_page.h>
 
 #include <base/counted.h>
+#include <base/mapped.h>
 #include <base/outputs.h>
 #include <base/shell_word.h>
 #include <haptics/measures.h>
@@ -12,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -37,10 +39,8 @@ json number(double v)
 
 json trialNumbers(std::size_t count)
 {
-    json x = json::array();
-    for (std::size_t n = 1; n <= count; ++n) {
-        x.push_back(n);
-    }
+    std::vector<std::size_t> x(count);
+    std::iota(x.begin(), x.end(), 1);
     return x;
 }
 
@@ -97,8 +97,7 @@ json measureChart(const ExerciseProgress& p, const haptics::Measure& m)
 {
     json y = json::array();
     for (const StoredSession& s : p.sessions) {
-        const auto at = s.values.find(m.key);
-        y.push_back(at == s.values.end() ? json() : number(at->second));
+        y.push_back(number(valueIn(s.values, m.key)));
     }
     return {{"columns", json::array({trialNumbers(p.sessions.size()), y})},
             {"x", axis("session", "")},
@@ -216,12 +215,6 @@ std::string assumptions(const CusumPlan& plan)
 // The charts of an exercise: its levels' measures, the total, the CUSUM.
 std::string exerciseCard(const ExerciseProgress& e, const CusumPlan& plan, json& charts)
 {
-    std::vector<std::string> keys{"total"};
-    for (const Level& level : e.exercise->gate.levels) {
-        if (std::ranges::find(keys, level.measure) == keys.end()) {
-            keys.push_back(level.measure);
-        }
-    }
     std::string out = fmt::format(
         "<section class=\"card\"><h2>{}</h2><p class=\"note\">{}, {} at the level.</p>"
         "<div class=\"charts\">",
@@ -232,12 +225,10 @@ std::string exerciseCard(const ExerciseProgress& e, const CusumPlan& plan, json&
         out += fmt::format("<div><h3>{}</h3><div class=\"chart small\" id=\"{}\"></div></div>", escape(title), id);
     };
     place(cusumChart(e, plan), "CUSUM");
-    for (const std::string& key : keys) {
+    for (const std::string& key : measuresOf(*e.exercise)) {
         const haptics::Measure& m = measureCalled(key);
-        const bool any = std::ranges::any_of(e.sessions, [&](const StoredSession& session) {
-            const auto at = session.values.find(m.key);
-            return at != session.values.end() && std::isfinite(at->second);
-        });
+        const bool any = std::ranges::any_of(
+            e.sessions, [&](const StoredSession& session) { return std::isfinite(valueIn(session.values, m.key)); });
         if (any) {
             place(measureChart(e, m), m.label);
         } else {
@@ -260,9 +251,8 @@ std::string freeCard(const PersonProgress& p)
 {
     std::map<std::string, std::vector<double>> totals;
     for (const StoredSession& s : p.sessions) {
-        const auto at = s.values.find("total");
-        if (s.exercise.empty() && at != s.values.end()) {
-            totals[s.caseId.empty() ? s.scene : s.caseId].push_back(at->second);
+        if (const double total = valueIn(s.values, "total"); s.exercise.empty() && !std::isnan(total)) {
+            totals[s.caseId.empty() ? s.scene : s.caseId].push_back(total);
         }
     }
     if (totals.empty()) {
@@ -284,8 +274,8 @@ std::string personPart(const PersonProgress& p, json& charts)
 {
     std::string out =
         fmt::format("<header><div><p class=\"eyebrow\">{} hand &middot; {} since {}</p><h1>{}</h1></div></header>",
-                    p.person.hand == Hand::left ? "left" : "right", base::counted(p.sessions.size(), "session"),
-                    p.person.created.substr(0, 10), escape(p.person.name));
+                    nameOf(p.person.hand), base::counted(p.sessions.size(), "session"), p.person.created.substr(0, 10),
+                    escape(p.person.name));
     if (p.sessions.empty()) {
         out += "<section class=\"card\"><p>No sessions yet.</p></section>";
     }
@@ -303,12 +293,8 @@ std::string personPart(const PersonProgress& p, json& charts)
 
 std::vector<double> rowOf(const StoredSession& session)
 {
-    std::vector<double> row;
-    for (const haptics::Measure& m : haptics::measures()) {
-        const auto at = session.values.find(m.key);
-        row.push_back(at == session.values.end() ? std::numeric_limits<double>::quiet_NaN() : at->second);
-    }
-    return row;
+    return base::mapped<double>(haptics::measures(),
+                                [&](const haptics::Measure& m) { return valueIn(session.values, m.key); });
 }
 
 void writeProgressPage(const std::filesystem::path& html, const std::vector<PersonProgress>& people,

@@ -1,7 +1,6 @@
 #include <training/simulate.h>
 
-#include <fmt/chrono.h>
-#include <fmt/format.h>
+#include <base/utc.h>
 
 #include <algorithm>
 #include <cmath>
@@ -64,7 +63,7 @@ SimulatedCourse simulate(const Curriculum& curriculum, const LearningLaw& law, s
     std::map<std::string, int> tried;
     SimulatedCourse course;
     for (int n = 0; n < most; ++n) {
-        const std::string now = fmt::format("{:%FT%TZ}", fmt::gmtime(firstDay + n * day));
+        const std::string now = base::utc(firstDay + n * day);
         const CurriculumProgress progress = progressOf(curriculum, course.sessions, now);
         const ExerciseProgress* const next = progress.next();
         if (next == nullptr) {
@@ -86,7 +85,7 @@ SimulatedCourse simulate(const Curriculum& curriculum, const LearningLaw& law, s
         course.sessions.push_back(std::move(s));
         course.met.push_back(meet);
     }
-    const std::string end = course.sessions.empty() ? utcNow() : course.sessions.back().started;
+    const std::string end = course.sessions.empty() ? base::utc() : course.sessions.back().started;
     course.finished = progressOf(curriculum, course.sessions, end).finished();
     return course;
 }

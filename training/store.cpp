@@ -1,15 +1,16 @@
 #include <training/store.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <base/nearest.h>
 #include <base/outputs.h>
+#include <base/utc.h>
 #include <base/utf8.h>
 #include <haptics/measures.h>
 #include <haptics/record_format.h>
 #include <training/belongings.h>
 #include <training/folders.h>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
 #include <nlohmann/json.hpp>
@@ -23,7 +24,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <ctime>
 #include <stdexcept>
 
 namespace palpate::training {
@@ -56,11 +56,6 @@ constexpr int newest = static_cast<int>(migrations.size());
 constexpr const char* sessionColumns =
     "id, started, case_id, curriculum, exercise, test, guidance, scene, device, build, record, record_sha256, taken, note, "
     "rating";
-
-std::string now()
-{
-    return fmt::format("{:%FT%TZ}", fmt::gmtime(std::time(nullptr)));
-}
 
 // Whether a file is one of profiles, by the application's number in SQLite's header, or empty.
 bool isStore(int descriptor)
@@ -166,10 +161,6 @@ void checkLine(const std::string& what, const std::string& text, std::size_t mos
                  "{}: must be 1 to {} bytes of text (UTF-8) in one line", what, most);
 }
 
-}  // namespace
-
-namespace {
-
 // Does the work, and says which file its errors are about.
 template <class Work>
 auto guarded(const fs::path& file, const Work& work)
@@ -183,46 +174,25 @@ auto guarded(const fs::path& file, const Work& work)
 
 }  // namespace
 
-struct ProfileStore::Impl {
-    explicit Impl(fs::path path) : file(std::move(path))
-    {
-        makePrivate(file);
-        guarded(file, [&] {
-            database = std::make_unique<Database>(file.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
-            sqlite3_busy_timeout(database->get(), busyTimeout);
-            // The content is not trusted to bring functions along; what is removed is overwritten.
-            database->execute("PRAGMA trusted_schema = OFF; PRAGMA secure_delete = ON; PRAGMA foreign_keys = ON");
-            migrate(*database);
-            database->execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
-        });
-    }
+ProfileStore::ProfileStore(const fs::path& file) : file_(file.empty() ? standardFile() : fs::absolute(file))
+{
+    makePrivate(file_);
+    guarded(file_, [&] {
+        database_ = std::make_unique<Database>(file_.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
+        sqlite3_busy_timeout(database_->get(), busyTimeout);
+        // The content is not trusted to bring functions along; what is removed is overwritten.
+        database_->execute("PRAGMA trusted_schema = OFF; PRAGMA secure_delete = ON; PRAGMA foreign_keys = ON");
+        migrate(*database_);
+        database_->execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+    });
+}
 
-    fs::path file;
-    std::unique_ptr<Database> database;
-};
-
-ProfileStore::ProfileStore(const fs::path& file) : impl_(std::make_unique<Impl>(fs::absolute(file))) {}
 ProfileStore::~ProfileStore() = default;
 ProfileStore::ProfileStore(ProfileStore&&) noexcept = default;
 
 fs::path ProfileStore::standardFile()
 {
     return userData() / "profiles.db";
-}
-
-const fs::path& ProfileStore::file() const noexcept
-{
-    return impl_->file;
-}
-
-fs::path ProfileStore::recordFolder() const
-{
-    return impl_->file.parent_path() / "records";
-}
-
-fs::path ProfileStore::windowFolder() const
-{
-    return impl_->file.parent_path() / "sessions";
 }
 
 Person ProfileStore::add(const std::string& name, Hand hand)
@@ -233,21 +203,18 @@ Person ProfileStore::add(const std::string& name, Hand hand)
     for (const Person& one : people()) {
         base::failIf(one.name == name, "{}: there is a profile of this name already", name);
     }
-    return guarded(impl_->file, [&] {
-        Statement insert(*impl_->database, "INSERT INTO person (name, hand, created) VALUES (?, ?, ?)");
-        insert.bind(1, std::string_view(name));
-        insert.bind(2, std::string_view(hand == Hand::left ? "left" : "right"));
-        insert.bind(3, std::string_view(now()));
-        insert.run();
+    return guarded(file_, [&] {
+        Statement(*database_, "INSERT INTO person (name, hand, created) VALUES (?, ?, ?)", name, nameOf(hand), base::utc())
+            .run();
         return find(name);
     });
 }
 
 std::vector<Person> ProfileStore::people() const
 {
-    return guarded(impl_->file, [&] {
+    return guarded(file_, [&] {
         std::vector<Person> all;
-        Statement select(*impl_->database,
+        Statement select(*database_,
                          "SELECT id, name, hand, created, (SELECT count(*) FROM session WHERE person = person.id) "
                          "FROM person ORDER BY name");
         while (select.step()) {
@@ -266,60 +233,38 @@ Person ProfileStore::find(const std::string& name) const
     if (at != all.end()) {
         return *at;
     }
-    std::vector<std::string> names;
-    for (const Person& one : all) {
-        names.push_back(one.name);
-    }
-    const std::string meant = base::nearest(name, names);
     throw base::error("{}: there is no such profile{}", name,
-                      meant.empty() ? "; palpate profile new makes one" : "; did you mean " + meant + "?");
+                      base::meant(name, base::mapped<std::string>(all, &Person::name), "; palpate profile new makes one"));
 }
 
 void ProfileStore::setHand(const Person& person, Hand hand)
 {
-    guarded(impl_->file, [&] {
-        Statement update(*impl_->database, "UPDATE person SET hand = ? WHERE id = ?");
-        update.bind(1, std::string_view(hand == Hand::left ? "left" : "right"));
-        update.bind(2, person.id);
-        update.run();
+    guarded(file_, [&] {
+        Statement(*database_, "UPDATE person SET hand = ? WHERE id = ?", nameOf(hand), person.id).run();
     });
 }
 
 std::int64_t ProfileStore::store(const Person& person, const StoredSession& s)
 {
-    return guarded(impl_->file, [&] {
-        Transaction all(*impl_->database);
+    return guarded(file_, [&] {
+        Transaction all(*database_);
         if (!s.recordSha256.empty()) {
-            Statement known(*impl_->database, "SELECT id FROM session WHERE person = ? AND record_sha256 = ?");
-            known.bind(1, person.id);
-            known.bind(2, std::string_view(s.recordSha256));
+            Statement known(*database_, "SELECT id FROM session WHERE person = ? AND record_sha256 = ?", person.id,
+                            s.recordSha256);
             if (known.step()) {
                 throw base::error("{} has this session already, number {}", person.name, known.integer(0));
             }
         }
-        Statement insert(
-            *impl_->database,
+        Statement(
+            *database_,
             "INSERT INTO session (person, started, case_id, curriculum, exercise, test, guidance, scene, device, build, "
-            "record, record_sha256, taken) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
-        int c = 0;
-        insert.bind(++c, person.id);
-        for (const std::string* text : {&s.started, &s.caseId, &s.curriculum, &s.exercise}) {
-            insert.bind(++c, std::string_view(*text));
-        }
-        insert.bind(++c, static_cast<std::int64_t>(s.test));
-        insert.bind(++c, s.guidance);
-        for (const std::string* text : {&s.scene, &s.device, &s.build, &s.record, &s.recordSha256}) {
-            insert.bind(++c, std::string_view(*text));
-        }
-        insert.bind(++c, static_cast<std::int64_t>(s.taken));
-        insert.run();
-        const std::int64_t id = sqlite3_last_insert_rowid(impl_->database->get());
+            "record, record_sha256, taken) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            person.id, s.started, s.caseId, s.curriculum, s.exercise, std::int64_t{s.test}, s.guidance, s.scene, s.device,
+            s.build, s.record, s.recordSha256, std::int64_t{s.taken})
+            .run();
+        const std::int64_t id = sqlite3_last_insert_rowid(database_->get());
         for (const auto& [key, value] : s.values) {
-            Statement measure(*impl_->database, "INSERT INTO measure VALUES (?, ?, ?)");
-            measure.bind(1, id);
-            measure.bind(2, std::string_view(key));
-            measure.bind(3, value);
-            measure.run();
+            Statement(*database_, "INSERT INTO measure VALUES (?, ?, ?)", id, key, value).run();
         }
         all.commit();
         return id;
@@ -328,15 +273,14 @@ std::int64_t ProfileStore::store(const Person& person, const StoredSession& s)
 
 std::vector<StoredSession> ProfileStore::sessions(const Person& person) const
 {
-    return guarded(impl_->file, [&] {
+    return guarded(file_, [&] {
         std::vector<StoredSession> all;
-        Statement select(*impl_->database,
-                         fmt::format("SELECT {} FROM session WHERE person = ? ORDER BY started, id", sessionColumns));
-        select.bind(1, person.id);
+        Statement select(*database_,
+                         fmt::format("SELECT {} FROM session WHERE person = ? ORDER BY started, id", sessionColumns),
+                         person.id);
         while (select.step()) {
             all.push_back(readSession(select));
-            Statement measures(*impl_->database, "SELECT key, value FROM measure WHERE session = ?");
-            measures.bind(1, all.back().id);
+            Statement measures(*database_, "SELECT key, value FROM measure WHERE session = ?", all.back().id);
             while (measures.step()) {
                 all.back().values[std::string(measures.text(0))] = measures.real(1);
             }
@@ -347,10 +291,9 @@ std::vector<StoredSession> ProfileStore::sessions(const Person& person) const
 
 std::set<fs::path> ProfileStore::recordsOf(const Person& person) const
 {
-    return guarded(impl_->file, [&] {
+    return guarded(file_, [&] {
         std::set<fs::path> files;
-        Statement select(*impl_->database, "SELECT DISTINCT record FROM session WHERE person = ? AND record != ''");
-        select.bind(1, person.id);
+        Statement select(*database_, "SELECT DISTINCT record FROM session WHERE person = ? AND record != ''", person.id);
         while (select.step()) {
             std::error_code none;
             const fs::path file(select.text(0));
@@ -363,15 +306,12 @@ std::set<fs::path> ProfileStore::recordsOf(const Person& person) const
 
 void ProfileStore::annotate(const Person& person, std::int64_t session, const std::string& note, int rating)
 {
-    guarded(impl_->file, [&] {
+    guarded(file_, [&] {
         base::failIf(rating < 0 || rating > 5, "rating {}: must be 1 to 5, or 0 for none", rating);
-        Statement update(*impl_->database, "UPDATE session SET note = ?, rating = ? WHERE id = ? AND person = ?");
-        update.bind(1, std::string_view(note));
-        update.bind(2, static_cast<std::int64_t>(rating));
-        update.bind(3, session);
-        update.bind(4, person.id);
-        update.run();
-        base::failIf(sqlite3_changes(impl_->database->get()) == 0, "{} has no session {}: palpate progress '{}' lists them",
+        Statement(*database_, "UPDATE session SET note = ?, rating = ? WHERE id = ? AND person = ?", note,
+                  std::int64_t{rating}, session, person.id)
+            .run();
+        base::failIf(sqlite3_changes(database_->get()) == 0, "{} has no session {}: palpate progress '{}' lists them",
                      person.name, session, person.name);
     });
 }
@@ -379,7 +319,7 @@ void ProfileStore::annotate(const Person& person, std::int64_t session, const st
 nlohmann::json ProfileStore::exported(const Person& person) const
 {
     nlohmann::json out = {{"name", person.name},
-                          {"hand", person.hand == Hand::left ? "left" : "right"},
+                          {"hand", nameOf(person.hand)},
                           {"created", person.created},
                           {"sessions", nlohmann::json::array()}};
     for (const StoredSession& s : sessions(person)) {
@@ -419,14 +359,12 @@ Erased ProfileStore::erase(const Person& person)
     }
     // The files first: while the person is known, erasing can be done again.
     Erased erased = removeBelongings(of);
-    guarded(impl_->file, [&] {
-        Transaction all(*impl_->database);
-        Statement remove(*impl_->database, "DELETE FROM person WHERE id = ?");
-        remove.bind(1, person.id);
-        remove.run();
+    guarded(file_, [&] {
+        Transaction all(*database_);
+        Statement(*database_, "DELETE FROM person WHERE id = ?", person.id).run();
         all.commit();
         // Overwritten in the file by secure_delete; now also out of the write-ahead log and the free pages.
-        impl_->database->execute("PRAGMA wal_checkpoint(TRUNCATE); VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
+        database_->execute("PRAGMA wal_checkpoint(TRUNCATE); VACUUM; PRAGMA wal_checkpoint(TRUNCATE)");
     });
     return erased;
 }
@@ -440,7 +378,7 @@ void ProfileStore::backup(const fs::path& to) const
     try {
         makePrivate(part);
         Database copy(part.string(), SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX);
-        sqlite3_backup* const job = sqlite3_backup_init(copy.get(), "main", impl_->database->get(), "main");
+        sqlite3_backup* const job = sqlite3_backup_init(copy.get(), "main", database_->get(), "main");
         base::failIf(job == nullptr, "{}", sqlite3_errmsg(copy.get()));
         const int done = sqlite3_backup_step(job, -1);
         if (sqlite3_backup_finish(job); done != SQLITE_DONE) {

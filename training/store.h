@@ -13,9 +13,17 @@
 #include <string>
 #include <vector>
 
+namespace palpate::haptics::format {
+class Database;
+}
+
 namespace palpate::training {
 
 enum class Hand : std::uint8_t { right, left };
+inline const char* nameOf(Hand hand) noexcept
+{
+    return hand == Hand::left ? "left" : "right";
+}
 
 /// Somebody who trains. The name may be a pseudonym.
 struct Person {
@@ -68,17 +76,18 @@ class ProfileStore {
 public:
     /// Opens the file, or makes it and its folder (mode 0700). One of an older version is brought up to date in one
     /// transaction; one of a newer version, or of another program, is refused.
+    /// @param file  empty: the standard one
     explicit ProfileStore(const std::filesystem::path& file);
     ~ProfileStore();
     ProfileStore(ProfileStore&&) noexcept;
 
     /// $XDG_DATA_HOME/palpate/profiles.db, see userData().
     static std::filesystem::path standardFile();
-    const std::filesystem::path& file() const noexcept;
+    const std::filesystem::path& file() const noexcept { return file_; }
     /// The folder "records" beside the file, where sessions of profiles keep their records.
-    std::filesystem::path recordFolder() const;
+    std::filesystem::path recordFolder() const { return file_.parent_path() / "records"; }
     /// The folder "sessions" beside the file, where the trainer's window keeps records and figures.
-    std::filesystem::path windowFolder() const;
+    std::filesystem::path windowFolder() const { return file_.parent_path() / "sessions"; }
 
     /// @param name  1 to 100 bytes of text in one line; none that is there
     Person add(const std::string& name, Hand hand);
@@ -108,8 +117,8 @@ public:
 private:
     std::set<std::filesystem::path> recordsOf(const Person& person) const;
 
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
+    std::filesystem::path file_;
+    std::unique_ptr<haptics::format::Database> database_;
 };
 
 /// Clears who trained last in the settings of the trainer's window, where it is this person. Throws std::runtime_error.
