@@ -1,11 +1,10 @@
 #include <apps/command.h>
+#include <apps/parsed_program.h>
 #include <apps/version.h>
 #include <base/child_process.h>
 #include <base/error.h>
-#include <base/inputs.h>
 #include <base/mapped.h>
 #include <base/nearest.h>
-#include <command/interrupted.h>
 #include <command/options.h>
 #include <studies/accuracy/command.h>
 #include <studies/stability/command.h>
@@ -14,15 +13,12 @@
 #include <sweep/command.h>
 #endif
 
-#include <CLI/CLI.hpp>
-
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <exception>
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -67,27 +67,18 @@ void Viewers::stall(bool stopped)
 void Viewers::openWindow()
 {
     std::vector<std::string> arguments{"--layout", wanted_.layout, "--palette", wanted_.palette};
+    const auto add = [&](bool asked, std::initializer_list<std::string> words) {
+        arguments.insert(arguments.end(), words.begin(), asked ? words.end() : words.begin());
+    };
     for (const std::string& tissue : wanted_.hidden) {
-        arguments.insert(arguments.end(), {"--hide", tissue});
+        add(true, {"--hide", tissue});
     }
-    if (wanted_.test) {
-        arguments.insert(arguments.end(), {"--no-plan", "--no-steps"});
-    }
-    if (wanted_.sounds) {
-        arguments.emplace_back("--sounds");
-    }
-    if (wanted_.leftHanded) {
-        arguments.insert(arguments.end(), {"--hand", "left"});
-    }
-    if (wanted_.tryout > 0) {
-        arguments.insert(arguments.end(), {"--tryout", fmt::format("{:g}", wanted_.tryout)});
-    }
-    if (!wanted_.images.empty()) {
-        arguments.insert(arguments.end(), {"--images", wanted_.images.string()});
-    }
-    if (!wanted_.result.empty()) {
-        arguments.insert(arguments.end(), {"--result", wanted_.result.string()});
-    }
+    add(wanted_.test, {"--no-plan", "--no-steps"});
+    add(wanted_.sounds, {"--sounds"});
+    add(wanted_.leftHanded, {"--hand", "left"});
+    add(wanted_.tryout > 0, {"--tryout", fmt::format("{:g}", wanted_.tryout)});
+    add(!wanted_.images.empty(), {"--images", wanted_.images.string()});
+    add(!wanted_.result.empty(), {"--result", wanted_.result.string()});
     start(window, std::move(arguments));
     opened_ = std::chrono::steady_clock::now();
 }

@@ -1,5 +1,6 @@
 #include <trainer/case_entry.h>
 
+#include <base/mapped.h>
 #include <base/words.h>
 #include <trainer/lists.h>
 
@@ -21,21 +22,17 @@ using nlohmann::json;
 CaseEntry entryOf(const json& one)
 {
     CaseEntry c;
-    c.id = one.at("id").get<std::string>();
-    c.title = tr(one.at("title").get<std::string>());
-    c.picture = one.at("picture").get<std::string>();
-    c.difficulty = one.at("difficulty").get<int>();
-    auto trains = one.at("trains").get<std::vector<std::string>>();
-    std::ranges::transform(trains, trains.begin(), [](const std::string& what) { return tr(what); });
-    c.trains = fmt::format("{}", fmt::join(trains, ", "));
-    const auto measures = one.at("measures").get<std::vector<std::string>>();
+    std::vector<std::string> trains, measures;
+    read(one, "id", c.id, "title", c.title, "picture", c.picture, "difficulty", c.difficulty, "trains", trains, "measures",
+         measures, "briefing", c.steps);
+    c.title = tr(c.title);
+    const auto translated = [](const std::string& what) { return tr(what); };
+    c.trains = fmt::format("{}", fmt::join(base::mapped<std::string>(trains, translated), ", "));
+    std::ranges::transform(c.steps, c.steps.begin(), translated);
     c.palpation = std::ranges::find(measures, "mark_error_mm") != measures.end();
     c.core = !c.palpation && std::ranges::none_of(measures, [](const std::string& measure) {
         return measure == "rest_s" || measure == "tip_to_target_mm";
     });
-    for (const std::string& step : one.at("briefing").get<std::vector<std::string>>()) {
-        c.steps.push_back(tr(step));
-    }
     return c;
 }
 

@@ -14,6 +14,7 @@
 #include <fstream>
 #include <functional>
 #include <list>
+#include <map>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -49,26 +50,36 @@ struct Errands::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
+    void start(std::optional<Running>& one, const std::string& log, const std::vector<std::string>& words,
+               const char* program = "palpate")
+    {
+        one.emplace(programs / program, words, scratch / (log + ".log"));
+    }
     void startSession(State& state)
     {
         grip.letGo();
         const SessionFiles files = sink.filesFor(chosenCase(state));
         const auto arguments = trainArguments(state, files);
-        session.emplace(programs / "palpate", arguments, scratch / "session.log");
+        start(session, "session", arguments);
         ending = false;
         sessionStarted(state, files, asTyped("palpate", arguments));
     }
     // Once: what comes after its end, the profile and the figures, is not to be broken off.
-    void endSession()
+    void endSession(State&)
     {
         if (session && !std::exchange(ending, true)) {
             session->conclude();
         }
     }
+    void debriefAlone(State& state)
+    {
+        state.ghost.clear();
+        startDebrief(state);
+    }
     void startDebrief(State& state)
     {
         const auto arguments = debriefArguments(state);
-        replay.emplace(programs / "palpate-view", arguments, scratch / "replay.log");
+        start(replay, "replay", arguments, "palpate-view");
         state.command = asTyped("palpate-view", arguments);
         state.notice.clear();
         state.replaying = true;
@@ -82,6 +93,11 @@ struct Errands::Impl {
         }
         state.ghost.clear();
     }
+    static std::string whyNot(const Running& command, const std::vector<std::string>& arguments)
+    {
+        const std::string said = command.message();
+        return said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
+    }
     // What a short command writes as JSON; null where it fails, and the state says why.
     nlohmann::json answerOf(State& state, std::vector<std::string> arguments)
     {
@@ -92,10 +108,7 @@ struct Errands::Impl {
         command.finish(answerTime);
         std::ifstream in(file);
         auto answer = nlohmann::json::parse(in, nullptr, false);
-        if (answer.is_discarded()) {
-            const std::string said = command.message();
-            state.notice = said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
-        }
+        state.notice = answer.is_discarded() ? whyNot(command, arguments) : state.notice;
         return answer;
     }
     void listPeople(State& state)
@@ -114,8 +127,7 @@ struct Errands::Impl {
     {
         Running command(programs / "palpate", arguments, scratch / "short.log");
         const bool done = command.finish(answerTime) && !command.failed();
-        const std::string said = command.message();
-        state.notice = done ? "" : said.empty() ? asTyped("palpate", arguments) + tr(": no answer") : said;
+        state.notice = done ? "" : whyNot(command, arguments);
         return done;
     }
     std::vector<std::string> progressWords(const std::string& whose) const
@@ -178,11 +190,13 @@ struct Errands::Impl {
         std::ranges::stable_sort(i.everybody.sessions, std::greater(), &KeptSession::started);
         chooseKept(state, std::min(i.chosen, std::max<std::size_t>(i.everybody.sessions.size(), 1) - 1));
     }
-    void watch(State& state, const std::vector<std::string>& words)
+    void watchSession(State& state) { watch(state, "--session"); }
+    void seeKept(State& state) { watch(state, "--replay"); }
+    void watch(State& state, const char* what)
     {
-        std::vector<std::string> all = words;
-        all.insert(all.end(), {"--layout", "instructor", "--palette", state.settings.palette});
-        eyes.emplace_back(programs / "palpate-view", all, scratch / ("watch-" + std::to_string(++watched) + ".log"));
+        const std::vector<std::string> words{what,        state.instructor.watched, "--layout", "instructor",
+                                             "--palette", state.settings.palette};
+        eyes.emplace_back(programs / "palpate-view", words, scratch / ("watch-" + std::to_string(++watched) + ".log"));
         state.notice = opening();
     }
     void keepNote(State& state)
@@ -225,8 +239,7 @@ struct Errands::Impl {
         const fs::path file = scratch / "live.json";
         if (!live || live->ended()) {
             fs::remove(file);
-            live.emplace(programs / "palpate", std::vector<std::string>{"sessions", "--every", "0.5", "--json", file},
-                         scratch / "live.log");
+            start(live, "live", {"sessions", "--every", "0.5", "--json", file});
         }
         std::error_code none;
         if (const auto written = fs::last_write_time(file, none); !none && written != liveRead) {
@@ -253,8 +266,7 @@ struct Errands::Impl {
         state.devices = {};
         grip.letGo();
         fs::remove(scratch / "devices.json");
-        devices.emplace(programs / "palpate", std::vector<std::string>{"devices", "--json", scratch / "devices.json"},
-                        scratch / "devices.log");
+        start(devices, "devices", {"devices", "--json", scratch / "devices.json"});
     }
 
     void testForce(State& state)
@@ -265,13 +277,13 @@ struct Errands::Impl {
         if (!state.firmware.empty()) {
             words.insert(words.end(), {"--falcon-firmware", state.firmware});
         }
-        push.emplace(programs / "palpate", words, scratch / "force.log");
+        start(push, "force", words);
         state.pushing = true;
     }
     void tryHand(State& state)
     {
         grip.letGo();
-        tryout.emplace(programs / "palpate", tryoutArguments(state), scratch / "tryout.log");
+        start(tryout, "tryout", tryoutArguments(state));
         state.trying = true;
     }
     // An expert's session in the anatomy of the case is made once, and kept beside the others.
@@ -284,7 +296,7 @@ struct Errands::Impl {
         }
         const fs::path part = record.string() + ".part";
         fs::remove(part);
-        expert.emplace(programs / "palpate", expertArguments(state, part), scratch / "expert.log");
+        start(expert, "expert", expertArguments(state, part));
         expertOf = record;
         besideExpert = state.files.record;
         state.ghosting = true;
@@ -295,9 +307,7 @@ struct Errands::Impl {
         const bool can = ::access("/usr/bin/ffmpeg", X_OK) == 0;
         made = fs::path(state.files.record).replace_extension(can ? ".mp4" : ".pictures");
         making = fs::path(made).replace_extension(".part" + made.extension().string());
-        film.emplace(programs / "palpate-view",
-                     std::vector<std::string>{"--replay", state.files.record, can ? "--movie" : "--offscreen", making},
-                     scratch / "film.log");
+        start(film, "film", {"--replay", state.files.record, can ? "--movie" : "--offscreen", making}, "palpate-view");
         state.filming = true;
     }
     void takeFilm(State& state)
@@ -414,50 +424,30 @@ void Errands::list(State& state)
 
 void Errands::run(Errand errand, State& state)
 {
+    using Do = void (Impl::*)(State&);
+    static const std::map<Errand, Do> all{{Errand::addPerson, &Impl::addPerson},
+                                          {Errand::choosePerson, &Impl::choosePerson},
+                                          {Errand::changeHand, &Impl::changeHand},
+                                          {Errand::writeProgress, &Impl::writeProgress},
+                                          {Errand::loadEverybody, &Impl::loadEverybody},
+                                          {Errand::watchSession, &Impl::watchSession},
+                                          {Errand::seeKept, &Impl::seeKept},
+                                          {Errand::keepNote, &Impl::keepNote},
+                                          {Errand::compareGroups, &Impl::compareGroups},
+                                          {Errand::checkDevices, &Impl::checkDevices},
+                                          {Errand::startSession, &Impl::startSession},
+                                          {Errand::endSession, &Impl::endSession},
+                                          {Errand::testForce, &Impl::testForce},
+                                          {Errand::tryHand, &Impl::tryHand},
+                                          {Errand::seeExpert, &Impl::seeExpert},
+                                          {Errand::makeFilm, &Impl::makeFilm},
+                                          {Errand::keepSettings, &Impl::keepSettings},
+                                          {Errand::startDebrief, &Impl::debriefAlone}};
     try {
-        switch (errand) {
-            case Errand::addPerson:
-                return impl_->addPerson(state);
-            case Errand::choosePerson:
-                return impl_->choosePerson(state);
-            case Errand::changeHand:
-                return impl_->changeHand(state);
-            case Errand::writeProgress:
-                return impl_->writeProgress(state);
-            case Errand::loadEverybody:
-                return impl_->loadEverybody(state);
-            case Errand::watchSession:
-                return impl_->watch(state, {"--session", state.instructor.watched});
-            case Errand::seeKept:
-                return impl_->watch(state, {"--replay", state.instructor.watched});
-            case Errand::keepNote:
-                return impl_->keepNote(state);
-            case Errand::compareGroups:
-                return impl_->compareGroups(state);
-            case Errand::checkDevices:
-                return impl_->checkDevices(state);
-            case Errand::startSession:
-                return impl_->startSession(state);
-            case Errand::endSession:
-                return impl_->endSession();
-            case Errand::testForce:
-                return impl_->testForce(state);
-            case Errand::tryHand:
-                return impl_->tryHand(state);
-            case Errand::seeExpert:
-                return impl_->seeExpert(state);
-            case Errand::makeFilm:
-                return impl_->makeFilm(state);
-            case Errand::keepSettings:
-                impl_->keepSettings(state);
-                return list(state);
-            case Errand::startDebrief:
-                state.ghost.clear();
-                return impl_->startDebrief(state);
-            case Errand::none:
-            case Errand::quit:
-                return;
+        if (const auto at = all.find(errand); at != all.end()) {
+            ((*impl_).*at->second)(state);
         }
+        errand == Errand::keepSettings ? list(state) : void();
     } catch (const std::exception& e) {
         state.notice = e.what();
     }

@@ -1,5 +1,6 @@
 #include <trainer/instructor.h>
 
+#include <base/mapped.h>
 #include <base/said.h>
 #include <trainer/lists.h>
 
@@ -39,18 +40,13 @@ LiveSession liveOf(const json& one)
 {
     constexpr double silent = 2;  // [s]
     LiveSession s;
-    s.session = one.at("session").get<std::string>();
-    s.who = one.at("who").get<std::string>();
-    s.scene = one.at("scene").get<std::string>();
-    s.doing = translated(one.at("state").get<std::string>());
+    read(one, "session", s.session, "who", s.who, "scene", s.scene, "state", s.doing, "seconds", s.seconds, "inserted_mm",
+         s.inserted, "force_n", s.force, "cores", s.cores);
+    s.doing = translated(s.doing);
     s.warning = warningOf(one);
     s.touching = one.at("warning") == "touching";
-    s.seconds = one.at("seconds").get<double>();
-    s.inserted = one.at("inserted_mm").get<double>();
-    s.force = one.at("force_n").get<double>();
     s.target = numberAt(one, "target_mm");
     s.vital = numberAt(one, "vital_mm");
-    s.cores = one.at("cores").get<int>();
     s.lastCore = numberAt(one, "last_core_target_pct");
     s.stuck = one.at("age_s").get<double>() > silent && one.at("state") != "paused";
     return s;
@@ -115,21 +111,16 @@ Comparison comparisonIn(const json& figures)
     Comparison out;
     std::vector<json> groups;
     each(figures, "groups", [&](const json& one) {
-        const int n = one.at("n").get<int>();
-        out.names.push_back(one.at("name").get<std::string>());
-        out.sessions.push_back(n);
+        read(one, "n", out.sessions.emplace_back(), "name", out.names.emplace_back());
         groups.push_back(one);
     });
     each(figures, "measures", [&](const json& one) {
-        const auto key = one.at("key").get<std::string>();
-        ComparedMeasure m{tr(one.at("label").get<std::string>()),
-                          tr(one.at("unit").get<std::string>()),
-                          one.at("decimals").get<int>(),
-                          {},
-                          std::nullopt};
-        for (const json& group : groups) {
-            m.groups.push_back(spreadOf(group, key));
-        }
+        std::string key;
+        ComparedMeasure m;
+        read(one, "key", key, "label", m.label, "unit", m.unit, "decimals", m.decimals);
+        m.label = tr(m.label);
+        m.unit = tr(m.unit);
+        m.groups = base::mapped<Spread>(groups, [&](const json& group) { return spreadOf(group, key); });
         if (m.decimals == 0 && std::ranges::any_of(m.groups, liesBetween)) {
             m.decimals = 1;
         }

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include <optional>
+#include <utility>
 
 /// Lists in what commands write. Not part of the interface.
 namespace palpate::trainer {
@@ -24,6 +25,16 @@ void each(const nlohmann::json& list, const char* key, const Take& take)
         } catch (const nlohmann::json::exception&) {
             continue;
         }
+    }
+}
+
+/// Reads members into variables: `read(one, "name", s.name, "session", s.number)`. Throws nlohmann::json::exception.
+template <typename Value, typename... More>
+void read(const nlohmann::json& object, const char* key, Value& value, More&&... more)
+{
+    object.at(key).get_to(value);
+    if constexpr (sizeof...(more) > 0) {
+        read(object, std::forward<More>(more)...);
     }
 }
 

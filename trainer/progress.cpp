@@ -1,5 +1,6 @@
 #include <trainer/progress.h>
 
+#include <base/mapped.h>
 #include <base/said.h>
 #include <trainer/lists.h>
 
@@ -26,11 +27,9 @@ using Labels = std::map<std::string, Labelled>;
 
 std::vector<double> numbersOf(const json& list)
 {
-    std::vector<double> out;
-    for (const json& one : list) {
-        out.push_back(one.is_number() ? one.get<double>() : std::numeric_limits<double>::quiet_NaN());
-    }
-    return out;
+    return base::mapped<double>(list, [](const json& one) {
+        return one.is_number() ? one.get<double>() : std::numeric_limits<double>::quiet_NaN();
+    });
 }
 
 Standing standingOf(const std::string& word)
@@ -72,24 +71,16 @@ std::vector<Curve> curvesOf(const json& one, const Labels& labels)
 ExerciseEntry exerciseOf(const json& one, const Labels& labels)
 {
     ExerciseEntry e;
-    e.curriculum = one.at("curriculum").get<std::string>();
-    e.curriculumTitle = tr(one.at("curriculum_title").get<std::string>());
-    e.id = one.at("exercise").get<std::string>();
-    e.title = tr(one.at("title").get<std::string>());
-    e.caseId = one.at("case").get<std::string>();
+    read(one, "curriculum", e.curriculum, "curriculum_title", e.curriculumTitle, "exercise", e.id, "title", e.title, "case",
+         e.caseId, "next", e.next, "test", e.test, "sessions", e.sessions, "recent_met", e.recentMet, "recent_tried",
+         e.recentTried, "pass", e.pass, "of", e.of);
+    e.curriculumTitle = tr(e.curriculumTitle);
+    e.title = tr(e.title);
     e.standing = standingOf(one.at("state").get<std::string>());
-    e.next = one.at("next").get<bool>();
-    e.test = one.at("test").get<bool>();
-    e.sessions = one.at("sessions").get<int>();
-    e.recentMet = one.at("recent_met").get<int>();
-    e.recentTried = one.at("recent_tried").get<int>();
-    e.pass = one.at("pass").get<int>();
-    e.of = one.at("of").get<int>();
     e.daysSince = numberAt(one, "days_since");
     e.curves = curvesOf(one, labels);
     const json& cusum = one.at("cusum");
-    e.p0 = cusum.at("p0").get<double>();
-    e.p1 = cusum.at("p1").get<double>();
+    read(cusum, "p0", e.p0, "p1", e.p1);
     e.alarm = {tr("alarm: fails too often"), "", numbersOf(cusum.at("alarm")), std::nullopt,
                cusum.at("alarm_limit").get<double>()};
     e.learning = {tr("learning: fails seldom"), "", numbersOf(cusum.at("learning")), std::nullopt,
@@ -100,15 +91,9 @@ ExerciseEntry exerciseOf(const json& one, const Labels& labels)
 KeptSession sessionOf(const json& one)
 {
     KeptSession s;
-    s.name = one.at("name").get<std::string>();
-    s.number = one.at("session").get<std::int64_t>();
-    s.started = one.at("started").get<std::string>();
-    s.caseId = one.at("case").get<std::string>();
-    s.scene = one.at("scene").get<std::string>();
+    read(one, "name", s.name, "session", s.number, "started", s.started, "case", s.caseId, "scene", s.scene, "record",
+         s.record, "note", s.note, "rating", s.rating);
     s.test = one.at("mode") == "test";
-    s.record = one.at("record").get<std::string>();
-    s.note = one.at("note").get<std::string>();
-    s.rating = one.at("rating").get<int>();
     s.total = numberAt(one.at("measures"), "total");
     return s;
 }

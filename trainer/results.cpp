@@ -3,6 +3,7 @@
 #include <base/error.h>
 #include <base/said.h>
 #include <base/user_files.h>
+#include <trainer/lists.h>
 #include <trainer/state.h>
 
 #include <fmt/chrono.h>
@@ -38,19 +39,15 @@ nlohmann::json parsed(const fs::path& file)
 // What a level asks for, and whether it was met; empty: there is none.
 std::string levelInWords(const nlohmann::json& asked)
 {
-    const auto bound = [&asked](const char* key) {
-        const auto at = asked.find(key);
-        return at != asked.end() && at->is_number() ? std::optional(at->get<double>()) : std::nullopt;
-    };
     const auto met = asked.find("met");
     if (met == asked.end() || !met->is_boolean()) {
         return "";
     }
     std::string words;
-    if (const auto least = bound("at_least")) {
+    if (const auto least = numberAt(asked, "at_least")) {
         words += ", " + said(tr("at least {:Lg}"), *least);
     }
-    if (const auto most = bound("at_most")) {
+    if (const auto most = numberAt(asked, "at_most")) {
         words += ", " + said(tr("at most {:Lg}"), *most);
     }
     return words + ": " + (met->get<bool>() ? tr("met") : tr("not met"));
@@ -64,15 +61,13 @@ void addAsked(const nlohmann::json& asked, const nlohmann::json& score, std::map
     for (const auto& one : asked) {
         const auto key = one.at("measure").get<std::string>();
         const std::string level = levelInWords(one);
-        const auto value = score.find(key);
-        const bool known = value != score.end() && value->is_number();
+        const auto value = numberAt(score, key.c_str());
         const bool isShown = key == "total" && level.empty();
-        if (!isShown && !rows.contains(key) && (known || !level.empty())) {
+        if (!isShown && !rows.contains(key) && (value || !level.empty())) {
             rows[key] = result.measures.size();
             const std::string unit = tr(one.at("unit").get<std::string>());
-            result.measures.emplace_back(
-                tr(one.at("label").get<std::string>()),
-                known ? said("{:.{}Lf} {}", value->get<double>(), one.at("decimals").get<int>(), unit) : "-");
+            result.measures.emplace_back(tr(one.at("label").get<std::string>()),
+                                         value ? said("{:.{}Lf} {}", *value, one.at("decimals").get<int>(), unit) : "-");
         }
         if (rows.contains(key)) {
             result.measures[rows[key]].second += level;
@@ -101,15 +96,14 @@ void addMeasures(const nlohmann::json& asked, const nlohmann::json& score, const
                                std::tuple{"seconds", marked("Time"), "s", 1}};
     std::map<std::string, std::size_t> rows;
     for (const auto& [key, label, unit, decimals] : shown) {
-        const auto value = score.find(key);
         const bool ofCores = std::string_view(key).starts_with("best_target") || std::string_view(key) == "passes";
         const bool ofMarks = std::string_view(key).starts_with("mark_");  // anybody may mark; elsewhere it means nothing
         if ((noCore && ofCores) || (ofMarks && judged != "marks")) {
             continue;
         }
-        if (value != score.end() && value->is_number()) {
+        if (const auto value = numberAt(score, key)) {
             rows[key] = result.measures.size();
-            result.measures.emplace_back(tr(label), said("{:.{}Lf} {}", value->get<double>(), decimals, unit));
+            result.measures.emplace_back(tr(label), said("{:.{}Lf} {}", *value, decimals, unit));
         }
     }
     addAsked(asked, score, rows, result);
@@ -118,8 +112,7 @@ void addMeasures(const nlohmann::json& asked, const nlohmann::json& score, const
 // What the points of `core` are for. Figures of older programs do not say it.
 std::string judgedBy(const nlohmann::json& score)
 {
-    const auto marks = score.find("mark_error_mm");
-    return score.value("judged", marks != score.end() && marks->is_number() ? "marks" : "core");
+    return score.value("judged", numberAt(score, "mark_error_mm") ? "marks" : "core");
 }
 
 // Where a session left no figures, its record may be there: also of one that was killed.
@@ -153,11 +146,8 @@ Result readResult(const fs::path& figures)
             if (loss.at("points").get<double>() <= 0.5) {
                 continue;
             }
-            LossOfPoints lost{loss.at("points").get<double>(), loss.at("words").get<std::string>(), std::nullopt};
-            if (const auto at = loss.find("at_s"); at != loss.end() && at->is_number()) {
-                lost.at = at->get<double>();
-            }
-            result.losses.push_back(std::move(lost));
+            result.losses.push_back(
+                {loss.at("points").get<double>(), loss.at("words").get<std::string>(), numberAt(loss, "at_s")});
         }
         addMeasures(json.value("asked", nlohmann::json::array()), score, judged, result);
         result.fault = json.value("problem", "");

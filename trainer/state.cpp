@@ -20,15 +20,23 @@ using base::tr;
 namespace {
 
 // Of the viewer's window.
-void addLook(const State& state, std::vector<std::string>& words)
-{
-    if (state.settings.palette != "standard") {
-        words.insert(words.end(), {"--palette", state.settings.palette});
+// Words of a command, of which some are added only where they are asked for.
+struct Words : std::vector<std::string> {
+    void add(bool asked, std::initializer_list<std::string> more)
+    {
+        insert(end(), more.begin(), asked ? more.end() : more.begin());
     }
-    if (state.settings.sounds) {
-        words.emplace_back("--sounds");
+    void addLook(const State& state)
+    {
+        add(state.settings.palette != "standard", {"--palette", state.settings.palette});
+        add(state.settings.sounds, {"--sounds"});
     }
-}
+    void addDevice(const State& state)
+    {
+        add(true, {"--device", state.useFalcon ? "falcon" : "mouse"});
+        add(state.useFalcon && !state.firmware.empty(), {"--falcon-firmware", state.firmware});
+    }
+};
 
 // What was said on one screen is not said on the next.
 void turnTo(State& state, Screen screen)
@@ -85,23 +93,11 @@ const char* nameOf(Screen screen) noexcept
 
 const char* mainButton(const State& state) noexcept
 {
-    switch (state.screen) {
-        case Screen::cases:
-            return tr("Choose this case");
-        case Screen::devices:
-            return tr("Go on");
-        case Screen::briefing:
-            return tr("Start");
-        case Screen::session:
-            return tr("End the session");
-        case Screen::progress:
-            return tr("Train this exercise");
-        case Screen::instructor:
-            return tr("Choose a case");
-        case Screen::result:
-            break;
-    }
-    return state.exercise.empty() ? tr("Next case") : tr("What is next");
+    constexpr std::array words{marked("Choose this case"), marked("Go on"),     marked("Start"),
+                               marked("End the session"),  marked("Next case"), marked("Train this exercise"),
+                               marked("Choose a case")};
+    const bool inCurriculum = state.screen == Screen::result && !state.exercise.empty();
+    return inCurriculum ? tr("What is next") : tr(words[static_cast<std::size_t>(state.screen)]);
 }
 
 Errand advance(State& state)
@@ -174,10 +170,9 @@ Errand leave(State& state)
 
 Errand again(State& state)
 {
-    if (state.screen != Screen::result) {
-        return Errand::none;
+    if (state.screen == Screen::result) {
+        turnTo(state, Screen::briefing);
     }
-    turnTo(state, Screen::briefing);
     return Errand::none;
 }
 
@@ -307,78 +302,54 @@ void sessionEnded(State& state, Result result)
 
 std::vector<std::string> trainArguments(const State& state, const SessionFiles& files)
 {
-    std::vector<std::string> words{"train"};
-    const auto add = [&words](std::initializer_list<std::string> more) { words.insert(words.end(), more); };
-    const CaseEntry& chosen = chosenCase(state);
-    if (state.exercise.empty()) {
-        add({"--case", chosen.id});
-    } else {
-        add({"--exercise", state.exercise});
-    }
-    if (!state.person.empty()) {
-        add({"--profile", state.person});
-    }
-    add({"--device", state.useFalcon ? "falcon" : "mouse"});
-    if (state.useFalcon && !state.firmware.empty()) {
-        add({"--falcon-firmware", state.firmware});
-    }
-    add({"--view", "--close-at-end"});
-    addLook(state, words);
-    if (state.test) {
-        add({"--test"});
-    }
-    add({"--record", files.record.string(), "--json", files.figures.string()});
+    Words words{{"train"}};
+    words.add(state.exercise.empty(), {"--case", chosenCase(state).id});
+    words.add(!state.exercise.empty(), {"--exercise", state.exercise});
+    words.add(!state.person.empty(), {"--profile", state.person});
+    words.addDevice(state);
+    words.add(true, {"--view", "--close-at-end"});
+    words.addLook(state);
+    words.add(state.test, {"--test"});
+    words.add(true, {"--record", files.record.string(), "--json", files.figures.string()});
     return words;
 }
 
 std::vector<std::string> comparisonArguments(const State& state)
 {
-    std::vector<std::string> words{"progress"};
+    Words words{{"progress"}};
     const Instructor& of = state.instructor;
     for (int group = 1; group <= 2; ++group) {
         const std::size_t before = words.size();
         for (std::size_t i = 0; i < std::min(of.groupOf.size(), state.people.size()); ++i) {
             if (of.groupOf[i] == group) {  // one by one: a name may have a comma
-                words.insert(words.end(), {"--group", said(tr("group {}"), group) + "=" + state.people[i].name});
+                words.add(true, {"--group", said(tr("group {}"), group) + "=" + state.people[i].name});
             }
         }
         if (words.size() == before) {
             return {};
         }
     }
-    if (!of.caseId.empty()) {
-        words.insert(words.end(), {"--case", of.caseId});
-    }
+    words.add(!of.caseId.empty(), {"--case", of.caseId});
     return words;
 }
 
 std::vector<std::string> debriefArguments(const State& state)
 {
-    std::vector<std::string> words{
-        "--replay", state.files.record.string(),
-        "--layout", "trainee",
-        "--images", std::filesystem::path(state.files.record).replace_extension(".ultrasound").string()};
-    addLook(state, words);
-    if (state.from) {
-        words.insert(words.end(), {"--at", fmt::format("{:.2f}", *state.from)});
-    }
-    if (!state.ghost.empty()) {
-        words.insert(words.end(), {"--ghost", state.ghost.string()});
-    }
+    Words words{{"--replay", state.files.record.string(), "--layout", "trainee", "--images",
+                 std::filesystem::path(state.files.record).replace_extension(".ultrasound").string()}};
+    words.addLook(state);
+    words.add(state.from.has_value(), {"--at", fmt::format("{:.2f}", state.from.value_or(0))});
+    words.add(!state.ghost.empty(), {"--ghost", state.ghost.string()});
     return words;
 }
 
 std::vector<std::string> tryoutArguments(const State& state)
 {
-    std::vector<std::string> words{"train", "--tryout", "--device", state.useFalcon ? "falcon" : "mouse"};
+    Words words{{"train", "--tryout"}};
+    words.addDevice(state);
     const auto person = std::ranges::find(state.people, state.person, &PersonEntry::name);
-    if (person != state.people.end() && person->leftHanded) {
-        words.insert(words.end(), {"--hand", "left"});
-    }
-    if (state.useFalcon && !state.firmware.empty()) {
-        words.insert(words.end(), {"--falcon-firmware", state.firmware});
-    }
-    addLook(state, words);
+    words.add(person != state.people.end() && person->leftHanded, {"--hand", "left"});
+    words.addLook(state);
     return words;
 }
 
