@@ -11,7 +11,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
 #include <functional>
 #include <list>
 #include <map>
@@ -106,8 +105,7 @@ struct Errands::Impl {
         arguments.insert(arguments.end(), {"--json", file.string()});
         Running command(programs / "palpate", arguments, scratch / "answer.log");
         command.finish(answerTime);
-        std::ifstream in(file);
-        auto answer = nlohmann::json::parse(in, nullptr, false);
+        auto answer = parsed(file);
         state.notice = answer.is_discarded() ? whyNot(command, arguments) : state.notice;
         return answer;
     }
@@ -244,8 +242,7 @@ struct Errands::Impl {
         std::error_code none;
         if (const auto written = fs::last_write_time(file, none); !none && written != liveRead) {
             liveRead = written;
-            std::ifstream in(file);
-            state.instructor.live = liveIn(nlohmann::json::parse(in, nullptr, false));
+            state.instructor.live = liveIn(parsed(file));
         }
     }
     void addPerson(State& state)

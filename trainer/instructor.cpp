@@ -111,7 +111,9 @@ Comparison comparisonIn(const json& figures)
     Comparison out;
     std::vector<json> groups;
     each(figures, "groups", [&](const json& one) {
-        read(one, "n", out.sessions.emplace_back(), "name", out.names.emplace_back());
+        const int n = one.at("n").get<int>();
+        out.names.push_back(one.at("name").get<std::string>());
+        out.sessions.push_back(n);
         groups.push_back(one);
     });
     each(figures, "measures", [&](const json& one) {

@@ -41,8 +41,7 @@ Errand drawLive(State& state)
         ImGui::Separator();
         ImGui::AlignTextToFramePadding();
         heading(said("{}: {}", s.who.empty() ? s.session : s.who, titleOf(state, s)), 1.15F);
-        besideIfRoom(tr("Watch"));
-        if (ImGui::Button(tr("Watch"))) {
+        if (buttonBeside(tr("Watch"))) {
             i.watched = s.session;
             errand = Errand::watchSession;
         }
@@ -85,19 +84,13 @@ void drawKeptChoice(State& state)
 {
     Instructor& i = state.instructor;
     const auto& all = i.everybody.sessions;
-    const auto nameOf = [&](const KeptSession& s) { return said("{}: {}", s.name, titleOf(state, s)); };
+    const auto label = [&](std::size_t n) {
+        return said("{}: {}, {}", all[n].name, titleOf(state, all[n]), factsOf(i, all[n]));
+    };
     ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x);
-    if (!ImGui::BeginCombo("##kept", preview(nameOf(all[i.chosen]) + ", " + factsOf(i, all[i.chosen])).c_str())) {
-        return;
+    if (const auto now = choice("##kept", label(i.chosen), all.size(), i.chosen, label)) {
+        chooseKept(state, *now);
     }
-    for (std::size_t n = 0; n < all.size(); ++n) {
-        ImGui::PushID(static_cast<int>(n));
-        if (ImGui::Selectable((nameOf(all[n]) + ", " + factsOf(i, all[n])).c_str(), n == i.chosen)) {
-            chooseKept(state, n);
-        }
-        ImGui::PopID();
-    }
-    ImGui::EndCombo();
 }
 
 void drawKeptList(State& state)
@@ -108,23 +101,15 @@ void drawKeptList(State& state)
         ImGui::PushID(static_cast<int>(n));
         const ImVec2 at = ImGui::GetCursorPos();
         const float high = 2 * ImGui::GetTextLineHeightWithSpacing();
-        if (ImGui::Selectable("##kept", i.chosen == n, 0, {0, high})) {
-            chooseKept(state, n);
-        } else if (ImGui::IsItemFocused() && ImGui::GetIO().NavVisible && i.chosen != n) {
+        if (ImGui::Selectable("##kept", i.chosen == n, 0, {0, high}) ||
+            (ImGui::IsItemFocused() && ImGui::GetIO().NavVisible && i.chosen != n)) {
             chooseKept(state, n);
         }
         if (!ImGui::IsItemVisible()) {
             ImGui::PopID();
             continue;  // of hundreds a dozen are seen
         }
-        const ImVec2 next = ImGui::GetCursorPos();
-        ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
-        ImGui::BeginGroup();
-        const float wide = ImGui::GetContentRegionAvail().x;
-        ImGui::TextUnformatted(shortened(said("{}: {}", s.name, titleOf(state, s)), wide).c_str());
-        ImGui::TextColored(vec(i.chosen == n ? Rgb{1, 1, 1} : quiet), "%s", shortened(factsOf(i, s), wide).c_str());
-        ImGui::EndGroup();
-        ImGui::SetCursorPos(next);
+        drawRow(at, said("{}: {}", s.name, titleOf(state, s)), factsOf(i, s), i.chosen == n ? Rgb{1, 1, 1} : quiet);
         ImGui::PopID();
     }
 }
@@ -217,21 +202,14 @@ Errand drawChoiceOfGroups(State& state)
     drawMembers(state);
     const auto at = std::ranges::find(state.cases, i.caseId, &CaseEntry::id);
     const std::string label = fieldLabel(tr("Sessions"), 17 * ImGui::GetFontSize());  // sets the width
-    if (ImGui::BeginCombo(label.c_str(), preview(at == state.cases.end() ? tr("of all cases") : at->title).c_str())) {
-        if (ImGui::Selectable(tr("of all cases"), i.caseId.empty())) {
-            i.caseId.clear();
-        }
-        for (const CaseEntry& c : state.cases) {
-            if (ImGui::Selectable((c.title + "##" + c.id).c_str(), c.id == i.caseId)) {
-                i.caseId = c.id;
-            }
-        }
-        ImGui::EndCombo();
+    const std::size_t chosen =
+        at == state.cases.end() ? 0 : static_cast<std::size_t>(at - state.cases.begin()) + 1;  // 0: all cases
+    const auto title = [&](std::size_t n) { return n == 0 ? tr("of all cases") : state.cases[n - 1].title; };
+    if (const auto now = choice(label, title(chosen), state.cases.size() + 1, chosen, title)) {
+        i.caseId = *now == 0 ? "" : state.cases[*now - 1].id;
     }
-    besideIfRoom(tr("Compare"));
-    const bool compare = ImGui::Button(tr("Compare"));
-    besideIfRoom(tr("Compare, as a page too"));
-    i.asPage = ImGui::Button(fitted(tr("Compare, as a page too")).c_str());
+    const bool compare = buttonBeside(tr("Compare"));
+    i.asPage = buttonBeside(tr("Compare, as a page too"));
     return compare || i.asPage ? Errand::compareGroups : Errand::none;
 }
 

@@ -2,11 +2,20 @@
 
 #include <nlohmann/json.hpp>
 
+#include <filesystem>
+#include <fstream>
 #include <optional>
 #include <utility>
 
 /// Lists in what commands write. Not part of the interface.
 namespace palpate::trainer {
+
+/// Discarded where the file is not JSON.
+inline nlohmann::json parsed(const std::filesystem::path& file)
+{
+    std::ifstream in(file);
+    return nlohmann::json::parse(in, nullptr, false);
+}
 
 /// Calls `take` for each member of the list under `key`; what is not as it should be is left out.
 template <typename Take>

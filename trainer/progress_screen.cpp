@@ -4,6 +4,7 @@
 #include <base/said.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 namespace palpate::trainer {
@@ -16,16 +17,8 @@ using Standing = ExerciseEntry::Standing;
 
 Rgb colourOf(Standing standing)
 {
-    switch (standing) {
-        case Standing::reached:
-            return green;
-        case Standing::refresh:
-            return orange;
-        case Standing::next:
-            return skyBlue;
-        default:
-            return quiet;
-    }
+    constexpr std::array colours{quiet, quiet, skyBlue, green, orange};  // locked, open, next, reached, refresh
+    return colours[static_cast<std::size_t>(standing)];
 }
 
 std::string standingOf(const ExerciseEntry& e)
@@ -63,15 +56,8 @@ Errand drawExercises(State& state, bool entered)
             state.exerciseShown = i;
             state.curveShown = 0;
         }
-        const ImVec2 next = ImGui::GetCursorPos();
-        ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
-        ImGui::BeginGroup();
-        const float wide = ImGui::GetContentRegionAvail().x;
-        ImGui::TextUnformatted(shortened(said("{}. {}", ++number, e.title), wide).c_str());
-        ImGui::TextColored(vec(state.exerciseShown == i ? Rgb{1, 1, 1} : colourOf(e.standing)), "%s",
-                           shortened(standingOf(e), wide).c_str());
-        ImGui::EndGroup();
-        ImGui::SetCursorPos(next);
+        drawRow(at, said("{}. {}", ++number, e.title), standingOf(e),
+                state.exerciseShown == i ? Rgb{1, 1, 1} : colourOf(e.standing));
         ImGui::PopID();
     }
     return errand;
@@ -110,16 +96,12 @@ void chooseExercise(State& state)
 void drawCurvesOf(State& state, const ExerciseEntry& e, float wide, float high)
 {
     const std::size_t shown = std::min(state.curveShown, e.curves.size() - 1);
-    const auto labelOf = [](const Curve& c) { return c.unit.empty() ? c.label : c.label + " [" + c.unit + "]"; };
+    const auto label = [&](std::size_t i) {
+        const Curve& c = e.curves[i];
+        return c.unit.empty() ? c.label : c.label + " [" + c.unit + "]";
+    };
     ImGui::SetNextItemWidth(std::min(20 * ImGui::GetFontSize(), wide));
-    if (ImGui::BeginCombo("##measure", preview(labelOf(e.curves[shown])).c_str())) {
-        for (std::size_t i = 0; i < e.curves.size(); ++i) {
-            if (ImGui::Selectable(labelOf(e.curves[i]).c_str(), i == shown)) {
-                state.curveShown = i;
-            }
-        }
-        ImGui::EndCombo();
-    }
+    state.curveShown = choice("##measure", label(shown), e.curves.size(), shown, label).value_or(state.curveShown);
     drawCurves({{&e.curves[shown], skyBlue}}, wide, 0.55F * high);
     words(said(tr("CUSUM: tells who fails {:.0f} % of the time from who fails {:.0f} %"), 100 * e.p0, 100 * e.p1));
     drawCurves({{&e.alarm, orange}, {&e.learning, green}}, wide, 0.45F * high);

@@ -13,7 +13,6 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <string>
@@ -29,12 +28,6 @@ using base::said;
 using base::tr;
 
 namespace {
-
-nlohmann::json parsed(const fs::path& file)
-{
-    std::ifstream in(file);
-    return nlohmann::json::parse(in, nullptr, false);
-}
 
 // What a level asks for, and whether it was met; empty: there is none.
 std::string levelInWords(const nlohmann::json& asked)

@@ -51,18 +51,12 @@ Errand drawPeople(State& state)
     Errand errand = Errand::none;
     const std::string nobody = tr("nobody: no progress is kept");
     const std::string label = fieldLabel(tr("Who trains"), (roomForTwo() ? 17 : 11) * em);
-    if (ImGui::BeginCombo(label.c_str(), preview(state.person.empty() ? nobody : state.person).c_str())) {
-        if (ImGui::Selectable(nobody.c_str(), state.person.empty())) {
-            state.person.clear();
-            errand = Errand::choosePerson;
-        }
-        for (const PersonEntry& one : state.people) {
-            if (ImGui::Selectable(one.name.c_str(), state.person == one.name)) {
-                state.person = one.name;
-                errand = Errand::choosePerson;
-            }
-        }
-        ImGui::EndCombo();
+    const PersonEntry* const before = chosenPerson(state);
+    const std::size_t chosen = before == nullptr ? 0 : static_cast<std::size_t>(before - state.people.data()) + 1;
+    const auto name = [&](std::size_t n) { return n == 0 ? nobody : state.people[n - 1].name; };
+    if (const auto now = choice(label, name(chosen), state.people.size() + 1, chosen, name)) {
+        state.person = *now == 0 ? "" : state.people[*now - 1].name;
+        errand = Errand::choosePerson;
     }
     if (PersonEntry* const person = chosenPerson(state)) {
         besideIfRoom(std::string(tr("Left-handed")) + "    ");
@@ -79,13 +73,11 @@ Errand drawPeople(State& state)
     }
     ImGui::EndDisabled();
     ImGui::BeginDisabled(state.person.empty());
-    besideIfRoom(tr("Progress"));
-    if (ImGui::Button(tr("Progress"))) {
+    if (buttonBeside(tr("Progress"))) {
         errand = showProgress(state);
     }
     ImGui::EndDisabled();
-    besideIfRoom(tr("Instructor"));
-    if (ImGui::Button(tr("Instructor"))) {
+    if (buttonBeside(tr("Instructor"))) {
         errand = showInstructor(state);
     }
     besideIfRoom(tr("Settings"));
@@ -146,8 +138,7 @@ Errand drawDeviceTests(State& state)
         errand = Errand::tryHand;
     }
     if (state.useFalcon) {
-        besideIfRoom(tr("Force test: 1 N"));
-        if (ImGui::Button(tr("Force test: 1 N"))) {
+        if (buttonBeside(tr("Force test: 1 N"))) {
             errand = Errand::testForce;
         }
     }

@@ -1,6 +1,7 @@
 #include <trainer/settings.h>
 
 #include <base/words.h>
+#include <trainer/lists.h>
 
 #include <nlohmann/json.hpp>
 
@@ -14,8 +15,7 @@ namespace fs = std::filesystem;
 Settings readSettings(const fs::path& file)
 {
     Settings settings;
-    std::ifstream in(file);
-    const auto json = nlohmann::json::parse(in, nullptr, false);
+    const auto json = parsed(file);
     if (!json.is_object()) {
         return settings;
     }

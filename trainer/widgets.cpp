@@ -62,6 +62,12 @@ void besideIfRoom(const std::string& label)
     }
 }
 
+bool buttonBeside(const std::string& label)
+{
+    besideIfRoom(label);
+    return ImGui::Button(fitted(label).c_str());
+}
+
 std::string shortened(const std::string& text, float wide)
 {
     std::string out = text;
@@ -112,6 +118,34 @@ std::string fitted(const std::string& label)
 std::string preview(const std::string& chosen)
 {
     return shortened(chosen, ImGui::CalcItemWidth() - ImGui::GetFrameHeight() - 2 * ImGui::GetStyle().FramePadding.x);
+}
+
+std::optional<std::size_t> choice(const std::string& name, const std::string& shown, std::size_t count, std::size_t chosen,
+                                  const std::function<std::string(std::size_t)>& label)
+{
+    std::optional<std::size_t> now;
+    if (!ImGui::BeginCombo(name.c_str(), preview(shown).c_str())) {
+        return now;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        ImGui::PushID(static_cast<int>(i));
+        now = ImGui::Selectable(label(i).c_str(), i == chosen) ? i : now;
+        ImGui::PopID();
+    }
+    ImGui::EndCombo();
+    return now;
+}
+
+void drawRow(ImVec2 at, const std::string& title, const std::string& facts, Rgb colour)
+{
+    const ImVec2 next = ImGui::GetCursorPos();
+    ImGui::SetCursorPos({at.x + 0.4F * ImGui::GetFontSize(), at.y});
+    ImGui::BeginGroup();
+    const float wide = ImGui::GetContentRegionAvail().x;
+    ImGui::TextUnformatted(shortened(title, wide).c_str());
+    ImGui::TextColored(vec(colour), "%s", shortened(facts, wide).c_str());
+    ImGui::EndGroup();
+    ImGui::SetCursorPos(next);
 }
 
 bool radio(const std::string& label, bool active)

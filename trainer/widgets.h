@@ -5,6 +5,8 @@
 
 #include <imgui.h>
 
+#include <functional>
+#include <optional>
 #include <string>
 
 /// What the screens are put together of. Not part of the interface.
@@ -25,6 +27,9 @@ bool enterPressed();
 /// Puts the next widget beside the one before, or below it where a row has no room for `label`.
 void besideIfRoom(const std::string& label);
 
+/// Such a button. Returns whether it was pressed.
+bool buttonBeside(const std::string& label);
+
 /// The text, with its end left out where it is wider than so many pixels.
 std::string shortened(const std::string& text, float wide);
 /// Whether a list and what is chosen of it have room side by side in the window.
@@ -43,6 +48,11 @@ std::string fitted(const std::string& label);
 bool radio(const std::string& label, bool active);
 /// What a combo box shows of its choice, as it has room in the next field.
 std::string preview(const std::string& chosen);
+/// A combo box that shows `shown`, with so many choices. Returns the one that was just chosen; nothing: none was.
+std::optional<std::size_t> choice(const std::string& name, const std::string& shown, std::size_t count, std::size_t chosen,
+                                  const std::function<std::string(std::size_t)>& label);
+/// Two lines over a row that can be chosen and begins `at`: what it is, and facts in a colour.
+void drawRow(ImVec2 at, const std::string& title, const std::string& facts, Rgb colour);
 /// Sets the width of the next field. Returns its label; where rollsAsOne() that is above it instead.
 std::string fieldLabel(const std::string& label, float wide);
 
