@@ -53,11 +53,6 @@ bool Training::leftHanded() const noexcept
     return options_.hand.empty() ? person_ && person_->hand == training::Hand::left : options_.hand == "left";
 }
 
-std::string Training::scene() const
-{
-    return case_ ? case_->scene : "";
-}
-
 void Training::change(session::SceneChanges& changes) const
 {
     base::failIf(changes.dffb && (options_.test || exercise_ != nullptr), "{}",

@@ -40,7 +40,7 @@ public:
     explicit Training(TrainingOptions options);
 
     /// The scene to open; empty: none of the options says one.
-    std::string scene() const;
+    std::string scene() const { return case_ ? case_->scene : ""; }
     /// Guidance of this trial.
     void change(session::SceneChanges& changes) const;
     /// Where the record goes when nobody asked for one; empty: nowhere.

@@ -79,11 +79,6 @@ Inverse::Local Inverse::local(glm::vec3 g) const noexcept
     return inCell(cell, g - glm::vec3(cell));
 }
 
-glm::vec3 Inverse::displacement(glm::vec3 g) const noexcept
-{
-    return local(g).u;
-}
-
 // Solves shift + share u(g + shift) = 0; whether it got there, and to tissue that is not inside out.
 bool Inverse::newton(glm::vec3 g, float fraction, int steps, float enough, glm::vec3& shift) const noexcept
 {

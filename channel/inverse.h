@@ -34,7 +34,7 @@ public:
     void follow(glm::vec3 g, glm::vec3& shift, float enough = close) const noexcept;
 
     /// u at the rest place `g`.
-    glm::vec3 displacement(glm::vec3 g) const noexcept;
+    glm::vec3 displacement(glm::vec3 g) const noexcept { return local(g).u; }
     /// Cells that are folded, or nearly so.
     std::size_t folds() const noexcept { return folds_; }
 

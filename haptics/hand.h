@@ -36,7 +36,7 @@ public:
 private:
     void advance() noexcept;
     bool feltDrop() const noexcept;
-    bool gaveWay() const noexcept;
+    bool gaveWay() const noexcept { return sees_ ? inside_ : feltDrop(); }
     bool reached(const datasets::TraineeStep& step) const noexcept;
     void nextStep() noexcept;
 

@@ -54,11 +54,6 @@ bool ProbeHand::wantsAnother() noexcept
     return holds_ && !sees_ && random_.between(0.0, 1.0) < skill_.vigilance;
 }
 
-bool ProbeHand::stores() noexcept
-{
-    return holds_ && random_.between(0.0, 1.0) < skill_.vigilance;
-}
-
 void ProbeHand::observe(const TickRecord& record) noexcept
 {
     sees_ = record.tipInBeam;

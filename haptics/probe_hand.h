@@ -26,7 +26,7 @@ public:
     /// The look is over, and the tip is still not in the picture: whether this trainee sees that it must look again.
     bool wantsAnother() noexcept;
     /// Whether this trainee thinks of storing a picture now.
-    bool stores() noexcept;
+    bool stores() noexcept { return holds_ && random_.between(0.0, 1.0) < skill_.vigilance; }
 
     void observe(const TickRecord& record) noexcept;
     /// One tick on: where it has the probe, beside the scene's script.

@@ -90,20 +90,10 @@ void RowDigest::addBits(char type, std::uint64_t bits)
     addBytes(bytes.data(), bytes.size());
 }
 
-void RowDigest::add(double value)
-{
-    addBits('r', std::bit_cast<std::uint64_t>(value));
-}
-
 void RowDigest::add(std::string_view text)
 {
     addBits('t', text.size());
     addBytes(text.data(), text.size());
-}
-
-void RowDigest::addNull()
-{
-    addBytes("n", 1);
 }
 
 void RowDigest::endRow()

@@ -3,6 +3,7 @@
 // The seal of a record: SHA-256 of the rows of its tables, part by part. Shared by the writer (recorder.cpp) and the reader
 // (record.cpp), no public header.
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -23,9 +24,9 @@ public:
     RowDigest();
 
     void add(std::int64_t value) { addBits('i', static_cast<std::uint64_t>(value)); }
-    void add(double value);
+    void add(double value) { addBits('r', std::bit_cast<std::uint64_t>(value)); }
     void add(std::string_view text);
-    void addNull();
+    void addNull() { addBytes("n", 1); }
     void endRow();
 
     std::int64_t rows() const noexcept { return rows_; }

@@ -198,11 +198,6 @@ void JerkMeter::pause() noexcept
     blocks = 0;
 }
 
-double JerkMeter::rms() const noexcept
-{
-    return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
-}
-
 void PathMeter::add(Vec3 tip) noexcept
 {
     if (!running) {
@@ -220,11 +215,6 @@ void PathMeter::pause(Vec3 tip) noexcept
 {
     counted = length(tip);
     running = false;
-}
-
-double PathMeter::length(Vec3 tip) const noexcept
-{
-    return running ? counted + glm::distance(anchor, tip) : counted;
 }
 
 Scorer::Scorer(const SessionInfo& info)

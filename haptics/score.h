@@ -5,6 +5,7 @@
 #include <haptics/tick.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -111,7 +112,7 @@ struct PathMeter {
     void add(Vec3 tip) noexcept;
     /// Ends a stretch; the next add() starts another one.
     void pause(Vec3 tip) noexcept;
-    double length(Vec3 tip) const noexcept;
+    double length(Vec3 tip) const noexcept { return running ? counted + glm::distance(anchor, tip) : counted; }
 };
 
 /// Root mean square jerk of a path, from means over 25 ms: what an encoder's steps add stays below what a tremor has.
@@ -126,7 +127,7 @@ struct JerkMeter {
     void add(Vec3 tip, double rate) noexcept;
     /// The next add() starts another stretch.
     void pause() noexcept;
-    double rms() const noexcept;  // [m/s^3]
+    double rms() const noexcept { return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0; }  // [m/s^3]
 };
 
 /// The target at rest: what a palpation is judged by, and what a report draws. SessionInfo::extra keeps it.

@@ -91,11 +91,6 @@ void Trainee::plan(double keep) noexcept
     aim_ = model_.approach.aim + aimError_;
 }
 
-Vec3 Trainee::inward() const noexcept
-{
-    return glm::normalize(aim_ - entry_);
-}
-
 // Or, where no core is asked for, to stop with the tip at the aim.
 double Trainee::depthToFire() const noexcept
 {

@@ -59,7 +59,7 @@ private:
     bool arrived() const noexcept;
     bool isDeepEnough() const noexcept;
     bool dangerAhead() const noexcept;
-    Vec3 inward() const noexcept;
+    Vec3 inward() const noexcept { return glm::normalize(aim_ - entry_); }
     double depthToFire() const noexcept;
     bool asks(datasets::SessionTask task) const noexcept { return model_.scene.task == task; }
     void storePicture() noexcept;

@@ -121,11 +121,6 @@ void Controls::keep()
         picture_.setTimeline(playback_->time / std::max<double>(playback_->length, 1e-3));
 }
 
-bool Controls::used() noexcept
-{
-    return std::exchange(used_, false);
-}
-
 void Controls::camera(unsigned long event)
 {
     interactor_.InvokeEvent(event);
@@ -249,11 +244,6 @@ bool Controls::onUltrasound() const
 }
 
 // On a live picture the mouse that is the hand leads the needle.
-bool Controls::measures() const
-{
-    return !hand_.is() || picture_.ultrasound().frozen();
-}
-
 void Controls::scrub()
 {
     if (!scrubbing_)

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 struct GLFWwindow;
@@ -41,7 +42,7 @@ public:
     /// To be called after every look at the follower.
     void keep();
     /// Whether something was used since the last call.
-    bool used() noexcept;
+    bool used() noexcept { return std::exchange(used_, false); }
     bool holding() const noexcept { return hand_.held(); }
 
     struct Press {
@@ -97,7 +98,7 @@ private:
     double shownTime() const;
     void scrub();
     bool onUltrasound() const;
-    bool measures() const;
+    bool measures() const { return !hand_.is() || picture_.ultrasound().frozen(); }
     void camera(unsigned long event);
     void showHelp();
     void close();

@@ -77,16 +77,6 @@ void MouseHand::moveProbe(const ultrasound::ProbeMove& by) noexcept
         input_.probe[i] = std::clamp(input_.probe[i] + (paused() ? 0.0 : ways[i]), -furthest, furthest);
 }
 
-glm::dvec3 MouseHand::target() const noexcept
-{
-    return vec(input_.target);
-}
-
-glm::dvec3 MouseHand::axis() const noexcept
-{
-    return vec(input_.axis);
-}
-
 void MouseHand::move(glm::dvec3 by) noexcept
 {
     if (input_.held != 0)

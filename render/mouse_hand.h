@@ -26,9 +26,9 @@ public:
     void release() noexcept { input_.held = 0; }
     bool held() const noexcept { return is() && input_.held != 0; }
     /// Where the hand is [m].
-    glm::dvec3 target() const noexcept;
+    glm::dvec3 target() const noexcept { return vec(input_.target); }
     /// Of the tool, from its shaft to its tip; a unit vector.
-    glm::dvec3 axis() const noexcept;
+    glm::dvec3 axis() const noexcept { return vec(input_.axis); }
     /// While the switch is held, and only then: moves the hand [m].
     void move(glm::dvec3 by) noexcept;
     /// ... turns the tool by `angle` [rad] about the unit vector `about`.

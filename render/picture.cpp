@@ -481,26 +481,6 @@ void Picture::resetView()
     session_->repaint();
 }
 
-void Picture::setHelp(std::vector<KeyHelp> keys)
-{
-    help_ = std::move(keys);
-}
-
-void Picture::setCaption(const std::string& words)
-{
-    caption_ = words;
-}
-
-void Picture::setTimeline(double fraction)
-{
-    timeline_ = fraction;
-}
-
-void Picture::setDisplayScale(double scale)
-{
-    scale_ = std::max(scale, 1.0);
-}
-
 std::string Picture::display()
 {
     const char* report = window_.ReportCapabilities();

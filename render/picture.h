@@ -22,6 +22,7 @@
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -29,6 +30,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::render {
@@ -102,15 +104,15 @@ public:
     /// Camera and opacities as they were when the session was opened.
     void resetView();
     /// Lists the keys across the picture; empty = hidden.
-    void setHelp(std::vector<KeyHelp> keys);
+    void setHelp(std::vector<KeyHelp> keys) { help_ = std::move(keys); }
     /// Where the hand is that holds the tool [m]; nothing: not shown.
     void setHand(std::optional<glm::dvec3> hand) noexcept { hand_ = hand; }
     /// A few words on top, such as "PAUSED" or "REPLAY x 0.5"; empty = none.
-    void setCaption(const std::string& words);
+    void setCaption(const std::string& words) { caption_ = words; }
     /// A bar that shows which fraction of a record is over, in [0, 1]; negative = none.
-    void setTimeline(double fraction);
+    void setTimeline(double fraction) { timeline_ = fraction; }
     /// Pixels per point of the screen, from 1: texts are drawn so many times larger at least.
-    void setDisplayScale(double scale);
+    void setDisplayScale(double scale) { scale_ = std::max(scale, 1.0); }
     /// The point [m] under a pixel (from the lower left) of the 3-D view, in the plane through `point` [m] that faces the
     /// camera.
     glm::dvec3 under(Point2 pixel, glm::dvec3 point) const;

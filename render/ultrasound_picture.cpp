@@ -245,11 +245,6 @@ void UltrasoundPicture::drawCalipers(Canvas& canvas, const ultrasound::BeamImage
     }
 }
 
-void UltrasoundPicture::ask()
-{
-    scan_->ask(console_->first, console_->second);
-}
-
 void UltrasoundPicture::turn(Knob knob, int steps, int slider)
 {
     if (!scan_ || frozen_)
@@ -383,11 +378,6 @@ void UltrasoundPicture::store(const std::filesystem::path& folder)
     } catch (const std::exception& e) {
         message_ = e.what();
     }
-}
-
-std::optional<ScanFigures> UltrasoundPicture::figures() const
-{
-    return scan_ ? std::optional(scan_->figures()) : std::nullopt;
 }
 
 }  // namespace palpate::render

@@ -61,12 +61,12 @@ public:
     /// Writes the picture beside those before into `folder`.
     void store(const std::filesystem::path& folder);
 
-    std::optional<ScanFigures> figures() const;
+    std::optional<ScanFigures> figures() const { return scan_ ? std::optional(scan_->figures()) : std::nullopt; }
 
 private:
     using Ends = std::array<glm::vec2, 2>;  // lateral, axial [m]
 
-    void ask();
+    void ask() { scan_->ask(console_->first, console_->second); }
     ScanThread::Image shown() const;
     void convert(const ultrasound::BeamImage* image);
     ultrasound::Layout layout(const ultrasound::BeamImage& image) const;

@@ -289,11 +289,6 @@ void VolumePicture::cut(glm::dvec3 point, glm::dvec3 normal)
     cutNormal_ = -normal;
 }
 
-void VolumePicture::uncut()
-{
-    cutNormal_ = glm::dvec3(0.0);
-}
-
 void VolumePicture::prepare(Quality quality, bool software, double pixels)
 {
     moving_ = quality == Quality::moving;

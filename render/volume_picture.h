@@ -48,7 +48,7 @@ public:
                const std::array<float, channel::maxTissues>& factor);
     /// Shows only what lies behind the plane through `point` [m], seen from where `normal` points to.
     void cut(glm::dvec3 point, glm::dvec3 normal);
-    void uncut();
+    void uncut() { cutNormal_ = glm::dvec3(0.0); }
     /// Before a picture; the context must be current. `pixels`: size of the view.
     void prepare(Quality quality, bool software, double pixels);
     /// False when the picture was made without a body: VTK asks for what its shader needs from the second one on.

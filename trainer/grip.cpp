@@ -43,11 +43,6 @@ void Grip::listen(const std::string& firmware)
     command_.emplace(programs_ / "palpate", words, log_);
 }
 
-void Grip::letGo()
-{
-    command_.reset();
-}
-
 std::vector<Press> Grip::heard()
 {
     std::vector<Press> presses;

@@ -38,7 +38,7 @@ public:
     /// @param firmware  of the device, a file; empty: it runs already
     void listen(const std::string& firmware);
     /// Lets the device go, and waits until it is free.
-    void letGo();
+    void letGo() { command_.reset(); }
     /// The presses since this was last called, in their order.
     std::vector<Press> heard();
     /// Whether a device was there when it was last heard of.

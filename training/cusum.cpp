@@ -16,26 +16,6 @@ constexpr std::size_t maxStates = 2000;  // of a chain; finer values are merged 
 
 }  // namespace
 
-double CusumPlan::failureWeight() const noexcept
-{
-    return std::log(p1 / p0);
-}
-
-double CusumPlan::successWeight() const noexcept
-{
-    return std::log((1 - p1) / (1 - p0));
-}
-
-double CusumPlan::alarmLimit() const noexcept
-{
-    return std::log((1 - beta) / alpha);
-}
-
-double CusumPlan::learningLimit() const noexcept
-{
-    return std::log((1 - alpha) / beta);
-}
-
 std::vector<CusumPoint> cusum(const CusumPlan& plan, const std::vector<bool>& failed)
 {
     std::vector<CusumPoint> points;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 namespace palpate::training {
@@ -26,10 +27,10 @@ struct CusumPlan {
     double alpha = 0.05;  // of taking p0 for p1, 0 to 0.5
     double beta = 0.1;    // of taking p1 for p0, 0 to 0.5
 
-    double failureWeight() const noexcept;
-    double successWeight() const noexcept;  // below 0
-    double alarmLimit() const noexcept;
-    double learningLimit() const noexcept;
+    double failureWeight() const noexcept { return std::log(p1 / p0); }
+    double successWeight() const noexcept { return std::log((1 - p1) / (1 - p0)); }  // below 0
+    double alarmLimit() const noexcept { return std::log((1 - beta) / alpha); }
+    double learningLimit() const noexcept { return std::log((1 - alpha) / beta); }
 };
 
 /// Both charts after each session.

@@ -45,11 +45,6 @@ Values valuesFor(const Gate& gate, bool meet, std::mt19937_64& random)
 
 }  // namespace
 
-double LearningLaw::chance(int n) const noexcept
-{
-    return final - (final - first) * std::exp(-(n - 1) / tau);
-}
-
 const std::vector<LearningLaw>& learningLaws()
 {
     static const std::vector<LearningLaw> laws{

@@ -2,6 +2,7 @@
 
 #include <training/progress.h>
 
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ struct LearningLaw {
     double first = 0, final = 1;  // chances
     double tau = 5;               // sessions
 
-    double chance(int n) const noexcept;
+    double chance(int n) const noexcept { return final - (final - first) * std::exp(-(n - 1) / tau); }
 };
 
 /// novice, resident, expert.

@@ -111,11 +111,6 @@ double CheckBench::power(int sample, int line) const
                                         static_cast<std::size_t>(line)]);
 }
 
-double CheckBench::amplitude(int sample, int line) const
-{
-    return std::sqrt(power(sample, line));
-}
-
 double CheckBench::level(int fromSample, int toSample, int fromLine, int toLine) const
 {
     double sum = 0;

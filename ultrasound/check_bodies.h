@@ -4,6 +4,7 @@
 #include <ultrasound/checks.h>
 #include <ultrasound/scanner.h>
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -30,7 +31,7 @@ public:
     int line(double x) const;    // nearest to x of the box [m]
     int sample(double z) const;  // nearest to z of the box [m]
     double power(int sample, int line) const;
-    double amplitude(int sample, int line) const;
+    double amplitude(int sample, int line) const { return std::sqrt(power(sample, line)); }
     /// Mean power in a part of the picture [dB]; samples and lines from .. to (excluded).
     double level(int fromSample, int toSample, int fromLine, int toLine) const;
 

@@ -10,11 +10,6 @@
 
 namespace palpate::ultrasound {
 
-bool Check::good() const noexcept
-{
-    return std::abs(measured - wanted) <= tolerance;
-}
-
 std::vector<Check> runChecks(const SoundOf& soundOf, const std::function<void(double)>& progress)
 {
     constexpr std::array groups{checkReflections, checkAttenuation, checkPointSpread, checkSpeckle,

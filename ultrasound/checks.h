@@ -2,6 +2,7 @@
 
 #include <channel/layout.h>
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -17,7 +18,7 @@ struct Check {
     double tolerance = 0;  // of their difference
     std::string source;    // of what is wanted
 
-    bool good() const noexcept;
+    bool good() const noexcept { return std::abs(measured - wanted) <= tolerance; }
 };
 
 /// What a tissue of the table that is checked does to sound. Throws for one that it does not have.

@@ -81,11 +81,6 @@ Scatterers::Scatterers() : patterns_(patterns)
         level_[c] = std::pow(10.0F, (fatEcho + 0.5F * (static_cast<float>(c) - 128)) / 20);
 }
 
-void Scatterers::forget()
-{
-    std::fill(known_.begin(), known_.end(), Known::no);
-}
-
 void Scatterers::setVariation(float fraction)
 {
     variation_ = fraction;

@@ -4,6 +4,7 @@
 #include <ultrasound/rest_shifts.h>
 #include <ultrasound/view.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -27,7 +28,7 @@ public:
     Scatterers();
 
     /// Echo strengths are looked up again from the labels.
-    void forget();
+    void forget() { std::fill(known_.begin(), known_.end(), Known::no); }
     /// How much echoes vary within a tissue, 0 to 1.
     void setVariation(float fraction);
     /// Finds the blocks that lie in the picture now.

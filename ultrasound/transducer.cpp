@@ -126,11 +126,6 @@ float Beam::halfWidth() const noexcept
                     : 0.5F * transducer_.width;
 }
 
-float Beam::top() const noexcept
-{
-    return curved() ? transducer_.radius * (std::cos(0.5F * transducer_.sector) - 1) : 0.0F;
-}
-
 glm::vec2 Beam::place(float lateral, float axial) const noexcept
 {
     if (!curved())

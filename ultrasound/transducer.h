@@ -4,6 +4,7 @@
 #include <glm/vec3.hpp>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 namespace palpate::ultrasound {
@@ -90,7 +91,7 @@ public:
     glm::vec3 direction(float l) const noexcept;
     /// Of the picture: half its width, and its upper border, which is above 0 for curved probes [m].
     float halfWidth() const noexcept;
-    float top() const noexcept;
+    float top() const noexcept { return curved() ? transducer_.radius * (std::cos(0.5F * transducer_.sector) - 1) : 0.0F; }
     /// (l, z) of a point of the picture's plane.
     glm::vec2 place(float lateral, float axial) const noexcept;
 
