@@ -45,7 +45,6 @@ bool HandDevice::feltDrop() const noexcept
     return peak_ > parameters_.minFelt && glm::length(force_) < (1.0 - parameters_.dropFelt) * peak_;
 }
 
-// Seen, where there is something to see: a force that drops may be a device that fades, as after missed ticks.
 // Arrived, or past it: tissue that gives way may let the tip shoot beyond the mark. Inside the body also as soon as the
 // hand, braking, would arrive, and when the needle is in as far as it is to be, wherever the tissue has gone with it.
 bool HandDevice::reached(const TraineeStep& step) const noexcept

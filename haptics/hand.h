@@ -36,6 +36,7 @@ public:
 private:
     void advance() noexcept;
     bool feltDrop() const noexcept;
+    // Seen, where there is something to see: a force that drops may be a device that fades, as after missed ticks.
     bool gaveWay() const noexcept { return sees_ ? inside_ : feltDrop(); }
     bool reached(const datasets::TraineeStep& step) const noexcept;
     void nextStep() noexcept;

@@ -243,7 +243,6 @@ bool Controls::onUltrasound() const
     return picture_.ultrasoundShown() && picture_.ultrasound().holds(point(cursor_));
 }
 
-// On a live picture the mouse that is the hand leads the needle.
 void Controls::scrub()
 {
     if (!scrubbing_)

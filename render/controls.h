@@ -59,23 +59,47 @@ public:
         int value = 0;  // of several that do the same to different things
         bool alt = false;
     };
-    // What else a key needs: a needle as the tool, a probe that this window may move, one that no scene holds.
-    enum class Needs : std::uint8_t { nothing, needle, probe, freeProbe };
+    // What else a key needs, added to its windows: a body with a CT or MR, the ultrasound picture or the CT scan that is
+    // shown, a needle as the tool, a probe that this window may move, one that no scene holds.
+    static constexpr unsigned ofImage = 16, ofUltrasound = 32, ofCt = 64, ofNeedle = 128, ofProbe = 256, ofFreeProbe = 512;
     struct Key {
         unsigned windows;  // kinds, added up
         const char* shown;
         const char* what;
-        std::vector<Stroke> strokes;
-        void (*act)(Controls&, const Press&);
-        bool ofImage = false;       // only where the body has a CT or MR
-        bool ofUltrasound = false;  // only while the ultrasound picture is shown
-        bool ofCt = false;          // only while the CT scan is shown
-        Needs needs = Needs::nothing;
+        std::vector<Stroke> strokes = {};
+        void (*act)(Controls&, const Press&) = nullptr;
     };
     /// The one list of them.
     static const std::vector<Key> keys;
 
 private:
+    // What keys do that ask for nothing more.
+    template <auto Do>
+    static void here(Controls& c, const Press&)
+    {
+        (c.*Do)();
+    }
+    template <auto Do>
+    static void onHand(Controls& c, const Press&)
+    {
+        (c.hand_.*Do)();
+    }
+    template <auto Do>
+    static void onPicture(Controls& c, const Press&)
+    {
+        (c.picture_.*Do)();
+    }
+    template <auto Do>
+    static void onScan(Controls& c, const Press&)
+    {
+        (c.picture_.ultrasound().*Do)();
+    }
+    template <Knob what>
+    static void turn(Controls& c, const Press& p)
+    {
+        c.picture_.ultrasound().turn(what, p.shift ? -1 : 1, p.value);
+    }
+
     // The picture's directions at the hand [m]: to the right and up on the screen, and into it. Unit vectors.
     struct Screen {
         glm::dvec3 right, up, into;
@@ -90,7 +114,6 @@ private:
     void storePicture();
     void step(glm::dvec3 direction, double steps, bool fine);
     bool applies(const Key& key) const;
-    bool has(Needs what) const;
     bool sceneHoldsProbe() const;
     std::vector<KeyHelp> help() const;
     Screen screen() const;
@@ -98,6 +121,7 @@ private:
     double shownTime() const;
     void scrub();
     bool onUltrasound() const;
+    // On a live picture the mouse that is the hand leads the needle.
     bool measures() const { return !hand_.is() || picture_.ultrasound().frozen(); }
     void camera(unsigned long event);
     void showHelp();

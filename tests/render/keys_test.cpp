@@ -29,7 +29,8 @@ TEST(Keys, NoKeyHasTwoMeanings)
             // What is shown: the body, the ultrasound picture, the CT scan.
             for (const unsigned window : {1U, 2U, 4U, 8U})
                 for (const int shown : {0, 1, 2})
-                    if ((key.windows & window) != 0 && (!key.ofUltrasound || shown == 1) && (!key.ofCt || shown == 2)) {
+                    if ((key.windows & window) != 0 && ((key.windows & Controls::ofUltrasound) == 0 || shown == 1) &&
+                        ((key.windows & Controls::ofCt) == 0 || shown == 2)) {
                         EXPECT_TRUE(seen.emplace(window, shown, s.key, s.name, s.alt).second)
                             << key.shown << ": " << key.what;
                     }
