@@ -70,6 +70,12 @@ void Canvas::rectangle(Point2 low, Point2 size, const Colour& colour, double opa
     polygon(corners, colour, opacity);
 }
 
+void Canvas::rectangle(const Area& area, const Colour& colour, double opacity)
+{
+    const auto number = [](int n) { return static_cast<double>(n); };
+    rectangle({number(area.x), number(area.y)}, {number(area.width), number(area.height)}, colour, opacity);
+}
+
 void Canvas::line(Point2 from, Point2 to, double width, const Colour& colour)
 {
     const double dx = to[0] - from[0], dy = to[1] - from[1], length = std::hypot(dx, dy);
@@ -134,6 +140,14 @@ double Canvas::leftOf(const Put& put) const
     return put.at[0] - (put.align == Align::centre ? wide / 2 : wide);
 }
 
+double Canvas::widest(std::span<const std::string> lines, double size, bool bold) const
+{
+    double wide = 0;
+    for (const std::string& line : lines)
+        wide = std::max(wide, widthOf(line, size, bold));
+    return wide;
+}
+
 std::vector<Written> Canvas::written() const
 {
     std::vector<Written> all;
@@ -172,9 +186,7 @@ double Canvas::widthOf(const std::string& words, double size, bool bold) const
     if (widths_.size() > most)
         widths_.clear();
     vtkNew<vtkTextProperty> look;
-    look->SetFontFamilyToArial();
-    look->SetFontSize(pixels);
-    look->SetBold(bold ? 1 : 0);
+    dress(*look, size, {}, bold);
     std::array<int, 4> box{};
     vtkTextRenderer* const renderer = vtkTextRenderer::GetInstance();
     const bool measured = renderer != nullptr && renderer->GetBoundingBox(look, words, box.data(), screenDpi);

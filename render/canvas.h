@@ -1,5 +1,7 @@
 #pragma once
 
+#include <render/screen_plan.h>
+
 #include <vtkActor2D.h>
 #include <vtkCellArray.h>
 #include <vtkNew.h>
@@ -39,6 +41,7 @@ public:
 
     void begin();
     void rectangle(Point2 low, Point2 size, const Colour& colour, double opacity = 1);
+    void rectangle(const Area& area, const Colour& colour, double opacity = 1);
     void line(Point2 from, Point2 to, double width, const Colour& colour);
     void ring(Point2 centre, double radius, double width, const Colour& colour);
     void polygon(std::span<const Point2> corners, const Colour& colour, double opacity = 1);
@@ -53,6 +56,8 @@ public:
     double widthOf(const std::string& words, double size, bool bold = false) const;
     /// All words since begin(), in their order.
     std::vector<Written> written() const;
+    /// The width of the widest of these lines.
+    double widest(std::span<const std::string> lines, double size, bool bold = false) const;
 
 private:
     // Words of text(), which are measured only where somebody asks.

@@ -181,8 +181,7 @@ void CtPicture::draw(Canvas& canvas, const Area& area, const Area& around, doubl
     Area pictures = area;
     pictures.y += static_cast<int>(row * static_cast<double>(words.size()));
     pictures.height = std::max(1, area.height + area.y - pictures.y);
-    const bool resized = pictures.width != area_.width || pictures.height != area_.height || pictures.y != area_.y ||
-                         around.width != around_.width || around.height != around_.height;
+    const bool resized = pictures != area_ || around != around_;
     area_ = pictures;
     around_ = around;
     if (resized || due_)

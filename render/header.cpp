@@ -39,10 +39,7 @@ struct Column {
     Area box(const std::string& words, double size, const Colour& back, double opacity, const Colour& colour)
     {
         const auto lines = wrapped(canvas, words, size, true, width - size);
-        double widest = 0;
-        for (const std::string& part : lines)
-            widest = std::max(widest, canvas.widthOf(part, size, true));
-        const double high = heightOf(words, size);
+        const double widest = canvas.widest(lines, size, true), high = heightOf(words, size);
         y -= high + boxGap * font;
         canvas.cover({left - 0.4 * font, y}, {widest + size, high});
         canvas.rectangle({left - 0.4 * font, y}, {widest + size, high}, back, opacity);
@@ -230,11 +227,7 @@ void drawNotice(Canvas& canvas, const ScreenPlan& plan, const std::string& words
                small = wrapped(canvas, smaller, plan.font, false, width - size);
     const double high =
         1.35 * (size * static_cast<double>(large.size()) + plan.font * static_cast<double>(small.size())) + size;
-    double widest = 0;
-    for (const std::string& line : large)
-        widest = std::max(widest, canvas.widthOf(line, size, true));
-    for (const std::string& line : small)
-        widest = std::max(widest, canvas.widthOf(line, plan.font, false));
+    const double widest = std::max(canvas.widest(large, size, true), canvas.widest(small, plan.font));
     double y = 0.5 * plan.height + high / 2;
     canvas.cover({x - widest / 2 - size / 2, y - high}, {widest + size, high});
     canvas.rectangle({x - widest / 2 - size / 2, y - high}, {widest + size, high}, cardColour, 0.9);

@@ -1,10 +1,23 @@
 #pragma once
 
+#include <render/picture.h>
 #include <render/viewer.h>
 
 #include <atomic>
 
 namespace palpate::render {
+
+/// What a picture shows, and how, of what was asked for.
+inline void setUp(Picture& picture, const ViewerOptions& options)
+{
+    picture.setPalette(options.palette);
+    picture.setGhost(options.ghost);
+    picture.setRecorded(options.playback != nullptr ? &options.playback->recorded : nullptr);
+    picture.conceal(options.concealed);
+    picture.show(options.layout);
+    picture.show(options.slices);
+    picture.showUltrasound(options.ultrasound);
+}
 
 /// Shows the session in a GLFW window until it is over, the window is closed or `stop` is not 0.
 ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<int>& stop);

@@ -2,10 +2,9 @@
 
 #include <base/error.h>
 #include <base/process.h>
+#include <render/screen_image.h>
 
 #include <vtkImageData.h>
-#include <vtkNew.h>
-#include <vtkWindowToImageFilter.h>
 
 #include <fcntl.h>
 #include <sys/wait.h>
@@ -73,11 +72,7 @@ MovieFile::~MovieFile()
 
 void MovieFile::add(int frames)
 {
-    vtkNew<vtkWindowToImageFilter> grab;
-    grab->SetInput(&window_);
-    grab->SetInputBufferTypeToRGB();
-    grab->ReadFrontBufferOff();
-    grab->ShouldRerenderOff();
+    const auto grab = grabbed(window_);
     grab->Update();
     vtkImageData& image = *grab->GetOutput();
     const auto* bytes = static_cast<const char*>(image.GetScalarPointer());

@@ -5,16 +5,17 @@
 #include <render/follower.h>
 #include <render/hosts.h>
 #include <render/movie.h>
+#include <render/screen_image.h>
 
 #include <vtkNew.h>
 #include <vtkPNGWriter.h>
 #include <vtkRenderWindow.h>
 #include <vtkSmartPointer.h>
-#include <vtkWindowToImageFilter.h>
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <optional>
@@ -29,38 +30,13 @@ namespace {
 // An event as a part of a file's name: "very_near_artery".
 std::string fileWords(const Event& event, const channel::Name& structure)
 {
-    const std::string about = "_" + text(structure);
-    const auto words = [&]() -> std::string {
-        switch (event.kind) {
-            case EventKind::contact:
-                return "contact";
-            case EventKind::inserted:
-                return "inserted";
-            case EventKind::out:
-                return "out";
-            case EventKind::near:
-                return "near" + about;
-            case EventKind::veryNear:
-                return "very_near" + about;
-            case EventKind::touching:
-                return "touching" + about;
-            case EventKind::fired:
-                return "fired";
-            case EventKind::marked:
-                return "mark";
-            case EventKind::unmarked:
-                return "mark taken back";
-            case EventKind::fault:
-                return "fault";
-            case EventKind::finished:
-                break;
-        }
-        return "finished";
-    }();
-    std::string name = words;
-    for (char& c : name)
-        if (std::isalnum(static_cast<unsigned char>(c)) == 0)
-            c = '_';
+    constexpr std::array words{"contact", "inserted",        "out",   "near",    "very_near", "touching", "fired",
+                               "mark",    "mark_taken_back", "fault", "finished"};
+    const bool ofStructure =
+        event.kind == EventKind::near || event.kind == EventKind::veryNear || event.kind == EventKind::touching;
+    std::string name = words[static_cast<std::size_t>(event.kind)] + (ofStructure ? "_" + text(structure) : "");
+    std::ranges::replace_if(
+        name, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; }, '_');
     return name;
 }
 
@@ -80,11 +56,7 @@ private:
         if (!std::exchange(made_, true))
             base::makeFolders(folder_);
         const std::filesystem::path file = folder_ / name, partial = folder_ / (name + ".part");
-        vtkNew<vtkWindowToImageFilter> grab;
-        grab->SetInput(&window_);
-        grab->SetInputBufferTypeToRGB();
-        grab->ReadFrontBufferOff();
-        grab->ShouldRerenderOff();
+        const auto grab = grabbed(window_);
         vtkNew<vtkPNGWriter> writer;
         writer->SetInputConnection(grab->GetOutputPort());
         writer->SetCompressionLevel(2);
@@ -221,13 +193,7 @@ ViewerFigures writePictures(const ViewerOptions& options, const std::atomic<int>
     window->SetSize(options.width, options.height);
     Outputs outputs(options, *window);
     Picture picture(*window);
-    picture.setPalette(options.palette);
-    picture.setGhost(options.ghost);
-    picture.setRecorded(options.playback != nullptr ? &options.playback->recorded : nullptr);
-    picture.conceal(options.concealed);
-    picture.show(options.layout);
-    picture.show(options.slices);
-    picture.showUltrasound(options.ultrasound);
+    setUp(picture, options);
     Follower follower(options.session, options.wait, options.result);
     writeAll(options, stop, picture, follower, outputs);
     const bool filmed = outputs.finish();

@@ -288,8 +288,7 @@ void drawLegend(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     if (plan.events.empty())
         canvas.rectangle({x - 0.4 * font, bottom - 0.4 * font}, {wide, high + 0.4 * font}, panelColour, 0.6);
     else
-        canvas.rectangle({static_cast<double>(plan.legend.x), static_cast<double>(plan.legend.y)},
-                         {static_cast<double>(plan.legend.width), static_cast<double>(plan.legend.height)}, panelColour);
+        canvas.rectangle(plan.legend, panelColour);
     double y = bottom;
     for (const Entry& entry : entries) {
         canvas.rectangle({x, y}, {font, font}, entry.colour);
@@ -303,8 +302,7 @@ void drawFigures(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery&
                  const Health& health, bool targetHidden)
 {
     const double font = plan.font, edge = margin * font;
-    canvas.rectangle({static_cast<double>(plan.panel.x), 0},
-                     {static_cast<double>(plan.panel.width), static_cast<double>(plan.panel.height)}, panelColour);
+    canvas.rectangle(plan.panel, panelColour);
     Pen pen{canvas, plan.panel.x + edge, plan.panel.x + plan.panel.width - edge,
             static_cast<double>(plan.panel.height) - 0.2 * font, font,
             // Where the panel has the line of the health as well, that is its lowest.
@@ -323,8 +321,7 @@ void drawEvents(Canvas& canvas, const ScreenPlan& plan, const channel::Scenery& 
     if (plan.events.empty())
         return;
     const double font = plan.font, edge = margin * font, top = plan.events.y + plan.events.height;
-    canvas.rectangle({static_cast<double>(plan.events.x), static_cast<double>(plan.events.y)},
-                     {static_cast<double>(plan.events.width), static_cast<double>(plan.events.height)}, panelColour);
+    canvas.rectangle(plan.events, panelColour);
     Pen pen{canvas,
             plan.events.x + edge,
             plan.events.x + plan.events.width - edge,

@@ -357,8 +357,7 @@ void Picture::drawTraces(const ScreenPlan& plan)
 {
     for (const Area& area : {plan.forces, plan.distances})
         if (!area.empty() && !help_.empty())
-            canvas_.rectangle({static_cast<double>(area.x), static_cast<double>(area.y)},
-                              {static_cast<double>(area.width), static_cast<double>(area.height)}, panelColour);
+            canvas_.rectangle(area, panelColour);
     if (!plan.forces.empty() && help_.empty())
         drawForceTraces(canvas_, plan.forces, plan.font, session_->scenery, session_->history);
     if (!plan.distances.empty() && help_.empty())
@@ -431,8 +430,7 @@ void Picture::setSteps(bool told, bool handIsHere)
 
 bool Picture::endsAt(Point2 pixel) const noexcept
 {
-    return lastStep_ && !step_.empty() && pixel[0] >= step_.x && pixel[1] >= step_.y && pixel[0] < step_.x + step_.width &&
-           pixel[1] < step_.y + step_.height;
+    return lastStep_ && step_.holds(pixel);
 }
 
 void Picture::show(Layout layout)

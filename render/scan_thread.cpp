@@ -18,49 +18,43 @@ ScanThread::ScanThread(const channel::Scenery& scenery, std::span<const std::uin
 {
 }
 
-ScanThread::~ScanThread()
+template <typename How>
+void ScanThread::change(const How& how)
 {
     {
         const std::lock_guard lock(guard_);
-        stop_ = true;
+        how();
+        ++wanted_.number;
     }
     changed_.notify_all();
+}
+
+ScanThread::~ScanThread()
+{
+    change([&] { stop_ = true; });
     thread_.join();
 }
 
 void ScanThread::show(const channel::State& state, const channel::Displaced* shape)
 {
-    {
-        const std::lock_guard lock(guard_);
+    change([&] {
         wanted_.state = state;
         if (shape != nullptr) {
             wanted_.shape.assign(shape->nodes.begin(), shape->nodes.begin() + shape->count);
             wanted_.shapeTick = shape->tick;
         }
-        ++wanted_.number;
         known_ = true;
-    }
-    changed_.notify_all();
+    });
 }
 
 void ScanThread::ask(const ultrasound::Transducer& transducer, const ultrasound::Settings& settings)
 {
-    {
-        const std::lock_guard lock(guard_);
-        asked_ = {transducer, settings};
-        ++wanted_.number;
-    }
-    changed_.notify_all();
+    change([&] { asked_ = {transducer, settings}; });
 }
 
 void ScanThread::move(const ultrasound::ProbeMove& move)
 {
-    {
-        const std::lock_guard lock(guard_);
-        move_ += move;
-        ++wanted_.number;
-    }
-    changed_.notify_all();
+    change([&] { move_ += move; });
 }
 
 std::optional<ultrasound::Examination> ScanThread::beginning() const

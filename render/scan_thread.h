@@ -62,6 +62,9 @@ private:
         std::uint64_t number = 0;
     };
 
+    // Changes what is wanted, and wakes the thread.
+    template <typename How>
+    void change(const How& how);
     void run();
     void follow(const ultrasound::Scanner& scanner, ultrasound::Examination& e);
     void add(Image image, std::uint64_t number, double seconds, const std::array<double, ultrasound::stageCount>& stages);

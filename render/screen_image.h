@@ -4,7 +4,10 @@
 #include <vtkImageData.h>
 #include <vtkImageMapper.h>
 #include <vtkNew.h>
+#include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
+#include <vtkSmartPointer.h>
+#include <vtkWindowToImageFilter.h>
 
 namespace palpate::render {
 
@@ -19,6 +22,17 @@ inline void addScreenImage(vtkRenderer& renderer, vtkImageData* image, vtkActor2
     actor->SetLayerNumber(0);
     actor->SetVisibility(0);
     renderer.AddActor2D(actor);
+}
+
+/// The picture that a window has drawn last, as the input of what writes it.
+inline vtkSmartPointer<vtkWindowToImageFilter> grabbed(vtkRenderWindow& window)
+{
+    const auto grab = vtkSmartPointer<vtkWindowToImageFilter>::New();
+    grab->SetInput(&window);
+    grab->SetInputBufferTypeToRGB();
+    grab->ReadFrontBufferOff();
+    grab->ShouldRerenderOff();
+    return grab;
 }
 
 }  // namespace palpate::render

@@ -18,6 +18,11 @@ struct Area {
     int x = 0, y = 0, width = 0, height = 0;
 
     bool empty() const noexcept { return width <= 0 || height <= 0; }
+    bool holds(const std::array<double, 2>& p) const noexcept
+    {
+        return p[0] >= x && p[1] >= y && p[0] < x + width && p[1] < y + height;
+    }
+    bool operator==(const Area&) const = default;
 };
 
 /// Where things are in a window of `width` x `height` pixels. What the window is too small for has an empty area.

@@ -111,11 +111,6 @@ std::optional<std::pair<Point2, Point2>> clipped(Point2 a, Point2 b, const Area&
     return std::pair(at(from), at(to));
 }
 
-bool inside(Point2 p, const Area& area)
-{
-    return p[0] >= area.x && p[1] >= area.y && p[0] < area.x + area.width && p[1] < area.y + area.height;
-}
-
 }  // namespace
 
 SlicePicture::SlicePicture(vtkRenderer& renderer)
@@ -238,7 +233,7 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
     const glm::dvec3 tip = vec(state.tip);
     const double width = std::max(3.0, 2 * scenery.toolRadius * pixelsPerMetre(frame_, area_));
     if (scenery.tool == channel::ToolKind::sphere) {
-        if (inside(pixel(tip), area_)) {
+        if (area_.holds(pixel(tip))) {
             canvas.ring(pixel(tip), width / 2 + 1.5, 1.5, outline);
             canvas.ring(pixel(tip), width / 2, 3, toolColour);
         }
@@ -256,7 +251,7 @@ void SlicePicture::drawTool(Canvas& canvas, const channel::Scenery& scenery, con
             else if (part)
                 canvas.line(part->first, part->second, (away ? 0.6 : 1.0) * width, away ? farTool : toolColour);
         }
-    if (inside(pixel(tip), area_))
+    if (area_.holds(pixel(tip)))
         canvas.ring(pixel(tip), width / 2 + 2, 2, pureWhite);
 }
 
@@ -276,7 +271,7 @@ void SlicePicture::annotate(Canvas& canvas, const Anatomy& anatomy, const channe
             canvas.line(dash->first, dash->second, (away ? 0.1 : 0.18) * font, away ? farOf(planColour) : planColour);
         }
     }
-    if (planned && inside(pixel(aim), area_)) {
+    if (planned && area_.holds(pixel(aim))) {
         const bool away = isAway(aim);
         canvas.ring(pixel(aim), 0.55 * font, (away ? 0.24 : 0.36) * font, {0, 0, 0});
         canvas.ring(pixel(aim), 0.55 * font, (away ? 0.1 : 0.18) * font, away ? farOf(planColour) : planColour);
@@ -303,7 +298,7 @@ void SlicePicture::drawMarks(Canvas& canvas, const channel::Scenery& scenery, co
     constexpr double near = 5e-3;  // [m]
     for (std::size_t i = 0; i < std::min<std::size_t>(state.marks, channel::maxMarks); ++i) {
         const glm::dvec3 place = markedPlace(scenery, state.mark[i]);
-        if (std::abs(glm::dot(place - frame_.centre, frame_.towards)) > near || !inside(pixel(place), area_))
+        if (std::abs(glm::dot(place - frame_.centre, frame_.towards)) > near || !area_.holds(pixel(place)))
             continue;
         canvas.ring(pixel(place), 0.4 * font, 0.36 * font, {0, 0, 0});
         canvas.ring(pixel(place), 0.4 * font, 0.2 * font, markColour);

@@ -140,6 +140,7 @@ void setLine(vtkPolyData& data, std::span<const glm::dvec3> points)
 // Draws a line as a tube that follows it.
 void showTube(vtkRenderer& renderer, vtkPolyData& line, double radius, int sides, const std::array<double, 3>& colour)
 {
+    setLine(line, {});
     vtkNew<vtkTubeFilter> tube;
     tube->SetInputData(&line);
     tube->SetRadius(radius);
@@ -172,29 +173,20 @@ ToolPicture::ToolPicture(const channel::Scenery& scenery, vtkRenderer& renderer)
     tool->SetUserTransform(pose_);
     show(renderer, *proxy_, ball(std::max(0.8 * radius, 0.8)), proxyColour);
     if (scenery.tool == channel::ToolKind::needle) {
-        setLine(*shaft_, {});
         showTube(renderer, *shaft_, radius, facets, toolColour);
-        for (auto& core : cores_) {
-            setLine(*core, {});
+        for (auto& core : cores_)
             showTube(renderer, *core, 1.3 * radius, facets, coreColour);
-        }
-        setLine(*thrown_, {});
         showTube(renderer, *thrown_, 0.7 * radius, facets, toolColour);
     }
     for (std::size_t i = 0; i < marks_.size(); ++i) {
-        setLine(*pins_[i], {});
         showTube(renderer, *pins_[i], 0.4, 8, markColour);
         show(renderer, *marks_[i], ball(1.5), markColour);
         marks_[i]->SetVisibility(0);
     }
     constexpr double trail = 0.3;  // [mm]
-    setLine(*trail_, {});
     showTube(renderer, *trail_, trail, 6, trailColour);
-    setLine(*ghost_, {});
     showTube(renderer, *ghost_, 0.8 * radius, 8, ghostColour);
-    setLine(*ghostWay_, {});
     showTube(renderer, *ghostWay_, trail, 6, ghostColour);
-    setLine(*lead_, {});
     showTube(renderer, *lead_, trail, 6, handColour);
     show(renderer, *hand_, ball(1.0), handColour);
     hand_->SetVisibility(0);

@@ -37,8 +37,7 @@ struct Diagram {
 Diagram frameOf(Canvas& canvas, const Area& area, double font, const std::string& title, double now, double top,
                 const std::string& unit)
 {
-    canvas.rectangle({static_cast<double>(area.x), static_cast<double>(area.y)},
-                     {static_cast<double>(area.width), static_cast<double>(area.height)}, panelColour);
+    canvas.rectangle(area, panelColour);
     const int left = static_cast<int>(3.2 * font), low = static_cast<int>(1.7 * font), high = static_cast<int>(3.2 * font);
     const Diagram d{canvas,
                     {area.x + left, area.y + low, area.width - left - static_cast<int>(font), area.height - low - high},

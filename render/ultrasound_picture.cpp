@@ -14,9 +14,11 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <exception>
+#include <tuple>
 
 namespace palpate::render {
 namespace {
@@ -101,8 +103,7 @@ void UltrasoundPicture::draw(Canvas& canvas, const Area& area, const Area& aroun
         return;
     if (exact && !frozen_)
         scan_->await();
-    const bool resized = area.width != area_.width || area.height != area_.height || around.width != around_.width ||
-                         around.height != around_.height;
+    const bool resized = area != area_ || around != around_;
     area_ = area;
     around_ = around;
     const ScanThread::Image image = shown();
@@ -257,26 +258,16 @@ void UltrasoundPicture::turn(Knob knob, int steps, int slider)
     ultrasound::Settings& s = console_->second;
     const auto n = static_cast<float>(steps);
     const bool deep = console_->first.shape == ultrasound::ProbeShape::curved;
-    switch (knob) {
-        case Knob::depth:
-            s.depth += n * (deep ? 20e-3F : 5e-3F);
-            break;
-        case Knob::gain:
-            s.gain += 2 * n;
-            break;
-        case Knob::focus:
-            s.focus += n * (deep ? 10e-3F : 2e-3F);
-            break;
-        case Knob::frequency:
-            s.frequency += n * (deep ? 0.5e6F : 1e6F);
-            break;
-        case Knob::dynamicRange:
-            s.dynamicRange += 5 * n;
-            break;
-        case Knob::tgc:
-            s.tgc[static_cast<std::size_t>(std::clamp(slider, 0, ultrasound::tgcSliders - 1))] += 2 * n;
-            break;
-    }
+    // A step of each knob, with the linear and with the curved probe.
+    const std::array<std::tuple<float*, float, float>, 6> knobs{
+        {{&s.depth, 5e-3F, 20e-3F},
+         {&s.gain, 2.0F, 2.0F},
+         {&s.focus, 2e-3F, 10e-3F},
+         {&s.frequency, 1e6F, 0.5e6F},
+         {&s.dynamicRange, 5.0F, 5.0F},
+         {&s.tgc[static_cast<std::size_t>(std::clamp(slider, 0, ultrasound::tgcSliders - 1))], 2.0F, 2.0F}}};
+    const auto& [value, shallow, curved] = knobs[static_cast<std::size_t>(knob)];
+    *value += n * (deep ? curved : shallow);
     s = ultrasound::within(s, console_->first);
     ask();
 }
@@ -323,11 +314,6 @@ void UltrasoundPicture::moveProbe(const ultrasound::ProbeMove& move)
 {
     if (scan_ && !frozen_)
         scan_->move(move);
-}
-
-bool UltrasoundPicture::holds(Point2 p) const noexcept
-{
-    return p[0] >= area_.x && p[1] >= area_.y && p[0] < area_.x + area_.width && p[1] < area_.y + area_.height;
 }
 
 void UltrasoundPicture::beginCaliper(Point2 pixel)

@@ -53,7 +53,7 @@ public:
     void changeProbe();
     void moveProbe(const ultrasound::ProbeMove& move);
     /// Whether a pixel of the window (from the lower left) lies on the picture.
-    bool holds(Point2 pixel) const noexcept;
+    bool holds(Point2 pixel) const noexcept { return area_.holds(pixel); }
     void beginCaliper(Point2 pixel);
     void dragCaliper(Point2 pixel);
     void endCaliper();

@@ -182,13 +182,7 @@ ViewerFigures showInWindow(const ViewerOptions& options, const std::atomic<int>&
     target->SetSize(width, height);
 
     Picture picture(*target);
-    picture.setPalette(options.palette);
-    picture.setGhost(options.ghost);
-    picture.setRecorded(options.playback != nullptr ? &options.playback->recorded : nullptr);
-    picture.conceal(options.concealed);
-    picture.show(options.layout);
-    picture.show(options.slices);
-    picture.showUltrasound(options.ultrasound);
+    setUp(picture, options);
     vtkNew<vtkGenericRenderWindowInteractor> interactor;
     interactor->SetRenderWindow(target);
     vtkNew<vtkInteractorStyleTrackballCamera> style;
