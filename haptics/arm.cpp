@@ -1,6 +1,7 @@
 #include <haptics/arm.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 #include <haptics/bounded.h>
 
 #include <fmt/format.h>
@@ -50,7 +51,7 @@ const DeviceParameters& deviceParameters(std::string_view name)
     if (name == ideal.name) {
         return ideal;
     }
-    const auto* found = std::find_if(devices.begin(), devices.end(), [&](const auto& d) { return d.name == name; });
+    const auto* found = std::ranges::find(devices, name, &DeviceParameters::name);
     base::failIf(found == devices.end(), "no device '{}' is known: take one of {}, {}", name,
                  fmt::join(deviceNames(), ", "), ideal.name);
     return *found;
@@ -58,11 +59,7 @@ const DeviceParameters& deviceParameters(std::string_view name)
 
 std::vector<std::string> deviceNames()
 {
-    std::vector<std::string> names;
-    for (const auto& device : devices) {
-        names.emplace_back(device.name);
-    }
-    return names;
+    return base::mapped<std::string>(devices, &DeviceParameters::name);
 }
 
 Arm::Arm(const DeviceParameters& device, const Grip& grip, Vec3 start, double period)

@@ -139,8 +139,7 @@ struct Record::Impl {
     // That made the table; empty where there is none.
     std::string statementOf(const std::string& table) const
     {
-        Statement query(*database, "SELECT sql FROM sqlite_master WHERE type = 'table' AND name = ?");
-        query.bind(1, std::string_view(table));
+        Statement query(*database, "SELECT sql FROM sqlite_master WHERE type = 'table' AND name = ?", table);
         return query.step() ? std::string(query.text(0)) : std::string();
     }
 
@@ -168,8 +167,9 @@ struct Record::Impl {
                 info.seed = seedOf(std::string(session.text(1)));
             } else if (key.starts_with("extra.")) {
                 info.extra.emplace_back(key.substr(6), session.text(1));
-            } else if (std::string* field = textField(key)) {
-                *field = session.text(1);
+            } else if (const auto text = std::ranges::find(format::infoTexts, key, [](const auto& t) { return t.first; });
+                       text != format::infoTexts.end()) {
+                info.*text->second = session.text(1);
             }
         }
         for (const char* key : {"scene", "scene_text", "volume_hash", "build", "rate_hz"}) {
@@ -202,27 +202,6 @@ struct Record::Impl {
         const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
         base::failIf(error != std::errc() || end != text.data() + text.size(), "seed '{}' is no whole number", text);
         return seed;
-    }
-
-    std::string* textField(const std::string& key)
-    {
-        const std::pair<const char*, std::string*> fields[] = {{"scene", &info.scene},
-                                                               {"scene_text", &info.sceneText},
-                                                               {"scene_origin", &info.sceneOrigin},
-                                                               {"model", &info.model},
-                                                               {"volume_hash", &info.volumeHash},
-                                                               {"device", &info.device},
-                                                               {"build", &info.build},
-                                                               {"name", &info.name},
-                                                               {"operator", &info.operatorName},
-                                                               {"host", &info.host},
-                                                               {"started", &info.started}};
-        for (const auto& [name, field] : fields) {
-            if (key == name) {
-                return field;
-            }
-        }
-        return nullptr;
     }
 
     void each(const std::function<void(const TickRecord&)>& visit)

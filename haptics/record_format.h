@@ -35,6 +35,20 @@ inline constexpr std::array<const char*, maxStructures> aheadColumns{
 inline constexpr std::array<const char*, taskCount> taskColumns{"h2_us", "h3_us", "h4_us", "deform_us",
                                                                 "h6_us", "h7_us", "h5_us"};
 
+/// The texts of a session in table `session`, in the order of the file.
+inline constexpr std::array<std::pair<const char*, std::string SessionInfo::*>, 11> infoTexts{
+    {{"scene", &SessionInfo::scene},
+     {"scene_text", &SessionInfo::sceneText},
+     {"scene_origin", &SessionInfo::sceneOrigin},
+     {"volume_hash", &SessionInfo::volumeHash},
+     {"model", &SessionInfo::model},
+     {"device", &SessionInfo::device},
+     {"name", &SessionInfo::name},
+     {"operator", &SessionInfo::operatorName},
+     {"host", &SessionInfo::host},
+     {"started", &SessionInfo::started},
+     {"build", &SessionInfo::build}}};
+
 /// The index of a structure, of which 0xFF means none.
 template <class Byte>
 struct OptionalIndex {
@@ -154,8 +168,7 @@ public:
     template <class... Values>
     Statement(const Database& database, const std::string& sql, const Values&... values) : Statement(database, sql)
     {
-        int position = 0;
-        (bind(++position, values), ...);
+        bindAll(values...);
     }
     ~Statement();
     Statement(const Statement&) = delete;
@@ -165,6 +178,12 @@ public:
     void bind(int position, std::int64_t value);
     void bind(int position, std::string_view value);
     void bindNull(int position);
+    template <class... Values>
+    void bindAll(const Values&... values)
+    {
+        int position = 0;
+        (bind(++position, values), ...);
+    }
 
     /// What is bound from now on goes into `digest` too, a row with each run(). It must outlive the statement or be
     /// replaced.

@@ -53,43 +53,27 @@ void removeFile(const std::string& file) noexcept
 
 void insertPair(Database& database, const char* table, std::string_view key, const auto& value)
 {
-    Statement insert(database, std::string("INSERT INTO ") + table + " VALUES (?, ?)");
-    insert.bind(1, key);
-    insert.bind(2, value);
-    insert.run();
+    Statement(database, std::string("INSERT INTO ") + table + " VALUES (?, ?)", key, value).run();
 }
 
 void writeInfo(Database& database, const SessionInfo& info)
 {
     const auto put = [&](std::string_view key, const auto& value) { insertPair(database, "session", key, value); };
-    put("scene", std::string_view(info.scene));
-    put("scene_text", std::string_view(info.sceneText));
-    put("scene_origin", std::string_view(info.sceneOrigin));
-    put("volume_hash", std::string_view(info.volumeHash));
-    put("model", std::string_view(info.model));
-    put("device", std::string_view(info.device));
-    put("name", std::string_view(info.name));
-    put("operator", std::string_view(info.operatorName));
-    put("host", std::string_view(info.host));
-    put("started", std::string_view(info.started));
-    put("build", std::string_view(info.build));
+    for (const auto& [key, text] : format::infoTexts) {
+        put(key, info.*text);
+    }
     put("rate_hz", info.rate);
-    put("seed", std::string_view(std::to_string(info.seed)));
+    put("seed", std::to_string(info.seed));
     for (const auto& [key, value] : info.extra) {
-        put("extra." + key, std::string_view(value));
+        put("extra." + key, value);
     }
-    Statement structure(database, "INSERT INTO structures VALUES (?, ?, ?)");
     for (std::size_t i = 0; i < info.structures.size(); ++i) {
-        structure.bind(1, static_cast<std::int64_t>(i));
-        structure.bind(2, std::string_view(info.structures[i]));
-        structure.bind(3, i < info.warnDistances.size() ? info.warnDistances[i] : 0.0);
-        structure.run();
+        Statement(database, "INSERT INTO structures VALUES (?, ?, ?)", static_cast<std::int64_t>(i), info.structures[i],
+                  i < info.warnDistances.size() ? info.warnDistances[i] : 0.0)
+            .run();
     }
-    Statement tissue(database, "INSERT INTO tissues VALUES (?, ?)");
     for (std::size_t i = 0; i < info.tissues.size(); ++i) {
-        tissue.bind(1, static_cast<std::int64_t>(i));
-        tissue.bind(2, std::string_view(info.tissues[i]));
-        tissue.run();
+        Statement(database, "INSERT INTO tissues VALUES (?, ?)", static_cast<std::int64_t>(i), info.tissues[i]).run();
     }
 }
 
@@ -242,12 +226,8 @@ public:
         }
         parts.push_back(format::sealOf(parts));
         database_.execute("DELETE FROM seal");
-        Statement insert(database_, "INSERT INTO seal VALUES (?, ?, ?)");
         for (const format::SealedPart& part : parts) {
-            insert.bind(1, std::string_view(part.part));
-            insert.bind(2, part.rows);
-            insert.bind(3, std::string_view(part.sha256));
-            insert.run();
+            Statement(database_, "INSERT INTO seal VALUES (?, ?, ?)", part.part, part.rows, part.sha256).run();
         }
     }
 
@@ -265,9 +245,7 @@ private:
         core_.run();
         for (std::size_t i = 0; i < maxTissues; ++i) {
             if (core.fraction[i] != 0) {
-                fraction_.bind(1, static_cast<std::int64_t>(tick));
-                fraction_.bind(2, static_cast<std::int64_t>(i));
-                fraction_.bind(3, core.fraction[i]);
+                fraction_.bindAll(static_cast<std::int64_t>(tick), static_cast<std::int64_t>(i), core.fraction[i]);
                 fraction_.run();
             }
         }

@@ -150,39 +150,31 @@ SessionInfo infoOf(const SessionModel& model)
 std::string contradictionIn(const SessionInfo& info, const SessionModel& model)
 {
     const SessionInfo own = infoOf(model);
-    const auto differ = [](const char* what, std::string_view says, std::string_view is) {
-        return fmt::format("{} is '{}' in the record and '{}' by its scene", what, says, is);
-    };
-    if (info.scene != own.scene) {
-        return differ("scene", info.scene, own.scene);
-    }
-    if (info.model != own.model) {
-        return differ("model", info.model, own.model);
-    }
-    if (info.structures != own.structures) {
-        return differ("the list of structures", fmt::format("{}", fmt::join(info.structures, ", ")),
-                      fmt::format("{}", fmt::join(own.structures, ", ")));
-    }
-    if (info.tissues != own.tissues) {
-        return differ("the list of tissues", fmt::format("{}", fmt::join(info.tissues, ", ")),
-                      fmt::format("{}", fmt::join(own.tissues, ", ")));
-    }
-    if (info.warnDistances != own.warnDistances) {
-        return differ("the list of warning distances [m]", fmt::format("{}", fmt::join(info.warnDistances, ", ")),
-                      fmt::format("{}", fmt::join(own.warnDistances, ", ")));
-    }
     const auto extra = [](const SessionInfo& i, const char* key) {
         const auto found = std::ranges::find(i.extra, key, &std::pair<std::string, std::string>::first);
         return found == i.extra.end() ? std::string() : found->second;
     };
-    if (const std::string said = extra(info, targetShapeKey), is = extra(own, targetShapeKey);
-        !said.empty() && said != is) {
-        return differ("the target's shape", said, is);
-    }
-    if (const std::string said = extra(info, scanDoseKey), is = extra(own, scanDoseKey); said != is) {
-        return differ("the dose of a CT scan [mGy cm]", said, is);
-    }
-    return {};
+    const auto list = [](const auto& all) { return fmt::format("{}", fmt::join(all, ", ")); };
+    struct Said {
+        const char* what;
+        bool same;
+        std::string recorded, own;
+    };
+    const std::string shape = extra(info, targetShapeKey), ownShape = extra(own, targetShapeKey);
+    const std::string dose = extra(info, scanDoseKey), ownDose = extra(own, scanDoseKey);
+    const std::array<Said, 7> all{
+        {{"scene", info.scene == own.scene, info.scene, own.scene},
+         {"model", info.model == own.model, info.model, own.model},
+         {"the list of structures", info.structures == own.structures, list(info.structures), list(own.structures)},
+         {"the list of tissues", info.tissues == own.tissues, list(info.tissues), list(own.tissues)},
+         {"the list of warning distances [m]", info.warnDistances == own.warnDistances, list(info.warnDistances),
+          list(own.warnDistances)},
+         {"the target's shape", shape.empty() || shape == ownShape, shape, ownShape},
+         {"the dose of a CT scan [mGy cm]", dose == ownDose, dose, ownDose}}};
+    const auto other = std::ranges::find(all, false, &Said::same);
+    return other == all.end()
+               ? ""
+               : fmt::format("{} is '{}' in the record and '{}' by its scene", other->what, other->recorded, other->own);
 }
 
 }  // namespace palpate::haptics

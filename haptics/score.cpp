@@ -391,27 +391,21 @@ void Scorer::addFiring(const TickRecord& record) noexcept
 
 void Scorer::addMark(const TickRecord& record) noexcept
 {
-    const bool down = (record.device.buttons & buttonMark) != 0;
-    if (down && !markDown_ && score_.marks < marks_.size()) {
+    if (mark_.with(record.device) && score_.marks < marks_.size()) {
         marks_[score_.marks++] = record.device.position;
     }
-    markDown_ = down;
-    const bool takenBack = (record.device.buttons & buttonUnmark) != 0;
-    if (takenBack && !unmarkDown_ && score_.marks > 0) {
+    if (unmark_.with(record.device) && score_.marks > 0) {
         --score_.marks;
     }
-    unmarkDown_ = takenBack;
 }
 
 void Scorer::addPicture(const TickRecord& record) noexcept
 {
     probeTicks_ += glm::length(record.probeForce) > probeTouches ? 1 : 0;
-    const bool down = (record.device.buttons & buttonPicture) != 0;
-    if (down && !pictureDown_) {
+    if (picture_.with(record.device)) {
         score_.picturesAfter += score_.passes > 0 ? 1 : 0;
         score_.picturesBefore += score_.passes == 0 && record.phase == Phase::inserted ? 1 : 0;
     }
-    pictureDown_ = down;
     if (record.phase != Phase::inserted) {
         reached_ = 0;
         return;
@@ -432,9 +426,7 @@ void Scorer::addPicture(const TickRecord& record) noexcept
 
 void Scorer::addScan(const TickRecord& record) noexcept
 {
-    const bool down = (record.device.buttons & buttonPicture) != 0;
-    score_.scans += down && !pictureDown_ ? 1 : 0;
-    pictureDown_ = down;
+    score_.scans += picture_.with(record.device) ? 1 : 0;
 }
 
 void Scorer::judgeProbe(Score& s) const noexcept

@@ -324,10 +324,7 @@ void Simulation::seeNeedle() noexcept
 // The gun fires once per press of its button, and only a needle that is inside takes a core.
 void Simulation::fire() noexcept
 {
-    const bool down = (record_.device.buttons & buttonFire) != 0;
-    const bool pressed = down && !triggerWasDown_;
-    triggerWasDown_ = down;
-    if (!pressed || tip_.phase != Phase::inserted) {
+    if (!trigger_.with(record_.device) || tip_.phase != Phase::inserted) {
         return;
     }
     record_.fired = true;

@@ -86,7 +86,7 @@ private:
     std::uint64_t ticks_ = 0;
     Vec3 last_{0.0};          // tip in the tick before [m]
     Vec3 lastAxis_{0, 1, 0};  // and its axis
-    bool triggerWasDown_ = false;
+    PressedButton trigger_{buttonFire};
     TickRecord record_;
 };
 

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 namespace palpate::haptics {
 
@@ -39,6 +40,19 @@ struct DeviceSample {
 };
 
 /// The tasks of the thesis (Table 1) that run in every tick, in their order, and the deformation.
+/// A button that is heeded once as it goes down.
+struct PressedButton {
+    std::uint32_t button;
+    bool down = false;
+
+    /// Whether it has gone down with this sample.
+    bool with(const DeviceSample& sample) noexcept
+    {
+        const bool before = std::exchange(down, (sample.buttons & button) != 0);
+        return down && !before;
+    }
+};
+
 enum class Task : std::uint8_t { h2, h3, h4, deform, h6, h7, h5, count };
 inline constexpr std::size_t taskCount = static_cast<std::size_t>(Task::count);
 inline constexpr std::array<std::string_view, taskCount> taskNames{"H2", "H3", "H4", "deform", "H6", "H7", "H5"};

@@ -1,6 +1,7 @@
 #include <haptics/trainee.h>
 
 #include <base/error.h>
+#include <base/mapped.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -51,11 +52,7 @@ const Skill& skillCalled(std::string_view name)
 
 std::vector<std::string> skillNames()
 {
-    std::vector<std::string> names;
-    for (const Skill& s : skills) {
-        names.emplace_back(s.name);
-    }
-    return names;
+    return base::mapped<std::string>(skills, &Skill::name);
 }
 
 Trainee::Trainee(const SessionModel& model, const Skill& skill, std::uint64_t seed, double distance, double period)
