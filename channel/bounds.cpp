@@ -1,6 +1,7 @@
 #include <channel/bounds.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -8,7 +9,7 @@ namespace palpate::channel {
 namespace {
 
 constexpr double furthest = 100;                // of a place [m]
-constexpr float furthestMoved = 1;              // of a node, from where it is at rest [m]
+constexpr double furthestMoved = 1;             // of a node, from where it is at rest [m]
 constexpr std::uint64_t mostNodes = 1U << 24U;  // of a lattice; viewers keep some 64 bytes of each
 constexpr double strongest = 1e4;               // force [N]
 constexpr double largestValue = 1e12;
@@ -21,9 +22,20 @@ bool upTo(double value, double most) noexcept
     return std::abs(value) <= most;  // false for what is not a number
 }
 
-bool upTo(const Triple& v, double most) noexcept
+template <typename Number, std::size_t n>
+bool upTo(const std::array<Number, n>& values, double most) noexcept
 {
-    return std::all_of(v.begin(), v.end(), [most](double x) { return upTo(x, most); });
+    return std::ranges::all_of(values, [most](Number x) { return upTo(static_cast<double>(x), most); });
+}
+
+bool within(double value, double least, double most) noexcept
+{
+    return value >= least && value <= most;  // false for what is not a number
+}
+
+bool within(float value, double least, double most) noexcept
+{
+    return within(static_cast<double>(value), least, most);
 }
 
 bool ended(const Name& name) noexcept
@@ -38,21 +50,15 @@ bool sound(const Grid& grid) noexcept
 
 bool sound(const TissueLook& look) noexcept
 {
-    const auto fraction = [](float v) { return v >= 0.0F && v <= 1.0F; };
-    return ended(look.name) && fraction(look.opacity) && std::all_of(look.colour.begin(), look.colour.end(), fraction);
-}
-
-bool within(double value, double least, double most) noexcept
-{
-    return value >= least && value <= most;  // false for what is not a number
+    const auto fraction = [](float v) { return within(v, 0, 1); };
+    return ended(look.name) && fraction(look.opacity) && std::ranges::all_of(look.colour, fraction);
 }
 
 // Nothing of a tissue without figures is shown, and what reads a table takes these bounds too.
 bool sound(const TissueSound& s) noexcept
 {
-    return within(static_cast<double>(s.soundSpeed), 0, 1e4) && within(static_cast<double>(s.density), 0, 1e5) &&
-           within(static_cast<double>(s.attenuation), 0, 1e3) && within(static_cast<double>(s.attenuationPower), 0, 3) &&
-           within(static_cast<double>(s.echo), -100, 60) && within(static_cast<double>(s.echoVariation), 0, 30) &&
+    return within(s.soundSpeed, 0, 1e4) && within(s.density, 0, 1e5) && within(s.attenuation, 0, 1e3) &&
+           within(s.attenuationPower, 0, 3) && within(s.echo, -100, 60) && within(s.echoVariation, 0, 30) &&
            s.pattern <= maxPattern;
 }
 
@@ -61,7 +67,7 @@ bool soundOfUltrasound(const Scenery& s) noexcept
 {
     return (s.fine.size == noNodes || sound(s.fine)) && s.probe <= ProbeKind::curved && within(s.probeDepth, 0, 1) &&
            within(s.probeFrequency, 0, 1e8) && within(s.probeFocus, 0, 1) && within(s.holeRadius, 0, 1) &&
-           std::all_of(s.sound.begin(), s.sound.end(), [](const TissueSound& t) { return sound(t); });
+           std::ranges::all_of(s.sound, [](const TissueSound& t) { return sound(t); });
 }
 
 bool soundOfCt(const Scenery& s) noexcept
@@ -84,14 +90,12 @@ bool sound(const ProbePose& p) noexcept
 
 bool sound(const Hole& h) noexcept
 {
-    const auto place = [](float v) { return upTo(static_cast<double>(v), furthest); };
-    return std::all_of(h.from.begin(), h.from.end(), place) && std::all_of(h.to.begin(), h.to.end(), place);
+    return upTo(h.from, furthest) && upTo(h.to, furthest);
 }
 
 bool sound(const Mark& m) noexcept
 {
-    const auto place = [](float v) { return upTo(static_cast<double>(v), furthest); };
-    return std::all_of(m.place.begin(), m.place.end(), place) && std::all_of(m.axis.begin(), m.axis.end(), place);
+    return upTo(m.place, furthest) && upTo(m.axis, furthest);
 }
 
 }  // namespace
@@ -134,23 +138,22 @@ bool sound(const State& s, const Scenery& scenery) noexcept
     const bool rows = s.phase <= Phase::inserted && s.status <= Status::faulted && s.warning <= Warning::touching &&
                       s.tissue < maxTissues && s.aheadTissue < maxTissues &&
                       s.warned < std::max<std::uint32_t>(scenery.structures, 1);
-    const bool probe = sound(s.probe) && s.holes <= maxHoles &&
-                       std::all_of(s.hole.begin(), s.hole.end(), [](const Hole& h) { return sound(h); });
-    const bool marks = std::all_of(s.mark.begin(), s.mark.end(), [](const Mark& m) { return sound(m); });
+    const bool probe =
+        sound(s.probe) && s.holes <= maxHoles && std::ranges::all_of(s.hole, [](const Hole& h) { return sound(h); });
+    const bool marks = std::ranges::all_of(s.mark, [](const Mark& m) { return sound(m); });
     return places && forces && rows && probe && marks && upTo(s.time, largestValue) && upTo(s.tickP99, largestValue) &&
            upTo(s.coreTarget, furthest) && upTo(s.coreLength, furthest) && number(s.aheadTissueDistance) &&
-           std::all_of(s.distance.begin(), s.distance.end(), number) && std::all_of(s.ahead.begin(), s.ahead.end(), number);
+           std::ranges::all_of(s.distance, number) && std::ranges::all_of(s.ahead, number);
 }
 
 bool sound(const Input& input) noexcept
 {
-    return upTo(input.target, furthest) && upTo(input.axis, furthest) &&
-           std::all_of(input.probe.begin(), input.probe.end(), [](double v) { return upTo(v, furthest); });
+    return upTo(input.target, furthest) && upTo(input.axis, furthest) && upTo(input.probe, furthest);
 }
 
 bool sound(const Displacement& d, std::uint64_t nodes) noexcept
 {
-    return d.node < nodes && std::all_of(d.u.begin(), d.u.end(), [](float u) { return std::abs(u) <= furthestMoved; });
+    return d.node < nodes && upTo(d.u, furthestMoved);
 }
 
 }  // namespace palpate::channel

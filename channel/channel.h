@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace palpate::channel {
@@ -76,9 +77,8 @@ public:
 private:
     friend class ViewersHand;
     Subscriber();
-    /// The segment's file; below 0 when it is another one's by now.
-    int openToWrite() const noexcept;
-    std::uint64_t inputOffset() const noexcept;
+    /// The page of the input; empty when the segment's name is another one's by now.
+    Mapping inputToWrite() const;
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };
@@ -89,8 +89,12 @@ class ViewersHand {
 public:
     /// Nothing when the session is over or has a hand of its own, or another viewer that lives is its hand.
     static std::optional<ViewersHand> take(const Subscriber& session);
-    ViewersHand(ViewersHand&&) noexcept;
-    ViewersHand& operator=(ViewersHand&&) noexcept;
+    ViewersHand(ViewersHand&&) noexcept = default;
+    ViewersHand& operator=(ViewersHand other) noexcept
+    {
+        std::swap(page_, other.page_);
+        return *this;
+    }
     ~ViewersHand();
 
     /// Wait-free. Fills in `beat`: to be called often, also when nothing has changed.
@@ -98,9 +102,7 @@ public:
 
 private:
     ViewersHand() = default;
-    void release() noexcept;
-    void* page_ = nullptr;
-    MappingGuard guard_;
+    Mapping page_;
 };
 
 /// Sessions that can be attached to now, in order.

@@ -1,5 +1,6 @@
 #include <channel/deformation.h>
 
+#include <base/cells.h>
 #include <channel/lanes.h>
 
 #include <glm/common.hpp>
@@ -12,29 +13,6 @@
 
 namespace palpate::channel {
 namespace {
-
-std::size_t offset(const Grid& grid, glm::ivec3 n) noexcept
-{
-    return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(grid.size[1]) + static_cast<std::size_t>(n.y)) *
-               static_cast<std::size_t>(grid.size[0]) +
-           static_cast<std::size_t>(n.x);
-}
-
-glm::ivec3 size(const Grid& grid) noexcept
-{
-    return {grid.size[0], grid.size[1], grid.size[2]};
-}
-
-glm::ivec3 node(const Grid& grid, std::uint32_t at) noexcept
-{
-    const auto nx = static_cast<std::uint32_t>(grid.size[0]), ny = static_cast<std::uint32_t>(grid.size[1]);
-    return {static_cast<int>(at % nx), static_cast<int>(at / nx % ny), static_cast<int>(at / nx / ny)};
-}
-
-bool inside(const Grid& grid, glm::ivec3 n) noexcept
-{
-    return n.x >= 0 && n.y >= 0 && n.z >= 0 && n.x < grid.size[0] && n.y < grid.size[1] && n.z < grid.size[2];
-}
 
 glm::dvec3 position(const Grid& grid, glm::ivec3 n) noexcept
 {
@@ -63,14 +41,11 @@ Deformation::Deformation(const Scenery& scenery, std::span<const std::uint8_t> l
     : labelGrid_(scenery.labels),
       lattice_(scenery.lattice),
       labels_(labels.begin(), labels.end()),
-      inverse_(size(lattice_), static_cast<float>(1 / lattice_.spacing))
+      inverse_(sizeOf(lattice_), static_cast<float>(1 / lattice_.spacing))
 {
     markPure();
-    std::size_t nodes = 1;
-    for (const std::int32_t n : lattice_.size)
-        nodes *= static_cast<std::size_t>(std::max(n, 0));
-    u_.resize(nodes, glm::vec4(0));
-    visited_.resize(nodes, 0);
+    u_.resize(base::countOf(glm::max(sizeOf(lattice_), 0)), glm::vec4(0));
+    visited_.resize(u_.size(), 0);
     layerAir();
 }
 
@@ -103,14 +78,14 @@ void Deformation::layerAir()
     constexpr std::uint8_t unknown = 0xff;
     std::vector<std::uint32_t> last, next;
     for (std::uint32_t i = 0; i < u_.size(); ++i) {
-        const bool air = restTissue(position(lattice_, node(lattice_, i))) == 0;
+        const bool air = restTissue(position(lattice_, base::cellOf(sizeOf(lattice_), i))) == 0;
         layers[i] = air ? unknown : 0;
         if (!air)
             last.push_back(i);
     }
     std::uint8_t depth = 1;
     const auto reach = [&](std::uint32_t from, int k) {
-        if (!inside(lattice_, node(lattice_, from) + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1))
+        if (!base::holds(sizeOf(lattice_), base::cellOf(sizeOf(lattice_), from) + glm::ivec3(k % 3, k / 3 % 3, k / 9) - 1))
             return;
         const std::uint32_t at = neighbour(from, static_cast<std::size_t>(k));
         if (layers[at] == unknown) {
@@ -216,14 +191,14 @@ VoxelBox Deformation::boxOfMoved() const
 {
     if (moved_.empty())
         return {};
-    glm::ivec3 low = size(lattice_), high(-1);
+    glm::ivec3 low = sizeOf(lattice_), high(-1);
     const auto row = static_cast<std::uint32_t>(lattice_.size[0]);
     glm::ivec3 first(0);  // of the row that the last node was in
     std::uint32_t begin = ~row;
     for (std::size_t m = 0; m < visible_; ++m) {
         if (moved_[m] - begin >= row) {
             begin = moved_[m] - moved_[m] % row;
-            first = node(lattice_, begin);
+            first = base::cellOf(sizeOf(lattice_), begin);
             low = glm::min(low, glm::ivec3(low.x, first.y, first.z));
             high = glm::max(high, first);
         }
@@ -235,8 +210,8 @@ VoxelBox Deformation::boxOfMoved() const
     const glm::dvec3 reach(lattice_.spacing + largest_ + labelGrid_.spacing);
     const glm::dvec3 from = (position(lattice_, low) - reach - vec(labelGrid_.origin)) / labelGrid_.spacing;
     const glm::dvec3 to = (position(lattice_, high) + reach - vec(labelGrid_.origin)) / labelGrid_.spacing;
-    return {glm::clamp(glm::ivec3(glm::floor(from)), glm::ivec3(0), size(labelGrid_)),
-            glm::clamp(glm::ivec3(glm::ceil(to)) + 1, glm::ivec3(0), size(labelGrid_))};
+    return {glm::clamp(glm::ivec3(glm::floor(from)), glm::ivec3(0), sizeOf(labelGrid_)),
+            glm::clamp(glm::ivec3(glm::ceil(to)) + 1, glm::ivec3(0), sizeOf(labelGrid_))};
 }
 
 glm::dvec3 Deformation::rest(glm::dvec3 x, glm::vec3& shift) const noexcept
@@ -259,12 +234,12 @@ glm::dvec3 Deformation::seen(glm::dvec3 p) const noexcept
 std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
 {
     const glm::dvec3 g = (p - vec(labelGrid_.origin)) / labelGrid_.spacing, nearest = glm::floor(g + 0.5);
-    const glm::dvec3 last = glm::dvec3(size(labelGrid_)) - 1.0;
+    const glm::dvec3 last = glm::dvec3(sizeOf(labelGrid_)) - 1.0;
     if (!(nearest.x >= 1 && nearest.y >= 1 && nearest.z >= 1 && nearest.x < last.x && nearest.y < last.y &&
           nearest.z < last.z))
         return 0;
     const glm::ivec3 middle(nearest);
-    const std::uint8_t label = labels_[offset(labelGrid_, middle)];
+    const std::uint8_t label = labels_[base::offsetOf(sizeOf(labelGrid_), middle)];
     if ((label & pureBit) != 0)
         return label & rowBits;
     std::array<std::array<float, 3>, 3> along{};
@@ -277,7 +252,7 @@ std::uint8_t Deformation::restTissue(glm::dvec3 p) const noexcept
     std::size_t known = 0;
     const auto row = static_cast<std::size_t>(labelGrid_.size[0]),
                layer = row * static_cast<std::size_t>(labelGrid_.size[1]);
-    const std::uint8_t* corner = &labels_[offset(labelGrid_, middle - 1)];
+    const std::uint8_t* corner = &labels_[base::offsetOf(sizeOf(labelGrid_), middle - 1)];
     for (std::size_t z = 0; z < 3; ++z)
         for (std::size_t y = 0; y < 3; ++y)
             for (std::size_t x = 0; x < 3; ++x) {
@@ -297,9 +272,9 @@ std::uint8_t Deformation::restLabel(glm::dvec3 p) const noexcept
 {
     const glm::ivec3 nearest(glm::floor((p - vec(labelGrid_.origin)) / labelGrid_.spacing + 0.5));
     const std::uint8_t tissue = restTissue(p);
-    if (tissue == 0 || !inside(labelGrid_, nearest))
+    if (tissue == 0 || !base::holds(sizeOf(labelGrid_), nearest))
         return tissue;
-    return tissue | (labels_[offset(labelGrid_, nearest)] & shellBit);
+    return tissue | (labels_[base::offsetOf(sizeOf(labelGrid_), nearest)] & shellBit);
 }
 
 }  // namespace palpate::channel

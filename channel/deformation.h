@@ -19,6 +19,11 @@ inline glm::dvec3 vec(const Triple& t) noexcept
     return {t[0], t[1], t[2]};
 }
 
+inline glm::ivec3 sizeOf(const Grid& grid) noexcept
+{
+    return {grid.size[0], grid.size[1], grid.size[2]};
+}
+
 /// Voxels low <= v < high along each axis.
 struct VoxelBox {
     glm::ivec3 low{0}, high{0};

@@ -3,7 +3,6 @@
 #include <channel/lanes.h>
 
 #include <glm/common.hpp>
-#include <glm/ext/vector_int3_sized.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vector_relational.hpp>
@@ -44,15 +43,7 @@ void Inverse::Box::add(glm::vec3 p) noexcept
 
 Inverse::Inverse(glm::ivec3 size, float perMetre) : size_(glm::max(size, 0)), perMetre_(perMetre)
 {
-    checked_.resize(
-        static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) * static_cast<std::size_t>(size_.z), 0);
-}
-
-std::size_t Inverse::at(glm::ivec3 n) const noexcept
-{
-    return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(n.y)) *
-               static_cast<std::size_t>(size_.x) +
-           static_cast<std::size_t>(n.x);
+    checked_.resize(base::countOf(size_), 0);
 }
 
 Inverse::Local Inverse::inCell(glm::ivec3 cell, glm::vec3 part) const noexcept
@@ -182,12 +173,6 @@ void Inverse::forEachCellNear(const Box& place, Visit&& visit) const
                 visit(glm::ivec3(x, y, z));
 }
 
-std::size_t Inverse::bin(glm::ivec3 n) const noexcept
-{
-    const glm::i64vec3 all(bins_), at(n);
-    return static_cast<std::size_t>((at.z * all.y + at.y) * all.x + at.x);
-}
-
 Inverse::Answer Inverse::searched(glm::vec3 g) const noexcept
 {
     Answer best;
@@ -195,10 +180,8 @@ Inverse::Answer Inverse::searched(glm::vec3 g) const noexcept
         return best;
     if (folded_.holds(g)) {
         const std::size_t b = bin(glm::clamp(glm::ivec3(glm::floor(g)) - binLow_, glm::ivec3(0), bins_ - 1));
-        for (std::uint32_t i = first_[b]; i < first_[b + 1]; ++i) {
-            const auto cell = static_cast<int>(cells_[i]);
-            tryCell({cell % size_.x, cell / size_.x % size_.y, cell / size_.x / size_.y}, g, best);
-        }
+        for (std::uint32_t i = first_[b]; i < first_[b + 1]; ++i)
+            tryCell(base::cellOf(size_, cells_[i]), g, best);
         return best;
     }
     forEachCellNear({g, g}, [&](glm::ivec3 cell) { tryCell(cell, g, best); });
@@ -207,8 +190,7 @@ Inverse::Answer Inverse::searched(glm::vec3 g) const noexcept
 
 void Inverse::checkCell(glm::ivec3 cell)
 {
-    if (glm::any(glm::lessThan(cell, glm::ivec3(0))) || glm::any(glm::greaterThan(cell, size_ - 2)) ||
-        checked_[at(cell)] == updates_)
+    if (!base::holds(size_ - 1, cell) || checked_[at(cell)] == updates_)
         return;
     checked_[at(cell)] = updates_;
     for (int k = 0; k < 8; ++k)

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <base/cells.h>
+
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -54,7 +56,7 @@ private:
         float cost = -1;  // below 0: none
     };
 
-    std::size_t at(glm::ivec3 n) const noexcept;
+    std::size_t at(glm::ivec3 n) const noexcept { return base::offsetOf(size_, n); }
     Local local(glm::vec3 g) const noexcept;
     Local inCell(glm::ivec3 cell, glm::vec3 part) const noexcept;
     Box seen(glm::ivec3 cell) const noexcept;
@@ -68,7 +70,7 @@ private:
     void indexCells();
     template <typename Visit>
     void forEachCellNear(const Box& place, Visit&& visit) const;
-    std::size_t bin(glm::ivec3 n) const noexcept;
+    std::size_t bin(glm::ivec3 n) const noexcept { return base::offsetOf(bins_, n); }
 
     glm::ivec3 size_;
     float perMetre_;

@@ -4,11 +4,10 @@
 #include <signal.h>
 #include <sys/mman.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
-#include <cstdint>
 #include <mutex>
-#include <utility>
 
 namespace palpate::channel {
 namespace {
@@ -70,48 +69,41 @@ void install()
 
 }  // namespace
 
-MappingGuard::MappingGuard(void* base, std::size_t bytes)
+Mapping::Mapping(int file, std::size_t bytes, int protection, std::uint64_t offset, int flags)
 {
     install();
-    for (std::size_t i = 0; i < slots.size(); ++i) {
-        if (slots[i].taken.exchange(true))
-            continue;
-        slot_ = static_cast<int>(i);
-        slots[i].torn.store(false);
-        slots[i].bytes.store(bytes);
-        slots[i].base.store(reinterpret_cast<std::uintptr_t>(base), std::memory_order_release);
+    const auto free = std::ranges::find_if(slots, [](Slot& slot) { return !slot.taken.exchange(true); });
+    base::failIf(free == slots.end(), "too many sessions are looked at in one process");
+    void* mapped = ::mmap(nullptr, bytes, protection, MAP_SHARED | flags, file, static_cast<off_t>(offset));
+    if (mapped == MAP_FAILED) {
+        free->taken.store(false);
         return;
     }
-    throw base::error("too many sessions are looked at in one process");
+    slot_ = static_cast<int>(free - slots.begin());
+    free->torn.store(false);
+    free->bytes.store(bytes);
+    free->base.store(reinterpret_cast<std::uintptr_t>(mapped), std::memory_order_release);
 }
 
-MappingGuard::MappingGuard(MappingGuard&& other) noexcept : slot_(std::exchange(other.slot_, -1)) {}
-
-MappingGuard& MappingGuard::operator=(MappingGuard&& other) noexcept
-{
-    if (this != &other) {
-        release();
-        slot_ = std::exchange(other.slot_, -1);
-    }
-    return *this;
-}
-
-MappingGuard::~MappingGuard()
-{
-    release();
-}
-
-void MappingGuard::release() noexcept
+Mapping::~Mapping()
 {
     if (slot_ < 0)
         return;
     Slot& slot = slots[static_cast<std::size_t>(slot_)];
+    std::byte* const mapped = base();
+    const std::size_t bytes = slot.bytes.load();
     slot.base.store(0, std::memory_order_release);
     slot.taken.store(false, std::memory_order_release);
-    slot_ = -1;
+    ::munmap(mapped, bytes);
 }
 
-bool MappingGuard::torn() const noexcept
+std::byte* Mapping::base() const noexcept
+{
+    // NOLINTNEXTLINE: the address of a mapping
+    return reinterpret_cast<std::byte*>(slots[static_cast<std::size_t>(slot_)].base.load(std::memory_order_acquire));
+}
+
+bool Mapping::torn() const noexcept
 {
     return slot_ >= 0 && slots[static_cast<std::size_t>(slot_)].torn.load(std::memory_order_acquire);
 }

@@ -7,7 +7,6 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -15,86 +14,66 @@
 #include <cerrno>
 #include <cstring>
 #include <ctime>
-#include <filesystem>
 #include <new>
-#include <system_error>
 
 namespace palpate::channel {
 namespace {
-
-struct File {
-    explicit File(int opened) : descriptor(opened) {}
-    File(const File&) = delete;
-    File& operator=(const File&) = delete;
-    ~File()
-    {
-        if (descriptor >= 0)
-            ::close(descriptor);
-    }
-    int descriptor;
-};
 
 [[noreturn]] void fail(const std::string& session, const std::string& what, int error)
 {
     throw base::error("session {}: {}: {}", session, what, std::strerror(error));
 }
 
-bool sameFile(int descriptor, const std::string& name)
+bool sameFile(const base::Descriptor& file, const std::string& name)
 {
-    struct stat ours {
-    }, named{};
-    const File other(openSegment(name, O_RDONLY));
-    return other.descriptor >= 0 && ::fstat(descriptor, &ours) == 0 && ::fstat(other.descriptor, &named) == 0 &&
-           ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
+    const struct stat ours = statusOf(file), named = statusOf(openSegment(name, O_RDONLY));
+    return named.st_ino != 0 && ours.st_ino == named.st_ino && ours.st_dev == named.st_dev;
 }
+
+struct NameGoes {
+    ~NameGoes() { ::shm_unlink(name.c_str()); }
+    const std::string& name;
+};
 
 struct Owner {
     bool known = false;     // the segment is one of ours, complete and laid out as here
     std::uint64_t pid = 0;  // 0: dead
 };
 
-Owner ownerOf(int descriptor)
+Owner ownerOf(const base::Descriptor& file)
 {
-    struct stat status {};
-    if (::fstat(descriptor, &status) != 0 || static_cast<std::size_t>(status.st_size) < sizeof(Header))
+    if (static_cast<std::size_t>(statusOf(file).st_size) < sizeof(Header))
         return {};
-    void* mapped = ::mmap(nullptr, sizeof(Header), PROT_READ, MAP_SHARED, descriptor, 0);
-    if (mapped == MAP_FAILED)
+    const Mapping mapping(*file, sizeof(Header), PROT_READ);
+    const auto* header = mapping ? reinterpret_cast<const Header*>(mapping.base()) : nullptr;
+    if (header == nullptr || header->magic.load(std::memory_order_acquire) != magic)
         return {};
-    const MappingGuard guard(mapped, sizeof(Header));
-    const auto& header = *static_cast<const Header*>(mapped);
-    Owner owner;
-    if (header.magic.load(std::memory_order_acquire) == magic) {
-        owner.known = header.version == version && header.layoutHash == layoutHash();
-        owner.pid = ownerLives(header) ? header.ownerPid : 0;
-    }
-    ::munmap(mapped, sizeof(Header));
-    return owner;
+    return {header->version == version && header->layoutHash == layoutHash(), ownerLives(*header) ? header->ownerPid : 0};
 }
 
 // Removes the segment `name` that is open as `old`. The lock on it lets only one process at a time do so, and the second
 // look at the name keeps a slower one from removing what a faster one has put there. Who does not get the lock leaves it to
 // who has.
-void removeLocked(const File& old, const std::string& name)
+void removeLocked(const base::Descriptor& old, const std::string& name)
 {
-    if (::flock(old.descriptor, LOCK_EX | LOCK_NB) == 0 && sameFile(old.descriptor, name))
+    if (::flock(*old, LOCK_EX | LOCK_NB) == 0 && sameFile(old, name))
         ::shm_unlink(name.c_str());
 }
 
 // Removes the segment `name` if a dead process left it, or if it is not ours to understand.
 void removeLeftBehind(const std::string& session, const std::string& name)
 {
-    const File old(openSegment(name, O_RDWR));
-    if (old.descriptor < 0 && errno == ENOENT)
+    const base::Descriptor old = openSegment(name, O_RDWR);
+    if (!old && errno == ENOENT)
         return;
-    if (old.descriptor < 0)
+    if (!old)
         fail(session, "there is one already that belongs to somebody else (choose another --session)", errno);
-    if (const std::uint64_t pid = ownerOf(old.descriptor).pid)
-        throw base::error("session {} is running already (pid {}): end it or choose another --session", session, pid);
+    const std::uint64_t pid = ownerOf(old).pid;
+    base::failIf(pid != 0, "session {} is running already (pid {}): end it or choose another --session", session, pid);
     removeLocked(old, name);
 }
 
-// Whether `file` is the temporary name (Publisher::Impl::temporary) of a process that is dead.
+// Whether `file` is the temporary name of a process that is dead.
 bool unfinished(const std::string& file)
 {
     const std::size_t dot = file.rfind('.');
@@ -107,17 +86,11 @@ bool unfinished(const std::string& file)
 // ours to understand, or not to open, stays.
 void removeOthersLeftBehind()
 {
-    std::error_code failed;
-    for (auto i = std::filesystem::directory_iterator(segmentFolder, failed); !failed && i != end(i); i.increment(failed)) {
-        const std::string file = i->path().filename();
-        if (!file.starts_with("palpate-"))
-            continue;
+    for (const std::string& file : segmentFiles()) {
         const std::string name = "/" + file;
-        const File old(openSegment(name, O_RDWR));
-        if (old.descriptor < 0)
-            continue;
-        const Owner owner = ownerOf(old.descriptor);
-        if (owner.pid == 0 && (owner.known || unfinished(file)))
+        const base::Descriptor old = openSegment(name, O_RDWR);
+        const Owner owner = old ? ownerOf(old) : Owner{};
+        if (old && owner.pid == 0 && (owner.known || unfinished(file)))
             removeLocked(old, name);
     }
 }
@@ -160,21 +133,17 @@ struct Publisher::Impl {
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
 
-    void allocate(std::size_t size);
+    void map(std::size_t bytes);
     void fill(const Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint16_t> image,
               std::span<const std::uint8_t> fine);
-    void show();
-    void release() noexcept;
 
-    std::string session, name, temporary;
-    int descriptor = -1;
-    std::byte* base = nullptr;
-    std::size_t bytes = 0;
+    std::string session, name;
+    base::Descriptor file;
+    Mapping mapping;
     Header* header = nullptr;
     StateBlock* state = nullptr;
     InputBlock* input = nullptr;
     DisplacedBlock* displaced = nullptr;
-    MappingGuard guard;
     std::uint64_t owner = static_cast<std::uint64_t>(::getpid());
     std::uint64_t publication = 0;
     std::unique_ptr<Displaced> back = std::make_unique<Displaced>();
@@ -182,7 +151,7 @@ struct Publisher::Impl {
 
 Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, std::span<const std::uint8_t> labels,
                       std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
-    : session(sessionName), name(segmentName(sessionName)), temporary(name + "." + std::to_string(::getpid()))
+    : session(sessionName), name(segmentName(sessionName))
 {
     checkScenery(session, scenery, labels.size(), image.size(), fine.size());
     removeLeftBehind(session, name);
@@ -191,49 +160,49 @@ Publisher::Impl::Impl(const std::string& sessionName, const Scenery& scenery, st
                       grey = label + aligned(labels.size()), detail = grey + aligned(image.size_bytes()),
                       states = detail + aligned(fine.size()), inputs = states + aligned(sizeof(StateBlock)),
                       displacements = inputs + aligned(sizeof(InputBlock));
-    try {
-        allocate(displacements + aligned(sizeof(DisplacedBlock)));
-        header = new (base) Header;
-        header->sceneryOffset = scene;
-        header->labelsOffset = label;
-        header->labelsBytes = labels.size();
-        header->imageOffset = grey;
-        header->imageBytes = image.size_bytes();
-        header->fineOffset = detail;
-        header->fineBytes = fine.size();
-        header->stateOffset = states;
-        header->inputOffset = inputs;
-        header->displacedOffset = displacements;
-        fill(scenery, labels, image, fine);
-        show();
-    } catch (...) {
-        release();
-        throw;
+    const std::string temporary = name + "." + std::to_string(::getpid());
+    file = base::Descriptor(::shm_open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR));
+    if (!file)
+        fail(session, "cannot make shared memory", errno);
+    const NameGoes goes{temporary};
+    map(displacements + aligned(sizeof(DisplacedBlock)));
+    header->sceneryOffset = scene;
+    header->labelsOffset = label;
+    header->labelsBytes = labels.size();
+    header->imageOffset = grey;
+    header->imageBytes = image.size_bytes();
+    header->fineOffset = detail;
+    header->fineBytes = fine.size();
+    header->stateOffset = states;
+    header->inputOffset = inputs;
+    header->displacedOffset = displacements;
+    fill(scenery, labels, image, fine);
+    // A link, not a rename: it fails when another publisher has been faster.
+    const std::string folder(segmentFolder);
+    if (::link((folder + temporary).c_str(), (folder + name).c_str()) != 0) {
+        base::failIf(errno == EEXIST, "session {} has just been started by another process", session);
+        fail(session, "cannot show shared memory", errno);
     }
 }
 
-void Publisher::Impl::allocate(std::size_t size)
+void Publisher::Impl::map(std::size_t bytes)
 {
-    bytes = size;
-    descriptor = ::shm_open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
-    if (descriptor < 0)
-        fail(session, "cannot make shared memory", errno);
     // Reserved now, so that a full /dev/shm is an error here and not a SIGBUS in the servo loop.
-    if (const int error = ::posix_fallocate(descriptor, 0, static_cast<off_t>(bytes)))
+    if (const int error = ::posix_fallocate(*file, 0, static_cast<off_t>(bytes)))
         fail(session, "no room for " + std::to_string(bytes >> 20U) + " MB in " + segmentFolder, error);
-    void* mapped = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, descriptor, 0);
-    if (mapped == MAP_FAILED)
+    mapping = Mapping(*file, bytes, PROT_READ | PROT_WRITE, 0, MAP_POPULATE);
+    if (!mapping)
         fail(session, "cannot map shared memory", errno);
-    base = static_cast<std::byte*>(mapped);
-    guard = MappingGuard(mapped, bytes);
+    header = new (mapping.base()) Header;
+    header->bytes = bytes;
 }
 
 void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t> labels,
                            std::span<const std::uint16_t> image, std::span<const std::uint8_t> fine)
 {
+    std::byte* const base = mapping.base();
     header->version = version;
     header->layoutHash = layoutHash();
-    header->bytes = bytes;
     header->ownerPid = static_cast<std::uint64_t>(::getpid());
     header->ownerStart = processStart(header->ownerPid);
     header->closed.store(0, std::memory_order_relaxed);
@@ -249,38 +218,14 @@ void Publisher::Impl::fill(const Scenery& scenery, std::span<const std::uint8_t>
     header->magic.store(magic, std::memory_order_release);
 }
 
-// A link, not a rename: it fails when another publisher has been faster.
-void Publisher::Impl::show()
-{
-    const std::string folder(segmentFolder);
-    if (::link((folder + temporary).c_str(), (folder + name).c_str()) != 0) {
-        base::failIf(errno == EEXIST, "session {} has just been started by another process", session);
-        fail(session, "cannot show shared memory", errno);
-    }
-    ::shm_unlink(temporary.c_str());
-    temporary.clear();
-}
-
-void Publisher::Impl::release() noexcept
-{
-    if (!temporary.empty() && descriptor >= 0)
-        ::shm_unlink(temporary.c_str());
-    guard = {};
-    if (base != nullptr)
-        ::munmap(base, bytes);
-    if (descriptor >= 0)
-        ::close(descriptor);
-}
-
 Publisher::Impl::~Impl()
 {
     // A forked child holds a copy of this object, but not the session.
     if (owner == static_cast<std::uint64_t>(::getpid())) {
         header->closed.store(1, std::memory_order_release);
-        if (sameFile(descriptor, name))
+        if (sameFile(file, name))
             ::shm_unlink(name.c_str());
     }
-    release();
 }
 
 Publisher::Publisher(const std::string& session, const Scenery& scenery, std::span<const std::uint8_t> labels,
@@ -310,7 +255,7 @@ std::optional<Input> Publisher::input() const noexcept
 
 bool Publisher::torn() const noexcept
 {
-    return impl_->guard.torn();
+    return impl_->mapping.torn();
 }
 
 Displaced& Publisher::backBuffer() noexcept

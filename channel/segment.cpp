@@ -3,11 +3,12 @@
 #include <base/error.h>
 #include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
+#include <system_error>
 
 namespace palpate::channel {
 
@@ -22,17 +23,34 @@ std::string segmentName(const std::string& session)
     return "/palpate-" + session;
 }
 
-int openSegment(const std::string& name, int access) noexcept
+base::Descriptor openSegment(const std::string& name, int access) noexcept
 {
-    const int file = ::shm_open(name.c_str(), access | O_NONBLOCK, 0);
-    if (file < 0)
-        return file;
+    base::Descriptor file(::shm_open(name.c_str(), access | O_NONBLOCK, 0));
+    const struct stat status = statusOf(file);
+    if (file && (!S_ISREG(status.st_mode) || status.st_uid != ::geteuid())) {
+        file = base::Descriptor();
+        errno = EPERM;
+    }
+    return file;
+}
+
+struct stat statusOf(const base::Descriptor& file) noexcept
+{
     struct stat status {};
-    if (::fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == ::geteuid())
-        return file;
-    ::close(file);
-    errno = EPERM;
-    return -1;
+    if (!file || ::fstat(*file, &status) != 0)
+        return {};
+    return status;
+}
+
+std::vector<std::string> segmentFiles()
+{
+    std::vector<std::string> found;
+    std::error_code failed;
+    for (auto i = std::filesystem::directory_iterator(segmentFolder, failed); !failed && i != end(i); i.increment(failed))
+        if (i->path().filename().string().starts_with(segmentPrefix))
+            found.push_back(i->path().filename());
+    std::ranges::sort(found);
+    return found;
 }
 
 }  // namespace palpate::channel

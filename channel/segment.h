@@ -1,14 +1,19 @@
 #pragma once
 
+#include <base/descriptor.h>
 #include <base/process.h>
 #include <base/sequence_lock.h>
 #include <channel/layout.h>
+
+#include <sys/stat.h>
 
 #include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <vector>
 
 /// The bytes of the segment, for its ends, publisher.cpp, subscriber.cpp and hand.cpp, and for their tests. Not part of the
 /// interface.
@@ -150,9 +155,17 @@ constexpr std::uint64_t layoutHash() noexcept
 std::string segmentName(const std::string& session);
 
 /// Opens the segment `name` where it is a regular file of this user's own, and never waits: others may put a pipe, or a
-/// file that they hold locked, under any name. Returns -1 otherwise, with errno (EPERM: it is not ours).
+/// file that they hold locked, under any name. Nothing is open otherwise, with errno (EPERM: it is not ours).
 /// `access` is O_RDONLY or O_RDWR.
-int openSegment(const std::string& name, int access) noexcept;
+base::Descriptor openSegment(const std::string& name, int access) noexcept;
+
+/// What the system says of an open file; all zero where it says nothing.
+struct stat statusOf(const base::Descriptor& file) noexcept;
+
+/// How the segments of all sessions begin in that folder.
+inline constexpr std::string_view segmentPrefix = "palpate-";
+/// The files there that begin so.
+std::vector<std::string> segmentFiles();
 
 /// Where the system keeps the segments (Linux).
 inline constexpr const char* segmentFolder = "/dev/shm";
@@ -172,7 +185,8 @@ inline bool holderLives(std::uint64_t hand) noexcept
     return hand != 0 && handOf(hand >> 42U) == hand;
 }
 
-inline bool ownerLives(const Header& header) noexcept
+/// Of a header, or of what was read of it.
+bool ownerLives(const auto& header) noexcept
 {
     return header.ownerStart != 0 && processStart(header.ownerPid) == header.ownerStart;
 }

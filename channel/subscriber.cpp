@@ -4,17 +4,14 @@
 #include <channel/mapping_guard.h>
 #include <channel/segment.h>
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cstring>
-#include <string_view>
 
 namespace palpate::channel {
 namespace {
@@ -39,11 +36,6 @@ Places placesIn(const Header& h) noexcept
     return {h.version,       h.layoutHash,   h.bytes,       h.ownerPid,    h.ownerStart,
             h.sceneryOffset, h.labelsOffset, h.labelsBytes, h.imageOffset, h.imageBytes,
             h.fineOffset,    h.fineBytes,    h.stateOffset, h.inputOffset, h.displacedOffset};
-}
-
-bool lives(const Places& p) noexcept
-{
-    return p.ownerStart != 0 && processStart(p.ownerPid) == p.ownerStart;
 }
 
 // Whether labels, fine labels and image are as large as the scenery says.
@@ -78,23 +70,16 @@ void check(const std::string& session, const Places& header, std::uint64_t bytes
 }  // namespace
 
 struct Subscriber::Impl {
-    ~Impl()
-    {
-        guard = {};
-        if (base != nullptr)
-            ::munmap(base, bytes);
-    }
     template <class T>
     const T& at(std::uint64_t offset) const noexcept
     {
-        return *reinterpret_cast<const T*>(static_cast<const std::byte*>(base) + offset);
+        return *reinterpret_cast<const T*>(mapping.base() + offset);
     }
 
     std::string name;
-    void* base = nullptr;
     std::size_t bytes = 0;
     ino_t inode = 0;
-    MappingGuard guard;
+    Mapping mapping;
     const Header* header = nullptr;
     Places places;
     Scenery scenery;
@@ -114,33 +99,24 @@ std::optional<Subscriber> Subscriber::attach(const std::string& session)
     Subscriber subscriber;
     Impl& impl = *subscriber.impl_;
     impl.name = segmentName(session);
-    const int file = openSegment(impl.name, O_RDONLY);
-    if (file < 0 && errno == ENOENT)
+    const base::Descriptor file = openSegment(impl.name, O_RDONLY);
+    if (!file && errno == ENOENT)
         return std::nullopt;
-    base::failIf(file < 0, "session {}: cannot be read: {} (only the user who started it may)", session,
-                 std::strerror(errno));
-    struct stat status {};
-    const bool known = ::fstat(file, &status) == 0;
+    base::failIf(!file, "session {}: cannot be read: {} (only the user who started it may)", session, std::strerror(errno));
+    const struct stat status = statusOf(file);
     impl.bytes = static_cast<std::size_t>(status.st_size);
     impl.inode = status.st_ino;
-    void* mapped =
-        known && impl.bytes >= sizeof(Header) ? ::mmap(nullptr, impl.bytes, PROT_READ, MAP_SHARED, file, 0) : MAP_FAILED;
-    ::close(file);
-    if (mapped == MAP_FAILED)
-        throw base::error("session {}: its shared memory was not made by palpate; remove {}", session,
-                          (segmentFolder + impl.name));
-    impl.base = mapped;
-    impl.guard = MappingGuard(mapped, impl.bytes);
-    impl.header = &impl.at<Header>(0);
-    if (impl.header->magic.load(std::memory_order_acquire) != magic)
-        throw base::error("session {}: its shared memory was not made by palpate; remove {}", session,
-                          (segmentFolder + impl.name));
+    if (impl.bytes >= sizeof(Header))
+        impl.mapping = Mapping(*file, impl.bytes, PROT_READ);
+    impl.header = impl.mapping ? &impl.at<Header>(0) : nullptr;
+    base::failIf(impl.header == nullptr || impl.header->magic.load(std::memory_order_acquire) != magic,
+                 "session {}: its shared memory was not made by palpate; remove {}", session, segmentFolder + impl.name);
     impl.places = placesIn(*impl.header);
     check(session, impl.places, impl.bytes);
     std::memcpy(&impl.scenery, &impl.at<std::byte>(impl.places.scenery), sizeof(Scenery));
-    if (!coherent(impl.places, impl.scenery))
-        throw base::error("session {}: its shared memory is damaged; end the simulation and start it again", session);
-    if (!lives(impl.places))
+    base::failIf(!coherent(impl.places, impl.scenery),
+                 "session {}: its shared memory is damaged; end the simulation and start it again", session);
+    if (!ownerLives(impl.places))
         return std::nullopt;
     impl.nodes = voxelsOf(impl.scenery.lattice);
     impl.state = &impl.at<StateBlock>(impl.places.state);
@@ -216,19 +192,12 @@ bool Subscriber::displaced(Displaced& out) const noexcept
     return false;
 }
 
-int Subscriber::openToWrite() const noexcept
+Mapping Subscriber::inputToWrite() const
 {
-    const int file = openSegment(impl_->name, O_RDWR);
-    struct stat named {};
-    if (file < 0 || (::fstat(file, &named) == 0 && named.st_ino == impl_->inode))
-        return file;
-    ::close(file);
-    return -1;
-}
-
-std::uint64_t Subscriber::inputOffset() const noexcept
-{
-    return impl_->places.input;
+    const base::Descriptor file = openSegment(impl_->name, O_RDWR);
+    if (statusOf(file).st_ino != impl_->inode)
+        return {};
+    return {*file, sizeof(InputBlock), PROT_READ | PROT_WRITE, impl_->places.input};
 }
 
 Ending Subscriber::ending() const noexcept
@@ -237,18 +206,14 @@ Ending Subscriber::ending() const noexcept
         return Ending::finished;
     if (const auto last = state(); last && last->status == Status::finished)
         return Ending::finished;
-    if (impl_->guard.torn())
+    if (impl_->mapping.torn())
         return Ending::torn;
-    if (!lives(impl_->places))
+    if (!ownerLives(impl_->places))
         return Ending::killed;
-    struct stat named {};
-    const int file = openSegment(impl_->name, O_RDONLY);
-    const bool ours = file >= 0 && ::fstat(file, &named) == 0 && named.st_ino == impl_->inode;
-    if (file >= 0)
-        ::close(file);
-    if (ours && static_cast<std::uint64_t>(named.st_size) < impl_->bytes)
-        return Ending::torn;
-    return ours ? Ending::none : Ending::killed;
+    const struct stat named = statusOf(openSegment(impl_->name, O_RDONLY));
+    if (named.st_ino != impl_->inode)
+        return Ending::killed;
+    return static_cast<std::uint64_t>(named.st_size) < impl_->bytes ? Ending::torn : Ending::none;
 }
 
 std::uint64_t Subscriber::ownerPid() const noexcept
@@ -258,17 +223,10 @@ std::uint64_t Subscriber::ownerPid() const noexcept
 
 std::vector<std::string> sessions()
 {
-    constexpr std::string_view prefix = "palpate-";
     std::vector<std::string> found;
-    DIR* folder = ::opendir(segmentFolder);
-    if (folder == nullptr)
-        return found;
-    while (const dirent* entry = ::readdir(folder)) {
-        const std::string_view file(entry->d_name);
-        if (!file.starts_with(prefix))
-            continue;
+    for (const std::string& file : segmentFiles()) {
         try {
-            std::string session(file.substr(prefix.size()));
+            std::string session = file.substr(segmentPrefix.size());
             const auto subscriber = Subscriber::attach(session);
             if (subscriber && subscriber->alive())
                 found.push_back(std::move(session));
@@ -276,8 +234,6 @@ std::vector<std::string> sessions()
             continue;  // another user's, another version's, or one that is being made
         }
     }
-    ::closedir(folder);
-    std::sort(found.begin(), found.end());
     return found;
 }
 

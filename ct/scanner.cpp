@@ -1,5 +1,6 @@
 #include <ct/scanner.h>
 
+#include <base/cells.h>
 #include <base/png.h>
 #include <channel/needle_shape.h>
 
@@ -129,13 +130,9 @@ float Scanner::numberAt(const channel::Deformation& body, glm::dvec3 rest) const
     const channel::Grid& grid = scenery_.labels;
     if (!image_.empty()) {
         const glm::dvec3 g = glm::round((rest - vec(grid.origin)) / grid.spacing);
-        if (g.x >= 0 && g.y >= 0 && g.z >= 0 && g.x < grid.size[0] && g.y < grid.size[1] && g.z < grid.size[2]) {
-            const auto at =
-                (static_cast<std::size_t>(g.z) * static_cast<std::size_t>(grid.size[1]) + static_cast<std::size_t>(g.y)) *
-                    static_cast<std::size_t>(grid.size[0]) +
-                static_cast<std::size_t>(g.x);
-            return static_cast<float>(scenery_.imageLow + scenery_.imageStep * image_[at]);
-        }
+        if (g.x >= 0 && g.y >= 0 && g.z >= 0 && g.x < grid.size[0] && g.y < grid.size[1] && g.z < grid.size[2])
+            return static_cast<float>(scenery_.imageLow +
+                                      scenery_.imageStep * image_[base::offsetOf(channel::sizeOf(grid), glm::ivec3(g))]);
     }
     return number_[body.restLabel(rest) & channel::rowBits];
 }
@@ -179,7 +176,7 @@ std::vector<float> Scanner::slice(const channel::State& state, const channel::De
 Scan Scanner::scan(const channel::State& state, const channel::Deformation& body) const
 {
     const channel::Grid& grid = scenery_.labels;
-    const glm::dvec3 size = grid.spacing * glm::dvec3(grid.size[0], grid.size[1], grid.size[2]);
+    const glm::dvec3 size = grid.spacing * glm::dvec3(channel::sizeOf(grid));
     const glm::dvec3 tip = vec(state.tip), middle = vec(grid.origin) + 0.5 * (size - grid.spacing);
     Scan scan;
     scan.side = pixels;

@@ -28,11 +28,6 @@ struct RoundCone {
     double widest() const noexcept { return std::max(radiusA, radiusB); }
 };
 
-inline RoundCone roundCone(const Capsule& tool) noexcept
-{
-    return {tool.a, tool.b, tool.radius, tool.radius};
-}
-
 /// A round cone made ready to be asked for many points. With the point s along the axis and q away from it, the sphere that
 /// comes nearest is at
 ///
@@ -118,17 +113,5 @@ private:
     double sine_ = 0;  // of half the opening angle: radius gained per metre
     double cosine_ = 1;
 };
-
-/// Signed distance from `p` to the tool's surface, negative inside [m]. For many points make one ShapeDistance.
-inline double distance(const RoundCone& tool, Vec3 p) noexcept
-{
-    return ShapeDistance(tool).distance(p);
-}
-
-/// Unit vector along which distance() grows by 1 per metre; on the axis, one of them.
-inline Vec3 gradient(const RoundCone& tool, Vec3 p) noexcept
-{
-    return ShapeDistance(tool).gradient(p);
-}
 
 }  // namespace palpate::occupancy

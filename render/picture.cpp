@@ -26,7 +26,7 @@ std::pair<glm::dvec3, glm::dvec3> bodyBox(const Deformation& deformation)
 {
     const channel::Grid& grid = deformation.grid();
     const auto labels = deformation.labels();
-    glm::ivec3 low(grid.size[0], grid.size[1], grid.size[2]), high(-1);
+    glm::ivec3 low = channel::sizeOf(grid), high(-1);
     std::size_t at = 0;
     for (int z = 0; z < grid.size[2]; ++z)
         for (int y = 0; y < grid.size[1]; ++y)

@@ -1,5 +1,7 @@
 #include <render/shift_field.h>
 
+#include <base/cells.h>
+
 #include <glm/common.hpp>
 
 #include <algorithm>
@@ -35,8 +37,7 @@ void sample(const Deformation& deformation, ShiftField& out)
         if (static_cast<double>(out.size.x) * out.size.y * out.size.z <= affordable)
             break;
     }
-    const std::size_t nodes =
-        static_cast<std::size_t>(out.size.x) * static_cast<std::size_t>(out.size.y) * static_cast<std::size_t>(out.size.z);
+    const std::size_t nodes = base::countOf(out.size);
     out.shifts.resize(nodes);
     out.texels.resize(nodes);
     const glm::vec3 first((out.origin - corner) / lattice);

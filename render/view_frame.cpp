@@ -32,7 +32,7 @@ ViewFrame viewFrame(const channel::Scenery& scenery)
 {
     const glm::dvec3 entry = vec(scenery.entry), aim = vec(scenery.aim);
     const channel::Grid& grid = scenery.labels;
-    const glm::dvec3 size = grid.spacing * glm::dvec3(grid.size[0], grid.size[1], grid.size[2]);
+    const glm::dvec3 size = grid.spacing * glm::dvec3(channel::sizeOf(grid));
     const double length = glm::distance(entry, aim);
     ViewFrame frame;
     const bool planned = length > 1e-4;

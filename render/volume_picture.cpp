@@ -208,7 +208,7 @@ void VolumePicture::leaveWhole()
 void VolumePicture::setUniforms(vtkShaderProgram& program)
 {
     shown_ = true;
-    const glm::dvec3 count(grid_.size[0], grid_.size[1], grid_.size[2]);
+    const glm::dvec3 count(channel::sizeOf(grid_));
     const glm::dvec3 whole = count * grid_.spacing;  // of the texture [m]; the first voxel's middle is half a voxel inside
     const glm::dvec3 corner = vec(grid_.origin) - 0.5 * grid_.spacing;
     glm::dvec3 scale(0.0), offset(-1.0), reach(0.0);
@@ -293,7 +293,7 @@ void VolumePicture::prepare(Quality quality, bool software, double pixels)
 {
     moving_ = quality == Quality::moving;
     upload();
-    const glm::dvec3 extent = glm::dvec3(grid_.size[0], grid_.size[1], grid_.size[2]) * grid_.spacing * mm;
+    const glm::dvec3 extent = glm::dvec3(channel::sizeOf(grid_)) * grid_.spacing * mm;
     const double voxel = std::max(grid_.spacing * mm, std::max({extent.x, extent.y, extent.z}) / 128);
     if (!software || quality == Quality::still) {
         setSteps(1, (software ? 1.0 : 0.5) * voxel);

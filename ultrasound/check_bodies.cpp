@@ -1,5 +1,7 @@
 #include <ultrasound/check_bodies.h>
 
+#include <base/cells.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -18,21 +20,12 @@ channel::Grid gridOver(glm::dvec3 size, double spacing)
 
 glm::dvec3 nodeAt(const channel::Grid& grid, std::size_t i)
 {
-    const auto nx = static_cast<std::size_t>(grid.size[0]), ny = static_cast<std::size_t>(grid.size[1]);
-    return grid.spacing * glm::dvec3(i % nx, i / nx % ny, i / nx / ny);
-}
-
-std::size_t nodesOf(const channel::Grid& grid)
-{
-    std::size_t count = 1;
-    for (const std::int32_t n : grid.size)
-        count *= static_cast<std::size_t>(n);
-    return count;
+    return grid.spacing * glm::dvec3(base::cellOf(channel::sizeOf(grid), i));
 }
 
 std::vector<std::uint8_t> sampled(const channel::Grid& grid, const CheckBench::RowAt& rowAt)
 {
-    std::vector<std::uint8_t> rows(nodesOf(grid));
+    std::vector<std::uint8_t> rows(base::countOf(channel::sizeOf(grid)));
     for (std::size_t i = 0; i < rows.size(); ++i)
         rows[i] = rowAt(nodeAt(grid, i));
     return rows;
@@ -64,7 +57,7 @@ CheckBench::CheckBench(const std::vector<channel::TissueSound>& tissues, double 
 void CheckBench::displace(const std::function<glm::dvec3(glm::dvec3)>& u)
 {
     const auto out = std::make_unique<channel::Displaced>();
-    const std::size_t nodes = nodesOf(scenery_.lattice);
+    const std::size_t nodes = base::countOf(channel::sizeOf(scenery_.lattice));
     for (std::size_t i = 0; i < std::min(nodes, channel::maxDisplaced); ++i) {
         const glm::dvec3 d = u(nodeAt(scenery_.lattice, i));
         out->nodes[i] = {static_cast<std::uint32_t>(i),
@@ -105,10 +98,9 @@ int CheckBench::sample(double z) const
     return static_cast<int>(std::lround((z - pose.face.z) / static_cast<double>(beam().sample()) - 0.5));
 }
 
-double CheckBench::power(int sample, int line) const
+double CheckBench::in(const std::vector<float>& power, int sample, int line) const
 {
-    return static_cast<double>(envelope[static_cast<std::size_t>(sample) * static_cast<std::size_t>(settings.lines) +
-                                        static_cast<std::size_t>(line)]);
+    return static_cast<double>(power[static_cast<std::size_t>(sample * settings.lines + line)]);
 }
 
 double CheckBench::level(int fromSample, int toSample, int fromLine, int toLine) const

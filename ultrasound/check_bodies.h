@@ -30,7 +30,8 @@ public:
     Beam beam() const { return {linearProbe(), settings}; }
     int line(double x) const;    // nearest to x of the box [m]
     int sample(double z) const;  // nearest to z of the box [m]
-    double power(int sample, int line) const;
+    double in(const std::vector<float>& power, int sample, int line) const;
+    double power(int sample, int line) const { return in(envelope, sample, line); }
     double amplitude(int sample, int line) const { return std::sqrt(power(sample, line)); }
     /// Mean power in a part of the picture [dB]; samples and lines from .. to (excluded).
     double level(int fromSample, int toSample, int fromLine, int toLine) const;

@@ -23,11 +23,9 @@ CheckBench plain(const SoundOf& soundOf, const char* tissue)
 std::array<double, 2> tracked(const CheckBench& bench, const std::vector<float>& before, int k0, int i0)
 {
     constexpr int tall = 60, wide = 12, reach = 5;
-    const auto lines = static_cast<std::size_t>(bench.settings.lines);
     const auto fit = [&](int dk, int di) {
-        return correlation(bench, k0 - tall, k0 + tall, i0 - wide, i0 + wide, [&](int k, int i) {
-            return static_cast<double>(before[static_cast<std::size_t>(k - dk) * lines + static_cast<std::size_t>(i - di)]);
-        });
+        return correlation(bench, k0 - tall, k0 + tall, i0 - wide, i0 + wide,
+                           [&](int k, int i) { return bench.in(before, k - dk, i - di); });
     };
     int bestK = 0, bestI = 0;
     double best = -1;
@@ -71,15 +69,13 @@ void checkStrain(const SoundOf& soundOf, std::vector<Check>& out)
     CheckBench bench = plain(soundOf, "liver");
     bench.scan();
     const std::vector<float> before = bench.envelope;
-    const auto lines = static_cast<std::size_t>(bench.settings.lines);
     const double middle = bench.pose.face.z + 18e-3, pi = std::acos(-1.0);
     for (const double e : {0.02, 0.05, 0.1}) {
         bench.displace([&](glm::dvec3 x) { return glm::dvec3(0, 0, -e * (x.z - middle)); });
         bench.scan();
         const int k = bench.sample(middle);
-        const double found = correlation(bench, k - 3, k + 4, 10, 182, [&](int q, int i) {
-            return static_cast<double>(before[static_cast<std::size_t>(q) * lines + static_cast<std::size_t>(i)]);
-        });
+        const double found =
+            correlation(bench, k - 3, k + 4, 10, 182, [&](int q, int i) { return bench.in(before, q, i); });
         const double w = 1 + (1 - e) * (1 - e);
         const double phase =
             2 * pi / static_cast<double>(bench.beam().wavelength()) * e * static_cast<double>(bench.beam().axialSigma());
@@ -118,14 +114,11 @@ std::vector<Check> checkSpeckle(const SoundOf& soundOf)
     CheckBench bench = plain(soundOf, "liver");
     bench.scan();
     const std::vector<float> before = bench.envelope;
-    const auto lines = static_cast<std::size_t>(bench.settings.lines);
     const double y = bench.pose.face.y, sigma = static_cast<double>(bench.beam().elevationSigma(18e-3F));
     for (const double d : {0.2e-3, 0.4e-3, 0.8e-3}) {
         bench.pose.face.y = y + d;
         bench.scan();
-        const double found = correlation(bench, 400, 500, 10, 182, [&](int k, int i) {
-            return static_cast<double>(before[static_cast<std::size_t>(k) * lines + static_cast<std::size_t>(i)]);
-        });
+        const double found = correlation(bench, 400, 500, 10, 182, [&](int k, int i) { return bench.in(before, k, i); });
         out.push_back({fmt::format("correlation after {:.1f} mm across the plane", mm * d), "", found,
                        std::exp(-d * d / (2 * sigma * sigma)), 0.05, "Gaussian beam"});
     }

@@ -19,21 +19,6 @@ constexpr int border = 3;                       // voxels at the sides that are 
 // Blood and air after a core: dark, between the bright cut walls.
 constexpr channel::TissueSound blood{1578, 1050, 0.21F, 1.16F, -20, 0, 0};
 
-glm::ivec3 sizeOf(const channel::Grid& grid) noexcept
-{
-    return {grid.size[0], grid.size[1], grid.size[2]};
-}
-
-std::size_t countOf(glm::ivec3 n) noexcept
-{
-    return static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) * static_cast<std::size_t>(n.z);
-}
-
-bool operator==(const channel::Hole& a, const channel::Hole& b) noexcept
-{
-    return a.from == b.from && a.to == b.to;
-}
-
 glm::vec3 vec3(const std::array<float, 3>& v) noexcept
 {
     return {v[0], v[1], v[2]};
@@ -43,17 +28,17 @@ glm::vec3 vec3(const std::array<float, 3>& v) noexcept
 
 Medium::Medium(const channel::Scenery& scenery, std::span<const std::uint8_t> labels, std::span<const std::uint8_t> fine)
 {
-    for (std::size_t row = 0; row <= channel::rowBits; ++row)
+    for (std::size_t row = 0; row <= channel::rowBits; ++row) {
         sound_[row] = scenery.sound[row];
-    for (std::size_t row = 0; row <= channel::rowBits; ++row)
         sound_[row | holeBit] = blood;
+    }
     for (std::size_t label = 0; label < code_.size(); ++label)
         code_[label] =
             static_cast<std::int16_t>(std::lround(codes * std::log(impedance(static_cast<std::uint8_t>(label)))));
     if (!fine.empty()) {
         origin_ = channel::vec(scenery.fine.origin);
         spacing_ = scenery.fine.spacing;
-        size_ = sizeOf(scenery.fine);
+        size_ = channel::sizeOf(scenery.fine);
         labels_.assign(fine.begin(), fine.end());
         for (std::uint8_t& label : labels_)
             label &= channel::rowBits;
@@ -68,13 +53,14 @@ void Medium::refine(const channel::Scenery& scenery, std::span<const std::uint8_
 {
     const channel::Grid& grid = scenery.labels;
     int factor = 1;
-    while (factor < 3 && grid.spacing / factor > fineEnough && countOf((factor + 1) * sizeOf(grid)) <= affordable)
+    while (factor < 3 && grid.spacing / factor > fineEnough &&
+           base::countOf((factor + 1) * channel::sizeOf(grid)) <= affordable)
         ++factor;
     // As many to each voxel as to the next: between two voxels a node would always belong to the upper one.
     spacing_ = grid.spacing / factor;
     origin_ = channel::vec(grid.origin) - 0.5 * (factor - 1) * spacing_;
-    size_ = factor * sizeOf(grid);
-    labels_.resize(countOf(size_));
+    size_ = factor * channel::sizeOf(grid);
+    labels_.resize(base::countOf(size_));
     channel::Scenery still = scenery;
     still.lattice = {{1, 1, 1}, 0, grid.origin, grid.spacing};  // nothing of it is asked for
     const channel::Deformation rest(still, labels);
@@ -83,13 +69,6 @@ void Medium::refine(const channel::Scenery& scenery, std::span<const std::uint8_
         for (int y = 0; y < size_.y; ++y)
             for (int x = 0; x < size_.x; ++x)
                 labels_[at++] = rest.restLabel(origin_ + spacing_ * glm::dvec3(x, y, z)) & channel::rowBits;
-}
-
-std::size_t Medium::offset(glm::ivec3 n) const noexcept
-{
-    return (static_cast<std::size_t>(n.z) * static_cast<std::size_t>(size_.y) + static_cast<std::size_t>(n.y)) *
-               static_cast<std::size_t>(size_.x) +
-           static_cast<std::size_t>(n.x);
 }
 
 float Medium::impedance(std::uint8_t label) const noexcept
@@ -110,8 +89,8 @@ void Medium::finish(glm::ivec3 low, glm::ivec3 high)
     const glm::ivec3 n = high - low;
     if (to.x <= from.x || to.y <= from.y || to.z <= from.z)
         return;
-    std::vector<std::int16_t> z(countOf(n)), before;
-    std::vector<std::uint8_t> same(countOf(n)), was;  // the label, or 0xff where not pure
+    std::vector<std::int16_t> z(base::countOf(n)), before;
+    std::vector<std::uint8_t> same(base::countOf(n)), was;  // the label, or 0xff where not pure
     std::size_t at = 0;
     for (int k = low.z; k < high.z; ++k)
         for (int j = low.y; j < high.y; ++j)
@@ -211,15 +190,13 @@ void Medium::dig(const channel::Hole& hole, double radius, glm::ivec3& low, glm:
 
 bool Medium::punch(std::span<const channel::Hole> holes, double radius)
 {
-    if (std::equal(holes.begin(), holes.end(), holes_.begin(), holes_.end(),
-                   [](const channel::Hole& a, const channel::Hole& b) { return a == b; }))
+    if (std::ranges::equal(holes, holes_, [](const auto& a, const auto& b) { return a.from == b.from && a.to == b.to; }))
         return false;
     glm::ivec3 low = size_, high(0);
     while (!saved_.empty()) {
         const Saved& s = saved_.back();
         labels_[s.at] = s.label;
-        const auto nx = static_cast<std::size_t>(size_.x), ny = static_cast<std::size_t>(size_.y);
-        const glm::ivec3 n(static_cast<int>(s.at % nx), static_cast<int>(s.at / nx % ny), static_cast<int>(s.at / nx / ny));
+        const glm::ivec3 n = base::cellOf(size_, s.at);
         low = glm::min(low, n);
         high = glm::max(high, n + 1);
         saved_.pop_back();

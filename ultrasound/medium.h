@@ -1,5 +1,6 @@
 #pragma once
 
+#include <base/cells.h>
 #include <channel/layout.h>
 
 #include <glm/vec3.hpp>
@@ -60,7 +61,7 @@ private:
 
     void refine(const channel::Scenery& scenery, std::span<const std::uint8_t> labels);
     void finish(glm::ivec3 low, glm::ivec3 high);
-    std::size_t offset(glm::ivec3 n) const noexcept;
+    std::size_t offset(glm::ivec3 n) const noexcept { return base::offsetOf(size_, n); }
     void dig(const channel::Hole& hole, double radius, glm::ivec3& low, glm::ivec3& high);
 
     glm::dvec3 origin_{0.0};

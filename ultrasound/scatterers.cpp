@@ -1,5 +1,7 @@
 #include <ultrasound/scatterers.h>
 
+#include <base/cells.h>
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -96,8 +98,7 @@ void Scatterers::prepare(const View& view, const Medium& medium)
         edge_ = edge;
         voxelsPerBlock_ = edge / static_cast<float>(medium.spacing());
         size_ = glm::ivec3(glm::vec3(medium.size()) / voxelsPerBlock_) + 1;
-        const std::size_t count =
-            static_cast<std::size_t>(size_.x) * static_cast<std::size_t>(size_.y) * static_cast<std::size_t>(size_.z);
+        const std::size_t count = base::countOf(size_);
         stamp_.assign(count, pass_);
         known_.assign(count, Known::no);
         block_.resize(count);
@@ -112,12 +113,6 @@ void Scatterers::prepare(const View& view, const Medium& medium)
         norm_[k] = lost / std::sqrt(density * rootPi * beam.axialSigma() * apart * apart /
                                     (2 * rootPi * beam.lateralSigma(z)) * rootPi * beam.elevationSigma(z));
     }
-}
-
-glm::vec3 Scatterers::cornerOf(std::uint32_t id) const noexcept
-{
-    const auto nx = static_cast<std::uint32_t>(size_.x), ny = static_cast<std::uint32_t>(size_.y);
-    return voxelsPerBlock_ * glm::vec3(id % nx, id / nx % ny, id / nx / ny);
 }
 
 // By looks at the slice half a block apart.
@@ -163,9 +158,9 @@ void Scatterers::findAlong(const View& view, glm::vec3 first, int looks)
         if (!nearPicture(view.beam(), p.x, p.z))
             continue;
         const glm::ivec3 n(glm::floor(perBlockVoxel * rest_.voxel(view, p, i, 0)));
-        if (n.x < 0 || n.y < 0 || n.z < 0 || n.x >= size_.x || n.y >= size_.y || n.z >= size_.z)
+        if (!base::holds(size_, n))
             continue;
-        const auto id = static_cast<std::uint32_t>(n.x + size_.x * (n.y + size_.y * n.z));
+        const auto id = static_cast<std::uint32_t>(base::offsetOf(size_, n));
         if (stamp_[id] == pass_)
             continue;
         stamp_[id] = pass_;
@@ -303,7 +298,7 @@ void Scatterers::splat(const View& view, const Shade& shade, EchoLines& echoes)
     for (const std::uint32_t id : chosen_) {
         if (known_[id] == Known::nothing)
             continue;
-        const glm::vec3 corner = cornerOf(id);
+        const glm::vec3 corner = voxelsPerBlock_ * glm::vec3(base::cellOf(size_, id));
         if (known_[id] == Known::no)
             fill(id, corner, view.medium());
         if (known_[id] == Known::nothing)

@@ -69,7 +69,6 @@ private:
                float& off) const;
     void add(const View& view, const Shade& shade, const Block& block, const BlockEchoes& at);
     BlockScale scaleAt(const View& view, float depth) const;
-    glm::vec3 cornerOf(std::uint32_t id) const noexcept;
 
     std::vector<Pattern> patterns_;
     std::array<float, 256> level_{};  // amplitude of a strength

@@ -80,12 +80,6 @@ public:
     {
         return voxelAt_ + perVoxel_ * inPatient(p) + voxelsPerSpacing_ * shift;
     }
-    /// The voxel at rest of what is at `p` in the probe's frame [m]. `shift`: as in follow().
-    glm::vec3 restVoxel(glm::vec3 p, glm::vec3& shift) const noexcept
-    {
-        follow(p, shift);
-        return voxel(p, shift);
-    }
     /// A direction of the patient's frame in the probe's.
     glm::vec3 inward(glm::vec3 d) const noexcept
     {

@@ -13,11 +13,10 @@ namespace {
 
 constexpr Geometry delta;
 constexpr double radPerDegree = std::numbers::pi / 180.0;
-constexpr double workspaceApex = 0.182;  // of the cone towards the user [m]
-constexpr int maxSteps = 40;             // of Newton's method
-constexpr double converged = 1e-12;      // [m]
-constexpr double longestStep = 0.03;     // of Newton's method [m]
-constexpr double widestSide = 0.95;      // of the shin's way sideways, over its length
+constexpr int maxSteps = 40;          // of Newton's method
+constexpr double converged = 1e-12;   // [m]
+constexpr double longestStep = 0.03;  // of Newton's method [m]
+constexpr double widestSide = 0.95;   // of the shin's way sideways, over its length
 
 // Directions of a leg: outwards and along the tangent.
 struct Frame {
@@ -108,12 +107,6 @@ bool plausible(Vec3 p) noexcept
 }
 
 }  // namespace
-
-bool inWorkspace(Vec3 p) noexcept
-{
-    return p.z >= workspaceNear && p.z <= workspaceFar &&
-           std::hypot(p.x, p.y) <= std::min(workspaceRadius, workspaceApex - p.z);
-}
 
 std::optional<Angles> anglesAt(Vec3 position) noexcept
 {

@@ -28,12 +28,7 @@ struct Geometry {
     std::array<double, 3> bearing{105.0, -15.0, -135.0};  // of the legs [deg]
 };
 
-/// Whether the legs are known to hold the grip well there: a cylinder about z, with a cone towards the user, where they
-/// are near stretched [m].
-bool inWorkspace(Vec3 position) noexcept;
-inline constexpr double workspaceNear = 0.08, workspaceFar = 0.172;  // along z [m]
-inline constexpr double workspaceRadius = 0.05;                      // [m]
-inline constexpr double homedDepth = 0.17;                           // z beyond which every encoder has passed its zero [m]
+inline constexpr double homedDepth = 0.17;  // z beyond which every encoder has passed its zero [m]
 
 /// How far from singular a pose is: below `singular` no torque is to be trusted.
 inline constexpr double singular = 0.1, wellPosed = 0.25;

@@ -15,6 +15,18 @@
 namespace palpate::falcon {
 namespace {
 
+constexpr double workspaceNear = 0.08, workspaceFar = 0.172;  // along z [m]
+constexpr double workspaceRadius = 0.05;                      // [m]
+constexpr double workspaceApex = 0.182;                       // of the cone towards the user [m]
+
+// Whether the legs are known to hold the grip well there: a cylinder about z, with a cone towards the user, where they are
+// near stretched.
+bool inWorkspace(Vec3 p)
+{
+    return p.z >= workspaceNear && p.z <= workspaceFar &&
+           std::hypot(p.x, p.y) <= std::min(workspaceRadius, workspaceApex - p.z);
+}
+
 // Every place of a grid that lies in the workspace.
 std::vector<Vec3> placesOf(double spacing)
 {

@@ -14,6 +14,16 @@
 namespace palpate::occupancy {
 namespace {
 
+double distance(const RoundCone& tool, Vec3 p)
+{
+    return ShapeDistance(tool).distance(p);
+}
+
+Vec3 gradient(const RoundCone& tool, Vec3 p)
+{
+    return ShapeDistance(tool).gradient(p);
+}
+
 class Random {
 public:
     double between(double low, double high) { return std::uniform_real_distribution<double>(low, high)(engine_); }
@@ -101,8 +111,7 @@ TEST(RoundCone, GradientOnTheAxisLeadsOut)
 
 TEST(RoundCone, OfACapsuleHasTheDistanceToItsSegmentLessItsRadius)
 {
-    const Capsule capsule{{0, 0, 0}, {0, 0, 2}, 0.5};
-    const RoundCone tool = roundCone(capsule);
+    const RoundCone tool{{0, 0, 0}, {0, 0, 2}, 0.5, 0.5};
     EXPECT_NEAR(distance(tool, {3, 4, 1}), 4.5, 1e-15);
     EXPECT_NEAR(distance(tool, {3, 0, 6}), 4.5, 1e-15);
     EXPECT_NEAR(distance(tool, {0, 0, -2}), 1.5, 1e-15);

@@ -47,7 +47,8 @@ struct Box {
         for (int r = 0; r < rows; ++r)
             for (int c = 0; c < columns; ++c) {
                 glm::vec3 shift(0);
-                const glm::vec3 exact = view.restVoxel(point(c, r), shift);
+                view.follow(point(c, r), shift);
+                const glm::vec3 exact = view.voxel(point(c, r), shift);
                 most = std::max(most, static_cast<double>(glm::distance(net.voxel(view, point(c, r), c, r), exact)));
             }
         return most;
